@@ -7,7 +7,7 @@ that is no IFC lies in its `Window.states`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from bim.fenestration import ShadingState
 from bim.ifc.corrections import corrections_beside, corrections_file
 from bim.ifc.head import check_head
 from bim.model import Building, Window
+from bim.standing import Standing, selected
 from mitsuba_cfs.errors import DataError
 
 Progress = Callable[[str, float], None]
@@ -30,6 +31,7 @@ class ReadOptions:
     apertures: tuple[str, ...] = ()  # materials of the surfaces that are windows
     surroundings: tuple[Path, ...] = ()  # files of what stands around, with any format
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
+    facade_panes: tuple[str, ...] = ()  # materials of panes before dark rooms: they mirror
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +59,62 @@ def read_building_file(
     options = options or ReadOptions()
     path = Path(path)
     kind = _format(path)
-    for field, value in (("join", options.join), ("apertures", options.apertures)):
-        if value and field not in kind.has:
+    for field in FLAGS:
+        if getattr(options, field) and field not in kind.has:
             raise DataError(f"not for {kind.name} files", file=path, field=f"--{FLAGS[field]}")
     building = kind.read(path, options, progress or (lambda stage, fraction: None))
     return surrounded(building, options.surroundings, options.surroundings_offset)
+
+
+def read_standing_file(
+    path: Path,
+    select: Sequence[str],
+    *,
+    options: ReadOptions | None = None,
+    leave_out: Sequence[str] = (),
+    reflectance: float | None = None,
+    selected_in: str | Path = "",
+    progress: Progress | None = None,
+) -> Standing:
+    """All elements of a file of any format, and those that selectors choose.
+
+    Args:
+        select: selectors, in an IFC file those of ifcopenshell, else those of `selected`.
+        options: of the reader; leave_out: selectors of elements that are not there.
+        reflectance: of all opaque elements instead of the file's.
+        selected_in: the file that has the selectors, for messages.
+
+    Raises: `DataError` for a file that cannot be used, or a text that is no selector.
+    """
+    if is_ifc(path):
+        from bim.ifc.corrections import corrections_beside
+        from bim.ifc.standing import read_standing
+
+        beside = corrections_beside(path)
+        corrections = replace(
+            beside,
+            leave_out=(*beside.leave_out, *leave_out),
+            surroundings=beside.surroundings if reflectance is None else reflectance,
+        )
+        return read_standing(
+            path, select, corrections=corrections, selected_in=selected_in, progress=progress
+        )
+    options = options or ReadOptions()
+    if _format(path) is RADIANCE:
+        from bim.radiance.building import read_radiance_elements
+
+        elements, issues = read_radiance_elements(path, options.facade_panes)
+        name = path.stem
+    else:
+        building = read_building_file(path, options, progress)
+        elements, issues, name = building.elements, building.issues, building.name
+    gone = frozenset().union(*(selected(elements, one, selected_in) for one in leave_out))
+    elements = tuple(element for element in elements if element.guid not in gone)
+    chosen = tuple(selected(elements, one, selected_in) for one in select)
+    if reflectance is not None:
+        both = {"reflectance_visible": reflectance, "reflectance_solar": reflectance}
+        elements = tuple(replace(element, **both) for element in elements)
+    return Standing(elements, chosen, tuple(issues), name)
 
 
 def surrounded(
@@ -132,7 +185,7 @@ def _read_radiance(path: Path, options: ReadOptions, progress: Progress) -> Buil
     from bim.radiance.building import read_radiance_building
 
     progress("opening", 0.0)
-    return read_radiance_building(path, options.apertures)
+    return read_radiance_building(path, options.apertures, options.facade_panes)
 
 
 def _check_honeybee(path: Path) -> None:
@@ -161,9 +214,11 @@ def _read_gbxml(path: Path, options: ReadOptions, progress: Progress) -> Buildin
     return read_gbxml(path, join=options.join, furniture=options.furniture)
 
 
-FLAGS = {"join": "join", "apertures": "aperture"}
+FLAGS = {"join": "join", "apertures": "aperture", "facade_panes": "facade-pane"}
 IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join",))
-RADIANCE = BuildingFormat("Radiance", (".rad",), _check_there, _read_radiance, ("apertures",))
+RADIANCE = BuildingFormat(
+    "Radiance", (".rad",), _check_there, _read_radiance, ("apertures", "facade_panes")
+)
 HONEYBEE = BuildingFormat("honeybee", (".hbjson",), _check_honeybee, _read_honeybee, ("join",))
 GBXML = BuildingFormat("gbXML", (".gbxml", ".xml"), _check_gbxml, _read_gbxml, ("join",))
 FORMATS: tuple[BuildingFormat, ...] = (IFC, RADIANCE, HONEYBEE, GBXML)

@@ -1,11 +1,11 @@
 """The names of `import scenes`, and the modules that they come from."""
 
-from .run.building import read_building as read_building
+from .input_files import read_building as read_building
 from .fenestration.systems import (
     FenestrationSystem as FenestrationSystem,
     read_system as read_system,
 )
-from .run.inputs import read_weather as read_weather
+from .input_files import read_weather as read_weather
 from .room.operation import Operation as Operation, read_operation as read_operation
 from .room.options import RoomOptions as RoomOptions
 from .results import (

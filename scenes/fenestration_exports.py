@@ -17,7 +17,7 @@ from scenes.fenestration.resolver import (
     window_sources,
     windows_named,
 )
-from scenes.fenestration.systems import FenestrationSystem, Given
+from scenes.fenestration.systems import FenestrationSystem, WindowOverrides
 from scenes.fenestration.thermal_system import checked_system
 from scenes.room.windows import room_windows
 
@@ -83,6 +83,6 @@ class KnownFenestration:
 def known_fenestration(spaces: Iterable[Space], file: Path) -> KnownFenestration:
     """What an IFC file holds for the windows of some rooms."""
     windows = tuple(window for space in spaces for window in space.windows)
-    systems, unfilled = held_systems(windows, Given(light_only=True), file)
+    systems, unfilled = held_systems(windows, WindowOverrides(light_only=True), file)
     first = {guid: states[0] for guid, states in systems.items()}
     return KnownFenestration(file, windows, first, unfilled)

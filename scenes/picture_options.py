@@ -1,27 +1,19 @@
-"""What the user may choose about a picture; every default is stated here."""
+"""Options of `cfs picture`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
+
+from scenes.input_options import InputOptions
 
 SUFFIXES = (".hdr", ".exr", ".png")
 
 
-@dataclass(frozen=True, slots=True)
-class PictureOptions:
-    """Inputs and choices."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PictureOptions(InputOptions):
+    """Options of a picture; of the rooms the first is seen."""
 
-    building: Path
-    weather: Path
-    system: Path | None  # of every window; None: what the building's file holds
     at: str  # month, day and clock time, `06-21 12:00`
-    space: str | None = None  # name or GUID; None: the first room that has a window
-    join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
-    furniture: bool = False  # whether what stands in the room is in its light and views
-    apertures: tuple[str, ...] = ()  # materials of a Radiance scene's windows; none: all of glass
-    surroundings: tuple[Path, ...] = ()  # files of what stands around
-    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     view: str | None = None  # Radiance view options, or a file of them
     eye_height: float = 1.2  # [m] above the floor, where no view is given
     size: int = 800  # [px] of the longer side

@@ -25,6 +25,7 @@ from mitsuba_cfs.files import (
 )
 
 MARK, PROGRAM, FORMAT = "cfs-results.json", "mitsuba-cfs", 1
+RENAMED = {"ifc export": "export"}  # commands by their earlier names, which marks may have
 EXPLORER = "explore"  # folder of the explorer, inside that of the results
 
 
@@ -43,7 +44,8 @@ class FolderMark:
             record = json.loads((folder / MARK).read_text(encoding="utf-8"))
             known = record["program"] == PROGRAM and record["format"] == FORMAT
             names = (tuple(map(str, record[key])) for key in ("files", "removed"))
-            mark = cls(str(record["command"]), *names)
+            command = str(record["command"])
+            mark = cls(RENAMED.get(command, command), *names)
         except (OSError, ValueError, KeyError, TypeError):
             return None
         return mark if known and all(map(_inside, mark.files + mark.removed)) else None

@@ -14,16 +14,17 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes import plots
 from scenes import quick as quick_run
-from scenes.fenestration.systems import FenestrationSystem, Given
+from scenes.fenestration.systems import FenestrationSystem
 from scenes.fenestration.thermal_system import checked_system
+from scenes.head import NO_HEAD, Head
+from scenes.input_files import InputFiles, overrides_of
+from scenes.inputs import inputs_of
 from scenes.report import write_report
 from scenes.report.headline import cards
 from scenes.result_folder import ResultFolder
 from scenes.results import RoomYear, RunResult
 from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions
-from scenes.run.files import JobFiles
-from scenes.run.job import job_inputs
 from scenes.run.netcdf import year_dataset
 from scenes.run.options import JobOptions
 from scenes.run.outputs import write_results
@@ -39,6 +40,7 @@ class SimulatedYear(RoomYear):
     """A room's year that can write its files and show itself."""
 
     run: RunResult  # that it is the one room of; without it
+    head: Head = NO_HEAD  # what was left out of the model, what was assumed
 
     def write(
         self, folder: str | PathLike[str], *, report: bool = True, netcdf: bool = False
@@ -132,11 +134,10 @@ def simulate(
         quick=quick,
         room=RoomOptions.of(**options),
     )
-    states = () if operation is None else operation.systems
-    states = states if system is None else (system,)
-    files = JobFiles(weather, system, operation, Given(states))
-    inputs = job_inputs(building, chosen.spaces, files)
+    overrides = overrides_of(chosen, system, operation)
+    files = InputFiles(weather, overrides, operation)
+    inputs = inputs_of(building, chosen, files)
     run = run_inputs(inputs, chosen, progress)
     (year,) = run.spaces
     own = {name: getattr(year, name) for name in RoomYear.__dataclass_fields__}
-    return SimulatedYear(**own, run=replace(run, spaces=()))
+    return SimulatedYear(**own, run=replace(run, spaces=()), head=inputs.head)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,11 +22,13 @@ from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import annual_sky
+from scenes.head import NO_HEAD, Head
+from scenes.inputs import first_states, read_inputs
 from scenes.picture_files import PictureFiles, read_files
 from scenes.picture_options import SUFFIXES, PictureOptions
 from scenes.pictures import write_falsecolour, write_tone_mapped
 from scenes.room_views import check_eye, held_view
-from scenes.run.viewed_room import read_viewed_room
+from scenes.viewed_room import viewed_room
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,20 +39,26 @@ class RoomPicture:
     view: View
     room: str
     time: pd.Timestamp  # middle of the hour
-    notes: tuple[str, ...]  # of systems and weather
+    head: Head = NO_HEAD  # what was left out, what was assumed
+    notes: tuple[str, ...] = ()  # light that is lost through leaks of the model
     glare: GlareResult | None = None  # of a fisheye of the whole hemisphere
     radiance: NDArray[np.float32] | None = None  # [ny, nx, 3] [W/m2/sr] in colour
 
 
 def room_picture(
-    options: PictureOptions, progress: Progress = silent, files: PictureFiles | None = None
+    options: PictureOptions,
+    progress: Progress = silent,
+    files: PictureFiles | None = None,
+    on_head: Callable[[Head], None] = lambda head: None,
 ) -> RoomPicture:
     """The picture, path-traced; `DataError` where an input cannot be used.
 
-    Args: files: what `read_files` has read of the options; read now without.
+    Args:
+        files: of `read_files`; read now by default.
+        on_head: called with what was left out and assumed, before anything is traced.
     """
     files = files or read_files(options)
-    weather, hour = files.weather, files.hour
+    hour = files.hour
 
     def view_of(building: Building, space: Space) -> View:
         named = files.view or held_view(building, space)
@@ -59,15 +68,11 @@ def room_picture(
         return fitted(named.view, options.size)
 
     steps = part(progress, 0.0, 0.4)
-    viewed = read_viewed_room(
-        options.building, options.space, options.join, files.given, view_of, steps,
-        furniture=options.furniture,
-        apertures=options.apertures,
-        surroundings=options.surroundings,
-        surroundings_offset=options.surroundings_offset,
-        colour=options.colour,
-        month=int(weather.midpoints[hour].month),
-    )  # fmt: skip
+    inputs = read_inputs(options, files.inputs, steps, rooms="first", states=first_states)
+    weather = inputs.weather
+    on_head(inputs.head)
+    month = int(weather.midpoints[hour].month)
+    viewed = viewed_room(inputs, view_of, colour=options.colour, month=month)
     variants.activate()
     sampling = Sampling(picture_samples=options.samples, seed=options.seed)
     place = {"sun_model": options.sun_model, "ground": options.sky_ground}
@@ -80,14 +85,16 @@ def room_picture(
         [(luminance, rated)] = rated_pictures(light, [0], options=rating, progress=steps)
     else:
         luminance = light.picture(0, progress=steps)
-    notes = (*viewed.notes(), *weather.notes)
     radiance = None
     if options.colour:
         bands = [PathSystems(scene, viewed.optics, sampling) for scene in viewed.bands]
         steps = part(progress, end, 1.0, "colour")
         radiance = coloured_picture(luminance, bands, sky, 0, progress=steps)
     middle = weather.midpoints[hour]
-    return RoomPicture(luminance, view, viewed.space.label, middle, notes, rated, radiance)
+    return RoomPicture(
+        luminance, view, viewed.space.label, middle, inputs.head, tuple(viewed.leaks()), rated,
+        radiance,
+    )  # fmt: skip
 
 
 def write_picture(picture: RoomPicture, path: Path, *, print_like: bool = False) -> None:

@@ -3,24 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from bim.ifc.corrections import Corrections, chosen, corrections_beside
 from bim.ifc.elements import outdoor_elements
 from bim.ifc.source import Progress, read_source
-from bim.model import Element
-from bim.report.issue import Issue
-
-
-@dataclass(frozen=True, slots=True)
-class Standing:
-    """Every element and terrain of a model, in world axes."""
-
-    elements: tuple[Element, ...]
-    chosen: tuple[frozenset[str], ...]  # GUIDs that each selector chose, in their order
-    issues: tuple[Issue, ...]
-    name: str
+from bim.standing import Standing
 
 
 def read_standing(

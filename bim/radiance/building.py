@@ -24,15 +24,20 @@ FLAT = 0.5  # cosine from which a surface is floor or ceiling
 LIKELY = (0.5, 2.0)  # enclosed volume over that of floor and height, where the shell is sound
 
 
-def read_radiance_building(path: Path, apertures: Sequence[str] = ()) -> Building:
+def read_radiance_building(
+    path: Path, apertures: Sequence[str] = (), facades: Sequence[str] = ()
+) -> Building:
     """The room of a Radiance scene file.
 
-    Args: apertures: materials or modifiers of its windows; by default all of glass or with a BSDF.
+    Args:
+        apertures: materials or modifiers of its windows; by default all of glass or with a BSDF
+            that are no facades.
+        facades: materials or modifiers of panes before dark rooms: they mirror.
 
     Raises: `DataError` for what is no scene, has no such material, or shows no room.
     """
     scene = read_radiance(path)
-    named = apertures or _clear(scene, path)
+    named = apertures or _clear(scene, path, facades)
     panes, surfaces = scene.of_modifiers(named), scene_windows(scene, named)
     names = numbered([surface.name for surface in surfaces])
     windows = tuple(
@@ -42,7 +47,7 @@ def read_radiance_building(path: Path, apertures: Sequence[str] = ()) -> Buildin
         )
         for name, surface, pane in zip(names, surfaces, panes, strict=True)
     )  # fmt: skip
-    objects = opaque_objects(scene)
+    objects = opaque_objects(scene, facades)
     if not objects:
         raise DataError("has no opaque surface", file=path)
     indoors = indoors_of(objects, windows)
@@ -58,9 +63,30 @@ def read_radiance_building(path: Path, apertures: Sequence[str] = ()) -> Buildin
     return Building(path.stem, (space,), elements, found, file=path)
 
 
-def _clear(scene: RadianceScene, path: Path) -> list[str]:
+def read_radiance_elements(
+    path: Path, facades: Sequence[str] = ()
+) -> tuple[tuple[Element, ...], tuple[Issue, ...]]:
+    """Every opaque surface of a Radiance scene file, by its name in the file.
+
+    Args: facades: as of `read_radiance_building`.
+    """
+    scene = read_radiance(path)
+    objects = opaque_objects(scene, facades)
+    names = numbered([thing.name for thing in objects])
+    elements = tuple(
+        _element(name, thing, thing.triangles) for name, thing in zip(names, objects, strict=True)
+    )
+    return elements, scene.issues
+
+
+def _clear(scene: RadianceScene, path: Path, facades: Sequence[str]) -> list[str]:
     kinds = ("glass", *SYSTEMS)
-    names = {thing.material.name for thing in scene.objects if thing.material.kind in kinds}
+    dark = {id(thing) for thing in scene.of_modifiers(facades)} if facades else set()
+    names = {
+        thing.material.name
+        for thing in scene.objects
+        if thing.material.kind in kinds and id(thing) not in dark
+    }
     if not names:
         there = ", ".join(sorted({thing.material.name for thing in scene.objects})[:12])
         message = f"has no glass and no BSDF: name the windows' material, there are {there}"

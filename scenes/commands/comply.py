@@ -9,22 +9,22 @@ import click
 
 from bim.report.issue import issue_text
 from scenes import quick as quick_run
-from scenes.commands.parameters import FILE
+from scenes.commands.parameters import FILE, check_is_ifc
+from scenes.commands.printed_head import PrintedHead
 from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
-    building_options,
     directions_option,
     eye_height_option,
     grid_option,
+    input_options,
     named_settings,
+    room_options,
+    taken,
     write_ifc_option,
 )
 from scenes.comply.options import ComplyOptions
 from scenes.room.options import RoomOptions
 
-OWN = (  # parameters that `ComplyOptions` has by the same name, beside those of every command
-    "standards", "closed", "uses", "least_altitude_deg", "eye_height", "grid", "directions",
-)  # fmt: skip
 OF_RULES = (  # choices of a run that are the rules' own, or of what a check has not
     "sensor_spacing", "sensor_height", "sensor_margin", "picture_hours", "picture_count",
 )  # fmt: skip
@@ -32,7 +32,8 @@ DAYS = ((2, 1), (3, 21))  # between which EN 17037 has the day of the sunlight c
 
 
 @click.command()
-@building_options("all")
+@input_options("all")
+@room_options
 @click.option(
     "--standard", "standards", multiple=True, required=True, metavar="NAME|FILE.toml",
     help="Rules to check: en17037, leed-v4.1, any other of docs/comply.md, or a file of your own.",
@@ -56,45 +57,36 @@ DAYS = ((2, 1), (3, 21))  # between which EN 17037 has the day of the sunlight c
 @directions_option
 @write_ifc_option("a level for each criterion of each room")
 def command(
-    building: Path,
     *,
-    weather: Path,
-    system: Path | None,
     out: Path,
-    spaces: tuple[str, ...],
-    join: tuple[str, ...],
-    furniture: bool,
-    apertures: tuple[str, ...],
-    surroundings: tuple[Path, ...],
-    surroundings_offset: tuple[float, float, float] | None,
     day: str,
     write_ifc: Path | None,
-    quick: bool,
     page: Path | None,
     settings: tuple[str, ...],
-    no_cache: bool,
     **chosen,
 ) -> None:
-    """The rooms of an IFC building against daylight rules: a dossier and a table of all values."""
-    own = {name: chosen.pop(name) for name in OWN}
+    """The rooms of a building against daylight rules: a dossier and a table of all values.
+
+    BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
+    """
     named = named_settings(settings, OF_RULES)
-    if quick:
+    if chosen["quick"]:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     chosen |= named
-    options = ComplyOptions(
-        building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
-        RoomOptions.of(**chosen), surroundings, surroundings_offset, day=day_of(day), **own,
-    )  # fmt: skip
+    own = taken(ComplyOptions, chosen)
+    options = ComplyOptions(**own, day=day_of(day), room=RoomOptions.of(**chosen))
+    building, quick = options.building, options.quick
     from mitsuba_cfs.files import check_file
     from scenes.comply.files import read_files
     from scenes.page_options import DossierSection, read_page
     from scenes.result_folder import ResultFolder
 
     page_options = read_page(page, DossierSection)
-    inputs = (building, weather, system, own["closed"], own["uses"])
-    inputs += (*surroundings, *page_options.inputs)
+    inputs = (building, options.weather, options.system, options.closed, options.uses)
+    inputs += (*options.surroundings, *page_options.inputs)
     folder = ResultFolder(out, "comply", inputs=inputs)
     if write_ifc is not None:
+        check_is_ifc(building, "--write-ifc")
         check_file(write_ifc, field="--write-ifc", inputs=(building,))
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.compiling import compiled_beside
@@ -104,15 +96,15 @@ def command(
 
     if quick:
         click.echo(quick_run.NOTE)
+    head = PrintedHead()
     with ProgressBar() as progress, compiled_beside():
-        result = check_building(options, progress, files)
+        result = check_building(options, progress, files, head)
         write_compliance(result, folder, quick=quick, page=page_options)
     for verdict in result.verdicts:
         if verdict.rooms and verdict.criterion.over != "no building":
             name = f"{verdict.rule}, {verdict.criterion.title}"
             click.echo(f"{name}: {verdict.reached} ({verdict.rooms} room(s))")
-    for text in (*result.assumptions, *result.notes):
-        click.echo(f"note: {text}")
+    head.notes((*result.assumptions, *result.notes))
     click.echo(f"dossier: {out / 'dossier.html'}")
     if write_ifc is not None:
         for issue in write_into_ifc(result, write_ifc):

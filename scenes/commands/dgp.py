@@ -7,32 +7,21 @@ from pathlib import Path
 import click
 
 from scenes import quick
-from scenes.commands.parameters import BUILDING_FILE
+from scenes.commands.printed_head import PrintedHead
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
-    aperture_option,
     directions_option,
     eye_height_option,
-    furniture_option,
-    glare_sources_option,
-    glare_sun_option,
     grid_option,
-    join_option,
+    input_options,
+    light_options,
     method_option,
     out_folder_option,
-    room_files,
     samples_option,
-    seed_option,
     size_option,
-    sky_ground_option,
-    space_option,
     subdivide_option,
-    sun_option,
-    surroundings_offset_option,
-    surroundings_option,
-    system_option,
     view_option,
-    weather_option,
+    with_demo,
 )
 from scenes.year_of_glare.options import METHODS, METRICS, YearOptions
 
@@ -40,16 +29,8 @@ _DEFAULT = YearOptions(Path(), Path())
 
 
 @click.command()
-@click.argument("building", type=BUILDING_FILE, required=False, metavar="[BUILDING]")
-@weather_option
-@system_option
+@input_options("the first with a window", several=False, weather="demo")
 @out_folder_option
-@space_option("space", "default: the first with a window", several=False)
-@join_option
-@furniture_option
-@aperture_option
-@surroundings_option
-@surroundings_offset_option
 @view_option("views", "or a file of them", several=True)
 @grid_option
 @directions_option
@@ -75,15 +56,9 @@ _DEFAULT = YearOptions(Path(), Path())
 )  # fmt: skip
 @click.option("--hdr", is_flag=True, help="These pictures as .hdr too.")
 @subdivide_option
-@glare_sources_option
-@glare_sun_option
-@sun_option
-@sky_ground_option
-@seed_option
+@light_options
 @quick_option
-def command(
-    building: Path | None, weather: Path | None, system: Path | None, out: Path, **chosen
-) -> None:
+def command(out: Path, **chosen) -> None:
     """Daylight glare probability of a room's views in every hour with the sun up.
 
     What fills the windows without --cfs: the BSDF attached to them or their types in the IFC, else
@@ -99,12 +74,13 @@ def command(
     if start == end or start == 24:
         raise click.UsageError(f"--occupied {start} {end}: expected two different hours, 0 to 24")
     from scenes.result_folder import ResultFolder
-    from scenes.year_of_glare.files import read_files
+    from scenes.year_of_glare.views import read_files
 
     if chosen["quick"]:
         chosen |= quick.picks(quick.VIEWS, given())
-    files = (building, weather, system, *map(Path, chosen["views"]), *chosen["surroundings"])
-    options = YearOptions(*room_files(building, weather, system), **chosen)
+    named = (chosen["building"], chosen["weather"], chosen["system"])
+    files = (*named, *map(Path, chosen["views"]), *chosen["surroundings"])
+    options = YearOptions(**with_demo(chosen))
     folder = ResultFolder(out, "dgp", inputs=files)
     read = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
@@ -114,8 +90,9 @@ def command(
 
     if options.quick:
         click.echo(quick.NOTE)
+    head = PrintedHead()
     with ProgressBar() as progress:
-        year = read_year(options, progress, read)
+        year = read_year(options, progress, read, head)
         views = rate_views(year, folder.kept(outputs.KEPT), progress)
         with folder.replaced() as place:
             rows = [outputs.write_view(year, rated, place) for rated in views]
@@ -130,8 +107,7 @@ def command(
     )
     for level, count in table["protection_en17037"].value_counts().items():
         click.echo(f"protection {level}: {counted(count, 'view')}")
-    for note in year.notes:
-        click.echo(f"note: {note}")
+    head.notes(year.notes)
     click.echo(f"{out / 'views.csv'}")
     click.echo(f"report: {out / 'report.html'}")
 

@@ -1,40 +1,27 @@
-"""`cfs ifc`: what an IFC file holds, what is wrong with it, and what can be made of it."""
+"""`cfs ifc`: what is only for IFC files: attach data, query, survey, property templates."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from bim.report.issue import COLUMNS, issue_rows
-from mitsuba_cfs.files import check_file, write_table, write_text
+from mitsuba_cfs.files import check_file, write_text
 from mitsuba_cfs.progress import Stage
 from scenes.commands.bonsai import bonsai
-from scenes.commands.ifc_exports import (
-    export_files,
-    export_folders,
-    result_folders,
-    room_writers,
-)
+from scenes.commands.check import command as check
+from scenes.commands.export import command as export
 from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.commands.room_options import (
-    furniture_option,
-    height_option,
-    join_option,
     out_folder_option,
     space_option,
-    spacing_option,
-    subdivision_option,
     u_option,
 )
 from scenes.result_folder import ResultFolder
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
-    from bim.model import Building
+    pass
 
 BANDS = ("Visible", "Solar")
 UNCUT = 100_000  # columns of a table that nobody sees
@@ -42,41 +29,24 @@ UNCUT = 100_000  # columns of a table that nobody sees
 
 @click.group(commands=[bonsai])
 def command() -> None:
-    """What an IFC file holds, and what is wrong with it."""
+    """Attach data to IFC files, query and survey them.  See also `cfs check` and `cfs export`."""
 
 
-@command.command()
-@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@click.option("--csv", "issues", type=click.Path(path_type=Path), help="Also write the problems.")
-@join_option
-@furniture_option
-def check(building: Path, join: tuple[str, ...], furniture: bool, issues: Path | None) -> None:
-    """Rooms, windows and problems of an IFC file, as the simulation will see them."""
-    if issues is not None:
-        check_file(issues, field="--csv", inputs=[building])
-    from rich.console import Console
+def _renamed(name: str, current: click.Command) -> click.Command:
+    """A command by its earlier name, which prints the name that it has now."""
 
-    from bim.ifc.building import read_ifc
-    from scenes.commands.progress_bar import ProgressBar
+    def callback(**chosen: object) -> object:
+        click.echo(f"note: `cfs ifc {name}` is now `cfs {name}`", err=True)
+        return current.callback(**chosen) if current.callback is not None else None
 
-    with ProgressBar() as progress:
-        read = read_ifc(building, join=join, furniture=furniture, progress=progress)
-    # a file or a program that reads on gets every line whole, however long
-    console = Console(width=None if Console().is_terminal else UNCUT)
-    for line in read.account.lines if read.account is not None else ():
-        console.print(line, markup=False, highlight=False)
-    console.print(_rooms(read))
-    console.print(_issues(read))
-    console.print(
-        f"{len(read.spaces)} rooms, {sum(bool(s.windows) for s in read.spaces)} with windows, "
-        f"{len(read.windows)} windows, {sum(w.area for w in read.windows):.1f} m2 of glass, "
-        f"{len(read.issues)} problems"
-    )
-    if issues is not None:
-        import pandas as pd
+    return click.Command(
+        name, params=current.params, callback=callback, help=current.help,
+        short_help=f"Now `cfs {name}`.",
+    )  # fmt: skip
 
-        rows = issue_rows(read.issues, "command")
-        write_table(pd.DataFrame(rows, columns=list(COLUMNS)), issues, index=False)
+
+for _name, _current in (("check", check), ("export", export)):
+    command.add_command(_renamed(_name, _current))
 
 
 @command.command()
@@ -141,86 +111,6 @@ def attach(
     for note in notes:
         click.echo(f"note: {note}")
     click.echo(f"{out}: {count} windows or window types")
-
-
-@command.command()
-@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@space_option("spaces", "default: all")
-@join_option
-@furniture_option
-@click.option(
-    "--radiance", type=click.Path(file_okay=False, path_type=Path),
-    help="Folder of Radiance scenes; one folder inside for each room.",
-)  # fmt: skip
-@click.option(
-    "--mitsuba", type=click.Path(file_okay=False, path_type=Path),
-    help="Folder of Mitsuba scenes; one folder inside for each room with a window.",
-)  # fmt: skip
-@click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
-@click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
-@click.option("--honeybee", type=click.Path(path_type=Path), help="honeybee model (.hbjson).")
-@click.option("--gbxml", type=click.Path(path_type=Path), help="gbXML file (.gbxml).")
-@click.option(
-    "--band", type=click.Choice(BANDS, case_sensitive=False), default="Visible", show_default=True,
-    help="Visible or Solar; of the Radiance and Mitsuba scenes.",
-)  # fmt: skip
-@spacing_option
-@height_option
-@subdivision_option
-def export(
-    building: Path,
-    *,
-    spaces: tuple[str, ...],
-    join: tuple[str, ...],
-    furniture: bool,
-    radiance: Path | None,
-    mitsuba: Path | None,
-    epjson: Path | None,
-    gltf: Path | None,
-    honeybee: Path | None,
-    gbxml: Path | None,
-    band: str,
-    sensor_spacing: float,
-    sensor_height: float,
-    subdivision: str,
-) -> None:
-    """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing.
-
-    Windows go with the BSDF, U and g that the file holds or states for them; where they come from,
-    and what is not known, is said.
-    """
-    files = {"--epjson": epjson, "--gltf": gltf, "--honeybee": honeybee, "--gbxml": gbxml}
-    asked = {"--radiance": radiance, "--mitsuba": mitsuba, **files}
-    if not any(asked.values()):
-        raise click.UsageError(f"nothing to write: give one of {', '.join(asked)}")
-    for field, path in files.items():
-        if path is not None:
-            check_file(path, field=field, inputs=[building])
-    folders = result_folders({"--radiance": radiance, "--mitsuba": mitsuba})
-    from bim.ifc.building import read_ifc
-    from scenes.commands.progress_bar import ProgressBar
-    from scenes.fenestration_exports import known_fenestration
-    from scenes.run.inputs import named_spaces
-
-    with ProgressBar() as progress:
-        read = read_ifc(building, join=join, furniture=furniture, progress=progress)
-    chosen = named_spaces(read, spaces, building)
-    known = known_fenestration(chosen, building)
-    writers = room_writers(
-        known, band.lower(), spacing=sensor_spacing, height=sensor_height,
-        sky_division=int(subdivision),
-    )  # fmt: skip
-    export_folders(read, chosen, writers, folders)
-    exported = replace(read, spaces=tuple(chosen))
-    assumed = export_files(exported, known, epjson=epjson, honeybee=honeybee, gbxml=gbxml)
-    if gltf is not None:
-        from bim.to_gltf import write_gltf
-
-        write_gltf(exported, gltf)
-        click.echo(gltf)
-    notes = known.notes() if folders or epjson or honeybee or gbxml else ()
-    for note in (*notes, *assumed):
-        click.echo(f"note: {note}")
 
 
 @command.command()
@@ -291,41 +181,3 @@ def query(building: Path, selector: str) -> None:
     if found:
         console.print(table)
     console.print(f"{len(found)} elements")
-
-
-def _rooms(building: Building) -> Table:
-    """One line for each room, drawn figures beside those that the file states."""
-    from rich.table import Table
-
-    table = Table(title=f"Rooms of {building.name}", title_justify="left")
-    table.add_column("room", overflow="fold")
-    table.add_column("storey", overflow="fold")
-    for head in ("floor m2", "stated", "volume m3", "stated", "faces", "windows", "glass m2"):
-        table.add_column(head, justify="right")
-    for space in building.spaces:
-        table.add_row(
-            space.label, space.storey, f"{space.floor_area:.2f}", _number(space.stated_area),
-            f"{space.drawn_volume:.2f}", _number(space.stated_volume), str(len(space.faces)),
-            str(len(space.windows)), f"{sum(w.area for w in space.windows):.2f}",
-        )  # fmt: skip
-    return table
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"
-
-
-def _issues(building: Building) -> Table:
-    """The problems by their weight, alike ones counted once."""
-    from rich.table import Table
-
-    from bim.report.ranking import ranked
-
-    table = Table(title="Problems", title_justify="left")
-    table.add_column("glass m2", justify="right")
-    for head in ("where", "what", "consequence or repair"):
-        table.add_column(head, overflow="fold")
-    for one in ranked(building.issues):
-        glass = f"{one.glass:.2f}" if one.glass else ""
-        table.add_row(glass, one.first.where, *one.text("command").pair)
-    return table

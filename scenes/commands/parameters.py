@@ -31,6 +31,15 @@ class BuildingFile(click.Path):
         return path
 
 
+def check_is_ifc(path: Path, field: str) -> None:
+    """Raise `DataError` for what only an IFC file can do, asked of another format."""
+    from bim.building_file import is_ifc
+    from mitsuba_cfs.errors import DataError
+
+    if not is_ifc(path):
+        raise DataError(f"needs an IFC file, got {path.name}", field=field)
+
+
 FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
 BUILDING_FILE = BuildingFile(exists=True, dir_okay=False, readable=True, path_type=Path)
 IFC_FILE = IfcFile(exists=True, dir_okay=False, readable=True, path_type=Path)

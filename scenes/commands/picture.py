@@ -8,43 +8,24 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.files import check_file
-from scenes.commands.parameters import BUILDING_FILE
+from scenes.commands.printed_head import PrintedHead
 from scenes.commands.room_options import (
-    aperture_option,
     eye_height_option,
-    furniture_option,
-    glare_sources_option,
-    glare_sun_option,
-    join_option,
-    room_files,
+    input_options,
+    light_options,
     samples_option,
-    seed_option,
     size_option,
-    sky_ground_option,
-    space_option,
-    sun_option,
-    surroundings_offset_option,
-    surroundings_option,
-    system_option,
     view_option,
-    weather_option,
+    with_demo,
 )
 from scenes.picture_options import SUFFIXES, PictureOptions
 
 
 @click.command()
-@click.argument("building", type=BUILDING_FILE, required=False, metavar="[BUILDING]")
-@weather_option
-@system_option
+@input_options("the first with a window", several=False, weather="demo")
 @click.option(
     "--at", required=True, metavar="'MM-DD HH[:MM]'", help="The hour of the weather that holds it."
 )
-@space_option("space", "default: the first with a window", several=False)
-@join_option
-@furniture_option
-@aperture_option
-@surroundings_option
-@surroundings_offset_option
 @view_option("view", "not parallel", several=False)
 @eye_height_option
 @size_option("size", 800, "as evalglare wants them")
@@ -53,23 +34,12 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 @click.option(
     "--colour", is_flag=True, help="By the surfaces' colours, white-balanced; PNG tone-mapped."
 )
-@glare_sources_option
-@glare_sun_option
-@sun_option
-@sky_ground_option
-@seed_option
+@light_options
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), multiple=True, required=True,
     help=f"File to write ({', '.join(SUFFIXES)}); may be repeated.",
 )  # fmt: skip
-def command(
-    building: Path | None,
-    weather: Path | None,
-    system: Path | None,
-    out: tuple[Path, ...],
-    tone: bool,
-    **chosen,
-) -> None:
+def command(out: tuple[Path, ...], tone: bool, **chosen) -> None:
     """Luminance picture of a room under the sun and sky of an hour, path-traced.
 
     What fills the windows without --cfs: the BSDF attached to them or their types in the IFC, else
@@ -82,13 +52,14 @@ def command(
     from scenes.picture_files import read_files
 
     start = time.perf_counter()
-    options = PictureOptions(*room_files(building, weather, system), **chosen)
+    options = PictureOptions(**with_demo(chosen))
     read = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
     from scenes.view_picture import room_picture, write_picture
 
+    head = PrintedHead()
     with ProgressBar() as progress:
-        found = room_picture(options, progress, read)
+        found = room_picture(options, progress, read, head)
     for file in out:
         write_picture(found, file, print_like=tone)
     view, rated = found.view, found.glare
@@ -96,5 +67,4 @@ def command(
     if rated is not None:
         says += f", Ev {rated.Ev:,.0f} lx, DGP {rated.dgp:.3f}, {rated.count} glare source(s)"
     click.echo(f"{says}; {time.perf_counter() - start:.1f} s")
-    for note in found.notes:
-        click.echo(f"note: {note}")
+    head.notes(found.notes)

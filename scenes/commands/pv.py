@@ -1,4 +1,4 @@
-"""`cfs pv`: irradiance and yield of the photovoltaic modules in an IFC file."""
+"""`cfs pv`: irradiance and yield of the photovoltaic modules of a building."""
 
 from __future__ import annotations
 
@@ -9,41 +9,34 @@ from typing import TYPE_CHECKING
 import click
 
 from bim.report.issue import COLUMNS, issue_rows
-from scenes.commands.parameters import FILE, IFC_FILE
-
-if TYPE_CHECKING:
-    from scenes.result_folder import ResultFolder
 from scenes import quick as quick_run
+from scenes.commands.parameters import FILE
+from scenes.commands.printed_head import PrintedHead
 from scenes.commands.quick_option import quick_option
 from scenes.commands.room_options import (
-    needed_weather_option,
+    input_options,
     no_cache_option,
     out_folder_option,
     seed_option,
 )
+from scenes.input_options import InputOptions
+
+if TYPE_CHECKING:
+    from scenes.result_folder import ResultFolder
 
 
 @click.command()
-@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@needed_weather_option
+@input_options("", system=False)
 @click.option("--study", "study_file", required=True, type=FILE, help="TOML file, docs/pv.md.")
 @out_folder_option
 @seed_option
 @no_cache_option
 @quick_option
-def command(
-    building: Path,
-    *,
-    weather: Path,
-    study_file: Path,
-    out: Path,
-    seed: int,
-    no_cache: bool,
-    quick: bool,
-) -> None:
+def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
     """Irradiance and yield of the photovoltaic modules of a building.
 
-    Modules are found by material, type, name or GUID; shade and reflections by everything in the
+    BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).  Modules
+    are found by material, type, name or GUID; shade and reflections by everything in the
     model are traced, the sun as its exact disc.
     """
     from mitsuba_cfs.sky.epw import read_epw
@@ -51,6 +44,8 @@ def command(
     from scenes.result_folder import ResultFolder
 
     study = read_pv_study(study_file)
+    options = InputOptions(**chosen)
+    building, weather, quick = options.building, options.weather, options.quick
     climate = read_epw(weather)
     folder = ResultFolder(out, "pv", inputs=(building, weather, study_file))
     # all that is small is read: what is heavy is loaded now
@@ -60,17 +55,18 @@ def command(
     from scenes.photovoltaics.study import run_pv
 
     variants.activate()
-    cache = None if no_cache else MatrixCache.of_user()
+    head = PrintedHead()
     if quick:
         click.echo(quick_run.NOTE)
     with ProgressBar() as progress:
         result = run_pv(
-            building, climate, study, file=study_file, seed=seed, progress=progress, cache=cache,
+            options, climate, study, file=study_file, seed=seed, progress=progress,
+            cache=MatrixCache.of_user() if options.cache else None, on_head=head,
             **(quick_run.PV if quick else {}),
         )  # fmt: skip
         progress("results", 0.0)
         record = {
-            "quick": quick, "building": str(building), "weather": str(weather),
+            "quick": quick, "head": head.record, "building": str(building), "weather": str(weather),
             "study": study.model_dump(mode="json"), "seed": seed,
             "relative_standard_error_of_diffuse": result.irradiance.diffuse_error,
         }  # fmt: skip
@@ -82,8 +78,7 @@ def command(
             f"{row.yield_kwh:.0f} kWh a year ({row.kwh_per_kw:.0f} kWh/kW), "
             f"mismatch {100 * row.mismatch_loss:.1f} %"
         )
-    for note in climate.notes:
-        click.echo(f"note: {note}")
+    head.notes(climate.notes)
     click.echo(f"results: {out}")
 
 

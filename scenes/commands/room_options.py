@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -35,8 +36,12 @@ join_option = click.option(
     help="Rooms open to each other that are to be one; 'open' (IFC): all by more than a door.",
 )  # fmt: skip
 furniture_option = click.option(
-    "--furniture", is_flag=True, help="Count the furniture that the IFC holds in light and views."
+    "--furniture", is_flag=True, help="Include the furniture of the model in light and views."
 )
+facade_pane_option = click.option(
+    "--facade-pane", "facade_panes", multiple=True, metavar="MATERIAL",
+    help="Material of panes before dark rooms in a Radiance scene (.rad): they mirror.",
+)  # fmt: skip
 aperture_option = click.option(
     "--aperture", "apertures", multiple=True, metavar="MATERIAL",
     help="Material of the windows of a Radiance scene (.rad); default: all glass and BSDF.",
@@ -57,7 +62,7 @@ weather_option = click.option(
 )
 system_option = click.option(
     "--cfs", "system", type=FILE,
-    help="BSDF XML file of every window, Klems full or tensor tree; default: what the IFC holds.",
+    help="BSDF XML file of every window, Klems full or tensor tree; default: the building's own.",
 )  # fmt: skip
 u_option = click.option("--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value [W/(m2 K)].")
 eye_height_option = click.option(
@@ -92,7 +97,7 @@ subdivision_option = click.option(
 )  # fmt: skip
 subdivide_option = click.option(
     "--subdivide", "window_parts", type=click.IntRange(0, 64), default=0, show_default=True,
-    help="Parts of each window group; 0: as many as what stands outdoors asks for.",
+    help="Subgroups of each window group; 0: choose from the surroundings.",
 )  # fmt: skip
 glare_sources_option = click.option(
     "--glare-sources", type=click.Choice(GLARE_SOURCES), default=GLARE_SOURCES[0],
@@ -123,8 +128,9 @@ set_option = click.option(
     help="A choice by its name in `[options]` of study files, such as sensor_samples=4096.",
 )  # fmt: skip
 no_cache_option = click.option(
-    "--no-cache", is_flag=True, help="Trace everything anew; keep nothing."
-)
+    "--no-cache", "cache", is_flag=True, flag_value=False, default=True,
+    help="Trace everything anew; keep nothing.",
+)  # fmt: skip
 
 
 def with_flags(
@@ -140,7 +146,15 @@ def with_flags(
 def space_option(name: str, what: str, *, several: bool = True) -> Option:
     """`--space` into the parameter `name`; `what` it is for, or which room without it."""
     text = f"Name or GUID of a room; {what}."
-    return click.option("--space", name, multiple=several, metavar="NAME", help=text)
+    shared = {"metavar": "NAME", "help": text}
+    if several:
+        return click.option("--space", name, multiple=True, **shared)
+    return click.option("--space", name, callback=_only, **shared)
+
+
+def _only(_context: click.Context, _option: click.Parameter, value: str | None) -> tuple[str, ...]:
+    """A value that may be given once, as the tuple of the options."""
+    return () if value is None else (value,)
 
 
 def method_option(methods: Sequence[str], what: str, *, default: str | None = None) -> Option:
@@ -159,34 +173,60 @@ def size_option(name: str, default: int, why: str) -> Option:
     )  # fmt: skip
 
 
-def building_options(spaces: str) -> Option:
-    """The argument and the options that `cfs run` and `cfs comply` share; `spaces` by default."""
-    shared: Sequence[Option] = (
-        click.argument("building", type=BUILDING_FILE, metavar="BUILDING"),
-        needed_weather_option,
-        system_option,
-        out_folder_option,
-        space_option("spaces", f"default: {spaces}"),
-        join_option,
-        furniture_option,
+def input_options(
+    spaces: str, *, several: bool = True, weather: str = "needed", system: bool = True
+) -> Option:
+    """The argument and the options of every command, named as in `InputOptions`.
+
+    Args:
+        spaces: what `--space` chooses by default, "" without rooms; several: may be repeated.
+        weather: "needed", "demo" (with the demo's building where there is none) or "" (none).
+        system: whether `--cfs` is one of them.
+    """
+    demo = weather == "demo"
+    weathers = {"needed": [needed_weather_option], "demo": [weather_option], "": []}
+    return _all_of(
+        click.argument(
+            "building", type=BUILDING_FILE, required=not demo,
+            metavar="[BUILDING]" if demo else "BUILDING",
+        ),
+        *weathers[weather],
+        *([system_option] if system else []),
+        *([] if not spaces else [
+            space_option("spaces", f"default: {spaces}", several=several), join_option,
+            furniture_option, surroundings_option, surroundings_offset_option,
+        ]),
         aperture_option,
-        surroundings_option,
-        surroundings_offset_option,
-        annual_glare_option,
-        subdivide_option,
-        glare_sources_option,
-        glare_sun_option,
-        sun_option,
-        sky_ground_option,
-        seed_option,
-        set_option,
-        no_cache_option,
-        quick_option,
-        page_option,
-    )
+        facade_pane_option,
+    )  # fmt: skip
+
+
+def light_options(command: Callable) -> Callable:
+    """The options that every command which rates glare has."""
+    return _all_of(
+        glare_sources_option, glare_sun_option, sun_option, sky_ground_option, seed_option
+    )(command)
+
+
+def room_options(command: Callable) -> Callable:
+    """The options that `cfs run` and `cfs comply` share beside the inputs."""
+    return _all_of(
+        out_folder_option, annual_glare_option, subdivide_option, light_options, set_option,
+        no_cache_option, quick_option, page_option,
+    )(command)  # fmt: skip
+
+
+def taken(options: type, chosen: dict) -> dict[str, object]:
+    """The parameters of a command that are fields of its options; they leave `chosen`."""
+    names = [field.name for field in fields(options) if field.name in chosen]
+    return {name: chosen.pop(name) for name in names}
+
+
+def _all_of(*options: Option) -> Option:
+    """Options one after the other."""
 
     def decorated(command: Callable) -> Callable:
-        for option in reversed(shared):
+        for option in reversed(options):
             command = option(command)
         return command
 
@@ -259,15 +299,16 @@ def view_option(name: str, what: str, *, several: bool) -> Option:
     )  # fmt: skip
 
 
-def room_files(
-    building: Path | None, weather: Path | None, system: Path | None
-) -> tuple[Path, Path, Path | None]:
-    """Building, weather and system; the demo's, which is said, only where there is no building."""
+def with_demo(chosen: dict) -> dict:
+    """The parameters with the demo's building, weather and system where there is no building."""
+    names = ("building", "weather", "system")
+    building, weather, system = (chosen[name] for name in names)
     if building is not None:
         if weather is None:
             raise click.UsageError("--weather: give the EPW file of the building's place")
-        return building, weather, system
+        return chosen
     demo = ["office"]
     demo += ["weather"] * (weather is None) + ["venetian blind"] * (system is None)
     click.echo(f"no BUILDING given: the demo's {', '.join(demo)}")
-    return OFFICE, weather or WEATHER, system or VENETIAN_BLIND
+    files = (OFFICE, weather or WEATHER, system or VENETIAN_BLIND)
+    return chosen | dict(zip(names, files, strict=True))

@@ -10,28 +10,35 @@ import click
 from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE
+from scenes.commands.printed_head import PrintedHead
 from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
-    building_options,
     explore_option,
     height_option,
+    input_options,
     method_option,
     named_settings,
     processes_option,
+    room_options,
     scheduler_option,
     size_option,
     spacing_option,
+    taken,
     u_option,
 )
 from scenes.room.options import RoomOptions
 from scenes.run.options import JobOptions
 
 LOADS = ("heating", "cooling", "lighting")
+NEED_PHASES = {
+    "annual_glare": "--annual-glare", "explore": "--explore", "inner_glass": "--inner-glass",
+}  # fmt: skip
 _DEFAULT = RoomOptions()
 
 
 @click.command()
-@building_options("all with a window")
+@input_options("all with a window")
+@room_options
 @method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
@@ -56,7 +63,7 @@ _DEFAULT = RoomOptions()
     "computed too, and those open to each other by more than a door are one room.",
 )  # fmt: skip
 @click.option(
-    "--no-coupled-heat", is_flag=True,
+    "--no-coupled-heat", "coupled_heat", is_flag=True, flag_value=False, default=True,
     help="Balance each room's heat alone, as if rooms of its own temperature lay around it.",
 )  # fmt: skip
 @click.option(
@@ -71,27 +78,7 @@ _DEFAULT = RoomOptions()
     help="Write all numbers of all rooms as results.nc besides, for xarray; see docs/formats.md.",
 )  # fmt: skip
 def command(
-    building: Path,
-    *,
-    weather: Path,
-    system: Path | None,
     out: Path,
-    spaces: tuple[str, ...],
-    u_value: float | None,
-    g_value: float | None,
-    join: tuple[str, ...],
-    furniture: bool,
-    apertures: tuple[str, ...],
-    surroundings: tuple[Path, ...],
-    surroundings_offset: tuple[float, float, float] | None,
-    operation: Path | None,
-    no_cache: bool,
-    inner_glass: bool,
-    no_coupled_heat: bool,
-    no_colour: bool,
-    explore: bool,
-    netcdf: bool,
-    quick: bool,
     page: Path | None,
     settings: tuple[str, ...],
     processes: int,
@@ -102,25 +89,19 @@ def command(
 
     BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
     """
-    if chosen["annual_glare"] and chosen["method"] == "point-in-time":
-        raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
-    if explore and chosen["method"] == "point-in-time":
-        raise click.UsageError("--explore needs --method three-phase or five-phase")
-    if inner_glass and explore:
+    phases = chosen["method"] != "point-in-time"
+    for name, flag in NEED_PHASES.items():
+        if chosen[name] and not phases:
+            raise click.UsageError(f"{flag} needs --method three-phase or five-phase")
+    if chosen["inner_glass"] and chosen["explore"]:
         raise click.UsageError("--inner-glass and --explore exclude each other")
-    if inner_glass and chosen["method"] == "point-in-time":
-        raise click.UsageError("--inner-glass needs --method three-phase or five-phase")
     named = named_settings(settings)
-    if quick:
+    if chosen["quick"]:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     chosen |= named
-    options = JobOptions(
-        building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
-        RoomOptions.of(**chosen), operation=operation, explore=explore, inner_glass=inner_glass,
-        coupled_heat=not no_coupled_heat, netcdf=netcdf, colour=not (no_colour or quick),
-        u_value=u_value, g_value=g_value, surroundings=surroundings,
-        surroundings_offset=surroundings_offset,
-    )  # fmt: skip
+    colour = not (chosen.pop("no_colour") or chosen["quick"])
+    own = taken(JobOptions, chosen)
+    options = JobOptions(**own, colour=colour, room=RoomOptions.of(**chosen))
     run_to_folder(options, out, page, processes=processes, scheduler=scheduler)
 
 
@@ -161,11 +142,11 @@ def run_to_folder(
     beside = processes > 1 or scheduler is not None
     if options.quick:
         click.echo(quick_run.NOTE)
-    lines = _RoomLines()
+    lines, head = _RoomLines(), PrintedHead()
     with ProgressBar() as progress, compiled_beside():
         result = run_job(
             options, progress, files,
-            on_room=lines.year, on_light=lines.light, on_building=_print_account,
+            on_room=lines.year, on_light=lines.light, on_head=head,
             workers=Workers(processes, scheduler) if beside else None,
         )  # fmt: skip
         progress("results", 0.0)
@@ -176,20 +157,13 @@ def run_to_folder(
             netcdf=options.netcdf, processes=processes, progress=progress,
         )  # fmt: skip
         progress("results", 1.0)
-    for note in result.notes:
-        if note != quick_run.NOTE:
-            click.echo(f"note: {note}")
+    head.notes(note for note in result.notes if note != quick_run.NOTE)
     if result.issues:
         found = counted(len(result.issues), "problem")
         click.echo(f"{found} in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
     if options.explore:
         click.echo(f"explorer: {out / EXPLORER / 'index.html'}")
-
-
-def _print_account(building) -> None:
-    for line in building.account.lines if building.account is not None else ():
-        click.echo(line)
 
 
 class _RoomLines:

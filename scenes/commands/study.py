@@ -10,7 +10,8 @@ import click
 
 from bim.report.issue import issue_text
 from scenes import quick as quick_run
-from scenes.commands.parameters import FILE
+from scenes.commands.parameters import FILE, check_is_ifc
+from scenes.commands.printed_head import PrintedHead
 from scenes.commands.quick_option import quick_option
 from scenes.commands.room_options import (
     explore_option,
@@ -175,7 +176,7 @@ def _checked(
     default_folder()  # of the cache, or one line that it cannot be one
     if write_ifc is not None:
         check_file(write_ifc, field="--write-ifc", inputs=parsed.files)
-        one_building(room.building for room in parsed.room)
+        check_is_ifc(one_building(room.building for room in parsed.room), "--write-ifc")
     if scheduler is not None:
         check_dask()
     check_files(parsed)
@@ -183,18 +184,12 @@ def _checked(
 
 
 def _print_plan(plan: StudyPlan) -> None:
-    """Why methods were chosen, and what was noticed of the weather."""
-    from scenes.room.operation import read_operation
-    from scenes.study.one_case import case_weather
+    """What was left out and assumed, and why methods were chosen."""
+    from scenes.study.one_case import plan_head
 
+    PrintedHead()(plan_head(plan))
     for why in dict.fromkeys(case.chosen for case in plan.cases if case.chosen):
         click.echo(f"auto: {why}")
-    notes: dict[str, None] = {}
-    for case in {(case.weather, case.operation): case for case in plan.cases}.values():
-        operation = None if case.operation is None else read_operation(case.operation.path)
-        notes |= dict.fromkeys(case_weather(case, operation).notes)
-    for note in notes:
-        click.echo(f"note: {note}")
 
 
 def _print_outcome(result: StudyResult, out: Path) -> None:

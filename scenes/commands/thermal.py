@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from scenes.heat.study_file import StudyFile
     from scenes.result_folder import ResultFolder
 from scenes import quick as quick_run
+from scenes.commands.printed_head import PrintedHead
 from scenes.commands.quick_option import quick_option
 from scenes.commands.room_options import (
     out_folder_option,
@@ -75,12 +76,14 @@ def command(
     if quick:
         click.echo(quick_run.NOTE)
     twins: list[EnergyPlusTwin] = []
+    head = PrintedHead()
     balanced = _twin_taken(parsed, twins) if energyplus else None
     with ProgressBar() as progress, compiled_beside():
-        rooms, notes = run_study(parsed, progress, files, balanced=balanced)
+        rooms, notes = run_study(parsed, progress, files, balanced=balanced, on_head=head)
     in_twin = (f"model.epJSON: {note}." for twin in twins for note in twin.notes)
     notes = (*[quick_run.NOTE] * quick, *notes, *in_twin)
-    record = {"quick": quick, "study": parsed.model_dump(mode="json"), "notes": list(notes)}
+    record = {"quick": quick, "study": parsed.model_dump(mode="json"), "head": head.record,
+              "notes": list(notes)}  # fmt: skip
     _write(rooms, record, folder, figures=figures, twins=twins)
     for room in rooms:
         summary = room.summary
@@ -90,8 +93,7 @@ def command(
             f"cooling {summary['cold_kwh']:.0f} kWh, comfortable "
             f"{summary['comfortable_h ASHRAE 55 80 %']:.0f} of the occupied hours"
         )
-    for note in notes[quick:]:
-        click.echo(f"note: {note}")
+    head.notes(notes[quick:])
     click.echo(f"results: {out}")
 
 

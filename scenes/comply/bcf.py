@@ -15,6 +15,7 @@ import numpy as np
 from numpy.linalg import inv
 from numpy.typing import NDArray
 
+from bim.building_file import is_ifc
 from bim.sensors import view_point
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import replacing
@@ -69,8 +70,10 @@ def _viewpoint(room: CheckedRoom, view: str, result: Compliance) -> ElementTree.
     root = ElementTree.Element("VisualizationInfo", Guid=view)
     components = ElementTree.SubElement(root, "Components")
     ElementTree.SubElement(components, "ViewSetupHints", SpacesVisible="true")
-    selection = ElementTree.SubElement(components, "Selection")
-    ElementTree.SubElement(selection, "Component", IfcGuid=room.space.guid)
+    file = result.building.file
+    if file is None or is_ifc(file):  # the rooms of other formats have no IFC GUID
+        selection = ElementTree.SubElement(components, "Selection")
+        ElementTree.SubElement(selection, "Component", IfcGuid=room.space.guid)
     ElementTree.SubElement(components, "Visibility", DefaultVisibility="true")
     try:
         eye, direction = view_point(room.space)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.building_file import is_ifc
 from bim.model import Building, Space
 from bim.report.issue import Effect, Issue
 from bim.seasons import in_month
@@ -20,6 +21,7 @@ from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded
 from mitsuba_cfs.metrics.lm83 import sunlit_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
+from scenes.chosen_rooms import no_window
 from scenes.comply.assess import asked_of, assess_room, values_of
 from scenes.comply.blinds import open_and_closed
 from scenes.comply.dwellings import dwelling_words, judged
@@ -36,30 +38,36 @@ from scenes.comply.solar import solar_sentences
 from scenes.comply.sunlight import SunExposure, sun_day, sun_exposure
 from scenes.comply.uses import UNKNOWN, RoomUse
 from scenes.comply.view_out import ViewOut, view_out
-from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
 from scenes.fenestration.systems import States
+from scenes.head import Head, unused_notes
+from scenes.input_files import building_of
+from scenes.inputs import first_states, inputs_of
 from scenes.room.inputs import room_inputs
 from scenes.room.light import room_light
 from scenes.room.options import RoomOptions
 from scenes.room.room import StageTimes
 from scenes.room.series import RoomSeries, corner
 from scenes.room.skies import skies_for
-from scenes.room.windows import traced_building
-from scenes.run.building import building_of
-from scenes.run.inputs import named_spaces, no_window
-from scenes.run.notes import unused_notes
 
 # the parts of a room's light, as the dossier's last line names their seconds
 PARTS = TRACING, SUMS, GLARE, HEAT = (
     "V and D", "light and blinds of every hour", "glare by pictures", "temperatures",
 )  # fmt: skip
+OnHead = Callable[[Head], None]
 LIGHT, RAYS = frozenset({"open", "operated", "glare", "heat"}), frozenset({"view", "sun"})
 
 
 def check_building(
-    options: ComplyOptions, progress: Progress = silent, files: ComplyFiles | None = None
+    options: ComplyOptions,
+    progress: Progress = silent,
+    files: ComplyFiles | None = None,
+    on_head: OnHead = lambda head: None,
 ) -> Compliance:
     """The rooms of a building file against the rules of the options.
+
+    Args:
+        files: of `read_files`; read now by default.
+        on_head: called with what was left out and assumed, before anything is traced.
 
     Raises: `DataError` for a file that cannot be used, before anything is traced.
     """
@@ -69,16 +77,21 @@ def check_building(
     start, steps = time.monotonic(), part(progress, 0.1, 1.0)
     building = building_of(options, steps)
     reading = round(time.monotonic() - start, 1)
-    result = check_rooms(building, options, files, progress)
+    result = check_rooms(building, options, files, progress, on_head)
     return replace(result, seconds={"reading": reading, **result.seconds})
 
 
 def check_rooms(
-    building: Building, options: ComplyOptions, files: ComplyFiles, progress: Progress = silent
+    building: Building,
+    options: ComplyOptions,
+    files: ComplyFiles,
+    progress: Progress = silent,
+    on_head: OnHead = lambda head: None,
 ) -> Compliance:
-    """The rooms of a building against the rules of the options."""
+    """The rooms of a building against the rules of the options; on_head: as `check_building`."""
     check = Check(building, options, files, progress)
-    spaces = named_spaces(building, options.spaces, check.file)
+    on_head(check.head)
+    spaces = list(check.inputs.spaces)
     uses = check.uses_of(spaces)
     glazed = [space for space in spaces if space.windows]
     dark = [s for s in spaces if not s.windows and uses[s.guid].occupied]
@@ -101,7 +114,7 @@ def check_rooms(
     return Compliance(
         check.building, files.rules, tuple(rooms), tuple(verdicts), check.calendar, files.weather,
         check.day, tuple(check.assumptions(rooms, left_out(spaces, glazed, dark))),
-        tuple(dict.fromkeys([*check.notes, *check.files.weather.notes, *notes])),
+        check.head, tuple(dict.fromkeys(notes)),
         (*building.issues, *view_issues, *issues), check.seconds,
     )  # fmt: skip
 
@@ -116,25 +129,30 @@ class Check:
         self.options, self.files, self.progress = options, files, progress
         self.file = options.building or Path(building.name)
         self.parts = frozenset(p for rule in files.rules.values() for p in rule.parts)
-        windows = [w for space in building.spaces for w in space.windows]
-        if options.spaces:
-            chosen = named_spaces(building, options.spaces, self.file)
-            windows = [w for space in chosen for w in space.windows]
-        systems = fill_windows(windows, files.given, building.file) if self.lit else {}
-        self.systems: dict[str, States] = {guid: states[:1] for guid, states in systems.items()}
-        # LM-83's default shade is for its own sum alone, no rating of glare
-        self.shaded = files.closed is not None or min(map(len, systems.values()), default=0) > 1
-        if "operated" in self.parts or (self.shaded and self.moving):
-            self.systems = open_and_closed(systems, files.closed)
-        self.building = traced_building(building, self.systems)
-        self.notes = [*source_notes(window_sources(windows, self.systems))] if self.lit else []
-        self.notes += [*unused_notes(building), *solar_sentences(self.systems)]
+        self.inputs = inputs_of(
+            building, options, files.inputs, rooms="all", states=self._states, fill=self.lit
+        )
+        self.systems, self.building = self.inputs.systems, self.inputs.building
+        self.shaded = self._shaded(self.inputs.filled)
+        extra = [*unused_notes(building), *solar_sentences(self.systems)]
+        self.head = self.inputs.head.with_assumptions(extra)
+        windows = [window for space in self.inputs.spaces for window in space.windows]
         self.hidden, self.glass = windows_without_view(windows, self.systems)
         self.calendar = calendar_of(files.weather)
         self.day = sun_day(files.weather, *options.day, files.least_altitude_deg)
         self.outdoors: OutdoorMesh = outdoors_of(in_month(self.building, options.day[0]))
         self.seconds: dict[str, float] = {}
         self.asked: Mapping[str, frozenset[str]] = {}  # parts that a room's own criteria need
+
+    def _shaded(self, systems: Mapping[str, States]) -> bool:
+        """Whether there are real blinds: LM-83's default shade rates no glare."""
+        return self.files.closed is not None or min(map(len, systems.values()), default=0) > 1
+
+    def _states(self, systems: Mapping[str, States]) -> Mapping[str, States]:
+        """Each window open, and closed too where blinds move."""
+        if "operated" in self.parts or (self._shaded(systems) and self.moving):
+            return open_and_closed(systems, self.files.closed)
+        return first_states(systems)
 
     @property
     def lit(self) -> bool:
@@ -154,7 +172,7 @@ class Check:
     def uses_of(self, spaces: list[Space]) -> dict[str, RoomUse]:
         """The use of each room by GUID; rooms without a window and without a use count as none."""
         texts = {}
-        if self.building.file is not None:
+        if self.building.file is not None and is_ifc(self.building.file):
             from bim.ifc.room_uses import read_room_uses  # reads IFC: only where there is a file
 
             texts = read_room_uses(self.building.file)

@@ -5,28 +5,31 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from bim.building_file import check_building_file
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.options import OTHER_ALTITUDE_DEG, ComplyOptions
 from scenes.comply.rules import RuleTable, read_rule
 from scenes.comply.uses import RoomUses, read_uses
-from scenes.fenestration.systems import FenestrationSystem, Given, given_light, read_system
-from scenes.run.files import check_names
-from scenes.run.inputs import read_weather
+from scenes.fenestration.systems import FenestrationSystem, read_system
+from scenes.input_files import InputFiles, check_building
+from scenes.input_files import read_files as read_inputs
 
 
 @dataclass(frozen=True, slots=True)
 class ComplyFiles:
     """What the files of a check hold, all but the building."""
 
-    weather: Weather
+    inputs: InputFiles
     rules: dict[str, RuleTable]  # by name
     uses: RoomUses
-    given: Given
     closed: FenestrationSystem | None
     least_altitude_deg: float
     altitude_source: str  # in words
+
+    @property
+    def weather(self) -> Weather:
+        """The weather of the year."""
+        return self.inputs.weather
 
 
 def read_files(options: ComplyOptions) -> ComplyFiles:
@@ -36,17 +39,16 @@ def read_files(options: ComplyOptions) -> ComplyFiles:
     """
     if options.building is None or options.weather is None:
         raise ValueError("a check of files needs a building and a weather")
-    check_building_file(options.building)
-    check_names(options.spaces)
+    check_building(options)
     rules = {Path(name).stem if name[-5:] == ".toml" else name: read_rule(name)
              for name in options.standards}  # fmt: skip
     if not rules:
         raise DataError("expected at least one rule", field="--standard")
-    weather = read_weather(options.weather)
-    altitude, source = least_altitude(options, rules, weather)
+    inputs = read_inputs(options, light_only=True)
+    altitude, source = least_altitude(options, rules, inputs.weather)
     closed = None if options.closed is None else read_system(options.closed, by="--closed")
     uses = read_uses(options.uses)
-    return ComplyFiles(weather, rules, uses, given_light(options.system), closed, altitude, source)
+    return ComplyFiles(inputs, rules, uses, closed, altitude, source)
 
 
 def least_altitude(

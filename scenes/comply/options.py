@@ -1,20 +1,22 @@
-"""Inputs and choices of a check against rules."""
+"""Options of `cfs comply`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from scenes.run.options import BuildingOptions
+from scenes.input_options import InputOptions
+from scenes.room.options import RoomOptions
 
 OTHER_ALTITUDE_DEG = 13.0  # where a rule has none for the country: the greatest that it has
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ComplyOptions(BuildingOptions):
-    """Inputs and choices of a check against rules; `system` is that of the open state."""
+class ComplyOptions(InputOptions):
+    """Options of a check against rules; `system` is that of the open state."""
 
     standards: tuple[str, ...]  # names of `rules.rule_names`, or rule files
+    room: RoomOptions = field(default_factory=RoomOptions)  # how each room is computed
     closed: Path | None = None  # of every window with its blinds closed
     uses: Path | None = None  # mapping file of room uses
     day: tuple[int, int] = (3, 21)  # of the sunlight: month and day

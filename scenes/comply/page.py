@@ -61,7 +61,7 @@ def dossier_html(result: Compliance, *, quick: bool = False, page: PageOptions =
         page=page,
         title=page.title or result.building.name or "Building",
         facts=summary(result) + page.facts,
-        notes=([NOTE] if quick else []) + list(result.notes),
+        notes=[*([NOTE] if quick else []), *result.head.lines, *result.notes],
         assumptions=result.assumptions,
         rules=[dossier_rule(result, name) for name in result.rules],
         rooms=rooms,

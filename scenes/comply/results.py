@@ -18,6 +18,7 @@ from scenes.comply.rules import RuleTable
 from scenes.comply.sunlight import SunDay, SunExposure
 from scenes.comply.uses import RoomUse
 from scenes.comply.view_out import ViewOut
+from scenes.head import Head
 
 FloatArray = NDArray[np.float64]
 
@@ -71,6 +72,7 @@ class Compliance:
     weather: Weather
     day: SunDay
     assumptions: tuple[str, ...]  # sentences
+    head: Head  # what was left out of the model, what was assumed of it
     notes: tuple[str, ...]
     issues: tuple[Issue, ...]
     seconds: dict[str, float]  # by part

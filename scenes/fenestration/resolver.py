@@ -19,12 +19,14 @@ from pathlib import Path
 from bim.building_file import held_states, is_ifc
 from bim.model import Window
 from mitsuba_cfs.errors import DataError
-from scenes.fenestration.systems import FenestrationSystem, Given, States
+from scenes.fenestration.systems import FenestrationSystem, States, WindowOverrides
 
 NAMED = 5  # windows that one sentence names
 
 
-def fill_windows(windows: Iterable[Window], given: Given, file: Path | None) -> dict[str, States]:
+def fill_windows(
+    windows: Iterable[Window], overrides: WindowOverrides, file: Path | None
+) -> dict[str, States]:
     """The systems by state of each window, by its GUID; windows of the same data share theirs.
 
     Args: file: the IFC file of the windows; None for a box.
@@ -32,14 +34,14 @@ def fill_windows(windows: Iterable[Window], given: Given, file: Path | None) -> 
     Raises: `DataError` that names the windows that nothing fills, and says what to give.
     """
     windows = list(windows)
-    found, unfilled = held_systems(windows, given, file)
+    found, unfilled = held_systems(windows, overrides, file)
     for missing, names in unfilled.items():
         attach = (
             ", attach data (cfs ifc attach), or state VisibleLightTransmittance and "
             "SolarHeatGainTransmittance (Pset_DoorWindowGlazingType)"
         )
         raise DataError(
-            f"has no BSDF attached {missing}: give {given.ask}{attach if is_ifc(file) else ''}",
+            f"has no BSDF attached {missing}: give {overrides.ask}{attach if is_ifc(file) else ''}",
             file=file,
             element=f"window {_listed(names)}",
         )
@@ -47,40 +49,42 @@ def fill_windows(windows: Iterable[Window], given: Given, file: Path | None) -> 
 
 
 def held_systems(
-    windows: Iterable[Window], given: Given, file: Path | None
+    windows: Iterable[Window], overrides: WindowOverrides, file: Path | None
 ) -> tuple[dict[str, States], dict[str, list[str]]]:
     """As `fill_windows`, and the names of the windows that nothing fills by what is missing."""
     windows = list(windows)
-    own = _by_name(windows, given, file)
+    own = _by_name(windows, overrides, file)
     windows = [window for window in windows if window.guid not in own]
-    if given.states or not windows:
-        return own | {window.guid: given.states for window in windows}, {}
+    if overrides.states or not windows:
+        return own | {window.guid: overrides.states for window in windows}, {}
     if file is None:
         element = f"window {_listed([window.name for window in windows])}" if own else None
-        message = f"a box holds no fenestration data: give {given.ask}"
+        message = f"a box holds no fenestration data: give {overrides.ask}"
         raise DataError(message, element=element, field="box")
     from scenes.fenestration.attached import attached_systems
     from scenes.fenestration.stated import stated_systems, stated_values
 
     held = held_states(windows, file)
-    found = _with_given(attached_systems(held, windows, file), given)
+    found = _with_overrides(attached_systems(held, windows, file), overrides)
     left = [window for window in windows if window.guid not in found]
-    found |= stated_systems(held, left, file, given)
+    found |= stated_systems(held, left, file, overrides)
     unfilled: dict[str, list[str]] = {}
     for window in left:
         if window.guid not in found:
-            missing = stated_values(held, window, file, given).missing(given.light_only)
+            missing = stated_values(held, window, file, overrides).missing(overrides.light_only)
             unfilled.setdefault(missing, []).append(window.name or window.guid)
     return own | found, unfilled
 
 
-def _by_name(windows: list[Window], given: Given, file: Path | None) -> dict[str, States]:
+def _by_name(
+    windows: list[Window], overrides: WindowOverrides, file: Path | None
+) -> dict[str, States]:
     """The systems of the windows that the user names.
 
     Raises: `DataError` for a name that no window has, or that two systems have.
     """
     found: dict[str, States] = {}
-    for names, states in given.named:
+    for names, states in overrides.named:
         for name in names:
             meant = [window.guid for window in windows if name in (window.guid, window.name)]
             if not meant:
@@ -103,28 +107,28 @@ def stated_u_and_g(
 
     windows = list(windows)
     held = held_states(windows, file)
-    values = {w.guid: stated_values(held, w, file, Given()) for w in windows}
+    values = {w.guid: stated_values(held, w, file, WindowOverrides()) for w in windows}
     return {guid: (one.u_value, one.g_value) for guid, one in values.items()}
 
 
-def _with_given(systems: Mapping[str, States], given: Given) -> dict[str, States]:
-    """The systems with the U and g that the user gives; the same ones stay the same."""
-    if given.u_value is None and given.g_value is None:
+def _with_overrides(systems: Mapping[str, States], overrides: WindowOverrides) -> dict[str, States]:
+    """The systems with the user's U and g; the same ones stay the same."""
+    if overrides.u_value is None and overrides.g_value is None:
         return dict(systems)
     known: dict[int, FenestrationSystem] = {}
     for states in systems.values():
         for system in states:
-            known.setdefault(id(system), _changed(system, given))
+            known.setdefault(id(system), _changed(system, overrides))
     return {guid: tuple(known[id(s)] for s in states) for guid, states in systems.items()}
 
 
-def _changed(system: FenestrationSystem, given: Given) -> FenestrationSystem:
+def _changed(system: FenestrationSystem, overrides: WindowOverrides) -> FenestrationSystem:
     source = system.source
-    if given.u_value is not None:
-        system = replace(system, u_value=given.u_value)
+    if overrides.u_value is not None:
+        system = replace(system, u_value=overrides.u_value)
         source += ", U of --u"
-    if given.g_value is not None:
-        system = replace(system, g_value=given.g_value, g_by_patch=None)
+    if overrides.g_value is not None:
+        system = replace(system, g_value=overrides.g_value, g_by_patch=None)
         source += ", g of --g"
     return replace(system, source=source)
 

@@ -18,7 +18,7 @@ from mitsuba_cfs.bsdf.simple_glazing import (
 )
 from mitsuba_cfs.errors import DataError
 from scenes.fenestration.attached import Held, held_thermal, usual_first
-from scenes.fenestration.systems import FenestrationSystem, Given, States
+from scenes.fenestration.systems import FenestrationSystem, States, WindowOverrides
 from thermal.gvalue import TYPICAL_SYSTEMS
 
 PANES = (1, 2, 3)  # that Roos' factor knows
@@ -47,14 +47,14 @@ class StatedValues:
 
 
 def stated_systems(
-    held: Held, windows: Iterable[Window], path: Path, given: Given
+    held: Held, windows: Iterable[Window], path: Path, overrides: WindowOverrides
 ) -> dict[str, States]:
     """The glazing of each window of which enough is attached or stated, the same ones shared."""
     found: dict[str, States] = {}
     known: dict[StatedValues, States] = {}
     for window in windows:
-        values = stated_values(held, window, path, given)
-        if values.missing(given.light_only):
+        values = stated_values(held, window, path, overrides)
+        if values.missing(overrides.light_only):
             continue
         if values not in known:
             known[values] = (glazing_system(values, path.name),)
@@ -62,7 +62,9 @@ def stated_systems(
     return found
 
 
-def stated_values(held: Held, window: Window, path: Path, given: Given) -> StatedValues:
+def stated_values(
+    held: Held, window: Window, path: Path, overrides: WindowOverrides
+) -> StatedValues:
     """What the user gives goes before what is attached, and that before what is stated."""
     states = usual_first(held.get(window.guid, ()))
     thermal = held_thermal(states[0]) if states else {}
@@ -71,8 +73,8 @@ def stated_values(held: Held, window: Window, path: Path, given: Given) -> State
     values = StatedValues(
         window.visible_transmittance,
         window.solar_transmittance,
-        _first(given.g_value, attached_g, window.g_value),
-        _first(given.u_value, thermal.get("u_value"), window.u_value),
+        _first(overrides.g_value, attached_g, window.g_value),
+        _first(overrides.u_value, thermal.get("u_value"), window.u_value),
         window.panes if window.panes in PANES else None,
         any(state.shading_position not in NO_SHADE for state in states),
     )

@@ -1,4 +1,4 @@
-"""A fenestration system from its BSDF file, and what the user gives for all windows."""
+"""A fenestration system from its BSDF file, and the user's data for windows."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ States = tuple[FenestrationSystem, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
-    """What the user gives for all windows; what is not given is looked for in the IFC file."""
+class WindowOverrides:
+    """Fenestration data of the user, which go before those of the building's file."""
 
     states: States = ()  # by a flag or a study file
     u_value: float | None = None  # of --u, in place of the file's [W/(m2 K)]
@@ -64,12 +64,6 @@ class Given:
     ask: str = "--cfs FILE"  # how a system is given, for the error that none is
     light_only: bool = False  # neither U nor g is needed
     named: tuple[tuple[tuple[str, ...], States], ...] = ()  # states of windows by name or GUID
-
-
-def given_light(path: Path | None) -> Given:
-    """What `--cfs` gives to a command that asks for the light alone."""
-    states = () if path is None else (read_system(path, by="--cfs"),)
-    return Given(states, light_only=True)
 
 
 def read_system(

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from bim.building_file import surrounded
 from bim.model import Building, Construction, MaterialLayer
 from bim.shoebox import Plate, WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import lacquer
+from mitsuba_cfs.progress import Progress, silent
 from scenes.heat.study_file import BoxTable
+from scenes.input_files import building_of
+from scenes.input_options import InputOptions
 
 
 def box_building(box: BoxTable) -> Building:
@@ -41,3 +45,13 @@ def box_building(box: BoxTable) -> Building:
         )
     except ValueError as error:
         raise DataError(str(error), field="box") from error
+
+
+def building_or_box(
+    box: BoxTable | None, options: InputOptions, progress: Progress = silent
+) -> Building:
+    """The building of the options' file, or a box with what stands around it."""
+    if box is None:
+        return building_of(options, progress)
+    read = options.read
+    return surrounded(box_building(box), read.surroundings, read.surroundings_offset)

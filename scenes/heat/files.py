@@ -7,14 +7,13 @@ from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
-from scenes.fenestration.systems import FenestrationSystem, Given, States
+from scenes.fenestration.systems import FenestrationSystem, States, WindowOverrides
 from scenes.fenestration.thermal_system import checked_system
 from scenes.heat.measured_weather import read_measured
 from scenes.heat.study_file import StudyFile
+from scenes.input_files import InputFiles, check_names, read_weather
 from scenes.room.operation import read_state
 from scenes.room.operation_hours import check_schedules
-from scenes.run.files import check_names
-from scenes.run.inputs import read_weather
 
 YEAR_DAYS = 360  # that make a year
 
@@ -23,9 +22,13 @@ YEAR_DAYS = 360  # that make a year
 class HeatFiles:
     """What the files of a study hold, all but a building's."""
 
-    weather: Weather
+    inputs: InputFiles
     systems: tuple[FenestrationSystem, ...]  # of the study's tables
-    given: Given  # the same as states of the windows
+
+    @property
+    def weather(self) -> Weather:
+        """The weather of the year."""
+        return self.inputs.weather
 
 
 def read_files(study: StudyFile, file: Path | None = None) -> HeatFiles:
@@ -52,15 +55,15 @@ def read_files(study: StudyFile, file: Path | None = None) -> HeatFiles:
     systems = tuple(read_state(table, table.bsdf, by=by) for table in study.system)
     for one, table in zip(systems, study.system, strict=True):
         checked_system(one, table.bsdf or file)
-    return HeatFiles(weather, systems, _given(study, systems))
+    return HeatFiles(InputFiles(weather, _overrides(study, systems)), systems)
 
 
-def _given(study: StudyFile, systems: tuple[FenestrationSystem, ...]) -> Given:
+def _overrides(study: StudyFile, systems: tuple[FenestrationSystem, ...]) -> WindowOverrides:
     """The systems as the states of the windows that their tables name."""
     states: dict[tuple[str, ...], States] = {}
     for table, system in zip(study.system, systems, strict=True):
         states[table.windows] = (*states.get(table.windows, ()), system)
-    return Given(states.pop((), ()), named=tuple(states.items()), ask="a [[system]]")
+    return WindowOverrides(states.pop((), ()), named=tuple(states.items()), ask="a [[system]]")
 
 
 def _fits_measured(study: StudyFile, weather: Weather, file: Path | None) -> None:

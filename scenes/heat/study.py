@@ -9,25 +9,24 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.building_file import ReadOptions, read_building_file, surrounded
-from bim.model import Building, Space
+from bim.model import Building
 from bim.report.issue import issue_text
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.progress import Progress, item
+from mitsuba_cfs.progress import Progress, item, silent
 from mitsuba_cfs.sky.weather import Weather
-from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
 from scenes.fenestration.systems import States
-from scenes.fenestration.thermal_system import thermal_system
-from scenes.heat.box import box_building
+from scenes.head import Head
+from scenes.heat.box import building_or_box
 from scenes.heat.design_days import design_loads
 from scenes.heat.energy import energy_by_month, energy_summary, room_powers
 from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import comfort_summary, hourly_table, year_summary
+from scenes.inputs import Inputs, every_state, inputs_of
 from scenes.room.heat import felt_by, room_humidity
 from scenes.room.inputs import room_inputs
 from scenes.room.leaks import leak_issues
@@ -36,10 +35,7 @@ from scenes.room.operation import stated_note, with_stated_uses
 from scenes.room.operation_hours import OperationHours, check_schedules
 from scenes.room.room import operated_zone
 from scenes.room.skies import skies_for
-from scenes.room.windows import traced_building
 from scenes.room.zone import RoomZone, balances, coupled
-from scenes.run.inputs import chosen_spaces, named_spaces
-from scenes.run.notes import model_notes
 from thermal.balance import ZoneResult
 from thermal.moisture import Humidity
 from thermal.ventilation import AirTransfer
@@ -82,30 +78,25 @@ def run_study(
     files: HeatFiles | None = None,
     *,
     balanced: Callable[[BalancedRooms], object] | None = None,
+    on_head: Callable[[Head], None] = lambda head: None,
 ) -> tuple[list[ThermalYear], tuple[str, ...]]:
-    """The rooms of a study, and what had to be assumed.
+    """The rooms of a study, and what was assumed.
 
     Args:
-        files: what `read_files` has read of the study; read now without.
+        files: of `read_files`; read now by default.
         balanced: called with the rooms as they were balanced.
+        on_head: called with what was left out and assumed, before anything is traced.
     """
     files = files or read_files(study)
-    weather = files.weather
-    building, spaces = rooms_of(study)
-    said = (*model_notes(building), *stated_note(building, "the study"))
+    inputs = study_inputs(study, files, progress)
+    head, weather, in_windows = inputs.head, inputs.weather, inputs.systems
+    building, spaces = inputs.building, inputs.spaces
     if building.uses:
         study = with_stated_uses(study, building)
         check_schedules(study, weather, study.building)
-    windows = [window for space in spaces for window in space.windows]
-    in_windows = fill_windows(windows, files.given, study.building)
     _check_states(study, in_windows)
-    building = traced_building(building, in_windows)
-    systems = list({id(s): s for states in in_windows.values() for s in states}.values())
-    notes = dict.fromkeys([*said, *source_notes(window_sources(windows, in_windows))])
-    heats = [thermal_system(system) for system in systems]
-    noted = (weather, *systems, *heats)
-    notes |= dict.fromkeys(note for t in noted for note in t.notes)
-    notes |= dict.fromkeys(heat.named_model for heat in heats)
+    on_head(head)
+    notes = dict.fromkeys(head.notes)
     variants.activate()
     options, trace = study.options, study.trace
     cache = MatrixCache.of_user()
@@ -247,15 +238,13 @@ def _floor(zone: Zone) -> int:
     return int(np.argmax([-s.normal[2] * s.area for s in zone.surfaces]))
 
 
-def rooms_of(study: StudyFile) -> tuple[Building, list[Space]]:
-    """The building of a study and the rooms asked for."""
-    around = study.surroundings, study.surroundings_offset
-    if study.box is not None:
-        building = surrounded(box_building(study.box), *around)
-        return building, list(building.spaces)
-    options = ReadOptions(tuple(study.join), surroundings=around[0], surroundings_offset=around[1])
-    building = read_building_file(study.building, options)
-    if study.couple:
-        spaces = named_spaces(building, study.spaces, study.building)
-        return building, shared_constructions(spaces)
-    return building, chosen_spaces(building, study.spaces, study.building)
+def study_inputs(
+    study: StudyFile, files: HeatFiles | None = None, progress: Progress = silent
+) -> Inputs:
+    """The inputs of a study: its rooms with all states of their windows."""
+    files, options = files or read_files(study), study.inputs
+    building = building_or_box(study.box, options, progress)
+    rooms = "all" if study.couple or study.box is not None else "glazed"
+    inputs = inputs_of(building, options, files.inputs, rooms=rooms, states=every_state)
+    inputs = replace(inputs, notes=stated_note(building, "the study"))
+    return replace(inputs, spaces=shared_constructions(inputs.spaces)) if study.couple else inputs

@@ -16,7 +16,9 @@ from mitsuba_cfs.methods import METHODS
 from scenes import plausible
 from scenes.fenestration.tables import StateTable
 from scenes.heat.measured_weather import MeasuredTable
+from scenes.input_options import InputOptions
 from scenes.quick import HEAT, picks
+from scenes.read_table import OutdoorTable, ReadTable, read_options
 from scenes.room.operation import schedules_there
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
@@ -117,16 +119,13 @@ class WindowStateTable(StateTable):
     windows: tuple[str, ...] = ()  # names or GUIDs
 
 
-class StudyFile(OperationTables):
+class StudyFile(OperationTables, ReadTable, OutdoorTable):
     """A whole study; paths are relative to the file."""
 
     weather: Path  # an EPW file, or with `measured` a CSV file
     measured: MeasuredTable | None = None
     building: Path | None = None
     spaces: tuple[str, ...] = ()
-    join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
-    surroundings: tuple[Path, ...] = ()  # files of what stands around
-    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     couple: bool = False  # heat flows through the walls between the rooms
     transfer: tuple[TransferTable, ...] = ()
     design: DesignTable | None = None  # loads of design days too
@@ -134,6 +133,11 @@ class StudyFile(OperationTables):
     system: tuple[WindowStateTable, ...] = ()  # states; none: what the building's file holds
     trace: TraceTable = TraceTable()
     step_minutes: Literal[1, 2, 3, 4, 5, 6, 10, 12, 15, 20, 30, 60] = 10
+
+    @property
+    def inputs(self) -> InputOptions:
+        """The options of its building and rooms."""
+        return InputOptions(self.building, self.weather, spaces=self.spaces, **read_options(self))
 
     @property
     def options(self) -> RoomOptions:

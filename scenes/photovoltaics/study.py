@@ -1,23 +1,25 @@
-"""From an IFC file and a weather file to the yield of its photovoltaic modules."""
+"""From a building's file and a weather file to the yield of its photovoltaic modules."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from bim.ifc.corrections import corrections_beside
-from bim.ifc.standing import Standing, read_standing
+from bim.building_file import read_standing_file
 from bim.report.issue import Issue
+from bim.standing import Standing
 from bim.to_tracer import COMPASS
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
+from scenes.head import NO_HEAD, Head
+from scenes.input_options import InputOptions
 from scenes.photovoltaics.energy import Subsystem, SubsystemYield, subsystem_yields
 from scenes.photovoltaics.irradiance import CellIrradiance, cell_irradiance
 from scenes.photovoltaics.modules import PvModule, pv_modules
@@ -38,6 +40,7 @@ class PvResult:
     yields: tuple[SubsystemYield, ...]
     weather: Weather
     issues: tuple[Issue, ...]
+    head: Head = NO_HEAD  # what was left out, what was assumed
 
     def module_table(self) -> pd.DataFrame:
         """Annual irradiation of each module, in the plane and behind its glass [kWh/m2]."""
@@ -87,7 +90,7 @@ class PvResult:
 
 
 def run_pv(
-    model: Path,
+    options: InputOptions,
     weather: Weather,
     study: PvStudy,
     *,
@@ -96,30 +99,35 @@ def run_pv(
     seed: int = 0,
     progress: Progress = silent,
     cache: MatrixCache | None = None,
+    on_head: Callable[[Head], None] = lambda head: None,
 ) -> PvResult:
     """Find the modules, trace their irradiance and model their yield.
 
-    Args: file: of the study, for messages.
+    Args:
+        options: the building of any format, and how it is read.
+        file: of the study, for messages.
+        on_head: called with what was left out and assumed, before anything is traced.
     """
-    corrections = corrections_beside(model)
-    corrections = replace(
-        corrections,
-        leave_out=(*corrections.leave_out, *study.leave_out),
-        surroundings=corrections.surroundings if study.surroundings is None else study.surroundings,
-    )
+    if options.building is None:
+        raise ValueError("modules are searched in a building's file")
     queries = [study.module.select, *(table.select for table in study.subsystem)]
-    standing = read_standing(
-        model, queries, corrections=corrections, selected_in=file or "", progress=progress
-    )
+    standing = read_standing_file(
+        options.building, queries, options=options.read, leave_out=study.leave_out,
+        reflectance=study.surroundings, selected_in=file or "", progress=progress,
+    )  # fmt: skip
     modules = pv_modules(
         standing.elements, standing.chosen[0],
         substrings=study.module.substrings, along=study.module.groups,
     )  # fmt: skip
     if not modules:
-        message = f"chooses no element with a shape in {model}"
+        message = f"chooses no element with a shape in {options.building}"
         raise DataError(message, file=file, field=f"module.select = {study.module.select!r}")
     cell = fitted_cell(study.module.datasheet())
     subsystems, issues = _subsystems(study, standing, modules, file)
+    issues = [*standing.issues, *issues]
+    model = (f"Elements read: {len(standing.elements)}", f"Modules: {len(modules)}")
+    head = Head(model, tuple(issues), weather.notes)
+    on_head(head)
     irradiance = cell_irradiance(
         standing.elements, modules, weather, samples=samples, seed=seed, progress=progress,
         cache=cache,
@@ -131,7 +139,7 @@ def run_pv(
     )  # fmt: skip
     return PvResult(
         standing, tuple(modules), subsystems, irradiance, tuple(yields), weather,
-        (*standing.issues, *issues),
+        tuple(issues), head,
     )  # fmt: skip
 
 

@@ -10,15 +10,16 @@ from functools import lru_cache
 from typing import Generic, TypeVar
 
 from bim.model import Space
+from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.source_code import code_version
+from scenes.input_files import sha256
+from scenes.inputs import Inputs, read_inputs
 from scenes.room.skies import skies_for
-from scenes.run.inputs import sha256
-from scenes.run.job import JobInputs, input_files, read_inputs, run_spaces
 from scenes.run.options import JobOptions
 from scenes.workers import Tasks
 
@@ -38,7 +39,7 @@ class RoomWork(Generic[R]):
     """The computation of each room of a run."""
 
     function: Callable[..., R]  # `compute_room` or `lit_room`
-    inputs: JobInputs
+    inputs: Inputs
     spaces: Sequence[Space]  # `run_spaces`
     skies: AnnualSky
     options: JobOptions
@@ -101,8 +102,8 @@ class _FromFiles(Generic[R]):
 
 
 @lru_cache(maxsize=1)
-def _read(options: JobOptions, run: str) -> tuple[JobInputs, list[Space], AnnualSky]:
-    inputs, room = read_inputs(options, silent), options.room
+def _read(options: JobOptions, run: str) -> tuple[Inputs, Sequence[Space], AnnualSky]:
+    inputs, room = read_inputs(options, inner=options.inner_glass), options.room
     if _identity(options, inputs) != run:
         message = "a worker has other input files or another version of the program"
         raise DataError(message, field="--scheduler")
@@ -110,12 +111,24 @@ def _read(options: JobOptions, run: str) -> tuple[JobInputs, list[Space], Annual
     return inputs, run_spaces(inputs, options), skies
 
 
+def balanced_together(inputs: Inputs, options: JobOptions) -> bool:
+    """Whether heat flows between the rooms of a run."""
+    return options.coupled_heat and len(inputs.spaces) > 1
+
+
+def run_spaces(inputs: Inputs, options: JobOptions) -> Sequence[Space]:
+    """The rooms of a run; of those balanced together two sides of a wall are built alike."""
+    if not balanced_together(inputs, options):
+        return inputs.spaces
+    return list(shared_constructions(inputs.spaces))
+
+
 def _failed(guid: str, error: BaseException) -> tuple[str, BaseException]:
     return guid, error
 
 
-def _identity(options: JobOptions, inputs: JobInputs) -> str:
+def _identity(options: JobOptions, inputs: Inputs) -> str:
     """Hash of options, program and contents of the files, before the keys of a run's rooms."""
     parts = [repr(options), code_version(__name__)]
-    parts += map(sha256, input_files(options, inputs).values())
+    parts += map(sha256, inputs.files.values())
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16] + "-"

@@ -11,7 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TypeVar
 
-from bim.model import Building, Space
+from bim.model import Space
 from bim.report.issue import Issue, issue_text
 from bim.sensors import held_grids
 from bim.templates import same_hues
@@ -23,9 +23,9 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.stored_arrays import PassedArrays, StoredArrays
-from scenes.fenestration.resolver import source_notes
-from scenes.fenestration.systems import FenestrationSystem
-from scenes.fenestration.thermal_system import thermal_system
+from scenes.head import Head
+from scenes.input_files import InputFiles, sha256
+from scenes.inputs import Inputs, read_inputs
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
 from scenes.room.heat import DaylitRoom, coupled_years
@@ -34,54 +34,42 @@ from scenes.room.operation_tables import OperationTables
 from scenes.room.room import compute_room, lit_room
 from scenes.room.series import RoomSeries, moved_light, moved_result
 from scenes.room.skies import skies_for
-from scenes.run.files import JobFiles
-from scenes.run.inputs import sha256
-from scenes.run.job import (
-    JobInputs,
-    balanced_together,
-    input_files,
-    read_inputs,
-    run_spaces,
-    used_sources,
-    used_systems,
-)
-from scenes.run.notes import model_notes, site_notes
 from scenes.run.options import JobOptions
-from scenes.run.rooms_apart import RoomWork, Workers
+from scenes.run.rooms_apart import RoomWork, Workers, balanced_together, run_spaces
 
 R = TypeVar("R")
 
 OnLight = Callable[[DaylitRoom], None]  # called with each room's light where its heat comes later
 OnRoom = Callable[[RoomYear], None]  # called with each room as soon as it is computed
-OnBuilding = Callable[[Building], None]  # called with the building as soon as it is read
+OnHead = Callable[[Head], None]  # called as soon as all inputs are read
 
 
 def run_job(
     options: JobOptions,
     progress: Progress = silent,
-    files: JobFiles | None = None,
+    files: InputFiles | None = None,
     *,
     on_room: OnRoom | None = None,
     on_light: OnLight | None = None,
-    on_building: OnBuilding | None = None,
+    on_head: OnHead | None = None,
     workers: Workers | None = None,
 ) -> RunResult:
     """Daylight, glare, temperatures and comfort of the chosen rooms.
 
     Args:
-        files: what `read_files` has read of the options; read now without.
+        files: of `scenes.run.files.read_files`; read now by default.
         on_room: called with each room as soon as it is computed, in the rooms' order.
         on_light: called with the light of each room as soon as that is there, where rooms'
             heat is balanced together.
-        on_building: called with the building before anything is traced.
+        on_head: called with what was left out and assumed, before anything is traced.
         workers: that the rooms' light comes from; None: this process, room by room.
 
     Raises: `DataError` for a file that cannot be used, before anything is traced.
     """
     start = time.monotonic()
-    inputs = read_inputs(options, progress, files)
-    if on_building is not None:
-        on_building(inputs.building)
+    inputs = read_inputs(options, files, progress, inner=options.inner_glass)
+    if on_head is not None:
+        on_head(inputs.head)
     return run_inputs(
         inputs, options, progress,
         on_room=on_room, on_light=on_light, workers=workers, start=start,
@@ -89,7 +77,7 @@ def run_job(
 
 
 def run_inputs(
-    inputs: JobInputs,
+    inputs: Inputs,
     options: JobOptions,
     progress: Progress = silent,
     *,
@@ -106,10 +94,7 @@ def run_inputs(
     """
     start = time.monotonic() if start is None else start
     building, weather = inputs.building, inputs.weather
-    used = used_systems(inputs)
-    thermal_notes = [
-        note for heat in map(thermal_system, used) for note in (*heat.notes, heat.named_model)
-    ]
+    head = inputs.head
     sun = sun_directions(weather)
     variant = variants.activate()
     progress("sky", 0.0)
@@ -121,21 +106,14 @@ def run_inputs(
     if not results:
         raise DataError("none of its rooms could be computed", file=options.building)
     holes = [issue for result in results for issue in result.issues]
-    manifest = _manifest(options, variant, inputs, used, results)
+    manifest = _manifest(options, variant, inputs, results) | {"head": head.record}
     manifest["seconds"] = round(time.monotonic() - start, 1)
     notes = [
         *([NOTE] if options.quick else []),
-        *model_notes(building),
-        *inputs.stated,
-        *source_notes(used_sources(inputs)),
-        *(note for system in used for note in system.notes),
-        *thermal_notes,
-        *_state_notes(inputs, options),
+        *head.notes,
         *notes,
         *(result.borrowed for result in results if result.borrowed),
         *(f"{issue_text(hole, 'command').line}." for hole in holes),
-        *weather.notes,
-        *site_notes(building, weather),
     ]
     return RunResult(
         building,
@@ -150,7 +128,7 @@ def run_inputs(
 
 
 def _rooms(
-    inputs: JobInputs,
+    inputs: Inputs,
     skies: AnnualSky,
     options: JobOptions,
     progress: Progress,
@@ -193,7 +171,7 @@ def _passed(rooms: list[RoomYear], store: StoredArrays | None) -> Sequence[RoomY
 
 def _coupled(
     rooms: list[DaylitRoom],
-    inputs: JobInputs,
+    inputs: Inputs,
     options: JobOptions,
     progress: Progress,
     store: StoredArrays | None = None,
@@ -247,7 +225,7 @@ def _series(
     )
 
 
-def _operated_alike(inputs: JobInputs, one: Space, other: Space) -> bool:
+def _operated_alike(inputs: Inputs, one: Space, other: Space) -> bool:
     if inputs.operation is None:
         return True
     tables, building = inputs.operation.tables, inputs.building
@@ -257,8 +235,7 @@ def _operated_alike(inputs: JobInputs, one: Space, other: Space) -> bool:
 def _manifest(
     options: JobOptions,
     variant: str,
-    inputs: JobInputs,
-    used: list[FenestrationSystem],
+    inputs: Inputs,
     results: Sequence[RoomYear],
 ) -> dict:
     """What a reader needs to make the same numbers again."""
@@ -266,14 +243,13 @@ def _manifest(
     return {
         "quick": options.quick,
         "inputs": {
-            name: {"path": str(path), "sha256": sha256(path)}
-            for name, path in input_files(options, inputs).items()
+            name: {"path": str(path), "sha256": sha256(path)} for name, path in inputs.files.items()
         },
         "building": inputs.building.name,
         "site": inputs.weather.site,
         "weather_notes": list(inputs.weather.notes),
-        "system": ", ".join(dict.fromkeys(system.name for system in used)),
-        "fenestration": used_sources(inputs),
+        "system": ", ".join(dict.fromkeys(one.name for one in inputs.used_systems)),
+        "fenestration": inputs.sources,
         "options": {
             key: str(value)
             if isinstance(value, Path)
@@ -290,19 +266,3 @@ def _manifest(
         },
         "rooms": {result.space.guid: result.seconds for result in results},
     }
-
-
-def _state_notes(inputs: JobInputs, options: JobOptions) -> tuple[str, ...]:
-    """A sentence where windows have more states than are used."""
-    if inputs.operation is not None and inputs.operation.systems and options.system is not None:
-        file = inputs.operation.file.name
-        return (f"--cfs fills the windows: [[system]] of {file} is not used.",)
-    several = () if options.operation is not None else inputs.several
-    if not several:
-        return ()
-    names = ", ".join(dict.fromkeys(several))
-    held_by = inputs.building.name if options.building is None else options.building.name
-    return (
-        f"{held_by} holds several shading states; without --operation the first of "
-        f"each window ({names}) holds all year.",
-    )

@@ -17,9 +17,9 @@ from scenes.calibration.errors import MeasuredErrors, measured_errors
 from scenes.calibration.shipped import this_machines_costs
 from scenes.calibration.traits import Traits, hidden_sky, sun_in_view, system_traits
 from scenes.fenestration.systems import read_system
-from scenes.run.inputs import read_weather
+from scenes.input_files import read_weather
 from scenes.study.case import AUTO, Case, with_method
-from scenes.study.one_case import case_systems
+from scenes.study.one_case import case_inputs
 from scenes.study.plan import StudyPlan
 from scenes.study.study_file import Study
 
@@ -96,7 +96,7 @@ def case_traits(cases: list[Case], plan: StudyPlan) -> list[Traits]:
         building, space = plan.rooms[case.scene]
         filled = (case.scene, case.bsdf, case.operation)
         if filled not in systems:
-            systems[filled] = filled_traits(case, space)
+            systems[filled] = filled_traits(case, building)
         seen = (case.scene, case.weather, case.orientation_deg)
         if seen not in rooms:
             rooms[seen] = room_traits(case, building, space)
@@ -104,11 +104,12 @@ def case_traits(cases: list[Case], plan: StudyPlan) -> list[Traits]:
     return list(found)
 
 
-def filled_traits(case: Case, space: Space) -> list[tuple[float, float, float, float]]:
+def filled_traits(case: Case, building: Building) -> list[tuple[float, float, float, float]]:
     """The traits of what fills a case's windows, each in its first state."""
     if case.bsdf is not None:
         return [system_traits(read_system(case.bsdf.path).fine)]
-    first = {id(states[0]): states[0] for states in case_systems(case, space).values()}
+    filled = case_inputs(case, building).systems.values()
+    first = {id(states[0]): states[0] for states in filled}
     return [system_traits(system.fine) for system in first.values()]
 
 

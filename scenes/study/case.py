@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.source_code import code_version
+from scenes.input_options import InputOptions
 from scenes.room.options import RoomOptions
 
 if TYPE_CHECKING:
@@ -56,6 +57,10 @@ class Case:
     referenced: tuple[InputFile, ...] = ()  # BSDF files that the building's names, and those beside
     surroundings: tuple[InputFile, ...] = ()  # of what stands around the building
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
+    join: tuple[str, ...] = ()  # these four as of `InputOptions`
+    furniture: bool = False
+    apertures: tuple[str, ...] = ()
+    facade_panes: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
@@ -91,7 +96,24 @@ class Case:
         source = building.sha256 if isinstance(building, InputFile) else building.model_dump_json()
         around = [file.sha256 for file in self.surroundings]
         offset = self.surroundings_offset and list(self.surroundings_offset)
-        return digest(source, self.space, around, offset)[:32]
+        read = [list(self.join), self.furniture, list(self.apertures), list(self.facade_panes)]
+        return digest(source, self.space, around, offset, read)[:32]
+
+    @property
+    def inputs(self) -> InputOptions:
+        """The options of its building and room."""
+        file = self.building.path if isinstance(self.building, InputFile) else None
+        return InputOptions(
+            file,
+            self.weather.path,
+            spaces=(self.space,),
+            join=self.join,
+            furniture=self.furniture,
+            apertures=self.apertures,
+            facade_panes=self.facade_panes,
+            surroundings=tuple(file.path for file in self.surroundings),
+            surroundings_offset=self.surroundings_offset,
+        )
 
 
 def _plain(table: dict) -> list:

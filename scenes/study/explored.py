@@ -22,7 +22,7 @@ from scenes.explore.folder import CASE, write_rooms
 from scenes.explore.packing import read_data
 from scenes.results import RunResult
 from scenes.study.case import Case
-from scenes.study.one_case import ALONE, CaseRoom
+from scenes.study.one_case import ALONE, case_inputs, case_year
 from scenes.study.schedule import said
 from scenes.workers import Tasks
 
@@ -51,10 +51,10 @@ def compute_explorer(case: Case, progress: Progress = silent) -> ExploredCase:
     """
     with ALONE, tempfile.TemporaryDirectory() as name:
         variants.activate()
-        held, folder = CaseRoom.of(case), Path(name)
-        room, weather = held.year(case, explore=True, progress=progress), held.weather
+        inputs, folder = case_inputs(case), Path(name)
+        room, weather = case_year(inputs, case, explore=True, progress=progress), inputs.weather
         run = RunResult(
-            held.building, weather.midpoints, sun_directions(weather), (room,), (), {}
+            inputs.building, weather.midpoints, sun_directions(weather), (room,), (), {}
         )  # fmt: skip
         write_rooms(run, folder)
         found = (one for one in folder.rglob("*") if one.is_file())

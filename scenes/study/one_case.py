@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import lru_cache
 from typing import Unpack
 
@@ -12,8 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.building_file import ReadOptions, read_building_file, surrounded
-from bim.model import Building, Space
+from bim.model import Building
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.annual import AnnualGlare
@@ -25,19 +24,21 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
-from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
-from scenes.fenestration.systems import Given, States, read_system
+from scenes.fenestration.resolver import source_notes
+from scenes.fenestration.systems import States, WindowOverrides, read_system
 from scenes.fenestration.thermal_system import thermal_system
-from scenes.heat.box import box_building
+from scenes.head import Head, joined, model_lines, tree_notes
+from scenes.heat.box import building_or_box
+from scenes.input_files import InputFiles, building_of, read_weather
+from scenes.input_options import InputOptions
+from scenes.inputs import Inputs, inputs_of
 from scenes.results import RoomYear
-from scenes.room.operation import Operation, check_states, read_operation, used_operation
+from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
 from scenes.room.room import RoomChoices, compute_room
 from scenes.room.skies import skies_for
-from scenes.room.windows import traced_building
-from scenes.run.inputs import read_weather
-from scenes.run.notes import tree_notes
 from scenes.study.case import Case, InputFile, program_version
+from scenes.study.plan import StudyPlan
 from scenes.study.store import CaseResult
 from scenes.study.straight_view import straight_view
 
@@ -46,55 +47,63 @@ KEPT_TEMPERATURES = ("outdoor_c", "air_c", "operative_c")
 ALONE = threading.Lock()  # Dr.Jit has all cores already, and a worker may have several threads
 
 
-@dataclass(frozen=True, slots=True)
-class CaseRoom:
-    """The room of a case, its systems, weather and operation, as its files hold them."""
+def case_inputs(
+    case: Case, building: Building | None = None, spaces: tuple[str, ...] = ()
+) -> Inputs:
+    """The inputs of a case, from its files.
 
-    building: Building
-    space: Space
-    systems: dict[str, States]  # by GUID of the window
-    weather: Weather  # turned about the model
-    operation: Operation | None
+    Args: building: of the case, where it is read already; spaces: other rooms than its own.
 
-    @classmethod
-    def of(cls, case: Case) -> CaseRoom:
-        """Read the files of a case.
+    Raises: `DataError` for a file that has changed or cannot be used.
+    """
+    if case.program != program_version():
+        raise DataError("this process runs another version of the program than the study's")
+    for source in case.files:
+        if isinstance(source, InputFile) and InputFile.of(source.path) != source:
+            raise DataError("is not the file that it was when the study began", file=source.path)
+    operation = None if case.operation is None else read_operation(case.operation.path)
+    states: States = () if operation is None else operation.systems
+    if case.bsdf is not None:
+        values = {"u_value": case.u_value, "g_value": case.g_value}
+        states = (read_system(case.bsdf.path, **values),)
+    overrides = WindowOverrides(states, ask="a [[system]]")
+    files = InputFiles(_weather(case.weather, case.orientation_deg), overrides, operation)
+    options = replace(case.inputs, spaces=spaces) if spaces else case.inputs
+    return inputs_of(_building(case) if building is None else building, options, files)
 
-        Raises: `DataError` for a file that has changed or cannot be used.
-        """
-        if case.program != program_version():
-            raise DataError("this process runs another version of the program than the study's")
-        for source in case.files:
-            if isinstance(source, InputFile) and InputFile.of(source.path) != source:
-                raise DataError(
-                    "is not the file that it was when the study began", file=source.path
-                )
-        building, space = _room(case)
-        operation = None if case.operation is None else read_operation(case.operation.path)
-        systems = case_systems(case, space, operation)
-        building = traced_building(building, systems)
-        if operation is not None:
-            check_states(operation, max(map(len, systems.values())))
-        else:
-            systems = {guid: states[:1] for guid, states in systems.items()}
-        weather = case_weather(case, operation)
-        return cls(building, space, systems, weather, used_operation(operation, building))
 
-    def year(self, case: Case, **chosen: Unpack[RoomChoices]) -> RoomYear:
-        """The room's year by the case's options; chosen: as of `lit_room`."""
-        options = case.options
-        skies = _skies(
-            case.weather,
-            case.orientation_deg,
-            options.method,
-            options.sampling,
-            *options.sky.items(),
-        )
-        return compute_room(
-            self.building, self.space, self.systems, self.weather, options,
-            operation=self.operation, skies=skies, cache=MatrixCache.of_user(), pictures=False,
-            **chosen,
-        )  # fmt: skip
+def plan_head(plan: StudyPlan) -> Head:
+    """What was left out of the buildings of a study, and what is assumed in its cases."""
+    rooms: dict[tuple, tuple[Case, Building, list[str]]] = {}
+    for case in plan.cases:
+        building, space = plan.rooms[case.scene]
+        key = (id(building), case.bsdf, case.operation, case.u_value, case.g_value, case.weather)
+        rooms.setdefault(key, (case, building, []))[2].append(space.guid)
+    heads = []
+    for case, building, guids in rooms.values():
+        spaces = tuple(dict.fromkeys(guids))
+        try:
+            heads.append(case_inputs(case, building, spaces).head)
+        except DataError as error:  # of these cases alone, which then fail
+            heads.append(Head(model_lines(building), building.issues, (str(error),)))
+    return joined(heads)
+
+
+def case_year(inputs: Inputs, case: Case, **chosen: Unpack[RoomChoices]) -> RoomYear:
+    """The room's year by the case's options; chosen: as of `lit_room`."""
+    options, (space,) = case.options, inputs.spaces
+    skies = _skies(
+        case.weather,
+        case.orientation_deg,
+        options.method,
+        options.sampling,
+        *options.sky.items(),
+    )
+    return compute_room(
+        inputs.building, space, inputs.systems, inputs.weather, options,
+        operation=inputs.operation, skies=skies, cache=MatrixCache.of_user(), pictures=False,
+        **chosen,
+    )  # fmt: skip
 
 
 def compute_case(case: Case, progress: Progress = silent) -> CaseResult:
@@ -110,11 +119,11 @@ def compute_case(case: Case, progress: Progress = silent) -> CaseResult:
 def _computed(case: Case, progress: Progress) -> CaseResult:
     start = time.monotonic()
     variants.activate()
-    held = CaseRoom.of(case)
-    space, systems, weather = held.space, held.systems, held.weather
+    inputs = case_inputs(case)
+    systems, weather = inputs.systems, inputs.weather
     hours = _rated_hours(weather, case.options)
     rate = None if case.glare == "none" else (case.glare, hours)
-    room = held.year(case, rate=rate, progress=progress)
+    room = case_year(inputs, case, rate=rate, progress=progress)
     figures, arrays = room_figures(room)
     figures |= {f"da300 {grid.name}": grid.metrics["da300"] for grid in room.daylight.grids}
     figures["straight_view_percent"] = _straight_view(room, systems, hours)
@@ -124,14 +133,13 @@ def _computed(case: Case, progress: Progress) -> CaseResult:
         arrays["dgp"] = np.full(len(weather.times), np.nan, dtype=np.float32)
         arrays["dgp"][hours] = room.dgp.dgp
     if case.bsdf is None:  # else the table says it: names are no part of a case's key
-        figures["fenestration"] = " ".join(source_notes(window_sources(space.windows, systems)))
-    used = [state for states in systems.values() for state in states]
-    heats = {id(system): thermal_system(system).named_model for system in used}
-    figures["window_model"] = " ".join(dict.fromkeys(heats.values()))
+        figures["fenestration"] = " ".join(source_notes(inputs.sources))
+    models = (thermal_system(system).named_model for system in inputs.used_systems)
+    figures["window_model"] = " ".join(dict.fromkeys(models))
     of_file = _weather(case.weather, case.orientation_deg).notes
     if street := [note for note in weather.notes if note not in of_file]:
         figures["heat_island"] = " ".join(street)
-    if trees := tree_notes(held.building):
+    if trees := tree_notes(inputs.building):
         figures["trees"] = " ".join(trees)
     figures["seconds"] = round(time.monotonic() - start, 3)
     return CaseResult(case.key, figures, arrays)
@@ -145,26 +153,18 @@ def _straight_view(room: RoomYear, systems: dict[str, States], hours: NDArray[np
     return straight_view(room.space.windows, systems, state)
 
 
-Around = tuple[tuple[InputFile, ...], tuple[float, float, float] | None]
+def _building(case: Case) -> Building:
+    """The building of a case: files are read once for neighbours in the grid."""
+    options = replace(case.inputs, spaces=(), weather=None)
+    if isinstance(case.building, InputFile):
+        return _read_building(case.building, options)
+    return building_or_box(case.building, options)
 
 
 @lru_cache(maxsize=4)
-def _building(source: InputFile, around: Around) -> Building:
-    files, offset = around
-    options = ReadOptions(
-        surroundings=tuple(file.path for file in files), surroundings_offset=offset
-    )
-    return read_building_file(source.path, options)
-
-
-def _room(case: Case) -> tuple[Building, Space]:
-    around = case.surroundings, case.surroundings_offset
-    if isinstance(case.building, InputFile):
-        building = _building(case.building, around)
-    else:
-        files = [file.path for file in around[0]]
-        building = surrounded(box_building(case.building), files, around[1])
-    return building, building.space(case.space)
+def _read_building(source: InputFile, options: InputOptions) -> Building:
+    """The building of a file that has not changed since: `source` tells files apart."""
+    return building_of(options)
 
 
 @lru_cache(maxsize=4)
@@ -176,32 +176,11 @@ def _weather(source: InputFile, angle: float) -> Weather:
     return _read_weather(source).turned(angle)
 
 
-def case_weather(case: Case, operation: Operation | None) -> Weather:
-    """The weather of a case, turned as its building is, with the air that its operation states."""
-    weather = _weather(case.weather, case.orientation_deg)
-    return weather if operation is None else operation.outdoors(weather)
-
-
 @lru_cache(maxsize=1)  # some 100 MB each; neighbours in the grid share it
 def _skies(
     source: InputFile, angle: float, method: str, sampling: Sampling, *sky: tuple[str, str]
 ) -> AnnualSky:
     return skies_for(_weather(source, angle), method, sampling, **dict(sky))
-
-
-def case_systems(case: Case, space: Space, operation: Operation | None = None) -> dict[str, States]:
-    """The systems by state of each window of a case's room, by its GUID.
-
-    Args: operation: of the case; read now without.
-    """
-    if operation is None and case.operation is not None:
-        operation = read_operation(case.operation.path)
-    states: States = () if operation is None else operation.systems
-    if case.bsdf is not None:
-        given = {"u_value": case.u_value, "g_value": case.g_value}
-        states = (read_system(case.bsdf.path, **given),)
-    file = case.building.path if isinstance(case.building, InputFile) else None
-    return fill_windows(space.windows, Given(states, ask="a [[system]]"), file)
 
 
 def _rated_hours(weather: Weather, options: RoomOptions) -> NDArray[np.int64]:

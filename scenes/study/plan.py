@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
-from bim.building_file import ReadOptions, held_states, read_building_file, surrounded
+from bim.building_file import held_states
 from bim.model import Building, Space
 from mitsuba_cfs.errors import DataError
+from scenes.chosen_rooms import chosen_spaces
 from scenes.fenestration.thermal_file import files_beside
-from scenes.heat.box import box_building
+from scenes.heat.box import building_or_box
+from scenes.input_options import InputOptions
+from scenes.read_table import read_options
 from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
-from scenes.run.inputs import chosen_spaces
 from scenes.study.case import AUTO, Case, InputFile, program_version
 from scenes.study.study_file import RoomTable, Study, SystemTable
 
@@ -42,7 +43,8 @@ def plan_of(study: Study) -> StudyPlan:
     _check_turning(study)
     around = tuple(map(InputFile.of, study.surroundings))
     for room in study.room:
-        building, spaces = rooms_of(room, study.surroundings, study.surroundings_offset)
+        read = read_options(room, study)
+        building, spaces = rooms_of(room, study)
         source = room.box if room.box is not None else InputFile.of(room.building)
         held_files = () if study.system else _referenced(building)
         for space in spaces:
@@ -52,8 +54,8 @@ def plan_of(study: Study) -> StudyPlan:
                 "space_name": room.name if room.box else space.label,
                 "building": source,
                 "specular": room.specular,
+                **read,
                 "surroundings": around,
-                "surroundings_offset": study.surroundings_offset,
             }
             mine = [one | {"referenced": (*held_files, *one["referenced"])} for one in systems]
             of_space = list(_of_space(study, about, mine, climates))
@@ -118,18 +120,10 @@ def _referenced(building: Building) -> tuple[InputFile, ...]:
     return tuple(InputFile.of(file) for file in (*sorted(named), *beside) if file.is_file())
 
 
-def rooms_of(
-    room: RoomTable,
-    surroundings: Sequence[Path] = (),
-    offset: tuple[float, float, float] | None = None,
-) -> tuple[Building, list[Space]]:
-    """The building of an entry and the rooms asked for.
-
-    Args: surroundings, offset: what stands around, as of `read_building`.
-    """
+def rooms_of(room: RoomTable, study: Study) -> tuple[Building, list[Space]]:
+    """The building of an entry and the rooms asked for."""
+    options = InputOptions(room.building, None, **read_options(room, study))
+    building = building_or_box(room.box, options)
     if room.box is not None:
-        building = surrounded(box_building(room.box), surroundings, offset)
         return building, list(building.spaces)
-    options = ReadOptions(surroundings=tuple(surroundings), surroundings_offset=offset)
-    building = read_building_file(room.building, options)
     return building, chosen_spaces(building, room.spaces, room.building)

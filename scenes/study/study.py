@@ -16,11 +16,12 @@ from bim.model import Space
 from bim.report.issue import Issue
 from mitsuba_cfs.progress import Progress, Stage, silent
 from scenes.calibration.durations import spoken_time
+from scenes.head import Head
 from scenes.report.glare_figures import compass
 from scenes.study.automatic import settled
 from scenes.study.case import Case
 from scenes.study.explored import ExploredCase, explorer_key, explorers
-from scenes.study.one_case import compute_case
+from scenes.study.one_case import compute_case, plan_head
 from scenes.study.plan import AS_HELD, StudyPlan, plan_of
 from scenes.study.schedule import Compute, computed
 from scenes.study.store import CaseResult, Store
@@ -67,6 +68,11 @@ class StudyResult:
         """The faults of all building models, each once."""
         buildings = (building for building, _ in self.plan.rooms.values())
         return tuple(dict.fromkeys(issue for one in buildings for issue in one.issues))
+
+    @property
+    def head(self) -> Head:
+        """What was left out of the buildings, and what was assumed in the cases."""
+        return plan_head(self.plan)
 
     @property
     def table(self) -> pd.DataFrame:
@@ -240,4 +246,5 @@ def manifest(study: Study, plan: StudyPlan) -> dict:
         "sha256": files,
         "fenestration": {case.system: source_of(case) for case in plan.cases},
         "cases": [case.key for case in plan.cases],
+        "head": plan_head(plan).record,
     }

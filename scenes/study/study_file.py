@@ -13,6 +13,7 @@ from scenes import plausible
 from scenes.calibration.durations import seconds_of, share_of
 from scenes.heat.study_file import BoxTable
 from scenes.quick import ROOM, picks
+from scenes.read_table import OutdoorTable, ReadTable
 from scenes.room.operation import read_operation
 from scenes.room.options import CHOICES, RoomOptions, named_types
 from scenes.room.schedules import Hours
@@ -33,7 +34,7 @@ class _Table(TomlTable):
     model_config = ConfigDict(validate_default=True)
 
 
-class RoomTable(_Table):
+class RoomTable(_Table, ReadTable):
     """Rooms of a building file, or one box."""
 
     name: str = ""
@@ -104,7 +105,7 @@ def _options_table() -> type[BaseModel]:
 OptionsTable = _options_table()
 
 
-class Study(_Table):
+class Study(_Table, OutdoorTable):
     """A whole study; paths are relative to the file."""
 
     title: str = ""
@@ -118,8 +119,6 @@ class Study(_Table):
     ] = (RoomOptions().method,)
     glare: Literal["DGP", "eDGP", "sDGP", "none"] = "DGP"  # of every occupied hour with sun
     operation: Path | None = None  # control, gains, air, set points: as for `cfs run`
-    surroundings: tuple[Path, ...] = ()  # files of what stands around every building
-    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     auto: AutoTable = AutoTable()
     options: OptionsTable = OptionsTable()
     quick: bool = False  # a first look: what the options do not say is chosen by `scenes.quick`

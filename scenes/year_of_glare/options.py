@@ -1,27 +1,19 @@
-"""What the user may choose about a year of glare; every default is stated here."""
+"""Options of `cfs dgp`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
+
+from scenes.input_options import InputOptions
 
 METHODS = ("five-phase", "three-phase")
 METRICS = ("DGP", "eDGP", "sDGP")
 
 
-@dataclass(frozen=True, slots=True)
-class YearOptions:
-    """Inputs and choices."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class YearOptions(InputOptions):
+    """Options of a year of glare; of the rooms the first is rated."""
 
-    building: Path
-    weather: Path
-    system: Path | None = None  # of every window; None: what the building's file holds
-    space: str | None = None  # name or GUID; None: the first room that has a window
-    join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
-    furniture: bool = False  # whether what stands in the room is in its light and views
-    apertures: tuple[str, ...] = ()  # materials of a Radiance scene's windows; none: all of glass
-    surroundings: tuple[Path, ...] = ()  # files of what stands around
-    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     views: tuple[str, ...] = ()  # Radiance view options, or files of them
     grid: float | None = None  # [m] spacing of eyes all over the room, in place of one
     directions: int = 1  # at every eye, the first towards the biggest window
@@ -34,10 +26,9 @@ class YearOptions:
     occupied: tuple[int, int] = (8, 18)  # clock hours, every day
     worst: int = 3  # pictures of each view's worst hours
     hdr: bool = False  # the pictures as .hdr too
-    window_parts: int = 0  # of each group; 0: as many as what stands outdoors asks for
+    window_parts: int = 0  # subgroups of each window group; 0: choose from the surroundings
     glare_sources: str = "evalglare"  # bright pixels grouped so, or each of the "pixels"
     glare_sun: str = "source"  # the sun's disc: a source of its own, or part of its "pixels"
     sun_model: str = "spa"  # see `mitsuba_cfs.sky.sun`
     sky_ground: str = "reflected"  # see `mitsuba_cfs.sky.ground`
     seed: int = 0
-    quick: bool = False  # said in the results; what it chooses is in `scenes.quick`

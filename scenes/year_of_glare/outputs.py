@@ -120,11 +120,12 @@ def write_summary(year: GlareYear, rows: list[dict[str, object]], folder: Path) 
     manifest = {
         "quick": options.quick,
         "room": year.room,
-        "options": {name: _plain(getattr(options, name)) for name in options.__slots__},
+        "options": {name: _plain(value) for name, value in options.named().items()},
         "inputs": year.digest,
         "glare_rule": rating_of(options).rule,
         "fenestration": list(year.fenestration),
-        "notes": list(year.notes),
+        "head": year.head.record,
+        "notes": [*year.head.notes, *year.notes],
         "hours_with_sun": len(year.sky.lit),
         "version": metadata.version("mitsuba-cfs"),
     }

@@ -38,6 +38,7 @@ def write_page(year: GlareYear, table: pd.DataFrame, path: Path) -> None:
         .render(
             year=year,
             facts=_facts(year, table),
+            notes=(*year.head.lines, *year.notes),
             plan=_plan(year, table),
             limits=[f"{limit:.2f}" for limit in LIMITS],
             worst=_worst(year, table),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from bim.model import Building, Space
 from mitsuba_cfs.errors import DataError
+from scenes import input_files
+from scenes.input_files import InputFiles, check_building
 from scenes.room_views import NamedView, check_eye, eyes_of, given_views, held_fisheyes
 from scenes.year_of_glare.options import YearOptions
 
@@ -30,6 +32,16 @@ def rated_views(options: YearOptions) -> list[NamedView]:
     for each in found:
         _check_kind(each)
     return found
+
+
+def read_files(options: YearOptions) -> InputFiles:
+    """The small files of a year of glare; its views are checked too, before the building is read.
+
+    Raises: `DataError` for what cannot be used.
+    """
+    check_building(options)
+    rated_views(options)
+    return input_files.read_files(options, light_only=True)
 
 
 def _check_kind(each: NamedView) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,11 +34,12 @@ from mitsuba_cfs.progress import Progress, item, part, silent, summed
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.source_code import code_version
-from scenes.run.inputs import sha256
-from scenes.run.viewed_room import read_viewed_room
-from scenes.year_of_glare.files import YearFiles, read_files
+from scenes.head import NO_HEAD, Head
+from scenes.input_files import InputFiles, sha256
+from scenes.inputs import first_states, read_inputs
+from scenes.viewed_room import viewed_room
 from scenes.year_of_glare.options import YearOptions
-from scenes.year_of_glare.views import NamedView, chosen_views
+from scenes.year_of_glare.views import NamedView, chosen_views, read_files
 
 TRACING = {"daylight": 1.0, "view matrices": 2.0}  # shares of the time
 DARK = 0.0  # DGP of the hours of use without sun, for the share of hours
@@ -67,7 +68,8 @@ class GlareYear:
     sky: AnnualSky  # of the hours L with the sun up
     used: NDArray[np.bool_]  # [H] hours of use
     digest: str  # of all inputs
-    notes: tuple[str, ...] = ()  # of systems and weather
+    head: Head = NO_HEAD  # what was left out, what was assumed
+    notes: tuple[str, ...] = ()  # light that is lost through leaks of the model
     fenestration: Sequence[dict] = ()  # system, source and windows of each, see `resolver`
     space: Space | None = None  # the room, for its plan
     scenes: Sequence[DaylightScene] = ()  # of each season; none where it is always the same
@@ -75,27 +77,29 @@ class GlareYear:
 
 
 def read_year(
-    options: YearOptions, progress: Progress = silent, files: YearFiles | None = None
+    options: YearOptions,
+    progress: Progress = silent,
+    files: InputFiles | None = None,
+    on_head: Callable[[Head], None] = lambda head: None,
 ) -> GlareYear:
     """Read and check all inputs, the building last; `DataError` where one cannot be used.
 
-    Args: files: what `read_files` has read of the options; read now without.
+    Args:
+        files: of `read_files`; read now by default.
+        on_head: called with what was left out and assumed, before anything is traced.
     """
     files = files or read_files(options)
-    weather = files.weather
-    progress("inputs", 0.1)
     views: list[NamedView] = []
 
     def view_of(building: Building, space: Space) -> View:
         views.extend(chosen_views(building, space, options))
         return views[0].view
 
-    steps = part(progress, 0.1, 0.6)
-    viewed = read_viewed_room(
-        options.building, options.space, options.join, files.given, view_of, steps,
-        furniture=options.furniture, apertures=options.apertures,
-        surroundings=options.surroundings, surroundings_offset=options.surroundings_offset,
-    )  # fmt: skip
+    steps = part(progress, 0.0, 0.6)
+    inputs = read_inputs(options, files, steps, rooms="first", states=first_states)
+    weather = inputs.weather
+    on_head(inputs.head)
+    viewed = viewed_room(inputs, view_of)
     variants.activate()
     sampling = sampling_of(options)
     sky = annual_sky(
@@ -106,20 +110,19 @@ def read_year(
     chosen = [options.method, options.metric, options.samples, options.seed, options.join]
     chosen += [options.window_parts, options.glare_sources, options.glare_sun]
     chosen += [options.sun_model, options.sky_ground, options.furniture, options.apertures]
-    chosen.append(options.surroundings_offset)
+    chosen += [options.surroundings_offset, options.facade_panes]
     # corrections change rooms and surroundings, as --join does, under the same GUID
     files_read = (options.building, options.weather, *files_beside(options.building))
     files_read += options.surroundings
     hashes = [sha256(path) for path in files_read]
     # not of files: the model may name others, which change by themselves
-    hashes.append(content_digest(*([s.visible, s.fine, s.angular] for s in viewed.systems)))
+    hashes.append(content_digest(*([s.visible, s.fine, s.angular] for s in inputs.used_systems)))
     chosen = [code_version(__name__), *chosen, *hashes]
     digest = hashlib.sha256(json.dumps([*chosen, viewed.space.guid]).encode()).hexdigest()
     used = working_hours(weather, *options.occupied)
-    notes = (*viewed.notes(), *weather.notes)
     return GlareYear(
         options, viewed.space.label, views, viewed.scene, viewed.optics, weather, sky, used, digest,
-        notes, viewed.sources, viewed.space, viewed.scenes,
+        inputs.head, tuple(viewed.leaks()), inputs.sources, viewed.space, viewed.scenes,
         season_of(viewed.seasons, weather.midpoints[sky.lit].month.to_numpy()),
     )  # fmt: skip
 

@@ -28,11 +28,9 @@ from scenes.comply.rules import read_rule
 from scenes.comply.tables import beside_limit, shown
 from scenes.comply.uses import read_uses
 from scenes.demo import OFFICE, WEATHER
-from scenes.fenestration.systems import Given
+from scenes.input_files import InputFiles, read_building, read_weather
 from scenes.page_options import PageOptions
 from scenes.result_folder import ResultFolder
-from scenes.run.building import read_building
-from scenes.run.inputs import read_weather
 
 HEAD = """
 title = "View and sun"
@@ -73,7 +71,12 @@ def options(tmp_path_factory) -> ComplyOptions:
 def files_of(options: ComplyOptions, **more) -> ComplyFiles:
     rules = {"rays": read_rule(options.standards[0])}
     found = ComplyFiles(
-        read_weather(WEATHER), rules, read_uses(), Given(), None, 13.0, "assumed: as you like"
+        InputFiles(read_weather(WEATHER)),
+        rules,
+        read_uses(),
+        None,
+        13.0,
+        "assumed: as you like",
     )
     return replace(found, **more)
 
@@ -357,7 +360,7 @@ def test_files_are_read_by_their_options(tmp_path):
     options = ComplyOptions(OFFICE, WEATHER, standards=("en17037", str(path)))
     found = read_files(options)
     assert list(found.rules) == ["en17037", "house"]
-    assert found.given.light_only and isinstance(Path(str(path)), Path)
+    assert found.inputs.overrides.light_only and isinstance(Path(str(path)), Path)
 
 
 def test_a_dossier_prints_on_a4_with_units_as_they_are_written(result):

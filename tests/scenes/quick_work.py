@@ -52,8 +52,7 @@ def _compliance(options, *_others):
     from scenes.comply.findings import calendar_of
     from scenes.comply.results import Compliance
     from scenes.comply.sunlight import sun_day
-    from scenes.run.building import read_building
-    from scenes.run.inputs import read_weather
+    from scenes.input_files import read_building, read_weather
 
     weather, building = read_weather(options.weather), read_building(options.building)
     rooms = tuple(_checked(space) for space in building.spaces)

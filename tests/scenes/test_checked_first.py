@@ -345,4 +345,4 @@ def test_the_demos_inputs_are_no_mistake() -> None:
 
     room = RoomOptions.of(picture_hours=("06-21 12",))
     found = read_files(JobOptions(OFFICE, WEATHER, VENETIAN_BLIND, room=room))
-    assert found.system is not None and len(found.weather.times) == 8760
+    assert found.overrides.states and len(found.weather.times) == 8760

@@ -152,7 +152,7 @@ def test_a_run_has_the_temperatures_of_a_coupled_study(variant, weather, blind, 
     building = read_ifc(OFFICE)
     systems = in_all_windows(building, blind)
     operation = read_operation(tmp_path / "operation.toml")
-    inputs = run.JobInputs(building, list(building.spaces), weather, systems, operation)
+    inputs = run.Inputs(building, list(building.spaces), weather, systems, operation)
     room = study.options.changed(picture_size=32, picture_samples=1, picture_count=1)
     skies = skies_for(weather, room.method, room.sampling, **room.sky)
     options = JobOptions(OFFICE, WEATHER, cache=False, room=room)

@@ -20,10 +20,10 @@ def our_year(name: str) -> Year:
     """The year of the demo's room by this project's three-phase method."""
     from bim.ifc.building import read_ifc
     from scenes.fenestration.systems import read_system
+    from scenes.input_files import read_weather
     from scenes.room.options import RoomOptions
     from scenes.room.room import compute_room
     from scenes.room.windows import in_all_windows
-    from scenes.run.inputs import read_weather
 
     building = read_ifc(OFFICE)
     space = building.space(name)

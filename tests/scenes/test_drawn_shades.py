@@ -8,11 +8,10 @@ import pytest
 from bim.ifc.building import read_ifc
 from bim.report.issue import issue_text
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.progress import silent
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import FenestrationSystem, read_system
+from scenes.inputs import read_inputs
 from scenes.room.windows import has_shade
-from scenes.run.job import read_inputs
 from scenes.run.options import JobOptions
 from tests.bim.small_ifc import OPENING, WALL, WIDTH, SmallIfc, box_room
 from tests.issues import of_code
@@ -70,7 +69,7 @@ def inputs(model, folder, toml: str):
     system = folder / "system.xml"
     system.write_bytes(VENETIAN_BLIND.read_bytes())
     system.with_suffix(".toml").write_text(toml)
-    return read_inputs(JobOptions(model, WEATHER, system=system), silent).building
+    return read_inputs(JobOptions(model, WEATHER, system=system)).building
 
 
 def test_the_blind_of_the_bsdf_is_left_out_and_named_with_its_area(model, tmp_path, caplog):

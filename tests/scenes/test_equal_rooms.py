@@ -83,7 +83,7 @@ def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeyp
         sensor_samples=1024, patch_samples=1024,
     )  # fmt: skip
     options = JobOptions(Path(), Path(), cache=False, room=room)
-    inputs = run.JobInputs(building, spaces, weather, systems, None)
+    inputs = run.Inputs(building, spaces, weather, systems, None)
     results, issues, notes = run._rooms(inputs, skies, options, silent)
     assert computed == ["room", "other"] and not issues
     assert [r.space.name for r in results] == ["room", "other", "twin"]
@@ -114,7 +114,7 @@ def test_equal_rooms_that_are_operated_otherwise_are_computed_each(
     cooler = '[[rooms]]\nspaces = ["twin"]\n[rooms.loads]\nheating_c = 16\n'
     for rooms, names in (("", ["room"]), (cooler, ["room", "twin"])):
         path.write_text(f"[loads]\nheating_c = 20\n{rooms}")
-        inputs = run.JobInputs(building, [ROOM, twin], weather, systems, read_operation(path))
+        inputs = run.Inputs(building, [ROOM, twin], weather, systems, read_operation(path))
         run._rooms(inputs, skies, options, silent)
         assert computed == names
         computed.clear()

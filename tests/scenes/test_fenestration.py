@@ -19,7 +19,7 @@ from mitsuba_cfs.images.exr import read_exr
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.resolver import fill_windows, windows_named
-from scenes.fenestration.systems import FenestrationSystem, Given, read_system
+from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system
 from scenes.fenestration.thermal_system import thermal_system
 from tests.bim.small_ifc import box_room
 from tests.scenes.fenestration_models import (
@@ -39,9 +39,9 @@ TINY = ["--quick", "--size", "64", "--picture", "06-21 12", "--spacing", "2",
 YEAR = ["--quick", "--size", "64", "--metric", "sDGP", "--method", "three-phase"]
 
 
-def filled(path: Path, given: Given | None = None) -> FenestrationSystem:
+def filled(path: Path, given: WindowOverrides | None = None) -> FenestrationSystem:
     """What fills the only window of a model, in its first state."""
-    (states,) = fill_windows(read_ifc(path).windows, given or Given(), path).values()
+    (states,) = fill_windows(read_ifc(path).windows, given or WindowOverrides(), path).values()
     return states[0]
 
 
@@ -80,16 +80,16 @@ def test_each_rung_goes_before_the_next(tmp_path, schema, typed) -> None:
     holder = "window type fixed pane" if typed else "the window itself"
     assert attached.source == f"what is attached to {holder} in room.ifc"
     blind = read_system(VENETIAN_BLIND, by="--cfs")
-    assert filled(path, Given((blind,))) is blind
+    assert filled(path, WindowOverrides((blind,))) is blind
     assert blind.source == "--cfs venetian_blind.xml"
 
 
 def test_u_and_g_of_the_flags_go_before_those_of_the_file(tmp_path) -> None:
     path = room(tmp_path / "room.ifc", STATED)
-    system = filled(path, Given(u_value=0.8, g_value=0.45))
+    system = filled(path, WindowOverrides(u_value=0.8, g_value=0.45))
     assert (system.u_value, system.g_value) == (0.8, 0.45)
     with_attached(path, 0.3, u_value=0.9, g_normal=0.4)
-    system = filled(path, Given(u_value=1.5))
+    system = filled(path, WindowOverrides(u_value=1.5))
     assert (system.u_value, system.g_value) == (1.5, 0.4)
     assert system.source.endswith("room.ifc, U of --u")
 
@@ -143,7 +143,7 @@ def test_a_shade_without_a_bsdf_is_no_clear_glazing(tmp_path) -> None:
 
 def test_the_light_alone_needs_no_g(tmp_path) -> None:
     path = room(tmp_path / "room.ifc", NOTHING["no g"][0])
-    assert normal(filled(path, Given(light_only=True)))[0] == pytest.approx(0.7, rel=2e-4)
+    assert normal(filled(path, WindowOverrides(light_only=True)))[0] == pytest.approx(0.7, rel=2e-4)
 
 
 def words_of(command: str, path: Path, folder: Path) -> list[str]:

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.usefixtures("variant")
 def test_corrections_beside_the_model_are_part_of_the_key(tmp_path):
     path = tmp_path / "office.ifc"
     path.write_bytes(OFFICE.read_bytes())
-    options = YearOptions(path, WEATHER, VENETIAN_BLIND, space="A")
+    options = YearOptions(path, WEATHER, VENETIAN_BLIND, spaces=("A",))
     before = read_year(options).digest
     assert read_year(options).digest == before
     path.with_suffix(".corrections.toml").write_text("surroundings = 0.9\n")

@@ -11,13 +11,14 @@ from mitsuba_cfs.sky.heat_island import in_city
 from mitsuba_cfs.sky.weather import Weather
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.fenestration.systems import Given
+from scenes.fenestration.systems import WindowOverrides
 from scenes.heat.files import read_files as heat_files
 from scenes.heat.study_file import StudyFile
+from scenes.input_files import InputFiles
+from scenes.input_options import NO_OPTIONS
+from scenes.inputs import inputs_of
 from scenes.room.operation import read_operation
-from scenes.run.files import JobFiles
-from scenes.run.job import job_inputs
-from scenes.study.one_case import CaseRoom
+from scenes.study.one_case import case_inputs
 from scenes.study.plan import plan_of
 from scenes.study.study_file import read_study
 
@@ -44,8 +45,8 @@ def street(weather) -> Weather:
 
 def test_rooms_of_a_run_stand_in_the_street(weather, street, blind, operation):
     box = shoebox(3.0, 4.0, windows=[WindowRectangle(0.5, 1.0, 2.0, 1.5)])
-    files = JobFiles(weather, blind, read_operation(operation), Given((blind,)))
-    found = job_inputs(box, (), files).weather
+    files = InputFiles(weather, WindowOverrides((blind,)), read_operation(operation))
+    found = inputs_of(box, NO_OPTIONS, files).weather
     np.testing.assert_array_equal(found.dry_bulb_c, street.dry_bulb_c)
     assert found.dry_bulb_c.mean() > weather.dry_bulb_c.mean() + 0.5
     assert sum(STREET in note for note in found.notes) == 1
@@ -55,7 +56,7 @@ def test_rooms_of_a_run_stand_in_the_street(weather, street, blind, operation):
 def test_a_case_of_a_study_and_a_study_of_heat_have_the_same_air(street, operation, tmp_path):
     head = f'operation = "{operation.name}"\nmethods = ["three-phase"]\norientations_deg = [90]\n'
     (case,) = plan_of(read_study(study_file(tmp_path, head))).cases
-    held = CaseRoom.of(case).weather
+    held = case_inputs(case).weather
     np.testing.assert_allclose(held.dry_bulb_c, street.dry_bulb_c)
     table = {
         "weather": WEATHER, "system": [{"bsdf": VENETIAN_BLIND}],

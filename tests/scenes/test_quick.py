@@ -198,7 +198,7 @@ def test_progress_counts_the_rooms(three_rooms, monkeypatch) -> None:
 
 
 def test_a_room_is_said_though_the_run_fails_later(monkeypatch, tmp_path, capsys) -> None:
-    def half(options, progress, files, *, on_room, on_light, on_building, workers):
+    def half(options, progress, files, *, on_room, on_light, on_head, workers):
         on_light(first)
         on_room(first)
         on_room(SimpleNamespace(space=SimpleNamespace(guid="b", label="B"), daylight=light))

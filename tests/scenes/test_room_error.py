@@ -40,13 +40,13 @@ def box(name: str, height: float) -> Space:
     )  # fmt: skip
 
 
-def inputs_of(*spaces: Space) -> job.JobInputs:
+def inputs_of(*spaces: Space) -> job.Inputs:
     building = replace(shoebox(), spaces=spaces)
     system = read_system(VENETIAN_BLIND)
     systems: dict = {}
     for space in spaces:
         systems |= in_all_windows(space, system)
-    return job.JobInputs(building, list(spaces), read_epw(WEATHER), systems, None)
+    return job.Inputs(building, list(spaces), read_epw(WEATHER), systems, None)
 
 
 def only_high_rooms_are_made_up(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,7 +60,7 @@ def only_high_rooms_are_made_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(job, "compute_room", made_up)
 
 
-def rooms_of(inputs: job.JobInputs):
+def rooms_of(inputs: job.Inputs):
     room = OPTIONS.room
     skies = skies_for(inputs.weather, room.method, room.sampling)
     return job._rooms(inputs, skies, OPTIONS, silent)

@@ -17,7 +17,7 @@ from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system
-from scenes.heat.study import rooms_of, run_study
+from scenes.heat.study import run_study, study_inputs
 from scenes.heat.study_file import read_study
 from scenes.room.inputs import RoomInputs, room_inputs
 from scenes.room.light import room_light
@@ -145,7 +145,8 @@ def test_states_switch_in_the_same_hours(variant, tmp_path, weather, rule) -> No
     )
     study, operation = read_study(tmp_path / "t.toml"), read_operation(tmp_path / "o.toml")
     (year,), _ = run_study(study, silent)
-    building, (space,) = rooms_of(study)
+    inputs = study_inputs(study)
+    building, (space,) = inputs.building, inputs.spaces
     found = compute_room(
         building, space, in_all_windows(space, *operation.systems), weather,
         RoomOptions.of(**SAMPLING), operation=operation, pictures=False,

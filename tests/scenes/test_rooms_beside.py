@@ -20,11 +20,11 @@ from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.progress import silent
 from mitsuba_cfs.variants import BLAS_THREADS
 from scenes.demo import VENETIAN_BLIND, WEATHER
+from scenes.inputs import Inputs, read_inputs
 from scenes.room import series
 from scenes.room.options import RoomOptions
 from scenes.room.series import RoomSeries
 from scenes.run import outputs, rooms_apart
-from scenes.run.job import JobInputs, read_inputs
 from scenes.run.options import JobOptions
 from scenes.run.rooms_apart import Workers
 from scenes.run.run import run_inputs, run_job
@@ -122,11 +122,11 @@ def test_a_worker_with_other_files_than_the_command_has_computes_nothing(tmp_pat
     options = JobOptions(building, WEATHER, VENETIAN_BLIND, cache=False, room=SMALL)
 
     def command() -> rooms_apart._FromFiles:
-        run = rooms_apart._identity(options, read_inputs(options, silent))
+        run = rooms_apart._identity(options, read_inputs(options))
         return rooms_apart._FromFiles(lambda building, space, *rest, **more: text, options, run)
 
     before = command()
-    (name,) = {space.guid for space in read_inputs(options, silent).spaces if "Hall" in space.label}
+    (name,) = {space.guid for space in read_inputs(options).spaces if "Hall" in space.label}
     assert before(name) == (name, text)
     building.write_text(text + "\n")
     assert command()(name) == (name, text)
@@ -148,7 +148,7 @@ def test_two_processes_give_what_one_gives(variant, weather, glass, monkeypatch)
         sky_subdivision=1, sensor_spacing=1.0, sensor_samples=512, patch_samples=256,
         picture_size=64, picture_count=1, picture_samples=1,
     )  # fmt: skip
-    inputs = JobInputs(building, spaces, weather, systems, None)
+    inputs = Inputs(building, spaces, weather, systems, None)
     options = JobOptions(Path(__file__), Path(__file__), cache=False, room=room)
     told: list[SimpleNamespace] = []
     one = run_inputs(inputs, options)

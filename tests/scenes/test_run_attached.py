@@ -15,13 +15,12 @@ import pytest
 from bim.fenestration import AngularGValue
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.matrices.cache import digest
-from mitsuba_cfs.progress import silent
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.attached import g_by_patch
 from scenes.fenestration.systems import read_system
 from scenes.fenestration.thermal_system import thermal_system
-from scenes.run.job import read_inputs, used_systems
+from scenes.inputs import read_inputs
 from scenes.run.options import JobOptions
 
 pytestmark = pytest.mark.early
@@ -82,8 +81,8 @@ def test_attached_data_give_the_numbers_of_the_file(tmp_path, blind) -> None:
 def test_a_file_named_by_the_model_is_read_with_u_beside_it(tmp_path, blind) -> None:
     with_data = tmp_path / "with_data.ifc"
     attach(OFFICE, with_data, "--all", "--bsdf", blind, "--u", "1.4", "--reference")
-    read = read_inputs(JobOptions(with_data, WEATHER, spaces=("A",)), silent)
-    systems = used_systems(read)
+    read = read_inputs(JobOptions(with_data, WEATHER, spaces=("A",)))
+    systems = read.used_systems
     assert len(systems) == 1 and systems[0].u_value == 1.4
     expected = read_system(blind).solar
     for name, block in systems[0].solar.blocks().items():
@@ -189,9 +188,9 @@ def both(blind: Path, tmp_path: Path, *options):
     attach(OFFICE, with_data, "--all", "--bsdf", blind, *options)
     for building, system in ((OFFICE, blind), (with_data, None)):
         inputs = read_inputs(
-            JobOptions(building=building, weather=WEATHER, system=system, spaces=("A",)), silent
+            JobOptions(building=building, weather=WEATHER, system=system, spaces=("A",))
         )
-        (found,) = used_systems(inputs)
+        (found,) = inputs.used_systems
         yield thermal_system(found)
 
 
@@ -220,7 +219,7 @@ def test_a_model_that_names_a_bsdf_has_the_toml_beside_that(tmp_path, blind) -> 
     with_data = tmp_path / "with_data.ifc"
     attach(OFFICE, with_data, "--all", "--bsdf", blind, "--reference")
     blind.with_suffix(".toml").write_text("u_value = 0.77\ng_value = 0.25\n")
-    (system,) = used_systems(read_inputs(JobOptions(with_data, WEATHER, spaces=("A",)), silent))
+    (system,) = read_inputs(JobOptions(with_data, WEATHER, spaces=("A",))).used_systems
     assert (system.u_value, system.g_value) == (0.77, 0.25)
 
 
@@ -246,7 +245,7 @@ def test_what_is_given_goes_before_the_toml_and_is_said(tmp_path, blind, capsys)
     assert "U 0.9 W/(m2 K) from --u (1.2 in blind.toml is not used)" in said
     assert "g from --g 0.28 (g in blind.toml is not used)" in said
     assert "BSDF (Visible, Solar) copied from blind.xml" in said
-    (system,) = used_systems(read_inputs(JobOptions(out, WEATHER, spaces=("A",)), silent))
+    (system,) = read_inputs(JobOptions(out, WEATHER, spaces=("A",))).used_systems
     assert (system.u_value, system.g_value, system.g_by_patch) == (0.9, 0.28, None)
     attach(OFFICE, out, "--all", "--bsdf", blind)
     assert "g 0.31 at normal incidence from blind.toml" in capsys.readouterr().out

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from mitsuba_cfs.sky.sun import direction
-from scenes.heat.study import rooms_of
+from scenes.heat.study import study_inputs
 from scenes.heat.study_file import read_study
 from tests.validation import simquality
 
@@ -47,7 +47,8 @@ def test_shapes_shade_as_the_suite_says(file: Path, reference: Path) -> None:
         np.radians(suite["Altitude [Deg]"].to_numpy()),
         np.radians(suite["Azimuth [Deg]"].to_numpy()),
     )
-    building, (space,) = rooms_of(read_study(file))
+    inputs = study_inputs(read_study(file))
+    building, (space,) = inputs.building, inputs.spaces
     corners = space.windows[0].triangles.reshape(-1, 3)
     low, high = corners.min(axis=0), corners.max(axis=0)
     steps = (np.arange(60) + 0.5) / 60

@@ -14,8 +14,10 @@ from bim.use import ALWAYS, ScheduledValue, StatedUse, YearSchedule
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.images.view import View, fisheye
 from scenes.demo import WEATHER
+from scenes.head import unused_notes
 from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
+from scenes.input_files import read_weather
 from scenes.room.inputs import FileSensors
 from scenes.room.operation import stated_note, with_stated_uses
 from scenes.room.operation_hours import OperationHours
@@ -23,8 +25,6 @@ from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.room import compute_room
 from scenes.room_views import held_fisheyes, held_view
-from scenes.run.inputs import read_weather
-from scenes.run.notes import unused_notes
 from tests.bim.honeybee_models import used_model, write
 from tests.conftest import REPOSITORY
 
@@ -126,7 +126,7 @@ def test_a_grid_of_the_file_has_the_light_of_its_own_sensors(used, weather, vari
         sensor_spacing=2.0, picture_count=0,
     )  # fmt: skip
     from scenes.fenestration.resolver import fill_windows
-    from scenes.fenestration.systems import Given
+    from scenes.fenestration.systems import WindowOverrides
     from scenes.room.light import grid_points
 
     points = grid_points(office, options.grid)
@@ -137,7 +137,7 @@ def test_a_grid_of_the_file_has_the_light_of_its_own_sensors(used, weather, vari
         HeldGrid("walls", points[:2], np.tile([0.0, -1.0, 0.0], (2, 1))),
     )
     building = replace(used, grids=grids)
-    systems = fill_windows(office.windows, Given(), building.file)
+    systems = fill_windows(office.windows, WindowOverrides(), building.file)
     year = compute_room(building, office, systems, weather, options, pictures=False)
     plane, walls = year.daylight.grids
     assert len(plane.sensor_metrics) == len(points) == len(year.daylight.points)

@@ -8,14 +8,13 @@ from dataclasses import replace
 import pytest
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.progress import silent
 from scenes import cli
 from scenes.commands.room_options import with_flags
 from scenes.demo import WEATHER
 from scenes.heat import study_file as heat_file
-from scenes.heat.study import rooms_of as heat_rooms
+from scenes.heat.study import study_inputs
+from scenes.inputs import read_inputs
 from scenes.run.files import read_files
-from scenes.run.job import read_inputs
 from scenes.run.options import JobOptions
 from scenes.run.run import _manifest
 from scenes.study import one_case
@@ -38,14 +37,14 @@ def options():
 
 
 def test_the_quarter_stands_around_the_room(options):
-    inputs = read_inputs(options, silent, read_files(options))
+    inputs = read_inputs(options, read_files(options))
     names = {element.name for element in inputs.building.elements}
     assert {"north block", "street block", "tower", "Overhang"} <= names
 
 
 def test_the_manifest_names_the_files(options):
-    inputs = read_inputs(options, silent, read_files(options))
-    manifest = json.loads(json.dumps(_manifest(options, "llvm", inputs, [], [])))
+    inputs = read_inputs(options, read_files(options))
+    manifest = json.loads(json.dumps(_manifest(options, "llvm", inputs, [])))
     assert manifest["inputs"]["surroundings_0"]["path"] == str(QUARTER)
     assert manifest["options"]["surroundings"] == [str(QUARTER)]
 
@@ -72,7 +71,7 @@ def test_ratings_of_a_year_are_not_found_again_for_other_surroundings(tmp_path, 
     wall = tmp_path / "wall.obj"
     wall.write_text("v -9 -3 0\nv 9 -3 0\nv 9 -3 6\nv -9 -3 6\nf 1 2 3 4\n")
     options = YearOptions(
-        TUTORIALS / "two_rooms.hbjson", WEATHER, space="Office", surroundings=(wall,)
+        TUTORIALS / "two_rooms.hbjson", WEATHER, spaces=("Office",), surroundings=(wall,)
     )
     moved = replace(options, surroundings_offset=(0.0, -1.0, 0.0))
     digests = [read_year(one).digest for one in (options, moved)]
@@ -102,12 +101,12 @@ def test_study_files_name_them(tmp_path):
     """Of `cfs thermal` and `cfs study`; `--surroundings` adds to them; the offset moves all."""
     heat = heat_file.read_study(study_of(tmp_path, "thermal"))
     heat = with_flags(heat, (QUARTER,), (-456000.0, -5430000.0, -110.0))
-    building, _ = heat_rooms(heat)
+    building = study_inputs(heat).building
     assert {"north block", "tower"} <= {element.name for element in building.elements}
     assert [file.name for file in heat.surroundings] == ["wall.obj", QUARTER.name]
     grid = grid_file.read_study(study_of(tmp_path, "study"))
     plan = plan_of(grid)
-    building, _ = one_case._room(plan.cases[0])
+    building = one_case._building(plan.cases[0])
     (wall,) = (element for element in building.elements if element.guid == "wall-0")
     assert wall.triangles[..., 1] == pytest.approx(-4.0)
     assert [file.path for file in plan.cases[0].surroundings] == list(grid.surroundings)

@@ -8,9 +8,8 @@ import pytest
 
 from mitsuba_cfs.errors import DataError
 from scenes.demo import WEATHER
-from scenes.fenestration.resolver import fill_windows
 from scenes.heat.files import read_files
-from scenes.heat.study import rooms_of
+from scenes.heat.study import study_inputs
 from scenes.heat.study_file import read_study
 
 BOX = """
@@ -39,10 +38,9 @@ def filled(folder: Path, *systems: str) -> list[tuple[str, ...]]:
     path = folder / "study.toml"
     path.write_text(f'weather = "{WEATHER}"\n' + BOX.format(systems="".join(systems)))
     study = read_study(path)
-    building, _ = rooms_of(study)
-    windows = [window for space in building.spaces for window in space.windows]
-    states = fill_windows(windows, read_files(study).given, study.building)
-    return [tuple(state.name for state in states[window.guid]) for window in windows]
+    inputs = study_inputs(study, read_files(study))
+    windows = [window for space in inputs.spaces for window in space.windows]
+    return [tuple(state.name for state in inputs.systems[window.guid]) for window in windows]
 
 
 def test_named_windows_have_their_own_states_and_the_rest_the_others(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from bim.seasons import seasons
 from mitsuba_cfs.errors import DataError
 from scenes import cli
 from scenes.demo import WEATHER
+from scenes.head import model_notes, unused_notes
 from scenes.room.control import shading_state
 from scenes.room.daylight import room_daylight
 from scenes.room.glare import annual_glare, room_glare
@@ -28,7 +29,6 @@ from scenes.room.skies import skies_for
 from scenes.room.solar import facade_irradiance, seasonal_outdoors, window_irradiance
 from scenes.room.windows import in_all_windows
 from scenes.room.zone import zone_surfaces
-from scenes.run.notes import model_notes, unused_notes
 from tests.conftest import REPOSITORY
 from tests.scenes.small_box import BOX, HOURS, SMALL
 

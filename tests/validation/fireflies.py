@@ -34,9 +34,9 @@ import mitsuba_cfs as cfs
 from bim.sensors import view_point
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs.glare.annual import full_picture
+from scenes.chosen_rooms import chosen_spaces
 from scenes.cost import room as box
-from scenes.run.building import read_building
-from scenes.run.inputs import chosen_spaces
+from scenes.input_files import read_building
 from tests.validation import geneva_scene as geneva
 
 LIMIT = 1.5  # times the brightest of the neighbourhood

@@ -1,31 +1,16 @@
-"""Reading the weather of a run, and choosing its rooms."""
+"""Rooms of a building by their names, and why a room or its windows are missing."""
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Callable, Sequence
-from os import PathLike
 from pathlib import Path
 
 from bim.model import Building, Space
 from bim.report.issue import Issue, issue_text
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.sky.epw import read_epw
-from mitsuba_cfs.sky.weather import Weather
 
 QUOTED = 3  # problems of the model that one message quotes
-
-
-def read_weather(path: str | PathLike[str]) -> Weather:
-    """Hourly weather of one year from an EPW file.
-
-    Raises: `DataError` for a file that cannot be used.
-    """
-    weather = read_epw(path)
-    if weather.step_h != 1.0:
-        raise DataError(f"has steps of {weather.step_h:g} h; the run needs hours", file=path)
-    return weather
 
 
 def chosen_spaces(
@@ -107,10 +92,4 @@ def _quoted(issues: Sequence[Issue]) -> str:
     texts = [issue_text(issue, "command") for issue in issues[:QUOTED]]
     shown = "; ".join(f"{text.what} ({text.effect})" for text in texts)
     more = len(issues) - QUOTED
-    return f"{shown}; and {more} more, see cfs ifc check" if more > 0 else shown
-
-
-def sha256(path: Path) -> str:
-    """Hash of a file's bytes."""
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    return f"{shown}; and {more} more, see cfs check" if more > 0 else shown

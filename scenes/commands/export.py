@@ -1,9 +1,10 @@
-"""The folders and files of `cfs ifc export`."""
+"""`cfs export`: the rooms of a building for other programs, with what is known of their windows."""
 
 from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,16 +12,106 @@ from typing import TYPE_CHECKING
 import click
 
 from mitsuba_cfs.errors import RoomError
+from mitsuba_cfs.files import check_file
+from scenes.commands.printed_head import PrintedHead
+from scenes.commands.room_options import (
+    height_option,
+    input_options,
+    spacing_option,
+    subdivision_option,
+)
+from scenes.input_options import InputOptions
 from scenes.result_folder import ResultFolder
 
 if TYPE_CHECKING:
     from bim.model import Building, Space
     from scenes.fenestration_exports import KnownFenestration
 
+BANDS = ("Visible", "Solar")
 PATTERNS = {  # of the files that an export writes
     "--radiance": ("*.rad", "*.pts", "*.vf", "windows_*.xml", "run.sh", "Makefile"),
     "--mitsuba": ("scene.xml", "glass_*.xml", "*.ply"),
 }
+
+
+@click.command()
+@input_options("all", weather="", system=False)
+@click.option(
+    "--radiance", type=click.Path(file_okay=False, path_type=Path),
+    help="Folder of Radiance scenes; one folder inside for each room.",
+)  # fmt: skip
+@click.option(
+    "--mitsuba", type=click.Path(file_okay=False, path_type=Path),
+    help="Folder of Mitsuba scenes; one folder inside for each room with a window.",
+)  # fmt: skip
+@click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
+@click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
+@click.option("--honeybee", type=click.Path(path_type=Path), help="honeybee model (.hbjson).")
+@click.option("--gbxml", type=click.Path(path_type=Path), help="gbXML file (.gbxml).")
+@click.option(
+    "--band", type=click.Choice(BANDS, case_sensitive=False), default="Visible", show_default=True,
+    help="Visible or Solar; of the Radiance and Mitsuba scenes.",
+)  # fmt: skip
+@spacing_option
+@height_option
+@subdivision_option
+def command(
+    *,
+    radiance: Path | None,
+    mitsuba: Path | None,
+    epjson: Path | None,
+    gltf: Path | None,
+    honeybee: Path | None,
+    gbxml: Path | None,
+    band: str,
+    sensor_spacing: float,
+    sensor_height: float,
+    subdivision: str,
+    **chosen,
+) -> None:
+    """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing.
+
+    BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
+
+    Windows go with the BSDF, U and g that the file holds or states for them; where they come from,
+    and what is not known, is said.
+    """
+    options = InputOptions(**chosen, weather=None)
+    building = options.building
+    files = {"--epjson": epjson, "--gltf": gltf, "--honeybee": honeybee, "--gbxml": gbxml}
+    asked = {"--radiance": radiance, "--mitsuba": mitsuba, **files}
+    if not any(asked.values()):
+        raise click.UsageError(f"nothing to write: give one of {', '.join(asked)}")
+    for field, path in files.items():
+        if path is not None:
+            check_file(path, field=field, inputs=[building])
+    folders = result_folders({"--radiance": radiance, "--mitsuba": mitsuba})
+
+    from scenes.chosen_rooms import named_spaces
+    from scenes.commands.progress_bar import ProgressBar
+    from scenes.fenestration_exports import known_fenestration
+    from scenes.head import head_of
+    from scenes.input_files import building_of
+
+    with ProgressBar() as progress:
+        read = building_of(options, progress)
+    spaces = named_spaces(read, options.spaces, building)
+    known = known_fenestration(spaces, building)
+    head = PrintedHead()
+    head(head_of(read, light_only=True).with_assumptions(known.notes()))
+    writers = room_writers(
+        known, band.lower(), spacing=sensor_spacing, height=sensor_height,
+        sky_division=int(subdivision),
+    )  # fmt: skip
+    export_folders(read, spaces, writers, folders)
+    exported = replace(read, spaces=tuple(spaces))
+    assumed = export_files(exported, known, epjson=epjson, honeybee=honeybee, gbxml=gbxml)
+    if gltf is not None:
+        from bim.to_gltf import write_gltf
+
+        write_gltf(exported, gltf)
+        click.echo(gltf)
+    head.notes(assumed)
 
 
 def result_folders(asked: Mapping[str, Path | None]) -> dict[Path, tuple[ResultFolder, list[str]]]:
@@ -30,7 +121,7 @@ def result_folders(asked: Mapping[str, Path | None]) -> dict[Path, tuple[ResultF
         if parent is not None:
             formats.setdefault(parent, []).append(option)
     return {
-        parent: (ResultFolder(parent, "ifc export", adding=True, field=options[0]), options)
+        parent: (ResultFolder(parent, "export", adding=True, field=options[0]), options)
         for parent, options in formats.items()
     }
 

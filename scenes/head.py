@@ -1,0 +1,218 @@
+"""The head of every result: what was left out, what was assumed, and how much it matters.
+
+The terminal, the JSON record and the pages of every command show the same lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from bim.account import NOT_USABLE
+from bim.model import Building, Space
+from bim.report.issue import Audience, Issue, issue_text
+from bim.report.ranking import Ranked, ranked
+from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration.resolver import source_notes, window_sources
+from scenes.fenestration.systems import FenestrationSystem, States
+from scenes.fenestration.thermal_system import thermal_system
+
+# Labels of the issues in a head, by severity, the gravest first; "info" changes nothing
+LABELS = {
+    "loss": "left out", "warning": "warning", "unused": "not used", "assumption": "assumed",
+}  # fmt: skip
+TREES = "trees-by-month"
+NOTED = ("rooms-joined-by-size", TREES)  # codes of issues that are notes of a result's pages
+SHOWN = 8  # kinds of issues of a severity that a head lists
+FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
+LEAST_PEAK = 0.01  # transmittance at normal incidence below which a peak is not noted
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What was left out of the inputs of a result, and what was assumed."""
+
+    model: tuple[str, ...]  # rooms and glass that were read, and a verdict
+    issues: tuple[Issue, ...] = ()  # of the building model
+    assumed: tuple[str, ...] = ()  # sentences: of use, systems, weather and site
+    noted: tuple[str, ...] = ()  # sentences of the model for pages that list its issues apart
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The head as the terminal and the pages show it."""
+        return self.text("command")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The assumptions as sentences, for a page that has account and issues elsewhere."""
+        return (*self.noted, *self.assumed)
+
+    def text(self, audience: Audience) -> tuple[str, ...]:
+        """The lines of the head; audience: whom the fixes are for."""
+        of_model = (
+            f"{label}: {text}"
+            for severity, label in LABELS.items()
+            for text in _issue_lines(self.issues, severity, audience)
+        )
+        return (*self.model, *of_model, *(f"assumed: {text}" for text in self.assumed))
+
+    def with_assumptions(self, sentences: Iterable[str]) -> Head:
+        """The head with further assumptions."""
+        return replace(self, assumed=tuple(dict.fromkeys([*self.assumed, *sentences])))
+
+    @property
+    def record(self) -> dict[str, list]:
+        """The head as data for a JSON file: issues by kind, the largest glass area first."""
+        return {
+            "model": list(self.model),
+            "issues": [
+                {
+                    "code": one.first.code, "severity": one.first.severity, "count": one.count,
+                    "glass_m2": round(one.glass, 3), "where": one.first.where,
+                    "text": one.text("command").line,
+                }
+                for one in ranked(self.issues)
+            ],
+            "assumed": list(self.assumed),
+        }  # fmt: skip
+
+
+NO_HEAD = Head(())
+
+
+def joined(heads: Iterable[Head]) -> Head:
+    """One head of several results, each line once."""
+    heads = list(heads)
+    issues = {(one.code, one.where, str(one.values)): one for head in heads for one in head.issues}
+    return Head(
+        _once(line for head in heads for line in head.model),
+        tuple(issues.values()),
+        _once(line for head in heads for line in head.assumed),
+        _once(line for head in heads for line in head.noted),
+    )
+
+
+def head_of(
+    building: Building,
+    spaces: Sequence[Space] = (),
+    systems: Mapping[str, States] | None = None,
+    weather: Weather | None = None,
+    *,
+    notes: Iterable[str] = (),
+    light_only: bool = False,
+) -> Head:
+    """The head of what is computed of a building.
+
+    Args:
+        spaces: the rooms that are computed; systems: of their windows, by GUID.
+        notes: further assumptions; light_only: neither U nor g of the systems is used.
+    """
+    systems = systems or {}
+    windows = [w for space in spaces for w in space.windows if w.guid in systems]
+    used = {id(one): one for states in systems.values() for one in states}.values()
+    assumed = [
+        *notes,
+        *source_notes(window_sources(windows, systems)),
+        *system_notes(used, light_only=light_only),
+        *([] if weather is None else [*weather.notes, *site_notes(building, weather)]),
+    ]
+    return Head(model_lines(building), building.issues, _once(assumed), model_notes(building))
+
+
+def model_lines(building: Building) -> tuple[str, ...]:
+    """Rooms and glass that were read; with the verdict where the reader gives an account."""
+    if building.account is not None:
+        return building.account.lines
+    glass = sum(window.area for window in building.windows)
+    return (
+        f"Rooms read: {len(building.spaces)}",
+        f"Glass: {glass:.1f} m2 in {len(building.windows)} windows",
+    )
+
+
+def _issue_lines(issues: Iterable[Issue], severity: str, audience: Audience) -> list[str]:
+    """The issues of a severity by kind, the largest glass area first."""
+    kinds = ranked([issue for issue in issues if issue.severity == severity])
+    lines = [_issue_line(one, audience) for one in kinds[:SHOWN]]
+    if len(kinds) > SHOWN:
+        count = sum(one.count for one in kinds[SHOWN:])
+        lines.append(f"{count} more of {len(kinds) - SHOWN} other kinds; cfs check lists all")
+    return lines
+
+
+def _issue_line(one: Ranked, audience: Audience) -> str:
+    area = f" ({one.glass:.2f} m2 of glass)" if one.glass else ""
+    return f"{one.text(audience).line}{area}"
+
+
+def model_notes(building: Building) -> tuple[str, ...]:
+    """Why the model cannot be used, what was joined, and what no result depends on."""
+    account = building.account
+    verdict = account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
+    issues = (one for one in building.issues if one.severity == "unused" or one.code in NOTED)
+    return (*verdict, *map(_note, issues))
+
+
+def unused_notes(building: Building) -> tuple[str, ...]:
+    """What of a building's file a command with uses, sensors and eyes of its own leaves out."""
+    held = {
+        "uses of rooms": building.uses, "sensor grids": building.grids, "views": building.views,
+    }  # fmt: skip
+    counts = [f"{len(some)} {what}" for what, some in held.items() if some]
+    if not counts or building.file is None:
+        return ()
+    return (f"{building.file.name} holds {', '.join(counts)}: not used here.",)
+
+
+def tree_notes(building: Building) -> tuple[str, ...]:
+    """How much light the trees outdoors let pass."""
+    return tuple(_note(issue) for issue in building.issues if issue.code == TREES)
+
+
+def _note(issue: Issue) -> str:
+    return f"{issue_text(issue, 'command').line}."
+
+
+def _once(lines: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(lines))
+
+
+def system_notes(
+    systems: Iterable[FenestrationSystem], *, light_only: bool = False
+) -> tuple[str, ...]:
+    """What was assumed of fenestration systems: bands, see-through peaks, U, g and window model."""
+    systems = list(systems)
+    notes = [note for system in systems for note in (*system.notes, *_peak_note(system))]
+    for heat in [] if light_only else map(thermal_system, systems):
+        notes += [*heat.notes, heat.named_model]
+    return tuple(dict.fromkeys(notes))
+
+
+def _peak_note(system: FenestrationSystem) -> tuple[str, ...]:
+    """A sentence where the light that passes straight on is taken from the Klems patches."""
+    if system.angular is not None or system.tree is not None:
+        return ()
+    bsdf = system.visible.filled()
+    peak = float(through_peak(bsdf.transmission_front, bsdf.basis_in).transmittance[0])
+    if peak < LEAST_PEAK:
+        return ()
+    return (
+        f"{system.name}: direct sun and view pass straight on by a see-through peak of the Klems "
+        f"patches, transmittance {peak:.2f} at normal incidence.",
+    )
+
+
+def site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
+    """A sentence where building and weather lie far apart."""
+    if building.latitude_deg is None or building.longitude_deg is None:
+        return ()
+    north = building.latitude_deg - weather.latitude_deg
+    east = (building.longitude_deg - weather.longitude_deg + 180) % 360 - 180
+    if max(abs(north), abs(east)) <= FAR_SITE_DEG:
+        return ()
+    return (
+        f"The building's site ({building.latitude_deg:.1f} N, {building.longitude_deg:.1f} E) is "
+        f"far from the weather station {weather.site} ({weather.latitude_deg:.1f} N, "
+        f"{weather.longitude_deg:.1f} E): the sun is the weather station's.",
+    )

@@ -1,0 +1,154 @@
+"""The files of a command: the small ones are read and checked before its building is.
+
+No tracer and no IFC reader is loaded for that: a mistake is reported within a second or two.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+
+from bim.building_file import STAGES, ReadOptions, check_building_file, read_building_file
+from bim.model import Building
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.progress import Progress, silent, summed
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system
+from scenes.fenestration.thermal_system import checked_system
+from scenes.input_options import InputOptions
+from scenes.room.operation import Operation, check_states, check_systems, read_operation
+from scenes.room.operation_hours import check_schedules
+
+
+@dataclass(frozen=True, slots=True)
+class InputFiles:
+    """Contents of the small files: all but the building."""
+
+    weather: Weather
+    # fenestration data that go before those of the building's file
+    overrides: WindowOverrides = field(default_factory=WindowOverrides)
+    operation: Operation | None = None
+
+
+def read_files(options: InputOptions, *, light_only: bool = False) -> InputFiles:
+    """Read and check the weather, the system and the operation, the quick ones first.
+
+    Args: light_only: neither U nor g is needed.
+
+    Raises: `DataError` for a file that cannot be used.
+    """
+    check_building(options)
+    if options.weather is None:
+        raise ValueError("inputs from files need a weather file")
+    weather = read_weather(options.weather)
+    operation = None if options.operation is None else read_operation(options.operation)
+    system = read_override(options, heat=not light_only)
+    if operation is not None:
+        check_systems(operation)
+        states = () if system is None else (system,)
+        if states or operation.systems:
+            check_states(operation, len(states or operation.systems))
+        check_schedules(operation.tables, weather, operation.file)
+        operation.outdoors(weather)  # a street out of range is named before the building is read
+    return InputFiles(weather, overrides_of(options, system, operation, light_only), operation)
+
+
+def check_building(options: InputOptions) -> None:
+    """Check what can be checked of the building and the rooms' names without reading the building.
+
+    Raises: `DataError` for a file of no format that is read, or an empty name.
+    """
+    if options.building is not None:
+        check_building_file(options.building)
+    check_names(options.spaces)
+
+
+def check_names(names: Sequence[str], field: str = "--space") -> None:
+    """Raise `DataError` for an empty name of a room."""
+    for name in names:
+        if not name.strip():
+            raise DataError("expected the name or GUID of a room, got nothing", field=field)
+
+
+def read_weather(path: str | PathLike[str]) -> Weather:
+    """Hourly weather of one year from an EPW file.
+
+    Raises: `DataError` for a file that cannot be used.
+    """
+    weather = read_epw(path)
+    if weather.step_h != 1.0:
+        raise DataError(f"has steps of {weather.step_h:g} h; the run needs hours", file=path)
+    return weather
+
+
+def read_override(options: InputOptions, *, heat: bool) -> FenestrationSystem | None:
+    """The system of `options.system` for every window.
+
+    Args: heat: whether its U, g and BSDF must go together.
+    """
+    if options.system is None:
+        return None
+    values = {"u_value": options.u_value, "g_value": options.g_value}
+    system = read_system(options.system, **values, by="--cfs")
+    if heat:
+        checked_system(system, options.system)
+    return system
+
+
+def overrides_of(
+    options: InputOptions,
+    system: FenestrationSystem | None,
+    operation: Operation | None = None,
+    light_only: bool = False,
+) -> WindowOverrides:
+    """What replaces the windows' own data: the system, else the operation's states; U and g."""
+    states = () if operation is None else operation.systems
+    states = states if system is None else (system,)
+    return WindowOverrides(states, options.u_value, options.g_value, light_only=light_only)
+
+
+def read_building(
+    path: str | PathLike[str],
+    *,
+    join: Sequence[str] = (),
+    furniture: bool = False,
+    apertures: Sequence[str] = (),
+    surroundings: Sequence[str | PathLike[str]] = (),
+    surroundings_offset: tuple[float, float, float] | None = None,
+    facade_panes: Sequence[str] = (),
+    progress: Progress = silent,
+) -> Building:
+    """The building of an IFC file, with the corrections kept beside it, or of another format.
+
+    Args:
+        join: rooms to make one, as "Hall + Living".
+        furniture: whether furniture is in the light and the views of its room.
+        apertures: materials of a Radiance scene's surfaces that are windows.
+        surroundings: files of what stands around, see `bim.with_surroundings`.
+        surroundings_offset: added to their coordinates [m] in place of any georeference.
+        facade_panes: materials of a Radiance scene's panes before dark rooms; they mirror.
+
+    Raises: `DataError` for a file that cannot be used; faults of the model are the building's
+        `problems`.
+    """
+    read = ReadOptions(
+        tuple(join), furniture, tuple(apertures), tuple(map(Path, surroundings)),
+        surroundings_offset, tuple(facade_panes),
+    )  # fmt: skip
+    return read_building_file(path, read, summed(progress, "inputs", STAGES))
+
+
+def building_of(options: InputOptions, progress: Progress = silent) -> Building:
+    """The building of a command's options; raises as `read_building`."""
+    steps = summed(progress, "inputs", STAGES)
+    return read_building_file(options.building, options.read, steps)
+
+
+def sha256(path: Path) -> str:
+    """Hash of a file's bytes."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

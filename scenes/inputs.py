@@ -1,0 +1,189 @@
+"""The one road from options to the inputs of every command.
+
+files = read_files(options)                 # `input_files`: weather, BSDF, operation
+inputs = read_inputs(options, files)        # the building, its rooms, what fills each window
+inputs.head.lines                           # what was left out, what was assumed
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from bim.model import Building, Space
+from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.sky.weather import Weather
+from scenes.chosen_rooms import chosen_spaces, named_spaces
+from scenes.fenestration.resolver import fill_windows, window_sources
+from scenes.fenestration.systems import FenestrationSystem, States
+from scenes.fenestration.thermal_file import files_beside
+from scenes.head import Head, head_of
+from scenes.input_files import InputFiles, building_of, read_files
+from scenes.input_options import NO_OPTIONS, InputOptions
+from scenes.room.inner_glass import opened, source_rooms
+from scenes.room.operation import Operation, check_states, stated_note, used_operation
+from scenes.room.operation_hours import check_schedules
+from scenes.room.windows import traced_building
+
+Systems = Mapping[str, States]  # by window GUID
+ChooseStates = Callable[[Systems], Systems]
+Rooms = Literal["glazed", "first", "all"]
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """Inputs of a command: a building with what fills each window, rooms, weather, operation."""
+
+    building: Building  # as it is traced: without drawn shades that a window's BSDF contains
+    spaces: Sequence[Space]  # the chosen rooms
+    weather: Weather
+    systems: Systems  # the states that are used
+    operation: Operation | None = None
+    options: InputOptions = NO_OPTIONS
+    filled: Systems = field(default_factory=dict)  # all states that the windows have
+    notes: tuple[str, ...] = ()  # assumptions about the use of rooms and the shading states
+    light_only: bool = False  # neither U nor g is used
+
+    @property
+    def used_systems(self) -> list[FenestrationSystem]:
+        """Each system of the windows once."""
+        return list({id(one): one for states in self.systems.values() for one in states}.values())
+
+    @property
+    def sources(self) -> list[dict]:
+        """Name and source of each system, and its windows."""
+        windows = [window for space in self.spaces for window in space.windows]
+        return window_sources([w for w in windows if w.guid in self.systems], self.systems)
+
+    @property
+    def head(self) -> Head:
+        """What was left out, what was assumed, and how much it matters."""
+        return head_of(
+            self.building, self.spaces, self.systems, self.weather,
+            notes=self.notes, light_only=self.light_only,
+        )  # fmt: skip
+
+    @property
+    def files(self) -> dict[str, Path]:
+        """The files that the inputs are made of, by what they are."""
+        options = self.options
+        named = {"building": options.building, "weather": options.weather}
+        files = {name: path for name, path in named.items() if path is not None}
+        if options.system is not None:
+            files["system"] = options.system
+            for i, path in enumerate(files_beside(options.system)):
+                files[f"system_angular_{i}" if i else "system_thermal"] = path
+        if self.operation is not None and self.operation.file != options.building:
+            files["operation"] = self.operation.file
+            files |= {f"state_{i}": path for i, path in enumerate(self.operation.files)}
+        return files | {f"surroundings_{i}": path for i, path in enumerate(options.surroundings)}
+
+
+def read_inputs(
+    options: InputOptions, files: InputFiles | None = None, progress: Progress = silent, **chosen
+) -> Inputs:
+    """The inputs of a command from its options: the building is read last.
+
+    Args: files: of `read_files`; read now by default; chosen: as of `inputs_of`.
+
+    Raises: as `read_files` and `inputs_of`.
+    """
+    files = files or read_files(options)
+    progress("inputs", 0.1)
+    building = building_of(options, part(progress, 0.1, 1.0))
+    inputs = inputs_of(building, options, files, **chosen)
+    progress("inputs", 1.0)
+    return inputs
+
+
+def inputs_of(
+    building: Building,
+    options: InputOptions,
+    files: InputFiles,
+    *,
+    rooms: Rooms = "glazed",
+    states: ChooseStates | None = None,
+    inner: bool = False,
+    fill: bool = True,
+) -> Inputs:
+    """The inputs of a command, of a building that was read or made.
+
+    Args:
+        rooms: which rooms without names: those with a window, the first of them, or all.
+        states: chooses from the states that the windows have; by default all states with an
+            operation, else the first.
+        inner: light passes glass between rooms; rooms lit by that alone count as glazed.
+        fill: whether the command needs to know what fills the windows.
+
+    Raises: `DataError` for a room that is not in the building, a window that nothing fills.
+    """
+    operation, weather, overrides = files.operation, files.weather, files.overrides
+    beyond: dict[str, list[Space]] = {}
+    if inner:
+        building = opened(building)
+        beyond = {space.guid: source_rooms(building, space) for space in building.spaces}
+    file = options.building or building.file or Path(building.name)
+    if rooms == "all":
+        spaces = named_spaces(building, options.spaces, file)
+    else:
+        spaces = chosen_spaces(
+            building, options.spaces, file, lambda s: bool(s.windows or beyond.get(s.guid))
+        )
+    spaces = spaces[:1] if rooms == "first" else spaces
+    traced = {s.guid: s for space in spaces for s in (space, *beyond.get(space.guid, ()))}
+    windows = [window for space in traced.values() for window in space.windows]
+    filled = fill_windows(windows, overrides, building.file) if fill else {}
+    if operation is not None:
+        weather = operation.outdoors(weather)
+        check_states(operation, max(len(states) for states in filled.values()))
+    states = states or (first_states if operation is None else every_state)
+    systems = states(filled)
+    used = used_operation(operation, building)
+    if used is not None and used is not operation:
+        check_schedules(used.tables, weather, used.file)
+    notes = (
+        *stated_note(building, "" if operation is None else operation.file.name),
+        *_state_notes(options, operation, filled, systems, building),
+    )
+    return Inputs(
+        traced_building(building, systems), spaces, weather, systems, used, options, filled,
+        notes, overrides.light_only,
+    )  # fmt: skip
+
+
+def first_states(systems: Systems) -> Systems:
+    """Each window in its first state."""
+    return {guid: states[:1] for guid, states in systems.items()}
+
+
+def every_state(systems: Systems) -> Systems:
+    """Each window in all its states."""
+    return systems
+
+
+def _state_notes(
+    options: InputOptions,
+    operation: Operation | None,
+    filled: Systems,
+    systems: Systems,
+    building: Building,
+) -> tuple[str, ...]:
+    """A sentence where windows have more states than are used."""
+    if operation is not None and operation.systems and options.system is not None:
+        name = operation.file.name
+        return (f"--cfs fills the windows: [[system]] of {name} is not used.",)
+    several = [
+        states[0].name
+        for guid, states in filled.items()
+        if operation is None and len(systems[guid]) == 1 < len(states)
+    ]
+    if not several:
+        return ()
+    source = building.name if options.building is None else options.building.name
+    names = ", ".join(dict.fromkeys(several))
+    return (
+        f"{source} holds several shading states; without --operation the first of "
+        f"each window ({names}) holds all year.",
+    )

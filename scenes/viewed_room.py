@@ -1,0 +1,67 @@
+"""The scene of a room for `cfs dgp` and `cfs picture`: its windows in their first state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bim.model import COLOURS, Building, Space
+from bim.seasons import Season, in_month, seasons
+from mitsuba_cfs.images.view import View
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods.optics import BsdfOptics
+from mitsuba_cfs.methods.scene import DaylightScene
+from scenes.inputs import Inputs
+from scenes.room.glare import band_scenes
+from scenes.room.leaks import leak_notes
+from scenes.room.windows import room_windows
+
+
+@dataclass(frozen=True, slots=True)
+class ViewedRoom:
+    """A room as a scene with the optics of its windows."""
+
+    space: Space
+    optics: list[list[BsdfOptics]]  # [G][1]
+    seasons: tuple[Season, ...]  # what stands outdoors in which months
+    scenes: tuple[DaylightScene, ...]  # of each season
+    bands: tuple[DaylightScene, ...] = ()  # the first scene by red, green and blue
+
+    @property
+    def scene(self) -> DaylightScene:
+        """The scene of the first season."""
+        return self.scenes[0]
+
+    def leaks(self) -> list[str]:
+        """Light that is lost through leaks of the model; traces a little."""
+        return leak_notes(self.space, cache=MatrixCache.of_user())
+
+
+def viewed_room(
+    inputs: Inputs,
+    view_of: Callable[[Building, Space], View],
+    *,
+    colour: bool = False,
+    month: int | None = None,
+) -> ViewedRoom:
+    """The first room of the inputs, in the visible band.
+
+    Args:
+        view_of: the view of a building's room; it refuses one that is not in the room.
+        colour: the scene in three bands too.
+        month: 1 to 12, of what stands outdoors; None: all seasons.
+    """
+    building, room = inputs.building, inputs.spaces[0]
+    view = view_of(building, room)
+    windows = room_windows(room, inputs.systems)
+    times = seasons(building)
+    if month is not None:
+        times = (Season((month,), in_month(building, month)),)
+    visible, *bands = band_scenes(
+        times[0].building, room, windows.groups, view, ("visible", *(COLOURS if colour else ()))
+    )
+    others = (
+        band_scenes(season.building, room, windows.groups, view, ("visible",))[0]
+        for season in times[1:]
+    )
+    return ViewedRoom(room, windows.optics(), times, (visible, *others), tuple(bands))

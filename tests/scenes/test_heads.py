@@ -1,0 +1,205 @@
+"""Every command takes every format and begins with the same head."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from bim.building_file import read_building_file
+from bim.gbxml.write import write_gbxml
+from bim.report.issue import issue_text
+from mitsuba_cfs.errors import DataError
+from scenes import cli
+from scenes.demo import VENETIAN_BLIND, WEATHER
+from scenes.head import Head, head_of, joined
+from scenes.input_files import read_files
+from scenes.input_options import InputOptions
+from scenes.inputs import read_inputs
+from tests.bim.honeybee_models import two_rooms, write
+from tests.bim.small_ifc import box_model
+from tests.conftest import REPOSITORY
+
+STOP = "stopped before anything is traced"
+RAD = REPOSITORY / "docs/tutorials/office.rad"
+STUDY = f"""
+[[room]]
+building = "{{0}}"
+[[system]]
+bsdf = "{VENETIAN_BLIND}"
+[[climate]]
+weather = "{WEATHER}"
+"""
+HEAT = f"""
+weather = "{WEATHER}"
+building = "{{0}}"
+[[system]]
+bsdf = "{VENETIAN_BLIND}"
+"""
+PV = """
+[module]
+select = "{0}"
+short_circuit_current = 9.5
+open_circuit_voltage = 40
+current = 9
+voltage = 32
+cells = 60
+"""
+
+
+def ifc(folder: Path) -> Path:
+    """A room, and above it a storey with a window and no room."""
+    path = folder / "house.ifc"
+    box_model(upper=True)[0].model.write(str(path))
+    return path
+
+
+def hbjson(folder: Path) -> Path:
+    """Two rooms, and one of a single wall: no room."""
+    model = two_rooms()
+    wall = dict(model["rooms"][0]["faces"][2], identifier="Lost_wall")
+    lost = {"type": "Room", "identifier": "Lost", "properties": {}, "faces": [wall]}
+    model["rooms"].append(lost | {"properties": {"energy": {}, "radiance": {}}})
+    return write(model, folder)
+
+
+def gbxml(folder: Path) -> Path:
+    """Two rooms, and a space that states an area and has no surface."""
+    empty = '<Space id="Lost"><Name>Lost</Name><Area>9</Area></Space>'
+    path = folder / "house.gbxml"
+    write_gbxml(read_building_file(write(two_rooms(), folder)), path)
+    path.write_text(path.read_text().replace("<Space ", f"{empty}<Space ", 1))
+    return path
+
+
+def rad(folder: Path) -> Path:
+    """A room, and an instance of an octree, which is not read."""
+    path = folder / "house.rad"
+    path.write_text(RAD.read_text() + "\nvoid instance lost\n1 lost.oct\n0\n0\n")
+    return path
+
+
+FORMATS: dict[str, Callable[[Path], Path]] = {
+    "ifc": ifc, "hbjson": hbjson, "gbxml": gbxml, "rad": rad,
+}  # fmt: skip
+MODULES = {
+    "ifc": "IfcSlab", "hbjson": "Overhang", "gbxml": "name=Overhang", "rad": "name=/ground.*/",
+}  # fmt: skip
+
+
+def _from(folder: Path, text: str, *values: object) -> Path:
+    path = folder / f"{len(list(folder.glob('*.toml')))}.toml"
+    path.write_text(text.format(*values))
+    return path
+
+
+def words(command: str, path: Path, folder: Path) -> list[object]:
+    """The call of a command for a building."""
+    weather, out = ["--weather", WEATHER], ["--out", folder / "out"]
+    system = ["--cfs", VENETIAN_BLIND]
+    return {
+        "run": ["run", path, *weather, *system, *out],
+        "dgp": ["dgp", path, *weather, *system, *out],
+        "picture": ["picture", path, *weather, *system, "--at", "06-21 12", "--out",
+                    folder / "a.png"],
+        "comply": ["comply", path, *weather, *system, "--standard", "en17037", *out],
+        "thermal": ["thermal", _from(folder, HEAT, path), *out],
+        "study": ["study", _from(folder, STUDY, path), *out],
+        "pv": ["pv", path, *weather, *out, "--study",
+               _from(folder, PV, MODULES[path.suffix[1:]])],
+        "check": ["check", path],
+        "export": ["export", path, "--gltf", folder / "a.glb"],
+    }[command]  # fmt: skip
+
+
+@pytest.fixture
+def stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The commands end where they would begin to trace."""
+
+    def stop(*_: object, **__: object) -> None:
+        raise DataError(STOP)
+
+    for name in (
+        "scenes.run.run.run_inputs", "scenes.year_of_glare.year.viewed_room",
+        "scenes.view_picture.viewed_room", "scenes.comply.comply.view_out",
+        "scenes.heat.study.skies_for", "scenes.study.study.computed",
+        "scenes.photovoltaics.study.cell_irradiance",
+    ):  # fmt: skip
+        monkeypatch.setattr(name, stop)
+
+
+COMMANDS = ("run", "dgp", "picture", "comply", "thermal", "study", "pv", "check", "export")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("kind", FORMATS)
+def test_every_command_shows_the_loss_of_every_format(
+    command: str, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], stopped: None
+) -> None:
+    path = FORMATS[kind](tmp_path)
+    code = cli.run([str(word) for word in words(command, path, tmp_path)])
+    output, errors = capsys.readouterr()
+    assert code == 0 or STOP in errors, errors
+    building = read_building_file(path)
+    losses = [issue for issue in building.issues if issue.severity == "loss"]
+    assert losses
+    if (command, kind) != ("pv", "ifc"):  # which reads no rooms
+        assert all(issue_text(issue, "command").what in output for issue in losses)
+    if command != "pv":
+        assert head_of(building).model[0] in output
+    if command not in ("pv", "check", "export"):
+        assert "assumed: " in output and VENETIAN_BLIND.name in output
+
+
+@pytest.mark.parametrize("command", ["run", "dgp", "picture", "comply"])
+def test_a_window_that_nothing_fills_ends_every_command(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call = [word for word in words(command, ifc(tmp_path), tmp_path) if word != "--cfs"]
+    call.remove(VENETIAN_BLIND)
+    assert cli.run([str(word) for word in call]) == 1
+    assert "window W1: has no BSDF attached" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["check", "export"])
+def test_the_earlier_names_lead_to_the_commands(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call = [str(word) for word in words(name, ifc(tmp_path), tmp_path)]
+    assert cli.run(call) == 0
+    now = capsys.readouterr()
+    assert cli.run(["ifc", *call]) == 0
+    before = capsys.readouterr()
+    note = f"note: `cfs ifc {name}` is now `cfs {name}`\n"
+    assert before.out == now.out
+    assert note in before.err and note not in now.err
+
+
+def test_a_head_is_data(tmp_path: Path) -> None:
+    """Issues by kind with their glass, and what was assumed of the systems."""
+    options = InputOptions(ifc(tmp_path), WEATHER, VENETIAN_BLIND)
+    head = read_inputs(options, read_files(options)).head
+    record = json.loads(json.dumps(head.record))
+    (lost,) = (one for one in record["issues"] if one["severity"] == "loss")
+    assert lost["code"] == "window-without-room" and lost["glass_m2"] > 1
+    assert any("window model" in text for text in record["assumed"])
+    assert joined([head, head]) == head
+    assert "cfs" not in " ".join(Head((), head.issues).text("python"))
+
+
+def test_panes_before_dark_rooms_mirror(tmp_path: Path) -> None:
+    """They are no windows of the room, and no light passes them."""
+    path = tmp_path / "house.rad"
+    pane = "0 0 12  -2 -8 0  6 -8 0  6 -8 6  -2 -8 6"
+    path.write_text(
+        RAD.read_text() + f"\nvoid glass across\n0\n0\n3 .8 .8 .8\nacross polygon p\n{pane}\n"
+    )
+    with pytest.raises(DataError, match="which one is outdoors"):
+        read_building_file(path)
+    options = InputOptions(path, None, facade_panes=("across",))
+    building = read_building_file(path, options.read)
+    assert len(building.windows) == 1
+    (pane,) = (one for one in building.elements if one.material == "across")
+    assert pane.gloss is not None and pane.reflectance_visible == 0
