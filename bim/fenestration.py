@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.bsdf.angular import AngularTable
+from mitsuba_cfs.bsdf.angular import AngularTable, glass_table
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
+from mitsuba_cfs.gloss import pane_shares
 from thermal.closure import Closure
 
 
@@ -27,6 +28,24 @@ class AngularGValue:
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.polar), len(self.azimuth)):
             raise ValueError("g-values: expected one for each polar angle and azimuth")
+
+
+@dataclass(frozen=True, slots=True)
+class PlainGlass:
+    """A single pane of uncoated glass as Radiance's material `glass` describes it."""
+
+    transmissivity: float  # of one way through it at normal incidence, visible
+    index: float  # of refraction
+
+    @property
+    def transmittance(self) -> float:
+        """Visible transmittance at normal incidence, with all reflections between the faces."""
+        return float(pane_shares(1.0, self.index, self.transmissivity)[0])
+
+    @property
+    def table(self) -> AngularTable:
+        """Transmittance and reflectance by the angle of incidence."""
+        return glass_table(self.transmissivity, self.index)
 
 
 @dataclass(frozen=True, slots=True)

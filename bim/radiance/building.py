@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bim.defaults import default_construction
 from bim.model import Building, Element, Face, Space, Window
 from bim.names import numbered
-from bim.radiance.daylight import held_states, opaque_objects, scene_windows
+from bim.radiance.daylight import held_states, opaque_objects, plain_glass, scene_windows
 from bim.radiance.indoors import THICK, Indoors, indoors_of
 from bim.radiance.materials import SYSTEMS
 from bim.radiance.scene import RadianceObject, RadianceScene, read_radiance
@@ -43,9 +43,11 @@ def read_radiance_building(
     windows = tuple(
         Window(
             name, name, surface.triangles, opening_area=_area(surface.triangles),
-            type_name=pane.material.name, states=held_states(pane),
+            visible_transmittance=None if glass is None else glass.transmittance,
+            type_name=pane.material.name, states=held_states(pane), glass=glass,
         )
         for name, surface, pane in zip(names, surfaces, panes, strict=True)
+        for glass in (plain_glass(pane.material),)
     )  # fmt: skip
     objects = opaque_objects(scene, facades)
     if not objects:

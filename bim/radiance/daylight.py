@@ -7,11 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.fenestration import ShadingState
+from bim.fenestration import PlainGlass, ShadingState
 from bim.radiance.materials import SYSTEMS, RadianceMaterial
 from bim.radiance.scene import RadianceObject, RadianceScene
 from bim.rays import RayMesh, hemisphere, ray_mesh
-from mitsuba_cfs.bsdf.angular import AngularTable, specular_matrices
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import pane_shares
@@ -91,20 +90,19 @@ def _sky_seen(
 
 
 def held_states(thing: RadianceObject) -> tuple[ShadingState, ...]:
-    """What the material of a window says of its optics: glass at every angle, or a BSDF file.
-
-    The file's front is outdoors; none for other materials.
-    """
+    """The BSDF file of a window's material, its front outdoors; none for other materials."""
     material = thing.material
     if material.kind in SYSTEMS:
         path = thing.primitive.file.parent / material.bsdf
         return (ShadingState(bands=dict(read_bsdf_xml(path).bands), file=path),)
+    return ()
+
+
+def plain_glass(material: RadianceMaterial) -> PlainGlass | None:
+    """The pane that a material of a window describes; None for others than `glass`."""
     if material.kind != "glass":
-        return ()
-    passed, mirrored = (shares[::-1].copy() for shares in glass_shares(material))
-    theta = np.arccos(np.linspace(0.0, 1.0, ANGLES))[::-1].copy()
-    table = AngularTable(theta, passed, mirrored, mirrored)
-    return (ShadingState(bands={"Visible": specular_matrices(table)}, angular=table),)
+        return None
+    return PlainGlass(material.transmissivity, material.index)
 
 
 def glass_shares(

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, polarised_values
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.pane_stack import PaneOptics, pane_optics, stack
+from mitsuba_cfs.gloss import pane_shares
 
 FloatArray = NDArray[np.float64]
 ANGLES = np.radians(np.arange(0.0, 90.25, 0.5))  # that formulas are tabulated at
@@ -93,6 +94,21 @@ def roos_table(glazing: Glazing) -> AngularTable:
     """A glazing unit after Roos et al. 2001, see `glazing_values`."""
     tau, front, back = (np.clip(v, 0, 1) for v in glazing_values(glazing, ANGLES))
     return AngularTable(ANGLES, tau, front, back)
+
+
+def glass_table(transmissivity: float, index: float) -> AngularTable:
+    """A single pane of uncoated glass, absorbing or not.
+
+    Args:
+        transmissivity: of one way through the glass at normal incidence, without reflections;
+        index: of refraction.
+
+    Source: Fresnel's equations with all reflections between the two faces; Radiance's material
+    `glass` ("The RADIANCE 5.1 Synthetic Imaging System", 3.2).
+    """
+    shares = pane_shares(np.cos(ANGLES), index, transmissivity)
+    tau, rho = (np.clip(values, 0.0, 1.0) for values in shares)
+    return AngularTable(ANGLES, tau, rho, rho)
 
 
 def stack_table(panes: Sequence[Pane]) -> AngularTable:
