@@ -12,13 +12,14 @@ INPUTS := pyproject.toml constraints.txt .ci/set-up
 # Some hundred tests start Python anew; each would compile the program's source to bytecode again
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo test test-all lint format docs clean
+.PHONY: help demo test test-all lint format catalogues docs clean
 
 help:
 	@echo "make demo      compare the office that the repository ships, blind up, down and controlled"
 	@echo "make test      lint and the quick tests"
 	@echo "make test-all  lint, all tests, the slow ones too, with coverage, and the documentation"
 	@echo "make lint      check style and types; make format repairs what it can"
+	@echo "make catalogues  bring the pages' translations up to date with the code; name what is missing"
 	@echo "make docs      the documentation as a site, in site/index.html"
 	@echo "make clean     remove what these made, the virtual environment too"
 
@@ -50,6 +51,9 @@ $(VENV)/.run: $(INPUTS)
 $(VENV)/.dev: $(INPUTS)
 	@bash .ci/set-up '.[dev,peers,distributed,georeference,netcdf,docs,notebooks]'
 	@touch $@ $(VENV)/.run
+
+catalogues: $(VENV)/.dev
+	$(BIN)/python -m scenes.language.extraction
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .coverage site out cfs-demo

@@ -31,12 +31,12 @@ class KnownFenestration:
     systems: dict[str, FenestrationSystem]  # by window GUID
     unfilled: dict[str, list[str]]  # names of the other windows, by what is missing of them
 
-    def notes(self) -> tuple[str, ...]:
-        """Where each window's optics come from, and which windows have none."""
+    def notes(self, without: str = "written without") -> tuple[str, ...]:
+        """Where each window's optics come from, and which windows have none, as `without` says."""
         filled = [window for window in self.windows if window.guid in self.systems]
         states = {guid: (system,) for guid, system in self.systems.items()}
         none = (
-            f"{windows_named(names)}: no BSDF is attached {missing}: written without."
+            f"{windows_named(names)}: no BSDF is attached {missing}: {without}."
             for missing, names in self.unfilled.items()
         )
         return (*source_notes(window_sources(filled, states)), *none)

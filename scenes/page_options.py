@@ -14,7 +14,7 @@ from pydantic import Field
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
 from scenes.figures.picture import bytes_uri
-from scenes.language.catalogue import Language
+from scenes.language.catalogue import Language, gettext
 from scenes.toml_file import TomlTable, read_table, validated
 
 # Sections that a page can do without, by their names in a file; those of a room hold for each.
@@ -59,7 +59,7 @@ class PageOptions:
     @property
     def facts(self) -> tuple[tuple[str, str], ...]:
         """What stands in the page's head beside its own facts."""
-        return (("Author", self.author),) if self.author else ()
+        return ((gettext("Author"), self.author),) if self.author else ()
 
     def shows(self, section: str) -> bool:
         """Whether the page has a section."""

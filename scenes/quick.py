@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-NOTE = (
-    "A quick run: few rays, small pictures, one hour. For a first look; leave --quick away for "
-    "results to rely on."
+from scenes.language.catalogue import N_
+
+NOTE = N_(
+    "Quick run: few rays, small pictures, one hour. This is a preview; run without --quick for "
+    "reliable results."
 )
 
 ROOM = {  # by the names of `scenes.room.options.NAMES`: `cfs run` and `cfs study`

@@ -43,7 +43,7 @@ def command(issues: Path | None, **chosen) -> None:
     known = known_fenestration(spaces, options.building)
     # a file or a program that reads on gets every line whole, however long
     console = Console(width=None if Console().is_terminal else UNCUT)
-    head = head_of(read, light_only=True).with_assumptions(known.notes())
+    head = head_of(read, light_only=True).with_assumptions(known.notes("a run needs --cfs"))
     for line in (*head.model, *(f"assumed: {text}" for text in head.assumed)):
         console.print(line, markup=False, highlight=False)
     console.print(_rooms(read))

@@ -84,7 +84,7 @@ def command(out: Path, **chosen) -> None:
     folder = ResultFolder(out, "dgp", inputs=files)
     read = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
-    from scenes.report.numbers import counted
+    from scenes.language.catalogue import ngettext
     from scenes.year_of_glare import outputs, page
     from scenes.year_of_glare.year import rate_views, read_year
 
@@ -99,14 +99,16 @@ def command(out: Path, **chosen) -> None:
             table = outputs.write_summary(year, rows, place)
             page.write_page(year, table, place / "report.html")
     worst = table.loc[table["highest_dgp"].idxmax()]
+    views = ngettext("{count} view", "{count} views", len(table))
+    hours = ngettext("{count} hour", "{count} hours", len(year.sky.lit))
     click.echo(
-        f"{year.room}: {counted(len(table), 'view')}, "
-        f"{counted(len(year.sky.lit), 'hour')} with the sun up.  Highest "
+        f"{year.room}: {views}, {hours} with the sun up.  Highest "
         f"{year.options.metric} {worst['highest_dgp']:.2f}{_error(worst)} "
         f"({worst['view']}, {worst['worst_hour']})"
     )
     for level, count in table["protection_en17037"].value_counts().items():
-        click.echo(f"protection {level}: {counted(count, 'view')}")
+        views = ngettext("{count} view", "{count} views", count)
+        click.echo(f"protection {level}: {views}")
     head.notes(year.notes)
     click.echo(f"{out / 'views.csv'}")
     click.echo(f"report: {out / 'report.html'}")

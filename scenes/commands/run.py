@@ -132,8 +132,8 @@ def run_to_folder(
     from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
     from scenes.explore.folder import write_explorer
+    from scenes.language.catalogue import ngettext
     from scenes.report import write_report
-    from scenes.report.numbers import counted
     from scenes.result_folder import EXPLORER
     from scenes.run.outputs import write_results
     from scenes.run.rooms_apart import Workers
@@ -159,7 +159,7 @@ def run_to_folder(
         progress("results", 1.0)
     head.notes(note for note in result.notes if note != quick_run.NOTE)
     if result.issues:
-        found = counted(len(result.issues), "problem")
+        found = ngettext("{count} problem", "{count} problems", len(result.issues))
         click.echo(f"{found} in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
     if options.explore:

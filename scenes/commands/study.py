@@ -194,11 +194,12 @@ def _print_plan(plan: StudyPlan) -> None:
 
 def _print_outcome(result: StudyResult, out: Path) -> None:
     """How many cases there are, what they took, and the pages."""
-    from scenes.report.numbers import counted
+    from scenes.language.catalogue import ngettext
     from scenes.result_folder import EXPLORER
 
     click.echo(
-        f"{counted(len(result.results), 'case')}: {result.reused} were there, "
+        f"{ngettext('{count} case', '{count} cases', len(result.results))}: {result.reused} were "
+        f"there, "
         f"{result.failed} failed, {result.seconds:.0f} s; table: {out / 'results.parquet'}"
     )
     if result.clock:
@@ -206,7 +207,7 @@ def _print_outcome(result: StudyResult, out: Path) -> None:
     if result.failed < len(result.results):
         click.echo(f"report: {out / 'report.html'}")
     if result.explored:
-        number = counted(len(result.explored), "case")
+        number = ngettext("{count} case", "{count} cases", len(result.explored))
         click.echo(f"explorer: {out / EXPLORER / 'index.html'}, {number}")
 
 

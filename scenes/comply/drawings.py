@@ -10,7 +10,7 @@ from scenes.comply.results import CheckedRoom, Compliance, GridSummary
 from scenes.figures.chart import Chart, ChartMark, box
 from scenes.figures.plan import FloorPlan, plan, plan_frame
 from scenes.figures.scale import ColourScale, Tick
-from scenes.report.numbers import rounded
+from scenes.language.numbers import rounded
 
 FIRST_HOUR, LAST_HOUR = 4, 21  # of the sun's bars
 # plans of the light, and the needs of rules that look at what they show, the nearest first

@@ -16,9 +16,9 @@ from scenes.comply.findings import SeatGlare
 from scenes.comply.results import CheckedRoom, Compliance
 from scenes.comply.rules import RuleTable
 from scenes.figures.chart import Chart
+from scenes.language.numbers import rounded
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
-from scenes.report.numbers import rounded
 from scenes.report.page import FILES as SHARED
 from scenes.report.page import environment
 from scenes.report.page_files import page_files

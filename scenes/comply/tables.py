@@ -10,7 +10,7 @@ from scenes.comply.assess import NOT_COMPUTED, NOT_FOR_IT, RoomVerdict
 from scenes.comply.need import Need
 from scenes.comply.results import CheckedRoom, Compliance
 from scenes.comply.rules import NOT_MET, LevelTable
-from scenes.report.numbers import MISSING, rounded
+from scenes.language.numbers import MISSING, rounded
 from scenes.report.tables import Column, Table
 
 OVER = "share of the floor area whose rooms meet it"

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from scenes.figures.chart import Chart
 from scenes.figures.picture import png_uri
 from scenes.figures.scale import ColourScale, Tick
-from scenes.language.catalogue import said, short_month
+from scenes.language.catalogue import gettext
+from scenes.language.numbers import short_month
 
 
 def day_grid(times: pd.DatetimeIndex, values: ArrayLike) -> NDArray[np.float64]:
@@ -113,8 +114,8 @@ def _carpet(times, rgba, pointer, title: str, explanation: str, **legend) -> Cha
     return Chart(
         title,
         explanation,
-        x_label=said("Day of the year"),
-        y_label=said("Hour of the day (local standard time)"),
+        x_label=gettext("Day of the year"),
+        y_label=gettext("Hour of the day (local standard time)"),
         x_ticks=month_ticks(times),
         y_ticks=hour_ticks(),
         picture=png_uri(rgba),

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from bim.model import Space, Window
 from bim.sensors import horizontal_section
 from scenes.figures.scale import ColourScale
-from scenes.language.catalogue import decimal, said
+from scenes.language.catalogue import decimal, gettext
 
 UNIT = 100.0  # SVG units per metre
 MARGIN = 0.45  # white space round the room [m]
@@ -127,7 +127,7 @@ def _cells(frame: PlanFrame, values, scale: ColourScale, digits: int) -> list[st
     inside = shapely.intersection(shapely.polygons(frame.cells), frame.outline)
     for point, cell, corners, value in zip(frame.points, inside, frame.cells, values, strict=True):
         number = decimal(f"{value:.{digits}f}")
-        text = said("no value") if np.isnan(value) else f"{number} {scale.unit}"
+        text = gettext("no value") if np.isnan(value) else f"{number} {scale.unit}"
         where = decimal(f"x {point[0]:.2f} m, y {point[1]:.2f} m").replace(", y", "; y")
         parts.append(
             f'<path class="cell" fill="{scale.hex(value)}" d="{rings(cell)}">'
@@ -154,7 +154,7 @@ def _eye(position: NDArray[np.float64], direction: NDArray[np.float64]) -> str:
     aside = np.array([-heading[1], heading[0]])
     tip, back = position[:2] + 0.22 * heading, position[:2] - 0.14 * heading
     shape = np.stack([tip, back + 0.16 * aside, back + 0.06 * heading, back - 0.16 * aside])
-    path, title = _path(shape, closed=True), said("view point")
+    path, title = _path(shape, closed=True), gettext("view point")
     return f'<path class="eye" d="{path}"><title>{title}</title></path>'
 
 

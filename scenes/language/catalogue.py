@@ -1,62 +1,100 @@
-"""Text of a page in its language: English keys, their translations in a file for each language.
+"""Text of the pages in English, German and French: gettext messages with fields in braces.
 
-The language holds while a page is filled, as gettext's does: its text is made in many small
-functions that know nothing else of the page.
+The English text in code, templates and tables is the message; `de.po` and `fr.po` beside this
+module hold its translations and are read when a page in their language is first filled.  The
+language is a context variable: a page's text is made in many small functions.  `make catalogues`
+brings the files up to date with the code.
 """
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Iterator, Mapping
+import io
+import string
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import cache
+from gettext import GNUTranslations, NullTranslations
 from importlib.resources import files
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from babel.messages import Catalog
 
 Language = Literal["en", "de", "fr"]
-MONTHS = (
-    "January", "February", "March", "April", "May", "June", "July", "August", "September",
-    "October", "November", "December",
-)  # fmt: skip
-
-
-def _catalogue(language: str) -> Mapping[str, str]:
-    return tomllib.loads((files("scenes.language") / f"{language}.toml").read_text("utf-8"))
-
-
-CATALOGUES: dict[str, Mapping[str, str]] = {name: _catalogue(name) for name in ("de", "fr")}
-_now: ContextVar[str] = ContextVar("language", default="en")
+TRANSLATED = ("de", "fr")
+NARROW_SPACE = "\N{NARROW NO-BREAK SPACE}"
+_language: ContextVar[str] = ContextVar("language", default="en")
 
 
 @contextmanager
 def in_language(language: str) -> Iterator[None]:
-    """Within, pages are filled in that language."""
-    before = _now.set(language)
+    """Within, text is in that language."""
+    token = _language.set(language)
     try:
         yield
     finally:
-        _now.reset(before)
+        _language.reset(token)
 
 
-def said(text: str, **values: object) -> str:
-    """English text in the page's language, its fields in braces filled.
+def current_language() -> str:
+    """The language of the page that is being filled."""
+    return _language.get()
 
-    What the catalogue does not have stays English; a test sees to it that it has all that is shown.
+
+def gettext(message: str, **values: object) -> str:
+    """A message in the page's language, its fields in braces filled.
+
+    Numbers have the decimal mark of the language; what is not in the catalogue stays English.
     """
-    found = CATALOGUES[_now.get()].get(text, text) if _now.get() != "en" else text
-    return found.format(**values) if values else found
+    text = translations(_language.get()).gettext(message) if message else ""
+    return FORMATTER.format(text, **values) if values else text
+
+
+def ngettext(singular: str, plural: str, count: int, **values: object) -> str:
+    """A message on a counted thing in the page's language; `{count}` is the number."""
+    text = translations(_language.get()).ngettext(singular, plural, count)
+    return FORMATTER.format(text, count=f"{count:,}".replace(",", NARROW_SPACE), **values)
+
+
+def N_(message: str) -> str:
+    """Mark a message for the catalogue; it is translated where it is shown."""
+    return message
 
 
 def decimal(number: str) -> str:
     """A number as text with the decimal mark of the page's language."""
-    return number if _now.get() == "en" else number.replace(".", ",")
+    return number if _language.get() == "en" else number.replace(".", ",")
 
 
-def month_name(month: int) -> str:
-    """The name of a month, 1 to 12."""
-    return said(MONTHS[month - 1])
+class _Formatter(string.Formatter):
+    """`str.format` whose numbers have the decimal mark of the page's language."""
+
+    def format_field(self, value: object, format_spec: str) -> str:
+        text = super().format_field(value, format_spec)
+        return decimal(text) if isinstance(value, float) else text
 
 
-def short_month(month: int) -> str:
-    """The short name of a month, 1 to 12."""
-    return said(MONTHS[month - 1][:3])
+FORMATTER = _Formatter()
+
+
+@cache
+def messages(language: str) -> Catalog:
+    """The catalogue of a language with the files that each message is from."""
+    from babel.messages.pofile import read_po
+
+    with (files("scenes.language") / f"{language}.po").open("rb") as file:
+        return read_po(file, locale=language)
+
+
+@cache
+def translations(language: str) -> NullTranslations:
+    """The translations of a language; English has none."""
+    if language == "en":
+        return NullTranslations()
+    from babel.messages.mofile import write_mo
+
+    compiled = io.BytesIO()
+    write_mo(compiled, messages(language))
+    compiled.seek(0)
+    return GNUTranslations(compiled)

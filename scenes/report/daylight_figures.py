@@ -11,10 +11,10 @@ from scenes.figures.carpet import carpet
 from scenes.figures.chart import Chart
 from scenes.figures.plan import FloorPlan, plan, plan_frame
 from scenes.figures.scale import ColourScale, round_limits
-from scenes.language.catalogue import said
+from scenes.language.catalogue import gettext
+from scenes.language.numbers import percent, rounded, significant
 from scenes.report.headline import sensor_column
 from scenes.report.names import quantity
-from scenes.report.numbers import percent, rounded, significant
 from scenes.results import RoomYear, RunResult
 
 DARK_LX = 1.0  # less than this is night, left empty
@@ -39,26 +39,31 @@ def plans(room: RoomYear, beside: Sequence[RoomYear] = ()) -> tuple[FloorPlan, .
             )
     if column := sensor_column(room, "daylight_factor", "df"):
         values = daylight.sensor_metrics[column].to_numpy(dtype=float)
-        scale = _from_zero(_of_all(column, room, beside), said("Daylight factor"), "%")
+        scale = _from_zero(_of_all(column, room, beside), gettext("Daylight factor"), "%")
         digits = 1 if scale.high > 1 else 2
         text = _mean(values, "%", quantity("daylight_factor").meaning)
         pictures.append(
             plan(
-                frame, values, scale, title=said("Daylight factor"), explanation=text, digits=digits
+                frame,
+                values,
+                scale,
+                title=gettext("Daylight factor"),
+                explanation=text,
+                digits=digits,
             )
         )
     column = sensor_column(room, "sunlit_hours")
     if column and (every := _of_all(column, room, beside)).any():
         values = daylight.sensor_metrics[column].to_numpy(dtype=float)
-        scale = _from_zero(every, said("Sunlit hours"), "h")
+        scale = _from_zero(every, gettext("Sunlit hours"), "h")
         text = quantity("sunlit_hours").meaning
-        pictures.append(plan(frame, values, scale, title=said("Sunlit hours"), explanation=text))
+        pictures.append(plan(frame, values, scale, title=gettext("Sunlit hours"), explanation=text))
     values = daylight.illuminance.mean(axis=0)
     every = np.concatenate([one.daylight.illuminance.mean(axis=0) for one in (room, *beside)])
-    scale = _from_zero(every, said("Annual mean illuminance"), "lx")
+    scale = _from_zero(every, gettext("Annual mean illuminance"), "lx")
     text = _mean(values, "lx", quantity("annual_mean").meaning)
     pictures.append(
-        plan(frame, values, scale, title=said("Annual mean illuminance"), explanation=text)
+        plan(frame, values, scale, title=gettext("Annual mean illuminance"), explanation=text)
     )
     return tuple(pictures)
 
@@ -83,19 +88,21 @@ def illuminance_carpet(result: RunResult, room: RoomYear) -> Chart:
     """Median over the work plane for each hour."""
     median = np.median(room.daylight.illuminance, axis=1).astype(float)
     lit = median >= DARK_LX
-    scale = ColourScale(30, 10000, said("Median illuminance"), "lx", logarithmic=True)
-    text = said(
-        "Illuminance that half of the work plane exceeds in each hour; nights are left empty."
-    )
+    scale = ColourScale(30, 10000, gettext("Median illuminance"), "lx", logarithmic=True)
+    text = gettext("Illuminance exceeded on half of the work plane in each hour; nights are blank.")
     if lit.any():
-        text += " " + said(
+        text += " " + gettext(
             "Median of the {hours} daylit hours: {lux} lx.",
             hours=rounded(lit.sum(), 0),
             lux=significant(float(np.median(median[lit])), 2),
         )
     values = np.where(lit, median, np.nan)
     return carpet(
-        result.times, values, scale, title=said("Light on the work plane"), explanation=text
+        result.times,
+        values,
+        scale,
+        title=gettext("Illuminance of the work plane"),
+        explanation=text,
     )
 
 
@@ -117,4 +124,4 @@ def _mean(values, unit: str, meaning: str) -> str:
         return meaning
     mean = float(np.nanmean(values))
     text = percent(mean) if unit == "%" else significant(mean, 3)
-    return said("Mean {value} {unit}.", value=text, unit=unit) + f" {meaning}"
+    return gettext("Mean {value} {unit}.", value=text, unit=unit) + f" {meaning}"

@@ -11,10 +11,10 @@ from scipy.ndimage import binary_closing, binary_dilation, binary_erosion
 from mitsuba_cfs.images.view import View
 from scenes.figures.picture import photo_uri, png_uri, reduced
 from scenes.figures.scale import ColourScale
-from scenes.language.catalogue import said
+from scenes.language.catalogue import N_, gettext, ngettext
+from scenes.language.numbers import rounded, significant, spoken
 from scenes.pictures import tone_mapped
-from scenes.report.numbers import counted, rounded, significant
-from scenes.report.tables import glare_class, spoken
+from scenes.report.tables import GLARE_WORDS, glare_class
 from scenes.results import GlareResults, LuminancePicture, RoomYear, RunResult
 
 MOST_PICTURES = 4  # the worst ones; the table has them all
@@ -23,7 +23,8 @@ LARGEST_SIDE = 620  # [px] of a picture in the page
 MANY_ROOMS, SIDE_OF_MANY = 10, 240  # beyond so many rooms [px]
 BRIDGE = 4  # slits up to twice as many pixels wide do not split an outline
 COMPASS = (
-    "north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west"
+    N_("north"), N_("north-east"), N_("east"), N_("south-east"), N_("south"), N_("south-west"),
+    N_("west"), N_("north-west"),
 )  # fmt: skip
 OUTLINE = (255, 0, 144)  # of glare sources; occurs in no colour map used here
 
@@ -36,6 +37,7 @@ class GlarePicture:
     words: str
     dgp: str
     dgp_class: str
+    dgp_words: str  # of the class
     numbers: str
     falsecolour: str  # data URI
     seen: str  # data URI, tone-mapped, glare sources outlined
@@ -97,7 +99,7 @@ def luminance_scale(pictures: list[LuminancePicture]) -> ColourScale:
     lit = [p.luminance[p.luminance > 0] for p in pictures]
     top = max((float(np.quantile(values, 0.999)) for values in lit if values.size), default=0.0)
     high = _half_decade(top)
-    return ColourScale(max(high / 3000, 1.0), high, said("Luminance"), "cd/m²", True, "viridis")
+    return ColourScale(max(high / 3000, 1.0), high, gettext("Luminance"), "cd/m²", True, "viridis")
 
 
 def _half_decade(value: float) -> float:
@@ -114,19 +116,24 @@ def glare_picture(
     luminance = reduced(picture.luminance.astype(float), factor)
     glare = picture.glare
     seen = tone_mapped(luminance)
-    sources = said("no glare source")
+    sources = gettext("no glare source")
     if picture.source_mask is not None and picture.source_mask.any():
         mask = reduced(picture.source_mask.astype(float), factor) > 0.5
         seen[outline(mask)] = OUTLINE
         count = int(glare.get("sources", 0))
-        sources = f"{counted(count, 'glare source')} ({said('outlined')})" if count else ""
+        sources = (
+            ngettext("{count} glare source (outlined)", "{count} glare sources (outlined)", count)
+            if count
+            else ""
+        )
     numbers = f"Ev {significant(glare['ev'], 3)} lx" if "ev" in glare else ""
-    brightest = said("up to {value} cd/m²", value=significant(float(picture.luminance.max()), 2))
+    brightest = gettext("up to {value} cd/m²", value=significant(float(picture.luminance.max()), 2))
     return GlarePicture(
         title=spoken(result.times[picture.hour]),
         words=sun_words(result, picture.hour),
         dgp=rounded(glare["dgp"], 2),
         dgp_class=glare_class(glare["dgp"]),
+        dgp_words=gettext(GLARE_WORDS[glare_class(glare["dgp"])]),
         numbers=", ".join(part for part in (numbers, sources, brightest) if part),
         falsecolour=png_uri(scale.rgba(luminance)[..., :3]),
         seen=photo_uri(seen),
@@ -135,12 +142,17 @@ def glare_picture(
 
 
 def sun_words(result: RunResult, hour: int) -> str:
-    """Where the sun stands."""
+    """Altitude and azimuth of the sun."""
     sun = result.sun[hour]
     altitude = np.degrees(np.arcsin(np.clip(sun[2], -1, 1)))
     if altitude <= 0:
-        return said("sun below the horizon")
-    return said(f"sun {{altitude}}° high in the {compass(sun)}", altitude=f"{altitude:.0f}")
+        return gettext("sun below the horizon")
+    azimuth = np.degrees(np.arctan2(sun[0], sun[1])) % 360
+    return gettext(
+        "solar altitude {altitude}°, azimuth {azimuth}°",
+        altitude=f"{altitude:.0f}",
+        azimuth=f"{azimuth:.0f}",
+    )
 
 
 def compass(direction: NDArray[np.float64]) -> str:

@@ -10,15 +10,23 @@ import numpy as np
 import pandas as pd
 
 from mitsuba_cfs.glare.classes import hour_not_exceeded, protection_level
-from scenes.language.catalogue import said
+from scenes.language.catalogue import N_, gettext, ngettext
+from scenes.language.numbers import percent, rounded, semicolons, significant, spoken
 from scenes.provision_levels import provision_levels
 from scenes.report.names import quantity
-from scenes.report.numbers import percent, rounded, significant
-from scenes.report.tables import glare_class, spoken, step_hours
+from scenes.report.tables import GLARE_WORDS, glare_class, step_hours
 from scenes.results import RoomYear, RunResult
 
 WARM_C = 26.0  # operative temperature above which hours are counted
-PROTECTION = {"high": "0.35", "medium": "0.40", "minimum": "0.45"}  # DGP
+PROTECTION = {  # DGP of EN 17037's levels
+    "high": N_("high: at most 0.35"),
+    "medium": N_("medium: at most 0.40"),
+    "minimum": N_("minimum: at most 0.45"),
+    "none": N_("above 0.45"),
+}
+LEVEL_WORDS = {
+    "high": N_("high"), "medium": N_("medium"), "minimum": N_("minimum"), "none": N_("none"),
+}  # fmt: skip
 GOOD, FAIR, POOR, PLAIN = "good", "fair", "poor", "plain"
 
 
@@ -87,10 +95,13 @@ def occupied(room: RoomYear) -> pd.Series:
 def heated(room: RoomYear) -> str:
     """Whether the room is heated and cooled, as a sentence."""
     if room.operation is None:
-        return said("Without heating and cooling.")
-    energy = {name: room.operation.summary[f"{name}_kwh"] for name in ("heating", "cooling")}
-    used = " and ".join(name for name, value in energy.items() if value > 0)
-    return said(f"With {used}." if used else "Without heating and cooling.")
+        return gettext("Without heating and cooling.")
+    heating, cooling = (room.operation.summary[f"{n}_kwh"] > 0 for n in ("heating", "cooling"))
+    if heating and cooling:
+        return gettext("With heating and cooling.")
+    if heating:
+        return gettext("With heating.")
+    return gettext("With cooling.") if cooling else gettext("Without heating and cooling.")
 
 
 def applicable(comfort: pd.DataFrame) -> pd.Series:
@@ -107,14 +118,18 @@ def _spatial_autonomy(room: RoomYear) -> Card | None:
     if value is None:
         return None
     grade, verdict = (
-        (GOOD, "preferred (75 % or more)")
+        (GOOD, gettext("preferred (75 % or more)"))
         if value >= 75
-        else (FAIR, "acceptable (55 % or more)")
+        else (FAIR, gettext("acceptable (55 % or more)"))
         if value >= 55
-        else (POOR, "below the 55 % of LM-83")
+        else (POOR, gettext("below 55 % (LM-83)"))
     )
-    words = said("of the work plane has 300 lx of daylight for at least half of the occupied hours")
-    card = _of_plane(value, said("Spatial daylight autonomy"), words, "sda300_50", (grade, verdict))
+    words = gettext(
+        "of the work plane has 300 lx of daylight in at least half of the occupied hours"
+    )
+    card = _of_plane(
+        value, gettext("Spatial daylight autonomy"), words, "sda300_50", (grade, verdict)
+    )
     return replace(card, worth=value)
 
 
@@ -123,10 +138,15 @@ def _sunlight(room: RoomYear) -> Card | None:
     if value is None:
         return None
     grade, verdict = (
-        (GOOD, "within the 10 % of LM-83") if value <= 10 else (POOR, "above the 10 % of LM-83")
+        (GOOD, gettext("at most 10 % (LM-83)"))
+        if value <= 10
+        else (POOR, gettext("above 10 % (LM-83)"))
     )
-    words = said("of the work plane gets direct sun over 1000 lx in more than 250 hours a year")
-    label = said("Annual sunlight exposure")
+    words = gettext(
+        "of the work plane receives more than 1000 lx of direct sun in more than 250 occupied "
+        "hours a year"
+    )
+    label = gettext("Annual sunlight exposure")
     return replace(_of_plane(value, label, words, "ase1000_250", (grade, verdict)), worth=-value)
 
 
@@ -134,9 +154,7 @@ def _of_plane(value: float, label: str, words: str, key: str, judged: tuple[str,
     """A share of the work plane [%], its grade and verdict; key: of its quantity."""
     grade, verdict = judged
     meaning = quantity(key).meaning
-    return Card(
-        label, percent(value), "%", words, said(verdict), grade, meaning, value, traced=True
-    )
+    return Card(label, percent(value), "%", words, verdict, grade, meaning, value, traced=True)
 
 
 def _autonomy(room: RoomYear) -> Card | None:
@@ -144,15 +162,17 @@ def _autonomy(room: RoomYear) -> Card | None:
     if column is None:
         return None
     values = room.daylight.sensor_metrics[column].to_numpy(dtype=float)
-    words = said(
-        "of the occupied hours have 300 lx of daylight, as a mean over the work plane "
-        "({least} to {most} % by place)",
+    words = gettext(
+        "of the occupied hours have 300 lx of daylight, averaged over the work plane "
+        "(sensors: {least} to {most} %)",
         least=percent(values.min()),
         most=percent(values.max()),
     )
     meaning = quantity("da300").meaning
     mean = float(values.mean())
-    return Card(said("Daylight autonomy"), percent(mean), "%", words, meaning=meaning, meter=mean)
+    return Card(
+        gettext("Daylight autonomy"), percent(mean), "%", words, meaning=meaning, meter=mean
+    )
 
 
 def _provision(room: RoomYear) -> Card | None:
@@ -164,23 +184,24 @@ def _provision(room: RoomYear) -> Card | None:
         return None
     index, levels = int(level), provision_levels()
     target, least = metrics.get("en17037_target_lx"), metrics.get("en17037_minimum_lx")
-    words = said("level of daylight provision by EN 17037")
+    words = gettext("level of daylight provision (EN 17037)")
     if target is not None and least is not None:
-        words += ": " + said(
-            "in half of the daylight hours half of the room has {target} lx or more and nearly "
-            "all of it {least} lx",
+        words = gettext(
+            "level of daylight provision (EN 17037): in half of the daylight hours, half of the "
+            "room reaches {target} lx and 95 % of it {least} lx",
             target=significant(target),
             least=significant(least),
         )
     reached = levels[max(index - 1, 0)]
-    verdict = said(
-        "{target} and {least} lx" if index else "below {target} and {least} lx",
-        target=f"{reached.target:g}",
-        least=f"{reached.minimum:g}",
+    limits = {"target": f"{reached.target:g}", "least": f"{reached.minimum:g}"}
+    verdict = (
+        gettext("{target} and {least} lx", **limits)
+        if index
+        else gettext("below {target} and {least} lx", **limits)
     )
     grade = (POOR, FAIR, GOOD, GOOD)[index]
     return Card(
-        said("Daylight provision"),
+        gettext("Daylight provision"),
         q.values[index].capitalize(),
         "",
         words,
@@ -200,19 +221,18 @@ def _glare(result: RunResult, room: RoomYear) -> Card | None:
     dgp = worst.glare["dgp"]
     word = glare_class(dgp)
     grade = {"imperceptible": GOOD, "perceptible": FAIR}.get(word, POOR)
-    words = said(
-        "daylight glare probability in the worst of {count} pictures, {hour}"
-        if len(pictures) > 1
-        else "daylight glare probability in the picture, {hour}",
-        count=len(pictures),
+    words = ngettext(
+        "daylight glare probability of the picture, {hour}",
+        "highest daylight glare probability of {count} pictures, {hour}",
+        len(pictures),
         hour=spoken(result.times[worst.hour]),
     )
     return Card(
-        said("Glare at its worst"),
+        gettext("Highest glare"),
         rounded(dgp, 2),
         "DGP",
         words,
-        said(f"{word} glare"),
+        gettext(GLARE_WORDS[word]),
         grade,
         quantity("dgp").meaning,
         min(100 * dgp, 100),
@@ -225,9 +245,8 @@ def _protection(room: RoomYear) -> Card | None:
     if room.annual_glare is None or not occupied(room).any():
         return None
     dgp = room.annual_glare["dgp"].fillna(0.0).to_numpy()[occupied(room).to_numpy()]
-    words = said(
-        "protection from glare by EN 17037: DGP is above {dgp} in no more than 5 % of the occupied "
-        "hours",
+    words = gettext(
+        "protection from glare (EN 17037): DGP exceeds {dgp} in at most 5 % of the occupied hours",
         dgp=rounded(hour_not_exceeded(dgp), 2),
     )
     return protection_card(protection_level(dgp), words, -hour_not_exceeded(dgp))
@@ -236,13 +255,12 @@ def _protection(room: RoomYear) -> Card | None:
 def protection_card(level: str, words: str = "", worth: float | None = None) -> Card:
     """EN 17037's protection from glare by its level: high, medium, minimum or none."""
     order = ("none", "minimum", "medium", "high").index(level)
-    verdict = said("above 0.45" if level == "none" else f"{level}: at most {PROTECTION[level]}")
     return Card(
-        said("Protection from glare"),
-        said(level.capitalize()),
+        gettext("Protection from glare"),
+        gettext(LEVEL_WORDS[level]).capitalize(),
         "",
         words,
-        verdict,
+        gettext(PROTECTION[level]),
         (POOR, FAIR, GOOD, GOOD)[order],
         quantity("dgp").meaning,
         worth=float(order) if worth is None else worth,
@@ -258,15 +276,17 @@ def _warm_hours(room: RoomYear) -> Card | None:
     warm = (temperatures["operative_c"].to_numpy() > WARM_C) & used
     hours, total = float(warm.sum()) * step, float(used.sum()) * step
     share = 100 * hours / total if total else float("nan")
-    words = said(
-        "with an operative temperature above {limit} °C, {share} % of the {total} occupied hours.",
+    words = gettext(
+        "of the {total} occupied hours ({share} %) have an operative temperature above {limit} °C.",
         limit=f"{WARM_C:.0f}",
         share=percent(share),
         total=rounded(total, 0),
     )
     words += f" {heated(room)}"
     meaning = quantity("operative_c").meaning
-    return Card(said("Warm hours"), rounded(hours, 0), "h", words, meaning=meaning, meter=share)
+    return Card(
+        gettext("Overheating hours"), rounded(hours, 0), "h", words, meaning=meaning, meter=share
+    )
 
 
 def _comfort(room: RoomYear) -> Card | None:
@@ -277,15 +297,18 @@ def _comfort(room: RoomYear) -> Card | None:
         return None
     widest = columns[-1]
     value = 100 * float(comfort.loc[used, widest].mean())
-    words = said("of the occupied hours: {band} of adaptive comfort", band=quantity(widest).label)
+    words = gettext("of the occupied hours: adaptive comfort, {band}", band=quantity(widest).label)
     outside = 100 * float((~applicable(comfort))[used].mean())
     if outside > 0.5:
-        words += "; " + said(
-            "{share} % have weather that the model does not cover (counted as no)",
+        outdoors = gettext(
+            "{share} % are outside the range of the model and count as uncomfortable",
             share=percent(outside),
         )
+        words = semicolons([words, outdoors])
     meaning = quantity(widest).meaning
-    return Card(said("Adaptive comfort"), percent(value), "%", words, meaning=meaning, meter=value)
+    return Card(
+        gettext("Adaptive comfort"), percent(value), "%", words, meaning=meaning, meter=value
+    )
 
 
 def comfort_columns(comfort: pd.DataFrame) -> list[str]:
@@ -299,13 +322,12 @@ def _peak(room: RoomYear) -> Card | None:
     if not {"air_c", "operative_c"} <= set(temperatures):
         return None
     air, operative = temperatures["air_c"], temperatures["operative_c"]
-    words = said(
-        "highest operative temperature ({hour}); highest air temperature {high} °C, lowest {low} "
-        "°C.",
+    words = gettext(
+        "highest operative temperature ({hour}); air temperature from {low} to {high} °C.",
         hour=spoken(operative.idxmax()),
         high=rounded(float(air.max()), 1),
         low=rounded(float(air.min()), 1),
     )
     words += f" {heated(room)}"
-    return Card(said("Peak temperature"), rounded(float(np.max(operative)), 1), "°C", words,
+    return Card(gettext("Peak temperature"), rounded(float(np.max(operative)), 1), "°C", words,
                 meaning=quantity("operative_c").meaning)  # fmt: skip

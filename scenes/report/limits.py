@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.language.catalogue import decimal, said
+from scenes.language.catalogue import decimal, gettext
+from scenes.language.numbers import colon, semicolons, share
 from scenes.report.headline import FAIR, GOOD, POOR, Card
-from scenes.report.numbers import share
 from scenes.report.tables import Column, Table
 from scenes.results import LuminancePicture, RoomYear
 
@@ -42,10 +42,10 @@ def limits(rooms: Sequence[Named], of: str) -> LimitTables:
 
 def _every(rooms: Sequence[Named], of: str) -> Table:
     columns = (
-        Column(of, numeric=False), Column(said("Figure"), numeric=False),
-        Column(said("Value"), numeric=False, short=True),
-        Column(said("Against the limit"), numeric=False),
-        Column(said("Standard error"), numeric=False),
+        Column(of, numeric=False), Column(gettext("Figure"), numeric=False),
+        Column(gettext("Value"), numeric=False, short=True),
+        Column(gettext("Limit"), numeric=False),
+        Column(gettext("Standard error"), numeric=False),
     )  # fmt: skip
     rows = tuple(
         (name, card.label, _value(card), card.verdict, _error(room, card))
@@ -53,15 +53,15 @@ def _every(rooms: Sequence[Named], of: str) -> Table:
         for card in own
         if card.verdict
     )
-    return Table(said("Figures against the limits of the standards"), columns, rows)
+    return Table(gettext("Results and limits of the standards"), columns, rows)
 
 
 def _by_figure(rooms: Sequence[Named]) -> Table:
     """A row for each figure: how many meet what, which are the worst, the error of the worst."""
     columns = (
-        Column(said("Figure"), numeric=False), Column(said("Against the limit"), numeric=False),
-        Column(said("The worst"), numeric=False),
-        Column(said("Standard error of the worst"), numeric=False),
+        Column(gettext("Figure"), numeric=False), Column(gettext("Rooms by limit"), numeric=False),
+        Column(gettext("Worst rooms"), numeric=False),
+        Column(gettext("Standard error of the worst"), numeric=False),
     )  # fmt: skip
     rows = []
     judged = [(name, room, card) for name, room, own in rooms for card in own if card.verdict]
@@ -70,10 +70,10 @@ def _by_figure(rooms: Sequence[Named]) -> Table:
             (one for one in judged if one[2].label == label), key=lambda one: one[2].worth
         )
         counts = Counter((GRADES.index(card.grade), card.verdict) for _, _, card in found)
-        meets = "; ".join(f"{counts[key]}: {key[1]}" for key in sorted(counts))
-        worst = "; ".join(f"{name}: {_value(card)}" for name, _, card in found[:WORST])
+        meets = semicolons([colon(str(counts[key]), key[1]) for key in sorted(counts)])
+        worst = semicolons([colon(name, _value(card)) for name, _, card in found[:WORST]])
         rows.append((label, meets, worst, _error(*found[0][1:])))
-    return Table(said("Figures against the limits of the standards"), columns, tuple(rows))
+    return Table(gettext("Results and limits of the standards"), columns, tuple(rows))
 
 
 def _value(card: Card) -> str:
@@ -83,11 +83,11 @@ def _value(card: Card) -> str:
 def _error(room: RoomYear, card: Card) -> str:
     if card.unit == "DGP":
         worst = max(room.glare.pictures, key=lambda picture: picture.glare["dgp"])
-        return plus_minus(worst).strip() or said("not known")
+        return plus_minus(worst).strip() or gettext("unknown")
     if card.traced:
         light = float(np.mean(room.daylight.relative_error))
-        return said("± {share} % of each illuminance, from the tracing", share=share(light))
-    return said("not known")
+        return gettext("± {share} % of each illuminance, from ray tracing", share=share(light))
+    return gettext("unknown")
 
 
 def plus_minus(picture: LuminancePicture) -> str:

@@ -1,98 +1,154 @@
-"""What was done, in words: the method of a run as the reader of its report is told."""
+"""The method of a run in words, for the reader of its report."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from scenes.language.catalogue import said
-from scenes.report.numbers import rounded, share
+from scenes.language.catalogue import N_, gettext
+from scenes.language.numbers import rounded, share
 from scenes.results import RunResult
 
-TRACED = (
-    "Rays traced with Mitsuba 3 give how much of each direction of light leaving the window "
-    "reaches each sensor (view matrix V) and how much of each patch of sky and ground reaches the "
-    "window (daylight matrix D). With the transmission matrix T of the fenestration (from its "
-    "BSDF, the table of how it sends light on from every direction into every direction) and the "
-    "sky of each hour s, the illuminance is V T D s."
+METHODS = {
+    "three-phase": N_("three-phase"),
+    "five-phase": N_("five-phase"),
+    "point-in-time": N_("point-in-time"),
+}
+MATRICES = N_(
+    "Mitsuba 3 traces rays for the view matrix V (light that leaves the window in each direction "
+    "and reaches a sensor) and the daylight matrix D (light of each patch of sky and ground that "
+    "reaches the window). With the transmission matrix T of the fenestration (from its BSDF) and "
+    "the sky vector s of each hour, the illuminance is V T D s."
 )
-SKIES = (
-    "Skies follow Perez's all-weather model from the direct and diffuse irradiance of the weather "
-    "file."
+SKIES = N_(
+    "Skies follow the Perez all-weather model, from the direct and diffuse irradiance of the "
+    "weather file."
 )
 LIGHT = {  # sentences
-    "three-phase": ("The three-phase method.", TRACED, SKIES),
+    "three-phase": (N_("Three-phase method."), MATRICES, SKIES),
     "five-phase": (
-        "The five-phase method.",
-        TRACED,
-        "What of it comes straight from the sun is taken out and traced anew with the sun's true "
-        "disc of 0.53 degrees through the window's BSDF, its through beam kept apart: "
-        "V T D s - V_d T D_d s_d + C_ds s_sun.",
+        N_("Five-phase method."),
+        MATRICES,
+        N_(
+            "Its direct sun is replaced by the true solar disc of 0.53°, traced through the BSDF "
+            "of "
+            "the window with the specular beam kept separate: V T D s - V_d T D_d s_d + "
+            "C_ds s_sun."
+        ),
         SKIES,
     ),
     "point-in-time": (
-        "Point-in-time path tracing: in every hour with daylight paths are traced with Mitsuba 3 "
-        "from each sensor through the window's BSDF to the sky and to the sun's true disc of 0.53 "
-        "degrees, with all reflections, also from the window's back.",
+        N_(
+            "Point-in-time path tracing: in every hour with daylight, Mitsuba 3 traces paths from "
+            "each sensor through the BSDF of the window to the sky and to the true solar disc of "
+            "0.53°, with all interreflections, those from the room side of the window included."
+        ),
         SKIES,
     ),
 }
 PICTURES = {
-    "three-phase": "by the same matrices, the sun spread over the directions of the BSDF's table",
-    "five-phase": (
-        "by the same method: the sun's disc, its beam on surfaces and its light scattered in the "
-        "window are looked for in each pixel"
+    "three-phase": N_(
+        "Luminance pictures of 180° are computed for the chosen hours with the same matrices; the "
+        "sun is spread over the directions of the BSDF. Their bright areas and the illuminance at "
+        "the eye give the daylight glare probability (Wienold and Christoffersen 2006)."
     ),
-    "point-in-time": "by paths from each pixel",
+    "five-phase": N_(
+        "Luminance pictures of 180° are computed for the chosen hours with the same method; the "
+        "solar disc, its beam on surfaces and its light scattered by the window are computed for "
+        "each pixel. Their bright areas and the illuminance at the eye give the daylight glare "
+        "probability (Wienold and Christoffersen 2006)."
+    ),
+    "point-in-time": N_(
+        "Luminance pictures of 180° are computed for the chosen hours by path tracing from each "
+        "pixel. Their bright areas and the illuminance at the eye give the daylight glare "
+        "probability (Wienold and Christoffersen 2006)."
+    ),
 }
-PATCHES = (
-    "or the 10 to 15 degrees over which the directions of the fenestration's table average the sun"
+HEAT = (
+    N_(
+        "The daylight matrix in the solar band gives the solar radiation that the window transmits "
+        "and absorbs; the two layers of the window model exchange heat according to its U-value "
+        "and "
+        "g-value (Kuhn's Blackbox model)."
+    ),
+    N_(
+        "The sky for heat has the three components of Perez's model for tilted planes: isotropic, "
+        "circumsolar and horizon."
+    ),
 )
-SCATTER = "or the directions over which the fenestration's table averages what it scatters"
+CONTROLLED = N_(
+    "A heat balance of the room's surfaces and air every ten minutes, with the gains, outdoor air "
+    "and set points of the operation file, gives the temperatures."
+)
+FREE_RUNNING = N_(
+    "A heat balance of the room's surfaces and air every ten minutes, without heating and cooling, "
+    "gives the temperatures."
+)
+COMFORT = N_(
+    "Comfort follows from the operative temperature and the running mean of the outdoor "
+    "temperature."
+)
 
 
 def method_words(result: RunResult) -> list[tuple[str, str]]:
-    """Heading and text of each part of the method."""
+    """Heading and text of each part."""
     rooms = result.spaces
     worst = share(max(float(r.daylight.relative_error.max()) for r in rooms))
     mean = share(float(np.mean([r.daylight.relative_error.mean() for r in rooms])))
-    bars = said(
-        "Traced numbers scatter; the spread of independent repetitions gives their relative "
-        "standard error: two times out of three the exact value is nearer than this, 19 times out "
-        "of 20 nearer than twice this. For the annual mean illuminance it is {mean} % as a mean "
-        "over all sensors and {worst} % at the worst. It covers the tracing only: not the weather "
-        "file, the sky model, the reflectances taken, {blurred}.",
-        mean=mean,
-        worst=worst,
-        blurred=said(PATCHES if result.method == "three-phase" else SCATTER),
+    errors = {"mean": mean, "worst": worst}
+    bars = (
+        gettext(
+            "Ray tracing has random errors. Their relative standard error, from independent "
+            "repetitions, is {mean} % on average and {worst} % at most for the annual mean "
+            "illuminance of the sensors: 68 % of the errors are smaller, 95 % are smaller than "
+            "twice that. It does not cover the weather file, the sky model, the assumed "
+            "reflectances or the 10° to 15° over which the BSDF averages the sun.",
+            **errors,
+        )
+        if result.method == "three-phase"
+        else gettext(
+            "Ray tracing has random errors. Their relative standard error, from independent "
+            "repetitions, is {mean} % on average and {worst} % at most for the annual mean "
+            "illuminance of the sensors: 68 % of the errors are smaller, 95 % are smaller than "
+            "twice that. It does not cover the weather file, the sky model, the assumed "
+            "reflectances or the directions over which the BSDF averages scattered light.",
+            **errors,
+        )
     )
     found = [
-        (said("Light"), " ".join(said(sentence) for sentence in LIGHT[result.method])),
-        (said("Error bars"), bars + _glare_error(result)),
+        (gettext("Light"), " ".join(gettext(sentence) for sentence in LIGHT[result.method])),
+        (gettext("Error bars"), bars + _glare_error(result)),
     ]
     if any("ase1000_250" in room.daylight.room_metrics for room in rooms):
-        sun = said(
-            "Annual sunlight exposure counts what comes straight from the sun through the window, "
-            "scattered in it or not, without reflections in the room."
+        sun = gettext(
+            "Annual sunlight exposure counts direct sun through the window, scattered by it or "
+            "not, "
+            "without interreflections in the room."
         )
-        if _controlled(result):
-            sun += " " + said("It is that of the most open shading state.")
-        found.append((said("Direct sun"), sun))
+        if _moved(result):
+            sun += " " + gettext("It is for the most open shading state.")
+        found.append((gettext("Direct sun"), sun))
     sources = _sources(result)
     if sources:
-        found.append((said("Fenestration"), sources))
-    found.append((said("Glare"), _glare(result)))
-    found.append((said("Heat"), _heat(result)))
+        found.append((gettext("Fenestration"), sources))
+    found.append((gettext("Glare"), _glare(result)))
+    found.append((gettext("Heat"), _heat(result)))
     twins = [room.space.label for room in rooms if room.template]
     if twins:
-        text = said(
-            "Of rooms equal in shape, orientation, materials, windows and surroundings one is "
-            "computed; its light is given for the others too ({rooms})."
+        names = ", ".join(twins)
+        text = (
+            gettext(
+                "Of rooms with equal shape, orientation, materials, windows and surroundings, one "
+                "is computed; its light also stands for {rooms}.",
+                rooms=names,
+            )
             if _coupled(result)
-            else "Of rooms equal in shape, orientation, materials, windows and surroundings one is "
-            "computed; its results are given for the others too ({rooms}).",
-            rooms=", ".join(twins),
+            else gettext(
+                "Of rooms with equal shape, orientation, materials, windows and surroundings, one "
+                "is computed; its results also stand for {rooms}.",
+                rooms=names,
+            )
         )
-        found.append((said("Equal rooms"), text))
+        found.append((gettext("Equal rooms"), text))
     return found
 
 
@@ -109,12 +165,12 @@ def _glare_error(result: RunResult) -> str:
     if not len(known):
         return ""
     typical, most = (
-        rounded(error, 4) if error >= 5e-5 else said("below {limit}", limit=rounded(1e-4, 4))
+        rounded(error, 4) if error >= 5e-5 else gettext("below {limit}", limit=rounded(1e-4, 4))
         for error in (np.sqrt(np.mean(known**2)), known.max())
     )
-    return " " + said(
-        "The standard error of DGP, from pictures of halves of the paths, is {typical} (root mean "
-        "square of the hours), at the worst {most}.",
+    return " " + gettext(
+        "The standard error of DGP, from pictures with half of the paths each, is {typical} (root "
+        "mean square over the hours) and {most} at most.",
         typical=typical,
         most=most,
     )
@@ -124,32 +180,28 @@ def _sources(result: RunResult) -> str:
     """Where each system comes from; empty where that is not known."""
     tables = [values for room in result.spaces for values in room.heat.fenestration]
     sources = {
-        said("{system}, from {source}.", system=t["system"], source=t["source"])
+        gettext("{system}: from {source}.", system=t["system"], source=t["source"])
         for t in tables
         if t.get("source")
     }
     return " ".join(sorted(sources))
 
 
-def _controlled(result: RunResult) -> bool:
+def _moved(result: RunResult) -> bool:
     return any(room.operation is not None and len(room.operation.states) > 1
                for room in result.spaces)  # fmt: skip
 
 
 def _glare(result: RunResult) -> str:
-    text = said(
-        "Luminance pictures of 180 degrees are made for the chosen hours, {how}; bright areas "
-        "found in them and the light at the eye give the daylight glare probability (Wienold and "
-        "Christoffersen 2006).",
-        how=said(PICTURES[result.method]),
-    )
+    text = gettext(PICTURES[result.method])
     rule = next((room.glare.rule for room in result.spaces if room.glare.rule), "")
     if rule:
-        text += " " + said("Glare sources: {rule}.", rule=rule)
+        text += " " + gettext("Glare sources: {rule}.", rule=rule)
     if any(room.annual_glare is not None for room in result.spaces):
-        text += " " + said(
-            "The same was done for every hour with the sun up; EN 17037 asks that DGP exceeds its "
-            "limit in no more than 5 % of the hours of use."
+        text += " " + gettext(
+            "All hours with the sun up are rated in the same way; EN 17037 requires that DGP "
+            "exceeds "
+            "its limit in at most 5 % of the hours of use."
         )
     return text
 
@@ -160,28 +212,18 @@ def _coupled(result: RunResult) -> bool:
 
 
 def _heat(result: RunResult) -> str:
-    sentences = [
-        "The daylight matrix in the solar band gives the solar radiation passing into the room and "
-        "absorbed in the window, whose two layers take and give heat by its U and g (Kuhn's "
-        "Blackbox).",
-        "The sky of heat has three parts with the irradiances that Perez found on tilted planes: "
-        "an even dome, light around the sun and a band at the horizon.",
-        "A balance of the room's surfaces and air every ten minutes, with the gains, outdoor air "
-        "and set points of the operation file, gives temperatures."
-        if any(room.operation is not None for room in result.spaces)
-        else "A balance of the room's surfaces and air every ten minutes, without heating or "
-        "cooling, gives temperatures.",
-        "Comfort follows from the operative temperature and the running mean of the outdoor "
-        "temperature.",
-    ]
+    controlled = any(room.operation is not None for room in result.spaces)
+    sentences = [*HEAT, CONTROLLED if controlled else FREE_RUNNING, COMFORT]
     if _coupled(result):
         sentences.append(
-            "The rooms computed are balanced together: heat flows through what lies between."
+            N_("The rooms are balanced together: heat flows through the walls between them.")
         )
     elif len(result.spaces) > 1:
         sentences.append(
-            "Each room is balanced alone, with rooms of its own temperature around it."
+            N_("Each room is balanced alone; adjacent rooms are assumed to have its temperature.")
         )
-    if _controlled(result):
-        sentences.append("Each hour's shading state holds for light, glare and heat together.")
-    return " ".join(said(sentence) for sentence in sentences)
+    if _moved(result):
+        sentences.append(
+            N_("The shading state of each hour applies to light, glare and heat alike.")
+        )
+    return " ".join(gettext(sentence) for sentence in sentences)

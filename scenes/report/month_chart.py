@@ -8,9 +8,9 @@ import pandas as pd
 
 from scenes.figures.chart import Chart, ChartMark, Readout
 from scenes.figures.scale import Tick, axis_ticks
-from scenes.language.catalogue import month_name, said, short_month
+from scenes.language.catalogue import gettext
+from scenes.language.numbers import month_name, rounded, short_month
 from scenes.report.names import quantity
-from scenes.report.numbers import rounded
 
 
 def month_chart(
@@ -36,8 +36,8 @@ def month_chart(
     return Chart(
         title,
         explanation,
-        said("Month"),
-        said("Energy [kWh]"),
+        gettext("Month"),
+        gettext("Energy [kWh]"),
         ticks,
         axis_ticks(0.0, top),
         tuple(marks),

@@ -7,7 +7,7 @@ import tomllib
 from dataclasses import dataclass
 from importlib.resources import files
 
-from scenes.language.catalogue import said
+from scenes.language.catalogue import gettext, ngettext
 
 PERCENT = "%"
 WITHIN = re.compile(r"^within_(.+)$")
@@ -39,22 +39,33 @@ WORDS = _words()
 
 def glossary() -> tuple[tuple[str, str], ...]:
     """Terms and their meanings, in the alphabet's order."""
-    found = ((said(term), said(meaning)) for term, meaning in WORDS["glossary"].items())
+    found = ((gettext(term), gettext(meaning)) for term, meaning in WORDS["glossary"].items())
     return tuple(sorted(found, key=lambda item: item[0].lower()))
+
+
+def rooms_counted(count: int) -> str:
+    """A number of rooms."""
+    return ngettext("{count} room", "{count} rooms", count)
+
+
+def systems_counted(count: int) -> str:
+    """A number of fenestration systems."""
+    return ngettext("{count} system", "{count} systems", count)
 
 
 def option_words(key: str) -> tuple[str, str]:
     """Label and meaning of an option of the run."""
     entry = WORDS["options"].get(key, {})
-    return said(entry.get("label", key.replace("_", " "))), said(entry.get("meaning", ""))
+    label, meaning = entry.get("label", key.replace("_", " ")), entry.get("meaning", "")
+    return gettext(label), gettext(meaning)
 
 
 def quantity(key: str) -> Quantity:
     """The quantity of that name; for an unknown one a label made from the name."""
     if key in WORDS["quantities"]:
         entry = WORDS["quantities"][key]
-        label, meaning = said(entry["label"]), said(entry["meaning"])
-        values = tuple(said(value) for value in entry.get("values", ()))
+        label, meaning = map(gettext, (entry["label"], entry["meaning"]))
+        values = tuple(gettext(value) for value in entry.get("values", ()))
         return Quantity(label, entry["unit"], entry["digits"], meaning, values)
     if match := UDI.match(key):
         return _useful_illuminance(*match.groups())
@@ -68,33 +79,50 @@ def quantity(key: str) -> Quantity:
 def _useful_illuminance(side: str | None, first: str | None, second: str | None) -> Quantity:
     """Useful daylight illuminance: the share of hours in, below or above the useful range."""
     if first and second:
-        label = f"UDI {first}–{second} lx"
-        dim = int(second) <= 300
-        what = (
-            "between {first} and {second} lx, useful with some electric light"
-            if dim
-            else "between {first} and {second} lx, neither too dark nor too bright"
+        label, range_lx = f"UDI {first}–{second} lx", {"first": first, "second": second}
+        meaning = (
+            gettext(
+                "Useful daylight illuminance: share of the occupied hours with {first} to {second} "
+                "lx, useful with supplementary electric light.",
+                **range_lx,
+            )
+            if int(second) <= 300
+            else gettext(
+                "Useful daylight illuminance: share of the occupied hours with {first} to {second} "
+                "lx, neither too dark nor too bright.",
+                **range_lx,
+            )
+        )
+    elif first and side in ("below", "under"):
+        label = gettext("UDI below {limit} lx", limit=first)
+        meaning = gettext(
+            "Useful daylight illuminance: share of the occupied hours below {limit} lx.",
+            limit=first,
         )
     elif first and side:
-        below = side in ("below", "under")
-        label = said("UDI below {first} lx" if below else "UDI above {first} lx", first=first)
-        what = "below {first} lx" if below else "above {first} lx"
+        label = gettext("UDI above {limit} lx", limit=first)
+        meaning = gettext(
+            "Useful daylight illuminance: share of the occupied hours above {limit} lx.",
+            limit=first,
+        )
     else:
-        label, what = "UDI", "in the useful range"
-    what = said(what, first=first, second=second)
-    meaning = said("Useful daylight illuminance: share of the occupied hours {what}.", what=what)
+        label = "UDI"
+        meaning = gettext(
+            "Useful daylight illuminance: share of the occupied hours in the useful range."
+        )
     return Quantity(label, PERCENT, 0, meaning)
 
 
 def _within(limit: str) -> Quantity:
     """A column or figure of adaptive comfort."""
     if limit.isdigit():
-        label = said("Within the {limit} % limits", limit=limit)
-        meaning = said(
-            "Share of the occupied hours in the adaptive comfort band that {limit} % of people "
-            "accept.",
+        label = gettext("Within the {limit} % limits", limit=limit)
+        meaning = gettext(
+            "Share of the occupied hours within the adaptive comfort band for {limit} % "
+            "acceptability.",
             limit=limit,
         )
         return Quantity(label, PERCENT, 0, meaning)
-    label = f"Within {limit.replace('_', ' ')}"
-    return Quantity(label, PERCENT, 0, f"Share of the occupied hours in {label}.")
+    band = limit.replace("_", " ")
+    meaning = gettext("Share of the occupied hours within the comfort band {band}.", band=band)
+    return Quantity(gettext("Within {band}", band=band), PERCENT, 0, meaning)

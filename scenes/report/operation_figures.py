@@ -8,22 +8,22 @@ import pandas as pd
 from scenes.figures.carpet import carpet, class_carpet
 from scenes.figures.chart import Chart, ChartMark, box
 from scenes.figures.scale import ColourScale, round_limits
-from scenes.language.catalogue import said
+from scenes.language.catalogue import N_, gettext
+from scenes.language.numbers import percent, rounded
 from scenes.report.headline import occupied
 from scenes.report.month_chart import month_chart
 from scenes.report.names import quantity
-from scenes.report.numbers import percent, rounded
 from scenes.report.tables import monthly_gains
 from scenes.results import RoomYear, RunResult
 
 STATE_COLOURS = ("#f0e7c8", "#c9b458", "#8f9d3d", "#4f7f4f", "#2c5f66", "#23395b")
 LOADS = {"heating_w": "part0", "cooling_w": "part1", "lighting_w": "part2"}
 RULES = {
-    "always": "one state all year",
-    "schedule": "by the clock",
-    "irradiance": "by the irradiance of the windows",
-    "glare": "the most open state without glare at the view point",
-    "cut-off": "the most open slats that stop the direct sun",
+    "always": N_("one state all year"),
+    "schedule": N_("by schedule"),
+    "irradiance": N_("by irradiance on the windows"),
+    "glare": N_("most open state without glare at the view point"),
+    "cut-off": N_("most open slats that block the direct sun (cut-off)"),
 }
 
 
@@ -43,11 +43,11 @@ def state_carpet(result: RunResult, room: RoomYear) -> Chart | None:
         result.times,
         np.where(lit, state, -1),
         legend,
-        title=said("Shading state"),
-        explanation=said(
-            "Control: {rule}. Hours with the sun up; optics and heat of the windows change "
+        title=gettext("Shading state"),
+        explanation=gettext(
+            "Control: {rule}. Hours with the sun up; optical and thermal properties change "
             "together.",
-            rule=said(RULES[ran.rule]) if ran.rule in RULES else ran.rule,
+            rule=gettext(RULES[ran.rule]) if ran.rule in RULES else ran.rule,
         ),
     )
 
@@ -76,10 +76,10 @@ def loads_chart(room: RoomYear) -> Chart | None:
         names,
         marks,
         top,
-        title=said("Heating, cooling and light by month"),
-        explanation=said(
-            "Heat that an ideal system gives or takes to keep the set points, and the lamps' "
-            "energy that daylight leaves to be given."
+        title=gettext("Heating, cooling and electric light by month"),
+        explanation=gettext(
+            "Heating and cooling of an ideal system that keeps the set points, and electric light "
+            "dimmed by daylight."
         ),
     )
 
@@ -91,16 +91,16 @@ def glare_carpet(result: RunResult, room: RoomYear) -> Chart | None:
         return None
     dgp = year["dgp"].to_numpy(dtype=float)
     used = dgp_in_use(room)
-    text = quantity("dgp").meaning + " " + said("Nights are left empty.")
+    text = quantity("dgp").meaning + " " + gettext("Nights are blank.")
     if len(used):
-        text += " " + said(
-            "It is above 0.40 in {share} % of the {hours} occupied hours.",
+        text += " " + gettext(
+            "DGP exceeds 0.40 in {share} % of the {hours} occupied hours.",
             share=percent(100 * float(np.mean(used > 0.40))),
             hours=rounded(len(used), 0),
         )
-    scale = ColourScale(0.2, 0.6, said("Daylight glare probability"), "", colours="inferno")
-    return carpet(result.times, dgp, scale, title=said("Glare through the year"), explanation=text,
-                  digits=2)  # fmt: skip
+    scale = ColourScale(0.2, 0.6, gettext("Daylight glare probability"), "", colours="inferno")
+    title = gettext("Glare through the year")
+    return carpet(result.times, dgp, scale, title=title, explanation=text, digits=2)
 
 
 def dgp_in_use(room: RoomYear) -> np.ndarray:

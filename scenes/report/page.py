@@ -13,15 +13,15 @@ import jinja2
 from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
-from scenes.language.catalogue import in_language, said, short_month
+from scenes.language.catalogue import N_, gettext, in_language, ngettext
 from scenes.language.heard import heard, heard_list
+from scenes.language.numbers import cell, day_and_month, rounded, semicolons
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import tables
 from scenes.report.method import method_words
 from scenes.report.model3d import model3d
 from scenes.report.names import glossary, option_words
-from scenes.report.numbers import counted, rounded
 from scenes.report.page_files import page_files
 from scenes.report.room import room_page
 from scenes.report.storeys import RoomMetric, room_metrics, storey_plans
@@ -56,7 +56,7 @@ def _filled(result: RunResult, page: PageOptions) -> str:
     metrics = room_metrics(result) if several else ()
     return environment().get_template("report.html.j2").render(
         page=page,
-        title=page.title or result.building.name or said("Building"),
+        title=page.title or result.building.name or gettext("Building"),
         result=result,
         notes=notes(result),
         rooms=rooms,
@@ -66,13 +66,13 @@ def _filled(result: RunResult, page: PageOptions) -> str:
         metrics=metrics,
         storeys=storey_plans(result) if several else (),
         storey_data=storey_data(metrics, len(rooms)),
-        summary=summary(result) + tuple((said(name), value) for name, value in page.facts),
+        summary=summary(result) + page.facts,
         problems=tables.problems_table(result),
         version=manifest.get("versions", {}).get("mitsuba-cfs", ""),
         inputs=inputs_table(manifest.get("inputs", {})),
         options=options_table(manifest),
-        versions=tables.nested_table(said("Versions"), manifest.get("versions", {})),
-        rest=tables.nested_table(said("Run"), remaining(manifest)),
+        versions=tables.nested_table(gettext("Versions"), manifest.get("versions", {})),
+        rest=tables.nested_table(gettext("Run"), remaining(manifest)),
         timings=timings_table(result),
         method=method_words(result),
         glossary=glossary(),
@@ -103,14 +103,15 @@ def environment(own: Mapping[str, str] | None = None) -> jinja2.Environment:
     environment = jinja2.Environment(
         loader=jinja2.DictLoader({**FILES, **(own or {})}),
         autoescape=True,
+        extensions=["jinja2.ext.i18n"],
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
     environment.filters["script_json"] = script_json
-    environment.globals["say"] = said
     environment.filters["packed_json"] = packed_json
     environment.filters["tied"] = prose
+    environment.install_gettext_callables(gettext, ngettext)
     return environment
 
 
@@ -135,41 +136,51 @@ def packed_json(value: object) -> str:
 def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
     """The run in a few facts."""
     building = result.building
-    rows = [(said("Run"), said(NOTE))] if result.manifest.get("quick") else []
-    rows.append((said("Building"), building.name or said("without a name")))
+    rows = [(gettext("Run"), gettext(NOTE))] if result.manifest.get("quick") else []
+    rows.append((gettext("Building"), building.name or gettext("unnamed")))
     if building.latitude_deg is not None and building.longitude_deg is not None:
         north, east = building.latitude_deg, building.longitude_deg
+        latitude, longitude = rounded(abs(north), 2), rounded(abs(east), 2)
         place = (
-            f"{rounded(abs(north), 2)}° {said('N' if north >= 0 else 'S')}",
-            f"{rounded(abs(east), 2)}° {said('E' if east >= 0 else 'W')}",
+            gettext("{degrees}° N", degrees=latitude)
+            if north >= 0
+            else gettext("{degrees}° S", degrees=latitude),
+            gettext("{degrees}° E", degrees=longitude)
+            if east >= 0
+            else gettext("{degrees}° W", degrees=longitude),
         )
-        rows.append((said("Place"), "; ".join(place)))
+        rows.append((gettext("Location"), semicolons(place)))
     manifest = result.manifest
     inputs = manifest.get("inputs", {})
     main = ("building", "weather", "system")
     rows += [(_title(name), _named(manifest, name)) for name in main if name in inputs]
     if "system" not in inputs and manifest.get("system"):
-        rows.append((said("Fenestration"), str(manifest["system"])))
+        rows.append((gettext("Fenestration"), str(manifest["system"])))
     first, last = result.times[0], result.times[-1]
-    period = said(
-        "{first} to {last}, {hours}",
-        first=f"{first.day} {short_month(first.month)}",
-        last=f"{last.day} {short_month(last.month)}",
-        hours=counted(len(result.times), "hour"),
+    period = ngettext(
+        "{first} to {last}, {count} hour",
+        "{first} to {last}, {count} hours",
+        len(result.times),
+        first=day_and_month(first, short=True),
+        last=day_and_month(last, short=True),
     )
-    rows.append((said("Period"), period))
+    rows.append((gettext("Period"), period))
     others = len(building.spaces) - len(result.spaces)
-    rooms = said("{count} computed", count=len(result.spaces))
-    rooms += said(", {count} more in the file", count=others) if others > 0 else ""
-    rows.append((said("Rooms"), rooms))
+    computed = len(result.spaces)
+    rooms = (
+        gettext("{count} computed, {others} more in the file", count=computed, others=others)
+        if others > 0
+        else gettext("{count} computed", count=computed)
+    )
+    rows.append((gettext("Rooms"), rooms))
     account = building.account
     read = () if account is None else account.facts
-    return (*rows, *((said(title), prose(heard_list(text, ", "))) for title, text in read))
+    return (*rows, *((gettext(title), prose(heard_list(text, ", "))) for title, text in read))
 
 
 def notes(result: RunResult) -> tuple[tuple[str, bool], ...]:
     """What is to be known first, and whether it is there in English alone."""
-    found = [(note, said(note) if note == NOTE else heard(note)) for note in result.notes]
+    found = [(note, gettext(note) if note == NOTE else heard(note)) for note in result.notes]
     return tuple((text, text == note) for note, text in found)
 
 
@@ -180,19 +191,20 @@ def comparison(result: RunResult, rooms) -> tables.Table | None:
     labels = list(dict.fromkeys(card.label for room in rooms for card in room.cards))
     meaning = {card.label: card for room in rooms for card in room.cards}
     columns = (
-        tables.Column(said("Room"), numeric=False),
+        tables.Column(gettext("Room"), numeric=False),
         *(tables.Column(text, meaning[text].unit, meaning[text].meaning) for text in labels),
     )
     rows = []
     for room in rooms:
         values = {card.label: card.value for card in room.cards}
         rows.append((room.name, *(values.get(label, "–") for label in labels)))
-    return tables.Table(said("All rooms"), columns, tuple(rows))
+    return tables.Table(gettext("All rooms"), columns, tuple(rows))
 
 
 def options_table(manifest: Mapping) -> tables.Table:
     """What was chosen for the run; the input files have a table of their own."""
-    columns = tuple(tables.Column(said(c), numeric=False) for c in ("Option", "Value", "Meaning"))
+    titles = (gettext("Option"), gettext("Value"), gettext("Meaning"))
+    columns = tuple(tables.Column(title, numeric=False) for title in titles)
     files = {"building", "weather", "system", *manifest.get("inputs", {})}
     rows = []
     for key, value in manifest.get("options", {}).items():
@@ -200,17 +212,22 @@ def options_table(manifest: Mapping) -> tables.Table:
             continue
         label, meaning = option_words(key)
         rows.append((label, tables.plain_value(value), meaning))
-    return tables.Table(said("Options"), columns, tuple(rows))
+    return tables.Table(gettext("Options"), columns, tuple(rows))
 
 
 def inputs_table(inputs: Mapping) -> tables.Table:
     """Input files with their hashes."""
-    columns = tuple(tables.Column(said(c), numeric=False) for c in ("Input", "File", "SHA-256"))
+    columns = tuple(tables.Column(title, numeric=False) for title in input_titles())
     rows = []
     for name, entry in inputs.items():
         digest = entry.get("sha256", "–") if isinstance(entry, Mapping) else "–"
         rows.append((_title(name), file_name(entry), str(digest)))
-    return tables.Table(said("Input files"), columns, tuple(rows))
+    return tables.Table(gettext("Input files"), columns, tuple(rows))
+
+
+def input_titles() -> tuple[str, str, str]:
+    """Headings of a table of input files."""
+    return gettext("Input"), gettext("File"), "SHA-256"
 
 
 def file_name(entry: object) -> str:
@@ -226,19 +243,42 @@ def file_name(entry: object) -> str:
 def timings_table(result: RunResult) -> tables.Table:
     """Seconds by stage: of each room, then of the run."""
     columns = (
-        tables.Column(said("Room"), numeric=False),
-        tables.Column(said("Stage"), numeric=False),
-        tables.Column(said("Time"), "s"),
+        tables.Column(gettext("Room"), numeric=False),
+        tables.Column(gettext("Stage"), numeric=False),
+        tables.Column(gettext("Time"), "s"),
     )
     rows = [
-        (room.space.label, stage.replace("_", " "), tables.cell(seconds, 1))
+        (room.space.label, stage_words(stage), cell(seconds, 1))
         for room in result.spaces
         for stage, seconds in room.seconds.items()
     ]
     total = result.manifest.get("seconds")
     if isinstance(total, int | float):
-        rows.append((said("whole run"), said("all"), tables.cell(total, 1)))
-    return tables.Table(said("Time taken"), columns, tuple(rows))
+        rows.append((gettext("entire run"), gettext("all"), cell(total, 1)))
+    return tables.Table(gettext("Computing time"), columns, tuple(rows))
+
+
+STAGES = {  # whose seconds are noted
+    "view matrix": N_("view matrix"),
+    "view matrices": N_("view matrices"),
+    "daylight matrix": N_("daylight matrix"),
+    "direct sun": N_("direct sun"),
+    "annual product": N_("annual product"),
+    "daylight": N_("daylight"),
+    "holes": N_("check for leaks"),
+    "annual glare": N_("annual glare"),
+    "glare": N_("glare"),
+    "pictures": N_("pictures"),
+    "colour": N_("colour picture"),
+    "explorer": N_("explorer"),
+    "thermal": N_("heat balance"),
+}
+
+
+def stage_words(stage: str) -> str:
+    """A stage of the computation in words."""
+    name = stage.replace("_", " ")
+    return gettext(STAGES.get(name, name))
 
 
 def remaining(manifest: Mapping) -> dict:
@@ -267,9 +307,11 @@ def _named(manifest: Mapping, name: str) -> str:
 
 def _title(name: str) -> str:
     known = {
-        "system": "Fenestration system",
-        "operation": "Operation",
-        "system_thermal": "Its thermal values",
-        "building": "Model file",
+        "system": gettext("Fenestration system"),
+        "operation": gettext("Operation"),
+        "system_thermal": gettext("Thermal data of the system"),
+        "building": gettext("Model file"),
+        "weather": gettext("Weather"),
+        "surroundings": gettext("Surroundings"),
     }
-    return said(known.get(name, name.replace("_", " ").capitalize()))
+    return known.get(name, name.replace("_", " ").capitalize())

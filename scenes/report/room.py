@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from bim.model import Space
 from scenes.figures.chart import Chart
 from scenes.figures.plan import FloorPlan
-from scenes.language.catalogue import said
+from scenes.language.catalogue import gettext, ngettext
+from scenes.language.numbers import rounded, share
 from scenes.report import (
     daylight_figures,
     glare_figures,
@@ -20,7 +21,6 @@ from scenes.report import (
 )
 from scenes.report.glare_figures import compass
 from scenes.report.headline import Card, cards
-from scenes.report.numbers import counted, rounded, share
 from scenes.results import RoomYear, RunResult
 
 
@@ -69,7 +69,7 @@ def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
         plans=daylight_figures.plans(room),
         light=daylight_figures.illuminance_carpet(result, room),
         daylight_tables=(
-            tables.values_table(said("Daylight of the room"), room.daylight.room_metrics),
+            tables.values_table(gettext("Daylight of the room"), room.daylight.room_metrics),
             tables.sensors_table(room),
         ),
         error_words=error_words(room),
@@ -88,11 +88,11 @@ def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
         loads=operation_figures.loads_chart(room),
         loads_table=None
         if room.operation is None
-        else tables.values_table(said("Loads of the year"), room.operation.summary),
-        comfort_table=tables.values_table(said("Comfort"), room.heat.comfort_summary),
+        else tables.values_table(gettext("Annual loads"), room.operation.summary),
+        comfort_table=tables.values_table(gettext("Comfort"), room.heat.comfort_summary),
         fenestration=tuple(
             tables.values_table(
-                str(values.get("system") or said("The window with its shade")),
+                str(values.get("system") or gettext("Window with shading")),
                 {k: v for k, v in values.items() if k not in ("system", "source")},
             )
             for values in room.heat.fenestration
@@ -105,36 +105,45 @@ def facts(space: Space, template: str = "") -> tuple[tuple[str, str], ...]:
     glass = sum(window.area for window in space.windows)
     count = len(space.windows)
     rows = [
-        (said("Floor area"), f"{rounded(space.floor_area, 1)} m²"),
-        (said("Air volume"), f"{rounded(space.volume, 0)} m³"),
+        (gettext("Floor area"), f"{rounded(space.floor_area, 1)} m²"),
+        (gettext("Air volume"), f"{rounded(space.volume, 0)} m³"),
         (
-            said("Windows"),
-            said("{count} with {area} m² of glass", count=count, area=rounded(glass, 1)),
+            gettext("Windows"),
+            ngettext(
+                "{count} window, {area} m² of glass",
+                "{count} windows, {area} m² of glass",
+                count,
+                area=rounded(glass, 1),
+            ),
         ),
-        (said("Facing"), ", ".join(dict.fromkeys(heading(w.normal) for w in space.windows)) or "–"),
-        (said("Glass to floor"), f"{rounded(100 * glass / space.floor_area, 0)} %"),
+        (
+            gettext("Orientation"),
+            ", ".join(dict.fromkeys(heading(w.normal) for w in space.windows)) or "–",
+        ),
+        (gettext("Glass-to-floor ratio"), f"{rounded(100 * glass / space.floor_area, 0)} %"),
     ]
     if space.storey:
-        rows.append((said("Storey"), space.storey))
+        rows.append((gettext("Storey"), space.storey))
     if template:
-        rows.append((said("Results of"), said("{room}, an equal room", room=template)))
+        rows.append((gettext("Results from"), gettext("{room} (equal room)", room=template)))
     return tuple(rows)
 
 
 def heading(normal: NDArray[np.float64]) -> str:
-    """The compass direction that a window faces, or "up"."""
+    """The compass direction that a window faces, or upwards."""
     if normal[2] > 0.7:
-        return said("up")
-    return said(compass(normal))
+        return gettext("upwards")
+    return gettext(compass(normal))
 
 
 def error_words(room: RoomYear) -> str:
     """The standard error of the room's illuminances in one sentence."""
     error = room.daylight.relative_error
-    return said(
-        "Relative standard error of the annual mean illuminance: {mean} % as a mean over "
-        "{sensors}, {worst} % at the worst one.",
+    return ngettext(
+        "Relative standard error of the annual mean illuminance: {mean} % at the one sensor.",
+        "Relative standard error of the annual mean illuminance: {mean} % on average over {count} "
+        "sensors, {worst} % at most.",
+        len(error),
         mean=share(float(error.mean())),
-        sensors=counted(len(error), "sensor"),
         worst=share(float(error.max())),
     )

@@ -11,7 +11,7 @@ import shapely
 from bim.model import Space
 from scenes.figures.plan import MARGIN, UNIT, plan_frame, rings
 from scenes.figures.scale import ColourScale, round_limits
-from scenes.language.catalogue import decimal, said
+from scenes.language.catalogue import decimal, gettext
 from scenes.report.headline import WARM_C, occupied, room_metric, sensor_column
 from scenes.results import RoomYear, RunResult
 
@@ -65,11 +65,26 @@ class StoreyPlan:
 def room_metrics(result: RunResult) -> tuple[RoomMetric, ...]:
     """Every figure that at least one room has."""
     asked: tuple[tuple[ColourScale, int, bool, Callable[[RoomYear], float | None]], ...] = (
-        (_share(said("Spatial daylight autonomy")), 0, True, lambda room: room_metric(room, "sda")),
-        (_share(said("Daylight autonomy")), 0, True, _autonomy),
-        (_share(said("Annual sunlight exposure")), 0, False, lambda room: room_metric(room, "ase")),
-        (ColourScale(0.2, 0.5, said("Highest DGP"), "", colours="inferno"), 2, False, _glare),
-        (_share(said("Occupied hours above {limit} °C", limit=f"{WARM_C:.0f}")), 0, False, _warm),
+        (
+            _share(gettext("Spatial daylight autonomy")),
+            0,
+            True,
+            lambda room: room_metric(room, "sda"),
+        ),
+        (_share(gettext("Daylight autonomy")), 0, True, _autonomy),
+        (
+            _share(gettext("Annual sunlight exposure")),
+            0,
+            False,
+            lambda room: room_metric(room, "ase"),
+        ),
+        (ColourScale(0.2, 0.5, gettext("Highest DGP"), "", colours="inferno"), 2, False, _glare),
+        (
+            _share(gettext("Occupied hours above {limit} °C", limit=f"{WARM_C:.0f}")),
+            0,
+            False,
+            _warm,
+        ),
         (_temperatures(result), 1, False, _peak),
     )
     found = []
@@ -96,7 +111,7 @@ def storey_plans(result: RunResult) -> tuple[StoreyPlan, ...]:
 
 def storey_name(space: Space) -> str:
     """The storey of a room; by its floor's height where the model has none."""
-    return space.storey or said("Floor at {level} m", level=decimal(f"{space.floor_level:.1f}"))
+    return space.storey or gettext("Floor at {level} m", level=decimal(f"{space.floor_level:.1f}"))
 
 
 def _storey(name: str, spaces: Sequence[Space], numbers: dict[str, int]) -> StoreyPlan:
@@ -126,7 +141,7 @@ def _share(label: str) -> ColourScale:
 def _temperatures(result: RunResult) -> ColourScale:
     peaks = [peak for room in result.spaces if (peak := _peak(room)) is not None]
     low, high = round_limits(peaks or [0.0, 1.0])
-    label = said("Highest operative temperature")
+    label = gettext("Highest operative temperature")
     return ColourScale(low, max(high, low + 1.0), label, "°C", colours="cividis")
 
 

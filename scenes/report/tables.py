@@ -8,12 +8,24 @@ from dataclasses import dataclass
 import pandas as pd
 
 from bim.report.ranking import ranked
-from scenes.language.catalogue import month_name, said
+from scenes.language.catalogue import N_, gettext
+from scenes.language.numbers import cell
 from scenes.report.names import Quantity, quantity
-from scenes.report.numbers import cell
 from scenes.results import LuminancePicture, RoomYear, RunResult
 
 DGP_LIMITS = ((0.35, "imperceptible"), (0.40, "perceptible"), (0.45, "disturbing"))
+CLASS_WORDS = {  # of glare
+    "imperceptible": N_("imperceptible"),
+    "perceptible": N_("perceptible"),
+    "disturbing": N_("disturbing"),
+    "intolerable": N_("intolerable"),
+}
+GLARE_WORDS = {
+    "imperceptible": N_("imperceptible glare"),
+    "perceptible": N_("perceptible glare"),
+    "disturbing": N_("disturbing glare"),
+    "intolerable": N_("intolerable glare"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,32 +58,27 @@ def glare_table(times: pd.DatetimeIndex, pictures: Iterable[LuminancePicture]) -
     pictures = sorted(pictures, key=lambda picture: picture.hour)
     others = dict.fromkeys(key for picture in pictures for key in picture.glare)
     keys = ["dgp", *(key for key in others if key != "dgp")]
-    columns = [Column(said("Hour"), numeric=False, short=True)]
+    columns = [Column(gettext("Hour"), numeric=False, short=True)]
     columns += [_column(key) for key in keys]
-    columns.insert(2, Column(said("Class"), "", said("Class of DGP."), numeric=False, short=True))
+    columns.insert(
+        2, Column(gettext("Class"), "", gettext("Class of the DGP."), numeric=False, short=True)
+    )
     columns.append(
-        Column(said("Brightest pixel"), "cd/m²", said("Highest luminance in the picture."))
+        Column(gettext("Brightest pixel"), "cd/m²", gettext("Highest luminance in the picture."))
     )
     rows = []
     for picture in pictures:
         row = [moment(times[picture.hour])]
         row += [cell(picture.glare.get(key), quantity(key).digits) for key in keys]
-        row.insert(2, said(glare_class(picture.glare["dgp"])))
+        row.insert(2, gettext(CLASS_WORDS[glare_class(picture.glare["dgp"])]))
         row.append(cell(float(picture.luminance.max()), 0))
         rows.append(tuple(row))
-    return Table(said("Glare by hour"), tuple(columns), tuple(rows))
+    return Table(gettext("Glare by hour"), tuple(columns), tuple(rows))
 
 
 def moment(time: pd.Timestamp) -> str:
     """A time as a reader says it, sortable as text too."""
     return f"{time:%Y-%m-%d %H:%M}"
-
-
-def spoken(time: pd.Timestamp) -> str:
-    """A time in a sentence; the year of a weather file means nothing."""
-    return said(
-        "{day} {month} {clock}", day=time.day, month=month_name(time.month), clock=f"{time:%H:%M}"
-    )
 
 
 def monthly_gains(gains: pd.DataFrame) -> pd.DataFrame:
@@ -90,14 +97,14 @@ def step_hours(times: pd.DatetimeIndex) -> float:
 
 def gains_table(monthly: pd.DataFrame) -> Table:
     """Monthly energies with their sum."""
-    columns = [Column(said("Month"), numeric=False, short=True)]
+    columns = [Column(gettext("Month"), numeric=False, short=True)]
     columns += [Column(quantity(n).label, "kWh", quantity(n).meaning) for n in monthly]
     rows = [
         (f"{month:%Y-%m}", *(cell(v, 0) for v in row))
         for month, row in zip(monthly.index, monthly.to_numpy(), strict=True)
     ]
-    rows.append((said("Sum"), *(cell(v, 0) for v in monthly.sum())))
-    return Table(said("Solar energy by month"), tuple(columns), tuple(rows))
+    rows.append((gettext("Sum"), *(cell(v, 0) for v in monthly.sum())))
+    return Table(gettext("Solar energy by month"), tuple(columns), tuple(rows))
 
 
 def values_table(caption: str, values: Mapping[str, float]) -> Table:
@@ -107,10 +114,10 @@ def values_table(caption: str, values: Mapping[str, float]) -> Table:
         q = quantity(key)
         rows.append((q.label, named(q, value), q.unit, q.meaning))
     columns = (
-        Column(said("Quantity"), numeric=False),
-        Column(said("Value")),
-        Column(said("Unit"), numeric=False, short=True),
-        Column(said("Meaning"), numeric=False),
+        Column(gettext("Quantity"), numeric=False),
+        Column(gettext("Value")),
+        Column(gettext("Unit"), numeric=False, short=True),
+        Column(gettext("Meaning"), numeric=False),
     )
     return Table(caption, columns, tuple(rows))
 
@@ -128,8 +135,8 @@ def sensors_table(room: RoomYear) -> Table:
     """Every sensor with its metrics and its standard error."""
     daylight = room.daylight
     frame = daylight.sensor_metrics
-    columns = [Column(said("Sensor"))] + [_column(key) for key in frame]
-    columns += [Column(said("Annual mean"), "lx"), Column(said("Standard error"), "%")]
+    columns = [Column(gettext("Sensor"))] + [_column(key) for key in frame]
+    columns += [Column(gettext("Annual mean"), "lx"), Column(gettext("Standard error"), "%")]
     digits = [2 if key in ("x", "y", "z") else max(quantity(key).digits, 1) for key in frame]
     mean = daylight.illuminance.mean(axis=0)
     rows = [
@@ -141,28 +148,27 @@ def sensors_table(room: RoomYear) -> Table:
         )
         for i, row in enumerate(frame.to_numpy())
     ]
-    return Table(said("Sensors of {room}", room=room.space.label), tuple(columns), tuple(rows))
+    return Table(gettext("Sensors of {room}", room=room.space.label), tuple(columns), tuple(rows))
 
 
 def problems_table(result: RunResult) -> Table:
     """What is wrong with the building's file and what was done about it."""
     columns = (
-        Column(said("Glass"), "m²"),
-        *(
-            Column(said(label), numeric=False)
-            for label in ("Where", "What", "Consequence and repair")
-        ),
+        Column(gettext("Glass"), "m²"),
+        Column(gettext("Element"), numeric=False),
+        Column(gettext("Problem"), numeric=False),
+        Column(gettext("Treatment in the model"), numeric=False),
     )
     rows = tuple(
         (cell(one.glass, 2) if one.glass else "–", one.first.where, *one.text("command").pair)
         for one in ranked(result.issues)
     )
-    return Table(said("By element"), columns, rows)
+    return Table(gettext("Problems by element"), columns, rows)
 
 
 def nested_table(caption: str, content: Mapping) -> Table:
     """Any nested mapping of the manifest, one value a row."""
-    columns = (Column(said("Name"), numeric=False), Column(said("Value"), numeric=False))
+    columns = (Column(gettext("Name"), numeric=False), Column(gettext("Value"), numeric=False))
     return Table(caption, columns, tuple(_flat(content)))
 
 

@@ -10,11 +10,11 @@ import pandas as pd
 from scenes.figures.carpet import carpet, class_carpet
 from scenes.figures.chart import Chart, ChartMark, Readout, box, line
 from scenes.figures.scale import ColourScale, Tick, axis_ticks, round_limits
-from scenes.language.catalogue import month_name, said, short_month
+from scenes.language.catalogue import gettext
+from scenes.language.numbers import day_and_month, percent, rounded, short_month
 from scenes.report.headline import WARM_C, applicable, comfort_columns, heated, occupied
 from scenes.report.month_chart import month_chart
 from scenes.report.names import quantity
-from scenes.report.numbers import percent, rounded
 from scenes.report.tables import step_hours
 from scenes.results import RoomYear, RunResult
 
@@ -27,9 +27,9 @@ def temperature_carpet(result: RunResult, room: RoomYear) -> Chart:
     """Operative temperature of every hour."""
     values = room.heat.temperatures["operative_c"].to_numpy()
     low, high = round_limits(values, 8)
-    scale = ColourScale(low, high, said("Operative temperature"), "°C", colours="cividis")
+    scale = ColourScale(low, high, gettext("Operative temperature"), "°C", colours="cividis")
     return carpet(
-        result.times, values, scale, title=said("Operative temperature"), digits=1,
+        result.times, values, scale, title=gettext("Operative temperature"), digits=1,
         explanation=f"{quantity('operative_c').meaning} {heated(room)}",
     )  # fmt: skip
 
@@ -53,10 +53,10 @@ def comfort_carpet(result: RunResult, room: RoomYear) -> Chart | None:
     wide, narrow = quantity(columns[-1]).label, quantity(columns[0]).label
     legend = (
         (STRICT, narrow),
-        (COMFORT, said("{band} only", band=wide)),
-        (WARM, said("Too warm")),
-        (COLD, said("Too cold")),
-        (UNKNOWN, said("Weather that the model does not cover")),
+        (COMFORT, gettext("{band} only", band=wide)),
+        (WARM, gettext("Too warm")),
+        (COLD, gettext("Too cold")),
+        (UNKNOWN, gettext("Outside the range of the model")),
     )
     share = 100 * np.bincount(classes[classes >= 0], minlength=5) / max((classes >= 0).sum(), 1)
     names = tuple(
@@ -66,10 +66,10 @@ def comfort_carpet(result: RunResult, room: RoomYear) -> Chart | None:
     order = np.full(6, -1)
     order[used] = np.arange(len(used))
     return class_carpet(
-        result.times, order[classes], tuple(names[i] for i in used), title=said("Adaptive comfort"),
-        explanation=said(
-            "Occupied hours, by how the operative temperature compares with what people accept "
-            "after the recent weather; other hours are left empty."
+        result.times, order[classes], tuple(names[i] for i in used),
+        title=gettext("Adaptive comfort"), explanation=gettext(
+            "Occupied hours by operative temperature relative to the adaptive comfort bands; "
+            "unoccupied hours are blank."
         ),
     )  # fmt: skip
 
@@ -98,21 +98,21 @@ def duration_curve(room: RoomYear, beside: Sequence[RoomYear] = ()) -> Chart:
     ]
     above = float((curves["operative_c"] > WARM_C).mean()) * hours if "operative_c" in curves else 0
     return Chart(
-        said("Temperature duration"),
-        said(
-            "Each curve shows for how many hours a temperature is exceeded. The operative "
-            "temperature is above {limit} °C for {above} of {hours} hours, occupied or not.",
+        gettext("Temperature duration curve"),
+        gettext(
+            "Hours in which each temperature is exceeded. The operative temperature exceeds "
+            "{limit} °C in {above} of all {hours} hours, occupied or not.",
             limit=f"{WARM_C:.0f}",
             above=rounded(above, 0),
             hours=rounded(hours, 0),
         ),
-        said("Hours above [h]"),
-        said("Temperature [°C]"),
+        gettext("Hours exceeded [h]"),
+        gettext("Temperature [°C]"),
         axis_ticks(*x_range, 6),
         axis_ticks(*y_range),
         tuple(marks),
         readout=Readout(
-            tuple(said("{hours} h above", hours=rounded(s * hours, 0)) for s in share),
+            tuple(gettext("exceeded in {hours} h", hours=rounded(s * hours, 0)) for s in share),
             tuple(
                 (quantity(n).label, tuple(f"{rounded(float(t), 1)} °C" for t in v))
                 for n, v in sorted_curves.items()
@@ -126,12 +126,12 @@ def extreme_weeks(room: RoomYear) -> tuple[Chart, ...]:
     temperatures = room.heat.temperatures
     daily = temperatures["operative_c"].resample("D").mean()
     if len(daily) < 8:
-        return (week(room, temperatures.index[0].normalize(), said("The period")),)
+        return (week(room, temperatures.index[0].normalize(), gettext("Period")),)
     weekly = daily.rolling(7).mean()
     warm, cold = (day - pd.Timedelta(days=6) for day in (weekly.idxmax(), weekly.idxmin()))
     return (
-        week(room, warm, said("The warmest week")),
-        week(room, cold, said("The coldest week")),
+        week(room, warm, gettext("Warmest week")),
+        week(room, cold, gettext("Coldest week")),
     )
 
 
@@ -159,21 +159,19 @@ def week(room: RoomYear, start: pd.Timestamp, title: str) -> Chart:
     ]
     last = stop - pd.Timedelta(days=1)
     return Chart(
-        said(
-            "{week}: {first_day} {first_month} to {last_day} {last_month}",
+        gettext(
+            "{week}: {first} to {last}",
             week=title,
-            first_day=start.day,
-            first_month=month_name(start.month),
-            last_day=last.day,
-            last_month=month_name(last.month),
+            first=day_and_month(start),
+            last=day_and_month(last),
         ),
-        said("Temperatures outdoors and in the room.") + f" {heated(room)}",
-        said("Day"),
-        said("Temperature [°C]"),
+        gettext("Outdoor and room temperatures.") + f" {heated(room)}",
+        gettext("Day"),
+        gettext("Temperature [°C]"),
         tuple(ticks),
         axis_ticks(*y_range),
         (ChartMark(_midnights(y_range), "grid"), *marks),
-        readout=_readout([f"{t.day} {short_month(t.month)} {t:%H:%M}" for t in part.index], curves),
+        readout=_readout([f"{day_and_month(t, short=True)} {t:%H:%M}" for t in part.index], curves),
     )
 
 
@@ -218,9 +216,9 @@ def gains_chart(monthly: pd.DataFrame) -> Chart | None:
         ([incident] if incident else []) + parts,
         marks,
         y_range[1],
-        title=said("Solar energy by month"),
-        explanation=said(
-            "What reaches the glass from outside, and what of it passes into the room or is "
-            "absorbed in the window (part of which reaches the room as heat)."
+        title=gettext("Solar energy by month"),
+        explanation=gettext(
+            "Solar radiation incident on the glass, transmitted into the room, and absorbed in the "
+            "window (a part of it reaches the room as heat)."
         ),
     )

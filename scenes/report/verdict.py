@@ -1,4 +1,4 @@
-"""The verdict at the head of a report: what was asked, three sentences, figures against limits."""
+"""The verdict at the head of a report: the question, three sentences, results and limits."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.language.catalogue import month_name, said
+from scenes.language.catalogue import gettext, ngettext
+from scenes.language.numbers import month_name, percent, rounded, significant, spoken
 from scenes.report.glare_figures import sun_words
 from scenes.report.headline import WARM_C, Card, heated, occupied
 from scenes.report.limits import LimitTables, limits, plus_minus
-from scenes.report.numbers import counted, percent, rounded, significant
-from scenes.report.tables import glare_class, spoken, step_hours
+from scenes.report.method import METHODS
+from scenes.report.names import rooms_counted, systems_counted
+from scenes.report.tables import GLARE_WORDS, glare_class, step_hours
 from scenes.results import ExploredRoom, LuminancePicture, RoomYear, RunResult
 
 MOST_NAMES = 4  # of systems in the first sentence, of rooms in that on shading
@@ -24,9 +26,9 @@ BY_LIGHT, NO_LIGHT = 5.87e-5, 0.159
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """One page for who reads no more."""
+    """The summary on one page."""
 
-    asked: str
+    question: str
     sentences: tuple[tuple[str, str], ...]  # heading, text
     limits: LimitTables
 
@@ -39,51 +41,50 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
     names = [room.space.label for room in result.spaces]
     used = result.manifest.get("fenestration", ())
     systems = list(dict.fromkeys(f"“{one['system']}”" for one in used))
-    asked = said(
-        "Daylight, glare and temperatures of {rooms} of {building} in a year of {weather}, with "
-        "{systems}, by the {method} method.",
-        rooms=names[0] if len(names) == 1 else counted(len(names), "room"),
-        building=result.building.name or said("the building"),
-        weather=result.manifest.get("site") or said("the given weather"),
+    question = gettext(
+        "Daylight, glare and temperatures in {rooms} of {building}; weather: {weather}; "
+        "fenestration: {systems}; method: {method}.",
+        rooms=names[0] if len(names) == 1 else rooms_counted(len(names)),
+        building=result.building.name or gettext("the building"),
+        weather=result.manifest.get("site") or gettext("weather file"),
         systems=_systems(systems)
         or result.manifest.get("system")
-        or said("what fills its windows"),
-        method=said(result.method),
+        or gettext("windows as modelled"),
+        method=gettext(METHODS[result.method]),
     )
     sentences = (
-        (said("Glare"), _glare(result)),
-        (said("Warmth"), _warmth(result)),
-        (said("Shading"), _shading(result)),
+        (gettext("Glare"), _glare(result)),
+        (gettext("Overheating"), _overheating(result)),
+        (gettext("Shading"), _shading(result)),
     )
     named = [(r.space.label, r, own) for r, own in zip(result.spaces, cards, strict=True)]
-    return Verdict(asked, sentences, limits(named, said("Room")))
+    return Verdict(question, sentences, limits(named, gettext("Room")))
 
 
 def _systems(names: Sequence[str]) -> str:
-    """All of them, or how many where they are more than a line holds."""
-    return ", ".join(names) if len(names) <= MOST_NAMES else counted(len(names), "system")
+    """All of them, or their number where they do not fit on a line."""
+    return ", ".join(names) if len(names) <= MOST_NAMES else systems_counted(len(names))
 
 
 def _glare(result: RunResult) -> str:
-    """Why it glares at its worst."""
+    """The worst glare and its cause."""
     found = [(p.glare["dgp"], room, p) for room in result.spaces for p in room.glare.pictures]
     if not found:
-        return said("No picture was made, so that glare is not known.")
+        return gettext("Glare is unknown: no picture was computed.")
     dgp, room, picture = max(found, key=lambda one: one[0])
     value = rounded(dgp, 2) + plus_minus(picture)
     where = f"{room.space.label}, {spoken(result.times[picture.hour])}"
     if glare_class(dgp) == "imperceptible":
-        return said(
-            "No picture has more than imperceptible glare; the highest DGP is {dgp} ({where}).",
+        return gettext(
+            "Glare is imperceptible in all pictures; the highest DGP is {dgp} ({where}).",
             dgp=value,
             where=where,
         )
-    text = said(
-        "Of {count} pictures the worst has {glare}, DGP {dgp} ({where}): {sun}, and {cause}."
-        if len(found) > 1
-        else "The one picture made has {glare}, DGP {dgp} ({where}): {sun}, and {cause}.",
-        count=len(found),
-        glare=said(f"{glare_class(dgp)} glare"),
+    text = ngettext(
+        "The picture shows {glare}: DGP {dgp} ({where}; {sun}). {cause}",
+        "The worst of {count} pictures shows {glare}: DGP {dgp} ({where}; {sun}). {cause}",
+        len(found),
+        glare=gettext(GLARE_WORDS[glare_class(dgp)]),
         dgp=value,
         where=where,
         sun=sun_words(result, picture.hour),
@@ -91,35 +92,45 @@ def _glare(result: RunResult) -> str:
     )
     if room.annual_glare is not None and occupied(room).any():
         year = room.annual_glare["dgp"].fillna(0.0).to_numpy()[occupied(room).to_numpy()]
-        text += " " + said(
-            "DGP is above 0.40 in {share} % of the occupied hours.",
+        text += " " + gettext(
+            "DGP exceeds 0.40 in {share} % of the occupied hours.",
             share=percent(100 * float((year > 0.40).mean())),
         )
     return text
 
 
 def _cause(picture: LuminancePicture) -> str:
-    """Which term of DGP is the larger."""
+    """The larger term of DGP, as a sentence."""
     glare = picture.glare
     if "ev" not in glare:
-        return said("bright surfaces are in view")
+        return gettext("Bright surfaces are in view.")
     by_light = BY_LIGHT * glare["ev"]
     by_sources = glare["dgp"] - NO_LIGHT - by_light
     lux = significant(glare["ev"], 2)
     count = int(glare.get("sources", 0))
-    many = counted(count, "bright source")
     if by_sources > by_light:
-        return said(
-            "{sources} in view weigh more than the {lux} lx at the eye ({parts})",
-            sources=many,
+        parts = _parts(by_sources, by_light)
+        if not count:
+            return gettext(
+                "Bright areas in view contribute more than the {lux} lx at the eye ({parts}).",
+                lux=lux,
+                parts=parts,
+            )
+        return ngettext(
+            "{count} bright source in view contributes more than the {lux} lx at the eye "
+            "({parts}).",
+            "{count} bright sources in view contribute more than the {lux} lx at the eye "
+            "({parts}).",
+            count,
             lux=lux,
-            parts=_parts(by_sources, by_light),
+            parts=parts,
         )
     if count == 0 or by_sources <= 0:
-        return said("the {lux} lx at the eye are all of it", lux=lux)
-    return said(
-        "the {lux} lx at the eye weigh more than {sources} in view ({parts})",
-        sources=many,
+        return gettext("The {lux} lx at the eye are the only cause.", lux=lux)
+    return ngettext(
+        "The {lux} lx at the eye contribute more than {count} bright source in view ({parts}).",
+        "The {lux} lx at the eye contribute more than {count} bright sources in view ({parts}).",
+        count,
         lux=lux,
         parts=_parts(by_light, by_sources),
     )
@@ -128,29 +139,30 @@ def _cause(picture: LuminancePicture) -> str:
 def _parts(one: float, other: float) -> str:
     """Two shares of what DGP has beyond its value without light."""
     part = round(100 * one / (one + other))
-    return said("{one} to {other} %", one=part, other=100 - part)
+    return gettext("{one} to {other} %", one=part, other=100 - part)
 
 
-def _warmth(result: RunResult) -> str:
-    """When it is too warm."""
+def _overheating(result: RunResult) -> str:
+    """Overheating hours of the worst room and the highest temperature."""
     rooms = [room for room in result.spaces if "operative_c" in room.heat.temperatures]
     if not rooms:
-        return said("Temperatures were not computed.")
+        return gettext("Temperatures were not computed.")
     hours = [_warm_hours(room) for room in rooms]
     room, warm = max(  # of rooms too warm in as many hours, the hottest
         zip(rooms, hours, strict=True),
         key=lambda one: (one[1].sum(), one[0].heat.operative_c.max()),
     )
     if not warm.any():
-        none = said("No occupied hour is above {limit} °C.", limit=f"{WARM_C:.0f}")
+        none = gettext("No occupied hour exceeds {limit} °C.", limit=f"{WARM_C:.0f}")
         return f"{none} {heated(room)}"
     times, step = room.heat.temperatures.index, step_hours(room.heat.temperatures.index)
     months = np.bincount(times.month[warm], minlength=13)
     month = times[warm][times.month[warm] == months.argmax()][0]
     total, peak = occupied(room).sum() * step, room.heat.operative_c
-    text = said(
-        "{room} is above {limit} °C in {hours} of its {total} occupied hours, most of them in "
-        "{month}; the highest operative temperature is {peak} °C, {hour}.",
+    text = gettext(
+        "{room}: the operative temperature exceeds {limit} °C in {hours} of {total} occupied "
+        "hours, "
+        "mostly in {month}; the maximum is {peak} °C ({hour}).",
         room=room.space.label,
         limit=f"{WARM_C:.0f}",
         hours=rounded(warm.sum() * step, 0),
@@ -167,22 +179,20 @@ def _warm_hours(room: RoomYear) -> NDArray[np.bool_]:
 
 
 def _shading(result: RunResult) -> str:
-    """What the shading costs in daylight."""
+    """Hours with the shading in use, and its effect on daylight autonomy."""
     moved = [r for r in result.spaces if r.operation is not None and len(r.operation.states) > 1]
     if not moved:
-        return said(
-            "What fills the windows stays in one state all year: all figures are of that state."
-        )
+        return gettext("The shading does not move: all results are for one state.")
     drawn = [_drawn(room) for room in moved]
     cost = [None if r.explored is None else _autonomies(r, r.explored) for r in moved]
     found = list(zip(moved, drawn, cost, strict=True))
     if len(moved) > MOST_NAMES:
         found.sort(key=lambda one: -one[1])
         parts = [
-            said(
-                "In {rooms} the shading is drawn in {least} to {most} % of the occupied daylight "
+            gettext(
+                "{rooms}: the shading is in use in {least} to {most} % of the occupied daylight "
                 "hours, most in {room}.",
-                rooms=counted(len(moved), "room"),
+                rooms=rooms_counted(len(moved)),
                 least=percent(min(drawn)),
                 most=percent(max(drawn)),
                 room=found[0][0].space.label,
@@ -193,7 +203,7 @@ def _shading(result: RunResult) -> str:
         parts = []
     parts += [_shading_of(*one) for one in found if not parts or one[2] is not None]
     if not any(r.explored for r in moved):
-        parts.append(said("--explore tells what that costs in daylight."))
+        parts.append(gettext("Use --explore to compute its effect on daylight."))
     return " ".join(parts)
 
 
@@ -209,15 +219,23 @@ def _drawn(room: RoomYear) -> float:
 def _shading_of(room: RoomYear, drawn: float, cost: tuple[float, float] | None) -> str:
     facts = {"room": room.space.label, "share": percent(drawn)}
     if cost is None:
-        return said(
-            "In {room} the shading is drawn in {share} % of the occupied daylight hours.", **facts
+        return gettext(
+            "{room}: the shading is in use in {share} % of the occupied daylight hours.", **facts
         )
-    return said(
-        "In {room} the shading is drawn in {share} % of the occupied daylight hours, which lowers "
+    most, least = map(percent, cost)
+    if most == least:
+        return gettext(
+            "{room}: the shading is in use in {share} % of the occupied daylight hours; daylight "
+            "autonomy stays at {most} %.",
+            **facts,
+            most=most,
+        )
+    return gettext(
+        "{room}: the shading is in use in {share} % of the occupied daylight hours and reduces "
         "daylight autonomy from {most} to {least} %.",
         **facts,
-        most=percent(cost[0]),
-        least=percent(cost[1]),
+        most=most,
+        least=least,
     )
 
 

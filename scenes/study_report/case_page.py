@@ -12,10 +12,11 @@ from scenes.figures.carpet import carpet
 from scenes.figures.chart import Chart
 from scenes.figures.plan import FloorPlan
 from scenes.figures.scale import ColourScale
-from scenes.language.catalogue import said
+from scenes.language.catalogue import gettext
+from scenes.language.numbers import rounded
 from scenes.report import daylight_figures, tables, thermal_figures
+from scenes.report.method import METHODS
 from scenes.report.names import quantity
-from scenes.report.numbers import rounded
 from scenes.report.room import error_words
 from scenes.results import DaylightResult, GlareResults, RoomYear, RunResult, ThermalResult
 from scenes.study.case import Case
@@ -94,17 +95,20 @@ def case_label(study: StudyResult, case: Case) -> str:
     if len({c.orientation_deg for c in cases}) > 1:
         parts.append(f"{facing(space, case.orientation_deg)} ({case.orientation_deg:g}°)")
     if len({c.options.method for c in cases}) > 1:
-        parts.append(said(case.options.method))
+        parts.append(gettext(METHODS[case.options.method]))
     return ", ".join(parts)
 
 
 def method_words(case: Case) -> str:
     """How the case was computed, in a few words."""
-    glare = said(
-        "no glare" if case.glare == "none" else "{glare} of every occupied hour with sun",
+    method = gettext(METHODS[case.options.method])
+    if case.glare == "none":
+        return gettext("{method} method, no glare", method=method)
+    return gettext(
+        "{method} method, {glare} of every occupied hour with the sun up",
+        method=method,
         glare=case.glare,
     )
-    return f"{said(case.options.method)}, {glare}"
 
 
 def room_of(study: StudyResult, case: Case, result: CaseResult) -> RoomYear:
@@ -139,22 +143,22 @@ def glare_map(times: pd.DatetimeIndex, case: Case, result: CaseResult) -> Chart:
     """DGP of every rated hour as a carpet."""
     f = result.figures
     scale = ColourScale(LEAST_DGP, MOST_DGP, case.glare, "", colours="inferno")
-    words = said(
-        "{glare} of the occupied hours with the sun up, seen from the middle of the room towards "
-        "its biggest window. Above 0.40 in {some} h, above 0.45 in {few} h; highest {most}.",
+    words = gettext(
+        "{glare} of the occupied hours with the sun up, from the middle of the room towards its "
+        "largest window. Above 0.40 in {some} h, above 0.45 in {few} h; maximum {most}.",
         glare=case.glare,
         some=rounded(f["glare_disturbing_h"] + f["glare_intolerable_h"], 0),
         few=rounded(f["glare_intolerable_h"], 0),
         most=rounded(f["dgp_max"], 2),
     )
-    return carpet(times, result.arrays["dgp"], scale, title=said("Glare through the year"),
+    return carpet(times, result.arrays["dgp"], scale, title=gettext("Glare through the year"),
                   explanation=words, digits=3)  # fmt: skip
 
 
 def figures_table(result: CaseResult) -> tables.Table:
     """Every figure of a case."""
     values = {k: v for k, v in result.figures.items() if v is not None}
-    table = tables.values_table(said("All figures of this case"), values)
+    table = tables.values_table(gettext("All results of this case"), values)
     return replace(table, rows=tuple(sorted(table.rows, key=lambda row: row[0].lower())))
 
 

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 
 from mitsuba_cfs.glare.classes import CLASSES
 from scenes.figures.scale import Tick, axis_ticks, round_limits
-from scenes.language.catalogue import said
+from scenes.language.catalogue import gettext
+from scenes.language.numbers import cell, percent, rounded
 from scenes.report import tables
+from scenes.report.headline import LEVEL_WORDS
+from scenes.report.method import METHODS
 from scenes.report.names import quantity
-from scenes.report.numbers import cell, percent, rounded
+from scenes.report.tables import CLASS_WORDS
 from scenes.study.case import Case
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
@@ -81,14 +84,12 @@ def scatter(study: StudyResult) -> Scatter:
     (x0, x1), (y0, y1) = round_limits([*x, 0.0, 100.0]), round_limits([*y, 0.0, 1.0])
 
     def words(case: Case, light: float, share: float) -> str:
-        return said(
-            "{case}: daylight {light} %, disturbing glare {share} %"
-            if rated
-            else "{case}: daylight {light} %, too warm {share} %",
-            case=case_label(study, case),
-            light=percent(light),
-            share=percent(share),
-        )
+        values = {
+            "case": case_label(study, case), "light": percent(light), "share": percent(share)
+        }  # fmt: skip
+        if rated:
+            return gettext("{case}: daylight {light} %, disturbing glare {share} %", **values)
+        return gettext("{case}: daylight {light} %, overheating {share} %", **values)
 
     dots = tuple(
         Dot(
@@ -101,20 +102,22 @@ def scatter(study: StudyResult) -> Scatter:
         for (number, case, _), a, b in zip(cases, x, y, strict=True)
     )
     return Scatter(
-        said("Daylight against glare" if rated else "Daylight against warmth"),
-        said(
-            "Each case is a mark in the colour of its system; further right is more daylight, "
-            "further down less glare. No case beats those on the line in both. A click shows a "
-            "case."
-            if rated
-            else "Each case is a mark in the colour of its system; further right is more "
-            "daylight, further down less heat. No case beats those on the line in both. A click "
-            "shows a case."
+        gettext("Daylight and glare") if rated else gettext("Daylight and overheating"),
+        gettext(
+            "Each case is a mark in the colour of its system; more daylight to the right, less "
+            "glare downwards. The line joins the cases that no other case surpasses in both "
+            "(Pareto front). Click a mark to show its case."
+        )
+        if rated
+        else gettext(
+            "Each case is a mark in the colour of its system; more daylight to the right, less "
+            "overheating downwards. The line joins the cases that no other case surpasses in both "
+            "(Pareto front). Click a mark to show its case."
         ),
-        said("Daylight autonomy: mean over the work plane of the occupied hours above 300 lx [%]"),
-        said(
-            "Occupied hours with DGP above 0.40 [%]" if rated else "Occupied hours above 26 °C [%]"
-        ),
+        gettext("Daylight autonomy (300 lx), mean over the work plane [%]"),
+        gettext("Occupied hours with DGP above 0.40 [%]")
+        if rated
+        else gettext("Occupied hours above 26 °C [%]"),
         axis_ticks(x0, x1),
         axis_ticks(y0, y1),
         dots,
@@ -149,7 +152,9 @@ def bars(study: StudyResult) -> tuple[Bar, ...]:
         if None in hours:
             continue
         shares = tuple((n, 100 * h / sum(hours)) for n, h in zip(CLASSES, hours, strict=True))
-        words = ", ".join(f"{said(name)} {percent(share)} %" for name, share in shares)
+        words = ", ".join(
+            f"{gettext(CLASS_WORDS[name])} {percent(share)} %" for name, share in shares
+        )
         label = case_label(study, case)
         found.append(Bar(number, label, shares, result.figures["da300"], words))
     return tuple(found)
@@ -172,22 +177,24 @@ def comparison_table(study: StudyResult) -> tables.Table:
     present = {name for result in study.results for name in result.figures}
     columns = [c for c in COLUMNS if c in present]
     headings = (
-        tables.Column(said("Case"), meaning=said("Number of the case; choose it below.")),
-        tables.Column(said("What"), numeric=False, short=True),
-        tables.Column(said("Method"), numeric=False, short=True),
+        tables.Column(gettext("Case"), meaning=gettext("Number of the case; select it below.")),
+        tables.Column(gettext("Description"), numeric=False, short=True),
+        tables.Column(gettext("Method"), numeric=False, short=True),
         *(label_of(c) for c in columns),
     )
     rows = []
     for number, case, result in finished(study):
         values = [_shown(c, result.figures.get(c)) for c in columns]
-        method = said(case.options.method) + ("" if case.glare == "none" else f", {case.glare}")
+        method = gettext(METHODS[case.options.method]) + (
+            "" if case.glare == "none" else f", {case.glare}"
+        )
         rows.append((str(number), case_label(study, case), method, *values))
-    return tables.Table(said("All cases"), headings, tuple(rows))
+    return tables.Table(gettext("All cases"), headings, tuple(rows))
 
 
 def _shown(column: str, value: float | str | None) -> str:
     if isinstance(value, str):
-        return said(value)
+        return gettext(LEVEL_WORDS[value])
     return cell(value, 1 if column == "daylight_factor" else quantity(column).digits)
 
 
@@ -195,18 +202,23 @@ def failures_table(study: StudyResult) -> tables.Table:
     """The cases without a result, and why."""
     pairs = enumerate(zip(study.plan.cases, study.results, strict=True), 1)
     columns = (
-        tables.Column(said("Case")),
-        tables.Column(said("What"), numeric=False),
-        tables.Column(said("What went wrong"), numeric=False),
+        tables.Column(gettext("Case")),
+        tables.Column(gettext("Description"), numeric=False),
+        tables.Column(gettext("Error"), numeric=False),
     )
     rows = [(str(i), case_label(study, c), r.error) for i, (c, r) in pairs if r.error]
-    return tables.Table(said("Cases without a result"), columns, tuple(rows))
+    return tables.Table(gettext("Cases without a result"), columns, tuple(rows))
 
 
 def clock_table(study: StudyResult) -> tables.Table:
     """Time taken by the cases together, stage by stage."""
     stages = ("daylight_s", "glare_s", "thermal_s", "seconds")
-    names = (said("Daylight"), said("Glare"), said("Heat"), said("All, with reading the files"))
+    names = (
+        gettext("Daylight"),
+        gettext("Glare"),
+        gettext("Heat"),
+        gettext("Total, with reading of files"),
+    )
     rows = []
     for stage, name in zip(stages, names, strict=True):
         values = [float(r.figures.get(stage, 0.0)) for r in study.results if not r.error]
@@ -214,9 +226,9 @@ def clock_table(study: StudyResult) -> tables.Table:
             mean, most = sum(values) / len(values), max(values)
             rows.append((name, rounded(sum(values), 1), rounded(mean, 1), rounded(most, 1)))
     columns = (
-        tables.Column(said("Part"), numeric=False),
-        tables.Column(said("All cases"), "s"),
-        tables.Column(said("Mean of a case"), "s"),
-        tables.Column(said("Longest"), "s"),
+        tables.Column(gettext("Stage"), numeric=False),
+        tables.Column(gettext("All cases"), "s"),
+        tables.Column(gettext("Mean per case"), "s"),
+        tables.Column(gettext("Longest"), "s"),
     )
-    return tables.Table(said("Time taken"), columns, tuple(rows))
+    return tables.Table(gettext("Time taken"), columns, tuple(rows))

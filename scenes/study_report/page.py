@@ -10,13 +10,14 @@ from markupsafe import Markup
 
 from bim.report.issue import issue_rows
 from mitsuba_cfs.files import write_text
-from scenes.language.catalogue import decimal, in_language, said
+from scenes.language.catalogue import decimal, gettext, in_language, ngettext
+from scenes.language.numbers import rounded, share
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import page as run_page
 from scenes.report import tables
+from scenes.report.method import METHODS
 from scenes.report.names import glossary
-from scenes.report.numbers import counted, rounded, share
 from scenes.report.page_files import page_files
 from scenes.study.case import Case
 from scenes.study.store import CaseResult
@@ -69,7 +70,7 @@ def _filled(
     return run_page.environment(FILES).get_template("study.html.j2").render(
         study=study,
         page=page,
-        title=page.title or study.title or said("Study of fenestration systems"),
+        title=page.title or study.title or gettext("Study of fenestration systems"),
         facts=facts(study) + page.facts,
         verdict=study_verdict(study),
         explored={number: explorer_link(study, number) for number in study.explored},
@@ -106,35 +107,44 @@ def facts(study: StudyResult) -> tuple[tuple[str, str], ...]:
         return ", ".join(values) if len(values) <= 4 else f"{len(values)}"
 
     return (
-        *([(said("Run"), said(NOTE))] if study.quick else []),
-        (said("Cases"), f"{len(cases)}" + _failed(study)),
-        (said("Rooms"), named(c.place for c in cases)),
-        (said("Systems"), named(c.system for c in cases)),
-        (said("Climates"), named(c.climate for c in cases)),
-        (said("Turned by"), named(decimal(f"{c.orientation_deg:g}°") for c in cases)),
-        (said("Methods"), named(said(c.options.method) for c in cases)),
-        (said("Computed in"), f"{rounded(study.seconds, 0)} s" + _reused(study)),
+        *([(gettext("Run"), gettext(NOTE))] if study.quick else []),
+        (gettext("Cases"), _cases(study)),
+        (gettext("Rooms"), named(c.place for c in cases)),
+        (gettext("Systems"), named(c.system for c in cases)),
+        (gettext("Climates"), named(c.climate for c in cases)),
+        (gettext("Rotation"), named(decimal(f"{c.orientation_deg:g}°") for c in cases)),
+        (gettext("Methods"), named(gettext(METHODS[c.options.method]) for c in cases)),
+        (gettext("Computing time"), _seconds(study)),
     )
 
 
-def _failed(study: StudyResult) -> str:
-    return said(", {count} failed", count=study.failed) if study.failed else ""
+def _cases(study: StudyResult) -> str:
+    count = len(study.plan.cases)
+    if not study.failed:
+        return str(count)
+    return gettext("{count}, of which {failed} failed", count=count, failed=study.failed)
 
 
-def _reused(study: StudyResult) -> str:
+def _seconds(study: StudyResult) -> str:
+    seconds = rounded(study.seconds, 0)
     if not study.reused:
-        return ""
-    return said(", {cases} from before", cases=counted(study.reused, "case"))
+        return f"{seconds} s"
+    return ngettext(
+        "{seconds} s, {count} case from an earlier run",
+        "{seconds} s, {count} cases from an earlier run",
+        study.reused,
+        seconds=seconds,
+    )
 
 
 def problems_table(study: StudyResult) -> tables.Table:
     """What is wrong with the building files and what was done about it."""
-    columns = tuple(
-        tables.Column(said(label), numeric=False)
-        for label in ("Where", "What", "Consequence and repair")
-    )
+    titles = (gettext("Element"), gettext("Problem"), gettext("Treatment in the model"))
+    columns = tuple(tables.Column(title, numeric=False) for title in titles)
     return tables.Table(
-        said("By element"), columns, tuple(row[:3] for row in issue_rows(study.issues, "command"))
+        gettext("Problems by element"),
+        columns,
+        tuple(row[:3] for row in issue_rows(study.issues, "command")),
     )
 
 
@@ -143,14 +153,14 @@ def inputs_table(study: StudyResult) -> tables.Table:
     found = {}
     for case in study.plan.cases:
         for kind, source in (
-            (said("Building"), case.building),
-            (said("Fenestration"), case.bsdf),
-            (said("Its thermal values"), case.thermal),
-            (said("Weather"), case.weather),
-            (said("Operation"), case.operation),
+            (gettext("Building"), case.building),
+            (gettext("Fenestration"), case.bsdf),
+            (gettext("Thermal data of the system"), case.thermal),
+            (gettext("Weather"), case.weather),
+            (gettext("Operation"), case.operation),
         ):
             if path := getattr(source, "path", None):
                 found[kind, path] = source.sha256
-    columns = tuple(tables.Column(said(c), numeric=False) for c in ("Input", "File", "SHA-256"))
+    columns = tuple(tables.Column(title, numeric=False) for title in run_page.input_titles())
     rows = tuple((kind, path.name, digest) for (kind, path), digest in found.items())
-    return tables.Table(said("Input files"), columns, rows)
+    return tables.Table(gettext("Input files"), columns, rows)

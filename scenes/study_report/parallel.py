@@ -9,8 +9,8 @@ import numpy as np
 
 from bim.model import Space
 from scenes.figures.scale import Tick, axis_ticks, round_limits
-from scenes.language.catalogue import said
-from scenes.report.numbers import rounded
+from scenes.language.catalogue import N_, gettext
+from scenes.language.numbers import colon, rounded
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
 from scenes.study_report.case_page import case_label
@@ -68,7 +68,7 @@ class Parallel:
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
+class _Candidate:
     """A figure that may be an axis."""
 
     name: str
@@ -86,7 +86,7 @@ class _Asked:
         if not self.more_is_better:
             low, high = high, low
             ticks = tuple(replace(tick, at=100.0 - tick.at) for tick in ticks)
-        name, words = said(self.name), said(self.words)
+        name, words = gettext(self.name), gettext(self.words)
         return ParallelAxis(name, words, self.unit, self.digits, low, high, x, ticks)
 
 
@@ -95,13 +95,13 @@ def parallel(study: StudyResult) -> Parallel:
     cases = finished(study)
     spaces = [study.plan.rooms[case.scene][1] for _, case, _ in cases]
     columns = []
-    for asked in ASKED:
-        values = [asked.value(r, space) for (_, _, r), space in zip(cases, spaces, strict=True)]
+    for axis in CANDIDATES:
+        values = [axis.value(r, space) for (_, _, r), space in zip(cases, spaces, strict=True)]
         if not np.isnan(values).all():
-            columns.append((asked, values))
+            columns.append((axis, values))
     axes = tuple(
-        asked.axis(values, 100.0 * (i + 0.5) / len(columns))
-        for i, (asked, values) in enumerate(columns)
+        candidate.axis(values, 100.0 * (i + 0.5) / len(columns))
+        for i, (candidate, values) in enumerate(columns)
     )
     looks = system_looks(cases)
     lines = []
@@ -112,7 +112,7 @@ def parallel(study: StudyResult) -> Parallel:
             for axis, value in own
             if not np.isnan(value)
         )
-        words = f"{number}: {case_label(study, case)}: {', '.join(figures)}"
+        words = colon(f"{number}, {case_label(study, case)}", ", ".join(figures))
         at = tuple(axis.at(value) for axis, value in own)
         lines.append(CaseLine(number, looks[case.system][0], at, words))
     return Parallel(axes, tuple(lines))
@@ -137,14 +137,15 @@ def _energy(result: CaseResult, space: Space) -> float:
     return sum(_figure(result, name) for name in ENERGIES) / space.floor_area
 
 
-ASKED = (
-    _Asked("Daylight", "daylight autonomy 300 lx", "%", 0, True,
+CANDIDATES = (
+    _Candidate(N_("Daylight"), N_("daylight autonomy 300 lx"), "%", 0, True,
            lambda result, _: _figure(result, "da300")),
-    _Asked("Glare", "occupied hours with DGP above 0.40", "%", 1, False,
+    _Candidate(N_("Glare"), N_("occupied hours with DGP above 0.40"), "%", 1, False,
            lambda result, _: _glare(result)),
-    _Asked("Comfort", "occupied hours within the 80 % limits", "%", 0, True,
+    _Candidate(N_("Comfort"), N_("occupied hours within the 80 % limits"), "%", 0, True,
            lambda result, _: _comfort(result)),
-    _Asked("Energy", "heating, cooling and light by floor area", "kWh/m²", 0, False, _energy),
-    _Asked("View", "visible transmittance straight on", "%", 0, True,
+    _Candidate(N_("Energy"), N_("heating, cooling and light per floor area"), "kWh/m²", 0, False,
+           _energy),
+    _Candidate(N_("View"), N_("direct visible transmittance"), "%", 0, True,
            lambda result, _: _figure(result, "straight_view_percent")),
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The verdict at the head of a study's report: what was asked, what is best and worst, limits."""
+"""The verdict at the head of a study's report: the question, best and worst cases, limits."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from mitsuba_cfs.glare.classes import CLASSES
-from scenes.language.catalogue import said
+from scenes.language.catalogue import gettext, ngettext
+from scenes.language.numbers import percent, rounded
 from scenes.report.headline import WARM_C, Card, cards, protection_card
 from scenes.report.limits import LimitTables, limits
-from scenes.report.numbers import counted, percent, rounded
+from scenes.report.names import rooms_counted, systems_counted
 from scenes.report.verdict import Verdict
 from scenes.results import RunResult
 from scenes.study.store import CaseResult
@@ -25,31 +26,35 @@ def study_verdict(study: StudyResult) -> Verdict:
     """The verdict of a study with at least one result."""
     cases = study.plan.cases
 
-    def named(values: list[str], what: str) -> str:
+    def named(values: list[str], counted: Callable[[int], str]) -> str:
         values = list(dict.fromkeys(values))
-        return _and(values) if len(values) <= 3 else counted(len(values), what)
+        return _and(values) if len(values) <= 3 else counted(len(values))
 
-    asked = said(
-        "Daylight, glare and temperatures of {rooms} in a year of {climates}, compared for "
-        "{systems}: {cases}.",
-        rooms=named([c.place for c in cases], "room"),
-        climates=named([c.climate for c in cases], "climate"),
-        systems=named([c.system for c in cases], "system"),
-        cases=counted(len(cases), "case"),
+    question = ngettext(
+        "Daylight, glare and temperatures of {count} case; rooms: {rooms}; weather: {climates}; "
+        "fenestration: {systems}.",
+        "Comparison of daylight, glare and temperatures of {count} cases; rooms: {rooms}; weather: "
+        "{climates}; fenestration: {systems}.",
+        len(cases),
+        rooms=named([c.place for c in cases], rooms_counted),
+        climates=named(
+            [c.climate for c in cases], lambda n: ngettext("{count} climate", "{count} climates", n)
+        ),
+        systems=named([c.system for c in cases], systems_counted),
     )
     found = (
-        (said("Daylight"), _daylight),
-        (said("Glare"), _glare),
-        (said("Heat and energy"), _heat),
+        (gettext("Daylight"), _daylight),
+        (gettext("Glare"), _glare),
+        (gettext("Heat and energy"), _heat),
     )
     sentences = tuple((heading, sentence(study)) for heading, sentence in found)
-    return Verdict(asked, sentences, _limits(study))
+    return Verdict(question, sentences, _limits(study))
 
 
 def _and(names: list[str]) -> str:
     if len(names) == 1:
         return names[0]
-    return said("{names} and {last}", names=", ".join(names[:-1]), last=names[-1])
+    return gettext("{names} and {last}", names=", ".join(names[:-1]), last=names[-1])
 
 
 def _extremes(
@@ -62,65 +67,62 @@ def _extremes(
 
 def _daylight(study: StudyResult) -> str:
     least, most = _extremes(study, lambda result: float(result.figures["da300"]))
-    text = said(
-        "{case} has 300 lx of daylight in {share} % of the occupied hours, as a mean over the work "
-        "plane",
-        case=most[0],
-        share=percent(most[1]),
-    )
-    return text + _and_least(least, most)
+    text = gettext("Share of the occupied hours with 300 lx, mean over the work plane")
+    return _highest_and_lowest(text, least, most)
 
 
-def _and_least(least: tuple[str, float], most: tuple[str, float]) -> str:
-    """The end of a sentence on the case with most: that with least."""
+def _highest_and_lowest(text: str, least: tuple[str, float], most: tuple[str, float]) -> str:
+    """A quantity [%] with its highest and lowest case, as a sentence."""
+    values = {"quantity": text, "case": most[0], "share": percent(most[1])}
     if least[0] == most[0]:
-        return "."
-    return said("; {case} in {share} %.", case=least[0], share=percent(least[1]))
+        return gettext("{quantity}: {share} % ({case}).", **values)
+    return gettext(
+        "{quantity}: highest {share} % ({case}), lowest {lowest} % ({other}).",
+        **values,
+        other=least[0],
+        lowest=percent(least[1]),
+    )
 
 
 def _glare(study: StudyResult) -> str:
     done = [result for _, _, result in finished(study)]
     if any(f"glare_{CLASSES[0]}_h" not in result.figures for result in done):
-        return said("Glare was not rated in every case.")
+        return gettext("Glare was not rated in all cases.")
     least, most = _extremes(study, glare_share)
-    text = said(
-        "{case} has a DGP above 0.40 in {share} % of the occupied hours",
-        case=most[0],
-        share=percent(most[1]),
-    )
-    return text + _and_least(least, most)
+    text = gettext("Share of the occupied hours with a DGP above 0.40")
+    return _highest_and_lowest(text, least, most)
 
 
 def _heat(study: StudyResult) -> str:
-    """Which case takes least for heat, cold and lamps; how warm the warmest gets."""
+    """Overheating, and the cases with the lowest and highest energy demand."""
     cool, warm = _extremes(study, warm_share)
-    text = said(
-        "{case} is above {limit} °C in {share} % of the occupied hours",
-        case=warm[0],
-        limit=f"{WARM_C:.0f}",
-        share=percent(warm[1]),
-    )
-    text += _and_least(cool, warm)
+    text = gettext("Share of the occupied hours above {limit} °C", limit=f"{WARM_C:.0f}")
+    text = _highest_and_lowest(text, cool, warm)
     if any(not set(ENERGIES) <= set(result.figures) for _, _, result in finished(study)):
-        return f"{text} {said('Without heating and cooling in every case.')}"
+        return text + " " + gettext("Not all cases have heating and cooling.")
     least, most = _extremes(study, lambda result: sum(result.figures[e] for e in ENERGIES))
     if most[1] <= 0:
-        return f"{text} {said('Without heating and cooling.')}"
-    text += " " + said(
-        "Least heating, cooling and light together: {case} with {energy} kWh a year ({parts})",
-        case=least[0],
-        energy=rounded(least[1], 0),
-        parts=_parts(study, least[0]),
-    )
-    if least[0] != most[0]:
-        text += said(
-            "; most: {case} with {energy} kWh ({parts})",
-            case=most[0],
-            energy=rounded(most[1], 0),
-            parts=_parts(study, most[0]),
+        return text + " " + gettext("Without heating and cooling.")
+    values = {
+        "case": least[0], "energy": rounded(least[1], 0), "parts": _parts(study, least[0])
+    }  # fmt: skip
+    energy = (
+        gettext(
+            "Heating, cooling and lighting energy, unweighted: {energy} kWh a year ({case}; "
+            "{parts}).",
+            **values,
         )
-    added = said("That is heat and cold of the room and power of the lamps, added as they are.")
-    return f"{text}. {added}"
+        if least[0] == most[0]
+        else gettext(
+            "Heating, cooling and lighting energy, unweighted: lowest {energy} kWh a year ({case}; "
+            "{parts}), highest {most} kWh ({other}; {most_parts}).",
+            **values,
+            other=most[0],
+            most=rounded(most[1], 0),
+            most_parts=_parts(study, most[0]),
+        )
+    )
+    return f"{text} {energy}"
 
 
 def _parts(study: StudyResult, label: str) -> str:
@@ -138,7 +140,7 @@ def _limits(study: StudyResult) -> LimitTables:
         run = RunResult(building, times, np.empty((0, 3)), (room,), (), {})
         own = (*cards(run, room), *_protection(result))
         rows.append((case_label(study, case), room, own))
-    return limits(rows, said("Case"))
+    return limits(rows, gettext("Case"))
 
 
 def _protection(result: CaseResult) -> tuple[Card, ...]:

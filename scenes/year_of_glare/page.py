@@ -14,12 +14,12 @@ from mitsuba_cfs.files import write_text
 from mitsuba_cfs.glare.classes import LEVELS, LIMITS
 from scenes.figures.plan import PlanFrame, plan_frame, sensor_cells
 from scenes.figures.rose import RoseWedge, roses
+from scenes.language.numbers import percent, rounded, spoken
 from scenes.quick import NOTE
-from scenes.report.numbers import counted, percent, rounded
 from scenes.report.page import FILES as SHARED
 from scenes.report.page import environment
 from scenes.report.page_files import page_files
-from scenes.report.tables import Column, Table, spoken
+from scenes.report.tables import Column, Table
 from scenes.year_of_glare.year import GlareYear, rating_of
 
 FILES = page_files("scenes.year_of_glare")
@@ -60,7 +60,7 @@ def _facts(year: GlareYear, table: pd.DataFrame) -> list[tuple[str, str]]:
         ("Room", year.room),
         ("Weather", year.weather.site),
         ("Fenestration", ", ".join(dict.fromkeys(str(f["system"]) for f in year.fenestration))),
-        ("Views", f"{len(table)}, of {counted(len(_eyes(table)[1]), 'eye')}"),
+        ("Views", f"{len(table)}, of {len(_eyes(table)[1])} eyes"),
         ("Hours of use", f"{start} to {end} o'clock, {table['hours_of_use'].iloc[0]} hours"),
         ("Rating", f"{options.metric}, {options.method}; {rating_of(options).rule}"),
     ]

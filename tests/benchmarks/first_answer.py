@@ -115,8 +115,8 @@ def lines(folder: Path, building: Path, demo: Path) -> Iterator[tuple[str, str, 
     facade = folder / "facade.ifc"
     make_facade.facade().write(str(facade))
     yield "pv", "result", ["pv", facade, "--study", demo / "facade_pv.toml", *of_pv]
-    yield "ifc check", "mistake", ["ifc", "check", bad["bad.toml"]]
-    yield "ifc check", "result", ["ifc", "check", building]
+    yield "ifc check", "mistake", ["check", bad["bad.toml"]]
+    yield "ifc check", "result", ["check", building]
     yield "bsdf check", "mistake", ["bsdf", "check", bad["bad.xml"]]
     yield "bsdf check", "result", ["bsdf", "check", system]
     yield "sky sun", "mistake", ["sky", "positions", bad["bad.epw"], folder / "sun.csv"]

@@ -6,7 +6,7 @@
 Each storey has nine offices with a window, five to the south and four to the north, and between
 them a corridor with a window at each end and a door to each office: ten rooms.  The building is
 written in IFC4 with the demo's constructions and glazing; the command gets the demo's weather and
-blind and a folder and a cache of its own.  `--of check`: `cfs ifc check`, which reads the building
+blind and a folder and a cache of its own.  `--of check`: `cfs check`, which reads the building
 alone; `--of thermal`: `cfs thermal --quick` with all rooms coupled; OPTIONS go to the command.
 
 By room: processor seconds of the command and all that it started, and what each ten rooms more
@@ -142,7 +142,7 @@ def measured(rooms: int, options: list[str], *, of: str = "run") -> Used:
         study.write_text(STUDY.format(weather=WEATHER, blind=VENETIAN_BLIND))
         results = ["--quick", "--out", str(folder / "results")]
         given = {
-            "check": ["ifc", "check", str(path)],
+            "check": ["check", str(path)],
             "thermal": ["thermal", str(study), *results],
             "run": ["run", str(path), "--weather", str(WEATHER), "--cfs", str(VENETIAN_BLIND),
                     *results],

@@ -1,4 +1,4 @@
-"""`cfs ifc check` and `export` as a user meets them."""
+"""`cfs check` and `export` as a user meets them."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ def test_check_shows_rooms_and_issues(path, tmp_path):
     )
     assert result.exit_code == 0
     assert "R1 Room" in result.output and "24.00" in result.output and "72.00" in result.output
-    assert "drawn twice" in result.output
+    assert "is drawn where" in result.output
     assert "1 rooms, 1 with windows, 1 windows, 3.6 m2 of glass" in result.output
     lines = table.read_text().splitlines()
-    assert lines[0] == "where,what,consequence" and any("drawn twice" in line for line in lines)
+    assert lines[0] == "where,what,consequence,code,severity"
+    assert any("is drawn where" in line for line in lines)
 
 
 def test_export_writes_what_is_asked_for(path, tmp_path):

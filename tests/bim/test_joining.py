@@ -97,13 +97,13 @@ def test_a_join_that_names_no_rooms_is_an_error(tmp_path, join, message):
 
 def test_what_check_says_is_what_the_commands_take(tmp_path, capsys):
     path = two_rooms(tmp_path)
-    assert cli.run(["ifc", "check", str(path)]) == 0
+    assert cli.run(["check", str(path)]) == 0
     said = capsys.readouterr().out
     text = said.partition("--join '")[2].partition("'")[0]
-    assert cli.run(["ifc", "check", str(path), "--join", text]) == 0
+    assert cli.run(["check", str(path), "--join", text]) == 0
     assert "1 rooms" in capsys.readouterr().out
     out = str(tmp_path / "a.glb")
-    assert cli.run(["ifc", "export", str(path), "--join", text, "--space", text,
+    assert cli.run(["export", str(path), "--join", text, "--space", text,
                     "--gltf", out]) == 0  # fmt: skip
     for command in (["run", str(path), "--weather", __file__, "--out", out],
                     ["dgp", str(path), "--out", out],

@@ -131,7 +131,7 @@ def test_a_dossier_with_a_title_and_without_its_rooms(result):
     options = PageOptions(title="Ours", author="A", left_out=("rooms", "sources"))
     html = dossier_html(result, page=options)
     assert "<h1>Ours</h1>" in html and "<dt>Author</dt><dd>A</dd>" in html
-    assert "Left out of this page by choice: rooms, sources." in html
+    assert "Sections left out by the page file: rooms, sources." in html
     assert "13° above the horizon" in html  # what was assumed always stands
     for gone in ('id="room-', 'href="#room-', 'id="sources"', 'href="#sources"'):
         assert gone in dossier_html(result) and gone not in html

@@ -2,38 +2,28 @@
 
 from __future__ import annotations
 
-import ast
 import re
-import string
-from collections.abc import Mapping
 from dataclasses import replace
+from gettext import NullTranslations
 from html import unescape
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 
 from bim.account import Account, StoreyAccount
 from mitsuba_cfs.errors import DataError
 from scenes.language import catalogue
-from scenes.language.catalogue import CATALOGUES, MONTHS, decimal, in_language, said, short_month
-from scenes.language.heard import HEARD, heard
+from scenes.language.catalogue import TRANSLATED, in_language
+from scenes.language.heard import heard
 from scenes.page_options import DossierSection, PageOptions, RunSection, read_page
-from scenes.report.headline import PROTECTION
-from scenes.report.method import LIGHT, PATCHES, PICTURES, SCATTER
-from scenes.report.names import WORDS
-from scenes.report.numbers import rounded
-from scenes.report.operation_figures import RULES
 from scenes.report.page import report_html, summary
 from scenes.study_report.page import study_report_html
-from scenes.study_report.parallel import ASKED
-from tests.modules import MODULES
 from tests.report.browser import chromium, inspect
 from tests.report.building_page import building
 from tests.report.synthetic import run_result
 from tests.report.test_study_report import study
 
-LANGUAGES = tuple(CATALOGUES)
+LANGUAGES = TRANSLATED
 EVERYTHING = Account(  # that can be said of a model which is usable with care
     (StoreyAccount("EG", 3, 5, 20.0, 15.5), StoreyAccount("OG", 0, 0, 2.5, 0.0)), 9, 7,
     glass_assumed=4.2, glass_low=1.5, glass_missing=0.5, phantom=3.1, closed=1.1,
@@ -53,29 +43,20 @@ DATA = (
     r"|Venetian blind <45>|open|slats|closed <70°>|view matrix|daylight matrix|annual product"
     r"|pictures|mitsuba-cfs|mitsuba|drjit|llvm_ad_mono|variant|seed"
     r"|[\w.]+\.(?:ifc|epw|xml)|[0-9a-f]{64}"
+    r"|SHA-256|(?:J|F|M|A|S|O|N|D)?(?:an|eb|ar|pr|ay|un|ul|ug|ept|ct|ov|ec)"  # months, by Babel
     r"|°C|W/\(m²K\)|cd/m²|m²|m³|kWh|lx|DGP|Ev|UDI|EN 17037|LM-83"
     r"|\b[hmsxyzNESW]\b"
 )
 
 
-class _Marked(Mapping):
-    """A language that says every text between marks."""
+class _Marked(NullTranslations):
+    """A language that puts every text between marks."""
 
-    def get(self, key: str, default: str = "") -> str:
-        self.asked.add(key)
-        return f"‹{key}›"
+    def gettext(self, message: str) -> str:
+        return f"‹{message}›"
 
-    def __init__(self) -> None:
-        self.asked: set[str] = set()
-
-    def __getitem__(self, key: str) -> str:
-        return self.get(key)
-
-    def __iter__(self):
-        return iter(())
-
-    def __len__(self) -> int:
-        return 0
+    def ngettext(self, msgid1: str, msgid2: str, n: int) -> str:
+        return f"‹{msgid1 if n == 1 else msgid2}›"
 
 
 @pytest.fixture(scope="module")
@@ -94,10 +75,9 @@ def result():
 
 @pytest.fixture(scope="module")
 def marked(result):
-    """Pages in the marked language, and what was asked of it."""
-    language = _Marked()
+    """Pages in the marked language."""
     patch = pytest.MonkeyPatch()
-    patch.setitem(catalogue.CATALOGUES, "xx", language)
+    patch.setattr(catalogue, "translations", lambda language: _Marked())
     pages = [
         report_html(one, PageOptions(language="xx", author="A", left_out=left_out))
         for one, left_out in (
@@ -108,7 +88,7 @@ def marked(result):
         )
     ]
     patch.undo()
-    return pages, language.asked
+    return pages
 
 
 def shown(page: str) -> list[str]:
@@ -121,92 +101,14 @@ def shown(page: str) -> list[str]:
 
 def test_every_string_of_the_page_is_asked_of_the_catalogue(marked) -> None:
     missing = set()
-    for text in shown(marked[0][0]):
+    for text in shown(marked[0]):
         rest = text
         while MARK.search(rest):
             rest = MARK.sub("", rest)
-        rest = re.sub(
-            DATA, "", re.sub(r"^[A-Z][a-z]{2}›$", "", rest)
-        )  # a month after its first letter
+        rest = re.sub(DATA, "", rest)
         if re.search(r"[A-Za-z]{2}", rest):
             missing.add(rest.strip())
     assert not missing, "; ".join(sorted(missing))
-
-
-def _asked_in_code() -> set[str]:
-    """Literal texts of `said(...)`, of templates' `say(...)`, and of the tables of words."""
-    found: set[str] = set()
-    for path in MODULES:
-        if not path.as_posix().startswith(str(ROOT / "scenes")):
-            continue
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "said" and node.args:
-                found |= set(_texts(node.args[0]))
-    for path in (ROOT / "scenes").glob("*report/templates/*.j2"):
-        found |= set(re.findall(r"""\bsay\("((?:[^"\\])*)\"""", path.read_text(encoding="utf-8")))
-    for entry in (*WORDS["quantities"].values(), *WORDS["options"].values()):
-        found |= {entry["label"], entry["meaning"], *entry.get("values", ())}
-    found |= {*WORDS["glossary"], *WORDS["glossary"].values()}
-    found |= {*RULES.values(), *PICTURES.values(), PATCHES, SCATTER, *LIGHT}
-    found |= {sentence for sentences in LIGHT.values() for sentence in sentences}
-    found |= {text for one in ASKED for text in (one.name, one.words)}
-    found |= {f"{level}: at most {dgp}" for level, dgp in PROTECTION.items()}
-    found |= {*HEARD, *(title for title, _ in EVERYTHING.facts)}
-    found |= {*MONTHS, *(month[:3] for month in MONTHS)}
-    return found
-
-
-def _texts(node: ast.expr) -> list[str]:
-    if isinstance(node, ast.Constant) and isinstance(node.value, str):
-        return [node.value]
-    if isinstance(node, ast.IfExp):
-        return _texts(node.body) + _texts(node.orelse)
-    return []
-
-
-ROOT = Path(catalogue.__file__).parents[2]
-
-
-@pytest.mark.parametrize("language", LANGUAGES)
-def test_every_string_has_its_translation(marked, language) -> None:
-    asked = {text for text in marked[1] | _asked_in_code() if re.search("[A-Za-z]{2}", text)}
-    free = {"seed"}  # options without words of their own, and states
-    assert not {text for text in asked - free if text not in CATALOGUES[language]}
-
-
-@pytest.mark.parametrize("language", LANGUAGES)
-def test_a_translation_has_the_fields_of_its_text(language) -> None:
-    def fields(text: str) -> set[str]:
-        return {name for _, name, _, _ in string.Formatter().parse(text) if name}
-
-    for text, translated in CATALOGUES[language].items():
-        assert fields(text) == fields(translated), text
-        assert translated.strip(), text
-
-
-def test_nothing_of_the_catalogue_is_asked_by_nobody(marked) -> None:
-    """Texts put together from parts, such as "sun ... in the north", are asked by some page."""
-    parts = re.compile(r"sun \{|^north|^south|^east$|^west$|glare$|^\{level|^With |^Within")
-    asked = marked[1] | _asked_in_code()
-    nobody = {t for t in CATALOGUES["de"] if t not in asked and not parts.search(t)}
-    assert nobody <= ALONE, nobody - ALONE
-
-
-ALONE = {  # classes, levels and counted nouns, chosen by a result
-    "imperceptible", "perceptible", "disturbing", "intolerable", "High", "Medium", "Minimum",
-    "None", "room", "rooms", "hour", "hours", "sensor", "sensors", "glare source", "glare sources",
-    "bright source", "bright sources", "system", "systems", "case", "cases",
-    "climate", "climates",
-    "acceptable (55 % or more)", "preferred (75 % or more)",
-    "below the 55 % of LM-83", "within the 10 % of LM-83", "above the 10 % of LM-83",
-    "Its thermal values", "Fenestration system", "Model file", "Weather", "Author", "S", "W",
-    "N", "E",
-    "A quick run: few rays, small pictures, one hour. For a first look; leave --quick away for "
-    "results to rely on.",
-    "in the useful range", "Option", "Input", "File",
-    "The rooms computed are balanced together: heat flows through what lies between.",
-    "SHA-256", "Where", "What", "Consequence and repair",
-}  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -228,21 +130,6 @@ def test_the_page_is_in_the_fields_words_with_a_comma(result, language, words) -
     assert not re.findall(r"\d\.\d", rest)
     levels = [int(level) for level in re.findall(r"<h([1-6])", page)]
     assert all(after <= before + 1 for before, after in pairwise(levels))
-
-
-def test_numbers_and_months_follow_the_language() -> None:
-    assert (rounded(1234.5, 1), decimal("0.5"), short_month(3)) == ("1\u202f234.5", "0.5", "Mar")
-    with in_language("de"):
-        assert (rounded(1234.5, 1), decimal("0.5"), short_month(3)) == (
-            "1\u202f234,5",
-            "0,5",
-            "März",
-        )
-        with pytest.raises(KeyError):
-            said("{day}. {month}", day=1)
-    with in_language("fr"):
-        assert said("Glare") == "Éblouissement"
-    assert said("Glare") == "Glare"
 
 
 def test_english_is_as_it_was(result) -> None:
@@ -287,7 +174,7 @@ def test_the_account_of_the_model_is_in_the_pages_language(result, language, acc
     run = replace(result, building=replace(result.building, account=account))
     with in_language(language):
         facts = dict(summary(run))
-    shown = [facts[catalogue.CATALOGUES[language][title]] for title, _ in account.facts]
+    shown = [facts[catalogue.translations(language).gettext(title)] for title, _ in account.facts]
     assert len(shown) >= 3
     for text in shown:
         assert not ENGLISH.search(text), text

@@ -6,10 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from scenes.language.catalogue import ngettext
+from scenes.language.numbers import cell, percent, rounded, significant
 from scenes.report import tables
 from scenes.report.headline import WARM_C, named_like
 from scenes.report.names import glossary, quantity
-from scenes.report.numbers import cell, counted, percent, rounded, significant
 from scenes.report.thermal_figures import duration_curve, extreme_weeks, gains_chart
 from tests.report.synthetic import run_result
 
@@ -20,8 +21,8 @@ def room():
 
 
 def test_one_of_a_thing_is_not_several() -> None:
-    assert counted(1, "hour") == "1 hour" and counted(0, "hour") == "0 hours"
-    assert counted(8760, "hour") == "8\u202f760 hours"
+    counted = [ngettext("{count} hour", "{count} hours", number) for number in (1, 0, 8760)]
+    assert counted == ["1 hour", "0 hours", "8\u202f760 hours"]
 
 
 def test_digits() -> None:
@@ -89,7 +90,7 @@ def test_stack_of_gains_leaves_out_what_is_counted_already(room) -> None:
 def test_duration_curve_crosses_at_the_counted_hours(room) -> None:
     operative = room.heat.temperatures["operative_c"]
     chart = duration_curve(room)
-    series = dict(chart.readout.series)["Operative"]
+    series = dict(chart.readout.series)["Operative temperature"]
     shown = np.array([float(text.removesuffix(" °C").replace("−", "-")) for text in series])
     assert np.all(np.diff(shown) <= 0)
     hours = 8760 * np.searchsorted(-shown, -WARM_C) / (len(shown) - 1)
@@ -102,8 +103,8 @@ def test_warmest_and_coldest_week_hold_the_planted_extremes(room) -> None:
     temperatures.loc["2023-05-08":"2023-05-14", "operative_c"] += 30
     temperatures.loc["2023-10-02":"2023-10-08", "operative_c"] -= 40
     warm, cold = extreme_weeks(room)
-    assert warm.title == "The warmest week: 8 May to 14 May"
-    assert cold.title == "The coldest week: 2 October to 8 October"
+    assert warm.title == "Warmest week: 8 May to 14 May"
+    assert cold.title == "Coldest week: 2 October to 8 October"
     assert len(warm.readout.x) == 168
 
 

@@ -28,10 +28,10 @@ from tests.report.test_study_report import study
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><rect width="9" height="9"/></svg>'
 HEADINGS = {  # of the sections that a run's report can do without
-    "verdict": "Verdict", "rooms": "The rooms at a glance", "daylight": "Daylight",
+    "verdict": "Verdict", "rooms": "Overview of the rooms", "daylight": "Daylight",
     "glare": "Glare", "operation": "Operation", "temperatures": "Temperatures and comfort",
     "glazing": "Glazing and shading", "model": "3D model",
-    "problems": "Problems found in the building model", "method": "Method",
+    "problems": "Problems in the building model", "method": "Method",
     "inputs": "Inputs and versions", "glossary": "Glossary",
 }  # fmt: skip
 
@@ -81,7 +81,7 @@ def test_a_section_is_left_out_alone_and_the_foot_says_so(result, name) -> None:
     assert there & set(HEADINGS.values()) == set(HEADINGS.values()) - {HEADINGS[name]}
     for anchor in re.findall(r'href="#([^"]+)"', page):
         assert f'id="{anchor}"' in page
-    assert f"Left out of this page by choice: {name}." in page.partition("<footer>")[2]
+    assert f"Sections left out by the page file: {name}." in page.partition("<footer>")[2]
     assert result.notes[0] in page
 
 
@@ -96,7 +96,7 @@ def test_without_a_file_the_page_is_as_it_was(result) -> None:
 def test_a_study_without_a_section(name) -> None:
     page = study_report_html(study(), PageOptions(left_out=(name,)))
     assert f'id="{name}"' not in page and f'href="#{name}"' not in page
-    assert 'id="cases"' in page and "Left out of this page by choice" in page
+    assert 'id="cases"' in page and "Sections left out by the page file" in page
 
 
 @pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")

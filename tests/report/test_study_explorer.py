@@ -35,7 +35,7 @@ def test_links_lead_to_the_explorers_that_there_are() -> None:
     for number, target in ((1, "#case-1"), (2, "explore/index.html#case-2"), (4, "#case-4")):
         assert f'class="line" href="{target}" data-case="{number}"' in page
     assert page.count('data-explorer="explore/index.html#case-') == 2
-    assert page.count("Any hour of this case in the explorer") == 2
+    assert page.count("Open this case in the explorer") == 2
     assert "explore/index.html" not in study_report_html(study(failed=False))
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scenes.language.numbers import percent
 from scenes.report.headline import cards
-from scenes.report.numbers import percent
 from scenes.report.page import report_html
 from scenes.report.verdict import verdict
 from tests.report.building_page import building
@@ -37,29 +37,34 @@ def test_glare_names_its_hour_its_sun_and_its_cause(result) -> None:
     # 5.87e-5 of 5,000 lx are 0.29; the sources add 0.05
     text = said(_with_glare(result, dgp=0.50, ev=5000.0, dgp_standard_error=0.0012), "Glare")
     assert (
-        "The one picture made has intolerable glare, DGP 0.50 ± 0.001" in text
-        and "high in the" in text
+        "The picture shows intolerable glare: DGP 0.50 ± 0.001" in text and "solar altitude" in text
     )
-    assert "5\u202f000 lx at the eye weigh more than 2 bright sources in view (86 to 14 %)" in text
+    assert (
+        "5\u202f000 lx at the eye contribute more than 2 bright sources in view (86 to 14 %)"
+        in text
+    )
     text = said(_with_glare(result, dgp=0.42, ev=1000.0, sources=3), "Glare")
-    assert "disturbing" in text and "3 bright sources in view weigh more" in text
+    assert "disturbing" in text and "3 bright sources in view contribute more" in text
     text = said(_with_glare(result, dgp=0.30), "Glare")
-    assert text.startswith("No picture has more than imperceptible glare; the highest DGP is 0.30")
+    assert text.startswith("Glare is imperceptible in all pictures; the highest DGP is 0.30")
 
 
 def test_warmth_counts_the_hours_of_the_warmest_room(result) -> None:
-    text = said(result, "Warmth")
+    text = said(result, "Overheating")
     counts = []
     for room in result.spaces:
         used = room.heat.comfort["occupied"].to_numpy()
         counts.append(int(((room.heat.operative_c.to_numpy() > 26) & used).sum()))
     worst = result.spaces[int(np.argmax(counts))]
     number = f"{max(counts):,}".replace(",", "\u202f")
-    assert text.startswith(f"{worst.space.label} is above 26 °C in {number} of its ")
+    words = f"{worst.space.label}: the operative temperature exceeds 26 °C in {number} of "
+    assert text.startswith(words)
     room = result.spaces[0]
     cold = room.heat.temperatures.assign(operative_c=20.0)
     one = replace(room, heat=replace(room.heat, temperatures=cold))
-    assert said(replace(result, spaces=(one,)), "Warmth").startswith("No occupied hour is above 26")
+    assert said(replace(result, spaces=(one,)), "Overheating").startswith(
+        "No occupied hour exceeds 26"
+    )
 
 
 def test_of_rooms_warm_in_every_hour_the_hottest_is_named(result) -> None:
@@ -67,16 +72,16 @@ def test_of_rooms_warm_in_every_hour_the_hottest_is_named(result) -> None:
     for room, peak in zip(result.spaces[:2], (33.0, 34.2), strict=True):
         hot = room.heat.temperatures.assign(operative_c=peak)
         rooms.append(replace(room, heat=replace(room.heat, temperatures=hot)))
-    text = said(replace(result, spaces=tuple(rooms)), "Warmth")
+    text = said(replace(result, spaces=tuple(rooms)), "Overheating")
     assert text.startswith(rooms[1].space.label) and "34.2 °C" in text
 
 
 def test_shading_says_how_often_and_at_what_cost(result) -> None:
     from tests.explore.synthetic import explored_run
 
-    assert "stays in one state" in said(replace(result, spaces=result.spaces[:1]), "Shading")
+    assert "does not move" in said(replace(result, spaces=result.spaces[:1]), "Shading")
     text = said(result, "Shading")
-    assert text.startswith("In ") and "the shading is drawn in" in text and "--explore" in text
+    assert "the shading is in use in" in text and "--explore" in text
     whole = explored_run(step=400, size=32)
     moved = replace(whole.spaces[0], operation=result.spaces[1].operation)
     text = said(replace(whole, spaces=(moved,)), "Shading")
@@ -113,7 +118,7 @@ def test_many_rooms_stay_on_one_page_with_the_worst_of_each_figure() -> None:
     most = max(room.daylight.room_metrics["ase1000_250"] for room in run.spaces)
     assert f": {percent(most)} %" in sunlight[2].split(";")[0]
     text = dict(found.sentences)["Shading"]
-    assert text.startswith("In 41 rooms the shading is drawn in ") and len(text) < 400
+    assert text.startswith("41 rooms: the shading is in use in ") and len(text) < 400
     page = report_html(run)
     head = page[page.index('<section id="verdict">') : page.index("<details>")]
     assert head.count("<tr>") == 1 + len(labels) and 'href="#rooms"' in head

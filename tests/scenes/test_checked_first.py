@@ -244,14 +244,14 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
     "picture, view": (lambda p: _picture("--view", "-vta -vh 400"), "illegal size"),
     "picture, --at": (lambda p: _picture(at="noon"), "expected month, day and hour"),
     "picture, --out": (lambda p: _picture("--out", "none/a.hdr"), "no such folder"),
-    "ifc check, head": (lambda p: ["ifc", "check", "word.ifc"], "word.ifc: not an IFC file"),
-    "ifc check, --csv": (lambda p: ["ifc", "check", "house.ifc", "--csv", "none/a"], "no such fol"),
+    "check, head": (lambda p: ["check", "word.ifc"], "word.ifc: not an IFC file"),
+    "check, --csv": (lambda p: ["check", "house.ifc", "--csv", "none/a"], "no such fol"),
     "ifc attach, BSDF": (
         lambda p: ["ifc", "attach", "house.ifc", "--all", "--bsdf", "bad.xml", "-o", "b.ifc"],
         "bad.xml: is not well-formed",
     ),
-    "ifc export, --gltf": (
-        lambda p: ["ifc", "export", "house.ifc", "--gltf", "none/a.glb"],
+    "export, --gltf": (
+        lambda p: ["export", "house.ifc", "--gltf", "none/a.glb"],
         "no such folder",
     ),
 }

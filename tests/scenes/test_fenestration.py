@@ -321,7 +321,7 @@ def test_a_change_of_a_file_that_the_model_names_changes_the_years_key(tmp_path)
 def test_exports_write_what_is_known(tmp_path, capsys) -> None:
     path = room(tmp_path / "room.ifc", STATED)
     out = {option: tmp_path / option for option in ("radiance", "mitsuba", "epjson")}
-    words = ["ifc", "export", str(path)]
+    words = ["export", str(path)]
     for option, place in out.items():
         words += [f"--{option}", str(place)]
     assert run(words) == 0
@@ -348,7 +348,7 @@ def test_the_mitsuba_scene_is_lit_through_its_bsdf(tmp_path, variant) -> None:
     for number, share in enumerate((0.2, 0.4)):
         path = with_attached(room(tmp_path / f"{number}.ifc"), share)
         out = tmp_path / str(number)
-        assert run(["ifc", "export", str(path), "--mitsuba", str(out)]) == 0
+        assert run(["export", str(path), "--mitsuba", str(out)]) == 0
         (scene,) = out.rglob("scene.xml")
         means.append(float(np.array(mi.render(mi.load_file(str(scene)), spp=1)).mean()))
     # twice the transmittance, a little more for what the window throws back: 512^2 paths
@@ -358,13 +358,13 @@ def test_the_mitsuba_scene_is_lit_through_its_bsdf(tmp_path, variant) -> None:
 def test_exports_say_what_is_not_known(tmp_path, capsys) -> None:
     path = room(tmp_path / "room.ifc")
     out = tmp_path / "a.epJSON"
-    assert run(["ifc", "export", str(path), "--epjson", str(out)]) == 0
+    assert run(["export", str(path), "--epjson", str(out)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "Window W1: no U is known, 1.3 is written" in said
     assert "Window W1: no g is known, 0.6 is written" in said
     write_text(out, "")
     assert run(["ifc", "attach", str(path), "--all", "--u", "0.9", "-o", str(path)]) == 0
-    assert run(["ifc", "export", str(path), "--epjson", str(out)]) == 0
+    assert run(["export", str(path), "--epjson", str(out)]) == 0
     (values,) = json.loads(out.read_text())["WindowMaterial:SimpleGlazingSystem"].values()
     assert values["u_factor"] == 0.9
 

@@ -132,9 +132,9 @@ def test_a_file_for_a_folder_and_a_folder_for_a_file_are_refused(name, place, ca
 @pytest.mark.parametrize(
     "words",
     [
-        ["ifc", "check", "office.ifc", "--csv", "office.ifc"],
-        ["ifc", "export", "office.ifc", "--epjson", "office.ifc"],
-        ["ifc", "export", "office.ifc", "--gltf", "office.ifc"],
+        ["check", "office.ifc", "--csv", "office.ifc"],
+        ["export", "office.ifc", "--epjson", "office.ifc"],
+        ["export", "office.ifc", "--gltf", "office.ifc"],
         ["ifc", "survey", "office.ifc", "--markdown", "office.ifc"],
         ["sky", "wea", "weather.epw", "weather.epw"],
         ["sky", "matrix", "weather.epw", "weather.epw"],

@@ -47,7 +47,7 @@ def commands(path, folder):
     yield ["thermal", thermal, *out]
     yield ["thermal", coupled, *out]
     yield ["study", study, *out]
-    yield ["ifc", "export", path, "--gltf", folder / "a.glb"]
+    yield ["export", path, "--gltf", folder / "a.glb"]
 
 
 @pytest.mark.parametrize("number", range(7))
@@ -64,7 +64,7 @@ def test_a_room_asked_for_by_name_that_was_left_out(tmp_path, capsys):
     small.box("IfcSpace", "1", (0, 0, 0), (4, 4, 3), LongName="Hall")
     small.box("IfcSpace", "7", (9, 0, 0), (0.1, 0.1, 3), LongName="Shaft")
     small.model.write(str(tmp_path / "m.ifc"))
-    call = ["ifc", "export", str(tmp_path / "m.ifc"), "--gltf", str(tmp_path / "a.glb")]
+    call = ["export", str(tmp_path / "m.ifc"), "--gltf", str(tmp_path / "a.glb")]
     assert cli.run([*call, "--space", "shaft"]) == 1
     said = capsys.readouterr().err.strip().splitlines()[-1]
     assert "space 'shaft' was left out: space 7 Shaft: holds 0.030 m3 only" in said
@@ -83,7 +83,7 @@ def test_the_tables_of_check_are_whole_when_piped(tmp_path, capsys):
     model.by_type("IfcBuildingStorey")[0].Name = "storey " * 20 + "END"
     path, table = tmp_path / "m.ifc", tmp_path / "p.csv"
     model.write(str(path))
-    assert cli.run(["ifc", "check", str(path), "--csv", str(table)]) == 0
+    assert cli.run(["check", str(path), "--csv", str(table)]) == 0
     said = capsys.readouterr().out
     assert "…" not in said and space.LongName in said
     for row in csv.reader(io.StringIO(table.read_text())):
