@@ -9,7 +9,6 @@ those below a tenth.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -42,12 +41,10 @@ def seen(path: Path) -> Iterator[tuple[str, str, float, float]]:
             yield space.label, group.name, group.area, float(one.sum(axis=1) @ weight)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(files: Sequence[Path]) -> None:
     """Print the dim windows of each file and how many there are of all."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("files", nargs="+", type=Path)
     variants.activate()
-    for path in parser.parse_args(arguments).files:
+    for path in files:
         try:
             found = list(seen(path))
         except CfsError as error:
@@ -57,7 +54,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"{path.name}: {len(dim)} of {len(found)} windows see less than {100 * DIM:.0f} %")
         for room, window, area, share in dim:
             print(f"    {share:.3f}  {area:.2f} m2  {window} of room {room}", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -11,10 +11,11 @@ only BSDFs made from it.
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -252,31 +253,27 @@ def write_series(results: dict, path: Path) -> None:
     figure.savefig(path)
 
 
-def main() -> None:
+def main(
+    *,
+    weather: Path,
+    every: Annotated[int, "days from one to the next"] = 10,
+    samples: Annotated[int, "paths of a sensor in a batch"] = 8192,
+    only: Annotated[Sequence[str], TILTS, "system, all by default"] = (),
+    json_: Path | None = None,
+    series: Annotated[Path | None, "Figures 27 to 30 of a day each, as a picture"] = None,
+) -> None:
     """Run all systems and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--weather", type=Path, required=True)
-    parser.add_argument("--every", type=int, default=10, help="days from one to the next")
-    parser.add_argument("--samples", type=int, default=8192, help="paths of a sensor in a batch")
-    parser.add_argument("--only", choices=TILTS, action="append", help="system, all by default")
-    parser.add_argument("--json", type=Path)
-    parser.add_argument("--series", type=Path, help="Figures 27 to 30 of a day each, as a picture")
-    options = parser.parse_args()
     variants.activate()
-    weather = read_epw(options.weather)
+    weather = read_epw(weather)
     scene, results = test_room(), {}
-    for name in options.only or TILTS:
-        if options.series:
+    for name in only or TILTS:
+        if series:
             sky, times = of_a_day(weather, *DAYS[name])
         else:
-            sky, times = chosen_hours(weather, options.every), []
-        results[name] = one_case(scene, sky, TILTS[name], options.samples) | {"times": times}
+            sky, times = chosen_hours(weather, every), []
+        results[name] = one_case(scene, sky, TILTS[name], samples) | {"times": times}
         print(name, json.dumps(results[name], indent=1), flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(results, indent=1))
-    if options.series:
-        write_series(results, options.series)
-
-
-if __name__ == "__main__":
-    main()
+    if json_:
+        json_.write_text(json.dumps(results, indent=1))
+    if series:
+        write_series(results, series)

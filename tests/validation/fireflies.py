@@ -19,12 +19,12 @@ pictures, over the same point by point, at distances from the window's plane and
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -222,39 +222,35 @@ def beside_window(lit: LitScene, hours: int) -> Iterator[str]:
         yield f"| {y} | " + " | ".join(f"{r.min():.2f} to {r.max():.2f}" for r in row) + " |"
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    *,
+    weather: Path,
+    ifc: Path | None = None,
+    space: str | None = None,
+    geneva_: Path | None = None,
+    hours: Annotated[int, "of each scene"] = 67,
+    size: Annotated[int, "[px]"] = 160,
+    samples: Annotated[int, "of each pixel by paths, shared"] = 16,
+    seed: int = 0,
+    json_: Path | None = None,
+    walls: Annotated[bool, "the wall beside the box's window"] = False,
+) -> None:
     """Hold the scenes that files are given for, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--weather", type=Path, required=True)
-    parser.add_argument("--ifc", type=Path)
-    parser.add_argument("--space")
-    parser.add_argument("--geneva", type=Path)
-    parser.add_argument("--hours", type=int, default=67, help="of each scene")
-    parser.add_argument("--size", type=int, default=160, help="[px]")
-    parser.add_argument("--samples", type=int, default=16, help="of each pixel by paths, shared")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--json", type=Path)
-    parser.add_argument("--walls", action="store_true", help="the wall beside the box's window")
-    options = parser.parse_args(arguments)
-    weather = cfs.read_epw(options.weather)
-    if options.walls:
-        print("\n".join(beside_window(overhang(weather, options.size), WALL_HOURS)))
+    weather = cfs.read_epw(weather)
+    if walls:
+        print("\n".join(beside_window(overhang(weather, size), WALL_HOURS)))
         return
-    scenes = [overhang(weather, options.size)]
-    if options.ifc:
-        scenes.append(ifc_room(options.ifc, options.space, weather, options.size))
-    if options.geneva:
-        scenes.append(office(options.geneva, options.size))
+    scenes = [overhang(weather, size)]
+    if ifc:
+        scenes.append(ifc_room(ifc, space, weather, size))
+    if geneva_:
+        scenes.append(office(geneva_, size))
     rows = {}
     for lit in scenes:
-        found = held(lit, options.hours, samples=options.samples, seed=options.seed)
+        found = held(lit, hours, samples=samples, seed=seed)
         rows[lit.name] = {
             name: getattr(found, name).tolist() for name in ("worst", "beyond", "bright", "looked")
         }
         print(f"| {lit.name} | {found.line()} |", flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(rows))
-
-
-if __name__ == "__main__":
-    main()
+    if json_:
+        json_.write_text(json.dumps(rows))

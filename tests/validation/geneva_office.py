@@ -12,11 +12,12 @@ difference of DGP, and of Ev as a share of the reference's, mean over views.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -87,28 +88,19 @@ def errors(row: dict, name: str) -> tuple[float, float, int]:
     return float(np.abs(difference).mean()), float(difference.mean()), int(counted.sum())
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    folder: Path,
+    *,
+    cases: Annotated[Sequence[str], geneva.CASES] = tuple(geneva.CASES),
+    views: Annotated[Sequence[int], geneva.VIEWS] = (1, 2, 3),
+    every: Annotated[int, "of the 2,022 hours"] = 20,
+    size: Annotated[int, "[px]"] = 300,
+    json_: Path | None = None,
+) -> None:
     """Run the cases and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--cases", nargs="+", choices=geneva.CASES, default=list(geneva.CASES))
-    parser.add_argument("--views", nargs="+", type=int, choices=geneva.VIEWS, default=[1, 2, 3])
-    parser.add_argument("--every", type=int, default=20, help="of the 2,022 hours")
-    parser.add_argument("--size", type=int, default=300, help="[px]")
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args(arguments)
-    found = {
-        case: rated(
-            options.folder, case, options.views, options.every, options.size, cfs.Sampling()
-        )
-        for case in options.cases
-    }
-    if options.json:
-        options.json.write_text(json.dumps(found))
+    found = {case: rated(folder, case, views, every, size, cfs.Sampling()) for case in cases}
+    if json_:
+        json_.write_text(json.dumps(found))
     for case, result in found.items():
         for number, row in result["views"].items():
             print(case, number, _line(row))
-
-
-if __name__ == "__main__":
-    main()

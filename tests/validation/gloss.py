@@ -14,11 +14,11 @@ of the pane at the sun's angle, seen as `glass`.
 
 from __future__ import annotations
 
-import argparse
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -39,7 +39,7 @@ from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks import radiance
 from tests.validation.rendered_scene import RenderedScene
-from tests.validation.scene_rows import add_row_options, show_rows
+from tests.validation.scene_rows import show_rows
 
 EYE, DIRECTION = (-1.8, -2.0, 1.2), (0.0, 1.0, 0.0)
 TURN = np.array([-1.0, -1.0, 1.0])  # of the room, its window to the north
@@ -250,22 +250,18 @@ def _diffuse(given: Case) -> Case:
     return replace(given, interior=even[0], exterior=even[1])
 
 
-def main() -> None:
+def main(
+    *,
+    cases: Annotated[Sequence[str], MATERIALS] = tuple(MATERIALS),
+    size: int = SIZE,
+    points: Annotated[int, "times that rtrace finds Ev"] = 8,
+    json_: Path | None = None,
+) -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", nargs="+", choices=MATERIALS, default=list(MATERIALS))
-    parser.add_argument("--size", type=int, default=SIZE)
-    parser.add_argument("--points", type=int, default=8, help="times that rtrace finds Ev")
-    add_row_options(parser)
-    options = parser.parse_args()
     variants.activate()
 
     def rows(folder: Path) -> Iterator[Outcome]:
-        for name in options.cases:
-            yield outcome(name, folder / name, size=options.size, points=options.points)
+        for name in cases:
+            yield outcome(name, folder / name, size=size, points=points)
 
-    show_rows(options, rows, lambda row: json.dumps(asdict(row), indent=1))
-
-
-if __name__ == "__main__":
-    main()
+    show_rows(json_, rows, lambda row: json.dumps(asdict(row), indent=1))

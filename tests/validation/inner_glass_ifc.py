@@ -12,11 +12,11 @@ their standard errors, and ours by each, of the sensors' means.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,37 +168,32 @@ def _triangles(groups: Sequence[WindowGroup]) -> NDArray[np.float64]:
     return np.concatenate(found) if found else np.empty((0, 3, 3))
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    building: Path,
+    *,
+    space: Sequence[str] = (),
+    seeds: int = 4,
+    paths: Annotated[int, "of a sensor for each seed"] = 1 << 19,
+) -> None:
     """Print three lines for each room that borrows light."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("building", type=Path)
-    parser.add_argument("--space", action="append", default=[])
-    parser.add_argument("--seeds", type=int, default=4)
-    parser.add_argument("--paths", type=int, default=1 << 19, help="of a sensor for each seed")
-    options = parser.parse_args(arguments)
-    building = opened(read_ifc(options.building, join=[OPEN]))
+    building = opened(read_ifc(building, join=[OPEN]))
     variants.activate()
-    spaces = [building.space(name) for name in options.space] or building.spaces
+    rooms = [building.space(name) for name in space] or building.spaces
     print("| room | from | | sensors [lx] | three-phase by it |\n|---|---|---|---|---|")
-    for space in spaces:
-        scene = borrowing_scene(building, space)
+    for room in rooms:
+        scene = borrowing_scene(building, room)
         if scene is None:
             continue
-        seeds = range(options.seeds)
-        lent = ", ".join(room.label for room in source_rooms(building, space))
+        lent = ", ".join(other.label for other in source_rooms(building, room))
         with tempfile.TemporaryDirectory() as name:
             runs = {
-                "three-phase": [by_phases(scene, seed) for seed in seeds],
-                "paths": [by_paths(scene, options.paths, seed) for seed in seeds],
-                "`rtrace`": [by_radiance(scene, Path(name)) for _ in seeds],
+                "three-phase": [by_phases(scene, seed) for seed in range(seeds)],
+                "paths": [by_paths(scene, paths, seed) for seed in range(seeds)],
+                "`rtrace`": [by_radiance(scene, Path(name)) for _ in range(seeds)],
             }
         ours = pooled(runs["three-phase"])[0].mean()
         for who, values in runs.items():
             mean, error = pooled(values)
             cells = (f"{m:.1f} ({100 * e:.1f} %)" for m, e in zip(mean, error, strict=True))
             ratio = f"{ours / mean.mean():.3f}"
-            print(f"| {space.label} | {lent} | {who} | {', '.join(cells)} | {ratio} |", flush=True)
-
-
-if __name__ == "__main__":
-    main()
+            print(f"| {room.label} | {lent} | {who} | {', '.join(cells)} | {ratio} |", flush=True)

@@ -13,11 +13,11 @@ the folder: both pictures as .hdr, and beside each other as pictures.png, in one
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -143,32 +143,32 @@ def show(pictures: dict[str, NDArray[np.float64]], path: Path) -> None:
     plt.close(figure)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(
+    building: Path | None = None,
+    *,
+    space: str = "",
+    size: Annotated[int, "pixels of a side"] = 200,
+    rays: Annotated[int, "of a pixel for `path`"] = 512,
+    bounces: Annotated[int, "-ab of rpict"] = 6,
+    out: Annotated[Path | None, "folder of the pictures"] = None,
+) -> None:
     """Print the table and write the pictures."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("building", type=Path, nargs="?")
-    parser.add_argument("--space", default="")
-    parser.add_argument("--size", type=int, default=200, help="pixels of a side")
-    parser.add_argument("--rays", type=int, default=512, help="of a pixel for `path`")
-    parser.add_argument("--bounces", type=int, default=6, help="-ab of rpict")
-    parser.add_argument("--out", type=Path, help="folder of the pictures")
-    options = parser.parse_args(arguments)
     variants.activate()
-    if options.building is None:
-        case = own_corridor(options.size)
+    if building is None:
+        case = own_corridor(size)
     else:
-        case = room_of(options.building, options.space, options.size)
+        case = room_of(building, space, size)
     scene, taus, write, rooms = case
     view, pictures = scene.view, {"this project": ours(scene, taus)}
     with tempfile.TemporaryDirectory() as folder:
-        pictures["rpict"] = by_rpict(write, view, options.bounces, Path(folder))
-    pictures["path"] = by_path(rooms, view, options.rays)
+        pictures["rpict"] = by_rpict(write, view, bounces, Path(folder))
+    pictures["path"] = by_path(rooms, view, rays)
     print_table(scene, pictures)
-    if options.out is not None:
-        options.out.mkdir(parents=True, exist_ok=True)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
         for name, picture in pictures.items():
-            write_hdr(options.out / f"{name.replace(' ', '_')}.hdr", picture, view=view)
-        show(pictures, options.out / "pictures.png")
+            write_hdr(out / f"{name.replace(' ', '_')}.hdr", picture, view=view)
+        show(pictures, out / "pictures.png")
 
 
 def print_table(scene: DaylightScene, pictures: dict[str, NDArray[np.float64]]) -> None:
@@ -187,7 +187,3 @@ def print_table(scene: DaylightScene, pictures: dict[str, NDArray[np.float64]]) 
             f"| {mine / rpict:.3f} | {mine / path:.3f} |",
             flush=True,
         )
-
-
-if __name__ == "__main__":
-    main()

@@ -11,12 +11,12 @@ compares what the table says of it with what was measured.
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from dataclasses import asdict, replace
 from datetime import date
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -229,19 +229,15 @@ def print_check(table: MeasuredErrors) -> None:
         )
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    *,
+    out: Path = FILE,
+    hours: int = 4,
+    size: Annotated[int, "pixels of a side"] = 96,
+    check: Annotated[bool, "read `out` instead of measuring"] = False,
+) -> None:
     """Measure or check."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=FILE)
-    parser.add_argument("--hours", type=int, default=4)
-    parser.add_argument("--size", type=int, default=96, help="pixels of a side")
-    parser.add_argument("--check", type=Path, nargs="?", const=FILE)
-    options = parser.parse_args(arguments)
-    if options.check is None:
+    if not check:
         variants.activate()
-        made(options.hours, options.size, options.out)
-    print_check(MeasuredErrors.read(options.check or options.out))
-
-
-if __name__ == "__main__":
-    main()
+        made(hours, size, out)
+    print_check(MeasuredErrors.read(out))

@@ -11,10 +11,11 @@ measured errors are those of `method_errors`, expected ones those of the table t
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -116,27 +117,23 @@ def print_table(rows: list[dict]) -> None:
           f"{np.quantile(ratio, 0.9):.2f}")  # fmt: skip
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    files: Sequence[Path],
+    *,
+    weather: Path,
+    rooms_: Annotated[Sequence[str], ("near", "deep")] = ("near", "deep"),
+    hours: int = 4,
+    sun_in_view: Annotated[bool, "in a window before the eye"] = False,
+    size: Annotated[int, "pixels of a side"] = 96,
+    json_: Path | None = None,
+) -> None:
     """Measure and compare."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("files", type=Path, nargs="+")
-    parser.add_argument("--weather", type=Path, required=True)
-    parser.add_argument("--rooms", nargs="+", choices=("near", "deep"), default=["near", "deep"])
-    parser.add_argument("--hours", type=int, default=4)
-    parser.add_argument("--sun-in-view", action="store_true", help="in a window before the eye")
-    parser.add_argument("--size", type=int, default=96, help="pixels of a side")
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args(arguments)
     variants.activate()
-    known, weather, rows = rooms(options.size), read_epw(options.weather), []
-    for name in options.rooms:
+    known, weather, rows = rooms(size), read_epw(weather), []
+    for name in rooms_:
         scene = known[name]
-        lit = fresh_hours(weather, options.hours, scene if options.sun_in_view else None)
-        rows += compared(scene, lit, options.files, name)
+        lit = fresh_hours(weather, hours, scene if sun_in_view else None)
+        rows += compared(scene, lit, files, name)
     print_table(rows)
-    if options.json is not None:
-        options.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+    if json_ is not None:
+        json_.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")

@@ -10,8 +10,9 @@ root mean squares; the processor time over that with the window in one part.
 
 from __future__ import annotations
 
-import argparse
 import time
+from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,12 +100,12 @@ def row(name: str, glass: KlemsBsdf, paths: int) -> str:
     )
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    *,
+    cases: Annotated[Sequence[str], CASES] = tuple(CASES),
+    paths: Annotated[int, "of a sensor in an hour"] = 131_072,
+) -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", nargs="+", choices=CASES, default=list(CASES))
-    parser.add_argument("--paths", type=int, default=131_072, help="of a sensor in an hour")
-    options = parser.parse_args(arguments)
     glass = specular_klems(Glazing("double", 0.78, 0.14, 0.14), KLEMS_FULL)
     interior, group = room()
     compiled = DaylightScene(interior, surfaces(CASES["fins"]), [group], POINTS, UP)
@@ -114,9 +115,5 @@ def main(arguments: list[str] | None = None) -> None:
         "| before the window | 5-phase | within 3 % | 3-phase | 5-phase's noise | paths' error, "
         "largest | parts | time, times |\n|---|---|---|---|---|---|---|---|"
     )
-    for name in options.cases:
-        print(row(name, glass, options.paths), flush=True)
-
-
-if __name__ == "__main__":
-    main()
+    for name in cases:
+        print(row(name, glass, paths), flush=True)
