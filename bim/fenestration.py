@@ -13,7 +13,6 @@ from mitsuba_cfs.bsdf.angular import AngularTable, glass_table
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
-from mitsuba_cfs.gloss import pane_shares
 from thermal.closure import Closure
 
 
@@ -32,20 +31,19 @@ class AngularGValue:
 
 @dataclass(frozen=True, slots=True)
 class PlainGlass:
-    """A single pane of uncoated glass as Radiance's material `glass` describes it."""
+    """Panes of uncoated glass behind each other, as Radiance's material `glass` describes each."""
 
-    transmissivity: float  # of one way through it at normal incidence, visible
-    index: float  # of refraction
+    panes: tuple[tuple[float, float], ...]  # transmissivity and index of each, the outer one first
+
+    @property
+    def table(self) -> AngularTable:
+        """Visible transmittance and reflectance by the angle of incidence."""
+        return glass_table(self.panes)
 
     @property
     def transmittance(self) -> float:
         """Visible transmittance at normal incidence, with all reflections between the faces."""
-        return float(pane_shares(1.0, self.index, self.transmissivity)[0])
-
-    @property
-    def table(self) -> AngularTable:
-        """Transmittance and reflectance by the angle of incidence."""
-        return glass_table(self.transmissivity, self.index)
+        return float(self.table.transmittance[0])
 
 
 @dataclass(frozen=True, slots=True)

@@ -211,7 +211,7 @@ class _Reader:
             known = {"element": one.label, "modifier": modifier, "type": material.kind}
             self.issues.append(Issue("modifier-not-glass", one.identifier, known))
             return values
-        glass = PlainGlass(material.transmissivity, material.index)
+        glass = PlainGlass(((material.transmissivity, material.index),))
         return replace(
             values, visible=glass.transmittance, name=values.name or material.name, glass=glass
         )

@@ -89,7 +89,7 @@ class ModifierLibrary:
         material = self.material(name)
         if material is None or material.kind != "glass":
             return None
-        table = glass_table(material.transmissivity, material.index)
+        table = glass_table([(material.transmissivity, material.index)])
         bands = {"Visible": specular_matrices(table)}
         if values.solar is not None and values.visible:
             tau, rho = float(table.transmittance[0]), float(table.reflectance_front[0])

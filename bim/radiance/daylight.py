@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ def opaque_surfaces(scene: RadianceScene, facades: Iterable[str] = ()) -> Surfac
     Args: facades: materials or modifiers of panes that stand before something dark: they mirror
         what is before them, and nothing passes.
     """
-    parts = opaque_objects(scene, facades)
+    parts = opaque_objects(scene, scene.of_modifiers(facades))
     if not parts:
         return Surfaces.none()
     counts = [len(part.triangles) for part in parts]
@@ -43,9 +44,11 @@ def opaque_surfaces(scene: RadianceScene, facades: Iterable[str] = ()) -> Surfac
     )
 
 
-def opaque_objects(scene: RadianceScene, facades: Iterable[str] = ()) -> list[RadianceObject]:
+def opaque_objects(
+    scene: RadianceScene, facades: Iterable[RadianceObject] = ()
+) -> list[RadianceObject]:
     """The objects of `opaque_surfaces`, in its order."""
-    dark = {id(thing) for thing in scene.of_modifiers(facades)}
+    dark = {id(thing) for thing in facades}
     return [o for o in scene.objects if o.material.is_opaque or id(o) in dark]
 
 
@@ -58,10 +61,15 @@ def scene_windows(scene: RadianceScene, modifiers: Iterable[str]) -> list[Window
     Raises: `DataError` for a modifier that no surface has, and for a surface that sees about as
         much sky on either side.
     """
+    return list(map(pane_sides(scene), scene.of_modifiers(modifiers)))
+
+
+def pane_sides(scene: RadianceScene) -> Callable[[RadianceObject], WindowSurface]:
+    """A function from a pane of the scene to its surface seen from outdoors."""
     solid = ray_mesh(opaque_surfaces(scene).triangles)
     clear = [o.triangles for o in scene.objects if not o.material.is_opaque]
     panes = ray_mesh(np.concatenate([np.empty((0, 3, 3)), *clear]))
-    return [_window(thing, solid, panes) for thing in scene.of_modifiers(modifiers)]
+    return partial(_window, solid=solid, panes=panes)
 
 
 def _window(thing: RadianceObject, solid: RayMesh, panes: RayMesh) -> WindowSurface:
@@ -98,11 +106,11 @@ def held_states(thing: RadianceObject) -> tuple[ShadingState, ...]:
     return ()
 
 
-def plain_glass(material: RadianceMaterial) -> PlainGlass | None:
-    """The pane that a material of a window describes; None for others than `glass`."""
-    if material.kind != "glass":
+def plain_glass(materials: Sequence[RadianceMaterial]) -> PlainGlass | None:
+    """The panes of a window, the outer one first; None where one is no `glass`."""
+    if any(material.kind != "glass" for material in materials):
         return None
-    return PlainGlass(material.transmissivity, material.index)
+    return PlainGlass(tuple((one.transmissivity, one.index) for one in materials))
 
 
 def glass_shares(

@@ -114,7 +114,8 @@ def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
     else:
         table = values.glass.table
         visible = specular_matrices(table)
-        notes = [f"{name}: a single pane by its transmissivity and index of refraction."]
+        count = len(values.glass.panes)
+        notes = [f"{name}: {count} pane(s) of uncoated glass by Fresnel's equations."]
     solar, tau, g = visible, values.solar, values.g_value
     if g is not None:
         tau = solar_transmittance(u, g) if tau is None else tau
