@@ -72,11 +72,11 @@ def test_lamps_and_glare_read_the_light(inputs, monkeypatch, tables) -> None:
 def test_both_bands_share_the_matrices_of_equal_reflectances(inputs) -> None:
     room = inputs(visible=0.3, solar=0.3)
     light = room_light(room)
-    assert seasonal_outdoors(room, light).first is light.traced
-    assert seasonal_outdoors(room).first is not light.traced
+    assert seasonal_outdoors(room, light).first is light.matrices
+    assert seasonal_outdoors(room).first is not light.matrices
     unequal = inputs(visible=0.3, solar=0.6)
     light = room_light(unequal)
-    assert seasonal_outdoors(unequal, light).first is not light.traced
+    assert seasonal_outdoors(unequal, light).first is not light.matrices
 
 
 def test_no_picture_and_no_sun_without_a_reader(inputs, glass, weather, skies, monkeypatch):

@@ -22,10 +22,9 @@ import numpy as np
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.glazing import Pane, pane_values, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.methods.by_name import traced_scene, with_systems
+from mitsuba_cfs.methods.light import daylight, illuminance
 from mitsuba_cfs.methods.optics import AngularOptics, BsdfOptics, SystemOptics
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
@@ -74,8 +73,8 @@ def computed(case: Case, method: str, glass: str, sampling: Sampling = SAMPLING)
         )  # fmt: skip
         return found.values @ sky.whole
     scene = DaylightScene(Surfaces.none(), case.exterior(), [group], case.points, case.normals)
-    traced = traced_scene(METHODS[method], scene, sampling)
-    return with_systems(traced, [[filled]]).light(sky).illuminance()
+    light = daylight(scene, [[filled]], sky, method=METHODS[method], sampling=sampling)
+    return illuminance(light)
 
 
 def deviations(case: Case, method: str, glass: str, sampling: Sampling = SAMPLING) -> Array:

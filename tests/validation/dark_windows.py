@@ -19,9 +19,8 @@ from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import CfsError
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 
 DIM = 0.1  # share below which a window is named
@@ -35,7 +34,7 @@ def seen(path: Path) -> Iterator[tuple[str, str, float, float]]:
     for space in (space for space in building.spaces if space.windows):
         alone = [WindowGroup(w.name, (w,)) for g in window_groups(space) for w in g.windows]
         scene = DaylightScene(Surfaces.none(), exterior_surfaces(building, space), alone)
-        traced = PhaseScene(scene, SAMPLING)
+        traced = phase_matrices(scene, SAMPLING, five_phase=False, needs=())
         daylight = traced.parts.of_groups(traced.daylight.values)
         for group, one in zip(alone, daylight, strict=True):
             yield space.label, group.name, group.area, float(one.sum(axis=1) @ weight)

@@ -25,11 +25,11 @@ from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.matrices.fine_basis import fine_basis
-from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics
-from mitsuba_cfs.methods.phase_light import PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.light import illuminance, illuminance_with_error
+from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_series
@@ -97,14 +97,17 @@ def by_phases(
     room = DaylightScene(scene.interior, empty(), scene.groups, scene.points, scene.up)
     known, found = BsdfOptics(system), {}
     systems = [
-        [GivenOptics(known.transmission, way, reflection=known.reflection) for way in ways.values()]
+        [
+            MatrixOptics(known.transmission, way, reflection=known.reflection)
+            for way in ways.values()
+        ]
     ]
-    three_phase = PhaseSystems(PhaseScene(room, SAMPLING, five_phase=False), systems).light(sky)
-    found["three-phase"] = three_phase.illuminance()
-    light = PhaseSystems(PhaseScene(room, SAMPLING), systems).light(sky)
+    three_phase = phase_light(phase_matrices(room, SAMPLING, five_phase=False), systems, sky)
+    found["three-phase"] = illuminance(three_phase)
+    light = phase_light(phase_matrices(room, SAMPLING), systems, sky)
     for number, name in enumerate(ways):
-        found[f"five-phase, {name}"] = light.illuminance(np.full(len(sky.lit), number))
-    return found, float(three_phase.relative_error().max())
+        found[f"five-phase, {name}"] = illuminance(light, np.full(len(sky.lit), number))
+    return found, float(illuminance_with_error(three_phase)[1].max())
 
 
 def by_fine_matrix(scene: BlindRoom, tilt_deg: float | None, sky: AnnualSky) -> NDArray[np.float64]:

@@ -34,6 +34,9 @@ import mitsuba_cfs as cfs
 from bim.sensors import view_point
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs.glare.annual import full_picture
+from mitsuba_cfs.methods.coefficients import group_coefficients
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
+from mitsuba_cfs.methods.point_in_time import path_picture
 from scenes.chosen_rooms import chosen_spaces
 from scenes.cost import room as box
 from scenes.input_files import read_building
@@ -147,15 +150,15 @@ def _year(weather: cfs.Weather) -> Callable[[NDArray[np.int64] | None], cfs.Annu
 def held(lit: LitScene, hours: int, *, samples: int, seed: int = 0) -> Found:
     """Hold five-phase pictures of random hours against those by paths."""
     sky, view = lit.drawn(hours, seed), lit.scene.view
-    light = cfs.PhaseSystems(cfs.PhaseScene(lit.scene), lit.systems).light(sky)
+    light = cfs.phase_light(cfs.phase_matrices(lit.scene), lit.systems, sky)
     finer = replace(view, width=FINER * view.width, height=FINER * view.height)
-    paths = cfs.PathSystems(replace(lit.scene, view=finer), lit.systems).light(sky)
-    pictures = light.pictures(np.arange(len(sky.lit)), [0] * len(lit.systems))
+    paths = cfs.PathLight(replace(lit.scene, view=finer), lit.systems, sky)
+    pictures = pictures_in_state(light, np.arange(len(sky.lit)), [0] * len(lit.systems))
     found = []
     for hour in range(len(sky.lit)):
         values = pictures.without_disc(np.array([hour]))[0][0]
         ours = full_picture(values, pictures.pixels, view)
-        first = paths.picture(hour, disc=False, samples=samples, seed=seed)
+        first = path_picture(paths, hour, disc=False, samples=samples, seed=seed)
         ratio, count, noise = _ratio(ours, brightest(first)), 0, 0.0
         for i, (least, more) in enumerate(LOOKS):
             again = np.flatnonzero(ratio > least)
@@ -186,13 +189,13 @@ def looked_at(
     One half of the paths says which is the brightest, the other how bright it is: the largest of
     many noisy values would be too large.
     """
-    width = paths.filled.scene.view.width
+    width = paths.scene.eye.width
     row, column = np.divmod(pixels, width // FINER)
     down, across = np.divmod(np.arange((3 * FINER) ** 2), 3 * FINER)
     down, across = (FINER * a[:, None] + b - FINER for a, b in ((row, down), (column, across)))
     around = np.clip(down, 0, width - 1) * width + np.clip(across, 0, width - 1)
     options = {"samples": samples // 2, "tile": 1, "pixels": np.unique(around), "disc": False}
-    halves = [paths.picture(hour, seed=1000 + 2 * seed + i, **options) for i in range(2)]
+    halves = [path_picture(paths, hour, seed=1000 + 2 * seed + i, **options) for i in range(2)]
     first, second = (half.ravel()[around] for half in halves)
     every = np.arange(len(pixels))
     of_first, of_second = first[every, second.argmax(axis=1)], second[every, first.argmax(axis=1)]
@@ -214,9 +217,10 @@ def beside_window(lit: LitScene, hours: int) -> Iterator[str]:
     scene = cfs.DaylightScene(*around, points, np.tile([1.0, 0, 0], (len(points), 1)))
     chosen = cfs.Sampling(patch_samples=4096, sensor_samples=16384, window_parts=1)
     sky = lit.drawn(hours, 0)
-    filled = cfs.PhaseSystems(cfs.PhaseScene(scene, chosen), lit.systems)
-    exact, traced = filled.straight.matrix(0, 0).values, filled.traced
-    patches = (traced.direct_sensors[:, 0] * filled.straight.beam(0, 0)) @ traced.daylight.values[0]
+    matrices = cfs.phase_matrices(scene, chosen)
+    ((group,),) = group_coefficients(matrices, lit.systems)
+    exact = group.straight.values.values
+    patches = (matrices.direct_sensors[:, 0] * group.beam) @ matrices.daylight.values[0]
     ratio = (patches @ sky.without_sun()) / (exact @ sky.without_sun())
     for row, y in zip(ratio.reshape(len(DISTANCES), len(HEIGHTS), -1), DISTANCES, strict=True):
         yield f"| {y} | " + " | ".join(f"{r.min():.2f} to {r.max():.2f}" for r in row) + " |"

@@ -23,6 +23,7 @@ import numpy as np
 
 import bim
 import mitsuba_cfs as cfs
+from mitsuba_cfs.methods.phase_matrices import with_eye, with_needs
 from tests.validation import geneva_scene as geneva
 
 PUBLISHED = {"01_glz": (0.0109, 0.0420), "03_shd": (0.0038, 0.0305)}  # raytraverse: DGP, Ev
@@ -36,17 +37,17 @@ def rated(
     groups, systems = geneva.window_groups(folder, case)
     solid = bim.opaque_surfaces(geneva.scene(folder, case))
     hours = geneva.reference(folder, case, numbers[0]).hour[::every]
-    sky, traced, found = geneva.sky(folder, hours), None, {"hours": hours.tolist(), "views": {}}
+    sky, matrices, found = geneva.sky(folder, hours), None, {"hours": hours.tolist(), "views": {}}
     for number in numbers:
         view, start = geneva.view(folder, number, size), os.times()
-        if traced is None:
-            traced = cfs.PhaseScene(cfs.DaylightScene(solid, solid, groups, view=view), sampling)
+        if matrices is None:
+            scene = cfs.DaylightScene(solid, solid, groups, view=view)
+            matrices = cfs.phase_matrices(scene, sampling, needs=["DGP"])
         else:
-            traced = traced.seen_from(view)
-        traced.trace("DGP")
-        matrices = _seconds(start)
+            matrices = with_needs(with_eye(matrices, view), ["DGP"])
+        tracing = _seconds(start)
         start = os.times()
-        light = cfs.PhaseSystems(traced, systems).light(sky)
+        light = cfs.phase_light(matrices, systems, sky, needs=["DGP"])
         pixels = cfs.hourly_glare(light, options=cfs.GlareOptions(grouping="pixels"))
         seconds = _seconds(start)
         glare = cfs.hourly_glare(light)
@@ -57,7 +58,7 @@ def rated(
             "Ev": glare.Ev.round(1).tolist(),
             "reference dgp": truth.dgp[::every].tolist(),
             "reference Ev": truth.Ev[::every].tolist(),
-            "seconds of matrices": round(matrices, 1),
+            "seconds of matrices": round(tracing, 1),
             "seconds of hours": round(seconds, 1),
         }
         print(f"{case} view {number}:", _line(found["views"][str(number)]), file=sys.stderr)

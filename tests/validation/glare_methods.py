@@ -26,10 +26,11 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.methods import METHODS
-from mitsuba_cfs.methods.by_name import traced_scene, values, with_systems
+from mitsuba_cfs.methods.glare import metric_values
+from mitsuba_cfs.methods.light import daylight
 from mitsuba_cfs.methods.optics import SystemOptics
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.point_in_time import path_tracing_room, picture_with_disc
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
@@ -43,6 +44,7 @@ from tests.validation.glare_room import (
     measurement,
     sunny_days,
 )
+from tests.validation.method_errors import method_matrices
 
 GLARE = ("DGP", "eDGP", "sDGP")
 SEED = 7  # of the measurement; the methods have another
@@ -80,19 +82,19 @@ def measured(
     for height in case.raised:
         eye = np.add(scene.view.position, [0, 0, height])
         raised = replace(scene, view=replace(scene.view, position=tuple(eye)))
-        light, row = measurement(raised, case.exterior, sampling).light(case.sky), []
+        light, row = measurement(raised, case.exterior, case.sky, sampling), []
+        room = path_tracing_room(light.scene, light.systems)
         for hour in range(len(case.sky.lit)):
-            picture = light.picture(hour, seed=SEED, disc=False)
-            whole = light.with_disc(picture, hour)
+            picture = picture_with_disc(light, room, hour, seed=SEED)
             if case.sun == "source":
-                found = evaluate(picture, geometry, disc=light.disc(hour))
+                found = evaluate(picture.bare, geometry, disc=picture.disc)
             else:
-                found = evaluate(whole, geometry)
+                found = evaluate(picture.shown, geometry)
             row.append((found.dgp, found.Ev))
             if pictures is not None:
                 title = f"{case.name}, {case.times[hour]}: DGP {found.dgp:.3f}"
                 name = f"{case.name.replace(' ', '_')}_{hour:02d}.png"
-                write_falsecolour(pictures / name, whole, title=title)
+                write_falsecolour(pictures / name, picture.shown, title=title)
         rows.append(row)
     dgp, lux = np.mean(rows, axis=0).T
     return dgp, lux
@@ -111,12 +113,15 @@ def rated(
         )  # fmt: skip
         print(case.name, "measured", dgp.round(3), file=sys.stderr, flush=True)
     for method in METHODS:
-        traced = traced_scene(method, scene, sampling)
+        matrices = method_matrices(method, scene, sampling)
         for metric in GLARE:
             start = time.monotonic()
             for case, run in zip(cases, found, strict=True):
-                light = with_systems(traced, [[case.system]] * len(scene.groups)).light(case.sky)
-                dgp = values(light, metric)
+                light = daylight(
+                    scene, [[case.system]] * len(scene.groups), case.sky,
+                    method=method, sampling=sampling, needs=(), matrices=matrices,
+                )  # fmt: skip
+                dgp = metric_values(light, metric)
                 run["methods"][f"{method} {metric}"] = dgp.round(5).tolist()
             seconds = time.monotonic() - start
             print(f"{method} {metric}: {seconds:.0f} s", file=sys.stderr, flush=True)

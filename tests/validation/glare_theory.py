@@ -25,8 +25,7 @@ from mitsuba_cfs.bsdf.blinds import extrude
 from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, plastic
 from mitsuba_cfs.methods import METHODS
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky

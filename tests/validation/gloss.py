@@ -27,6 +27,7 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.gloss import Gloss, lacquer, mirror, pane
 from mitsuba_cfs.images.view import View, fisheye
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
@@ -218,13 +219,13 @@ def _five_phase(given: Case, view: View, seed: int) -> tuple[np.ndarray, float]:
     around = given.interior, given.exterior, given.groups
     scene = cfs.DaylightScene(*around, points, normals, view=view)
     sampling = cfs.Sampling(outdoor_samples=16, view_samples=16, seed=seed)
-    traced = cfs.PhaseScene(scene, sampling)
+    traced = cfs.phase_matrices(scene, sampling)
     clear = cfs.AngularOptics(np.ones(64))
-    light = cfs.PhaseSystems(traced, [[clear]]).light(sky)
-    shown = light.pictures(np.array([0]), [0])
+    light = cfs.phase_light(traced, [[clear]], sky)
+    shown = pictures_in_state(light, np.array([0]), [0])
     picture = np.zeros(view.width * view.height, dtype=np.float32)
     picture[shown.pixels] = shown.values(np.array([0]))[0]
-    return picture.reshape(view.height, view.width), float(light.illuminance()[0, 0])
+    return picture.reshape(view.height, view.width), float(cfs.illuminance(light)[0, 0])
 
 
 def _eye(given: Case, view: View):

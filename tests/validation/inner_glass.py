@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.methods.optics import GivenOptics
-from mitsuba_cfs.methods.phase_light import PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene, RoomBeyond
+from mitsuba_cfs.methods.light import illuminance
+from mitsuba_cfs.methods.optics import MatrixOptics
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -113,20 +113,20 @@ def scene(rooms: int) -> DaylightScene:
         taken = [] if last else [(upright(walls_at(rooms)[number + 1], GLASS, north=True), 0.0)]
         tau = INNER_TAU if number > 1 else TAU
         beyond = (
-            () if found is None else (RoomBeyond(found, (tau * eye,), INNER_TAU * np.ones(145)),)
+            () if found is None else (AdjacentRoom(found, (tau * eye,), INNER_TAU * np.ones(145)),)
         )
         found = DaylightScene(
             surfaces([*room(number, rooms), *taken]), Surfaces.none(), [group(number, rooms)],
-            *((sensors(rooms), UP) if last else ()), beyond=beyond,
+            *((sensors(rooms), UP) if last else ()), adjacent=beyond,
         )  # fmt: skip
     return found
 
 
 def by_phases(rooms: int, seed: int = 0, sampling: Sampling = SAMPLING) -> NDArray[np.float64]:
     """Illuminance of the sensors [S] [lx] by this project's three phases."""
-    traced = PhaseScene(scene(rooms), replace(sampling, seed=seed), five_phase=False)
-    light = PhaseSystems(traced, [[GivenOptics(INNER_TAU * np.eye(KLEMS_FULL.size))]])
-    return light.light(overcast()).illuminance()[:, 0]
+    traced = phase_matrices(scene(rooms), replace(sampling, seed=seed), five_phase=False)
+    systems = [[MatrixOptics(INNER_TAU * np.eye(KLEMS_FULL.size))]]
+    return illuminance(phase_light(traced, systems, overcast()))[:, 0]
 
 
 def by_paths(rooms: int, samples: int, seed: int = 0) -> NDArray[np.float64]:

@@ -26,11 +26,11 @@ from bim.ifc.corrections import OPEN
 from bim.model import Building, Space
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.methods.optics import GivenOptics
-from mitsuba_cfs.methods.phase_light import PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.light import illuminance
+from mitsuba_cfs.methods.optics import MatrixOptics
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from scenes.demo import VENETIAN_BLIND
 from scenes.fenestration.systems import read_system
@@ -74,25 +74,25 @@ def borrowing_scene(building: Building, space: Space) -> DaylightScene | None:
 def _plain(scene: DaylightScene) -> DaylightScene:
     """The scene with nothing outdoors, and the same glass everywhere."""
     beyond = []
-    for one, tau in zip(scene.beyond, inner_taus(scene), strict=True):
+    for one, tau in zip(scene.adjacent, inner_taus(scene), strict=True):
         behind = _plain(one.scene)
         taus = [TAU] * len(behind.outdoor_groups) + inner_taus(one.scene)
         passed = tuple(t * EYE for t in taus)
         beyond.append(replace(one, scene=behind, transmission=passed, beam=tau * EYE.diagonal()))
-    return replace(scene, exterior=Surfaces.none(), beyond=tuple(beyond))
+    return replace(scene, exterior=Surfaces.none(), adjacent=tuple(beyond))
 
 
 def inner_taus(scene: DaylightScene) -> list[float]:
     """What each pane between rooms passes: a doorway all."""
-    return [1.0 if np.all(one.beam == 1) else INNER_TAU for one in scene.beyond]
+    return [1.0 if np.all(one.beam == 1) else INNER_TAU for one in scene.adjacent]
 
 
 def by_phases(scene: DaylightScene, seed: int) -> NDArray[np.float64]:
     """Illuminance of the sensors [S] [lx] by this project's three phases."""
-    traced = PhaseScene(scene, replace(SAMPLING, seed=seed), five_phase=False)
+    traced = phase_matrices(scene, replace(SAMPLING, seed=seed), five_phase=False)
     tau = [0.0] * len(scene.outdoor_groups) + inner_taus(scene)
-    light = PhaseSystems(traced, [[GivenOptics(t * EYE)] for t in tau])
-    return light.light(overcast()).illuminance()[:, 0]
+    light = phase_light(traced, [[MatrixOptics(t * EYE)] for t in tau], overcast())
+    return illuminance(light)[:, 0]
 
 
 def by_paths(scene: DaylightScene, samples: int, seed: int) -> NDArray[np.float64]:

@@ -32,11 +32,12 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import View, fisheye, pixel_directions, pixel_solid_angles
-from mitsuba_cfs.methods.optics import GivenOptics
-from mitsuba_cfs.methods.phase_light import PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.optics import MatrixOptics
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
+from mitsuba_cfs.methods.point_in_time import path_picture
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.trace.kernels.sampling import spread_rays
 from scenes.room.inner_glass import opened
 from tests.validation import inner_glass, inner_glass_ifc
@@ -82,9 +83,11 @@ def _inner(scene: DaylightScene) -> Sequence:
 
 def ours(scene: DaylightScene, taus: Sequence[float]) -> NDArray[np.float64]:
     """Luminance [ny, nx] [cd/m2] by this project's three phases."""
-    traced = PhaseScene(scene, SAMPLING, five_phase=False)
-    systems = [[GivenOptics(tau * np.eye(KLEMS_FULL.size))] for tau in taus]
-    made = PhaseSystems(traced, systems).light(overcast()).pictures(np.arange(1), [0] * len(taus))
+    traced = phase_matrices(scene, SAMPLING, five_phase=False)
+    systems = [[MatrixOptics(tau * np.eye(KLEMS_FULL.size))] for tau in taus]
+    made = pictures_in_state(
+        phase_light(traced, systems, overcast()), np.arange(1), [0] * len(taus)
+    )
     view = scene.view
     picture = np.zeros(view.width * view.height)
     picture[made.pixels] = made.values(np.arange(1))[0]
@@ -97,7 +100,7 @@ def by_rpict(write: Writer, view: View, bounces: int, folder: Path) -> NDArray[n
     files = " ".join(sorted(path.name for path in folder.glob("*.rad")))
     rendered = RenderedScene(folder, files, f"{CACHED} -ab {bounces}", POINT)
     rendered.set_sky(overcast().whole[:, 0], 1, (0.0, 0.0, 1.0), 0.0)
-    return rendered.picture(view)
+    return path_picture(rendered, view)
 
 
 def by_path(rooms: tuple[Quads, Quads], view: View, rays: int) -> NDArray[np.float64]:

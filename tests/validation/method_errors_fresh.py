@@ -28,7 +28,6 @@ from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods import METHODS
-from mitsuba_cfs.methods.by_name import traced_scene
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.epw import read_epw
@@ -36,7 +35,14 @@ from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.calibration.errors import FILE, LEAST, MeasuredErrors
-from tests.validation.method_errors import BARS, BRIGHT, measured, traits_of, with_sun
+from tests.validation.method_errors import (
+    BARS,
+    BRIGHT,
+    measured,
+    method_matrices,
+    traits_of,
+    with_sun,
+)
 
 NEAR = [WindowRectangle(x, 0.8, 1.6, 1.7) for x in (0.3, 2.2, 4.1)]
 DEEP = [WindowRectangle(0.2, 1.9, 3.1, 0.8)]
@@ -85,7 +91,7 @@ def visible(path: Path) -> Bsdf:
 def compared(scene: DaylightScene, lit: AnnualSky, files: list[Path], room: str) -> list[dict]:
     """Expected and measured error of every method and metric, for each file."""
     table = MeasuredErrors.read(FILE)
-    traced = {method: traced_scene(method, scene) for method in METHODS}
+    traced = {method: method_matrices(method, scene) for method in METHODS}
     rows = []
     for path in files:
         bsdf = visible(path)

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.methods.light import illuminance, illuminance_with_error
 from mitsuba_cfs.methods.optics import BsdfOptics
-from mitsuba_cfs.methods.path_light import PathSystems
-from mitsuba_cfs.methods.phase_light import PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.point_in_time import PathLight
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky, given_sky
 from mitsuba_cfs.surfaces import Surfaces
 from tests.validation.cut_groups import (
@@ -55,8 +55,8 @@ def by_phases(
     """Illuminance [S, H], processor time [s] and number of parts."""
     start = time.process_time()
     sampling = Sampling(window_parts=parts, seed=seed)
-    traced = PhaseScene(scene, sampling, five_phase=five_phase)
-    values = PhaseSystems(traced, [[BsdfOptics(glass)]]).light(sunny()).illuminance()
+    traced = phase_matrices(scene, sampling, five_phase=five_phase)
+    values = illuminance(phase_light(traced, [[BsdfOptics(glass)]], sunny()))
     return values, time.process_time() - start, len(traced.parts.groups)
 
 
@@ -65,10 +65,10 @@ def by_paths(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Illuminance [S, H] and its standard error."""
     values, errors = [], []
-    light = PathSystems(scene, [[BsdfOptics(glass)]], Sampling(hour_samples=paths))
+    optics, sampling = [[BsdfOptics(glass)]], Sampling(hour_samples=paths)
     for hour in range(len(SUNS)):
-        one = light.light(sunny().part([hour]))
-        found, error = one.estimate()
+        one = PathLight(scene, optics, sunny().part([hour]), sampling)
+        found, error = illuminance_with_error(one)
         values.append(found[:, 0])
         errors.append(error * found[:, 0])
     return np.stack(values, axis=1), np.stack(errors, axis=1)

@@ -32,6 +32,7 @@ from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.glare.annual import full_picture
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.images.view import View, fisheye
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.sampling import lattice_2d
@@ -142,8 +143,8 @@ def five_phase(
     sun[stands, np.arange(n)] = strength / reinhart.solid_angles[stands]
     sky = cfs.AnnualSky(patches + sun, towards, strength, np.arange(n), 8760, sun=sun)
     scene = cfs.DaylightScene(room.room(), room.NOTHING, room.window_groups(), view=view)
-    traced = cfs.PhaseScene(scene, cfs.Sampling(subdivision=rendered.SUBDIVISION))
-    shown = cfs.PhaseSystems(traced, [[optics]]).light(sky).pictures(np.arange(n), [0])
+    traced = cfs.phase_matrices(scene, cfs.Sampling(subdivision=rendered.SUBDIVISION))
+    shown = pictures_in_state(cfs.phase_light(traced, [[optics]], sky), np.arange(n), [0])
     values = shown.values(np.arange(n))
     return [full_picture(row, shown.pixels, view) for row in values]
 
