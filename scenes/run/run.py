@@ -221,7 +221,7 @@ def _series(
             and alike(one, other)
         ),
         parallel=None if workers is None else partial(work.parallel, workers=workers),
-        stored=(lambda result: result) if store is None else store.kept,
+        stored=(lambda result: result) if store is None else store.stored,
     )
 
 
