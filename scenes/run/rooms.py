@@ -74,7 +74,7 @@ def computed_rooms(
         on_room=(on_light if coupled else on_room) or _ignore,
         shared="daylight, glare and sun are" if coupled else "results are",
         parallel=None if workers is None else partial(work.parallel, workers=workers),
-        stored=_unchanged if store is None else store.kept,
+        stored=_unchanged if store is None else store.stored,
     )
     results, issues, notes = series.results(progress)
     if not coupled:

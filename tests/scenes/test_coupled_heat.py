@@ -95,7 +95,7 @@ def _shared(room: DaylitRoom) -> int:
 def test_rooms_held_on_disk_have_the_same_year(variant, weather, skies) -> None:
     rooms = [lit(s, {"loads": WARM} if s.name == "w" else {}, weather, skies) for s in two_boxes()]
     store = StoredArrays()
-    held = [store.kept(room) for room in rooms]
+    held = [store.stored(room) for room in rooms]
     found, _ = coupled_years(rooms, weather, 3600.0, OperationTables())
     again, _ = coupled_years(held, weather, 3600.0, OperationTables(), store=store)
     for one, other in zip(found, again, strict=True):
