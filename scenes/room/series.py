@@ -167,7 +167,9 @@ class RoomSeries(Generic[R]):
         ahead: Iterator[tuple[str, R | BaseException]],
         progress: Progress,
     ) -> tuple[list[R], list[Issue], list[str]]:
-        results, issues, notes = [], [], []
+        results: list[R] = []
+        issues: list[Issue] = []
+        notes: list[str] = []
         computed: dict[str, R | BaseException] = {}
         for number, space in enumerate(self.spaces, 1):
             steps = item(progress, "room", number, len(self.spaces), space.label)
