@@ -15,7 +15,7 @@ from bim.radiance.daylight import held_states, opaque_objects, scene_windows
 from bim.radiance.indoors import THICK, Indoors, indoors_of
 from bim.radiance.materials import SYSTEMS
 from bim.radiance.scene import RadianceObject, RadianceScene, read_radiance
-from bim.report.issue import Issue
+from bim.report.issue import Effect, Issue
 from bim.shell import enclosed_volume, open_edges
 from mitsuba_cfs.errors import DataError, RoomError
 
@@ -59,8 +59,25 @@ def read_radiance_building(
         for i, thing in enumerate(objects)
         if not indoors.stands[indoors.owner == i].any()
     )
-    found = (*scene.issues, *issues)
+    found = (*scene.issues, *issues, *_unused_panes(scene, panes, objects, path))
     return Building(path.stem, (space,), elements, found, file=path)
+
+
+def _unused_panes(
+    scene: RadianceScene,
+    windows: Sequence[RadianceObject],
+    opaque: Sequence[RadianceObject],
+    path: Path,
+) -> list[Issue]:
+    """An issue where clear surfaces are neither windows nor panes before dark rooms."""
+    used = {id(thing) for thing in (*windows, *opaque)}
+    panes = [thing for thing in scene.objects if id(thing) not in used]
+    if not panes:
+        return []
+    materials = tuple(sorted({thing.material.name for thing in panes}))
+    area = sum(_area(thing.triangles) for thing in panes)
+    values = {"count": len(panes), "materials": materials}
+    return [Issue("radiance-panes-unused", path.name, values, Effect(glass=area))]
 
 
 def read_radiance_elements(
