@@ -11,7 +11,7 @@ from bim.account import Account, StoreyAccount
 from bim.coarser import coarser
 from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE
 from bim.model import Building, Element, Space
-from bim.names import JOINT, found_by_name, label_of
+from bim.names import JOINT, AmbiguousName, UnknownName, found_by_name, label_of
 from bim.outdoors import shut_in_area, unblinded
 from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, space_of
 from bim.report.issue import Effect, Issue
@@ -80,7 +80,7 @@ def _joined(rooms: Sequence[DrawnRoom], text: str, path: Path) -> list[DrawnRoom
         raise DataError(message, field="join")
     try:
         own = [found_by_name([_Labelled(room) for room in rooms], name, "room") for name in names]
-    except (KeyError, ValueError) as error:
+    except (UnknownName, AmbiguousName) as error:
         raise DataError(str(error.args[0]), file=path, field="join") from None
     chosen = {one.guid: one.room for one in own}
     first = own[0].room

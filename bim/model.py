@@ -19,7 +19,7 @@ from bim.colours import GREY, Colour
 from bim.fenestration import ShadingState
 from bim.georeference import Georeference
 from bim.held_sensors import HeldGrid, HeldView
-from bim.names import found_by_name, label_of
+from bim.names import AmbiguousName, UnknownName, found_by_name, label_of
 from bim.report.issue import Issue
 from bim.use import StatedUse
 from mitsuba_cfs.errors import DataError
@@ -264,7 +264,7 @@ class Building:
         """
         try:
             return Room(self, self.space(name_or_guid))
-        except (KeyError, ValueError) as error:
+        except (UnknownName, AmbiguousName) as error:
             raise DataError(str(error.args[0]), file=self.file, field="space") from None
 
 

@@ -77,6 +77,14 @@ def listed(wanted: str, names: Iterable[str]) -> str:
     return ", ".join(names[:SHOWN]) + more
 
 
+class UnknownName(KeyError):
+    """No item has the name."""
+
+
+class AmbiguousName(ValueError):
+    """Several items have the name."""
+
+
 def found_by_name(items: Sequence[T], wanted: str, kind: str) -> T:
     """The one item of that GUID, name, long name, or name and long name; else of such a part.
 
@@ -84,8 +92,8 @@ def found_by_name(items: Sequence[T], wanted: str, kind: str) -> T:
     those of rooms that were joined.
 
     Args: kind: what a message calls an item, such as "space".
-    Raises: `KeyError` where there is none, `ValueError` where there are several; their texts list
-        the nearest.
+    Raises: `UnknownName` where there is none, `AmbiguousName` where there are several; their texts
+        list the nearest.
     """
     found = [item for item in items if item.guid == wanted]
     found = found or [i for i in items if wanted in (i.name, i.long_name, i.label)]
@@ -96,12 +104,12 @@ def found_by_name(items: Sequence[T], wanted: str, kind: str) -> T:
     found = found or [item for item in items if key and key in map(_key, _names_of_parts(item))]
     if not found:
         there = listed(wanted, (item.label for item in items))
-        raise KeyError(f"no {kind} {wanted!r}; there are: {there}")
+        raise UnknownName(f"no {kind} {wanted!r}; there are: {there}")
     if len(found) > 1:
         labels = [item.label for item in found]
         same = len(set(labels)) < len(labels)
         shown = (f"{item.label} ({item.guid})" if same else item.label for item in found)
-        raise ValueError(f"{len(found)} {kind}s are named {wanted!r}: {listed(wanted, shown)}")
+        raise AmbiguousName(f"{len(found)} {kind}s are named {wanted!r}: {listed(wanted, shown)}")
     return found[0]
 
 

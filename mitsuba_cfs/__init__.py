@@ -7,8 +7,9 @@ The face for people with their own geometry: triangles and arrays in, arrays out
     sky = cfs.annual_sky(cfs.read_epw("city.epw"))
     system = cfs.BsdfOptics(cfs.read_bsdf_xml("blind.xml").band("Visible"))
     scene = cfs.DaylightScene(interior, outdoors, [window_group], points, normals, view)
-    light = cfs.PhaseSystems(cfs.PhaseScene(scene), [[system]]).light(sky)
-    light.illuminance(), cfs.hourly_glare(light, "eDGP", hours=[1000]).dgp
+    light = cfs.daylight(scene, [[system]], sky)
+    lux, error = cfs.illuminance_with_error(light)
+    dgp = cfs.hourly_glare(light, hours=[1000]).dgp
 
 The names and their modules are in `__init__.pyi`; a name is loaded when it is first used, and the
 Mitsuba variant is chosen when something is first traced.  docs/python.md runs it all.

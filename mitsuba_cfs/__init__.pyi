@@ -45,14 +45,30 @@ from .images.hdr import Picture as Picture, read_hdr as read_hdr, write_hdr as w
 from .images.view import View as View, fisheye as fisheye, parse_view as parse_view
 from .matrices.cache import MatrixCache as MatrixCache
 from .matrices.mtx_io import read_matrix as read_matrix, write_matrix as write_matrix
-from .methods.by_name import traced_scene as traced_scene, with_systems as with_systems
-from .methods.glare import hourly_glare as hourly_glare, pictures as pictures
+from .methods.glare import (
+    hourly_glare as hourly_glare,
+    pictures as pictures,
+    rated_pictures as rated_pictures,
+)
+from .methods.light import (
+    daylight as daylight,
+    daylight_coefficients as daylight_coefficients,
+    direct_sun as direct_sun,
+    eye_illuminance as eye_illuminance,
+    illuminance as illuminance,
+    illuminance_with_error as illuminance_with_error,
+    with_pictures as with_pictures,
+    with_view as with_view,
+)
 from .methods.optics import AngularOptics as AngularOptics, BsdfOptics as BsdfOptics
-from .methods.path_light import PathLight as PathLight, PathSystems as PathSystems
-from .methods.phase_light import PhaseLight as PhaseLight, PhaseSystems as PhaseSystems
-from .methods.phase_scene import PhaseScene as PhaseScene
-from .methods.sampling import Sampling as Sampling
-from .methods.scene import DaylightScene as DaylightScene
+from .methods.phase_light import PhaseLight as PhaseLight, phase_light as phase_light
+from .methods.phase_matrices import (
+    PhaseMatrices as PhaseMatrices,
+    phase_matrices as phase_matrices,
+    with_outdoors as with_outdoors,
+)
+from .methods.point_in_time import PathLight as PathLight
+from .methods.scene import DaylightScene as DaylightScene, Sampling as Sampling
 from .metrics.room import RoomMetrics as RoomMetrics, room_metrics as room_metrics
 from .sky.annual import (
     AnnualSky as AnnualSky,

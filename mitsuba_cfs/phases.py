@@ -1,4 +1,4 @@
-"""The products of the phase methods; `mitsuba_cfs.methods.phase_light` makes their sums of them."""
+"""The products of the phase methods; `mitsuba_cfs.methods` adds them up."""
 
 from __future__ import annotations
 

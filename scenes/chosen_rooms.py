@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bim.model import Building, Space
+from bim.names import AmbiguousName, UnknownName
 from bim.report.issue import Issue, issue_text
 from mitsuba_cfs.errors import DataError
 
@@ -60,9 +61,9 @@ def named_spaces(building: Building, names: Sequence[str], path: Path) -> list[S
 def _space(building: Building, name: str, path: Path) -> Space:
     try:
         return building.space(name)
-    except (KeyError, ValueError) as error:
+    except (UnknownName, AmbiguousName) as error:
         lost = [p for p in _lost(building, "room") if p.where == name or _names(p, name)]
-        if isinstance(error, KeyError) and lost:
+        if isinstance(error, UnknownName) and lost:
             message = f"space {name!r} was left out: {_quoted(lost)}"
         else:
             message = str(error.args[0])

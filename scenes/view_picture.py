@@ -18,8 +18,8 @@ from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import View, fisheye, fitted, pixel_directions
 from mitsuba_cfs.methods.colour_view import coloured_picture
 from mitsuba_cfs.methods.glare import rated_pictures
-from mitsuba_cfs.methods.path_light import PathSystems
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.point_in_time import PathLight, path_picture
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import annual_sky
 from scenes.head import NO_HEAD, Head
@@ -77,19 +77,20 @@ def room_picture(
     sampling = Sampling(picture_samples=options.samples, seed=options.seed)
     place = {"sun_model": options.sun_model, "ground": options.sky_ground}
     sky = annual_sky(weather, sampling.subdivision, hours=[hour], **place)
-    light = PathSystems(viewed.scene, viewed.optics, sampling).light(sky)
+    light = PathLight(viewed.scene, viewed.optics, sky, sampling)
     end = 0.7 if options.colour else 1.0
     view, steps, rated = viewed.scene.view, part(progress, 0.4, end, "picture"), None
     if view.covers_hemisphere:
         rating = GlareOptions(grouping=options.glare_sources, sun=options.glare_sun)
         [(luminance, rated)] = rated_pictures(light, [0], options=rating, progress=steps)
     else:
-        luminance = light.picture(0, progress=steps)
+        luminance = path_picture(light, 0, progress=steps)
     radiance = None
     if options.colour:
-        bands = [PathSystems(scene, viewed.optics, sampling) for scene in viewed.bands]
         steps = part(progress, end, 1.0, "colour")
-        radiance = coloured_picture(luminance, bands, sky, 0, progress=steps)
+        radiance = coloured_picture(
+            luminance, viewed.bands, viewed.optics, sky, 0, sampling=sampling, progress=steps
+        )
     middle = weather.midpoints[hour]
     return RoomPicture(
         luminance, view, viewed.space.label, middle, inputs.head, tuple(viewed.leaks()), rated,

@@ -34,12 +34,9 @@ TRACING = (
 SOLVERS = tuple(
     f"mitsuba_cfs/methods/{name}.py"
     for name in (
-        "borrowed_pictures", "by_name", "colour_view", "exact_sun", "few_pictures", "glare",
-        "group_light", "optics", "path_light", "phase_error",
-        "phase_light", "phase_scene", "reflected_sun", "seasonal_light", "sensor_coefficients",
-        "straight_views",
-        "view_cache",
-        "window_reflection",
+        "coefficients", "colour_view", "glare", "light", "optics", "phase_light",
+        "phase_matrices", "phase_pictures", "point_in_time", "reflected_sun", "standard_error",
+        "view_cache", "window_reflection",
     )
 )  # fmt: skip
 IFC = ("bim/ifc/", "scenes/demo/")

@@ -47,8 +47,27 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+def two_facades() -> dict:
+    """A room with two window groups, two sensors and an eye, and a sampling for a few seconds."""
+    from mitsuba_cfs.images.view import fisheye
+    from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+    from tests.trace import rooms
+
+    interior, groups, exterior = rooms.l_shaped_room()
+    points, up = np.array([[2.0, 1.0, 0.8], [1.0, 4.5, 0.8]]), np.tile([0.0, 0.0, 1.0], (2, 1))
+    view = fisheye((2.0, 2.0, 1.2), (0, -1, 0), 48)
+    sampling = Sampling(
+        sensor_samples=256, patch_samples=64, sun_points=16, view_samples=1, outdoor_samples=1,
+        subdivision=1, window_parts=1,
+    )  # fmt: skip
+    scene = DaylightScene(interior, exterior, groups, points, up, view)
+    return {"scene": scene, "sampling": sampling}
+
+
 def given(page: str) -> dict:
     """What a page's examples take for granted."""
+    if page == "daylight.md":
+        return two_facades()
     if page != "glare.md":
         return {}
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL

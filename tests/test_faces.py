@@ -105,8 +105,8 @@ def test_a_planted_import_from_a_face_is_found() -> None:
 def test_the_variant_is_chosen_by_itself(first: str) -> None:
     """At the first use, whatever is first: matrices of a scene, or a system's optics."""
     use = {
-        "optics": "room = cfs.PathSystems(scene, [[optics]]).room([0])",
-        "matrices": "traced = cfs.PhaseScene(scene, few).sensors.values; assert traced.max() > 0",
+        "optics": "light = cfs.PathLight(scene, [[optics]], sky, few); cfs.illuminance(light)",
+        "matrices": "assert cfs.phase_matrices(scene, few).sensors.values.max() > 0",
     }[first]
     code = f"""
 import numpy as np
@@ -121,7 +121,8 @@ points = np.array([[0.5, 1.0, 0.3]])
 scene = cfs.DaylightScene(
     cfs.Surfaces.none(), cfs.Surfaces.none(), groups, points, np.array([[0.0, -1.0, 0.0]])
 )
-few = cfs.Sampling(sensor_samples=256, patch_samples=64)
+few = cfs.Sampling(sensor_samples=256, patch_samples=64, hour_samples=64, subdivision=1)
+sky = cfs.given_sky([[0, -0.8, 0.6]], [800.0], [90.0], 1, day_of_year=172)
 assert mitsuba.variant() is None
 {use}
 assert mitsuba.variant() is not None

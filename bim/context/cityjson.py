@@ -94,18 +94,23 @@ def _triangles(
     geometry: dict[str, Any], vertices: NDArray[np.float64], name: str, path: Path
 ) -> NDArray[np.float64]:
     """Triangles [T, 3, 3] of all surfaces of a geometry."""
-    try:
-        surfaces = _surfaces(geometry["boundaries"], DEPTH[geometry["type"]])
-        return triangles_of_surfaces([_ring(ring, vertices) for ring in one] for one in surfaces)
-    except (TypeError, ValueError, KeyError, IndexError):
+    boundaries, depth = geometry.get("boundaries"), DEPTH[geometry["type"]]
+    if not _is_nested(boundaries, depth + 1, len(vertices)):
         message = "expected lists of the numbers of vertices"
-        raise DataError(message, file=path, element=name[:60], field="boundaries") from None
+        raise DataError(message, file=path, element=name[:60], field="boundaries")
+    return triangles_of_surfaces(
+        [vertices[np.asarray(ring, dtype=int)] for ring in one]
+        for one in _surfaces(boundaries, depth)
+    )
 
 
-def _ring(ring: list[int], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    if not all(isinstance(i, int) and 0 <= i < len(vertices) for i in ring):
-        raise IndexError(ring)
-    return vertices[np.asarray(ring, dtype=int)]
+def _is_nested(part: Any, depth: int, count: int) -> bool:
+    """Whether lists in lists, so many deep, hold numbers of so many vertices."""
+    if not isinstance(part, list):
+        return False
+    if depth > 0:
+        return all(_is_nested(one, depth - 1, count) for one in part)
+    return all(isinstance(i, int) and 0 <= i < count for i in part)
 
 
 def _surfaces(boundaries: Any, depth: int) -> Iterator[Any]:

@@ -55,9 +55,10 @@ def read_footprints(path: Path) -> ContextFile:
 def _crs(content: dict[str, Any]) -> str:
     """Longitude and latitude, unless the file states another system in the old way."""
     try:
-        return crs_name(str(content["crs"]["properties"]["name"]))
+        name = str(content["crs"]["properties"]["name"])
     except (KeyError, TypeError):
         return LONGITUDE_LATITUDE
+    return crs_name(name)
 
 
 def _block(feature: Any, name: str, path: Path) -> list[ContextObject]:

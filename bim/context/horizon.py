@@ -39,8 +39,9 @@ def read_horizon(path: Path) -> NDArray[np.float64]:
 
 
 def _json_rows(path: Path) -> list[tuple[object, object]]:
+    content = read_object(path)
     try:
-        rows = read_object(path)["outputs"]["horizon_profile"]
+        rows = content["outputs"]["horizon_profile"]
         return [(row["A"], row["H_hor"]) for row in rows]
     except (KeyError, TypeError):
         message = "expected outputs.horizon_profile with A and H_hor (PVGIS printhorizon)"

@@ -267,7 +267,7 @@ class _Reader:
                     if isinstance(shade, ShadeMesh)
                     else triangles_of_rings(shade.geometry.rings(self.scale))
                 )
-            except IndexError:
+            except ValueError:
                 message = "a face has a corner that there is not"
                 raise DataError(message, file=self.path, element=shade.identifier,
                                 field="geometry.faces") from None  # fmt: skip

@@ -46,10 +46,13 @@ class Mesh(BaseModel):
     faces: list[Annotated[list[Annotated[int, Field(ge=0)]], Field(min_length=3, max_length=4)]]
 
     def triangles(self, scale: float) -> NDArray[np.float64]:
-        """Triangles [T, 3, 3] [m]; `IndexError` for a corner that there is not."""
+        """Triangles [T, 3, 3] [m]; `ValueError` for the number of a vertex that does not exist."""
         corners = scale * np.asarray(self.vertices, dtype=float).reshape(-1, 3)
         cut = [(f[0], b, c) for f in self.faces for b, c in pairwise(f[1:])]
-        return corners[np.asarray(cut, dtype=int).reshape(-1, 3)]
+        index = np.asarray(cut, dtype=int).reshape(-1, 3)
+        if len(index) and index.max() >= len(corners):
+            raise ValueError(f"vertex {index.max()} of {len(corners)}")
+        return corners[index]
 
 
 class Condition(BaseModel):

@@ -73,15 +73,20 @@ def view_of(view: Mapping[str, Any], scale: float) -> View | None:
     Args: scale: metres in the model's unit of length.
     """
     sizes = [60.0 if view.get(field) is None else view[field] for field in ("h_size", "v_size")]
+    up = view.get("up_vector") or (0.0, 0.0, 1.0)
     try:
-        position, direction = (
-            np.array(view[field], dtype=float) for field in ("position", "direction")
+        position, direction, up = (
+            tuple(np.array(one, dtype=float).reshape(3).tolist())
+            for one in (view.get("position"), view.get("direction"), up)
         )
-        return View(
-            KINDS[view.get("view_type") or "v"], tuple(scale * position), tuple(direction),
-            view.get("up_vector") or (0.0, 0.0, 1.0), *map(float, sizes),
-        )  # fmt: skip
-    except (KeyError, TypeError, ValueError):
+        width, height = map(float, sizes)
+        kind = KINDS[view.get("view_type") or "v"]
+    except (KeyError, TypeError, ValueError, OverflowError):
+        return None
+    place = tuple(scale * x for x in position)
+    try:
+        return View(kind, place, direction, up, width, height)
+    except ValueError:  # no direction, impossible angles
         return None
 
 

@@ -82,7 +82,7 @@ def read_ifc(
     if any(record.raised for record in records):
         glass = glass_of_rooms(source, apertures, records, mesh)
     elements, finishes, faults = bounding_elements(
-        source.model, source.walls, source.placed.rotation
+        source.model, source.walls, source.placed.rotation, source.damage
     )
     issues += [*glass.issues, *faults]
     around = _surroundings(mesh, source.walls, records, source.ground)
@@ -103,7 +103,7 @@ def read_ifc(
     tell("surroundings", 0.0)
     outside, more = _outdoors(source, spaces)
     tell("surroundings", 1.0)
-    issues += more
+    issues += [*more, *source.damage.issues]
     return Building(
         source.name, tuple(spaces), outside, tuple(dict.fromkeys(issues)),
         source.latitude_deg, source.longitude_deg, source.elevation, Path(path),
@@ -127,7 +127,9 @@ def _rooms(
     source: Source, mesh: RayMesh, tell: Callable[[float], None]
 ) -> tuple[_Rooms, list[Issue]]:
     """The spaces that are rooms; found from geometry where the file has none."""
-    records, issues = read_spaces(source.model, source.shapes, source.quantity_scales())
+    records, issues = read_spaces(
+        source.model, source.shapes, source.quantity_scales(), source.damage
+    )
     records, repeated, more = one_of_each(source.model, records)
     issues += more
     read, more = enclosed_spaces(records, mesh)

@@ -103,6 +103,7 @@ def chosen(model: ifcopenshell.file, query: str, file: str | Path = "") -> set[i
     # here, so that a mistake in the small file is found before these are loaded
     from ifcopenshell.util.selector import filter_elements
 
+    from bim.ifc.damage import raised_by_ifcopenshell
     from bim.ifc.elements import cad_layers_of
 
     found: set[int] = set()
@@ -110,7 +111,9 @@ def chosen(model: ifcopenshell.file, query: str, file: str | Path = "") -> set[i
         rest = LAYER.sub("", group).strip(" ,")
         try:
             elements = filter_elements(model, rest) if rest else set(model.by_type("IfcProduct"))
-        except Exception as error:  # the selector's parser raises many types
+        except Exception as error:
+            if not raised_by_ifcopenshell(error):  # the selector's parser raises many types
+                raise
             reason = str(error).strip().splitlines()[0] if str(error).strip() else "no selector"
             raise DataError(reason, file=file or None, field=query) from None
         layers = {name.strip().strip('"') for name in LAYER.findall(group)}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
@@ -19,6 +18,7 @@ from bim.defaults import (
     LOWEST_REFLECTANCE,
     SITE_REFLECTANCE,
 )
+from bim.ifc.damage import Damage, entities
 from bim.ifc.materials import MaterialReader, materials_of
 from bim.ifc.project import storey_of
 from bim.ifc.shapes import Shape
@@ -30,13 +30,16 @@ SITE = ("IfcSite", "IfcGeographicElement")
 
 
 def bounding_elements(
-    model: ifcopenshell.file, shapes: Sequence[Shape], rotation: NDArray[np.float64]
+    model: ifcopenshell.file,
+    shapes: Sequence[Shape],
+    rotation: NDArray[np.float64],
+    damage: Damage | None = None,
 ) -> tuple[list[ElementRecord], Finishes, list[Issue]]:
     """Record of each shape, what their triangles reflect, issues.
 
     Args: shapes: in world axes; rotation: [3, 3] from model axes to the world.
     """
-    reader = MaterialReader(model)
+    reader = MaterialReader(model, Damage() if damage is None else damage)
     records = [_record(model.by_id(shape.step_id), shape, reader, rotation) for shape in shapes]
     faults: dict[str, Issue] = {}
     values, gloss, hues = [], [], []
@@ -148,13 +151,13 @@ def outdoor_elements(
 def cad_layers_of(entity: ifcopenshell.entity_instance) -> list[str]:
     """Names of the presentation layers (CAD layers) that an element's body is on."""
     names: list[str] = []
-    with contextlib.suppress(Exception):  # damaged representations
-        for representation in entity.Representation.Representations:
-            layers = list(representation.LayerAssignments)
-            for item in representation.Items:
-                layers += getattr(item, "LayerAssignment", None) or ()  # IFC4
-                layers += getattr(item, "LayerAssignments", None) or ()  # IFC2X3
-            names += [layer.Name or "" for layer in layers]
+    shape = getattr(entity, "Representation", None)
+    for representation in entities(getattr(shape, "Representations", None)):
+        layers = entities(getattr(representation, "LayerAssignments", None))
+        for item in entities(representation.Items):
+            layers += entities(getattr(item, "LayerAssignment", None))  # IFC4
+            layers += entities(getattr(item, "LayerAssignments", None))  # IFC2X3
+        names += [layer.Name or "" for layer in layers]
     return names
 
 

@@ -6,12 +6,12 @@ reference of the window or its type names.
 
 from __future__ import annotations
 
-import contextlib
 import re
 from collections.abc import Iterable
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlparse
 
 import ifcopenshell
@@ -19,6 +19,7 @@ import ifcopenshell.util.element
 import numpy as np
 
 from bim.fenestration import AngularGValue, ShadingState
+from bim.ifc.damage import entities, type_of
 from bim.ifc.fenestration_write import (
     BLOCKS,
     BLOWN,
@@ -71,9 +72,7 @@ def read_states(
     for kind in HOLDERS:
         for element in model.by_type(kind):
             states: dict[str, ShadingState] = {}
-            element_type = None
-            with contextlib.suppress(Exception):  # a damaged type has no data either
-                element_type = ifcopenshell.util.element.get_type(element)
+            element_type = type_of(element)
             for source in (element_type, element):
                 of_type = None
                 if source is not None and source is element_type:
@@ -120,33 +119,71 @@ def _state(pset: Entity, file: str | Path, guid: str) -> ShadingState:
     bands: dict[str, Bsdf] = {}
     thermal: dict[str, object] = {}
     try:
-        for prop in pset.HasProperties:
-            if prop.is_a("IfcComplexProperty") and prop.Name.startswith("BSDF "):
-                bands[prop.Name[5:]] = _bsdf(prop)
+        for prop in entities(pset.HasProperties):
+            name_of_value = str(prop.Name or "")
+            if prop.is_a("IfcComplexProperty") and name_of_value.startswith("BSDF "):
+                bands[name_of_value[5:]] = _bsdf(prop)
             elif prop.Name in THERMAL:
                 field, read = THERMAL[prop.Name]
                 thermal[field] = read(prop)
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+    except ValueError as error:
         raise DataError(
             f"cannot be understood: {error}", file=file or None, element=guid, field=pset.Name
         ) from None
     return ShadingState(name, bands, **thermal)
 
 
-def _children(prop: Entity) -> dict[str, Entity]:
-    return {child.Name: child for child in prop.HasProperties}
+class _Parts(dict[str, Entity]):
+    """The properties of a complex property by name; `ValueError` for one that it lacks."""
+
+    def __missing__(self, name: str) -> Entity:
+        raise ValueError(f"has no {name!r}")
+
+
+def _children(prop: Entity) -> _Parts:
+    return _Parts({child.Name: child for child in _listed(prop)})
+
+
+def _listed(prop: Entity) -> list[Entity]:
+    """The properties of a complex property in their order."""
+    if not prop.is_a("IfcComplexProperty"):
+        raise ValueError(f"{prop.Name!r} is no complex property")
+    return entities(prop.HasProperties)
 
 
 def _numbers(prop: Entity, kind: type = float) -> np.ndarray:
+    if not prop.is_a("IfcPropertyListValue"):
+        raise ValueError(f"{prop.Name!r} is no list")
     # by number: by its name an attribute is looked for each time, three times as long for a BSDF
-    return np.array([value[0] for value in prop.ListValues], dtype=kind)
+    values = [value[0] for value in entities(prop.ListValues)]
+    try:
+        return np.array(values, dtype=kind)
+    except TypeError:
+        raise ValueError(f"{prop.Name!r} has values that are no numbers") from None
+
+
+def _wrapped(value: Any, name: str) -> Any:
+    """The value in an entity of a measure."""
+    if not isinstance(value, Entity):
+        raise ValueError(f"{name!r} has no value")
+    return value.wrappedValue
+
+
+def _number(value: Any, name: str) -> float:
+    number = _wrapped(value, name)
+    if not isinstance(number, int | float):
+        raise ValueError(f"{name!r} is no number")
+    return float(number)
 
 
 def _bsdf(prop: Entity) -> Bsdf:
     parts = _children(prop)
     values = _children(parts["Transmittance and reflectance values"])
     if (prop.UsageName or "").startswith(TREE):
-        rank = int(re.search(r"(\d+)$", prop.UsageName)[1])
+        digits = re.search(r"(\d+)$", prop.UsageName)
+        if digits is None:
+            raise ValueError(f"{prop.UsageName!r} states no rank")
+        rank = int(digits[1])
         trees = {
             key: TensorTree(
                 rank, _numbers(parts[f"{name}: depths"], np.int64), _numbers(values[name])
@@ -165,11 +202,16 @@ def _bsdf(prop: Entity) -> Bsdf:
 
 def _basis(parts: dict[str, Entity], side: str) -> KlemsBasis:
     polar = parts[f"{side} polar angle ranges"]
-    ranges = polar.HasProperties
-    bounds = [float(one.LowerBoundValue.wrappedValue) for one in ranges]
-    bounds.append(float(ranges[-1].UpperBoundValue.wrappedValue))
-    rings = parts[f"{side} azimuthal angle ranges"].HasProperties
-    return KlemsBasis(polar.UsageName, tuple(bounds), tuple(len(r.HasProperties) for r in rings))
+    ranges = _listed(polar)
+    if not ranges:
+        raise ValueError(f"{polar.Name!r} is empty")
+    lower, upper = (
+        [_number(getattr(one, f"{end}BoundValue", None), polar.Name) for one in ranges]
+        for end in ("Lower", "Upper")
+    )
+    rings = _listed(parts[f"{side} azimuthal angle ranges"])
+    sizes = tuple(len(_listed(ring)) for ring in rings)
+    return KlemsBasis(str(polar.UsageName), (*lower, upper[-1]), sizes)
 
 
 def _g_values(prop: Entity) -> AngularGValue:
@@ -180,11 +222,11 @@ def _g_values(prop: Entity) -> AngularGValue:
 
 
 def _single(prop: Entity) -> float:
-    return float(prop.NominalValue.wrappedValue)
+    return _number(getattr(prop, "NominalValue", None), prop.Name)
 
 
 def _position(prop: Entity) -> str:
-    position = prop.NominalValue.wrappedValue
+    position = _wrapped(getattr(prop, "NominalValue", None), prop.Name)
     if position not in TYPICAL_SYSTEMS:
         raise ValueError(f"{POSITION} {position!r} is not of {', '.join(TYPICAL_SYSTEMS)}")
     return position
@@ -202,7 +244,8 @@ def _closure(prop: Entity) -> Closure:
         found["surface"] = _tuple(parts[SURFACE])
     if LAYERS in parts:
         found["unit"] = _unit(_children(parts[LAYERS]))
-    return Closure(parts[U_MODEL].NominalValue.wrappedValue, **found)
+    model = _wrapped(getattr(parts[U_MODEL], "NominalValue", None), U_MODEL)
+    return Closure(model, **found)
 
 
 def _tuple(prop: Entity) -> tuple[float, ...]:
@@ -211,7 +254,7 @@ def _tuple(prop: Entity) -> tuple[float, ...]:
 
 def _gas_gap(parts: dict[str, Entity]) -> tuple[float, tuple[tuple[str, float], ...]]:
     """Width and gas of a gap."""
-    gas = tuple((share.Name, _single(share)) for share in parts["Gas"].HasProperties)
+    gas = tuple((share.Name, _single(share)) for share in _listed(parts["Gas"]))
     return _single(parts["Width"]), gas
 
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterator
 from dataclasses import replace
 
 import ifcopenshell
-import ifcopenshell.util.element
-import ifcopenshell.util.unit
 import numpy as np
 from numpy.typing import NDArray
 
 from bim.apertures import BESIDE, Filling
 from bim.colours import GREY
-from bim.ifc.project import definitions_of, psets_of
+from bim.ifc.damage import Damage, instances, type_of
+from bim.ifc.project import definitions_of, length_scale, psets_of
 from bim.ifc.shapes import Shape
 from bim.planes import area_vectors
 from bim.report.issue import Effect, Issue
@@ -33,12 +31,12 @@ LEAST_GLASS = 0.05  # transparent area that makes a panel a window [m2]
 
 
 def read_fillings(
-    model: ifcopenshell.file, shapes: dict[int, Shape]
+    model: ifcopenshell.file, shapes: dict[int, Shape], damage: Damage | None = None
 ) -> tuple[list[Filling], list[Issue]]:
     """Every window and door, and every other element with transparent parts (curtain panels)."""
     issues: list[Issue] = []
     fillings = []
-    scale = _length_scale(model)
+    scale = length_scale(model)
     for element in [*model.by_type("IfcWindow"), *model.by_type("IfcDoor")]:
         shape = shapes.get(element.id())
         if shape is not None and shape.is_unglazed and not element.is_a("IfcDoor"):
@@ -52,32 +50,23 @@ def read_fillings(
         if shape is None:
             values = {"element": _label(element)}
             issues.append(Issue("window-without-geometry", element.GlobalId, values))
-        one = _filling(element, shape or body, body, host, scale)
+        one = _filling(element, shape or body, body, host, scale, damage)
         wall = None if host is None else shapes.get(host.id())
         fillings.append(replace(one, beside=beside_opening(wall, body)))
     for class_name in PANELS:
-        with contextlib.suppress(RuntimeError):  # a class that this schema does not have
-            for element in model.by_type(class_name):
-                panel = _panel(element, shapes.get(element.id()), scale)
-                if panel is None:
-                    continue
-                fillings.append(panel)
-                if class_name in ("IfcWall", "IfcSlab", "IfcRoof", "IfcCovering"):
-                    values = {"element": _label(element)}
-                    issue = Issue("transparent-element-as-window", element.GlobalId, values)
-                    issues.append(issue)
+        for element in instances(model, class_name):
+            panel = _panel(element, shapes.get(element.id()), scale, damage)
+            if panel is None:
+                continue
+            fillings.append(panel)
+            if class_name in ("IfcWall", "IfcSlab", "IfcRoof", "IfcCovering"):
+                values = {"element": _label(element)}
+                issues.append(Issue("transparent-element-as-window", element.GlobalId, values))
     return fillings, issues
 
 
 def _label(element: ifcopenshell.entity_instance) -> str:
     return f"{element.is_a()} {element.Name or ''}"
-
-
-def _length_scale(model: ifcopenshell.file) -> float:
-    try:
-        return float(ifcopenshell.util.unit.calculate_unit_scale(model))
-    except Exception:  # broken unit assignment: reported by length_issues
-        return 1.0
 
 
 def _opening_and_host(element: ifcopenshell.entity_instance):
@@ -112,21 +101,21 @@ def beside_opening(host: Shape | None, opening: Shape | None) -> NDArray[np.floa
     return host.triangles[near & np.all(host.triangles.min(axis=1) < high, axis=1)]
 
 
-def _panel(element, shape: Shape | None, scale: float) -> Filling | None:
+def _panel(element, shape: Shape | None, scale: float, damage: Damage | None) -> Filling | None:
     """A curtain wall panel or other element as a window if enough of it is transparent."""
     if shape is None or not shape.transparent.any():
         return None
     clear = shape.triangles[shape.transparent]
     if 0.5 * np.linalg.norm(area_vectors(clear), axis=1).sum() < LEAST_GLASS:
         return None
-    return _filling(element, shape, None, element, scale)
+    return _filling(element, shape, None, element, scale, damage)
 
 
-def _filling(element, shape: Shape, body: Shape | None, host, scale: float) -> Filling:
-    psets = psets_of(element)
-    element_type = None
-    with contextlib.suppress(Exception):  # a damaged type must not stop the geometry
-        element_type = ifcopenshell.util.element.get_type(element)
+def _filling(
+    element, shape: Shape, body: Shape | None, host, scale: float, damage: Damage | None
+) -> Filling:
+    psets = psets_of(element, damage)
+    element_type = type_of(element, damage)
     opaque = [look for look in shape.looks if not look.is_glass]
     panes = _number(psets, "GlassLayers")
     return Filling(

@@ -8,14 +8,14 @@ from collections.abc import Callable
 
 import ifcopenshell
 import ifcopenshell.guid
-import ifcopenshell.util.placement
-import ifcopenshell.util.unit
 import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
 from bim.enclosure import GAP, LIMIT_S, Enclosed, first_rooms_enclosed
 from bim.guarded import solids_of
+from bim.ifc.damage import placement_of
+from bim.ifc.project import length_scale
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
@@ -172,13 +172,13 @@ def _slab(low: NDArray[np.float64], high: NDArray[np.float64], bottom: float) ->
 
 def _storeys(source: Source) -> list[tuple[float, str]]:
     """Height in the world and name of each storey, rising."""
-    unit = ifcopenshell.util.unit.calculate_unit_scale(source.model)
+    unit = length_scale(source.model)
     levels = []
     for storey in source.model.by_type("IfcBuildingStorey"):
-        if storey.ObjectPlacement is None:
+        matrix = placement_of(storey, source.damage)
+        if matrix is None:
             continue
-        matrix = ifcopenshell.util.placement.get_local_placement(storey.ObjectPlacement)
-        z = source.placed.to_world(np.asarray(matrix)[:3, 3] * unit)[2]
+        z = source.placed.to_world(matrix[:3, 3] * unit)[2]
         levels.append((float(z), storey.Name or ""))
     return sorted(levels)
 

@@ -66,7 +66,7 @@ class GlassOfRooms:
 
 def apertures_in(source: Source) -> tuple[list[Aperture], list[Issue]]:
     """The windows, doors and glazed panels of a file, each in its plane."""
-    fillings, issues = read_fillings(source.model, source.shapes)
+    fillings, issues = read_fillings(source.model, source.shapes, source.damage)
     apertures = []
     for filling in fillings:
         aperture, more = aperture_of(filling)

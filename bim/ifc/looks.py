@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -51,9 +50,7 @@ def look_of(
 
     Args: colour, transparency: the engine's own reading, for styles that cannot be found.
     """
-    shading = None
-    with contextlib.suppress(Exception):  # names of other kinds, or ids that do not exist
-        shading = model.by_id(int(name.rsplit("-", 1)[1]))
+    shading = _shading(model, name)
     label = name
     linear = linear_of_display(_bounded(colour))
     if shading is not None and shading.is_a("IfcSurfaceStyleShading"):
@@ -68,6 +65,17 @@ def look_of(
     transparency = min(max(float(transparency), 0.0), 1.0)
     diffuse, gloss = _gloss(shading, bounded, transparency > CLEAR)
     return Look(label, diffuse, transparency, stated, None, gloss, hue_of(linear))
+
+
+def _shading(model: ifcopenshell.file, name: str) -> ifcopenshell.entity_instance | None:
+    """The entity of a style's name; None for names of other kinds, or ids that do not exist."""
+    step_id = name.rpartition("-")[2]
+    if "-" not in name or not step_id.isdecimal():
+        return None
+    try:
+        return model.by_id(int(step_id))
+    except RuntimeError:
+        return None
 
 
 def _gloss(shading, reflectance: float, clear: bool) -> tuple[float, Gloss | None]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from bim.georeference import Georeference, crs_name
 from bim.ifc.placing import Placed
+from bim.ifc.project import length_scale
 
 
 def map_georeference(model: ifcopenshell.file, placed: Placed) -> Georeference | None:
@@ -41,10 +42,7 @@ def map_georeference(model: ifcopenshell.file, placed: Placed) -> Georeference |
 def _metres(model: ifcopenshell.file, unit: ifcopenshell.entity_instance | None) -> float:
     """Metres in the map's unit; the project's unit of length where it states none."""
     if unit is None:
-        try:
-            return float(ifcopenshell.util.unit.calculate_unit_scale(model))
-        except Exception:  # broken unit assignment: reported by length_issues
-            return 1.0
+        return length_scale(model)
     if unit.is_a("IfcConversionBasedUnit"):
         return float(unit.ConversionFactor.ValueComponent.wrappedValue)
     return float(ifcopenshell.util.unit.get_prefix_multiplier(getattr(unit, "Prefix", None)))

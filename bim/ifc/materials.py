@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 import ifcopenshell
 import ifcopenshell.util.element
-import ifcopenshell.util.placement
-import ifcopenshell.util.unit
 import numpy as np
 
 from bim.defaults import MATERIALS, UNKNOWN_MATERIAL
+from bim.ifc.damage import Damage, entities, instances, placement_of
+from bim.ifc.project import length_scale
 from bim.model import MaterialLayer
 from bim.names import plain_text
 from bim.report.issue import Issue, Phrase
@@ -33,6 +32,8 @@ OPTICAL = {
     "solar": ("SolarReflectanceFront",),
 }
 
+DEEPEST = 20  # parts of parts of a whole
+
 
 @dataclass(frozen=True, slots=True)
 class ElementLayers:
@@ -49,31 +50,28 @@ class MaterialReader:
     """Reads each material once and gathers what is missing."""
 
     model: ifcopenshell.file
+    damage: Damage = field(default_factory=Damage)
     issues: dict[str, Issue] = field(default_factory=dict)
-    scale: float = 1.0
+    scale: float = field(init=False)  # metres in the file's unit of length
     _aspects: dict[int, str] = field(default_factory=dict)  # names of representation items' aspects
     _contradicting: int = 0  # bodies whose aspect and style name two materials
     _properties: dict[int, dict[str, float]] = field(default_factory=dict)
     _optical: dict[int, dict[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        with contextlib.suppress(Exception):  # reported by length_issues
-            self.scale = float(ifcopenshell.util.unit.calculate_unit_scale(self.model))
+        self.scale = length_scale(self.model)
         for kind in (
             "IfcMaterialProperties",
             "IfcThermalMaterialProperties",
             "IfcGeneralMaterialProperties",
             "IfcOpticalMaterialProperties",
         ):
-            with contextlib.suppress(RuntimeError):  # not in this schema
-                for one in self.model.by_type(kind):
-                    self._gather(one)
-
+            for one in instances(self.model, kind):
+                self._gather(one)
         for aspect in self.model.by_type("IfcShapeAspect"):
-            with contextlib.suppress(Exception):  # damaged representations
-                for representation in aspect.ShapeRepresentations:
-                    for item in representation.Items:
-                        self._aspects.setdefault(item.id(), aspect.Name or "")
+            for representation in entities(aspect.ShapeRepresentations):
+                for item in entities(getattr(representation, "Items", None)):
+                    self._aspects.setdefault(item.id(), aspect.Name or "")
 
     def _gather(self, one: ifcopenshell.entity_instance) -> None:
         """Add the numbers of one property set of a material."""
@@ -103,7 +101,7 @@ class MaterialReader:
 
         Pset_MaterialOptical (IFC4), IfcOpticalMaterialProperties (IFC2X3); the front value.
         """
-        for material in materials_of(element):
+        for material in materials_of(element, self.damage):
             given = self._optical.get(material.id(), {})
             if "visible" in given or "solar" in given:
                 visible = given.get("visible", given.get("solar"))
@@ -112,8 +110,8 @@ class MaterialReader:
 
     def layers_of(self, element: ifcopenshell.entity_instance) -> ElementLayers | None:
         """The element's layers, or None where it has no layer set or only one plain material."""
-        element = _with_material(element)
-        material = _material_of(element)
+        element = _with_material(element, self.damage)
+        material = _material_of(element, self.damage)
         if material is None:
             return None
         usage = material if material.is_a("IfcMaterialLayerSetUsage") else None
@@ -131,11 +129,11 @@ class MaterialReader:
         if not layers:
             return None
         name = getattr(layer_set, "LayerSetName", None) or element.Name or element.is_a()
-        return ElementLayers(name, tuple(layers), _axis(element, usage), stated)
+        return ElementLayers(name, tuple(layers), _axis(element, usage, self.damage), stated)
 
     def single_material(self, element: ifcopenshell.entity_instance):
         """The material of an element without layers: the first one it names, or None."""
-        return next(iter(materials_of(element)), None)
+        return next(iter(materials_of(element, self.damage)), None)
 
     def of_items(
         self, element: ifcopenshell.entity_instance, items: Iterable[int]
@@ -169,7 +167,7 @@ class MaterialReader:
 
     def _constituents(self, element: ifcopenshell.entity_instance) -> dict:
         """Materials of an element without layers, by the names of constituents or their own."""
-        material = _material_of(_with_material(element))
+        material = _material_of(_with_material(element, self.damage), self.damage)
         if material is not None and material.is_a("IfcMaterialConstituentSet"):
             parts = material.MaterialConstituents or ()
             return {one.Name: one.Material for one in parts if one.Material is not None}
@@ -179,13 +177,16 @@ class MaterialReader:
 
     def _style_names(self, item: int) -> set[str]:
         """Names of the surface styles of a representation item."""
+        try:
+            body = self.model.by_id(item)
+        except RuntimeError:  # the geometry engine's own
+            return set()
         names: set[str] = set()
-        with contextlib.suppress(Exception):  # not in the file, damaged styles
-            for styled in self.model.by_id(item).StyledByItem:
-                for style in styled.Styles:
-                    is_many = style.is_a("IfcPresentationStyleAssignment")
-                    kept = style.Styles if is_many else [style]
-                    names |= {one.Name for one in kept if one.Name}
+        for styled in entities(getattr(body, "StyledByItem", None)):
+            for style in entities(styled.Styles):
+                is_many = style.is_a("IfcPresentationStyleAssignment")
+                styles = entities(style.Styles) if is_many else [style]
+                names |= {name for one in styles if (name := getattr(one, "Name", None))}
         return names
 
     def layer(self, material, thickness: float) -> tuple[MaterialLayer, bool]:
@@ -217,31 +218,51 @@ class MaterialReader:
         return MaterialLayer(name, thickness, **values), not missing
 
 
-def materials_of(element: ifcopenshell.entity_instance) -> list[ifcopenshell.entity_instance]:
+def materials_of(
+    element: ifcopenshell.entity_instance, damage: Damage | None = None
+) -> list[ifcopenshell.entity_instance]:
     """The materials of an element, its own or those of the whole that it is a part of."""
-    with contextlib.suppress(Exception):  # damaged associations
-        return list(ifcopenshell.util.element.get_materials(_with_material(element)))
-    return []
+    return own_materials(_with_material(element, damage), damage)
 
 
-def _material_of(element: ifcopenshell.entity_instance) -> ifcopenshell.entity_instance | None:
-    """What is associated with an element or its type, usages of layer sets too."""
-    with contextlib.suppress(Exception):  # damaged associations
-        return ifcopenshell.util.element.get_material(element, should_skip_usage=False)
-    return None
+def own_materials(
+    element: ifcopenshell.entity_instance, damage: Damage | None = None
+) -> list[ifcopenshell.entity_instance]:
+    """The materials of an element or of its type."""
+    damage = Damage() if damage is None else damage
+    read = ifcopenshell.util.element.get_materials
+    return entities(damage.read(read, element, of=element, data="material", default=[]))
 
 
-def _with_material(element: ifcopenshell.entity_instance) -> ifcopenshell.entity_instance:
+def _material_of(
+    element: ifcopenshell.entity_instance, damage: Damage | None
+) -> ifcopenshell.entity_instance | None:
+    """The material associated with an element or its type: a usage, set, list or material."""
+    damage = Damage() if damage is None else damage
+    found = damage.read(
+        ifcopenshell.util.element.get_material, element, should_skip_usage=False,
+        of=element, data="material", default=None,
+    )  # fmt: skip
+    return next(iter(entities(found)), None)
+
+
+def _with_material(
+    element: ifcopenshell.entity_instance, damage: Damage | None
+) -> ifcopenshell.entity_instance:
     """The element, or where it has no material the whole that it is a part of and that has one.
 
     A roof's material is the roof's, its body that of its slabs (IfcRelAggregates).
     """
-    whole = element
-    with contextlib.suppress(Exception):  # damaged aggregates
-        while whole is not None and whole.is_a("IfcElement"):
-            if _material_of(whole) is not None:
-                return whole
-            whole = ifcopenshell.util.element.get_aggregate(whole)
+    damage = Damage() if damage is None else damage
+    whole: ifcopenshell.entity_instance | None = element
+    for _ in range(DEEPEST):  # a damaged file may hold a loop
+        if whole is None or not whole.is_a("IfcElement"):
+            break
+        if _material_of(whole, damage) is not None:
+            return whole
+        read = ifcopenshell.util.element.get_aggregate
+        found = damage.read(read, whole, of=whole, data="whole", default=None)
+        whole = next(iter(entities(found)), None)
     return element
 
 
@@ -259,13 +280,13 @@ def default_material(name: str) -> MaterialLayer:
     return UNKNOWN_MATERIAL
 
 
-def _axis(element: ifcopenshell.entity_instance, usage) -> np.ndarray | None:
+def _axis(element: ifcopenshell.entity_instance, usage, damage: Damage) -> np.ndarray | None:
     """Direction [3] in model axes along which the layers follow each other."""
-    if usage is None or element.ObjectPlacement is None:
+    columns = {"AXIS1": 0, "AXIS2": 1, "AXIS3": 2}
+    if usage is None or usage.LayerSetDirection not in columns:
         return None
-    with contextlib.suppress(Exception):  # placements of damaged files
-        matrix = ifcopenshell.util.placement.get_local_placement(element.ObjectPlacement)
-        column = {"AXIS1": 0, "AXIS2": 1, "AXIS3": 2}[usage.LayerSetDirection]
-        sign = -1.0 if usage.DirectionSense == "NEGATIVE" else 1.0
-        return sign * np.asarray(matrix)[:3, column]
-    return None
+    matrix = placement_of(element, damage)
+    if matrix is None:
+        return None
+    sign = -1.0 if usage.DirectionSense == "NEGATIVE" else 1.0
+    return sign * matrix[:3, columns[usage.LayerSetDirection]]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import ifcopenshell
-import ifcopenshell.util.placement
-import ifcopenshell.util.unit
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.ifc.damage import Damage, placement_of
+from bim.ifc.project import length_scale
 from bim.ifc.shapes import Shape
 from bim.report.issue import Issue
 
@@ -87,21 +87,16 @@ def _unit_slip(shapes: dict[int, Shape]) -> float:
     return fits[0] if fits else 1.0
 
 
-def ground_level(model: ifcopenshell.file, placed: Placed) -> float:
+def ground_level(model: ifcopenshell.file, placed: Placed, damage: Damage | None = None) -> float:
     """Height [m] in the world of the storey nearest to elevation zero, else of the lowest one."""
-    try:
-        unit = float(ifcopenshell.util.unit.calculate_unit_scale(model))
-    except Exception:  # broken unit assignment: reported by length_issues
-        unit = 1.0
+    unit = length_scale(model)
     levels: list[tuple[float, float]] = []
     for storey in model.by_type("IfcBuildingStorey"):
-        if storey.ObjectPlacement is None or storey.Elevation is None:
+        matrix = placement_of(storey, damage)
+        if matrix is None or storey.Elevation is None:
             continue
-        try:
-            z = ifcopenshell.util.placement.get_local_placement(storey.ObjectPlacement)[2][3]
-        except Exception:  # placements of damaged files
-            continue
-        levels.append((float(storey.Elevation) * unit * placed.scale, float(z) * unit))
+        z = float(matrix[2, 3])
+        levels.append((float(storey.Elevation) * unit * placed.scale, z * unit))
     if not levels:
         bottoms = [shape.triangles[..., 2].min() for shape in placed.shapes.values()]
         return float(min(bottoms, default=0.0))

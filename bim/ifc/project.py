@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import shutil
 import tempfile
@@ -15,6 +14,7 @@ import ifcopenshell.util.unit
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.ifc.damage import Damage, entities, type_of
 from bim.ifc.head import SCHEMAS, ZIPPED, check_head, model_name
 from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
@@ -44,7 +44,7 @@ def _open_step(path: Path, shown: Path) -> ifcopenshell.file:
     """Open a STEP file; errors name the file that the user gave."""
     try:
         model = ifcopenshell.open(str(path))
-    except Exception as error:  # the parser raises several unrelated types
+    except (ifcopenshell.Error, OSError, RuntimeError, UnicodeDecodeError) as error:
         reason = (str(error).strip().splitlines() or ["the parser gives no reason"])[0]
         raise DataError(f"cannot be read as IFC: {reason}", file=shown) from None
     if not model.schema.startswith(SCHEMAS):
@@ -71,7 +71,7 @@ def _mend_stars(model: ifcopenshell.file) -> None:
 
 
 def ending_issues(path: str | Path) -> list[Issue]:
-    """A issue where a STEP file has lost its end."""
+    """An issue where a STEP file has lost its end."""
     path = Path(path)
     if b"END-ISO-10303-21" in _end(path):
         return []
@@ -92,29 +92,41 @@ def _end(path: Path) -> bytes:
 
 
 def length_issues(model: ifcopenshell.file) -> list[Issue]:
-    """A issue where the file states no length unit."""
-    with contextlib.suppress(Exception):
-        if ifcopenshell.util.unit.get_project_unit(model, "LENGTHUNIT") is not None:
-            return []
-    return [Issue("length-unit-missing", "project")]
+    """An issue where the file states no length unit, or where its units cannot be read."""
+    damage = Damage()
+    unit = _unit(model, "LENGTHUNIT", damage)
+    _unit_scale(model, "LENGTHUNIT", damage)
+    missing = unit is None and not damage.issues
+    return [Issue("length-unit-missing", "project")] if missing else damage.issues
 
 
 def area_scale(model: ifcopenshell.file, kind: str) -> float:
     """Factor from the file's unit of "AREAUNIT" or "VOLUMEUNIT" to m2 or m3."""
-    try:
-        if ifcopenshell.util.unit.get_project_unit(model, kind) is not None:
-            return float(ifcopenshell.util.unit.calculate_unit_scale(model, kind))
-    except Exception:  # files with broken unit assignments
-        return 1.0
+    if _unit(model, kind, Damage()) is not None:
+        return _unit_scale(model, kind, Damage())
     return length_scale(model) ** (2 if kind == "AREAUNIT" else 3)
 
 
 def length_scale(model: ifcopenshell.file) -> float:
-    """Factor from the file's unit of length to m."""
-    try:
-        return float(ifcopenshell.util.unit.calculate_unit_scale(model))
-    except Exception:  # files without or with broken unit assignments
-        return 1.0
+    """Factor from the file's unit of length to m; 1 where `length_issues` reports its units."""
+    return _unit_scale(model, "LENGTHUNIT", Damage())
+
+
+def _unit(
+    model: ifcopenshell.file, kind: str, damage: Damage
+) -> ifcopenshell.entity_instance | None:
+    return damage.read(
+        ifcopenshell.util.unit.get_project_unit, model, kind, of=None, data="units", default=None
+    )
+
+
+def _unit_scale(model: ifcopenshell.file, kind: str, damage: Damage) -> float:
+    return float(
+        damage.read(
+            ifcopenshell.util.unit.calculate_unit_scale, model, kind,
+            of=None, data="units", default=1.0,
+        )
+    )  # fmt: skip
 
 
 def north_rotation(model: ifcopenshell.file) -> tuple[NDArray[np.float64], list[Issue]]:
@@ -156,11 +168,7 @@ def site_location(
     """Latitude and longitude (east positive) [deg], elevation [m], and what is wrong with them."""
     for site in model.by_type("IfcSite"):
         latitude, longitude = _degrees(site.RefLatitude), _degrees(site.RefLongitude)
-        try:
-            scale = float(ifcopenshell.util.unit.calculate_unit_scale(model))
-        except Exception:  # broken unit assignment: reported by length_issues
-            scale = 1.0
-        elevation = float(site.RefElevation or 0.0) * scale
+        elevation = float(site.RefElevation or 0.0) * length_scale(model)
         if latitude is None or longitude is None:
             continue
         if abs(latitude) > 90 or abs(longitude) > 180:
@@ -212,35 +220,43 @@ def definitions_of(
     holder: ifcopenshell.entity_instance | None,
 ) -> list[ifcopenshell.entity_instance]:
     """Property and quantity sets of an element or of a type itself."""
-    found = list(getattr(holder, "HasPropertySets", None) or ())
+    found = entities(getattr(holder, "HasPropertySets", None))
     for relation in getattr(holder, "IsDefinedBy", None) or ():
-        definition = getattr(relation, "RelatingPropertyDefinition", None)
-        if definition is not None and definition.is_a("IfcPropertySetDefinitionSet"):
-            found += definition.wrappedValue
-        elif definition is not None:
-            found.append(definition)
+        for definition in entities(getattr(relation, "RelatingPropertyDefinition", None)):
+            is_set = definition.is_a("IfcPropertySetDefinitionSet")
+            found += entities(definition.wrappedValue) if is_set else [definition]
     return found
 
 
-def psets_of(element: ifcopenshell.entity_instance) -> dict[str, dict]:
+def psets_of(
+    element: ifcopenshell.entity_instance, damage: Damage | None = None
+) -> dict[str, dict]:
     """Properties and quantities, by the name of their set, of an element and its type.
 
-    Empty where they cannot be read.  Complex properties are left out: through the numbers of a
-    BSDF it takes a second.
+    Complex properties are left out: through the numbers of a BSDF it takes a second.
     """
+    damage = Damage() if damage is None else damage
     found: dict[str, dict] = {}
-    try:
-        for holder in (ifcopenshell.util.element.get_type(element), element):
-            for definition in definitions_of(holder):
-                if definition.Name is not None:
-                    found.setdefault(definition.Name, {}).update(_plain_values(definition))
-    except Exception:  # damaged property sets must not stop the geometry
-        return {}
+    for holder in (type_of(element, damage), element):
+        for definition in definitions_of(holder):
+            name = getattr(definition, "Name", None)
+            if name is not None:
+                values = _plain_values(definition, element, damage)
+                found.setdefault(name, {}).update(values)
     return found
 
 
-def _plain_values(definition: ifcopenshell.entity_instance) -> dict[str, object]:
-    if definition.is_a("IfcPropertySet"):
-        plain = [p for p in definition.HasProperties or () if not p.is_a("IfcComplexProperty")]
-        return ifcopenshell.util.element.get_properties(plain)
-    return ifcopenshell.util.element.get_property_definition(definition)
+def _plain_values(
+    definition: ifcopenshell.entity_instance,
+    element: ifcopenshell.entity_instance,
+    damage: Damage,
+) -> dict[str, object]:
+    if not definition.is_a("IfcPropertySet"):
+        read = ifcopenshell.util.element.get_property_definition
+        return damage.read(read, definition, of=element, data="quantities", default={})
+    values: dict[str, object] = {}
+    for one in entities(definition.HasProperties):
+        if not one.is_a("IfcComplexProperty"):
+            read = ifcopenshell.util.element.get_properties
+            values |= damage.read(read, [one], of=element, data="properties", default={})
+    return values

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from os import PathLike
 
 import ifcopenshell
-import ifcopenshell.util.element
 
 from bim.ifc.corrections import chosen
+from bim.ifc.damage import type_of
 from bim.ifc.elements import cad_layers_of, material_name
 from bim.ifc.project import open_ifc, storey_of
 
@@ -37,7 +37,7 @@ def query(path: str | PathLike[str], selector: str) -> list[ChosenElement]:
 
 
 def _described(element: ifcopenshell.entity_instance) -> ChosenElement:
-    kind = ifcopenshell.util.element.get_type(element)
+    kind = type_of(element)
     return ChosenElement(
         element.is_a(),
         element.Name or "",

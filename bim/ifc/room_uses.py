@@ -7,7 +7,7 @@ from os import PathLike
 import ifcopenshell.util.classification
 import ifcopenshell.util.element
 
-from bim.ifc.project import open_ifc
+from bim.ifc.project import open_ifc, psets_of
 
 # Property sets and properties that name a use, the most telling first
 PROPERTIES = (
@@ -23,7 +23,7 @@ def read_room_uses(path: str | PathLike[str]) -> dict[str, tuple[tuple[str, str]
     model = open_ifc(path)
     found = {}
     for space in model.by_type("IfcSpace"):
-        psets = ifcopenshell.util.element.get_psets(space, psets_only=True)
+        psets = psets_of(space)
         texts = [
             (f"{name}.{key}", str(psets[name][key]))
             for name, key in PROPERTIES

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import ifcopenshell
@@ -11,6 +11,7 @@ import numpy as np
 
 from bim.colours import GREY
 from bim.ifc.corrections import Corrections, Paint
+from bim.ifc.damage import Damage
 from bim.ifc.looks import Look
 from bim.ifc.placing import Placed, ground_level, in_world
 from bim.ifc.project import (
@@ -42,6 +43,9 @@ class Source:
     longitude_deg: float | None
     elevation: float
     issues: tuple[Issue, ...]
+    damage: Damage = field(
+        default_factory=Damage
+    )  # gathers what cannot be read, as it is asked for
 
     @property
     def shapes(self) -> dict[int, Shape]:
@@ -61,7 +65,7 @@ class Source:
     @property
     def ground(self) -> float:
         """Height of the ground in the world [m]."""
-        return ground_level(self.model, self.placed)
+        return ground_level(self.model, self.placed, self.damage)
 
     @property
     def name(self) -> str:
@@ -82,7 +86,7 @@ class Source:
 def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> Source:
     """The opened model, its shapes meshed, corrected and placed."""
     tell("opening", 0.0)
-    model = open_ifc(path)
+    model, damage = open_ifc(path), Damage()
     issues = ending_issues(path) + length_issues(model)
     rotation, more = north_rotation(model)
     latitude, longitude, elevation, site = site_location(model)
@@ -92,7 +96,7 @@ def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> S
     )
     unglazed = corrections.unglazed(model)
     shapes |= {key: opaque(shapes[key]) for key in unglazed if key in shapes}
-    shapes, phantoms = judged_transparent(model, shapes)
+    shapes, phantoms = judged_transparent(model, shapes, damage)
     issues += more + site + faults + phantoms
     for step_id, paint in corrections.painted(model).items():
         if step_id in shapes:
@@ -106,7 +110,7 @@ def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> S
     placed = in_world(shapes, rotation)
     return Source(
         Path(path), model, placed, corrections, latitude, longitude, elevation,
-        tuple([*issues, *placed.issues]),
+        tuple([*issues, *placed.issues]), damage,
     )  # fmt: skip
 
 
@@ -118,7 +122,7 @@ def opaque(shape: Shape) -> Shape:
 
 def painted(shape: Shape, paint: Paint) -> Shape:
     """The shape with all that is not glass in one paint; of glass a gloss alone is taken."""
-    values = {"reflectance": paint.visible, "solar": paint.solar, "fault": "", "hue": GREY}
+    values = {"reflectance": paint.visible, "solar": paint.solar, "stated": None, "hue": GREY}
     values["gloss"] = paint.gloss
     looks = tuple(
         (replace(look, gloss=paint.gloss) if paint.gloss else look)

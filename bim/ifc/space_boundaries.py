@@ -8,7 +8,6 @@ its windows and doors in some files and not in others: either agrees.
 
 from __future__ import annotations
 
-import contextlib
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ import ifcopenshell
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.ifc.damage import entities
 from bim.ifc.project import length_scale
 from bim.ifc.source import Source
 from bim.model import Face, Space
@@ -89,27 +89,31 @@ def _stated(
         # type 2b ends at a wall, so that nothing of it passes to a neighbour: ours are adiabatic
         if element is None or room is None or one.PhysicalOrVirtualBoundary == "VIRTUAL":
             continue
-        area = None
-        with contextlib.suppress(Exception):  # damaged or rare geometry
-            area = _area(one.ConnectionGeometry.SurfaceOnRelatingElement) * scale**2
+        geometry = getattr(one, "ConnectionGeometry", None)
+        surfaces = entities(getattr(geometry, "SurfaceOnRelatingElement", None))
+        area = _area(surfaces[0]) if surfaces else None
         if area is None:
             unread += 1
             continue
         entry = found[room.GlobalId, element.GlobalId]
-        entry.area += area
-        entry.beyond[one.InternalOrExternalBoundary or ""] += area
+        entry.area += area * scale**2
+        entry.beyond[one.InternalOrExternalBoundary or ""] += area * scale**2
     return dict(found), unread
 
 
 def _area(surface: ifcopenshell.entity_instance) -> float | None:
     """Area of a plane boundary in the file's units squared; None where its curves are others."""
     if surface.is_a("IfcCurveBoundedPlane"):
-        outer = _ring_area(surface.OuterBoundary)
-        inner = [_ring_area(curve) for curve in surface.InnerBoundaries or ()]
-        return None if outer is None or None in inner else outer - sum(inner)
+        outer = [_ring_area(curve) for curve in entities(surface.OuterBoundary)]
+        inner = [_ring_area(curve) for curve in entities(surface.InnerBoundaries)]
+        areas = [area for area in inner if area is not None]
+        if len(outer) != 1 or outer[0] is None or len(areas) < len(inner):
+            return None
+        return outer[0] - sum(areas)
     if surface.is_a("IfcSurfaceOfLinearExtrusion"):
-        points = _points(surface.SweptCurve.Curve)
-        if points is None:
+        curves = entities(getattr(surface.SweptCurve, "Curve", None))
+        points = _points(curves[0]) if curves else None
+        if points is None or not isinstance(surface.Depth, float):
             return None
         return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum() * surface.Depth)
     return None
@@ -125,15 +129,21 @@ def _ring_area(curve: ifcopenshell.entity_instance) -> float | None:
 def _points(curve: ifcopenshell.entity_instance) -> NDArray[np.float64] | None:
     """Corners [N, 3] of a curve made of straight lines; None of any other."""
     if curve.is_a("IfcPolyline"):
-        flat = np.array([point.Coordinates for point in curve.Points], dtype=float)
+        rows = [getattr(point, "Coordinates", None) for point in entities(curve.Points)]
+        sizes = {len(row) if isinstance(row, tuple) else 0 for row in rows}
+        if sizes not in ({2}, {3}):
+            return None
+        flat = np.array(rows, dtype=float)
         return np.pad(flat, ((0, 0), (0, 3 - flat.shape[1])))
     if curve.is_a("IfcCompositeCurve"):
-        parts = [_points(segment.ParentCurve) for segment in curve.Segments]
-        turned = [
-            part if part is None or segment.SameSense else part[::-1]
-            for part, segment in zip(parts, curve.Segments, strict=True)
-        ]
-        return None if any(p is None for p in turned) else np.concatenate(turned)
+        turned = []
+        for segment in entities(curve.Segments):
+            parents = entities(getattr(segment, "ParentCurve", None))
+            part = _points(parents[0]) if parents else None
+            if part is None:
+                return None
+            turned.append(part if segment.SameSense else part[::-1])
+        return np.concatenate(turned) if turned else None
     return None
 
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import ifcopenshell
-import ifcopenshell.util.element
 import numpy as np
 from numpy.typing import NDArray
 
 from bim.guarded import spaces_of
+from bim.ifc.damage import Damage, type_of
 from bim.ifc.project import psets_of, storey_of
 from bim.ifc.quantities import QuantityScales, checked_volume, stated_quantities
 from bim.ifc.shapes import Shape
@@ -59,6 +59,7 @@ def read_spaces(
     model: ifcopenshell.file,
     shapes: dict[int, Shape],
     scales: QuantityScales,
+    damage: Damage | None = None,
 ) -> tuple[list[SpaceRecord], list[Issue]]:
     """Every space that is indoors and has a body; the others are issues."""
     records: list[SpaceRecord] = []
@@ -76,7 +77,7 @@ def read_spaces(
             values = {"room": label, "guid": guid}
             issues.append(Issue("space-guid-repeated", space.GlobalId, values))
         seen.add(guid)
-        psets = psets_of(space)
+        psets = psets_of(space, damage)
         if is_outdoors(space, psets):
             issues.append(Issue("space-external", guid, {"room": label}, Effect("room")))
             continue
@@ -112,15 +113,15 @@ def read_spaces(
                 solid.volume,
                 area,
                 volume,
-                _type_name(space),
+                _type_name(space, damage),
             )
         )
     return records, issues
 
 
-def _type_name(space: ifcopenshell.entity_instance) -> str:
+def _type_name(space: ifcopenshell.entity_instance, damage: Damage | None) -> str:
     """What kind of room it is: the name of its IfcSpaceType, else its ObjectType."""
-    kind = ifcopenshell.util.element.get_type(space)
+    kind = type_of(space, damage)
     return (kind.Name if kind is not None else space.ObjectType) or ""
 
 

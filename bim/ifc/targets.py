@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import ifcopenshell
-import ifcopenshell.util.element
 import numpy as np
 
 from bim.ifc.building import read_ifc
+from bim.ifc.damage import type_of
 from bim.model import Building, Window
-from bim.names import found_by_name, listed
+from bim.names import AmbiguousName, UnknownName, found_by_name, listed
 from bim.to_tracer import orientation_name
 from mitsuba_cfs.errors import DataError
 
@@ -100,7 +100,7 @@ def _of_type(model: ifcopenshell.file, name: str, path: str | Path) -> list[Enti
 
 
 def _type_id(element: Entity) -> int:
-    kind = ifcopenshell.util.element.get_type(element)
+    kind = type_of(element)
     return -1 if kind is None else kind.id()
 
 
@@ -123,7 +123,7 @@ def _placed(model: ifcopenshell.file, path: str | Path, targets: Targets) -> lis
 def _room(building: Building, name: str, path: str | Path):
     try:
         return found_by_name(building.spaces, name, "room")
-    except (KeyError, ValueError) as error:
+    except (UnknownName, AmbiguousName) as error:
         raise DataError(str(error.args[0]), file=path, field="space") from None
 
 

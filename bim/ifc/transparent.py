@@ -25,18 +25,17 @@ The thicknesses are our own judgement.
 
 from __future__ import annotations
 
-import contextlib
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import ifcopenshell
-import ifcopenshell.util.element
 import numpy as np
 
 from bim.apertures import FLAT, main_direction
 from bim.defaults import UNKNOWN_MATERIAL
-from bim.ifc.materials import default_material
+from bim.ifc.damage import Damage
+from bim.ifc.materials import default_material, own_materials
 from bim.ifc.shapes import NO_ELEMENTS, Shape
 from bim.names import plain_text
 from bim.planes import area_vectors, principal_extents
@@ -67,7 +66,7 @@ NOT_GLASS = re.compile(r"glass ?wool|glaswol|glasvlies|laine de verre|fib\w* ?(d
 
 
 def judged_transparent(
-    model: ifcopenshell.file, shapes: dict[int, Shape]
+    model: ifcopenshell.file, shapes: dict[int, Shape], damage: Damage | None = None
 ) -> tuple[dict[int, Shape], list[Issue]]:
     """Shapes whose transparent looks are glass, the others opaque or left out, and which they were.
 
@@ -76,7 +75,7 @@ def judged_transparent(
     kept: dict[int, Shape] = {}
     issues = []
     judgements = {
-        key: _judged(model.by_id(key), shape)
+        key: _judged(model.by_id(key), shape, damage)
         for key, shape in shapes.items()
         if shape.ifc_class.startswith((*JUDGED, "IfcMember")) and shape.transparent.any()
     }
@@ -112,14 +111,16 @@ def transparent_area(shape: Shape) -> float:
     )
 
 
-def _judged(element: ifcopenshell.entity_instance, shape: Shape) -> tuple[Shape | None, str]:
+def _judged(
+    element: ifcopenshell.entity_instance, shape: Shape, damage: Damage | None
+) -> tuple[Shape | None, str]:
     """The shape as it is, opaque, or None where it is no body, and the phrase that says why."""
     if shape.ifc_class.startswith("IfcMember"):
         if not _is_bar(shape):
             return shape, ""
         solid = tuple(replace(look, transparency=0.0) for look in shape.looks)
         return replace(shape, looks=solid), "bar"
-    materials = _material_texts(element)
+    materials = _material_texts(element, damage)
     own = plain_text(f"{element.Name or ''} {getattr(element, 'ObjectType', None) or ''}")
     thickness = _thickness(shape)
     if SEPARATION.search(own) or (materials and all(_is_air(text) for text in materials)):
@@ -195,14 +196,12 @@ def _names_a_body(text: str) -> bool:
     return default_material(text) is not UNKNOWN_MATERIAL
 
 
-def _material_texts(element: ifcopenshell.entity_instance) -> list[str]:
+def _material_texts(element: ifcopenshell.entity_instance, damage: Damage | None) -> list[str]:
     """Name and category of each material, as `plain_text`."""
-    with contextlib.suppress(Exception):  # damaged associations
-        return [
-            plain_text(f"{one.Name or ''} {getattr(one, 'Category', None) or ''}")
-            for one in ifcopenshell.util.element.get_materials(element)
-        ]
-    return []
+    return [
+        plain_text(f"{one.Name or ''} {getattr(one, 'Category', None) or ''}")
+        for one in own_materials(element, damage)
+    ]
 
 
 def _is_bar(shape: Shape) -> bool:

@@ -103,8 +103,13 @@ class AnnualGlare:
 class Pictures(Protocol):
     """The luminance of a view's pixels in every hour, worked out when asked for."""
 
-    view: View
-    pixels: NDArray[np.int64]  # [n] row * width + column of the pixels that show something
+    @property
+    def view(self) -> View:
+        """The view."""
+
+    @property
+    def pixels(self) -> NDArray[np.int64]:
+        """Numbers [n], row * width + column, of the pixels that show something."""
 
     @property
     def hours(self) -> int:
@@ -210,7 +215,7 @@ def annual_glare(
     options: GlareOptions | None = None,
     illuminance: ArrayLike | None = None,
     threads: int | None = None,
-    keep: Path | None = None,
+    checkpoint: Path | None = None,
     progress: Progress = silent,
 ) -> AnnualGlare:
     """Glare of every hour of one view.
@@ -221,7 +226,7 @@ def annual_glare(
         illuminance: [H] at the eye from its own calculation, for DGP [lx]: with pictures of direct
             light alone the result is eDGP.
         threads: pictures rated at a time; the processor's cores by default.
-        keep: file of the ratings so far: a killed run goes on where it was.  The caller names it
+        checkpoint: file of the ratings so far: a killed run continues from it.  The caller names it
             so that other inputs have another file.
     """
     geometry = geometry or GlareView(pictures.view)
@@ -231,7 +236,7 @@ def annual_glare(
         raise ValueError(
             f"illuminance {own.shape}: expected one for each of {pictures.hours} hours"
         )
-    table = _begin(keep, pictures.hours)
+    table = _begin(checkpoint, pictures.hours)
     left = np.flatnonzero(np.isnan(table[:, 0]))
     size = max(1, BATCH_BYTES // (4 * max(1, len(pictures.pixels))))
 
@@ -249,7 +254,7 @@ def annual_glare(
         for start in range(0, len(left), size):
             batch = left[start : start + size]
             table[batch] = list(pool.map(rated, *made(batch), batch))
-            _save(keep, table)
+            _save(checkpoint, table)
             progress("glare", (len(table) - len(left) + start + len(batch)) / len(table))
         dgp, errors = table[:, 0], []
         by_halves = hours_by_halves(dgp)
@@ -260,16 +265,16 @@ def annual_glare(
             one, other = (np.array(list(pool.map(rated, h, discs, batch)))[:, 0] for h in halves)
             errors.extend(np.abs(one - other) / 2)
     table[:, FIGURES.index("dgp_standard_error")] = dgp_errors(dgp, by_halves, np.array(errors))
-    _save(keep, table)
+    _save(checkpoint, table)
     return AnnualGlare(**dict(zip(FIGURES, table.T, strict=True)), rule=options.rule)
 
 
-def kept_glare(keep: Path, hours: int) -> AnnualGlare | None:
+def finished_glare(checkpoint: Path, hours: int) -> AnnualGlare | None:
     """The finished ratings of a run of `annual_glare` by the rule that holds without a choice.
 
     None where hours are missing.
     """
-    table = _begin(keep, hours)
+    table = _begin(checkpoint, hours)
     return None if np.isnan(table).any() else AnnualGlare(*table.T)
 
 
@@ -307,33 +312,33 @@ def figures(result: GlareResult) -> list[float]:
     return [float(result.count if f == "sources" else getattr(result, f)) for f in FIGURES]
 
 
-def _begin(keep: Path | None, hours: int) -> NDArray[np.float64]:
+def _begin(checkpoint: Path | None, hours: int) -> NDArray[np.float64]:
     """The ratings so far [H, figures], NaN where there is none."""
     empty = np.full((hours, len(FIGURES)), np.nan)
-    if keep is None or not keep.is_file():
+    if checkpoint is None or not checkpoint.is_file():
         return empty
     try:
-        table = np.load(keep, allow_pickle=False)
+        table = np.load(checkpoint, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
-        with open(keep, "rb") as file:
+        with open(checkpoint, "rb") as file:
             start = file.read(len(MAGIC))
         if start.strip(b"\0") and start != MAGIC[: len(start)]:
-            raise DataError("is no file of ratings", file=keep) from error
-        log.warning("%s: ignored, it is cut off or damaged; the hours are rated again", keep)
-        keep.unlink()
+            raise DataError("is no file of ratings", file=checkpoint) from error
+        log.warning("%s: ignored, it is cut off or damaged; the hours are rated again", checkpoint)
+        checkpoint.unlink()
         return empty
     if table.shape != empty.shape:
         raise DataError(
             f"ratings of shape {table.shape}, expected {empty.shape}: of another year (delete it)",
-            file=keep,
+            file=checkpoint,
         )
     return table
 
 
-def _save(keep: Path | None, table: NDArray[np.float64]) -> None:
+def _save(checkpoint: Path | None, table: NDArray[np.float64]) -> None:
     """Write the ratings; the file is the old one or the new one at any time."""
-    if keep is None:
+    if checkpoint is None:
         return
-    keep.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(keep) as part, open(part, "wb") as file:
+    checkpoint.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(checkpoint) as part, open(part, "wb") as file:
         np.save(file, table)

@@ -1,15 +1,25 @@
-"""Where matrices, systems and skies become light: the one place of the phase sums and of paths.
+"""Daylight of a scene by the three-phase method, the five-phase method, or path tracing.
 
-    scene     the room and its outdoors, without what fills the windows
-    systems   of each window group its states, as each method takes them
+The only place where matrices, system optics and skies become illuminance, luminance and glare:
+
+    scene     `DaylightScene`: room and outdoors, without what fills the windows
+    systems   of each window group its states, each a `SystemOptics`
     sky       `mitsuba_cfs.sky.annual.AnnualSky`
 
-A method is taken in three steps, each of which costs something of its own:
+    light = daylight(scene, systems, sky, method="five-phase", sampling=Sampling())
+    lux, error = illuminance_with_error(light)          # [S, L] [lx], relative error [S]
+    dgp = hourly_glare(light, "DGP", hours=[10]).dgp    # [n]
 
-    traced = traced_scene("five-phase", scene, sampling)    # once for a scene
-    filled = traced.with_systems(systems)                   # once for its systems
-    light = filled.light(sky)                               # illuminance, pictures, glare of hours
+By phase methods `daylight` is `phase_matrices`, once for a scene, and `phase_light`, once for its
+systems and sky.  All are frozen data; another eye or other outdoors are new data that share what
+stays the same.
 """
+
+from mitsuba_cfs.errors import CfsError
 
 METHODS = ("three-phase", "five-phase", "point-in-time")
 METRICS = ("DGP", "eDGP", "sDGP", "illuminance")
+
+
+class UnknownMethodError(CfsError, ValueError):
+    """A method or metric that does not exist."""

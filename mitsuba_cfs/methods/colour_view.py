@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.colour import WHITE, relative_rgb
 from mitsuba_cfs.images.hdr import EFFICACY, LUMINANCE_WEIGHTS
-from mitsuba_cfs.methods.path_light import PathSystems
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.optics import States
+from mitsuba_cfs.methods.point_in_time import path_tracing_room
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -110,11 +111,11 @@ def _rgb(x: ArrayLike, z: ArrayLike) -> NDArray[np.float64]:
 def has_colour(bands: Sequence[DaylightScene], sky: AnnualSky, hour: int) -> bool:
     """Whether a picture of the scenes by red, green and blue in one of the hours L is not grey.
 
-    It is where all surfaces reflect the bands alike and the hour's daylight is neutral all over.
+    It is grey where all surfaces reflect the bands equally and the hour's daylight is neutral.
     """
     first, *others = bands
-    for own, theirs in ((first, other) for other in others):
-        for one, two in ((own.interior, theirs.interior), (own.exterior, theirs.exterior)):
+    for other in others:
+        for one, two in ((first.interior, other.interior), (first.exterior, other.exterior)):
             if not np.array_equal(one.reflectance, two.reflectance):
                 return True
     shade = daylight_colour(sky, hour)
@@ -126,10 +127,12 @@ def has_colour(bands: Sequence[DaylightScene], sky: AnnualSky, hour: int) -> boo
 
 def coloured_picture(
     luminance: NDArray[np.float32],
-    bands: Sequence[PathSystems],
+    bands: Sequence[DaylightScene],
+    systems: Sequence[States],
     sky: AnnualSky,
     hour: int,
     *,
+    sampling: Sampling,
     state: Sequence[int] | None = None,
     progress: Progress = silent,
 ) -> NDArray[np.float32]:
@@ -139,21 +142,17 @@ def coloured_picture(
     paths each, which share their random numbers.
 
     Args:
-        bands: the scene with its view by red, green and blue, with the same systems.
+        bands: the scene with its view by red, green and blue.
+        systems: of each window group its states [G][J], the same in all bands.
         state: of each window group [G]; the first by default.
     """
     shade = daylight_colour(sky, hour)
     patches, towards = np.asarray(sky.without_sun(hour)), sky.direction[hour]
     disc = float(sky.illuminance[hour]) / SUN_SOLID_ANGLE
     skies = [Sky(patches * shade.patches[:, c], towards, disc * shade.sun[c]) for c in range(3)]
-    chosen, view = bands[0].sampling, bands[0].scene.view
-    if view is None:
-        raise ValueError("a picture needs the scene's view")
-    held = [0] * len(bands[0].systems) if state is None else state
-    rooms = [band.room(held) for band in bands]
     rgb = colour_picture(
-        rooms, skies, view,
-        samples=max(chosen.picture_samples // FEWER, 1), seed=chosen.seed, progress=progress,
+        [path_tracing_room(band, systems, state) for band in bands], skies, bands[0].eye,
+        samples=max(sampling.picture_samples // FEWER, 1), seed=sampling.seed, progress=progress,
     )  # fmt: skip
     return with_luminance(smoothed_colour(rgb, luminance), luminance)
 

@@ -2,7 +2,7 @@
 
     three-phase    E_v = V T D s                                eDGP pictures V_d T D_d s
     five-phase     E_v = V T D s - V_d T D_d s_d + C_ds s_sun   V_d T D_d s_sky + C s_sun
-    paths          E_v of a sensor at the eye                   paths of one reflection
+    point-in-time  E_v of a sensor at the eye                   paths of one reflection
 
 Source: Wienold 2009, "Dynamic daylight glare evaluation" (eDGP); the dissertation's 3.2.4 to 3.2.6,
 whose equation (20) has the sun twice if its s_d holds it: here s_sky is the sky without the sun.
@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,74 +25,198 @@ from mitsuba_cfs.glare.dgp_error import dgp_errors, hours_by_halves
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.glare.sun_disc import SunDisc
-from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import CacheEntry, kept_or_found
-from mitsuba_cfs.methods.few_pictures import pictures_by_state
+from mitsuba_cfs.methods import METRICS, UnknownMethodError
+from mitsuba_cfs.methods.light import (
+    Light,
+    SeasonalLight,
+    eye_illuminance,
+    illuminance,
+)
 from mitsuba_cfs.methods.optics import hourly_states
-from mitsuba_cfs.methods.path_light import PathLight, PathSystems
-from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
-from mitsuba_cfs.methods.seasonal_light import SeasonalLight
+from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.phase_pictures import (
+    pictures_by_state,
+    pictures_in_state,
+    with_phase_pictures,
+)
+from mitsuba_cfs.methods.point_in_time import (
+    PathLight,
+    disc_of_room,
+    path_eye_illuminance,
+    picture_of_room,
+    picture_with_disc,
+    rooms_by_state,
+)
 from mitsuba_cfs.progress import Progress, part, silent
 
-DIRECT_DEPTH = 2  # segments of a direct-only path behind what the eye sees: to window, to sky
+DIRECT_DEPTH = 2  # segments of a direct path after the surface that the eye sees: to window, to sky
 State = ArrayLike | None  # [G, L] of each window group in each hour, or [L] of all; None: the first
+Picture = NDArray[np.float32]  # [ny, nx] [cd/m2]
 
 
 def hourly_glare(
-    light: PhaseLight | PathLight | SeasonalLight,
+    light: Light,
     metric: str = "DGP",
     state: State = None,
     *,
     hours: ArrayLike | None = None,
     options: GlareOptions | None = None,
-    keep: Path | None = None,
-    kept: Callable[[NDArray[np.int64]], CacheEntry] | None = None,
+    checkpoint: Path | None = None,
+    cached: Callable[[NDArray[np.int64]], CacheEntry] | None = None,
     progress: Progress = silent,
 ) -> AnnualGlare:
     """Glare of the view in some hours [n] of the light's sky, all by default.
 
     Args:
-        metric: DGP, eDGP or sDGP; the latter has no figures but the illuminance.
+        metric: DGP, eDGP or sDGP; the latter gives nothing but DGP and the illuminance.
         state: of the windows in each of the sky's hours.
-        options: what a source is, and the rest of how glare is rated.
-        keep: file of the ratings so far, see `annual_glare`.
-        kept: the place of these hours' ratings with each window group in a state [G].  They are
-            kept where that state holds in all hours, and read where it holds in some.
+        options: how glare sources are detected and rated.
+        checkpoint: file of the ratings so far, see `annual_glare`.
+        cached: cache entry of the ratings of these hours with each window group in a state [G].
+            They are stored where that state holds in all hours, and read where it holds in some.
     """
+    if metric not in METRICS or metric == "illuminance":
+        raise UnknownMethodError(f"metric {metric!r}: expected one of {', '.join(METRICS[:3])}")
+    _ = light.scene.eye
     chosen = np.arange(len(light.sky.lit)) if hours is None else np.asarray(hours, dtype=np.int64)
-    rows = hourly_states(state, len(light.filled.systems), len(light.sky.lit))[:, chosen]
-    options = options or GlareOptions()
+    every = hourly_states(state, len(light.systems), len(light.sky.lit))
+    rows, options = every[:, chosen], options or GlareOptions()
     if isinstance(light, SeasonalLight):
-        return _of_seasons(light, metric, chosen, rows, options, progress, keep=keep)
+        return _of_seasons(light, metric, chosen, rows, options, progress, checkpoint=checkpoint)
     if isinstance(light, PathLight):
-        return _of_paths(light, metric, chosen, rows, options, progress)
+        return _by_path_tracing(light, metric, chosen, every, options, progress)
     if metric == "sDGP":
-        return _simplified(light.eye(state)[chosen])
-    own = light.eye(state)[chosen] if metric == "eDGP" else None
-    geometry = light.filled.traced.geometry
+        return _simplified(eye_illuminance(light, every)[chosen])
+    phases, direct = light, metric == "eDGP"
+    eye = eye_illuminance(light, every)[chosen] if direct else None
+    geometry = GlareView(light.scene.eye)
     table = np.full((len(FIGURES), len(chosen)), np.nan)
     kinds, kind = np.unique(rows, axis=1, return_inverse=True)
 
-    def found(i: int, columns: NDArray[np.int64]) -> NDArray[np.float64]:
-        rated = annual_glare(
-            light.pictures(chosen[columns], kinds[:, i], direct=metric == "eDGP"),
+    def rated(i: int, columns: NDArray[np.int64]) -> NDArray[np.float64]:
+        nonlocal phases
+        phases = with_phase_pictures(phases, direct=direct)  # unless all ratings are in the cache
+        glare = annual_glare(
+            pictures_in_state(phases, chosen[columns], kinds[:, i].tolist(), direct=direct),
             geometry=geometry,
             options=options,
-            illuminance=None if own is None else own[columns],
-            keep=keep if keep is None or i == 0 else keep.with_stem(f"{keep.stem}-{i}"),
+            illuminance=None if eye is None else eye[columns],
+            checkpoint=_numbered(checkpoint, f"{i}" if i else ""),
             progress=part(progress, i / kinds.shape[1], (i + 1) / kinds.shape[1], "glare"),
         )
-        return np.array([getattr(rated, name) for name in FIGURES])
+        return np.array([getattr(glare, name) for name in FIGURES])
 
     for i, combination in enumerate(kinds.T):
         columns = np.flatnonzero(kind.ravel() == i)
-        entry = None if kept is None else kept(combination)
+        entry = None if cached is None else cached(combination)
         if len(columns) == len(chosen):
-            table[:, columns] = kept_or_found(entry, partial(found, i, columns))
+            table[:, columns] = kept_or_found(entry, partial(rated, i, columns))
         else:
-            known = None if entry is None else entry.load()
-            table[:, columns] = found(i, columns) if known is None else known.mean[:, columns]
+            stored = None if entry is None else entry.load()
+            table[:, columns] = rated(i, columns) if stored is None else stored.mean[:, columns]
     return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)
+
+
+def metric_values(light: Light, metric: str) -> NDArray[np.float64]:
+    """A metric of `METRICS` in every hour of the light's sky [L]; illuminance [S, L] in lx."""
+    if metric == "illuminance":
+        return illuminance(light)
+    return hourly_glare(light, metric).dgp
+
+
+def pictures(
+    light: PhaseLight | PathLight,
+    hours: ArrayLike,
+    state: State = None,
+    *,
+    progress: Progress = silent,
+) -> list[Picture]:
+    """Luminance pictures [ny, nx] [cd/m2] of some hours [n] of the light's sky."""
+    hours = np.asarray(hours, dtype=np.int64)
+    rows = hourly_states(state, len(light.systems), len(light.sky.lit))[:, hours]
+    shown: dict[int, Picture] = {}
+    if isinstance(light, PathLight):
+        rooms = rooms_by_state(light, rows)
+        for i, now in enumerate(rows.T):
+            steps = part(progress, i / len(hours), (i + 1) / len(hours), "pictures")
+            room = rooms[tuple(now.tolist())]
+            shown[i] = picture_of_room(light, room, int(hours[i]), progress=steps)
+        return list(shown.values())
+    for columns, of_kind in pictures_by_state(light, hours, rows):
+        values = of_kind.values(np.arange(len(columns)))
+        for c, row in zip(columns.tolist(), values, strict=True):
+            shown[c] = full_picture(row, of_kind.pixels, of_kind.view)
+    progress("pictures", 1.0)
+    return [shown[i] for i in range(len(hours))]
+
+
+def rated_pictures(
+    light: Light,
+    hours: ArrayLike,
+    state: State = None,
+    *,
+    options: GlareOptions | None = None,
+    progress: Progress = silent,
+) -> list[tuple[Picture, GlareResult]]:
+    """Luminance pictures of some hours as of `pictures`, and the glare of each."""
+    hours, options = np.asarray(hours, dtype=np.int64), options or GlareOptions()
+    rows = hourly_states(state, len(light.systems), len(light.sky.lit))[:, hours]
+    if isinstance(light, SeasonalLight):
+        return _rated_in_seasons(light, hours, rows, options, progress)
+    results: dict[int, tuple[Picture, GlareResult]] = {}
+    geometry, apart = GlareView(light.scene.eye), options.sun == "source"
+    if isinstance(light, PathLight):
+        made = _path_pictures(light, hours, rows, progress)
+    else:
+        made = _phase_pictures(light, hours, rows)
+    for one in made:
+        how: dict[str, Any] = {"options": options, "disc": one.disc if apart else None}
+        rated = evaluate(one.bare if apart else one.shown, geometry, **how)
+        if one.halves:
+            add = 0 if apart else one.shown - one.bare
+            first, second = (evaluate(half + add, geometry, **how).dgp for half in one.halves)
+            rated = replace(rated, dgp_standard_error=abs(first - second) / 2)
+        results[one.number] = one.shown, rated
+        progress("pictures", len(results) / len(hours))
+    return [results[i] for i in range(len(hours))]
+
+
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """One of several pictures, before it is rated."""
+
+    number: int  # among them
+    bare: Picture  # without the sun's disc
+    disc: SunDisc | None
+    shown: Picture  # with the disc
+    halves: Sequence[Picture]  # of the paths, without the disc; none: not known
+
+
+def _path_pictures(
+    light: PathLight, hours: NDArray[np.int64], rows: NDArray[np.int64], progress: Progress
+) -> Iterator[_Made]:
+    """Pictures of hours [n] in their states [G, n], each of its own paths."""
+    rooms = rooms_by_state(light, rows)
+    for i, (hour, now) in enumerate(zip(hours.tolist(), rows.T, strict=True)):
+        steps = part(progress, i / len(hours), (i + 1) / len(hours), "pictures")
+        one = picture_with_disc(light, rooms[tuple(now.tolist())], hour, progress=steps)
+        yield _Made(i, one.bare, one.disc, one.shown, ())
+
+
+def _phase_pictures(
+    light: PhaseLight, hours: NDArray[np.int64], rows: NDArray[np.int64]
+) -> Iterator[_Made]:
+    """Pictures of hours [n] in their states [G, n] from matrices."""
+    for numbers, of_kind in pictures_by_state(light, hours, rows):
+        whole = partial(full_picture, pixels=of_kind.pixels, view=of_kind.view)
+        for i, number in enumerate(numbers.tolist()):
+            only = np.array([i])
+            values, discs = of_kind.without_disc(only)
+            noise, bare = of_kind.noise(only)[0], whole(values[0])
+            halves = [whole(np.maximum(values[0] + side * noise, 0)) for side in (1, -1)]
+            of_kind.add_disc(values, only)
+            yield _Made(number, bare, discs[0], whole(values[0]), halves)
 
 
 def _of_seasons(
@@ -102,137 +227,21 @@ def _of_seasons(
     options: GlareOptions,
     progress: Progress,
     *,
-    keep: Path | None,
+    checkpoint: Path | None,
 ) -> AnnualGlare:
     """Glare of some hours [n] in their states [G, n], season by season."""
     table = np.full((len(FIGURES), len(chosen)), np.nan)
     done = 0
-    for i, (own, hours) in enumerate(light.parts()):
-        columns = np.flatnonzero(np.isin(chosen, hours))
-        if not len(columns):
-            continue
-        among = np.searchsorted(hours, chosen[columns])
-        states = np.zeros((len(rows), len(hours)), dtype=np.int64)
-        states[:, among] = rows[:, columns]
-        end = (done + len(columns)) / len(chosen)
+    for i, season in enumerate(_in_seasons(light, chosen, rows)):
+        end = (done + len(season.columns)) / len(chosen)
         rated = hourly_glare(
-            own, metric, states, hours=among, options=options,
-            keep=keep and keep.with_stem(f"{keep.stem}-season-{i}"),
+            season.light, metric, season.state, hours=season.hours, options=options,
+            checkpoint=_numbered(checkpoint, f"season-{i}"),
             progress=part(progress, done / len(chosen), end, "glare"),
         )  # fmt: skip
-        table[:, columns] = [getattr(rated, name) for name in FIGURES]
-        done += len(columns)
+        table[:, season.columns] = [getattr(rated, name) for name in FIGURES]
+        done += len(season.columns)
     return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)
-
-
-def light_seen_from(
-    light: PhaseLight | SeasonalLight, view: View, progress: Progress = silent
-) -> PhaseLight | SeasonalLight:
-    """The same light seen from another eye: that of the windows is not computed again."""
-    if isinstance(light, SeasonalLight):
-        return light.changed(lambda own: light_seen_from(own, view, progress))
-    traced = light.filled.traced.seen_from(view, progress)
-    found = PhaseSystems(traced, light.filled.systems).light(light.sky)
-    found.__dict__["windows"] = light.windows
-    return found
-
-
-def pictures(
-    light: PhaseLight | PathLight,
-    hours: ArrayLike,
-    state: State = None,
-    *,
-    progress: Progress = silent,
-) -> list[NDArray[np.float32]]:
-    """Luminance pictures [ny, nx] [cd/m2] of some hours [n] of the light's sky."""
-    hours = np.asarray(hours, dtype=np.int64)
-    rows = hourly_states(state, len(light.filled.systems), len(light.sky.lit))[:, hours]
-    found: dict[int, NDArray[np.float32]] = {}
-    if isinstance(light, PathLight):
-        for i, now in enumerate(rows.T):
-            steps = part(progress, i / len(hours), (i + 1) / len(hours), "pictures")
-            found[i] = light.picture(int(hours[i]), now, progress=steps)
-        return list(found.values())
-    for columns, of_kind in pictures_by_state(light, hours, rows):
-        values = of_kind.values(np.arange(len(columns)))
-        for c, row in zip(columns.tolist(), values, strict=True):
-            found[c] = full_picture(row, of_kind.pixels, of_kind.view)
-    progress("pictures", 1.0)
-    return [found[i] for i in range(len(hours))]
-
-
-def _simplified(eye: NDArray[np.float64]) -> AnnualGlare:
-    nothing = np.full(len(eye), np.nan)
-    rest = {name: nothing for name in FIGURES[2:]}
-    dgp = np.array([indices.simplified_dgp(E) for E in eye.tolist()])
-    return AnnualGlare(dgp=dgp, Ev=np.asarray(eye, dtype=float), **rest)
-
-
-def rated_pictures(
-    light: PhaseLight | PathLight | SeasonalLight,
-    hours: ArrayLike,
-    state: State = None,
-    *,
-    options: GlareOptions | None = None,
-    progress: Progress = silent,
-) -> list[tuple[NDArray[np.float32], GlareResult]]:
-    """Luminance pictures of some hours as of `pictures`, and the glare of each."""
-    hours, options = np.asarray(hours, dtype=np.int64), options or GlareOptions()
-    rows = hourly_states(state, len(light.filled.systems), len(light.sky.lit))[:, hours]
-    if isinstance(light, SeasonalLight):
-        return _rated_in_seasons(light, hours, rows, options, progress)
-    found: dict[int, tuple[NDArray[np.float32], GlareResult]] = {}
-    geometry, apart = GlareView(_view(light)), options.sun == "source"
-    if isinstance(light, PathLight):
-        made = _by_paths(light, hours, rows, progress)
-    else:
-        made = _by_phases(light, hours, rows)
-    for one in made:
-        own = {"options": options, "disc": one.disc if apart else None}
-        rated = evaluate(one.bare if apart else one.shown, geometry, **own)
-        if one.halves:
-            add = 0 if apart else one.shown - one.bare
-            first, second = (evaluate(half + add, geometry, **own).dgp for half in one.halves)
-            rated = replace(rated, dgp_standard_error=abs(first - second) / 2)
-        found[one.number] = one.shown, rated
-        progress("pictures", len(found) / len(hours))
-    return [found[i] for i in range(len(hours))]
-
-
-@dataclass(frozen=True, slots=True)
-class _Made:
-    """One of several pictures, before it is rated."""
-
-    number: int  # among them
-    bare: NDArray[np.float32]  # [ny, nx] without the sun's disc
-    disc: SunDisc | None
-    shown: NDArray[np.float32]  # with the disc
-    halves: Sequence[NDArray[np.float32]]  # of the paths, without the disc; none: not known
-
-
-def _by_paths(
-    light: PathLight, hours: NDArray[np.int64], rows: NDArray[np.int64], progress: Progress
-) -> Iterator[_Made]:
-    """Pictures of hours [n] in their states [G, n], each of its own paths."""
-    for i, (hour, now) in enumerate(zip(hours.tolist(), rows.T, strict=True)):
-        steps = part(progress, i / len(hours), (i + 1) / len(hours), "pictures")
-        bare = light.picture(hour, now, disc=False, progress=steps)
-        yield _Made(i, bare, light.disc(hour, now), light.with_disc(bare, hour, now), ())
-
-
-def _by_phases(
-    light: PhaseLight, hours: NDArray[np.int64], rows: NDArray[np.int64]
-) -> Iterator[_Made]:
-    """Pictures of hours [n] in their states [G, n] from matrices."""
-    for numbers, found in pictures_by_state(light, hours, rows):
-        whole = partial(full_picture, pixels=found.pixels, view=found.view)
-        for i, number in enumerate(numbers.tolist()):
-            only = np.array([i])
-            values, discs = found.without_disc(only)
-            noise, bare = found.noise(only)[0], whole(values[0])
-            halves = [whole(np.maximum(values[0] + side * noise, 0)) for side in (1, -1)]
-            found.add_disc(values, only)
-            yield _Made(number, bare, discs[0], whole(values[0]), halves)
 
 
 def _rated_in_seasons(
@@ -241,55 +250,85 @@ def _rated_in_seasons(
     rows: NDArray[np.int64],
     options: GlareOptions,
     progress: Progress,
-) -> list[tuple[NDArray[np.float32], GlareResult]]:
+) -> list[tuple[Picture, GlareResult]]:
     """The pictures of hours [n] in their states [G, n], season by season, and their glare."""
-    found: dict[int, tuple[NDArray[np.float32], GlareResult]] = {}
-    for own, season in light.parts():
-        columns = np.flatnonzero(np.isin(hours, season))
-        if not len(columns):
-            continue
-        at = np.searchsorted(season, hours[columns])
-        states = np.zeros((len(rows), len(season)), dtype=np.int64)
-        states[:, at] = rows[:, columns]
-        rated = rated_pictures(own, at, states, options=options, progress=progress)
-        found |= dict(zip(columns.tolist(), rated, strict=True))
-    return [found[i] for i in range(len(hours))]
+    results: dict[int, tuple[Picture, GlareResult]] = {}
+    for season in _in_seasons(light, hours, rows):
+        rated = rated_pictures(
+            season.light, season.hours, season.state, options=options, progress=progress
+        )
+        results |= dict(zip(season.columns.tolist(), rated, strict=True))
+    return [results[i] for i in range(len(hours))]
 
 
-def _view(light: PhaseLight | PathLight) -> View | None:
-    filled = light.filled
-    return (filled.scene if isinstance(filled, PathSystems) else filled.traced.scene).view
+@dataclass(frozen=True, slots=True)
+class _Season:
+    """Those of some hours [n] that are in one season."""
+
+    light: PhaseLight | PathLight
+    columns: NDArray[np.int64]  # which of the hours
+    hours: NDArray[np.int64]  # their numbers among those of the season
+    state: NDArray[np.int64]  # [G, l] of all hours of the season
 
 
-def _of_paths(
+def _in_seasons(
+    light: SeasonalLight, hours: NDArray[np.int64], rows: NDArray[np.int64]
+) -> Iterator[_Season]:
+    """Hours [n] in their states [G, n], season by season."""
+    for one, of_season in light.seasons():
+        columns = np.flatnonzero(np.isin(hours, of_season))
+        if len(columns):
+            among = np.searchsorted(of_season, hours[columns])
+            state = np.zeros((len(rows), len(of_season)), dtype=np.int64)
+            state[:, among] = rows[:, columns]
+            yield _Season(one, columns, among, state)
+
+
+def _by_path_tracing(
     light: PathLight,
     metric: str,
     hours: NDArray[np.int64],
-    rows: NDArray[np.int64],
+    state: NDArray[np.int64],
     options: GlareOptions,
     progress: Progress,
 ) -> AnnualGlare:
-    """Glare of some hours, each by its own paths."""
+    """Glare of some hours, each by its own paths.
+
+    Args: state: [G, L] of all hours of the sky.
+    """
     if metric == "sDGP":
-        eye = [light.eye(int(h), now) for h, now in zip(hours, rows.T, strict=True)]
-        return _simplified(np.array(eye))
-    geometry, apart = GlareView(light.filled.scene.view), options.sun == "source"
+        return _simplified(path_eye_illuminance(light, hours, state))
+    rows, rooms = state[:, hours], rooms_by_state(light, state[:, hours])
+    geometry, apart = GlareView(light.scene.eye), options.sun == "source"
 
     def rated(i: int, **seed: int) -> list[float]:
-        hour, now, known, depth = int(hours[i]), rows[:, i], options, {}
+        hour, room = int(hours[i]), rooms[tuple(rows[:, i].tolist())]
+        known, depth = options, {}
         if metric == "eDGP":
-            known = replace(options, illuminance=light.eye(hour, now))
-            depth = {"max_depth": DIRECT_DEPTH}
-        picture = light.picture(hour, now, disc=not apart, **depth, **seed)
-        disc = light.disc(hour, now) if apart else None
+            [eye] = path_eye_illuminance(light, hours[i : i + 1], state)
+            known, depth = replace(options, illuminance=float(eye)), {"max_depth": DIRECT_DEPTH}
+        picture = picture_of_room(light, room, hour, disc=not apart, **depth, **seed)
+        disc = disc_of_room(light, room, hour) if apart else None
         return figures(evaluate(picture, geometry, options=known, disc=disc))
 
-    found = []
+    values = []
     for i in range(len(hours)):
-        found.append(rated(i))
+        values.append(rated(i))
         progress("glare", (i + 1) / len(hours))
-    table = np.array(found, dtype=float).reshape(len(hours), len(FIGURES)).T
+    table = np.array(values, dtype=float).reshape(len(hours), len(FIGURES)).T
     again = hours_by_halves(table[0])
-    other = np.array([rated(i, seed=light.filled.sampling.seed + 1)[0] for i in again])
+    other = np.array([rated(i, seed=light.sampling.seed + 1)[0] for i in again])
     table[-1] = dgp_errors(table[0], again, np.abs(table[0, again] - other) / np.sqrt(2))
     return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)
+
+
+def _simplified(eye: NDArray[np.float64]) -> AnnualGlare:
+    """sDGP from the illuminance at the eye [n] [lx]."""
+    unknown = np.full(len(eye), np.nan)
+    dgp = np.array([indices.simplified_dgp(E) for E in eye.tolist()])
+    rest: dict[str, Any] = dict.fromkeys(FIGURES[2:], unknown)
+    return AnnualGlare(dgp, np.asarray(eye, dtype=float), **rest)
+
+
+def _numbered(path: Path | None, name: str) -> Path | None:
+    return path if path is None or not name else path.with_stem(f"{path.stem}-{name}")

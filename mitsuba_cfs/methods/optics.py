@@ -193,7 +193,7 @@ class AngularOptics:
 
 
 @dataclass(frozen=True)
-class GivenOptics:
+class MatrixOptics:
     """Optics given for each method by itself; what is not given must not be asked for."""
 
     transmission: NDArray[np.float64] | None = None  # [K, K]

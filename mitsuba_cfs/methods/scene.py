@@ -1,4 +1,4 @@
-"""A scene in the dissertation's sense: room and outdoors, without what fills the windows."""
+"""A scene, room and outdoors without what fills the windows, and how finely it is computed."""
 
 from __future__ import annotations
 
@@ -12,41 +12,53 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 
 
-def _nowhere() -> NDArray[np.float64]:
+def _no_points() -> NDArray[np.float64]:
     return np.empty((0, 3))
 
 
 @dataclass(frozen=True, slots=True)
-class RoomBeyond:
-    """The room that a window group of another one looks into; of some groups it may be the same."""
+class AdjacentRoom:
+    """The room behind a window group that looks into another room; several groups may share it."""
 
     scene: DaylightScene  # its interior without the glass that is looked through
     transmission: tuple[NDArray[np.float64], ...]  # [G][K, K] T of its window groups
-    beam: NDArray[np.float64]  # [K] what goes straight on through the group that looks into it
+    beam: NDArray[np.float64]  # [K] direct transmittance of the group that looks into it
 
 
 @dataclass(frozen=True, slots=True)
 class DaylightScene:
-    """What light meets, the sensors it is taken at, and an eye."""
+    """Surfaces and window groups of a room, its outdoors, its sensors, and the view of an eye."""
 
     interior: Surfaces
     exterior: Surfaces
     groups: Sequence[WindowGroup]  # axis G
-    points: NDArray[np.float64] = field(default_factory=_nowhere)  # [S, 3] [m]
-    normals: NDArray[np.float64] = field(default_factory=_nowhere)  # [S, 3]
+    points: NDArray[np.float64] = field(default_factory=_no_points)  # [S, 3] [m]
+    normals: NDArray[np.float64] = field(default_factory=_no_points)  # [S, 3]
     view: View | None = None  # of the eye whose glare is rated
-    beyond: tuple[RoomBeyond, ...] = ()  # what the last of the groups look into, else outdoors
+    adjacent: tuple[AdjacentRoom, ...] = ()  # behind the last groups; outdoors is behind the others
 
     def __post_init__(self) -> None:
         if self.points.shape != self.normals.shape or self.points.shape[1:] != (3,):
             raise ValueError(
                 f"points {self.points.shape}, normals {self.normals.shape}: expected [S, 3] both"
             )
+        if len(self.adjacent) > len(self.groups):
+            raise ValueError(
+                f"{len(self.adjacent)} adjacent rooms for {len(self.groups)} window groups: "
+                "expected one for each group that looks into a room"
+            )
 
     @property
     def outdoor_groups(self) -> Sequence[WindowGroup]:
         """The groups that look outdoors: the first ones."""
-        return self.groups[: len(self.groups) - len(self.beyond)]
+        return self.groups[: len(self.groups) - len(self.adjacent)]
+
+    @property
+    def eye(self) -> View:
+        """The view; `ValueError` where the scene has none."""
+        if self.view is None:
+            raise ValueError("the scene has no view: DaylightScene(..., view=fisheye(...))")
+        return self.view
 
     def sensors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Positions and directions [S + 1, 3] of sensors, the eye last; [S, 3] without a view."""
@@ -56,3 +68,35 @@ class DaylightScene:
             np.asarray(a, dtype=float)[None] for a in (self.view.position, self.view.direction)
         )
         return np.concatenate([self.points, eye]), np.concatenate([self.normals, direction])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sampling:
+    """Numbers of paths, the sky's patches and the seed; the defaults are those of `cfs`."""
+
+    sensor_samples: int = 32_768  # paths of a sensor, for V
+    patch_samples: int = 16_384  # paths of a window patch, for D
+    # points on each window group for the direct sun and for its beam into the room; and points
+    # outdoors for the sun that surfaces reflect
+    sun_points: int = 1_024
+    view_samples: int = 8  # paths of a pixel, for the matrices of a view; a tile shares them
+    outdoor_samples: int = 8  # paths of a pixel straight through the windows
+    picture_samples: int = 16  # point-in-time: paths of a pixel under one sky
+    hour_samples: int = 2_048  # point-in-time: paths of a sensor under one sky
+    subdivision: int = 4  # Reinhart's MF
+    window_parts: int = 0  # of each group; 0: choose from the surroundings
+    memory: float = 2 * 2**30  # [bytes] of a view's matrices; above it they are on disk
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in (
+            "sensor_samples", "patch_samples", "sun_points", "view_samples", "outdoor_samples",
+            "picture_samples", "hour_samples",
+        ):  # fmt: skip
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} {getattr(self, name)}: expected at least 1")
+        if self.subdivision < 1:
+            raise ValueError(f"subdivision {self.subdivision}: expected Reinhart's MF, 1 or more")
+        for name in ("window_parts", "memory", "seed"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} {getattr(self, name)}: expected 0 or more")

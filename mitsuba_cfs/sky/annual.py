@@ -48,6 +48,12 @@ class AnnualSky:
             self._lit_sun.append(lit_rows(self.sun))
         return self._lit_sun[0]
 
+    def sun_alone(self, hours: Any = slice(None)) -> NDArray[np.floating]:
+        """Luminance [P, n] of the sun alone, of some of the hours L [cd/m2]."""
+        if self.sun is None:
+            raise ValueError(NO_SUN)
+        return self.sun[:, hours]
+
     def without_sun(self, hours: Any = slice(None)) -> NDArray[np.floating]:
         """Luminance [P, n] of sky and ground without the sun, of some of the hours L [cd/m2]."""
         if self.sun is None:

@@ -255,7 +255,6 @@ class Check:
         times = StageTimes()
         with times.stage(TRACING):
             light = room_light(room, progress=progress)
-            light.traced.trace("sDGP")
         with times.stage(SUMS):
             found = lights_of(room, light, operated)
         closed = next((one.closed for one in found if one.closed is not None), None)

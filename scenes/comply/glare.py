@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.methods.glare import hourly_glare, light_seen_from
+from mitsuba_cfs.methods.glare import hourly_glare
+from mitsuba_cfs.methods.light import with_view
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from scenes.comply.findings import SeatGlare
@@ -38,7 +39,7 @@ def seat_glare(
     for number, each in enumerate(views):
         steps = part(progress, number / len(views), (number + 1) / len(views), "annual glare")
         rated = hourly_glare(
-            light_seen_from(light.light, each.view), "DGP", state, hours=lit,
+            with_view(light.light, each.view), "DGP", state, hours=lit,
             options=rating_of(room.options.outputs), progress=steps,
         )  # fmt: skip
         whole = np.zeros(room.skies.hours)

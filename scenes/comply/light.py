@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from bim.model import Space
 from bim.sensors import plane_sides
+from mitsuba_cfs.methods.light import direct_sun_by_group, illuminance
 from mitsuba_cfs.metrics.en17037 import greatest_cell
 from mitsuba_cfs.metrics.lm83 import blinds_operated
 from scenes.comply.findings import GridLight
@@ -42,8 +43,8 @@ def lights_of(room: RoomInputs, traced: RoomLight, operated: Iterable[int]) -> l
     def year(values: NDArray[np.float64]) -> NDArray[np.float32]:
         return sky.whole_year(values.astype(np.float32)).T
 
-    opened, factor = light.illuminance(), overcast_factor(light)
-    through = light.direct_sun_by_group() or []
+    opened, factor = illuminance(light), overcast_factor(light)
+    through = direct_sun_by_group(light) or []
     points = traced.scene.points
     seen = [[sight_through(one).is_view for one in room.windows.in_state(j)] for j in (0, 1)]
     found, first = [], 0
@@ -55,7 +56,7 @@ def lights_of(room: RoomInputs, traced: RoomLight, operated: Iterable[int]) -> l
         blinds = closed = free = None
         if number in operated:
             state = blinds_operated([part.T for part in direct]).astype(np.int64)  # [G, L]
-            blinds, closed = year(light.illuminance(state)[own]), sky.whole_year(state).T > 0
+            blinds, closed = year(illuminance(light, state)[own]), sky.whole_year(state).T > 0
             free = np.where(closed, seen[1], seen[0])
         sun = np.sum(direct, axis=0) if direct else np.zeros_like(opened[own])
         found.append(

@@ -11,15 +11,19 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mitsuba_cfs.methods import METHODS, METRICS
-from mitsuba_cfs.methods.by_name import PathScene, traced_scene, values, with_systems
+from mitsuba_cfs.methods.glare import metric_values
+from mitsuba_cfs.methods.light import daylight
 from mitsuba_cfs.methods.optics import SystemOptics
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.point_in_time import PathLight
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 
@@ -89,26 +93,28 @@ def _measure(
     method, metric = pair
     systems = [[optics]] * len(scene.groups)
 
-    def traced(scene: DaylightScene, sampling: Sampling) -> PhaseScene | PathScene:
-        found = traced_scene(method, scene, sampling)
-        if isinstance(found, PhaseScene):
-            found.trace(metric)
-        return found
-
-    small = replace(scene, view=replace(scene.view, width=SMALL, height=SMALL))
+    small = replace(scene, view=replace(scene.eye, width=SMALL, height=SMALL))
     cheap = replace(sampling, sensor_samples=64, patch_samples=64, hour_samples=64)
-    values(with_systems(traced(small, cheap), systems).light(sky.part([0])), metric)
+    first = sky.part([0])
+    metric_values(daylight(small, systems, first, method=method, sampling=cheap), metric)
     few, many = (sky.part(np.arange(n) % len(sky.lit)) for n in STEPS[method])
-    found, per_scene = _timed(lambda: traced(scene, sampling), clock)
-    filled, per_system = _timed(lambda: with_systems(found, systems), clock)
-    values(filled.light(few), metric)  # kernels of this size are compiled
-    _, of_few = _timed(lambda: values(filled.light(few), metric), clock)
-    _, of_many = _timed(lambda: values(filled.light(many), metric), clock)
     if method == "point-in-time":  # all is done again in every step
-        return Cost(method, metric, per_scene, per_system, (of_few + of_many) / sum(STEPS[method]))
+        lights = [PathLight(scene, systems, steps, sampling) for steps in (few, many)]
+        seconds = [_timed(partial(metric_values, light, metric), clock)[1] for light in lights]
+        return Cost(method, metric, 0.0, 0.0, sum(seconds) / sum(STEPS[method]))
+    five_phase, needs = method == "five-phase", (metric,)
+    matrices, per_scene = _timed(
+        lambda: phase_matrices(scene, sampling, five_phase=five_phase, needs=needs), clock
+    )
+
+    def rated(steps: AnnualSky) -> NDArray[np.float64]:
+        return metric_values(phase_light(matrices, systems, steps, needs=needs), metric)
+
+    rated(few)  # kernels of this size are compiled
+    of_few, of_many = (_timed(partial(rated, steps), clock)[1] for steps in (few, many))
     slope = (of_many - of_few) / (len(many.lit) - len(few.lit))
     per_step = max(slope, LEAST * of_many / len(many.lit))
-    per_system += max(of_few - len(few.lit) * per_step, 0.0)
+    per_system = max(of_few - len(few.lit) * per_step, 0.0)
     return Cost(method, metric, per_scene, per_system, per_step)
 
 

@@ -6,8 +6,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mitsuba_cfs.methods.light import (
+    SeasonalLight,
+    daylight_coefficients,
+    direct_sun,
+    illuminance_with_error,
+)
 from mitsuba_cfs.methods.phase_light import PhaseLight
-from mitsuba_cfs.methods.seasonal_light import SeasonalLight, paths_of
 from mitsuba_cfs.metrics.daylight_factor import daylight_factor
 from mitsuba_cfs.metrics.room import room_metrics
 from mitsuba_cfs.progress import Progress, part, silent
@@ -17,7 +22,7 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.provision_levels import level_number
 from scenes.results import DaylightResult, GridDaylight
 from scenes.room.inputs import RoomInputs
-from scenes.room.light import RoomLight
+from scenes.room.light import RoomLight, picture_light
 
 
 def room_daylight(
@@ -30,14 +35,12 @@ def room_daylight(
     """Illuminance of the year with the shading state of each hour [H], and its metrics."""
     progress("daylight", 0.0)
     lights, lit_state, points = light.light, room.lit_state(state), light.scene.points
-    if room.options.method == "point-in-time":
-        steps = part(progress, 0.9, 1.0, "daylight")
-        lit, error = paths_of(lights, steps).estimate(lit_state)
-    else:
-        lit, error = lights.illuminance(lit_state), lights.relative_error(lit_state)
+    lit, error = illuminance_with_error(
+        picture_light(room, light), lit_state, progress=part(progress, 0.9, 1.0, "daylight")
+    )
     illuminance = room.skies.whole_year(lit.astype(np.float32)).T
     # LM-83's direct sun and the daylight factor are those of open blinds
-    direct = lights.direct_sun()
+    direct = direct_sun(lights)
     direct = None if direct is None else room.skies.whole_year(direct.astype(np.float32)).T
     factor = overcast_factor(lights)
 
@@ -67,9 +70,8 @@ def overcast_factor(light: PhaseLight | SeasonalLight) -> NDArray[np.float64]:
 
     With trees that change over the year: of the season with the most leaves.
     """
-    subdivision = light.filled.traced.sampling.subdivision
-    overcast = cie_patches("overcast", ReinhartSky(subdivision), 1.0)
-    return daylight_factor(light.filled.coefficients() @ overcast, 1.0)
+    overcast = cie_patches("overcast", ReinhartSky(light.sampling.subdivision), 1.0)
+    return daylight_factor(daylight_coefficients(light) @ overcast, 1.0)
 
 
 def illuminance_table(result: DaylightResult, times: pd.DatetimeIndex) -> pd.DataFrame:

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.methods.glare import light_seen_from
+from mitsuba_cfs.methods.light import eye_illuminance, illuminance, with_pictures, with_view
 from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.picture_year.year import picture_year
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.trace.kernels.scattering import through_beams
@@ -38,15 +39,15 @@ def explored_room(
     light, scene, sky = room_light.light, room_light.scene, room.skies
     progress = part(progress, 0.0, 1.0, "explorer")
     names = [system.name for system in max(room.windows.systems, key=len)]
-    L, J = len(sky.lit), light.filled.states
+    L, J = len(sky.lit), light.states
     small, pictures, through = _small(light, progress), [], []
     hours, ones = np.arange(L), np.ones(L, dtype=np.int64)
     for j in range(J):
-        of_groups = [min(j, len(states) - 1) for states in light.filled.systems]
+        of_groups = [min(j, len(states) - 1) for states in light.systems]
         steps = part(progress, j / J, (j + 1) / J)
-        made = small.pictures(hours, of_groups)
-        pictures.append(picture_year(made, seed=light.filled.traced.sampling.seed, progress=steps))
-        optics = [states[k] for states, k in zip(light.filled.systems, of_groups, strict=True)]
+        made = pictures_in_state(small, hours, of_groups)
+        pictures.append(picture_year(made, seed=light.sampling.seed, progress=steps))
+        optics = [states[k] for states, k in zip(light.systems, of_groups, strict=True)]
         scattering = [one.scattering for one in optics]
         through.append(through_beams(scene.groups, scattering, sky.direction))
     triangles = [np.concatenate([w.triangles for w in g.windows]) for g in scene.groups]
@@ -55,8 +56,8 @@ def explored_room(
         state,
         sky.lit,
         tuple(pictures),
-        tuple(light.illuminance(j * ones)[:sensors].astype(np.float32) for j in range(J)),
-        np.stack([light.eye(j * ones) for j in range(J)]).astype(np.float32),
+        tuple(illuminance(light, j * ones)[:sensors].astype(np.float32) for j in range(J)),
+        np.stack([eye_illuminance(light, j * ones) for j in range(J)]).astype(np.float32),
         np.stack(through).astype(np.float32),
         np.maximum(sky.illuminance, 0).astype(np.float32),
         tuple(triangles),
@@ -65,9 +66,9 @@ def explored_room(
 
 def _small(light: PhaseLight, progress: Progress) -> PhaseLight:
     """The light of the same hours for pictures of at most `LARGEST` pixels a side."""
-    view = light.filled.traced.scene.view
-    if view is None or max(view.width, view.height) <= LARGEST:
-        return light
+    view = light.scene.eye
+    if max(view.width, view.height) <= LARGEST:
+        return with_pictures(light, progress=progress)
     share = LARGEST / max(view.width, view.height)
     size = {"width": round(view.width * share), "height": round(view.height * share)}
-    return light_seen_from(light, replace(view, **size), progress)
+    return with_pictures(with_view(light, replace(view, **size)), progress=progress)

@@ -19,12 +19,10 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import CacheEntry, digest
 from mitsuba_cfs.methods.colour_view import coloured_picture, has_colour
 from mitsuba_cfs.methods.glare import hourly_glare, rated_pictures
+from mitsuba_cfs.methods.light import SeasonalLight
 from mitsuba_cfs.methods.optics import States
-from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.methods.seasonal_light import SeasonalLight
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.surfaces import WindowGroup
@@ -52,7 +50,7 @@ def glare_by_state(
     light: PhaseLight | SeasonalLight, rating: GlareOptions, progress: Progress
 ) -> NDArray[np.float64]:
     """DGP of every hour in every state [J, H], 0 in the dark."""
-    J, count = light.filled.states, len(light.sky.lit)
+    J, count = light.states, len(light.sky.lit)
     lit = [
         hourly_glare(
             light, "DGP", np.full(count, j), options=rating,
@@ -92,7 +90,7 @@ def rated_hours(
     if isinstance(source, PhaseLight) and light.inner is None:
         cached = cached_glare(source, room.windows, metric, columns, rating)
     return hourly_glare(
-        source, metric, room.lit_state(state), hours=columns, options=rating, kept=cached,
+        source, metric, room.lit_state(state), hours=columns, options=rating, cached=cached,
         progress=part(progress, 0.0, 1.0, "annual glare"),
     )  # fmt: skip
 
@@ -122,12 +120,12 @@ def cached_glare(
 
     Args: inputs: what the ratings depend on besides light and windows.
     """
-    traced, sky = light.filled.traced, light.sky
-    cache = traced.cache
+    matrices, sky = light.matrices, light.sky
+    cache = matrices.cache
     if cache is None:
         return None
     key = digest(
-        traced.scene, traced.sampling, traced.five_phase,
+        matrices.scene, matrices.sampling, matrices.five_phase,
         sky.whole, sky.sun, sky.direction, sky.illuminance, *inputs,
     )  # fmt: skip
 
@@ -259,7 +257,7 @@ def coloured(
     sky = annual_sky(room.weather, sampling.subdivision, hours=[hour], **room.options.sky)
     result = with_colour(
         glare, band_scenes(building, room.space, groups, glare.view),
-        light.light.filled.systems[: len(groups)], sky, state=int(state[hour]), sampling=sampling,
+        light.light.systems[: len(groups)], sky, state=int(state[hour]), sampling=sampling,
         progress=part(progress, 0.0, 1.0, "colour"),
     )  # fmt: skip
     progress("colour", 1.0)
@@ -288,8 +286,8 @@ def with_colour(
     shown = brightest_picture(glare)
     if not bands[0].groups or not has_colour(bands, sky, 0):
         return glare
-    filled = [PathSystems(band, systems, sampling) for band in bands]
     rgb = coloured_picture(
-        shown.luminance, filled, sky, 0, state=[state] * len(systems), progress=progress
-    )
+        shown.luminance, bands, systems, sky, 0,
+        sampling=sampling, state=[state] * len(systems), progress=progress,
+    )  # fmt: skip
     return replace(glare, colour=ColourPicture(shown.hour, rgb))

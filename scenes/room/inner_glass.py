@@ -23,10 +23,10 @@ from bim.to_tracer import (
     window_groups,
 )
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics, SystemOptics
+from mitsuba_cfs.methods.light import SeasonalLight, group_shares
+from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics, SystemOptics
 from mitsuba_cfs.methods.phase_light import PhaseLight
-from mitsuba_cfs.methods.scene import DaylightScene, RoomBeyond
-from mitsuba_cfs.methods.seasonal_light import SeasonalLight
+from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.scattering import AngularScattering
 from scenes.fenestration.stated import StatedValues, glazing_system
@@ -48,7 +48,7 @@ class InnerGlass:
     interior: Surfaces  # the room without this glass
     groups: tuple[WindowGroup, ...]  # axis I
     optics: tuple[tuple[SystemOptics, ...], ...]  # [I], each of one state
-    beyond: tuple[RoomBeyond, ...]  # [I]
+    beyond: tuple[AdjacentRoom, ...]  # [I]
     names: tuple[str, ...]  # [I] labels of the rooms beyond
     area: float  # of the glass [m2]
     open_area: float  # of the doorways [m2]
@@ -134,10 +134,10 @@ def _inner_glass(
         scene, transmission = _room_beyond(building, other, pairs, systems, onward)
         used += [face for face, _ in pairs]
         for optics, group in _groups(space, [face for face, _ in pairs]):
-            given = GivenOptics(optics.transmission, dark, reflection=optics.reflection)
+            given = MatrixOptics(optics.transmission, dark, reflection=optics.reflection)
             beam = np.diag(optics.transmission)
             named = replace(group, name=f"{group.name}, to {other.label}")
-            beyond = RoomBeyond(scene, transmission, beam)
+            beyond = AdjacentRoom(scene, transmission, beam)
             panes.append((named, (given,), beyond, other.label))
     if not panes:
         return None
@@ -154,12 +154,7 @@ def borrowed_share(
     """A sentence on the share of the sensors' light over the year that inner glass gives."""
     if inner is None:
         return ""
-    first = len(light.filled.traced.scene.outdoor_groups)
-    lights = [own for own, _ in light.parts()] if isinstance(light, SeasonalLight) else [light]
-    sums = sum(
-        np.array([states[0].over_hours(own.sky)[:-1].sum() for states in own.sensors])
-        for own in lights
-    )
+    first, sums = len(light.scene.outdoor_groups), group_shares(light)
     share = float(sums[first:].sum() / max(sums.sum(), 1e-9))
     return (
         f"Room {space.label} borrows {100 * share:.0f} % of its daylight through "
@@ -207,7 +202,7 @@ def _groups(space: Space, faces: Sequence[Face]) -> list[tuple[SystemOptics, Win
         by_tau.setdefault(tau, []).append(face.pane)
     groups = []
     for tau, panes in by_tau.items():
-        optics: SystemOptics = GivenOptics(np.eye(KLEMS_FULL.size))
+        optics: SystemOptics = MatrixOptics(np.eye(KLEMS_FULL.size))
         if tau is not None:
             glass = glazing_system(StatedValues(tau, None, None, None, 1), "the model")
             optics = BsdfOptics(glass.visible, glass.fine, glass.angular)
@@ -246,7 +241,7 @@ def _room_beyond(
         element_surfaces([*opaque, *room.furniture, *glass, *reveals]),
         exterior_surfaces(building, room),
         (*windows.groups, *(() if onward is None else onward.groups)),
-        beyond=() if onward is None else onward.beyond,
+        adjacent=() if onward is None else onward.beyond,
     )
     optics = [*windows.optics(), *(() if onward is None else onward.optics)]
     return scene, tuple(states[0].transmission for states in optics)

@@ -12,11 +12,22 @@ from bim.model import Building, Space
 from bim.sensors import sensor_grid, view_point
 from bim.to_tracer import exterior_surfaces, furnished_surfaces
 from mitsuba_cfs.images.view import fisheye, fitted
-from mitsuba_cfs.methods.path_light import PathLight
-from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.light import (
+    SeasonalLight,
+    eye_illuminance,
+    path_light_of,
+    seasonal_light,
+)
+from mitsuba_cfs.methods.optics import SystemOptics
+from mitsuba_cfs.methods.phase_light import PhaseLight, phase_light
+from mitsuba_cfs.methods.phase_matrices import (
+    DEFAULT_NEEDS,
+    PhaseMatrices,
+    phase_matrices,
+    with_outdoors,
+)
+from mitsuba_cfs.methods.point_in_time import PathLight
 from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.methods.seasonal_light import SeasonalLight, paths_of
 from mitsuba_cfs.progress import Progress, in_shares, part, silent
 from scenes.room.inner_glass import InnerGlass, inner_glass
 from scenes.room.inputs import NO_SENSORS, FileSensors, RoomInputs
@@ -32,35 +43,43 @@ class RoomLight:
     """A room's traced scene and the light of its lit hours in every shading state."""
 
     scene: DaylightScene  # of the first season, visible band
-    traced: PhaseScene  # V and D of that scene
+    matrices: PhaseMatrices  # V and D of that scene
     light: PhaseLight | SeasonalLight
     inner: InnerGlass | None  # glass to other rooms that gives light
 
     def eye(self) -> NDArray[np.float32]:
         """Illuminance at the eye in every shading state [J, L] [lx]."""
         hours = np.ones(len(self.light.sky.lit), dtype=np.int64)
-        states = range(self.light.filled.states)
-        return np.stack([self.light.eye(j * hours) for j in states]).astype(np.float32)
+        states = range(self.light.states)
+        return np.stack([eye_illuminance(self.light, j * hours) for j in states]).astype(np.float32)
 
 
-def room_light(room: RoomInputs, *, progress: Progress = silent) -> RoomLight:
-    """The light of a room's lit hours in every state; matrices are traced at their first use."""
-    first, *others = room.seasons
-    scene, inner = _scene(room, first.building)
-    traced = PhaseScene(
+def room_light(
+    room: RoomInputs, *, needs: Sequence[str] = DEFAULT_NEEDS, progress: Progress = silent
+) -> RoomLight:
+    """The light of a room's lit hours in every state.
+
+    Args: needs: with "DGP" the view's matrices are traced once for all stages that rate hours.
+    """
+    scene, inner = _scene(room, room.seasons[0].building)
+    matrices = phase_matrices(
         scene, room.options.sampling, five_phase=room.options.method != "three-phase",
-        cache=room.cache, progress=in_shares(progress, TRACED),
+        needs=needs, cache=room.cache, progress=in_shares(progress, TRACED),
     )  # fmt: skip
-    filled = [_filled(room, traced, inner)]
-    for season in others:
+    seasons, optics = [matrices], [_optics(room, inner)]
+    for season in room.seasons[1:]:
         outdoors, glass = _scene(room, season.building)
-        filled.append(_filled(room, traced.before(outdoors), glass))
+        seasons.append(with_outdoors(matrices, outdoors))
+        optics.append(_optics(room, glass))
     steps = part(progress, 0.6, 0.9, "daylight")
-    if len(filled) == 1:
-        light = filled[0].light(room.skies, progress=steps)
+    light: PhaseLight | SeasonalLight
+    if len(seasons) == 1:
+        light = phase_light(matrices, optics[0], room.skies, needs=needs, progress=steps)
     else:
-        light = SeasonalLight.of(filled, room.skies, room.season, progress=steps)
-    return RoomLight(scene, traced, light, inner)
+        light = seasonal_light(
+            seasons, optics, room.skies, room.season, needs=needs, progress=steps
+        )
+    return RoomLight(scene, matrices, light, inner)
 
 
 def visible_scene(room: RoomInputs) -> DaylightScene:
@@ -70,7 +89,7 @@ def visible_scene(room: RoomInputs) -> DaylightScene:
 
 def picture_light(room: RoomInputs, light: RoomLight) -> PhaseLight | PathLight | SeasonalLight:
     """The light that the room's pictures are made of."""
-    return paths_of(light.light) if room.options.method == "point-in-time" else light.light
+    return path_light_of(light.light) if room.options.method == "point-in-time" else light.light
 
 
 def _scene(room: RoomInputs, building: Building) -> tuple[DaylightScene, InnerGlass | None]:
@@ -83,8 +102,9 @@ def _scene(room: RoomInputs, building: Building) -> tuple[DaylightScene, InnerGl
     return scene, glass
 
 
-def _filled(room: RoomInputs, traced: PhaseScene, inner: InnerGlass | None) -> PhaseSystems:
-    return PhaseSystems(traced, [*room.windows.optics(), *(() if inner is None else inner.optics)])
+def _optics(room: RoomInputs, inner: InnerGlass | None) -> list[Sequence[SystemOptics]]:
+    """Optics of the window groups in their states [G][J]."""
+    return [*room.windows.optics(), *(() if inner is None else inner.optics)]
 
 
 def room_scene(

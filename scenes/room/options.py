@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, get_type_hints
 
 from mitsuba_cfs.methods import METHODS
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.sky.options import GROUNDS, SUN_MODELS
 
 GLARE_SOURCES = ("evalglare", "pixels")  # see `mitsuba_cfs.glare.evaluation.GROUPINGS`

@@ -163,7 +163,8 @@ def lit_room(
     times = StageTimes()
 
     with times.stage("daylight"):
-        light = room_light(room, progress=progress)
+        needs = light_needs(room, annual_glare=options.outputs.annual_glare)
+        light = room_light(room, needs=needs, progress=progress)
         if control_signal(room) == "irradiance":
             outdoors = seasonal_outdoors(room, light, progress=progress)
         state = shading_state(room, light, outdoors, progress=progress)
@@ -199,13 +200,22 @@ def lit_room(
     )  # fmt: skip
 
 
+def light_needs(room: RoomInputs, *, annual_glare: bool = False) -> tuple[str, ...]:
+    """The metrics that a room's stages ask its light for, in every hour."""
+    if annual_glare or control_signal(room) == "dgp":
+        return ("illuminance", "DGP")
+    return ("illuminance",)
+
+
 def operated_zone(room: RoomInputs, *, progress: Progress = silent) -> RoomZone:
     """The zone of a room whose light is computed only as far as its operation reads it.
 
     Raises: `RoomError` for a room without a closed zone.
     """
     surfaces, daylight = zone_surfaces(room), None
-    light = room_light(room, progress=progress) if reads_work_plane(room) else None
+    light = None
+    if reads_work_plane(room):
+        light = room_light(room, needs=light_needs(room), progress=progress)
     outdoors = seasonal_outdoors(room, light, progress=progress)
     state = shading_state(room, light, outdoors, progress=progress)
     if light is not None:

@@ -19,9 +19,8 @@ from bim.templates import template_rooms
 from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, phase_matrices, with_outdoors
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.progress import Progress, Stage, item, silent
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.fenestration.systems import States
@@ -76,17 +75,20 @@ class OutdoorLight:
 
     def _daylight(self, band: str) -> NDArray[np.float64]:
         """D of every season [.., K, P], one after the other."""
-        scenes: list[PhaseScene] = []
+        matrices: list[PhaseMatrices] = []
         groups = window_groups(self.space)
         for season in seasons(self.building):
             exterior = exterior_surfaces(season.building, self.space, band)
             scene = DaylightScene(Surfaces.none(), exterior, groups)
-            if scenes:
-                traced = scenes[0].before(scene)
+            if matrices:
+                matrices.append(with_outdoors(matrices[0], scene))
             else:
-                traced = PhaseScene(scene, self.sampling, cache=self.cache)
-            scenes.append(traced)
-        return np.concatenate([traced.daylight.values for traced in scenes])
+                matrices.append(
+                    phase_matrices(
+                        scene, self.sampling, five_phase=False, needs=(), cache=self.cache
+                    )
+                )
+        return np.concatenate([one.daylight.values for one in matrices])
 
 
 def same_matrix(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.matrices.cache import MatrixCache, kept_or_found
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather

@@ -13,9 +13,14 @@ from bim.to_thermal import ThermalRoom
 from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.gloss import Gloss
-from mitsuba_cfs.methods.phase_scene import BATCHES, PhaseScene
+from mitsuba_cfs.methods.light import hours_by_season, in_order_of_hours
+from mitsuba_cfs.methods.phase_matrices import (
+    BATCHES,
+    PhaseMatrices,
+    phase_matrices,
+    with_outdoors,
+)
 from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.methods.seasonal_light import hours_by_season, in_order_of_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.surfaces import Surfaces
@@ -37,16 +42,16 @@ Gains = dict[str, FloatArray]  # [H] [W] by name: incident_w, transmitted_w, abs
 class SeasonalOutdoors:
     """Solar daylight matrices D outside a room's windows, by season."""
 
-    scenes: list[PhaseScene]  # one a season: equal window groups and subgroups
+    scenes: list[PhaseMatrices]  # one a season: equal window groups and subgroups
     season: NDArray[np.int64]  # [L] of each lit hour
 
     @property
-    def first(self) -> PhaseScene:
+    def first(self) -> PhaseMatrices:
         """The scene of the first season."""
         return self.scenes[0]
 
     def by_season(
-        self, of_season: Callable[[PhaseScene, FloatArray], FloatArray], sky: FloatArray
+        self, of_season: Callable[[PhaseMatrices, FloatArray], FloatArray], sky: FloatArray
     ) -> FloatArray:
         """Values [.., L] of all lit hours, from the scene and the sky [P, l] of each season."""
         parts = hours_by_season(self.scenes, self.season)
@@ -80,21 +85,23 @@ def seasonal_outdoors(
     if light is not None and light.inner is None and np.array_equal(
         first.reflectance, light.scene.exterior.reflectance
     ):  # fmt: skip
-        scene = light.traced
+        matrices = light.matrices
     else:
-        scene = _traced_outdoors(room, first, progress)
-    later = (scene.before(replace(scene.scene, exterior=exterior)) for exterior in others)
-    return SeasonalOutdoors([scene, *later], room.season)
+        matrices = _traced_outdoors(room, first, progress)
+    of_daylight = replace(matrices, five_phase=False)  # no D_d
+    scenes = [replace(matrices.scene, exterior=exterior) for exterior in others]
+    later = (with_outdoors(of_daylight, scene) for scene in scenes)
+    return SeasonalOutdoors([matrices, *later], room.season)
 
 
-def _traced_outdoors(room: RoomInputs, exterior: Surfaces, progress: Progress) -> PhaseScene:
+def _traced_outdoors(room: RoomInputs, exterior: Surfaces, progress: Progress) -> PhaseMatrices:
     scene = DaylightScene(Surfaces.none(), exterior, room.windows.groups)
     steps = part(progress, 0.0, 1.0, "sun")
-    traced = PhaseScene(scene, room.options.sampling, cache=room.cache, progress=steps)
-    if scene.groups:
-        _ = traced.daylight  # traced now, so that the progress has a stage of its own
-        steps("sun", 1.0)
-    return traced
+    matrices = phase_matrices(
+        scene, room.options.sampling, five_phase=False, needs=(), cache=room.cache, progress=steps
+    )
+    steps("sun", 1.0)
+    return matrices
 
 
 def window_irradiance(outdoors: SeasonalOutdoors, skies: AnnualSky) -> FloatArray:
@@ -117,7 +124,7 @@ def directional_sums(
         return np.zeros((len(shares), len(skies.lit)))
     weights = (shares * KLEMS_FULL.projected_solid_angles()).reshape(len(shares), -1)
 
-    def of_season(scene: PhaseScene, sky: FloatArray) -> FloatArray:
+    def of_season(scene: PhaseMatrices, sky: FloatArray) -> FloatArray:
         daylight = scene.parts.of_groups(scene.daylight.values)
         rows = weights @ daylight.reshape(weights.shape[1], -1)
         return (rows.astype(sky.dtype) @ sky).astype(float)
@@ -184,7 +191,7 @@ def facade_irradiance(
     """Irradiance on the outside of a zone's surfaces [H, F] [W/m2]; 0 of those indoors."""
     facade = np.zeros((skies.hours, surfaces))
 
-    def of_season(scene: PhaseScene, sky: FloatArray) -> FloatArray:
+    def of_season(scene: PhaseMatrices, sky: FloatArray) -> FloatArray:
         coefficients = sky_irradiance_matrix(
             scene.scene.exterior, outer.points, outer.normals,
             subdivision=scene.sampling.subdivision, progress=progress, **_sampled(outdoors.first),
@@ -197,7 +204,7 @@ def facade_irradiance(
     return facade
 
 
-def _sampled(scene: PhaseScene) -> dict:
+def _sampled(scene: PhaseMatrices) -> dict:
     """Sampling of the matrices that are traced for the heat balance alone."""
     return {
         "samples": max(scene.sampling.patch_samples // BATCHES, 1),

@@ -18,7 +18,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, protection_level
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky

@@ -17,18 +17,22 @@ from bim.building_file import files_beside
 from bim.model import Building, Space
 from bim.seasons import season_of
 from mitsuba_cfs import variants
-from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, kept_glare
+from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, finished_glare
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
 from mitsuba_cfs.images.view import View, format_view
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.matrices.cache import digest as content_digest
 from mitsuba_cfs.methods.glare import hourly_glare, rated_pictures
+from mitsuba_cfs.methods.light import SeasonalLight, seasonal_light
 from mitsuba_cfs.methods.optics import States
-from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.methods.seasonal_light import SeasonalLight
+from mitsuba_cfs.methods.phase_light import PhaseLight, phase_light
+from mitsuba_cfs.methods.phase_matrices import (
+    PhaseMatrices,
+    phase_matrices,
+    with_eye,
+    with_outdoors,
+)
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, item, part, silent, summed
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
@@ -144,26 +148,26 @@ def rating_of(options: YearOptions) -> GlareOptions:
 def rate_views(year: GlareYear, kept: Path, progress: Progress = silent) -> Iterator[ViewYear]:
     """Rate one view after the other; what lies in the folder `kept` is not computed again."""
     options = year.options
-    traced = PhaseScene(
+    first = phase_matrices(
         year.scene,
         sampling_of(options),
         five_phase=options.method == "five-phase",
+        needs=(),
         cache=MatrixCache.of_user(),
     )
-    others = [traced.before(scene) for scene in year.scenes[1:]]
+    seasons = [first, *(with_outdoors(first, scene) for scene in year.scenes[1:])]
     times = year.weather.midpoints[year.sky.lit]
     for number, named in enumerate(year.views):
         steps = item(progress, "view", number + 1, len(year.views), named.name, whole=True)
         start = time.monotonic()
         text = f"{year.digest} {format_view(named.view)} {named.view.width}"
-        keep = kept / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.npy"
-        found = kept_glare(keep, len(times)) if keep.is_file() else None
+        checkpoint = kept / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.npy"
+        found = finished_glare(checkpoint, len(times)) if checkpoint.is_file() else None
         tracing = summed(part(steps, 0.0, 0.3), named.name, TRACING)
-        traced = traced.seen_from(named.view, tracing)
-        others = [other.seen_from(named.view, tracing) for other in others]
-        light = _light(year, [traced, *others])
+        matrices = [with_eye(one, named.view) for one in seasons]
+        light = _light(year, matrices, () if found else (options.metric,), tracing)
         found = found or hourly_glare(
-            light, options.metric, options=rating_of(options), keep=keep,
+            light, options.metric, options=rating_of(options), checkpoint=checkpoint,
             progress=part(steps, 0.3, 1.0),
         )  # fmt: skip
         table = pd.DataFrame(
@@ -174,12 +178,14 @@ def rate_views(year: GlareYear, kept: Path, progress: Progress = silent) -> Iter
         yield ViewYear(named, table, shown, time.monotonic() - start)
 
 
-def _light(year: GlareYear, traced: Sequence[PhaseScene]) -> PhaseLight | SeasonalLight:
+def _light(
+    year: GlareYear, matrices: Sequence[PhaseMatrices], needs: Sequence[str], progress: Progress
+) -> PhaseLight | SeasonalLight:
     """The light of the year's hours."""
-    filled = [PhaseSystems(one, year.optics) for one in traced]
-    if len(filled) == 1 or year.season is None:
-        return filled[0].light(year.sky)
-    return SeasonalLight.of(filled, year.sky, year.season)
+    if len(matrices) == 1 or year.season is None:
+        return phase_light(matrices[0], year.optics, year.sky, needs=needs, progress=progress)
+    systems = [year.optics] * len(matrices)
+    return seasonal_light(matrices, systems, year.sky, year.season, needs=needs, progress=progress)
 
 
 def _pictures(

@@ -19,11 +19,14 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.progress import Progress
 from mitsuba_cfs.sky.epw import read_epw
+from scenes.demo import WEATHER
 from tests.benchmarks.harness import Comparison, PeerMissing, Run
-from tests.benchmarks.thermal_year import EPW, Clock, energyplus_room, glazing
-from tests.validation import energyplus_model, energyplus_run, reference_room
+from tests.benchmarks.thermal_year import Clock
+from tests.validation import reference_room
 from tests.validation.energyplus_cases import STEPS
+from tests.validation.energyplus_program import TIME_FILE, Model, room_model, run_energyplus
 from tests.validation.facade_sun import facade_sun, sun_steps
+from tests.validation.reference_systems import clear_double
 from thermal.balance import simulate_zones
 from thermal.zone import Zone
 
@@ -33,7 +36,7 @@ SIDES = {"left": "right", "right": "left"}
 
 def row_of_zones(count: int) -> list[Zone]:
     """Rooms beside each other, from west to east."""
-    one = reference_room.zone("S", glazing().fenestration)
+    one = reference_room.zone("S", clear_double().fenestration)
     found = []
     for k in range(count):
         surfaces = []
@@ -46,9 +49,9 @@ def row_of_zones(count: int) -> list[Zone]:
     return found
 
 
-def energyplus_row(count: int) -> energyplus_model.Model:
+def energyplus_row(count: int, outputs: dict[str, str]) -> Model:
     """EnergyPlus' model of the same rooms."""
-    model = energyplus_room("S")
+    model = room_model("S", "clear_double", outputs=outputs)
     for kind in ("Zone", "BuildingSurface:Detailed", "FenestrationSurface:Detailed",
                  "ZoneInfiltration:DesignFlowRate", "ElectricEquipment", "People"):  # fmt: skip
         objects = model[kind]
@@ -84,9 +87,9 @@ def _moved(entry: dict, k: int) -> dict:
 def our_year(count: int) -> tuple[Clock, NDArray[np.float64]]:
     """Our time from the weather file on, and the air temperatures [H, Z]."""
     wall, processor = time.perf_counter(), time.process_time()
-    weather = read_epw(EPW)
+    weather = read_epw(WEATHER)
     sun = facade_sun(sun_steps(weather, STEPS), reference_room.facade_normal("S"))
-    solar = reference_room.solar(sun, glazing(), reference_room.RoomLight())
+    solar = reference_room.solar(sun, clear_double(), reference_room.RoomLight())
     zones = row_of_zones(count)
     found = simulate_zones(
         zones, reference_room.climate(weather), [solar] * count, step_s=3600.0 / STEPS
@@ -100,11 +103,11 @@ def compare(count: int, progress: Progress) -> Comparison:
     if find_spec("pyenergyplus") is None:
         raise PeerMissing("EnergyPlus is not installed (pyenergyplus-lbnl)")
     names = {f"ROOM {k}:Zone Mean Air Temperature": f"air {k}" for k in range(count)}
-    model = energyplus_row(count) | energyplus_model.hourly_outputs(names)
+    model = energyplus_row(count, names)
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
-        theirs = energyplus_model.run_energyplus(model, EPW, place, outputs=names)
-        elapsed, processor = map(float, (place / energyplus_run.TIME_FILE).read_text().split())
+        theirs = run_energyplus(model, WEATHER, place, outputs=names)
+        elapsed, processor = map(float, (place / TIME_FILE).read_text().split())
     progress("EnergyPlus", 1.0)
     our_year(1)  # loads the compiled loop
     ours, air = our_year(count)

@@ -10,7 +10,6 @@ With two repositories their turns alternate, so that both have the same machine.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import resource
@@ -19,9 +18,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Annotated
 
 from scenes.demo import make_facade
 
@@ -153,33 +153,29 @@ def answer(repository: Path, command: str, kind: str, arguments: list[str]) -> A
     )
 
 
-def main() -> None:
+def main(
+    *,
+    repository: Sequence[Path],
+    building: Annotated[Path | None, "IFC file beside the mistakes"] = None,
+    only: Annotated[str | None, "lines whose name begins so"] = None,
+    json_: Path | None = None,
+) -> None:
     """Time all lines and print a table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--repository", type=Path, action="append", required=True)
-    parser.add_argument("--building", type=Path, help="IFC file beside the mistakes")
-    parser.add_argument("--only", help="lines whose name begins so")
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args()
-    demo = options.repository[0].absolute() / "scenes" / "demo"
-    building = (options.building or demo / "office.ifc").absolute()
+    demo = repository[0].absolute() / "scenes" / "demo"
+    building = (building or demo / "office.ifc").absolute()
     found: list[list[Answer]] = []
     with tempfile.TemporaryDirectory() as place:
         for command, kind, arguments in lines(Path(place), building, demo):
-            if options.only and not command.startswith(options.only):
+            if only and not command.startswith(only):
                 continue
             row = []
-            for repository in options.repository:
+            for checkout in repository:
                 for name in ("run", "dgp", "heat", "study", "pv"):
                     shutil.rmtree(Path(place) / name, ignore_errors=True)
-                row.append(answer(repository.absolute(), command, kind, arguments))
+                row.append(answer(checkout.absolute(), command, kind, arguments))
             found.append(row)
             cells = [f"{a.seconds:7.2f} s {a.processor:7.2f} s exit {a.exit_code}" for a in row]
             print(f"{command:14} {kind:8} " + "   ".join(cells), flush=True)
             print(f"    {row[-1].line[:110]}", flush=True)
-    if options.json:
-        options.json.write_text(json.dumps([[asdict(a) for a in row] for row in found], indent=1))
-
-
-if __name__ == "__main__":
-    main()
+    if json_:
+        json_.write_text(json.dumps([[asdict(a) for a in row] for row in found], indent=1))

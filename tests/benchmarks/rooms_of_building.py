@@ -10,8 +10,8 @@ PYTHONPATH; `--results` keeps what the rooms give.
 
 from __future__ import annotations
 
-import argparse
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,19 +25,17 @@ from scenes.room.skies import skies_for
 from scenes.run.options import JobOptions
 
 
-def main() -> None:
+def main(
+    building: Path,
+    *,
+    weather: Path,
+    cfs: Path,
+    space: Sequence[str] = (),
+    results: Path | None = None,
+) -> None:
     """Print a line for each room."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("building", type=Path)
-    parser.add_argument("--weather", type=Path, required=True)
-    parser.add_argument("--cfs", type=Path, required=True)
-    parser.add_argument("--space", action="append", default=[])
-    parser.add_argument("--results", type=Path)
-    given = parser.parse_args()
     room = RoomOptions.of(**ROOM, picture_hours=("06-21 12",))
-    options = JobOptions(
-        given.building, given.weather, given.cfs, spaces=tuple(given.space), quick=True, room=room
-    )
+    options = JobOptions(building, weather, cfs, spaces=tuple(space), quick=True, room=room)
     inputs = read_inputs(options, lambda stage, fraction: None)
     variants.activate()
     skies = skies_for(inputs.weather, room.method, room.sampling, **room.sky)
@@ -48,8 +46,8 @@ def main() -> None:
         kept[f"{space.name} illuminance"] = result.daylight.illuminance
         kept[f"{space.name} air"] = result.heat.temperatures["air_c"].to_numpy()
         kept[f"{space.name} picture"] = result.glare.pictures[0].luminance
-    if given.results is not None:
-        np.savez(given.results, **kept)
+    if results is not None:
+        np.savez(results, **kept)
 
 
 def _timed(inputs, space, room, skies):
@@ -64,7 +62,3 @@ def _timed(inputs, space, room, skies):
         seconds = time.process_time() - start
         kernels = dr.kernel_history([dr.KernelType.JIT])
     return seconds, sum(not kernel["cache_hit"] for kernel in kernels), result
-
-
-if __name__ == "__main__":
-    main()

@@ -9,6 +9,7 @@ from bim.shell import open_edges
 from scenes.demo.make_office import HEIGHT
 from tests.benchmarks import tower as benchmark
 from tests.benchmarks.tower import NORTH, ROOMS, SOUTH, tower
+from tests.scripts import run_script
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +30,7 @@ def test_half_a_storey_is_refused(rooms):
         tower(rooms)
 
 
-def test_options_behind_two_dashes_go_to_the_command(monkeypatch, capsys):
+def test_options_go_to_the_command(monkeypatch, capsys):
     asked = []
 
     def measured(rooms, options, *, of):
@@ -37,7 +38,8 @@ def test_options_behind_two_dashes_go_to_the_command(monkeypatch, capsys):
         return benchmark.Used(rooms, 10.0, 6.0, 1.0)
 
     monkeypatch.setattr(benchmark, "measured", measured)
-    benchmark.main(["10", "30", "--of", "check", "--", "--processes", "2"])
+    words = ["tower", "10", "30", "--of", "check", "--options=--processes 2"]
+    assert run_script("tests.benchmarks", words) == 0
     assert asked == [(10, ["--processes", "2"], "check"), (30, ["--processes", "2"], "check")]
     assert "| 30 | 10.0 | 6 | 0.33 | 0.00 | 1.00 |" in capsys.readouterr().out
 

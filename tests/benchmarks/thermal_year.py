@@ -19,16 +19,14 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.progress import Progress
 from mitsuba_cfs.sky.epw import read_epw
-from scenes.demo import FOLDER as DEMO
+from scenes.demo import WEATHER
 from tests.benchmarks.harness import Comparison, PeerMissing, Run
-from tests.validation import energyplus_model, energyplus_run, reference_room
-from tests.validation.ashrae140_sun import ANGLES, PANE, glass
+from tests.validation import reference_room
 from tests.validation.energyplus_cases import STEPS, Site, simulate_case
+from tests.validation.energyplus_program import TIME_FILE, room_model, run_energyplus
 from tests.validation.facade_sun import facade_sun, sun_steps
-from tests.validation.reference_systems import Optics, ReferenceSystem
-from thermal.blackbox import Fenestration, LayerAbsorptances
+from tests.validation.reference_systems import clear_double
 
-EPW = DEMO / "USA_IL_Chicago-OHare.Intl.AP.725300_TMY3.epw"
 ORIENTATIONS = tuple(reference_room.ORIENTATIONS)
 REPEAT = 3  # of ours; the fastest counts
 
@@ -40,51 +38,22 @@ class Clock(NamedTuple):
     processor: float
 
 
-def glazing() -> ReferenceSystem:
-    """The clear double glazing of `glass("double")` as a system of the reference room."""
-    pane = glass("double")
-    tau, outer, inner = pane.diffuse
-    rho = 1.0 - tau - outer - inner
-    share = {"rho_back": pane.back[0]}
-    diffuse = np.array([[tau, rho, 0.0]] * 2)  # g is not needed any more
-    dark = np.zeros_like(ANGLES)
-    optics = Optics(ANGLES, None, pane.tau, dark, dark, diffuse, None, share)
-    both = LayerAbsorptances(np.full(2, outer), np.full(2, inner), 0.0)
-    direct = LayerAbsorptances(pane.outer, pane.inner, 0.0)
-    # light that the glass passes as beam: `reference_room` knows clear glass by this name
-    plain = pane.fenestration
-    fenestration = Fenestration("dgu", plain.u_value, resistance=plain.resistance)
-    return ReferenceSystem(fenestration, optics, direct, both, (pane.back[1], pane.back[2]))
-
-
-def energyplus_room(orientation: str) -> energyplus_model.Model:
-    """EnergyPlus' model of the same room and glazing."""
-    model = energyplus_model.room_model("dgu", orientation, steps=STEPS)
-    thickness, tau, rho = PANE
-    pane = energyplus_model.pane(tau, rho, rho, 0.84)
-    pane |= {"thickness": thickness, "conductivity": 1.0}
-    model["WindowMaterial:Glazing"] = {"CLEAR": pane, "LOWE": pane}
-    del model["WindowMaterial:GasMixture"]
-    model["WindowMaterial:Gas"] = {"GAP": {"gas_type": "Air", "thickness": 0.012}}
-    return model
-
-
 def energyplus_year(orientation: str) -> tuple[Clock, pd.DataFrame]:
     """EnergyPlus' time for one case, and its hours."""
     if find_spec("pyenergyplus") is None:
         raise PeerMissing("EnergyPlus is not installed (pyenergyplus-lbnl)")
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
-        hours = energyplus_model.run_energyplus(energyplus_room(orientation), EPW, place)
-        elapsed, processor = (place / energyplus_run.TIME_FILE).read_text().split()
+        hours = run_energyplus(room_model(orientation, "clear_double"), WEATHER, place)
+        elapsed, processor = (place / TIME_FILE).read_text().split()
     return Clock(float(elapsed), float(processor)), hours
 
 
 def our_years(orientations: tuple[str, ...]) -> tuple[Clock, list[NDArray[np.float64]]]:
     """Our time for some orientations from the weather file on, and their air temperatures."""
     wall, processor = time.perf_counter(), time.process_time()
-    light, system = reference_room.RoomLight(), glazing()
-    weather = read_epw(EPW)
+    light, system = reference_room.RoomLight(), clear_double()
+    weather = read_epw(WEATHER)
     steps = sun_steps(weather, STEPS)
     suns = {o: facade_sun(steps, reference_room.facade_normal(o)) for o in orientations}
     place = Site("bench", weather, reference_room.climate(weather), suns)

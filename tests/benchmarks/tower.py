@@ -1,6 +1,6 @@
 """Processor seconds and peak memory of `cfs run --quick` for towers of more and more rooms.
 
-    python -m tests.benchmarks tower [ROOMS ...] [--of run|check|thermal] [-- OPTIONS]
+    python -m tests.benchmarks tower [ROOMS ...] [--of run|check|thermal] [--options "..."]
     python -m tests.benchmarks tower ROOMS --write FILE.ifc
 
 Each storey has nine offices with a window, five to the south and four to the north, and between
@@ -15,13 +15,14 @@ cost above the tower before.
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import ifcopenshell
 import ifcopenshell.api.aggregate
@@ -163,34 +164,28 @@ def _used(rooms: int, command: list[str], folder: Path) -> Used:
     return Used(rooms, seconds, os.times().elapsed - before.elapsed, usage.ru_maxrss / 2**20)
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    rooms: Sequence[int] = (10, 30, 100, 300),
+    *,
+    of: Annotated[str, ("run", "check", "thermal")] = "run",
+    write: Annotated[Path | None, "write the first tower here, and no more"] = None,
+    options: Annotated[str, "of the command, as one text"] = "",
+) -> None:
     """Print a line for each tower."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("rooms", nargs="*", type=int, default=[10, 30, 100, 300])
-    parser.add_argument("--of", choices=["run", "check", "thermal"], default="run")
-    parser.add_argument("--write", type=Path, help="write the first tower here, and no more")
-    own, options = list(sys.argv[1:] if arguments is None else arguments), []
-    if "--" in own:
-        own, options = own[: own.index("--")], own[own.index("--") + 1 :]
-    given = parser.parse_args(own)
-    if given.write is not None:
-        tower(given.rooms[0]).write(str(given.write))
+    if write is not None:
+        tower(rooms[0]).write(str(write))
         return
     print("| rooms | processor s | elapsed s | by room | of each room more | GB |")
     print("|---" * 6 + "|")
     last = None
-    for rooms in given.rooms:
-        used = measured(rooms, options, of=given.of)
+    for count in rooms:
+        used = measured(count, options.split(), of=of)
         more = ""
-        if last is not None and rooms > last.rooms:
-            more = f"{(used.seconds - last.seconds) / (rooms - last.rooms):.2f}"
+        if last is not None and count > last.rooms:
+            more = f"{(used.seconds - last.seconds) / (count - last.rooms):.2f}"
         print(
-            f"| {rooms} | {used.seconds:.1f} | {used.elapsed:.0f} | {used.seconds / rooms:.2f} "
+            f"| {count} | {used.seconds:.1f} | {used.elapsed:.0f} | {used.seconds / count:.2f} "
             f"| {more} | {used.memory:.2f} |",
             flush=True,
         )
         last = used
-
-
-if __name__ == "__main__":
-    main()

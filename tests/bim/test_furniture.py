@@ -14,9 +14,8 @@ from bim.sensors import sensor_grid, view_point
 from bim.templates import room_features
 from bim.to_radiance import write_radiance
 from bim.to_tracer import furnished_surfaces, interior_surfaces, window_groups
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.surfaces import Surfaces
 from tests.bim.small_ifc import DEPTH, OPENING, WIDTH, box_model
 from tests.issues import of_code
@@ -94,7 +93,7 @@ def test_shelf_above_the_sensors_takes_their_light(room):
     for furniture in ((), shelf):
         surfaces = furnished_surfaces(replace(room, furniture=furniture))
         scene = DaylightScene(surfaces, Surfaces.none(), window_groups(room), points, normals)
-        seen.append(PhaseScene(scene, Sampling(sensor_samples=512)).sensors.values.sum(axis=-1))
+        seen.append(phase_matrices(scene, Sampling(sensor_samples=512)).sensors.values.sum(axis=-1))
     ratio = (seen[1] / seen[0]).ravel()
     under = points[:, 1] > SHELF[0][1] + 0.3
     assert ratio[under].max() < 0.2

@@ -134,5 +134,5 @@ def test_every_code_and_phrase_is_used():
     built = {f"{kind}-assumed" for kind in ("reflectance", "construction", "element", "adjacency")}
     built |= {"apertures-without-room", "doors-without-room"}
     assert not [code for code in catalogue() if f'"{code}"' not in text and code not in built]
-    prefixes = ("month-", "side-")
+    prefixes = ("month-", "side-", "data-")
     assert not [key for key in phrases() if f'"{key}"' not in text and not key.startswith(prefixes)]

@@ -10,6 +10,7 @@ import pytest
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.methods.light import direct_sun_by_group, illuminance
 from mitsuba_cfs.metrics import lm83
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.comply.blinds import diffuse_shade, open_and_closed, with_default_shade
@@ -107,14 +108,14 @@ def test_blinds_are_moved_group_by_group(room):
     assert closed[before_noon, east].any() and not closed[~before_noon, east].any()
     # by hand: state by state through the same matrices
     count = len(operated.points)
-    through = [part[:count] for part in light.light.direct_sun_by_group()]
+    through = [part[:count] for part in direct_sun_by_group(light.light)]
     over = lm83.blinds_operated([part.T for part in through])
     np.testing.assert_array_equal(closed.T, over)
     np.testing.assert_allclose(sum(through).T, operated.direct[lit], rtol=1e-6)
     for states in ((0, 0), (1, 0), (0, 1)):
         hours = np.all(over == np.array(states, dtype=bool)[:, None], axis=0)
         row = np.tile(np.array(states)[:, None], len(lit))
-        wanted = light.light.illuminance(row)[:count, hours].T
+        wanted = illuminance(light.light, row)[:count, hours].T
         np.testing.assert_allclose(operated.operated[lit][hours], wanted, rtol=ROUNDING)
     np.testing.assert_array_equal(operated.free, ~operated.closed)  # the default shade is no view
     # with closed blinds it is darker, with open ones the same

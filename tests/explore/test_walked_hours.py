@@ -43,6 +43,6 @@ def test_sizes_are_those_on_disk_and_the_command_prints_both(run, folder, capsys
     assert sizes(folder) == [
         f"{run.spaces[0].space.label}: {SIZE} x {SIZE} pixels, 2 states, {total:.1f} MB on disk"
     ]
-    main([str(folder)])
+    main(folder)
     lines = capsys.readouterr().out.splitlines()
     assert sum("a full hour: median" in line for line in lines) == 2

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 import mitsuba_cfs as cfs
 from mitsuba_cfs.glare.annual import full_picture
 from mitsuba_cfs.images.view import pixel_directions
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from scenes.cost import room as box
 from scenes.demo import WEATHER
 from tests.validation import fireflies
@@ -35,10 +36,10 @@ def beside_the_window(outdoors: bool) -> tuple[NDArray[np.float64], NDArray[np.f
     around = box.room(), exterior, box.window_groups()
     lit = replace(lit, scene=cfs.DaylightScene(*around, points, normals, view=view))
     sky = lit.drawn(1, 0)
-    light = cfs.PhaseSystems(cfs.PhaseScene(lit.scene), lit.systems).light(sky)
-    pictures = light.pictures(np.arange(1), [0])
+    light = cfs.phase_light(cfs.phase_matrices(lit.scene), lit.systems, sky)
+    pictures = pictures_in_state(light, np.arange(1), [0])
     found = full_picture(pictures.without_disc(np.array([0]))[0][0], pictures.pixels, view)
-    lux = cfs.PathSystems(lit.scene, lit.systems).light(sky).illuminance()[:, 0]
+    lux = cfs.illuminance(cfs.PathLight(lit.scene, lit.systems, sky))[:, 0]
     expected = box.WALLS / np.pi * lux.reshape(len(DISTANCES), -1).mean(axis=1)
     directions, _ = pixel_directions(view)
     before = directions[..., 0] < -0.1

@@ -12,7 +12,8 @@ from mitsuba_cfs.glare.annual import annual_glare
 from mitsuba_cfs.glare.dgp_error import dgp_errors, hours_by_halves
 from mitsuba_cfs.glare.evaluation import GlareOptions, evaluate
 from mitsuba_cfs.images.view import fisheye
-from mitsuba_cfs.methods.glare import _of_paths, rated_pictures
+from mitsuba_cfs.methods import glare as method_glare
+from mitsuba_cfs.methods.glare import _by_path_tracing, rated_pictures
 from tests.glare.test_outdoor_pictures import sky
 from tests.trace import rooms
 
@@ -87,14 +88,12 @@ def test_the_error_of_a_year_is_half_of_what_its_half_pictures_differ() -> None:
     assert found.dgp_standard_error[0] == pytest.approx(expected, rel=1e-5)
 
 
-def test_the_error_of_a_shown_picture_is_that_of_its_halves() -> None:
-    traced = SimpleNamespace(scene=Rated, few=lambda pictures: False)
-    filled = SimpleNamespace(systems=[[None]], traced=traced)
+def test_the_error_of_a_shown_picture_is_that_of_its_halves(monkeypatch) -> None:
     light = SimpleNamespace(
-        filled=filled,
-        sky=SimpleNamespace(lit=np.zeros(1)),
-        pictures=lambda hours, now, few: Rated(),
+        scene=SimpleNamespace(eye=VIEW), systems=[[None]], sky=SimpleNamespace(lit=np.zeros(1))
     )
+    made = [(np.array([0]), Rated())]
+    monkeypatch.setattr(method_glare, "pictures_by_state", lambda *_: made)
     ((shown, rated),) = rated_pictures(light, np.array([0]))
     assert shown[0, 0] == LUMINANCE[0] + DISC  # which a source's rating takes apart
     np.testing.assert_array_equal(shown.ravel()[1:], LUMINANCE[1:])
@@ -102,17 +101,19 @@ def test_the_error_of_a_shown_picture_is_that_of_its_halves() -> None:
     assert rated.dgp_standard_error == pytest.approx(expected, rel=1e-5)
 
 
-def test_the_error_by_paths_is_that_of_another_seed() -> None:
+def test_the_error_by_paths_is_that_of_another_seed(monkeypatch) -> None:
     """Two pictures of as many paths each differ by sqrt(2) of the error of one."""
 
-    def picture(hour, now, seed=0, **given):
+    def picture(light, room, hour, seed=0, **given):
         return ((1 + SHARE * seed) * LUMINANCE).reshape(48, 48)
 
-    filled = SimpleNamespace(scene=Rated, systems=[[None]], sampling=SimpleNamespace(seed=0))
-    light = SimpleNamespace(filled=filled, picture=picture, disc=lambda hour, now: None)
-    rows = np.zeros((1, 1), dtype=np.int64)
+    monkeypatch.setattr(method_glare, "picture_of_room", picture)
+    monkeypatch.setattr(method_glare, "disc_of_room", lambda *_: None)
+    monkeypatch.setattr(method_glare, "rooms_by_state", lambda *_: {(0,): None})
+    light = SimpleNamespace(scene=SimpleNamespace(eye=VIEW), sampling=SimpleNamespace(seed=0))
+    state = np.zeros((1, 1), dtype=np.int64)
     options = GlareOptions()
-    found = _of_paths(light, "DGP", np.array([0]), rows, options, lambda stage, share: None)
+    found = _by_path_tracing(light, "DGP", np.array([0]), state, options, lambda *_: None)
     expected = abs(dgp_of(1 + SHARE) - dgp_of(1.0)) / np.sqrt(2)
     assert found.dgp_standard_error[0] == pytest.approx(expected, rel=1e-5)
 
@@ -131,8 +132,8 @@ def test_the_stated_error_is_the_spread_over_seeds(five_phase: bool) -> None:
     rated, stated = [], []
     for seed in range(SEEDS):
         sampling = cfs.Sampling(view_samples=2, seed=seed)
-        traced = cfs.PhaseScene(scene, sampling, five_phase=five_phase)
-        light = cfs.PhaseSystems(traced, [[glass]]).light(sky(HOURS))
+        traced = cfs.phase_matrices(scene, sampling, five_phase=five_phase)
+        light = cfs.phase_light(traced, [[glass]], sky(HOURS))
         glare = cfs.hourly_glare(light)
         rated.append(glare.dgp)
         stated.append(glare.dgp_standard_error)

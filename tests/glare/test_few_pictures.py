@@ -11,6 +11,12 @@ import pytest
 from scipy import sparse
 
 from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.methods.phase_matrices import (
+    few_pictures,
+    view_of_light,
+    with_view_matrices,
+)
+from mitsuba_cfs.methods.subdivision import Parts
 from tests.glare.test_outdoor_pictures import sky
 from tests.trace import rooms
 from tests.trace.gloss_scenes import black_room
@@ -22,7 +28,7 @@ HOURS = np.array([3, 0, 4])
 STATES = np.array([[1, 0, 0, 1, 0]])  # of the one window in each of five hours: both at HOURS
 
 
-def filled(**kept: Any) -> Any:
+def light_of(*needs: str, **kept: Any) -> Any:
     """A room with a wall and an overhang before it, its window with two states of glass."""
     import mitsuba_cfs as cfs
 
@@ -30,7 +36,7 @@ def filled(**kept: Any) -> Any:
     scene = cfs.DaylightScene(room, rooms.obstruction(), groups, view=VIEW)
     sampling = cfs.Sampling(view_samples=2, patch_samples=256, window_parts=2)
     states = [cfs.AngularOptics([0.0, tau, tau, tau, tau]) for tau in (0.7, 0.2)]
-    return cfs.PhaseSystems(cfs.PhaseScene(scene, sampling, **kept), [states])
+    return cfs.daylight(scene, [states], sky(5), sampling=sampling, needs=needs, **kept)
 
 
 @cache
@@ -38,9 +44,9 @@ def by_patches() -> list:
     """The rated pictures by V of all patches."""
     from mitsuba_cfs.methods.glare import rated_pictures
 
-    systems = filled()
-    assert systems.traced.view.lit.rows.shape[1] == 145 * len(systems.traced.parts.groups)
-    return rated_pictures(systems.light(sky(5)), HOURS, STATES)
+    light = light_of("DGP")
+    assert light.matrices.view.lit.rows.shape[1] == 145 * len(light.matrices.parts.groups)
+    return rated_pictures(light, HOURS, STATES)
 
 
 def test_paths_that_carry_luminance_sum_to_the_matrix_times_it() -> None:
@@ -71,10 +77,9 @@ def test_few_pictures_are_those_of_the_matrices() -> None:
     """Hours out of order in two states: pictures, glare, and its error."""
     from mitsuba_cfs.methods.glare import pictures, rated_pictures
 
-    systems = filled()
-    light = systems.light(sky(5))
+    light = light_of()
+    assert few_pictures(light.matrices, len(HOURS))
     found = rated_pictures(light, HOURS, STATES)
-    assert "view" not in vars(systems.traced)  # V of all patches was not traced
     shown = pictures(light, HOURS, STATES)
     for (picture, rated), (expected, other), again in zip(found, by_patches(), shown, strict=True):
         np.testing.assert_allclose(picture, expected, rtol=1e-4, atol=1e-5 * expected.mean())
@@ -87,48 +92,44 @@ def test_few_pictures_are_those_of_the_matrices() -> None:
 
 
 def test_matrices_at_hand_are_taken_and_many_pictures_get_them() -> None:
-    systems = filled()
-    traced = systems.traced
-    patches = 145 * len(traced.parts.groups)
-    assert traced.few(10)
-    assert not traced.few(patches)
-    assert traced.view is traced.view
-    assert not traced.few(1)
+    matrices = light_of().matrices
+    patches = 145 * len(matrices.parts.groups)
+    assert few_pictures(matrices, 10)
+    assert not few_pictures(matrices, patches)
+    assert not few_pictures(with_view_matrices(matrices), 1)
 
 
 def test_the_cache_gives_few_pictures_again_and_matrices_first(tmp_path, monkeypatch) -> None:
     """The same pictures are not traced twice, and kept matrices serve other systems."""
     from mitsuba_cfs.matrices.cache import MatrixCache
-    from mitsuba_cfs.methods import phase_scene
+    from mitsuba_cfs.methods import phase_matrices
     from mitsuba_cfs.methods.glare import rated_pictures
 
     kept, calls = MatrixCache(tmp_path), []
-    trace = phase_scene.view_matrices
+    trace = phase_matrices.view_matrices
 
     def counted(*args, **options):
         calls.append(options["light"])
         return trace(*args, **options)
 
-    monkeypatch.setattr(phase_scene, "view_matrices", counted)
-    first, second = (
-        rated_pictures(filled(cache=kept).light(sky(5)), HOURS, STATES) for _ in range(2)
-    )
+    monkeypatch.setattr(phase_matrices, "view_matrices", counted)
+    first, second = (rated_pictures(light_of(cache=kept), HOURS, STATES) for _ in range(2))
     assert len(calls) == 1 and calls[0] is not None
     for (picture, _), (again, _) in zip(first, second, strict=True):
         np.testing.assert_array_equal(picture, again)
-    assert len(filled(cache=kept).traced.view.pixels) and calls[1] is None
-    assert not filled(cache=kept).traced.few(1)
-    rated_pictures(filled(cache=kept).light(sky(5)), HOURS, 1 - STATES)
+    assert len(light_of("DGP", cache=kept).matrices.view.pixels) and calls[1] is None
+    assert not few_pictures(light_of(cache=kept).matrices, 1)
+    rated_pictures(light_of(cache=kept), HOURS, 1 - STATES)
     assert len(calls) == 2
 
 
-def traced(**kept: Any) -> Any:
+def matrices_of(*needs: str, **kept: Any) -> Any:
     """The bare room, nothing outdoors: few paths, and elements near and far."""
     import mitsuba_cfs as cfs
 
     room, groups = rooms.test_room()
     scene = cfs.DaylightScene(room, rooms.NOTHING, groups, view=VIEW)
-    return cfs.PhaseScene(scene, cfs.Sampling(view_samples=2), **kept)
+    return cfs.phase_matrices(scene, cfs.Sampling(view_samples=2), needs=needs, **kept)
 
 
 def luminance(number: int) -> Any:
@@ -169,11 +170,13 @@ def test_sunlit_elements_are_found_again_under_any_light(tmp_path, elements_trac
     from mitsuba_cfs.matrices.cache import MatrixCache
 
     kept = MatrixCache(tmp_path)
-    found = [traced(cache=kept).view_of(luminance(number)) for number in (1, 2, 2)]
-    found.append(traced(cache=kept).view)
+    found = [view_of_light(matrices_of(cache=kept), luminance(number)) for number in (1, 2, 2)]
+    found.append(matrices_of("DGP", cache=kept).view)
     assert len(elements_traced) == 1
     assert len(list(tmp_path.glob("view-elements-*"))) == 1
-    alone = [traced().view_of(luminance(number)) for number in (1, 2, 2)] + [traced().view]
+    alone = [view_of_light(matrices_of(), luminance(number)) for number in (1, 2, 2)] + [
+        matrices_of("DGP").view
+    ]
     for one, other in zip(found, alone, strict=True):
         pairs = list(zip(arrays(one), arrays(other), strict=True))
         assert len(pairs) > 30 and one.elements.mean.near.nnz > 0 and one.elements.close.any()
@@ -187,10 +190,10 @@ def test_systems_share_the_elements_and_not_the_pictures(tmp_path, elements_trac
     from mitsuba_cfs.methods.glare import rated_pictures
 
     kept = MatrixCache(tmp_path)
-    rated_pictures(filled(cache=kept).light(sky(5)), HOURS, STATES)
-    found = rated_pictures(filled(cache=kept).light(sky(5)), HOURS, 1 - STATES)
+    rated_pictures(light_of(cache=kept), HOURS, STATES)
+    found = rated_pictures(light_of(cache=kept), HOURS, 1 - STATES)
     assert len(elements_traced) == 1
-    alone = rated_pictures(filled().light(sky(5)), HOURS, 1 - STATES)
+    alone = rated_pictures(light_of(), HOURS, 1 - STATES)
     for (picture, rated), (expected, other) in zip(found, alone, strict=True):
         np.testing.assert_array_equal(picture, expected)
         assert rated.dgp == other.dgp
@@ -218,11 +221,11 @@ def _changed(name: str, scene: Any, sampling: Any) -> Any:
 def test_elements_of_another_view_are_not_taken(tmp_path, elements_traced, name) -> None:
     from mitsuba_cfs.matrices.cache import MatrixCache
 
-    first = traced(cache=MatrixCache(tmp_path))
-    first.view_of(luminance(1))
+    first = matrices_of(cache=MatrixCache(tmp_path))
+    view_of_light(first, luminance(1))
     scene, sampling = _changed(name, first.scene, first.sampling)
-    other = type(first)(scene, sampling, cache=MatrixCache(tmp_path))
-    other.view_of(luminance(2))
+    other = replace(first, scene=scene, sampling=sampling, parts=Parts.whole(scene.groups))
+    view_of_light(other, luminance(2))
     assert len(elements_traced) == 2
     assert len(list(tmp_path.glob("view-elements-*"))) == 2
 
@@ -233,19 +236,19 @@ def test_what_is_lost_or_too_large_is_traced_anew(tmp_path, elements_traced, mon
     from mitsuba_cfs.methods import view_cache
 
     kept = MatrixCache(tmp_path)
-    traced(cache=kept).view_of(luminance(1))
+    view_of_light(matrices_of(cache=kept), luminance(1))
     (file,) = tmp_path.glob("view-elements-*")
     whole = file.read_bytes()
     for left in (None, whole[: len(whole) // 2]):
         file.unlink() if left is None else file.write_bytes(left)
         before = len(elements_traced)
-        assert traced(cache=kept).view_of(luminance(1)).elements is not None
+        assert view_of_light(matrices_of(cache=kept), luminance(1)).elements is not None
         assert len(elements_traced) == before + 1
         assert file.stat().st_size == len(whole)
     for other in tmp_path.glob("view-*"):
         other.unlink()
     monkeypatch.setattr(view_cache, "LARGEST", len(whole) // 2)
-    traced(cache=kept).view_of(luminance(1))
+    view_of_light(matrices_of(cache=kept), luminance(1))
     assert not list(tmp_path.glob("view-*"))
 
 
@@ -258,7 +261,7 @@ def test_rooms_with_gloss_keep_the_patches() -> None:
     groups = rooms.test_room()[1]
     room = black_room(cfs.Gloss((0.04, 0.04)))[1]
     scene = cfs.DaylightScene(room, rooms.NOTHING, groups, view=VIEW)
-    assert room.glossy and not cfs.PhaseScene(scene).few(1)
+    assert room.glossy and not few_pictures(cfs.phase_matrices(scene, needs=()), 1)
     light = np.ones((145, 1), dtype=np.float32)
     with pytest.raises(ValueError, match="gloss"):
         view_matrices(room, groups, VIEW, samples=1, light=PatchLight(light, light))

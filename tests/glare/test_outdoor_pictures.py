@@ -9,6 +9,8 @@ import pytest
 
 from mitsuba_cfs.glare.annual import full_picture
 from mitsuba_cfs.images.view import fisheye, pixel_directions
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
+from mitsuba_cfs.methods.point_in_time import path_picture
 from mitsuba_cfs.sky.annual import given_sky
 from mitsuba_cfs.sky.sun import direction
 from mitsuba_cfs.surfaces import Surfaces
@@ -54,18 +56,18 @@ def lights(hours=1, samples=8):
     scene = cfs.DaylightScene(room, street(), groups, view=VIEW)
     finer = replace(scene, view=replace(VIEW, width=FINER * SIZE, height=FINER * SIZE))
     glass = cfs.AngularOptics([0.0, 0.6, 0.6, 0.6, 0.6])
-    phases = cfs.PhaseSystems(cfs.PhaseScene(scene), [[glass]]).light(sky(hours))
+    phases = cfs.daylight(scene, [[glass]], sky(hours), needs=["DGP"])
     chosen = cfs.Sampling(picture_samples=samples)
-    return phases, cfs.PathSystems(finer, [[glass]], chosen).light(sky(hours))
+    return phases, cfs.PathLight(finer, [[glass]], sky(hours), chosen)
 
 
 def both(hours=1, samples=8):
     """Pictures [h, ny, nx] by five phases, and finer ones by paths, without the sun's disc."""
     phases, paths = lights(hours, samples)
-    made = phases.pictures(np.arange(hours), [0])
+    made = pictures_in_state(phases, np.arange(hours), [0])
     values = made.without_disc(np.arange(hours))[0]
     found = np.stack([full_picture(row, made.pixels, VIEW) for row in values])
-    return found, np.stack([paths.picture(h, disc=False) for h in range(hours)])
+    return found, np.stack([path_picture(paths, h, disc=False) for h in range(hours)])
 
 
 def coarse(picture, of):
@@ -143,12 +145,12 @@ def test_the_beam_that_the_room_reflects_has_the_suns_own_angle():
     sun = direction(np.radians([50.0, 70.0, 77.0]), np.radians([180.0, 180.0, 180.0]))
     sun = np.vstack([sun, direction(np.radians(30.0), np.radians(258.0))])  # 78 degrees aside
     hours = given_sky(sun, np.full(4, 900.0), np.full(4, 40.0), day_of_year=172)
-    light = cfs.PhaseSystems(cfs.PhaseScene(scene), [[glass]]).light(hours)
-    paths = cfs.PathSystems(scene, [[glass]], cfs.Sampling(hour_samples=65_536)).light(hours)
-    truth = [paths.eye(hour, [0]) for hour in range(4)]
+    light = cfs.daylight(scene, [[glass]], hours, needs=["DGP"])
+    paths = cfs.PathLight(scene, [[glass]], hours, cfs.Sampling(hour_samples=65_536))
+    truth = cfs.eye_illuminance(paths)
     # the beam lies on ten to fifty of the elements, four places on each: 3 %
     assert cfs.hourly_glare(light).Ev == pytest.approx(truth, rel=0.05)
-    pictures = light.pictures(np.arange(4), [0])
+    pictures = pictures_in_state(light, np.arange(4), [0])
     assert pictures.without_disc(np.arange(4))[1] == [None] * 4
 
 
@@ -176,8 +178,9 @@ def test_the_matrices_of_a_view_are_found_again_with_their_elements(tmp_path):
     room, groups = rooms.test_room()
     view = fisheye(VIEW.position, VIEW.direction, 32)
     scene = cfs.DaylightScene(room, rooms.NOTHING, groups, view=view)
-    first, again = (cfs.PhaseScene(scene, cache=cfs.MatrixCache(tmp_path)).view for _ in range(2))
-    assert first is not again and len(list(tmp_path.rglob("*.npz"))) == 2
+    cache = cfs.MatrixCache(tmp_path)
+    first, again = (cfs.phase_matrices(scene, needs=["DGP"], cache=cache).view for _ in range(2))
+    assert first is not again and len(list(tmp_path.rglob("view-*.npz"))) == 2
     light = np.random.default_rng(0).random((first.elements.mean.places.size, 3))
     np.testing.assert_array_equal(first.elements.mean.rows(light), again.elements.mean.rows(light))
     np.testing.assert_array_equal(

@@ -8,6 +8,10 @@ import pytest
 from mitsuba_cfs.glare.annual import annual_glare, full_picture
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.glare.indices import simplified_dgp
+from mitsuba_cfs.methods import UnknownMethodError
+from mitsuba_cfs.methods.glare import metric_values
+from mitsuba_cfs.methods.light import daylight
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
 from tests.glare.test_annual import VIEW, made_up
 
 
@@ -33,14 +37,12 @@ def test_sdgp_is_wienolds_line_and_at_most_one():
 @pytest.mark.parametrize(("scale", "same"), [(0.0, True), (1.0, False)])
 def test_a_direct_view_leaves_out_what_the_room_reflects_twice(variant, scale, same):
     """The pictures of eDGP: a part of the whole ones, pixel by pixel, as the seed is the same."""
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
-    from mitsuba_cfs.methods.scene import DaylightScene
+    from mitsuba_cfs.methods.scene import DaylightScene, Sampling
     from tests.trace import rooms
 
     room, groups = rooms.test_room(scale)
     scene = DaylightScene(room, rooms.NOTHING, groups, view=VIEW)
-    traced = PhaseScene(scene, Sampling(view_samples=4))
+    traced = phase_matrices(scene, Sampling(view_samples=4), needs=["DGP", "eDGP"])
     luminance = np.ones((1, 145, 1))
     whole, part = (
         m.three_phase(luminance).values(np.array([0])) for m in (traced.view, traced.direct_view)
@@ -57,7 +59,7 @@ def place(variant):
     """The benchmark's room in small, and its window."""
     from dataclasses import replace
 
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
     from scenes.cost.reference import reference_scene, reference_sky, reference_system
 
     scene = reference_scene(96)
@@ -75,13 +77,12 @@ def place(variant):
 )
 def test_the_methods_agree_on_every_metric_behind_a_blind(place, metric):
     from mitsuba_cfs.methods import METHODS
-    from mitsuba_cfs.methods.by_name import traced_scene, values, with_systems
 
     scene, system, sky, sampling = place
     found = {}
     for method in METHODS:
-        filled = with_systems(traced_scene(method, scene, sampling), [[system]])
-        found[method] = values(filled.light(sky), metric)
+        light = daylight(scene, [[system]], sky, method=method, sampling=sampling)
+        found[method] = metric_values(light, metric)
     reference = found["point-in-time"]
     for method in METHODS[:2]:
         # windows are black to the room in the phase methods, which take 2 to 6 % of the light;
@@ -93,14 +94,14 @@ def test_the_methods_agree_on_every_metric_behind_a_blind(place, metric):
 
 
 def test_a_method_that_there_is_not_is_refused(place):
-    from mitsuba_cfs.methods.by_name import UnknownMethodError, traced_scene, values, with_systems
-
     scene, system, sky, sampling = place
     with pytest.raises(UnknownMethodError, match="two-phase"):
-        traced_scene("two-phase", scene)
-    light = with_systems(traced_scene("five-phase", scene, sampling), [[system]]).light(sky)
+        daylight(scene, [[system]], sky, method="two-phase")
+    light = daylight(scene, [[system]], sky, sampling=sampling, needs=())
     with pytest.raises(UnknownMethodError, match="UGR"):
-        values(light, "UGR")
+        metric_values(light, "UGR")
+    with pytest.raises(UnknownMethodError, match="lux"):
+        phase_matrices(scene, sampling, needs=["lux"])
 
 
 def test_costs_predict_a_study(place):

@@ -5,6 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mitsuba_cfs.methods.light import illuminance
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.point_in_time import PathLight
+
 pytestmark = pytest.mark.usefixtures("variant")
 
 
@@ -60,10 +65,7 @@ def bands(variant):
 
 def test_each_band_has_its_own_system_in_light_and_in_glare(bands):
     from mitsuba_cfs.methods.glare import hourly_glare
-    from mitsuba_cfs.methods.path_light import PathSystems
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     scene, windows, hour = bands
     assert len(windows.groups) == 3 and [len(states) for states in windows.systems] == [1, 1, 1]
@@ -71,9 +73,9 @@ def test_each_band_has_its_own_system_in_light_and_in_glare(bands):
         sensor_samples=32_768, patch_samples=4_096, hour_samples=131_072, picture_samples=48
     )
     optics = windows.optics()
-    found = PhaseSystems(PhaseScene(scene, few), optics).light(hour)
-    paths = PathSystems(scene, optics, few).light(hour)
-    lit, expected = found.illuminance()[:, 0], paths.illuminance()[:, 0]
+    found = phase_light(phase_matrices(scene, few), optics, hour)
+    paths = PathLight(scene, optics, hour, few)
+    lit, expected = illuminance(found)[:, 0], illuminance(paths)[:, 0]
     print("illuminance over that by paths", lit / expected)
     # noise of 1 %, and the sun that the room reflects comes from a whole patch of 10 degrees
     np.testing.assert_allclose(lit, expected, rtol=0.05)
@@ -81,5 +83,5 @@ def test_each_band_has_its_own_system_in_light_and_in_glare(bands):
     print("DGP", glare.dgp, by_paths.dgp)
     assert glare.dgp[0] == pytest.approx(by_paths.dgp[0], abs=0.02)
     # the panes in another order are another room: the agreement is not that of any mixture
-    turned = PhaseSystems(found.filled.traced, [optics[2], optics[0], optics[1]]).light(hour)
-    assert np.abs(turned.illuminance()[:, 0] / expected - 1).max() > 0.1
+    turned = phase_light(found.matrices, [optics[2], optics[0], optics[1]], hour)
+    assert np.abs(illuminance(turned)[:, 0] / expected - 1).max() > 0.1

@@ -12,7 +12,7 @@ from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods import glare
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
@@ -65,7 +65,7 @@ def test_each_hour_is_that_of_its_state(variant, skies, tmp_path, monkeypatch) -
         def none(*_: object, **__: object) -> None:
             raise AssertionError("the pictures were made again")
 
-        patched.setattr(PhaseLight, "pictures", none)
+        patched.setattr(glare, "pictures_in_state", none)
         read = rated(skies, folder, (up, down), moves)
         for states, width in (((up, other), 2.0), ((up, down), 1.5)):
             with pytest.raises(AssertionError, match="made again"):

@@ -138,17 +138,17 @@ def test_an_error_that_is_not_of_the_file_comes_through(tmp_path):
 
 @pytest.mark.parametrize("damage", [b"", b"\x93NUMPY\x01", bytes(5000), None])
 def test_cut_off_ratings_are_made_again_with_a_note(tmp_path, caplog, damage):
-    from mitsuba_cfs.glare.annual import FIGURES, kept_glare
+    from mitsuba_cfs.glare.annual import FIGURES, finished_glare
 
     keep = tmp_path / "ratings.npy"
     np.save(keep, np.ones((9, len(FIGURES))))
-    assert kept_glare(keep, 9) is not None
+    assert finished_glare(keep, 9) is not None
     keep.write_bytes(keep.read_bytes()[:-100] if damage is None else damage)
-    assert kept_glare(keep, 9) is None
+    assert finished_glare(keep, 9) is None
     assert "rated again" in caplog.text and str(keep) in caplog.text
     keep.write_text("a letter")
     with pytest.raises(DataError, match="no file of ratings"):
-        kept_glare(keep, 9)
+        finished_glare(keep, 9)
     assert keep.read_text() == "a letter"
 
 

@@ -6,7 +6,7 @@ from dataclasses import fields
 
 import pytest
 
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from scenes.room.options import NAMES, Occupancy, Outputs, RoomOptions, SensorGrid, named_types
 
 # of `Sampling`, and no choice of a user: they follow from others, or from the machine

@@ -12,10 +12,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from mitsuba_cfs.methods.path_light import PathLight, PathSystems
-from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.reflected_sun import ReflectedSun, ReflectedSunLight
+from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.phase_matrices import PhaseMatrices
+from mitsuba_cfs.methods.point_in_time import PathLight
+from mitsuba_cfs.methods.reflected_sun import ReflectedSun
 from mitsuba_cfs.trace.kernels import scene as traced_scenes
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from scenes.comply.light import lights_of
@@ -27,8 +27,7 @@ from scenes.room.windows import in_all_windows
 from tests.scenes.small_box import BOX, ROOM, SMALL
 
 OF_A_ROOM = (
-    RoomLight, PhaseScene, PhaseSystems, PhaseLight, PathSystems, PathLight, ReflectedSun,
-    ReflectedSunLight,
+    RoomLight, PhaseMatrices, PhaseLight, PathLight, ReflectedSun,
 )  # fmt: skip
 FEW = SMALL.changed(
     sensor_samples=256, patch_samples=64, sun_points=16, picture_size=32, picture_samples=2,

@@ -83,7 +83,7 @@ def test_kept_matrices_serve_other_systems(
 
 def test_a_view_is_kept_as_well(tmp_path, variant, monkeypatch, weather, skies, glass) -> None:
     """The same pictures from the file; a broken file is traced anew."""
-    from mitsuba_cfs.methods import phase_scene
+    from mitsuba_cfs.methods import phase_matrices
 
     options = SMALL.changed(picture_hours=("12-19 12",), sensor_samples=1024, patch_samples=1024)
 
@@ -100,7 +100,7 @@ def test_a_view_is_kept_as_well(tmp_path, variant, monkeypatch, weather, skies, 
     (file,) = tmp_path.glob("view-pictures-*.npz")
     assert not list(tmp_path.glob("*.part"))
     with monkeypatch.context() as patch:
-        patch.setattr(phase_scene, "view_matrices", not_called)
+        patch.setattr(phase_matrices, "view_matrices", not_called)
         np.testing.assert_array_equal(seen(cache), traced)
     file.write_bytes(file.read_bytes()[:1000])
     np.testing.assert_array_equal(seen(cache), traced)

@@ -164,7 +164,7 @@ def test_cfs_thermal_has_the_files_set_points(tmp_path):
     office, hall = (year.hours["air_c"] for year in years)
     assert hall.min() < 15 < office.min()
     assert any(note.startswith("Gains, air and set points of 2 of 2 room(s)") for note in notes)
-    assert any(note.startswith("set points (Hall): not used") for note in notes)
+    assert any(note.startswith("The file states set points (rooms: Hall)") for note in notes)
 
 
 def test_commands_with_rules_of_their_own_say_what_they_leave_out(used):

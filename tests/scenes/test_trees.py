@@ -16,6 +16,7 @@ from bim.model import Building
 from bim.rays import ray_mesh
 from bim.seasons import seasons
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.methods.light import direct_sun
 from scenes import cli
 from scenes.demo import WEATHER
 from scenes.head import model_notes, unused_notes
@@ -150,7 +151,7 @@ def test_the_sun_through_a_crown_by_month_is_that_of_beers_law(variant, weather,
 
     def scattered(building: Building) -> np.ndarray:
         room = room_of(building, milk, weather, skies, options)
-        sun = room_light(room).light.direct_sun().mean(axis=0)
+        sun = direct_sun(room_light(room).light).mean(axis=0)
         return np.where(inside, sun, 0.0)
 
     free = scattered(replace(BOX, latitude_deg=41.98))

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from mitsuba_cfs.sky.epw import read_epw
-from tests.benchmarks.thermal_year import EPW, glazing
+from scenes.demo import WEATHER as EPW
 from tests.conftest import REPOSITORY
 from tests.validation.energyplus_cases import (
     EPW_FILES,
@@ -35,6 +35,7 @@ from tests.validation.reference_room import (
     climate,
     facade_normal,
 )
+from tests.validation.reference_systems import clear_double
 
 BARS = {
     "dgu": (0.2, 0.3),
@@ -89,7 +90,7 @@ def test_clear_glazing_meets_the_bars_in_the_demo_s_climate():
     stored = pd.read_csv(REPOSITORY / "tests/reference/energyplus_chicago" / DEMO_FILE)
     air, window = BARS["dgu"]
     for orientation, table in stored.groupby("ori"):
-        year = simulate_case(place, str(orientation), glazing(), light)
+        year = simulate_case(place, str(orientation), clear_double(), light)
         wall = year.surface_in_c.mean(axis=1)
         found = {"T_air": year.air_c, "T_wall": wall, "T_win_in": year.window_inner_c[:, 0]}
         for name, bar in (("T_air", air), ("T_wall", air), ("T_win_in", window)):
@@ -153,11 +154,11 @@ def test_comfort_agrees(real_data, reference_data):
 @pytest.mark.slow
 def test_energyplus_run_here_and_now_is_the_reference(real_data, reference_data, tmp_path):
     pytest.importorskip("pyenergyplus")
-    from tests.validation.energyplus_model import room_model, run_energyplus
+    from tests.validation.energyplus_program import room_model, run_energyplus
 
     epw = real_data / "epw" / EPW_FILES["Frankfurt"]
     table = pd.read_parquet(reference_data / "energyplus" / "ep_Frankfurt.parquet")
-    live = run_energyplus(room_model("ext_blind", "S"), epw, tmp_path)
+    live = run_energyplus(room_model("S", "ext_blind"), epw, tmp_path)
     stored = table[(table.cfs == "ext_blind") & (table.ori == "S")]
     for name in ("T_air", "T_facade", "T_win_in"):
         # stored with two decimals; warm-up tolerance 0.01 K

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.methods.light import illuminance
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 
@@ -21,37 +24,34 @@ def glass_transmittance(cosine):
 
 def glass():
     """T and the sun's way of glass that a file knows at the middles of its patches."""
-    from mitsuba_cfs.methods.optics import GivenOptics
+    from mitsuba_cfs.methods.optics import MatrixOptics
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 
     tau = glass_transmittance(KLEMS_FULL.incident_directions()[:, 2])
-    return GivenOptics(np.diag(tau), KlemsScattering(KLEMS_FULL, np.zeros((K, K)), tau))
+    return MatrixOptics(np.diag(tau), KlemsScattering(KLEMS_FULL, np.zeros((K, K)), tau))
 
 
 def diffuser(tau: float):
-    from mitsuba_cfs.methods.optics import GivenOptics
+    from mitsuba_cfs.methods.optics import MatrixOptics
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 
     block = np.full((K, K), tau / np.pi)
-    return GivenOptics(block * OMEGA, KlemsScattering(KLEMS_FULL, block, np.zeros(K)))
+    return MatrixOptics(block * OMEGA, KlemsScattering(KLEMS_FULL, block, np.zeros(K)))
 
 
 def traced(interior, exterior, groups, points, **sampling):
     """The matrices of a room, none of them traced yet."""
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
-    from mitsuba_cfs.methods.scene import DaylightScene
+    from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     scene = DaylightScene(interior, exterior, groups, points, up)
-    return PhaseScene(scene, Sampling(patch_samples=4096, **sampling))
+    return phase_matrices(scene, Sampling(patch_samples=4096, **sampling))
 
 
 def lit(matrices, systems, sky, state=None):
     """Illuminance [S, L] of a room with systems by group and state."""
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
 
-    return PhaseSystems(matrices, systems).light(sky).illuminance(state)
+    return illuminance(phase_light(matrices, systems, sky), state)
 
 
 def sun_series(sky: ReinhartSky, patches, diffuse: float = 0.0) -> AnnualSky:

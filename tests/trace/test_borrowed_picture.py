@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.images.view import View, pixel_directions
-from mitsuba_cfs.methods.optics import GivenOptics
-from mitsuba_cfs.methods.phase_light import PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.optics import MatrixOptics
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.kernels.sampling import spread_rays
 from mitsuba_cfs.trace.kernels.scattering import AngularScattering
@@ -40,16 +40,16 @@ def _view(rooms: int) -> View:
 def _black(scene: DaylightScene) -> DaylightScene:
     """The same rooms, which reflect nothing."""
     dark = replace(scene.interior, reflectance=0 * scene.interior.reflectance)
-    beyond = tuple(replace(one, scene=_black(one.scene)) for one in scene.beyond)
-    return replace(scene, interior=dark, beyond=beyond)
+    beyond = tuple(replace(one, scene=_black(one.scene)) for one in scene.adjacent)
+    return replace(scene, interior=dark, adjacent=beyond)
 
 
 def _picture(scene: DaylightScene, view: View, sky: AnnualSky, **options: bool) -> NDArray:
     """Luminance [ny, nx] of the last room under the first hour of a sky."""
-    traced = PhaseScene(replace(scene, view=view), FEW, **options)
+    traced = phase_matrices(replace(scene, view=view), FEW, **options)
     dark = AngularScattering(np.zeros(2), np.zeros(2))  # the sun comes by patches
-    given = GivenOptics(INNER_TAU * np.eye(KLEMS_FULL.size), dark)
-    made = PhaseSystems(traced, [[given]]).light(sky).pictures(np.arange(1), [0])
+    given = MatrixOptics(INNER_TAU * np.eye(KLEMS_FULL.size), dark)
+    made = pictures_in_state(phase_light(traced, [[given]], sky), np.arange(1), [0])
     picture = np.zeros(view.width * view.height)
     picture[made.pixels] = made.values(np.arange(1))[0]
     return picture.reshape(view.height, view.width)

@@ -16,9 +16,8 @@ from mitsuba_cfs.methods.colour_view import (
     sun_colour,
     with_luminance,
 )
-from mitsuba_cfs.methods.path_light import PathSystems
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.point_in_time import PathLight, path_picture
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import given_sky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from tests.trace import rooms
@@ -96,9 +95,10 @@ def test_walls_colour_a_room_under_a_grey_sky() -> None:
         for scale in (red, other, other):
             interior, groups = rooms.test_room(scale)
             scene = DaylightScene(interior, rooms.NOTHING, groups, view=view)
-            found.append(PathSystems(scene, [[_Glass(glass(0.7))]], sampling))
-        lit = found[1].light(sky).picture(0)
-        return lit, coloured_picture(lit, found, sky, 0)
+            found.append(scene)
+        systems = [[_Glass(glass(0.7))]]
+        lit = path_picture(PathLight(found[1], systems, sky, sampling), 0)
+        return lit, coloured_picture(lit, found, systems, sky, 0, sampling=sampling)
 
     lit, grey = pictured(1.0, 1.0)
     assert luminance(grey) == pytest.approx(lit, rel=1e-4)

@@ -10,6 +10,16 @@ import pytest
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.klems_peak import held_beams
+from mitsuba_cfs.methods.coefficients import (
+    GroupCoefficients,
+    direct_transmittance,
+    group_coefficients,
+)
+from mitsuba_cfs.methods.light import daylight_coefficients, illuminance, illuminance_with_error
+from mitsuba_cfs.methods.phase_light import SensorLight, over_hours, phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.point_in_time import PathLight
+from mitsuba_cfs.methods.reflected_sun import reflected_sun, reflected_to_sensors, sunlit_room
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
@@ -70,7 +80,6 @@ def test_a_group_with_fewer_states_ends_with_its_last(corner):
 
 def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     """V T D s - V_d T D_d s_d - the reflected beam by patches + itself, straight views, C_ds s."""
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.trace.kernels.estimate import Stopping
     from mitsuba_cfs.trace.kernels.scattering import patch_beams, through_beams
     from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
@@ -91,29 +100,29 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     assert np.array_equal(held[0], t[0])  # glass is a beam and nothing else
     at_sun = through_beams(scene.groups, ways, sky.direction)
     by_patch, _ = phases.sun_beams(held, at_sun, matrices.direct_daylight, sky.sun)
-    filled = PhaseSystems(matrices, [[one] for one in chosen])
-    straight, more = filled.straight, filled.reflected_sun.light(sky)
+    groups = [one for (one,) in group_coefficients(matrices, [[one] for one in chosen])]
+    sun = reflected_sun(matrices, sky)
     expected -= np.einsum("sgk,gkh->sh", view - direct_view, by_patch)
-    expected += more.sensors(0, 0, beam=True).values + more.sensors(1, 0, beam=False).values
-    whole, direct = straight.matrix(0, 0).values, straight.matrix(0, 0, direct=True).values
-    lost = direct_view[:, 0] * straight.beam(0, 0)
+    for g, cells in enumerate((sunlit_room(matrices, sun), None)):  # the diffuser has no beam
+        expected += reflected_to_sensors(matrices, sun, cells, groups[g], g).values
+    whole, direct = groups[0].straight.values.values, groups[0].straight.direct
+    lost = direct_view[:, 0] * groups[0].beam
     expected += (whole - lost @ matrices.daylight.values[0]) @ sky.whole
     expected -= (direct - lost @ matrices.direct_daylight[0]) @ sky.sun
-    assert straight.matrix(1, 0) is None  # the diffuser has no beam
+    assert groups[1].straight is None
     expected += exact.values * sky.illuminance / SUN_SOLID_ANGLE
     assert found == pytest.approx(expected, rel=1e-5)  # window luminances in single precision
 
 
 def test_a_beam_that_lies_beside_the_diagonal_too_is_not_counted_twice(corner):
     """As a tensor tree's, whose cells lie across patches: eyes behind one had 14 % too much."""
-    from mitsuba_cfs.methods.optics import GivenOptics
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
+    from mitsuba_cfs.methods.optics import MatrixOptics
 
     matrices, clear = corner[0], glass()
     spread = 0.8 * clear.transmission + 0.2 * np.roll(clear.transmission, 1, axis=0)
-    beside = GivenOptics(spread, clear.scattering)
-    found = [PhaseSystems(matrices, [[one], [diffuser(0.2)]]).straight for one in (clear, beside)]
-    assert found[0].beam(0, 0).any() and not found[1].beam(0, 0).any()
+    beside = MatrixOptics(spread, clear.scattering)
+    assert direct_transmittance(matrices, clear, 0).any()
+    assert not direct_transmittance(matrices, beside, 0).any()
 
 
 def test_what_t_has_of_a_beam_beside_the_diagonal_is_taken_with_it():
@@ -134,7 +143,7 @@ def test_what_t_has_of_a_beam_beside_the_diagonal_is_taken_with_it():
 
 def test_the_room_has_a_beam_once_wherever_t_has_it(corner):
     """T of a tensor tree has a part of its beam beside the diagonal: the room reflects it once."""
-    from mitsuba_cfs.methods.optics import GivenOptics
+    from mitsuba_cfs.methods.optics import MatrixOptics
 
     clear, sky = glass(), replace(corner[1], whole=corner[1].sun)
     room, groups = rooms.test_room()
@@ -143,7 +152,7 @@ def test_the_room_has_a_beam_once_wherever_t_has_it(corner):
     beside = np.argsort(-(ways @ ways.T), axis=0)[1]
     spread = 0.6 * clear.transmission
     spread[beside, np.arange(K)] += 0.4 * np.diag(clear.transmission) * OMEGA / OMEGA[beside]
-    tree = GivenOptics(spread, clear.scattering)
+    tree = MatrixOptics(spread, clear.scattering)
     found, expected = (lit(scene, [[one]], sky) for one in (tree, clear))
     assert expected[:, [0, 2]].min() > 500  # the second sun is behind the facade
     assert found == pytest.approx(expected, rel=1e-3)
@@ -189,11 +198,7 @@ def angular_glass(back: float):
 @pytest.mark.parametrize("kind", [mirror_glass, angular_glass])
 def test_windows_reflect_the_light_of_the_room_as_paths_have_it(kind):
     """A bright room with a front of glass that reflects 0.4 to it: a tenth of the back's light."""
-    from mitsuba_cfs.methods.path_light import PathSystems
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
-    from mitsuba_cfs.methods.scene import DaylightScene
+    from mitsuba_cfs.methods.scene import DaylightScene, Sampling
     from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
 
     w, d, h = 4.0, 5.0, 3.0
@@ -220,14 +225,14 @@ def test_windows_reflect_the_light_of_the_room_as_paths_have_it(kind):
     found = {}
     for back in (0.0, 0.4):
         system = [[kind(back)]]
-        paths = PathSystems(scene, system, few).light(hours).illuminance()
+        paths = illuminance(PathLight(scene, system, hours, few))
         for five in (False, True):
-            light = PhaseSystems(PhaseScene(scene, few, five_phase=five), system).light(hours)
-            lit_by_phases = light.illuminance()
-            print(back, five, (lit_by_phases / paths).ravel(), light.relative_error())
+            light = phase_light(phase_matrices(scene, few, five_phase=five), system, hours)
+            lit_by_phases = illuminance(light)
+            print(back, five, (lit_by_phases / paths).ravel(), illuminance_with_error(light)[1])
             # three errors of both, and a tenth of the gain: W is a mean over the whole front
             np.testing.assert_allclose(lit_by_phases, paths, rtol=0.022 if back else 0.015)
-            factor = light.filled.coefficients() @ whole
+            factor = daylight_coefficients(light) @ whole
             np.testing.assert_allclose(factor, lit_by_phases, rtol=1e-5)
         found[back] = lit_by_phases
     gain = found[0.4] / found[0.0] - 1
@@ -256,8 +261,6 @@ def test_product_with_the_sun_alone_is_that_with_any_sky(lit):
 @pytest.mark.parametrize("five", [False, True])
 def test_a_groups_light_over_the_hours_is_the_sum_of_each(five):
     """Which the share of light by glass between rooms is of."""
-    from mitsuba_cfs.methods.group_light import SensorLight
-
     random = np.random.default_rng(2)
     sky = random.random((40, 9))
     sun = sky * (random.random(sky.shape) < 0.1) if five else None
@@ -265,8 +268,9 @@ def test_a_groups_light_over_the_hours_is_the_sum_of_each(five):
     whole, by_sun = random.random((2, 3, 40))
     added, straight = random.random((2, 3, 9))
     expected = whole @ sky
-    light = SensorLight(whole)
+    light = SensorLight(GroupCoefficients(glass(), np.zeros(K), None, whole, None))
     if sun is not None:
         expected += added + straight - by_sun @ sun
-        light = SensorLight(whole, by_sun, added, straight)
-    np.testing.assert_allclose(light.over_hours(hours), expected.sum(axis=1), rtol=1e-12)
+        coefficients = replace(light.coefficients, by_sun=by_sun)
+        light = SensorLight(coefficients, added, straight)
+    np.testing.assert_allclose(over_hours(light, hours), expected.sum(axis=1), rtol=1e-12)

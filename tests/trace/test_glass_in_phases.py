@@ -92,7 +92,7 @@ def test_glass_keeps_its_hemispherical_transmittance():
 
 def test_five_phases_of_clear_glass_have_the_suns_own_transmittance_all_through():
     """A glass that had the sun's transmittance in every patch gives the same, hour by hour."""
-    from mitsuba_cfs.methods.optics import GivenOptics
+    from mitsuba_cfs.methods.optics import MatrixOptics
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 
     wanted = [(62, 0.3), (66, 0.9), (74, 0.3), (77, 0.6), (84, 0.6)]
@@ -102,7 +102,7 @@ def test_five_phases_of_clear_glass_have_the_suns_own_transmittance_all_through(
     found = lit(matrices, [[glass()]], sun)
     at_sun = between_the_rings(sun.direction @ [0, -1, 0])
     for h, tau in enumerate(at_sun):
-        even = GivenOptics(
+        even = MatrixOptics(
             tau * np.eye(K), KlemsScattering(KLEMS_FULL, np.zeros((K, K)), np.full(K, tau))
         )
         # between 82.5 and 90 degrees the even glass falls to 0, and so differs

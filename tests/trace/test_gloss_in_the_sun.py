@@ -71,9 +71,11 @@ def test_five_phases_have_the_sun_of_a_mirror_facade():
     scene = cfs.DaylightScene(room, outdoors, groups, POINTS, UP)
     sky = np.tile(np.where(np.arange(2306) == 0, 200.0, 2000.0)[:, None], (1, 1))
     system = cfs.AngularOptics(np.ones(64))
-    traced_scene = cfs.PhaseScene(scene, cfs.Sampling(patch_samples=2**14, sensor_samples=2**15))
+    traced_scene = cfs.phase_matrices(
+        scene, cfs.Sampling(patch_samples=2**14, sensor_samples=2**15)
+    )
     annual = one_hour(sky, SUN, 50_000.0)
-    found = cfs.PhaseSystems(traced_scene, [[system]]).light(annual).illuminance()[:, 0]
+    found = cfs.illuminance(cfs.phase_light(traced_scene, [[system]], annual))[:, 0]
     paths = traced(outdoors, lit_by(sky[:, 0], SUN, 50_000.0 / SUN_SOLID_ANGLE), samples=2**16)
     error = 4 * paths.standard_error / paths.values
     assert np.all(np.abs(found / paths.values - 1) < 0.02 + error), (found, paths.values)

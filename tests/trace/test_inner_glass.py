@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
 from tests.validation.cut_groups import surfaces
 from tests.validation.inner_glass import (

@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.methods.light import direct_sun, illuminance, illuminance_with_error
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.point_in_time import PathLight
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
@@ -45,19 +49,16 @@ def scene(exterior: Surfaces):
 def both(exterior: Surfaces, sky: AnnualSky, sensor_samples: int = 32_768):
     """Five phases without the direct sun, the same by paths, and the error of these [S]."""
     from mitsuba_cfs.methods.optics import BsdfOptics
-    from mitsuba_cfs.methods.path_light import PathSystems
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     system = [[BsdfOptics(clear_glass())]]
     chosen = Sampling(
         sensor_samples=sensor_samples, patch_samples=4096, subdivision=1, hour_samples=65_536
     )
-    light = PhaseSystems(PhaseScene(scene(exterior), chosen), system).light(sky)
-    paths, error = PathSystems(scene(exterior), system, chosen).light(sky).estimate()
-    direct = light.direct_sun()[:, 0]
-    return light.illuminance()[:, 0] - direct, paths[:, 0] - direct, error * paths[:, 0]
+    light = phase_light(phase_matrices(scene(exterior), chosen), system, sky)
+    paths, error = illuminance_with_error(PathLight(scene(exterior), system, sky, chosen))
+    direct = direct_sun(light)[:, 0]
+    return illuminance(light)[:, 0] - direct, paths[:, 0] - direct, error * paths[:, 0]
 
 
 def agrees(found, expected, error) -> None:
@@ -253,14 +254,12 @@ def test_the_beam_that_the_room_reflects_is_that_of_paths():
 def reflected(exterior: Surfaces, sky: AnnualSky, **sampling):
     """Light of the test room behind clear glass by five phases, without the direct sun [S, L]."""
     from mitsuba_cfs.methods.optics import BsdfOptics
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     few = {"sensor_samples": 4096, "patch_samples": 512, "subdivision": 1} | sampling
-    traced = PhaseScene(scene(exterior), Sampling(**few))
-    light = PhaseSystems(traced, [[BsdfOptics(clear_glass())]]).light(sky)
-    return light.illuminance() - light.direct_sun(), light.relative_error()
+    traced = phase_matrices(scene(exterior), Sampling(**few))
+    light = phase_light(traced, [[BsdfOptics(clear_glass())]], sky)
+    return illuminance(light) - direct_sun(light), illuminance_with_error(light)[1]
 
 
 def test_a_cut_window_lets_as_much_sun_into_the_room_as_a_whole_one():

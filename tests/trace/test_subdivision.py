@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.methods.light import illuminance, illuminance_with_error
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.point_in_time import PathLight
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -66,25 +70,22 @@ def scene(exterior: Surfaces):
 def by_phases(exterior: Surfaces, five_phase: bool = False, **sampling):
     """Light of the test room by phases in one hour, and its stated error."""
     from mitsuba_cfs.methods.optics import BsdfOptics
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
-    traced = PhaseScene(scene(exterior), Sampling(**FEW | sampling), five_phase=five_phase)
-    light = PhaseSystems(traced, [[BsdfOptics(clear_glass())]]).light(overcast())
-    return light.illuminance()[:, 0], light.relative_error(), traced
+    traced = phase_matrices(scene(exterior), Sampling(**FEW | sampling), five_phase=five_phase)
+    light = phase_light(traced, [[BsdfOptics(clear_glass())]], overcast())
+    return illuminance(light)[:, 0], illuminance_with_error(light)[1], traced
 
 
 def by_paths(exterior: Surfaces):
     """The same by paths, and its relative error."""
     from mitsuba_cfs.methods.optics import BsdfOptics
-    from mitsuba_cfs.methods.path_light import PathSystems
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
-    filled = PathSystems(
-        scene(exterior), [[BsdfOptics(clear_glass())]], Sampling(hour_samples=131_072)
+    light = PathLight(
+        scene(exterior), [[BsdfOptics(clear_glass())]], overcast(), Sampling(hour_samples=131_072)
     )
-    values, error = filled.light(overcast()).estimate()
+    values, error = illuminance_with_error(light)
     return values[:, 0], error
 
 
@@ -219,20 +220,18 @@ def test_a_window_that_sees_nothing_is_cut_without_a_warning(parts):
 
 def test_states_of_a_cut_group_go_together():
     from mitsuba_cfs.methods.optics import BsdfOptics
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     glass = clear_glass()
     half = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, *(0.5 * b for b in glass.blocks().values()))
-    traced = PhaseScene(scene(overhang(1.0)), Sampling(**FEW))
+    traced = phase_matrices(scene(overhang(1.0)), Sampling(**FEW))
     sky = overcast()
     twice = AnnualSky(
         np.tile(sky.whole, 2), np.tile(sky.direction, (2, 1)), np.zeros(2), np.arange(2), 2,
         np.zeros((sky.whole.shape[0], 2)),
     )  # fmt: skip
-    filled = PhaseSystems(traced, [[BsdfOptics(glass), BsdfOptics(half)]])
-    lit = filled.light(twice).illuminance(np.array([[0, 1]]))
+    light = phase_light(traced, [[BsdfOptics(glass), BsdfOptics(half)]], twice)
+    lit = illuminance(light, np.array([[0, 1]]))
     np.testing.assert_allclose(lit[:, 1], 0.5 * lit[:, 0], rtol=1e-6)
 
 

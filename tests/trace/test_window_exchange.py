@@ -10,6 +10,26 @@ from scipy import stats
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.methods.light import (
+    daylight_coefficients,
+    eye_illuminance,
+    illuminance,
+    illuminance_with_error,
+)
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
+from mitsuba_cfs.methods.point_in_time import PathLight
+from mitsuba_cfs.methods.reflected_sun import (
+    reflected_sun,
+    replaced_before,
+    replaced_luminance,
+)
+from mitsuba_cfs.methods.window_reflection import (
+    by_way_of_outdoors,
+    returned_from_outdoors,
+    shares_before_windows,
+)
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
@@ -113,13 +133,11 @@ def hours(subdivision: int) -> AnnualSky:
 
 def by_phases(scene, front: float, *, five_phase: bool, subdivision: int = 1):
     """The light of the hours behind panes that mirror so much outdoors."""
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     few = Sampling(sensor_samples=16_384, patch_samples=8_192, subdivision=subdivision)
-    traced = PhaseScene(scene, few, five_phase=five_phase)
-    return PhaseSystems(traced, [[mirroring(front)]]).light(hours(subdivision))
+    traced = phase_matrices(scene, few, five_phase=five_phase)
+    return phase_light(traced, [[mirroring(front)]], hours(subdivision))
 
 
 @pytest.mark.parametrize("five_phase", [False, pytest.param(True, marks=pytest.mark.slow)])
@@ -132,71 +150,67 @@ def test_panes_light_the_fins_beside_them_in_sensors_and_pictures(five_phase) ->
     gains = []
     for front in (0.0, 0.4):
         light = by_phases(scene, front, five_phase=five_phase)
-        shown = light.pictures(np.arange(2), [0])
+        shown = pictures_in_state(light, np.arange(2), [0])
         pictures = [full_picture(p, shown.pixels, scene.view) for p in shown.values(np.arange(2))]
         seen = [evaluate(p, scene.view).Ev for p in pictures]
-        gains.append((light.illuminance(), light.eye(), np.array(seen)))
+        gains.append((illuminance(light), eye_illuminance(light), np.array(seen)))
         if not five_phase:
-            factor = light.filled.coefficients() @ light.sky.whole
-            np.testing.assert_allclose(factor, light.illuminance(), rtol=1e-5)
+            factor = daylight_coefficients(light) @ light.sky.whole
+            np.testing.assert_allclose(factor, illuminance(light), rtol=1e-5)
     inside, eye, picture = (more - bare for bare, more in zip(*gains, strict=True))
     assert (inside / gains[0][0]).min() > 0.01
     np.testing.assert_allclose(picture, eye, rtol=0.1)
 
 
 def test_the_sun_on_the_fins_comes_to_panes_hour_by_hour_as_in_their_sum() -> None:
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     few = Sampling(sensor_samples=256, patch_samples=256, subdivision=1, window_parts=1)
-    traced = PhaseScene(replace(between_fins(), view=None), few)
-    light = PhaseSystems(traced, [[mirroring(0.4)]]).reflected_sun.light(hours(1))
-    found = light.before(np.eye(K), np.array([1, 0]))
+    traced = phase_matrices(replace(between_fins(), view=None), few)
+    sun = reflected_sun(traced, hours(1))
+    found = replaced_before(sun, np.eye(K), np.array([1, 0]))
     assert found[:, 1].max() > 100 and not found[:, 0].any()
-    whole = light.replaced(np.array([True, True]))
+    whole = replaced_luminance(sun, np.array([True, True]))
     np.testing.assert_allclose(found.sum(axis=1), whole.ravel(), rtol=1e-4, atol=0.1)
 
 
 def test_an_hour_alone_is_what_it_is_among_others() -> None:
     """What windows send out and get back goes from hours on; that of sensors, from these on."""
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     few = Sampling(
         sensor_samples=256, patch_samples=256, subdivision=1, window_parts=2, view_samples=1
     )
-    filled = PhaseSystems(PhaseScene(between_fins(), few), [[mirroring(0.4)]])
-    light, every = filled.light(hours(1)), np.arange(2)
-    whole = light.pictures(every, [0]).values(every)
+    light = phase_light(phase_matrices(between_fins(), few), [[mirroring(0.4)]], hours(1))
+    every = np.arange(2)
+    whole = pictures_in_state(light, every, [0]).values(every)
     for some in ([1], [0], [1, 0]):
-        hour = filled.light(hours(1)).pictures(np.array(some), [0])
+        hour = pictures_in_state(light, np.array(some), [0])
         found = hour.values(np.arange(len(some)))
         np.testing.assert_allclose(found, whole[some], rtol=1e-4, atol=1e-3 * whole.mean())
-    optics, sky = filled.optics([0]), np.random.default_rng(0).random((2 * K, 3))
-    shares = filled.mirrored.shares(optics)
-    expected = filled.mirrored.outdoors(optics, shares) @ sky
+    optics, sky = light.optics([0]), np.random.default_rng(0).random((2 * K, 3))
+    exchange = light.matrices.outdoor_exchange.values
+    shares = shares_before_windows(light.matrices, light.matrices.sensors.values, optics)
+    expected = by_way_of_outdoors(exchange, optics, shares) @ sky
     assert expected.min() > 0
-    np.testing.assert_allclose(shares @ filled.mirrored.returned(optics, sky), expected, rtol=1e-9)
+    returned = returned_from_outdoors(exchange, optics, sky)
+    np.testing.assert_allclose(shares @ returned, expected, rtol=1e-9)
 
 
 def test_each_hour_has_the_reflection_of_its_own_state() -> None:
     """Among hours of other states as with its system alone."""
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     few = Sampling(sensor_samples=256, patch_samples=256, subdivision=1, window_parts=2)
     states = [mirroring(0.4, 0.1), mirroring(0.0, 0.4)]
-    traced = PhaseScene(replace(between_fins(), view=None), few)
+    traced = phase_matrices(replace(between_fins(), view=None), few)
     sky = hours(1).part([0, 1, 1, 0])
-    alone = [PhaseSystems(traced, [[one]]).light(sky).illuminance() for one in states]
-    light = PhaseSystems(traced, [states]).light(sky)
+    alone = [illuminance(phase_light(traced, [[one]], sky)) for one in states]
+    light = phase_light(traced, [states], sky)
     assert np.abs(alone[0] / alone[1] - 1).min() > 0.003
     for chosen in ([0, 1, 0, 1], [1, 1, 0, 1], [1, 1, 1, 1]):
         expected = np.stack([alone[j][:, h] for h, j in enumerate(chosen)], axis=1)
-        np.testing.assert_allclose(light.illuminance(np.array(chosen)), expected, rtol=1e-9)
+        np.testing.assert_allclose(illuminance(light, np.array(chosen)), expected, rtol=1e-9)
 
 
 def test_totals_of_some_hours_are_theirs_whatever_was_asked_for_before() -> None:
@@ -211,25 +225,21 @@ def test_totals_of_some_hours_are_theirs_whatever_was_asked_for_before() -> None
 @pytest.mark.parametrize("shares", [(0.4, 0.0), (0.0, 0.4)], ids=["outdoors", "room"])
 def test_the_stated_error_has_the_noise_of_what_windows_send_one_another(shares) -> None:
     """All else is that of one seed; the spread over 24 seeds by chi-square, one time in 1,000."""
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     scene, seeds = replace(between_fins(), view=None), 24
     few = Sampling(sensor_samples=8192, patch_samples=512, subdivision=1, window_parts=1)
-    first = PhaseScene(scene, few, five_phase=False)
+    first = phase_matrices(scene, few, five_phase=False)
 
     def light(seed: int, *mirrors: float):
-        traced = PhaseScene(scene, replace(few, seed=seed), five_phase=False)
-        for name in ("parts", "daylight", "sensors"):
-            setattr(traced, name, getattr(first, name))
-        return PhaseSystems(traced, [[mirroring(*mirrors)]]).light(hours(1))
+        traced = replace(first, sampling=replace(few, seed=seed))
+        return phase_light(traced, [[mirroring(*mirrors)]], hours(1))
 
     runs = [light(seed, *shares) for seed in range(seeds)]
-    found = np.stack([run.illuminance().mean(axis=1) for run in runs])
-    said = np.stack([run.relative_error() for run in runs]) * found
+    found = np.stack([illuminance(run).mean(axis=1) for run in runs])
+    said = np.stack([illuminance_with_error(run)[1] for run in runs]) * found
     black = light(0, 0.0)
-    others = black.relative_error() * black.illuminance().mean(axis=1)
+    others = illuminance_with_error(black)[1] * illuminance(black).mean(axis=1)
     expected = (said**2).mean(axis=0) - others**2
     spread = (seeds - 1) * found.var(axis=0, ddof=1) / expected
     low, high = stats.chi2.ppf([0.0005, 0.9995], seeds - 1)
@@ -240,15 +250,14 @@ def test_the_stated_error_has_the_noise_of_what_windows_send_one_another(shares)
 @pytest.mark.slow
 def test_panes_light_the_fins_beside_them_as_paths_have_it() -> None:
     """The gain of two sensors; the sun's mirror image is as wide as a window patch, 15 degrees."""
-    from mitsuba_cfs.methods.path_light import PathSystems
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     scene = replace(between_fins(), view=None)
     few, found = Sampling(hour_samples=524_288, subdivision=4), {}
     for front in (0.0, 0.4):
-        paths = PathSystems(scene, [[mirroring(front)]], few).light(hours(4))
+        paths = PathLight(scene, [[mirroring(front)]], hours(4), few)
         phases = by_phases(scene, front, five_phase=True, subdivision=4)
-        found[front] = paths.illuminance(), phases.illuminance()
+        found[front] = illuminance(paths), illuminance(phases)
     by_paths, by_five = (found[0.4][i] - found[0.0][i] for i in (0, 1))
     print("gain", by_paths / found[0.0][0], by_five / found[0.0][1])
     assert (by_paths / found[0.0][0]).min() > 0.015

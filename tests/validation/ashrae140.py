@@ -5,9 +5,7 @@ python -m tests.validation ashrae140 --reference DIR --out DIR
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -123,19 +121,9 @@ def _transmitted_rows(
     return rows
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(*, reference: Path, out: Path, cases: Sequence[str] = ()) -> pd.DataFrame:
     """Run the cases and write `ashrae140.csv`."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--reference", type=Path, required=True)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--cases", nargs="*", default=[])
-    options = parser.parse_args(arguments)
-    table = compare(options.reference, options.cases)
-    options.out.mkdir(parents=True, exist_ok=True)
-    table.to_csv(options.out / "ashrae140.csv", index=False)
-    sys.stdout.write(table.round(3).to_string(index=False) + "\n")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    table = compare(reference, cases)
+    out.mkdir(parents=True, exist_ok=True)
+    table.to_csv(out / "ashrae140.csv", index=False)
+    return table.round(3)

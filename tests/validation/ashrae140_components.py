@@ -10,9 +10,6 @@ that same simplification.
 
 from __future__ import annotations
 
-import argparse
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -20,17 +17,11 @@ import pandas as pd
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.sky.epw import read_epw
-from tests.benchmarks.thermal_year import energyplus_room
 from tests.validation.ashrae140 import WEATHER
-from tests.validation.ashrae140_cases import DEPTH, HEIGHT, WIDTH, cases
+from tests.validation.ashrae140_cases import cases
 from tests.validation.ashrae140_sun import glass
 from tests.validation.ashrae140_traced import patch_transmittance, traced_light
-from tests.validation.energyplus_model import (
-    Model,
-    detailed_surface,
-    hourly_outputs,
-    run_energyplus,
-)
+from tests.validation.energyplus_program import room_model, run_energyplus
 
 WINDOWS = ("LEFT", "RIGHT")
 FALLING = {
@@ -42,53 +33,6 @@ PASSING = {
     "sun": "Surface Window Transmitted Beam Solar Radiation Rate",
     "all": "Surface Window Transmitted Solar Radiation Rate",
 }
-_X, _Y, _Z = WIDTH, DEPTH, HEIGHT
-_BOX = {  # vertices counter-clockwise from outside, upper left first
-    "FACADE": ("Wall", [(0, 0, _Z), (0, 0, 0), (_X, 0, 0), (_X, 0, _Z)]),
-    "WEST": ("Wall", [(0, _Y, _Z), (0, _Y, 0), (0, 0, 0), (0, 0, _Z)]),
-    "EAST": ("Wall", [(_X, 0, _Z), (_X, 0, 0), (_X, _Y, 0), (_X, _Y, _Z)]),
-    "NORTH": ("Wall", [(_X, _Y, _Z), (_X, _Y, 0), (0, _Y, 0), (0, _Y, _Z)]),
-    "FLOOR": ("Floor", [(0, 0, 0), (0, _Y, 0), (_X, _Y, 0), (_X, 0, 0)]),
-    "ROOF": ("Roof", [(0, _Y, _Z), (0, 0, _Z), (_X, 0, _Z), (_X, _Y, _Z)]),
-}
-_OVERHANG = [(0, 0, _Z), (0, -1, _Z), (_X, -1, _Z), (_X, 0, _Z)]
-
-
-def energyplus_model(name: str, outputs: dict[str, str]) -> Model:
-    """The box of a case with its south windows and its glass, for the sun alone."""
-    model = energyplus_room("S") | hourly_outputs(outputs)
-    model["BuildingSurface:Detailed"] = {
-        wall: detailed_surface(
-            kind, "FACADE", "ROOM", "Adiabatic" if wall == "FLOOR" else "Outdoors", vertices
-        )
-        for wall, (kind, vertices) in _BOX.items()
-    }
-    model["Zone"]["ROOM"] = {"volume": _X * _Y * _Z}
-    opening = cases()[name].openings[0]
-    model["FenestrationSurface:Detailed"] = {
-        window: _window(x, y) for window, (x, y) in zip(WINDOWS, opening.windows, strict=True)
-    }
-    if opening.devices:
-        corners = [
-            {f"vertex_{axis}_coordinate": c for axis, c in zip("xyz", v, strict=True)}
-            for v in _OVERHANG
-        ]
-        shade = {"base_surface_name": "FACADE", "vertices": corners, "number_of_vertices": 4}
-        model["Shading:Zone:Detailed"] = {"OVERHANG": shade}
-    return model
-
-
-def _window(x: tuple[float, float], y: tuple[float, float]) -> dict[str, object]:
-    window: dict[str, object] = {
-        "surface_type": "Window",
-        "construction_name": "GLAZING",
-        "building_surface_name": "FACADE",
-        "number_of_vertices": 4,
-    }
-    corners = [(x[0], 0, y[1]), (x[0], 0, y[0]), (x[1], 0, y[0]), (x[1], 0, y[1])]
-    for i, vertex in enumerate(corners, 1):
-        window |= {f"vertex_{i}_{a}_coordinate": c for a, c in zip("xyz", vertex, strict=True)}
-    return window
 
 
 def energyplus_sun(name: str, epw: Path) -> dict[str, tuple[float, float]]:
@@ -99,7 +43,9 @@ def energyplus_sun(name: str, epw: Path) -> dict[str, tuple[float, float]]:
         for kind, table in (("on", FALLING), ("through", PASSING))
         for part, variable in table.items()
     }
-    year = run_energyplus(energyplus_model(name, outputs), epw, outputs=outputs).sum() / 1e3
+    changes = ("clear_double", "box_600", *(("box_overhang",) if name == "610" else ()))
+    year = run_energyplus(room_model("S", *changes, outputs=outputs), epw, outputs=outputs)
+    year = year.sum() / 1e3
     area = cases()[name].openings[0].area / len(WINDOWS)
 
     def mean(column: str) -> float:
@@ -136,14 +82,6 @@ def compare(reference: Path, *, samples: int = 4096) -> pd.DataFrame:
     return pd.concat([table, totals], ignore_index=True)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--reference", type=Path, required=True)
-    options = parser.parse_args(arguments)
-    sys.stdout.write(compare(options.reference).round(1).to_string(index=False) + "\n")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def main(*, reference: Path) -> pd.DataFrame:
+    """A row for each case and part."""
+    return compare(reference).round(1)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -55,6 +54,6 @@ def compare(reference: Path, folder: Path, only: Sequence[str] = ()) -> pd.DataF
     return pd.DataFrame(rows)
 
 
-if __name__ == "__main__":
-    table = compare(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3:])
-    sys.stdout.write(table.round(3).to_string(index=False) + "\n")
+def main(reference: Path, folder: Path, only: Sequence[str] = ()) -> pd.DataFrame:
+    """A row for each case and output."""
+    return compare(reference, folder, only)

@@ -8,10 +8,7 @@ glass is the same, the light is this project's own from the weather file to the 
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -125,14 +122,6 @@ def compare(reference: Path, *, samples: int = 4096) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(*, reference: Path) -> pd.DataFrame:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--reference", type=Path, required=True)
-    options = parser.parse_args(arguments)
-    sys.stdout.write(compare(options.reference).round(1).to_string(index=False) + "\n")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return compare(reference).round(1)

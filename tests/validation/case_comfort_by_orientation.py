@@ -11,10 +11,6 @@ Writes `comfort_by_orientation.csv` and `.png`.
 
 from __future__ import annotations
 
-import argparse
-import logging
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -116,21 +112,10 @@ def draw(table: pd.DataFrame, path: Path) -> None:
     plt.close(figure)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(*, weather: Path, out: Path, samples: int = 4096) -> pd.DataFrame:
     """Run the eight orientations and write table and figure."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--weather", type=Path, required=True)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--samples", type=int, default=4096)
-    options = parser.parse_args(arguments)
-    logging.basicConfig(level=logging.ERROR)
-    options.out.mkdir(parents=True, exist_ok=True)
-    table = compare(options.weather, options.out, samples=options.samples)
-    table.round(3).to_csv(options.out / "comfort_by_orientation.csv", index=False)
-    draw(table, options.out / "comfort_by_orientation.png")
-    sys.stdout.write(table.round(1).to_string(index=False) + "\n")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    out.mkdir(parents=True, exist_ok=True)
+    table = compare(weather, out, samples=samples)
+    table.round(3).to_csv(out / "comfort_by_orientation.csv", index=False)
+    draw(table, out / "comfort_by_orientation.png")
+    return table.round(1)

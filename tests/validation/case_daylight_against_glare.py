@@ -11,11 +11,8 @@ drawn as in Figure 68.  Writes the systems, `study.toml`, the study's results, a
 
 from __future__ import annotations
 
-import argparse
-import logging
-import sys
-from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import pandas as pd
 
@@ -110,28 +107,20 @@ def draw(table: pd.DataFrame, path: Path) -> None:
     plt.close(figure)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(
+    *,
+    weather: Path,
+    out: Path,
+    facing: float = 180.0,
+    size: Annotated[int, "pixels of a picture's side"] = 400,
+) -> pd.DataFrame:
     """Run the study and write table and figure."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--weather", type=Path, required=True)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--facing", type=float, default=180.0)
-    parser.add_argument("--size", type=int, default=400, help="pixels of a picture's side")
-    options = parser.parse_args(arguments)
-    logging.basicConfig(level=logging.ERROR)
-    options.out.mkdir(parents=True, exist_ok=True)
+    out.mkdir(parents=True, exist_ok=True)
     variants.activate()
-    study = read_study(
-        write_study(options.weather, options.out, facing=options.facing, size=options.size)
-    )
+    study = read_study(write_study(weather, out, facing=facing, size=size))
     with ProgressBar() as progress:
-        result = run_study(study, Store(options.out / "results"), progress=progress)
+        result = run_study(study, Store(out / "results"), progress=progress)
     table = table_of(result.rows())
-    table.round(3).to_csv(options.out / "daylight_against_glare.csv", index=False)
-    draw(table, options.out / "daylight_against_glare.png")
-    sys.stdout.write(table.round(2).to_string(index=False) + "\n")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    table.round(3).to_csv(out / "daylight_against_glare.csv", index=False)
+    draw(table, out / "daylight_against_glare.png")
+    return table.round(2)

@@ -11,20 +11,20 @@ figures deviate from it.
 
 from __future__ import annotations
 
-import argparse
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.glazing import Pane, pane_values, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.methods.by_name import traced_scene, with_systems
+from mitsuba_cfs.methods.light import daylight, illuminance
 from mitsuba_cfs.methods.optics import AngularOptics, BsdfOptics, SystemOptics
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
@@ -73,8 +73,8 @@ def computed(case: Case, method: str, glass: str, sampling: Sampling = SAMPLING)
         )  # fmt: skip
         return found.values @ sky.whole
     scene = DaylightScene(Surfaces.none(), case.exterior(), [group], case.points, case.normals)
-    traced = traced_scene(METHODS[method], scene, sampling)
-    return with_systems(traced, [[filled]]).light(sky).illuminance()
+    light = daylight(scene, [[filled]], sky, method=METHODS[method], sampling=sampling)
+    return illuminance(light)
 
 
 def deviations(case: Case, method: str, glass: str, sampling: Sampling = SAMPLING) -> Array:
@@ -103,34 +103,30 @@ def figures_against_quadrature(file: Path) -> None:
             print(f"{case.label}, sky {kind}:", np.round(100 * ratio, 1))
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    *,
+    figures: Annotated[Path | None, "the report's figures: compared by themselves"] = None,
+    tests: Annotated[Sequence[str], "such as 5.9; all by default"] = (),
+    methods: Annotated[Sequence[str], METHODS] = tuple(METHODS),
+    glass: Annotated[Sequence[str], ("exact", "klems")] = ("exact",),
+    subdivision: Annotated[int, "Reinhart MF"] = SAMPLING.subdivision,
+    json_: Annotated[Path | None, "all deviations"] = None,
+) -> None:
     """Run the methods and print a line for each case."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--figures", type=Path, help="the report's figures: compared by themselves")
-    parser.add_argument("--tests", nargs="+", help="such as 5.9; all by default")
-    parser.add_argument("--methods", nargs="+", choices=list(METHODS), default=list(METHODS))
-    parser.add_argument("--glass", nargs="+", choices=("exact", "klems"), default=["exact"])
-    parser.add_argument("--subdivision", type=int, default=SAMPLING.subdivision, help="Reinhart MF")
-    parser.add_argument("--json", type=Path, help="all deviations")
-    options = parser.parse_args(arguments)
-    if options.figures:
-        figures_against_quadrature(options.figures)
+    if figures:
+        figures_against_quadrature(figures)
         return
     variants.activate("llvm_ad_mono")
-    sampling, rows = replace(SAMPLING, subdivision=options.subdivision), []
+    sampling, rows = replace(SAMPLING, subdivision=subdivision), []
     for case in cases():
-        if options.tests and case.name.split()[0] not in options.tests:
+        if tests and case.name.split()[0] not in tests:
             continue
-        for glass in options.glass if case.glass else ["none"]:
-            for method in options.methods:
-                found = deviations(case, method, glass, sampling)
-                figures = summary(found, case.grazing())
-                rows.append({"case": case.label, "glass": glass, "method": method} | figures)
+        for optics in glass if case.glass else ["none"]:
+            for method in methods:
+                found = deviations(case, method, optics, sampling)
+                shares = summary(found, case.grazing())
+                rows.append({"case": case.label, "glass": optics, "method": method} | shares)
                 rows[-1]["deviations"] = (100 * found).round(3).tolist()
-                print(f"{case.label:38} {glass:6} {method:12}", figures, flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(rows))
-
-
-if __name__ == "__main__":
-    main()
+                print(f"{case.label:38} {optics:6} {method:12}", shares, flush=True)
+    if json_:
+        json_.write_text(json.dumps(rows))

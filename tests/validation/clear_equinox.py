@@ -11,10 +11,11 @@ the sun's disc, and rcontrib without reflections for the sun of each hour of the
 
 from __future__ import annotations
 
-import argparse
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -203,18 +204,14 @@ def told_runs(name: str, count: int) -> None:
     print("\n".join(near_limits(np.array(clocks))))
 
 
-def main() -> None:
+def main(*, rooms: Annotated[Sequence[str], ROOMS] = tuple(ROOMS), runs: int = 1) -> None:
     """Print both programs' figures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rooms", nargs="+", choices=ROOMS, default=list(ROOMS))
-    parser.add_argument("--runs", type=int, default=1)
-    asked = parser.parse_args()
-    if asked.runs > 1:
-        for name in asked.rooms:
-            told_runs(name, asked.runs)
+    if runs > 1:
+        for name in rooms:
+            told_runs(name, runs)
         return
     print("room: ours/Radiance, half of the sensors within; option 2, ASE [%]; hours off")
-    for name in asked.rooms:
+    for name in rooms:
         with tempfile.TemporaryDirectory() as place:
             both = compared(ROOMS[name], Path(place))
         light, wanted = both.ours.open[both.hours], both.clear
@@ -227,7 +224,3 @@ def main() -> None:
             f"{np.abs(ours - theirs).max():.0f} of {theirs.max():.0f}, "
             f"{100 * area_share(ours == theirs):.0f} % of sensors equal"
         )
-
-
-if __name__ == "__main__":
-    main()

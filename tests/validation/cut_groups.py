@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.methods.light import illuminance, illuminance_with_error
 from mitsuba_cfs.methods.optics import BsdfOptics
-from mitsuba_cfs.methods.path_light import PathSystems
-from mitsuba_cfs.methods.phase_light import PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.point_in_time import PathLight
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -134,11 +134,11 @@ def by_phases(
 ) -> tuple[NDArray[np.float64], float, int, float]:
     """Illuminance [S], largest stated error, parts, and processor time [s]."""
     start = time.process_time()
-    traced = PhaseScene(scene, Sampling(window_parts=parts), five_phase=five_phase)
-    light = PhaseSystems(traced, [[BsdfOptics(bsdf)]]).light(overcast())
-    values = light.illuminance()[:, 0]
+    traced = phase_matrices(scene, Sampling(window_parts=parts), five_phase=five_phase)
+    light = phase_light(traced, [[BsdfOptics(bsdf)]], overcast())
+    values = illuminance(light)[:, 0]
     seconds = time.process_time() - start
-    return values, float(light.relative_error().max()), len(traced.parts.groups), seconds
+    return values, float(illuminance_with_error(light)[1].max()), len(traced.parts.groups), seconds
 
 
 def by_radiance(scene: DaylightScene) -> NDArray[np.float64]:
@@ -200,8 +200,9 @@ def main() -> None:
                 by_phases(DaylightScene(interior, surfaces(fins()), [group], POINTS, UP), glass,
                           parts, True)  # fmt: skip
             compiled = True
-        paths = PathSystems(scene, [[BsdfOptics(glass)]], Sampling(hour_samples=PATHS))
-        compare(name, scene, glass, paths.light(overcast()).illuminance()[:, 0])
+        sampling = Sampling(hour_samples=PATHS)
+        paths = PathLight(scene, [[BsdfOptics(glass)]], overcast(), sampling)
+        compare(name, scene, glass, illuminance(paths)[:, 0])
     for depth in (1.0, 3.0):
         outside = surfaces(slab(depth) + front(-15, 19, -4, 6, 0.4))
         scene = DaylightScene(interior, outside, [group], POINTS, UP)

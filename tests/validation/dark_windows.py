@@ -9,7 +9,6 @@ those below a tenth.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -20,9 +19,8 @@ from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import CfsError
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 
 DIM = 0.1  # share below which a window is named
@@ -36,18 +34,16 @@ def seen(path: Path) -> Iterator[tuple[str, str, float, float]]:
     for space in (space for space in building.spaces if space.windows):
         alone = [WindowGroup(w.name, (w,)) for g in window_groups(space) for w in g.windows]
         scene = DaylightScene(Surfaces.none(), exterior_surfaces(building, space), alone)
-        traced = PhaseScene(scene, SAMPLING)
+        traced = phase_matrices(scene, SAMPLING, five_phase=False, needs=())
         daylight = traced.parts.of_groups(traced.daylight.values)
         for group, one in zip(alone, daylight, strict=True):
             yield space.label, group.name, group.area, float(one.sum(axis=1) @ weight)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(files: Sequence[Path]) -> None:
     """Print the dim windows of each file and how many there are of all."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("files", nargs="+", type=Path)
     variants.activate()
-    for path in parser.parse_args(arguments).files:
+    for path in files:
         try:
             found = list(seen(path))
         except CfsError as error:
@@ -57,7 +53,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"{path.name}: {len(dim)} of {len(found)} windows see less than {100 * DIM:.0f} %")
         for room, window, area, share in dim:
             print(f"    {share:.3f}  {area:.2f} m2  {window} of room {room}", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -11,10 +11,11 @@ only BSDFs made from it.
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +25,11 @@ from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.matrices.fine_basis import fine_basis
-from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics
-from mitsuba_cfs.methods.phase_light import PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.light import illuminance, illuminance_with_error
+from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_series
@@ -96,14 +97,17 @@ def by_phases(
     room = DaylightScene(scene.interior, empty(), scene.groups, scene.points, scene.up)
     known, found = BsdfOptics(system), {}
     systems = [
-        [GivenOptics(known.transmission, way, reflection=known.reflection) for way in ways.values()]
+        [
+            MatrixOptics(known.transmission, way, reflection=known.reflection)
+            for way in ways.values()
+        ]
     ]
-    three_phase = PhaseSystems(PhaseScene(room, SAMPLING, five_phase=False), systems).light(sky)
-    found["three-phase"] = three_phase.illuminance()
-    light = PhaseSystems(PhaseScene(room, SAMPLING), systems).light(sky)
+    three_phase = phase_light(phase_matrices(room, SAMPLING, five_phase=False), systems, sky)
+    found["three-phase"] = illuminance(three_phase)
+    light = phase_light(phase_matrices(room, SAMPLING), systems, sky)
     for number, name in enumerate(ways):
-        found[f"five-phase, {name}"] = light.illuminance(np.full(len(sky.lit), number))
-    return found, float(three_phase.relative_error().max())
+        found[f"five-phase, {name}"] = illuminance(light, np.full(len(sky.lit), number))
+    return found, float(illuminance_with_error(three_phase)[1].max())
 
 
 def by_fine_matrix(scene: BlindRoom, tilt_deg: float | None, sky: AnnualSky) -> NDArray[np.float64]:
@@ -252,31 +256,27 @@ def write_series(results: dict, path: Path) -> None:
     figure.savefig(path)
 
 
-def main() -> None:
+def main(
+    *,
+    weather: Path,
+    every: Annotated[int, "days from one to the next"] = 10,
+    samples: Annotated[int, "paths of a sensor in a batch"] = 8192,
+    only: Annotated[Sequence[str], TILTS, "system, all by default"] = (),
+    json_: Path | None = None,
+    series: Annotated[Path | None, "Figures 27 to 30 of a day each, as a picture"] = None,
+) -> None:
     """Run all systems and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--weather", type=Path, required=True)
-    parser.add_argument("--every", type=int, default=10, help="days from one to the next")
-    parser.add_argument("--samples", type=int, default=8192, help="paths of a sensor in a batch")
-    parser.add_argument("--only", choices=TILTS, action="append", help="system, all by default")
-    parser.add_argument("--json", type=Path)
-    parser.add_argument("--series", type=Path, help="Figures 27 to 30 of a day each, as a picture")
-    options = parser.parse_args()
     variants.activate()
-    weather = read_epw(options.weather)
+    weather = read_epw(weather)
     scene, results = test_room(), {}
-    for name in options.only or TILTS:
-        if options.series:
+    for name in only or TILTS:
+        if series:
             sky, times = of_a_day(weather, *DAYS[name])
         else:
-            sky, times = chosen_hours(weather, options.every), []
-        results[name] = one_case(scene, sky, TILTS[name], options.samples) | {"times": times}
+            sky, times = chosen_hours(weather, every), []
+        results[name] = one_case(scene, sky, TILTS[name], samples) | {"times": times}
         print(name, json.dumps(results[name], indent=1), flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(results, indent=1))
-    if options.series:
-        write_series(results, options.series)
-
-
-if __name__ == "__main__":
-    main()
+    if json_:
+        json_.write_text(json.dumps(results, indent=1))
+    if series:
+        write_series(results, series)

@@ -11,14 +11,13 @@ Writes `energyplus.json` (every figure), `cases.csv` (each case) and the figures
 
 from __future__ import annotations
 
-import argparse
 import json
-import logging
 import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Annotated
 
 import pandas as pd
 
@@ -134,38 +133,30 @@ def _by_position(cases: pd.DataFrame, by: str) -> list[dict[str, object]]:
     return pooled(marked, ["model", "position", by]).reset_index().to_dict("records")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(
+    *,
+    reference: Path,
+    epw: Path,
+    out: Path,
+    climates: Annotated[Sequence[str], ALL_FILES] = tuple(EPW_FILES),
+    orientations: Sequence[str] = tuple(ORIENTATIONS),
+    closures: Annotated[Sequence[str], reference_systems.CLOSURES] = tuple(CLOSURES),
+    no_sensitivity: bool = False,
+) -> None:
     """Run the comparison and write its results."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--reference", type=Path, required=True)
-    parser.add_argument("--epw", type=Path, required=True)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--climates", nargs="+", default=list(EPW_FILES), choices=list(ALL_FILES))
-    parser.add_argument("--orientations", nargs="+", default=list(ORIENTATIONS))
-    parser.add_argument(
-        "--closures", nargs="+", default=list(CLOSURES), choices=reference_systems.CLOSURES
-    )
-    parser.add_argument("--no-sensitivity", action="store_true")
-    options = parser.parse_args(arguments)
-    logging.basicConfig(level=logging.ERROR)
     start = time.perf_counter()
     cases, summary = study(
-        options.reference,
-        options.epw,
-        options.climates,
-        options.orientations,
-        closures=options.closures,
-        sensitivity=not options.no_sensitivity,
+        reference,
+        epw,
+        climates,
+        orientations,
+        closures=closures,
+        sensitivity=not no_sensitivity,
     )
     summary["seconds"] = time.perf_counter() - start
-    options.out.mkdir(parents=True, exist_ok=True)
-    cases.to_csv(options.out / "cases.csv", index=False)
-    (options.out / "energyplus.json").write_text(json.dumps(summary, indent=1))
-    energyplus_figures.write_figures(summary, options.out)
+    out.mkdir(parents=True, exist_ok=True)
+    cases.to_csv(out / "cases.csv", index=False)
+    (out / "energyplus.json").write_text(json.dumps(summary, indent=1))
+    energyplus_figures.write_figures(summary, out)
     table = pd.DataFrame(summary["by system"]).round(3).to_string(index=False)
     sys.stdout.write(table + "\n")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

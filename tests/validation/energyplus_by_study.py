@@ -10,10 +10,9 @@ sun and sky traced.  EnergyPlus 25.2 computes the same room with its own layers 
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
@@ -23,7 +22,8 @@ from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
 from scenes.study.study import run_study
 from scenes.study.study_file import read_study
-from tests.validation.energyplus_model import room_model, run_energyplus
+from tests.validation.differences import rmse_and_bias
+from tests.validation.energyplus_program import room_model, run_energyplus
 from tests.validation.energyplus_reference import loads
 from tests.validation.energyplus_study import FIRST_HOUR, STUDY
 from tests.validation.energyplus_traced import traced_system
@@ -109,29 +109,24 @@ def compared(
                 key = epw.stem, turns[orientation]
                 _, air = found[(*key, f"{name} floating")]
                 kept, _ = found[(*key, f"{name} kept")]
-                theirs = run_energyplus(room_model(name, orientation), epw)["T_air"].to_numpy()
+                theirs = run_energyplus(room_model(orientation, name), epw)["T_air"].to_numpy()
                 needs = list(loads(name, orientation, epw).values())
-                gap = (air - theirs)[FIRST_HOUR:]
+                rmse, bias = rmse_and_bias(air[FIRST_HOUR:], theirs[FIRST_HOUR:])
                 row = {"climate": epw.stem, "facing": orientation, "system": name,
-                       "air RMSE": np.sqrt(np.mean(gap**2)), "bias": gap.mean()}  # fmt: skip
+                       "air RMSE": rmse, "bias": bias}  # fmt: skip
                 for what, other in zip(HEAT, needs, strict=True):
                     row |= {what: kept[what], f"{what} E+": other}
                 rows.append(row)
     return pd.DataFrame(rows)
 
 
-def main() -> None:
-    """Print a table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--reference", type=Path, required=True)
-    parser.add_argument("--climates", type=Path, nargs="+", required=True)
-    parser.add_argument("--orientations", nargs="+", default=["S", "W"], choices=list("SWNE"))
-    chosen = parser.parse_args()
+def main(
+    folder: Path,
+    *,
+    reference: Path,
+    climates: Sequence[Path],
+    orientations: Annotated[Sequence[str], ("S", "W", "N", "E")] = ("S", "W"),
+) -> pd.DataFrame:
+    """A row for each climate, orientation and system."""
     variants.activate()
-    table = compared(chosen.folder, chosen.reference, chosen.climates, chosen.orientations)
-    sys.stdout.write(table.round(3).to_string(index=False) + "\n")
-
-
-if __name__ == "__main__":
-    main()
+    return compared(folder, reference, climates, orientations)

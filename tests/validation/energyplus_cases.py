@@ -7,8 +7,9 @@ out, as in the dissertation.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
-from tests.validation import energyplus_model, reference_room, reference_systems
+from tests.validation import reference_room, reference_systems
+from tests.validation.energyplus_program import room_model, run_energyplus
 from tests.validation.facade_sun import FacadeSun, facade_sun, sun_steps
 from tests.validation.reference_systems import Optics
 from thermal.balance import ZoneResult, simulate
@@ -138,6 +140,15 @@ def simulate_case(
     return simulate(zone, place.climate, solar, step_s=3600.0 / steps)
 
 
+def clear_double_year(weather: Weather, orientation: str, **changes: Any) -> ZoneResult:
+    """The year of the room with clear double glazing; changes: fields of its `Zone`."""
+    system = reference_systems.clear_double()
+    zone = replace(reference_room.zone(orientation, system.fenestration), **changes)
+    sun = facade_sun(sun_steps(weather, STEPS), reference_room.facade_normal(orientation))
+    solar = reference_room.solar(sun, system, reference_room.RoomLight())
+    return simulate(zone, reference_room.climate(weather), solar, step_s=3600.0 / STEPS)
+
+
 def pairs(
     reference: Path,
     epw: Path,
@@ -177,8 +188,8 @@ def _reference_hours(
 ) -> Callable[[str, str], pd.DataFrame]:
     """EnergyPlus' table of a system and orientation: stored, or run now."""
     if climate in LIVE_FILES:
-        return lambda system, orientation: energyplus_model.run_energyplus(
-            energyplus_model.room_model(system, orientation), epw / LIVE_FILES[climate]
+        return lambda system, orientation: run_energyplus(
+            room_model(orientation, system), epw / LIVE_FILES[climate]
         )
     table = pd.read_parquet(reference / f"ep_{climate}.parquet")
     tables = dict(list(table.groupby(["cfs", "ori"], observed=True)))

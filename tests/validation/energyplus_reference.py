@@ -15,26 +15,16 @@ south, east and north; what tests/reference/energyplus_chicago holds.
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from tests.benchmarks.thermal_year import EPW, energyplus_room
+from scenes.demo import WEATHER
 from tests.validation.energyplus_cases import EPW_FILES, WALLS
-from tests.validation.energyplus_ideal_loads import ideal_loads
-from tests.validation.energyplus_loads import SET_POINTS
-from tests.validation.energyplus_model import (
-    OUTPUTS,
-    Model,
-    hourly_outputs,
-    room_model,
-    run_energyplus,
-)
+from tests.validation.energyplus_program import OUTPUTS, room_model, run_energyplus
 from tests.validation.reference_room import ORIENTATIONS
 from tests.validation.reference_systems import SYSTEMS
 
@@ -55,7 +45,7 @@ JOULES = 3.6e6  # of a kWh
 
 def hours(system: str, orientation: str, epw: Path) -> pd.DataFrame:
     """One case's year [H rows] of the room without heating or cooling."""
-    model = room_model(system, orientation, hourly=False) | hourly_outputs(HOURLY)
+    model = room_model(orientation, system, outputs=HOURLY)
     table = run_energyplus(model, epw, outputs=HOURLY)
     table = table.round({name: 2 if name.startswith("T_") else 1 for name in table})
     table = table.astype(np.float32)
@@ -67,28 +57,9 @@ def hours(system: str, orientation: str, epw: Path) -> pd.DataFrame:
 
 def loads(system: str, orientation: str, epw: Path) -> dict[str, float]:
     """Heating and cooling of one case's year [kWh]."""
-    model = room_model(system, orientation, hourly=False) | hourly_outputs(LOADS)
-    model = _with_ideal_loads(model)
+    model = room_model(orientation, system, "ideal_loads_20_26", outputs=LOADS)
     table = run_energyplus(model, epw, outputs=LOADS)
     return {name: float(table[name].sum()) / JOULES for name in LOADS.values()}
-
-
-def _with_ideal_loads(model: Model) -> Model:
-    """The model with an unlimited, sensible ideal system in its room."""
-
-    def always(value: float) -> dict[str, object]:
-        fields = ["Through: 12/31", "For: AllDays", "Until: 24:00", value]
-        return {"data": [{"field": field} for field in fields]}
-
-    schedules = {
-        "HEATED": always(float(SET_POINTS.heating_c)),
-        "COOLED": always(float(SET_POINTS.cooling_c)),
-        "DUAL": always(4.0),  # control type 4: two set points
-    }
-    return model | {
-        "Schedule:Compact": model["Schedule:Compact"] | schedules,
-        **ideal_loads("HEATED", "COOLED", "DUAL"),
-    }
 
 
 def write_climate(
@@ -111,7 +82,7 @@ def write_demo(out: Path) -> Path:
     """Hours of air, mean wall and window's inside face [degC] in the demo's climate."""
     tables = []
     for orientation in DEMO_ORIENTATIONS:
-        table = run_energyplus(energyplus_room(orientation), EPW)
+        table = run_energyplus(room_model(orientation, "clear_double"), WEATHER)
         kept = {"T_air": table["T_air"], "T_wall": table[list(WALLS)].mean(axis=1)}
         tables.append(pd.DataFrame({"ori": orientation, **kept, "T_win_in": table["T_win_in"]}))
     out.mkdir(parents=True, exist_ok=True)
@@ -122,29 +93,19 @@ def write_demo(out: Path) -> Path:
     return out / DEMO_FILE
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the climates asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument("--epw", type=Path, help="folder of weather files")
-    source.add_argument("--demo", action="store_true", help="the demo's climate")
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--climates", nargs="+", default=list(EPW_FILES), metavar="NAME[=FILE]")
-    parser.add_argument("--systems", nargs="+", default=list(SYSTEMS), choices=SYSTEMS)
-    parser.add_argument(
-        "--orientations", nargs="+", default=list(ORIENTATIONS), choices=list(ORIENTATIONS)
-    )
-    options = parser.parse_args(arguments)
-    if options.demo:
-        sys.stdout.write(f"{write_demo(options.out)}\n")
-        return 0
-    for climate in options.climates:
+def main(
+    *,
+    out: Path,
+    epw: Path | None = None,
+    demo: bool = False,
+    climates: Sequence[str] = tuple(EPW_FILES),
+    systems: Sequence[str] = SYSTEMS,
+    orientations: Sequence[str] = tuple(ORIENTATIONS),
+) -> str:
+    """Write the demo's climate, or the climates NAME[=FILE] of the folder `epw`."""
+    if demo or epw is None:
+        return str(write_demo(out))
+    for climate in climates:
         name, _, file = climate.partition("=")
-        epw = options.epw / (file or EPW_FILES[name])
-        write_climate(name, epw, options.systems, options.orientations, options.out)
-        sys.stdout.write(f"{name}: {options.out / f'ep_{name}.parquet'}\n")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+        write_climate(name, epw / (file or EPW_FILES[name]), systems, orientations, out)
+    return "\n".join(str(path) for path in sorted(out.glob("ep_*.parquet")))

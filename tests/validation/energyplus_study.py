@@ -9,18 +9,17 @@ are those that the tests hold.  `--energyplus DIR` has EnergyPlus compute those 
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from mitsuba_cfs.progress import silent
+from scenes.demo import WEATHER
 from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
-from tests.benchmarks.thermal_year import EPW
-from tests.validation.energyplus_model import Model, pane, room_model, run_energyplus
+from tests.validation.differences import rmse_and_bias
+from tests.validation.energyplus_program import room_model, run_energyplus
 
 REPOSITORY = Path(__file__).parents[2]
 STUDY = REPOSITORY / "docs" / "tutorials" / "energyplus_room.toml"
@@ -65,28 +64,16 @@ def differences(hours: pd.DataFrame, what: str) -> pd.DataFrame:
     stored = stored[stored["ori"] == "S"]
     rows = []
     for name, (ours, theirs) in COLUMNS.items():
-        gap = (hours[ours].to_numpy() - stored[theirs].to_numpy())[FIRST_HOUR:]
-        rmse = float(np.sqrt(np.mean(gap**2)))
-        rows.append({"system": what, "": name, "RMSE [K]": rmse, "bias [K]": gap.mean()})
+        values = hours[ours].to_numpy()[FIRST_HOUR:], stored[theirs].to_numpy()[FIRST_HOUR:]
+        rmse, bias = rmse_and_bias(*values)
+        rows.append({"system": what, "": name, "RMSE [K]": rmse, "bias [K]": bias})
     return pd.DataFrame(rows)
-
-
-def blind_model() -> Model:
-    """The room of the study in EnergyPlus."""
-    model = room_model("ext_blind", "S")
-    thin = {"thickness": 0.004, "conductivity": 1.0}
-    model["WindowMaterial:Glazing"] = {
-        "CLEAR": pane(0.84, 0.075, 0.075, 0.84) | thin,
-        "LOWE": pane(0.62, 0.27, 0.20, 0.03) | thin,
-    }
-    del model["WindowMaterial:GasMixture"]
-    model["WindowMaterial:Gas"] = {"GAP": {"gas_type": "Argon", "thickness": 0.016}}
-    return model
 
 
 def write_energyplus(folder: Path) -> Path:
     """EnergyPlus' hours of the blind."""
-    table = run_energyplus(blind_model(), EPW)[[theirs for _, theirs in COLUMNS.values()]]
+    table = run_energyplus(room_model("S", "ext_blind", "blind_study"), WEATHER)
+    table = table[[theirs for _, theirs in COLUMNS.values()]]
     table.insert(0, "ori", "S")
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / STORED["blind"].name
@@ -96,15 +83,10 @@ def write_energyplus(folder: Path) -> Path:
     return path
 
 
-def main(arguments: list[str]) -> str:
-    """Both comparisons, or EnergyPlus' year."""
-    if arguments[:1] == ["--energyplus"]:
-        return f"{write_energyplus(Path(arguments[1]))}\n"
+def main(*, energyplus: Path | None = None) -> pd.DataFrame | str:
+    """Both comparisons; energyplus: write EnergyPlus' year into this folder instead."""
+    if energyplus is not None:
+        return str(write_energyplus(energyplus))
     with tempfile.TemporaryDirectory() as folder:
         glazing = study_hours(glazing_study(Path(folder)))
-    found = [differences(study_hours(), "blind"), differences(glazing, "glazing")]
-    return pd.concat(found).round(3).to_string(index=False) + "\n"
-
-
-if __name__ == "__main__":
-    sys.stdout.write(main(sys.argv[1:]))
+    return pd.concat([differences(study_hours(), "blind"), differences(glazing, "glazing")])

@@ -10,8 +10,6 @@ are the set's own.
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -197,26 +195,16 @@ def compare(
     return pd.DataFrame(rows)
 
 
-def main(words: Sequence[str] | None = None) -> None:
-    """Print the errors by system, by orientation and by climate."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--reference", type=Path, required=True)
-    parser.add_argument("--epw", type=Path, required=True)
-    parser.add_argument("--climates", nargs="+", default=list(EPW_FILES), choices=list(EPW_FILES))
-    parser.add_argument("--orientations", nargs="+", default=list(ORIENTATIONS))
-    parser.add_argument("--systems", nargs="+", default=list(SYSTEMS), choices=list(SYSTEMS))
-    parser.add_argument(
-        "--one-diffuse", action="store_true",
-        help="windows pass light of sky and ground by one hemispherical value, as EnergyPlus",
-    )  # fmt: skip
-    chosen = parser.parse_args(words)
-    cases = compare(
-        chosen.reference, chosen.epw, chosen.climates, chosen.orientations, chosen.systems,
-        one_diffuse=chosen.one_diffuse,
-    )  # fmt: skip
-    for by in (["system"], ["system", "orientation"], ["system", "climate"]):
-        sys.stdout.write(pooled(cases, by).round(3).to_string() + "\n")
-
-
-if __name__ == "__main__":
-    main()
+def main(
+    *,
+    reference: Path,
+    epw: Path,
+    climates: Sequence[str] = tuple(EPW_FILES),
+    orientations: Sequence[str] = tuple(ORIENTATIONS),
+    systems: Sequence[str] = SYSTEMS,
+    one_diffuse: bool = False,
+) -> dict[str, pd.DataFrame]:
+    """Errors by system, by orientation and by climate; one_diffuse: see `with_one_diffuse`."""
+    cases = compare(reference, epw, climates, orientations, systems, one_diffuse=one_diffuse)
+    groups = (["system"], ["system", "orientation"], ["system", "climate"])
+    return {" and ".join(by): pooled(cases, by) for by in groups}

@@ -12,8 +12,6 @@ that each face sees stands beside EnergyPlus' own.
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +25,7 @@ from scenes.heat.energyplus import energyplus_twin
 from scenes.heat.study import BalancedRooms, run_study
 from scenes.heat.study_file import read_study
 from scenes.room.zone import RoomZone, balances
-from tests.validation.energyplus_run import run_written
+from tests.validation.energyplus_program import run_written
 
 Hours = NDArray[np.float64]  # [H] or [H, N]
 SETTLED = 7 * 24  # hours left out of the temperatures at the start
@@ -217,21 +215,14 @@ def shouted(name: str) -> str:
     return "".join(c.upper() if c.isascii() else c for c in name)
 
 
-def main(words: list[str] | None = None) -> None:
-    """Print a table for each study."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("studies", type=Path, nargs="+")
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--their-sun", action="store_true", help="ours with EnergyPlus' sun too")
-    parser.add_argument("--open-sky", action="store_true", help="ours with nothing before the sky")
-    chosen = parser.parse_args(words)
-    for path in chosen.studies:
-        tables = compared(
-            path, chosen.out / path.stem, their_sun=chosen.their_sun, open_sky=chosen.open_sky
-        )
-        for title, table in tables.items():
-            sys.stdout.write(f"{path.name}, {title}\n{table.round(2).to_string()}\n")
-
-
-if __name__ == "__main__":
-    main()
+def main(
+    studies: Sequence[Path], *, out: Path, their_sun: bool = False, open_sky: bool = False
+) -> dict[str, pd.DataFrame]:
+    """A table for each study; their_sun, open_sky: see `compared`."""
+    return {
+        f"{path.name}, {title}": table.round(2)
+        for path in studies
+        for title, table in compared(
+            path, out / path.stem, their_sun=their_sun, open_sky=open_sky
+        ).items()
+    }

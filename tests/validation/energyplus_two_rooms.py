@@ -8,23 +8,19 @@ size with an outside wall to the north, no window and no gains.  EnergyPlus runs
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
 from mitsuba_cfs.sky.epw import read_epw
-from tests.benchmarks.thermal_year import EPW, energyplus_room, glazing
+from scenes.demo import WEATHER
 from tests.validation import reference_room
+from tests.validation.differences import rmse_and_bias
 from tests.validation.energyplus_cases import STEPS
-from tests.validation.energyplus_model import (
-    Model,
-    detailed_surface,
-    hourly_outputs,
-    run_energyplus,
-)
+from tests.validation.energyplus_program import room_model, run_energyplus
 from tests.validation.facade_sun import facade_sun, sun_steps
+from tests.validation.reference_systems import clear_double
 from thermal.balance import ZoneResult, simulate_zones
 from thermal.climate import Solar
 from thermal.longwave import area_view_factors
@@ -38,49 +34,11 @@ OUTPUTS = {
 }
 DOOR_M3_S = 0.03
 SETTLED = 7 * 24  # hours left out at the start
-_REAR = {  # vertices counter-clockwise from outside
-    "FRONT": ("Wall", "WALL", [(0, 5, 3), (0, 5, 0), (4, 5, 0), (4, 5, 3)]),
-    "R0": ("Wall", "WALL", [(0, 10, 3), (0, 10, 0), (0, 5, 0), (0, 5, 3)]),
-    "R4": ("Wall", "WALL", [(4, 5, 3), (4, 5, 0), (4, 10, 0), (4, 10, 3)]),
-    "NORTH": ("Wall", "FACADE", [(4, 10, 3), (4, 10, 0), (0, 10, 0), (0, 10, 3)]),
-    "REAR FLOOR": ("Floor", "FLOOR", [(0, 5, 0), (0, 10, 0), (4, 10, 0), (4, 5, 0)]),
-    "REAR CEILING": ("Ceiling", "CEILING", [(0, 10, 3), (0, 5, 3), (4, 5, 3), (4, 10, 3)]),
-}
-
-
-def energyplus_model(door: float) -> Model:
-    """Both rooms; door: air exchanged each way [m3/s]."""
-    model = energyplus_room("S") | hourly_outputs(OUTPUTS)
-    walls = model["BuildingSurface:Detailed"]
-    walls["BACK"] |= {
-        "outside_boundary_condition": "Surface",
-        "outside_boundary_condition_object": "FRONT",
-    }
-    for name, (kind, construction, vertices) in _REAR.items():
-        outside = {"FRONT": "Surface", "NORTH": "Outdoors"}.get(name, "Adiabatic")
-        partner = "BACK" if name == "FRONT" else ""
-        walls[name] = detailed_surface(kind, construction, "REAR", outside, vertices, partner)
-    model["Zone"]["REAR"] = {"volume": 60.0}
-    air = model["ZoneInfiltration:DesignFlowRate"]
-    zone = "zone_or_zonelist_or_space_or_spacelist_name"
-    air["REAR AIR"] = air["AIR"] | {zone: "REAR"}
-    if door > 0:
-        model["ZoneMixing"] = {
-            f"{a} to {b}": {
-                "zone_or_space_name": b,
-                "source_zone_or_space_name": a,
-                "schedule_name": "ON",
-                "design_flow_rate_calculation_method": "Flow/Zone",
-                "design_flow_rate": door,
-            }
-            for a, b in (("ROOM", "REAR"), ("REAR", "ROOM"))
-        }
-    return model
 
 
 def our_rooms(door: float) -> tuple[ZoneResult, ...]:
     """The same two rooms by `thermal`, from the weather file on."""
-    weather, system = read_epw(EPW), glazing()
+    weather, system = read_epw(WEATHER), clear_double()
     steps = sun_steps(weather, STEPS)
     front = reference_room.zone("S", system.fenestration)
     rear = _rear(front)
@@ -129,7 +87,10 @@ def compare() -> pd.DataFrame:
     """RMS difference and bias [K] of both rooms' air and of both faces of the wall, hourly."""
     rows = []
     for label, door in (("wall", 0.0), ("wall and open door", DOOR_M3_S)):
-        theirs = run_energyplus(energyplus_model(door), EPW, outputs=OUTPUTS)
+        changes = ("clear_double", "second_room", *(("open_door",) if door else ()))
+        theirs = run_energyplus(
+            room_model("S", *changes, outputs=OUTPUTS), WEATHER, outputs=OUTPUTS
+        )
         front, rear = our_rooms(door)
         ours = {
             "front air": front.air_c,
@@ -138,11 +99,12 @@ def compare() -> pd.DataFrame:
             "rear wall": rear.surface_in_c[:, 5],
         }
         for name, values in ours.items():
-            gap = (values - theirs[name].to_numpy())[SETTLED:]
+            rmse, bias = rmse_and_bias(values[SETTLED:], theirs[name][SETTLED:])
             rows.append({"between": label, "quantity": name, "mean C": values.mean(),
-                         "rmse K": np.sqrt(np.mean(gap**2)), "bias K": gap.mean()})  # fmt: skip
+                         "rmse K": rmse, "bias K": bias})  # fmt: skip
     return pd.DataFrame(rows)
 
 
-if __name__ == "__main__":
-    sys.stdout.write(compare().round(3).to_string(index=False) + "\n")
+def main() -> pd.DataFrame:
+    """Both cases."""
+    return compare()

@@ -13,9 +13,7 @@ yet, unpacked, made a picture, rated, painted, the plan with its patches of sun.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -115,19 +113,11 @@ def sizes(results: Path) -> list[str]:
     return lines
 
 
-def main(words: Sequence[str] | None = None) -> None:
+def main(results: Path, *, screenshot: Path | None = None) -> None:
     """Print the sizes, then the hours of each room and state."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("results", type=Path)
-    parser.add_argument("--screenshot", type=Path)
-    given = parser.parse_args(words)
-    print("\n".join(sizes(given.results)))
+    print("\n".join(sizes(results)))
     with tempfile.TemporaryDirectory() as place, Page(Path(place)) as page:
-        for state in walked(page, given.results):
+        for state in walked(page, results):
             print(state)
-        if given.screenshot:
-            page.screenshot(given.screenshot)
-
-
-if __name__ == "__main__":
-    main()
+        if screenshot:
+            page.screenshot(screenshot)

@@ -19,12 +19,12 @@ pictures, over the same point by point, at distances from the window's plane and
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,9 @@ import mitsuba_cfs as cfs
 from bim.sensors import view_point
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs.glare.annual import full_picture
+from mitsuba_cfs.methods.coefficients import group_coefficients
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
+from mitsuba_cfs.methods.point_in_time import path_picture
 from scenes.chosen_rooms import chosen_spaces
 from scenes.cost import room as box
 from scenes.input_files import read_building
@@ -147,15 +150,15 @@ def _year(weather: cfs.Weather) -> Callable[[NDArray[np.int64] | None], cfs.Annu
 def held(lit: LitScene, hours: int, *, samples: int, seed: int = 0) -> Found:
     """Hold five-phase pictures of random hours against those by paths."""
     sky, view = lit.drawn(hours, seed), lit.scene.view
-    light = cfs.PhaseSystems(cfs.PhaseScene(lit.scene), lit.systems).light(sky)
+    light = cfs.phase_light(cfs.phase_matrices(lit.scene), lit.systems, sky)
     finer = replace(view, width=FINER * view.width, height=FINER * view.height)
-    paths = cfs.PathSystems(replace(lit.scene, view=finer), lit.systems).light(sky)
-    pictures = light.pictures(np.arange(len(sky.lit)), [0] * len(lit.systems))
+    paths = cfs.PathLight(replace(lit.scene, view=finer), lit.systems, sky)
+    pictures = pictures_in_state(light, np.arange(len(sky.lit)), [0] * len(lit.systems))
     found = []
     for hour in range(len(sky.lit)):
         values = pictures.without_disc(np.array([hour]))[0][0]
         ours = full_picture(values, pictures.pixels, view)
-        first = paths.picture(hour, disc=False, samples=samples, seed=seed)
+        first = path_picture(paths, hour, disc=False, samples=samples, seed=seed)
         ratio, count, noise = _ratio(ours, brightest(first)), 0, 0.0
         for i, (least, more) in enumerate(LOOKS):
             again = np.flatnonzero(ratio > least)
@@ -186,13 +189,13 @@ def looked_at(
     One half of the paths says which is the brightest, the other how bright it is: the largest of
     many noisy values would be too large.
     """
-    width = paths.filled.scene.view.width
+    width = paths.scene.eye.width
     row, column = np.divmod(pixels, width // FINER)
     down, across = np.divmod(np.arange((3 * FINER) ** 2), 3 * FINER)
     down, across = (FINER * a[:, None] + b - FINER for a, b in ((row, down), (column, across)))
     around = np.clip(down, 0, width - 1) * width + np.clip(across, 0, width - 1)
     options = {"samples": samples // 2, "tile": 1, "pixels": np.unique(around), "disc": False}
-    halves = [paths.picture(hour, seed=1000 + 2 * seed + i, **options) for i in range(2)]
+    halves = [path_picture(paths, hour, seed=1000 + 2 * seed + i, **options) for i in range(2)]
     first, second = (half.ravel()[around] for half in halves)
     every = np.arange(len(pixels))
     of_first, of_second = first[every, second.argmax(axis=1)], second[every, first.argmax(axis=1)]
@@ -214,47 +217,44 @@ def beside_window(lit: LitScene, hours: int) -> Iterator[str]:
     scene = cfs.DaylightScene(*around, points, np.tile([1.0, 0, 0], (len(points), 1)))
     chosen = cfs.Sampling(patch_samples=4096, sensor_samples=16384, window_parts=1)
     sky = lit.drawn(hours, 0)
-    filled = cfs.PhaseSystems(cfs.PhaseScene(scene, chosen), lit.systems)
-    exact, traced = filled.straight.matrix(0, 0).values, filled.traced
-    patches = (traced.direct_sensors[:, 0] * filled.straight.beam(0, 0)) @ traced.daylight.values[0]
+    matrices = cfs.phase_matrices(scene, chosen)
+    ((group,),) = group_coefficients(matrices, lit.systems)
+    exact = group.straight.values.values
+    patches = (matrices.direct_sensors[:, 0] * group.beam) @ matrices.daylight.values[0]
     ratio = (patches @ sky.without_sun()) / (exact @ sky.without_sun())
     for row, y in zip(ratio.reshape(len(DISTANCES), len(HEIGHTS), -1), DISTANCES, strict=True):
         yield f"| {y} | " + " | ".join(f"{r.min():.2f} to {r.max():.2f}" for r in row) + " |"
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    *,
+    weather: Path,
+    ifc: Path | None = None,
+    space: str | None = None,
+    geneva_: Path | None = None,
+    hours: Annotated[int, "of each scene"] = 67,
+    size: Annotated[int, "[px]"] = 160,
+    samples: Annotated[int, "of each pixel by paths, shared"] = 16,
+    seed: int = 0,
+    json_: Path | None = None,
+    walls: Annotated[bool, "the wall beside the box's window"] = False,
+) -> None:
     """Hold the scenes that files are given for, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--weather", type=Path, required=True)
-    parser.add_argument("--ifc", type=Path)
-    parser.add_argument("--space")
-    parser.add_argument("--geneva", type=Path)
-    parser.add_argument("--hours", type=int, default=67, help="of each scene")
-    parser.add_argument("--size", type=int, default=160, help="[px]")
-    parser.add_argument("--samples", type=int, default=16, help="of each pixel by paths, shared")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--json", type=Path)
-    parser.add_argument("--walls", action="store_true", help="the wall beside the box's window")
-    options = parser.parse_args(arguments)
-    weather = cfs.read_epw(options.weather)
-    if options.walls:
-        print("\n".join(beside_window(overhang(weather, options.size), WALL_HOURS)))
+    weather = cfs.read_epw(weather)
+    if walls:
+        print("\n".join(beside_window(overhang(weather, size), WALL_HOURS)))
         return
-    scenes = [overhang(weather, options.size)]
-    if options.ifc:
-        scenes.append(ifc_room(options.ifc, options.space, weather, options.size))
-    if options.geneva:
-        scenes.append(office(options.geneva, options.size))
+    scenes = [overhang(weather, size)]
+    if ifc:
+        scenes.append(ifc_room(ifc, space, weather, size))
+    if geneva_:
+        scenes.append(office(geneva_, size))
     rows = {}
     for lit in scenes:
-        found = held(lit, options.hours, samples=options.samples, seed=options.seed)
+        found = held(lit, hours, samples=samples, seed=seed)
         rows[lit.name] = {
             name: getattr(found, name).tolist() for name in ("worst", "beyond", "bright", "looked")
         }
         print(f"| {lit.name} | {found.line()} |", flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(rows))
-
-
-if __name__ == "__main__":
-    main()
+    if json_:
+        json_.write_text(json.dumps(rows))

@@ -12,16 +12,18 @@ difference of DGP, and of Ev as a share of the reference's, mean over views.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 import bim
 import mitsuba_cfs as cfs
+from mitsuba_cfs.methods.phase_matrices import with_eye, with_needs
 from tests.validation import geneva_scene as geneva
 
 PUBLISHED = {"01_glz": (0.0109, 0.0420), "03_shd": (0.0038, 0.0305)}  # raytraverse: DGP, Ev
@@ -35,17 +37,17 @@ def rated(
     groups, systems = geneva.window_groups(folder, case)
     solid = bim.opaque_surfaces(geneva.scene(folder, case))
     hours = geneva.reference(folder, case, numbers[0]).hour[::every]
-    sky, traced, found = geneva.sky(folder, hours), None, {"hours": hours.tolist(), "views": {}}
+    sky, matrices, found = geneva.sky(folder, hours), None, {"hours": hours.tolist(), "views": {}}
     for number in numbers:
         view, start = geneva.view(folder, number, size), os.times()
-        if traced is None:
-            traced = cfs.PhaseScene(cfs.DaylightScene(solid, solid, groups, view=view), sampling)
+        if matrices is None:
+            scene = cfs.DaylightScene(solid, solid, groups, view=view)
+            matrices = cfs.phase_matrices(scene, sampling, needs=["DGP"])
         else:
-            traced = traced.seen_from(view)
-        traced.trace("DGP")
-        matrices = _seconds(start)
+            matrices = with_needs(with_eye(matrices, view), ["DGP"])
+        tracing = _seconds(start)
         start = os.times()
-        light = cfs.PhaseSystems(traced, systems).light(sky)
+        light = cfs.phase_light(matrices, systems, sky, needs=["DGP"])
         pixels = cfs.hourly_glare(light, options=cfs.GlareOptions(grouping="pixels"))
         seconds = _seconds(start)
         glare = cfs.hourly_glare(light)
@@ -56,7 +58,7 @@ def rated(
             "Ev": glare.Ev.round(1).tolist(),
             "reference dgp": truth.dgp[::every].tolist(),
             "reference Ev": truth.Ev[::every].tolist(),
-            "seconds of matrices": round(matrices, 1),
+            "seconds of matrices": round(tracing, 1),
             "seconds of hours": round(seconds, 1),
         }
         print(f"{case} view {number}:", _line(found["views"][str(number)]), file=sys.stderr)
@@ -87,28 +89,19 @@ def errors(row: dict, name: str) -> tuple[float, float, int]:
     return float(np.abs(difference).mean()), float(difference.mean()), int(counted.sum())
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    folder: Path,
+    *,
+    cases: Annotated[Sequence[str], geneva.CASES] = tuple(geneva.CASES),
+    views: Annotated[Sequence[int], geneva.VIEWS] = (1, 2, 3),
+    every: Annotated[int, "of the 2,022 hours"] = 20,
+    size: Annotated[int, "[px]"] = 300,
+    json_: Path | None = None,
+) -> None:
     """Run the cases and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--cases", nargs="+", choices=geneva.CASES, default=list(geneva.CASES))
-    parser.add_argument("--views", nargs="+", type=int, choices=geneva.VIEWS, default=[1, 2, 3])
-    parser.add_argument("--every", type=int, default=20, help="of the 2,022 hours")
-    parser.add_argument("--size", type=int, default=300, help="[px]")
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args(arguments)
-    found = {
-        case: rated(
-            options.folder, case, options.views, options.every, options.size, cfs.Sampling()
-        )
-        for case in options.cases
-    }
-    if options.json:
-        options.json.write_text(json.dumps(found))
+    found = {case: rated(folder, case, views, every, size, cfs.Sampling()) for case in cases}
+    if json_:
+        json_.write_text(json.dumps(found))
     for case, result in found.items():
         for number, row in result["views"].items():
             print(case, number, _line(row))
-
-
-if __name__ == "__main__":
-    main()

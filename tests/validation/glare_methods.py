@@ -11,12 +11,13 @@ room with its slats as geometry; the methods know a blind by Klems matrices and 
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +26,11 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.methods import METHODS
-from mitsuba_cfs.methods.by_name import traced_scene, values, with_systems
+from mitsuba_cfs.methods.glare import metric_values
+from mitsuba_cfs.methods.light import daylight
 from mitsuba_cfs.methods.optics import SystemOptics
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.point_in_time import path_tracing_room, picture_with_disc
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
@@ -42,6 +44,7 @@ from tests.validation.glare_room import (
     measurement,
     sunny_days,
 )
+from tests.validation.method_errors import method_matrices
 
 GLARE = ("DGP", "eDGP", "sDGP")
 SEED = 7  # of the measurement; the methods have another
@@ -79,19 +82,19 @@ def measured(
     for height in case.raised:
         eye = np.add(scene.view.position, [0, 0, height])
         raised = replace(scene, view=replace(scene.view, position=tuple(eye)))
-        light, row = measurement(raised, case.exterior, sampling).light(case.sky), []
+        light, row = measurement(raised, case.exterior, case.sky, sampling), []
+        room = path_tracing_room(light.scene, light.systems)
         for hour in range(len(case.sky.lit)):
-            picture = light.picture(hour, seed=SEED, disc=False)
-            whole = light.with_disc(picture, hour)
+            picture = picture_with_disc(light, room, hour, seed=SEED)
             if case.sun == "source":
-                found = evaluate(picture, geometry, disc=light.disc(hour))
+                found = evaluate(picture.bare, geometry, disc=picture.disc)
             else:
-                found = evaluate(whole, geometry)
+                found = evaluate(picture.shown, geometry)
             row.append((found.dgp, found.Ev))
             if pictures is not None:
                 title = f"{case.name}, {case.times[hour]}: DGP {found.dgp:.3f}"
                 name = f"{case.name.replace(' ', '_')}_{hour:02d}.png"
-                write_falsecolour(pictures / name, whole, title=title)
+                write_falsecolour(pictures / name, picture.shown, title=title)
         rows.append(row)
     dgp, lux = np.mean(rows, axis=0).T
     return dgp, lux
@@ -110,30 +113,35 @@ def rated(
         )  # fmt: skip
         print(case.name, "measured", dgp.round(3), file=sys.stderr, flush=True)
     for method in METHODS:
-        traced = traced_scene(method, scene, sampling)
+        matrices = method_matrices(method, scene, sampling)
         for metric in GLARE:
             start = time.monotonic()
             for case, run in zip(cases, found, strict=True):
-                light = with_systems(traced, [[case.system]] * len(scene.groups)).light(case.sky)
-                dgp = values(light, metric)
+                light = daylight(
+                    scene, [[case.system]] * len(scene.groups), case.sky,
+                    method=method, sampling=sampling, needs=(), matrices=matrices,
+                )  # fmt: skip
+                dgp = metric_values(light, metric)
                 run["methods"][f"{method} {metric}"] = dgp.round(5).tolist()
             seconds = time.monotonic() - start
             print(f"{method} {metric}: {seconds:.0f} s", file=sys.stderr, flush=True)
     return found
 
 
-def weather_case(name: str, weather: Weather, scene: DaylightScene, options) -> GlareCase:
-    """A system of `TILTS` in the hours that the options choose."""
+def weather_case(
+    name: str, weather: Weather, scene: DaylightScene, days: int, every: int, levels: int
+) -> GlareCase:
+    """A system of `TILTS` in every so-many-th hour of so many days in a month."""
     tilt = TILTS[name]
-    days = [sunny_days(weather, 9, 4, options.days)]
+    chosen = [sunny_days(weather, 9, 4, days)]
     if tilt is not None:
-        days.append(sunny_days(weather, 6, 4, options.days))
-    hours = lit_hours(weather, np.sort(np.concatenate(days)), options.every)
+        chosen.append(sunny_days(weather, 6, 4, days))
+    hours = lit_hours(weather, np.sort(np.concatenate(chosen)), every)
     layer = None if tilt is None else blind_layer(tilt)
     return GlareCase(
         name,
         empty() if tilt is None else slats(scene.groups[0], tilt),
-        known_system(layer, levels=options.levels),
+        known_system(layer, levels=levels),
         annual_sky(weather, hours=hours),
         tuple(f"{t:%m-%d %H:%M}" for t in weather.midpoints[hours]),
     )
@@ -216,43 +224,39 @@ def _cell(found: tuple[float, ...]) -> str:
     return f"{square:g} ({bias:+g}), {least:+g} to {most:+g}"
 
 
-def main() -> None:
+def main(
+    *,
+    table_: Annotated[Path | None, "file of a run, to print its table again"] = None,
+    weather: Path | None = None,
+    system: Annotated[Sequence[str], TILTS, "default: all"] = (),
+    days: Annotated[int, "in each month"] = 2,
+    every: Annotated[int, "hours from one to the next"] = 3,
+    size: Annotated[int, "pixels of a side"] = 180,
+    samples: Annotated[int, "paths of a pixel"] = 8,
+    levels: Annotated[int, "4^levels cells of the tree"] = 5,
+    pictures: Annotated[Path | None, "folder for the measurement's pictures"] = None,
+    json_: Path | None = None,
+    series: Annotated[Path | None, "folder for the time series, Figures 33 to 44"] = None,
+) -> None:
     """Run the systems and print their table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--table", type=Path, help="file of a run, to print its table again")
-    parser.add_argument("--weather", type=Path)
-    parser.add_argument("--system", choices=TILTS, action="append", help="default: all")
-    parser.add_argument("--days", type=int, default=2, help="in each month")
-    parser.add_argument("--every", type=int, default=3, help="hours from one to the next")
-    parser.add_argument("--size", type=int, default=180, help="pixels of a side")
-    parser.add_argument("--samples", type=int, default=8, help="paths of a pixel")
-    parser.add_argument("--levels", type=int, default=5, help="4^levels cells of the tree")
-    parser.add_argument("--pictures", type=Path, help="folder for the measurement's pictures")
-    parser.add_argument("--json", type=Path)
-    parser.add_argument("--series", type=Path, help="folder for the time series, Figures 33 to 44")
-    options = parser.parse_args()
-    if options.table:
-        runs = json.loads(options.table.read_text())
+    if table_:
+        runs = json.loads(table_.read_text())
         print(table(runs))
-        if options.series:
-            write_series(runs, options.series)
+        if series:
+            write_series(runs, series)
         return
-    if options.weather is None:
-        parser.error("--weather is needed")
+    if weather is None:
+        raise ValueError("--weather is needed")
     variants.activate()
-    if options.pictures:
-        options.pictures.mkdir(parents=True, exist_ok=True)
-    scene, weather = glare_scene(options.size), read_epw(options.weather)
-    sampling = Sampling(picture_samples=options.samples, view_samples=2 * options.samples)
-    names = options.system or list(TILTS)
-    cases = [weather_case(name, weather, scene, options) for name in names]
-    found = rated(scene, cases, sampling, options.pictures)
-    if options.json:
-        options.json.write_text(json.dumps(found, indent=1))
-    if options.series:
-        write_series(found, options.series)
+    if pictures:
+        pictures.mkdir(parents=True, exist_ok=True)
+    scene, weather = glare_scene(size), read_epw(weather)
+    sampling = Sampling(picture_samples=samples, view_samples=2 * samples)
+    names = system or list(TILTS)
+    cases = [weather_case(name, weather, scene, days, every, levels) for name in names]
+    found = rated(scene, cases, sampling, pictures)
+    if json_:
+        json_.write_text(json.dumps(found, indent=1))
+    if series:
+        write_series(found, series)
     print(table(found))
-
-
-if __name__ == "__main__":
-    main()

@@ -16,10 +16,10 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer
 from mitsuba_cfs.images.view import fisheye
-from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics, SystemOptics
-from mitsuba_cfs.methods.path_light import PathSystems
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics, SystemOptics
+from mitsuba_cfs.methods.point_in_time import PathLight
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
@@ -54,10 +54,12 @@ def glazing() -> PathOptics:
     return PathOptics(None, AngularBeam(blind_room.glass_transmittance(COSINE)), mirrors)
 
 
-def measurement(scene: DaylightScene, exterior: Surfaces, sampling: Sampling) -> PathSystems:
+def measurement(
+    scene: DaylightScene, exterior: Surfaces, sky: AnnualSky, sampling: Sampling
+) -> PathLight:
     """The room with everything as geometry, path-traced."""
     scene = replace(scene, exterior=exterior)
-    return PathSystems(scene, [[GivenOptics(paths=glazing())]] * len(scene.groups), sampling)
+    return PathLight(scene, [[MatrixOptics(paths=glazing())]] * len(scene.groups), sky, sampling)
 
 
 def known_system(

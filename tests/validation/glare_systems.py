@@ -9,7 +9,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.plugin import klems_plugin
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
-from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics
+from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics
 from mitsuba_cfs.trace.kernels.scattering import AngularBeam, KlemsScattering
 from mitsuba_cfs.trace.paths.scene import PathOptics
 
@@ -87,7 +87,7 @@ def tree_optics(
     glass: AngularBeam,
     between: KlemsBsdf,
     mirrors: tuple[AngularBeam | None, AngularBeam | None] = (None, None),
-) -> GivenOptics:
+) -> MatrixOptics:
     """A layer known by a tensor tree before clear glazing known by its transmittance.
 
     Args:
@@ -97,4 +97,4 @@ def tree_optics(
     way = TreeBehind(tree, glass, between)
     known = BsdfOptics(klems)
     paths = PathOptics(way, way, mirrors)
-    return GivenOptics(known.transmission, way, paths, known.reflection)
+    return MatrixOptics(known.transmission, way, paths, known.reflection)

@@ -13,10 +13,10 @@ reference) the slats are path-traced as geometry.
 
 from __future__ import annotations
 
-import argparse
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -25,8 +25,7 @@ from mitsuba_cfs.bsdf.blinds import extrude
 from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, plastic
 from mitsuba_cfs.methods import METHODS
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -228,38 +227,34 @@ def write_figure(runs: list[dict], path: Path) -> None:
     figure.savefig(path)
 
 
-def main() -> None:
+def main(
+    *,
+    table_: Annotated[Path | None, "file of a run, to print its tables again"] = None,
+    size: Annotated[int, "pixels of a side"] = 180,
+    samples: Annotated[int, "paths of a pixel"] = 8,
+    levels: Annotated[int, "4^levels cells of the tree"] = 5,
+    pictures: Annotated[Path | None, "folder for the slats' pictures"] = None,
+    figure: Path | None = None,
+    scales: Annotated[bool, "the series of scales, alone"] = False,
+    json_: Path | None = None,
+) -> None:
     """Run both series and print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--table", type=Path, help="file of a run, to print its tables again")
-    parser.add_argument("--size", type=int, default=180, help="pixels of a side")
-    parser.add_argument("--samples", type=int, default=8, help="paths of a pixel")
-    parser.add_argument("--levels", type=int, default=5, help="4^levels cells of the tree")
-    parser.add_argument("--pictures", type=Path, help="folder for the slats' pictures")
-    parser.add_argument("--figure", type=Path)
-    parser.add_argument("--scales", action="store_true", help="the series of scales, alone")
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args()
-    if options.scales:
+    if scales:
         variants.activate()
         for row in scale_series():
             print(row)
         return
-    if options.table:
-        runs = json.loads(options.table.read_text())
+    if table_:
+        runs = json.loads(table_.read_text())
     else:
         variants.activate()
-        if options.pictures:
-            options.pictures.mkdir(parents=True, exist_ok=True)
-        scene = glare_scene(options.size)
-        sampling = Sampling(picture_samples=options.samples, view_samples=2 * options.samples)
-        runs = rated(scene, cases(scene, options.levels), sampling, options.pictures)
-    if options.json:
-        options.json.write_text(json.dumps(runs, indent=1))
-    if options.figure:
-        write_figure(runs, options.figure)
+        if pictures:
+            pictures.mkdir(parents=True, exist_ok=True)
+        scene = glare_scene(size)
+        sampling = Sampling(picture_samples=samples, view_samples=2 * samples)
+        runs = rated(scene, cases(scene, levels), sampling, pictures)
+    if json_:
+        json_.write_text(json.dumps(runs, indent=1))
+    if figure:
+        write_figure(runs, figure)
     print(table(runs))
-
-
-if __name__ == "__main__":
-    main()

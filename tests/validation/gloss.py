@@ -14,11 +14,11 @@ of the pane at the sun's angle, seen as `glass`.
 
 from __future__ import annotations
 
-import argparse
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.gloss import Gloss, lacquer, mirror, pane
 from mitsuba_cfs.images.view import View, fisheye
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
@@ -39,7 +40,7 @@ from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks import radiance
 from tests.validation.rendered_scene import RenderedScene
-from tests.validation.scene_rows import add_row_options, show_rows
+from tests.validation.scene_rows import show_rows
 
 EYE, DIRECTION = (-1.8, -2.0, 1.2), (0.0, 1.0, 0.0)
 TURN = np.array([-1.0, -1.0, 1.0])  # of the room, its window to the north
@@ -218,13 +219,13 @@ def _five_phase(given: Case, view: View, seed: int) -> tuple[np.ndarray, float]:
     around = given.interior, given.exterior, given.groups
     scene = cfs.DaylightScene(*around, points, normals, view=view)
     sampling = cfs.Sampling(outdoor_samples=16, view_samples=16, seed=seed)
-    traced = cfs.PhaseScene(scene, sampling)
+    traced = cfs.phase_matrices(scene, sampling)
     clear = cfs.AngularOptics(np.ones(64))
-    light = cfs.PhaseSystems(traced, [[clear]]).light(sky)
-    shown = light.pictures(np.array([0]), [0])
+    light = cfs.phase_light(traced, [[clear]], sky)
+    shown = pictures_in_state(light, np.array([0]), [0])
     picture = np.zeros(view.width * view.height, dtype=np.float32)
     picture[shown.pixels] = shown.values(np.array([0]))[0]
-    return picture.reshape(view.height, view.width), float(light.illuminance()[0, 0])
+    return picture.reshape(view.height, view.width), float(cfs.illuminance(light)[0, 0])
 
 
 def _eye(given: Case, view: View):
@@ -250,22 +251,18 @@ def _diffuse(given: Case) -> Case:
     return replace(given, interior=even[0], exterior=even[1])
 
 
-def main() -> None:
+def main(
+    *,
+    cases: Annotated[Sequence[str], MATERIALS] = tuple(MATERIALS),
+    size: int = SIZE,
+    points: Annotated[int, "times that rtrace finds Ev"] = 8,
+    json_: Path | None = None,
+) -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", nargs="+", choices=MATERIALS, default=list(MATERIALS))
-    parser.add_argument("--size", type=int, default=SIZE)
-    parser.add_argument("--points", type=int, default=8, help="times that rtrace finds Ev")
-    add_row_options(parser)
-    options = parser.parse_args()
     variants.activate()
 
     def rows(folder: Path) -> Iterator[Outcome]:
-        for name in options.cases:
-            yield outcome(name, folder / name, size=options.size, points=options.points)
+        for name in cases:
+            yield outcome(name, folder / name, size=size, points=points)
 
-    show_rows(options, rows, lambda row: json.dumps(asdict(row), indent=1))
-
-
-if __name__ == "__main__":
-    main()
+    show_rows(json_, rows, lambda row: json.dumps(asdict(row), indent=1))

@@ -9,7 +9,6 @@ compared with means of the closed form over the pairs of patches.
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -159,11 +158,8 @@ def rows() -> Iterator[dict[str, object]]:
         yield row
 
 
-def main() -> None:
+def main(*, json_: Path | None = None) -> None:
     """Print the table; `--json` keeps its rows."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args()
     found = []
     print("| sample | step in, out [deg] | noise | misplaced | Radiance | share | Radiance |")
     print("|---|---|---|---|---|---|---|")
@@ -175,9 +171,5 @@ def main() -> None:
             f" | {row['ours share']:.4f} | {row['Radiance share']:.4f} |",
             flush=True,
         )
-    if options.json:
-        options.json.write_text(json.dumps(found, indent=1))
-
-
-if __name__ == "__main__":
-    main()
+    if json_:
+        json_.write_text(json.dumps(found, indent=1))

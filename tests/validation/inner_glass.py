@@ -10,11 +10,11 @@ the mean over seeds with its standard error.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import drjit as dr
 import mitsuba as mi
@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.methods.optics import GivenOptics
-from mitsuba_cfs.methods.phase_light import PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene, RoomBeyond
+from mitsuba_cfs.methods.light import illuminance
+from mitsuba_cfs.methods.optics import MatrixOptics
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -113,20 +113,20 @@ def scene(rooms: int) -> DaylightScene:
         taken = [] if last else [(upright(walls_at(rooms)[number + 1], GLASS, north=True), 0.0)]
         tau = INNER_TAU if number > 1 else TAU
         beyond = (
-            () if found is None else (RoomBeyond(found, (tau * eye,), INNER_TAU * np.ones(145)),)
+            () if found is None else (AdjacentRoom(found, (tau * eye,), INNER_TAU * np.ones(145)),)
         )
         found = DaylightScene(
             surfaces([*room(number, rooms), *taken]), Surfaces.none(), [group(number, rooms)],
-            *((sensors(rooms), UP) if last else ()), beyond=beyond,
+            *((sensors(rooms), UP) if last else ()), adjacent=beyond,
         )  # fmt: skip
     return found
 
 
 def by_phases(rooms: int, seed: int = 0, sampling: Sampling = SAMPLING) -> NDArray[np.float64]:
     """Illuminance of the sensors [S] [lx] by this project's three phases."""
-    traced = PhaseScene(scene(rooms), replace(sampling, seed=seed), five_phase=False)
-    light = PhaseSystems(traced, [[GivenOptics(INNER_TAU * np.eye(KLEMS_FULL.size))]])
-    return light.light(overcast()).illuminance()[:, 0]
+    traced = phase_matrices(scene(rooms), replace(sampling, seed=seed), five_phase=False)
+    systems = [[MatrixOptics(INNER_TAU * np.eye(KLEMS_FULL.size))]]
+    return illuminance(phase_light(traced, systems, overcast()))[:, 0]
 
 
 def by_paths(rooms: int, samples: int, seed: int = 0) -> NDArray[np.float64]:
@@ -262,28 +262,23 @@ def pooled(runs: list[NDArray[np.float64]]) -> tuple[NDArray[np.float64], NDArra
     return mean, values.std(axis=0, ddof=1) / np.sqrt(len(values)) / mean
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    *,
+    rooms: Sequence[int] = (2, 3),
+    seeds: int = 4,
+    paths: Annotated[int, "of a sensor for each seed"] = 1 << 19,
+) -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rooms", type=int, nargs="+", default=[2, 3])
-    parser.add_argument("--seeds", type=int, default=4)
-    parser.add_argument("--paths", type=int, default=1 << 19, help="of a sensor for each seed")
-    options = parser.parse_args(arguments)
     variants.activate()
     print("| rooms | | 0.5 m | 1.2 m | 2.0 m | 3.0 m | aside |\n|---|---|---|---|---|---|---|")
-    for rooms in options.rooms:
-        seeds = range(options.seeds)
-        _print(rooms, "paths", *pooled([by_paths(rooms, options.paths, s) for s in seeds]))
+    for count in rooms:
+        _print(count, "paths", *pooled([by_paths(count, paths, s) for s in range(seeds)]))
         with tempfile.TemporaryDirectory() as folder:
-            theirs = pooled([by_radiance(rooms, Path(folder)) for _ in seeds])
-        _print(rooms, "`rtrace`", *theirs)
-        _print(rooms, "three-phase", *pooled([by_phases(rooms, seed) for seed in seeds]))
+            theirs = pooled([by_radiance(count, Path(folder)) for _ in range(seeds)])
+        _print(count, "`rtrace`", *theirs)
+        _print(count, "three-phase", *pooled([by_phases(count, s) for s in range(seeds)]))
 
 
 def _print(rooms: int, who: str, mean: NDArray[np.float64], error: NDArray[np.float64]) -> None:
     cells = (f"{m:.1f} ({100 * e:.1f} %)" for m, e in zip(mean, error, strict=True))
     print(f"| {rooms} | {who} [lx] | {' | '.join(cells)} |", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -12,11 +12,11 @@ their standard errors, and ours by each, of the sensors' means.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +26,11 @@ from bim.ifc.corrections import OPEN
 from bim.model import Building, Space
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.methods.optics import GivenOptics
-from mitsuba_cfs.methods.phase_light import PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.light import illuminance
+from mitsuba_cfs.methods.optics import MatrixOptics
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from scenes.demo import VENETIAN_BLIND
 from scenes.fenestration.systems import read_system
@@ -74,25 +74,25 @@ def borrowing_scene(building: Building, space: Space) -> DaylightScene | None:
 def _plain(scene: DaylightScene) -> DaylightScene:
     """The scene with nothing outdoors, and the same glass everywhere."""
     beyond = []
-    for one, tau in zip(scene.beyond, inner_taus(scene), strict=True):
+    for one, tau in zip(scene.adjacent, inner_taus(scene), strict=True):
         behind = _plain(one.scene)
         taus = [TAU] * len(behind.outdoor_groups) + inner_taus(one.scene)
         passed = tuple(t * EYE for t in taus)
         beyond.append(replace(one, scene=behind, transmission=passed, beam=tau * EYE.diagonal()))
-    return replace(scene, exterior=Surfaces.none(), beyond=tuple(beyond))
+    return replace(scene, exterior=Surfaces.none(), adjacent=tuple(beyond))
 
 
 def inner_taus(scene: DaylightScene) -> list[float]:
     """What each pane between rooms passes: a doorway all."""
-    return [1.0 if np.all(one.beam == 1) else INNER_TAU for one in scene.beyond]
+    return [1.0 if np.all(one.beam == 1) else INNER_TAU for one in scene.adjacent]
 
 
 def by_phases(scene: DaylightScene, seed: int) -> NDArray[np.float64]:
     """Illuminance of the sensors [S] [lx] by this project's three phases."""
-    traced = PhaseScene(scene, replace(SAMPLING, seed=seed), five_phase=False)
+    traced = phase_matrices(scene, replace(SAMPLING, seed=seed), five_phase=False)
     tau = [0.0] * len(scene.outdoor_groups) + inner_taus(scene)
-    light = PhaseSystems(traced, [[GivenOptics(t * EYE)] for t in tau])
-    return light.light(overcast()).illuminance()[:, 0]
+    light = phase_light(traced, [[MatrixOptics(t * EYE)] for t in tau], overcast())
+    return illuminance(light)[:, 0]
 
 
 def by_paths(scene: DaylightScene, samples: int, seed: int) -> NDArray[np.float64]:
@@ -168,37 +168,32 @@ def _triangles(groups: Sequence[WindowGroup]) -> NDArray[np.float64]:
     return np.concatenate(found) if found else np.empty((0, 3, 3))
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    building: Path,
+    *,
+    space: Sequence[str] = (),
+    seeds: int = 4,
+    paths: Annotated[int, "of a sensor for each seed"] = 1 << 19,
+) -> None:
     """Print three lines for each room that borrows light."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("building", type=Path)
-    parser.add_argument("--space", action="append", default=[])
-    parser.add_argument("--seeds", type=int, default=4)
-    parser.add_argument("--paths", type=int, default=1 << 19, help="of a sensor for each seed")
-    options = parser.parse_args(arguments)
-    building = opened(read_ifc(options.building, join=[OPEN]))
+    building = opened(read_ifc(building, join=[OPEN]))
     variants.activate()
-    spaces = [building.space(name) for name in options.space] or building.spaces
+    rooms = [building.space(name) for name in space] or building.spaces
     print("| room | from | | sensors [lx] | three-phase by it |\n|---|---|---|---|---|")
-    for space in spaces:
-        scene = borrowing_scene(building, space)
+    for room in rooms:
+        scene = borrowing_scene(building, room)
         if scene is None:
             continue
-        seeds = range(options.seeds)
-        lent = ", ".join(room.label for room in source_rooms(building, space))
+        lent = ", ".join(other.label for other in source_rooms(building, room))
         with tempfile.TemporaryDirectory() as name:
             runs = {
-                "three-phase": [by_phases(scene, seed) for seed in seeds],
-                "paths": [by_paths(scene, options.paths, seed) for seed in seeds],
-                "`rtrace`": [by_radiance(scene, Path(name)) for _ in seeds],
+                "three-phase": [by_phases(scene, seed) for seed in range(seeds)],
+                "paths": [by_paths(scene, paths, seed) for seed in range(seeds)],
+                "`rtrace`": [by_radiance(scene, Path(name)) for _ in range(seeds)],
             }
         ours = pooled(runs["three-phase"])[0].mean()
         for who, values in runs.items():
             mean, error = pooled(values)
             cells = (f"{m:.1f} ({100 * e:.1f} %)" for m, e in zip(mean, error, strict=True))
             ratio = f"{ours / mean.mean():.3f}"
-            print(f"| {space.label} | {lent} | {who} | {', '.join(cells)} | {ratio} |", flush=True)
-
-
-if __name__ == "__main__":
-    main()
+            print(f"| {room.label} | {lent} | {who} | {', '.join(cells)} | {ratio} |", flush=True)

@@ -13,11 +13,11 @@ the folder: both pictures as .hdr, and beside each other as pictures.png, in one
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -32,11 +32,12 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import View, fisheye, pixel_directions, pixel_solid_angles
-from mitsuba_cfs.methods.optics import GivenOptics
-from mitsuba_cfs.methods.phase_light import PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.optics import MatrixOptics
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
+from mitsuba_cfs.methods.point_in_time import path_picture
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.trace.kernels.sampling import spread_rays
 from scenes.room.inner_glass import opened
 from tests.validation import inner_glass, inner_glass_ifc
@@ -82,9 +83,11 @@ def _inner(scene: DaylightScene) -> Sequence:
 
 def ours(scene: DaylightScene, taus: Sequence[float]) -> NDArray[np.float64]:
     """Luminance [ny, nx] [cd/m2] by this project's three phases."""
-    traced = PhaseScene(scene, SAMPLING, five_phase=False)
-    systems = [[GivenOptics(tau * np.eye(KLEMS_FULL.size))] for tau in taus]
-    made = PhaseSystems(traced, systems).light(overcast()).pictures(np.arange(1), [0] * len(taus))
+    traced = phase_matrices(scene, SAMPLING, five_phase=False)
+    systems = [[MatrixOptics(tau * np.eye(KLEMS_FULL.size))] for tau in taus]
+    made = pictures_in_state(
+        phase_light(traced, systems, overcast()), np.arange(1), [0] * len(taus)
+    )
     view = scene.view
     picture = np.zeros(view.width * view.height)
     picture[made.pixels] = made.values(np.arange(1))[0]
@@ -97,7 +100,7 @@ def by_rpict(write: Writer, view: View, bounces: int, folder: Path) -> NDArray[n
     files = " ".join(sorted(path.name for path in folder.glob("*.rad")))
     rendered = RenderedScene(folder, files, f"{CACHED} -ab {bounces}", POINT)
     rendered.set_sky(overcast().whole[:, 0], 1, (0.0, 0.0, 1.0), 0.0)
-    return rendered.picture(view)
+    return path_picture(rendered, view)
 
 
 def by_path(rooms: tuple[Quads, Quads], view: View, rays: int) -> NDArray[np.float64]:
@@ -143,32 +146,32 @@ def show(pictures: dict[str, NDArray[np.float64]], path: Path) -> None:
     plt.close(figure)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(
+    building: Path | None = None,
+    *,
+    space: str = "",
+    size: Annotated[int, "pixels of a side"] = 200,
+    rays: Annotated[int, "of a pixel for `path`"] = 512,
+    bounces: Annotated[int, "-ab of rpict"] = 6,
+    out: Annotated[Path | None, "folder of the pictures"] = None,
+) -> None:
     """Print the table and write the pictures."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("building", type=Path, nargs="?")
-    parser.add_argument("--space", default="")
-    parser.add_argument("--size", type=int, default=200, help="pixels of a side")
-    parser.add_argument("--rays", type=int, default=512, help="of a pixel for `path`")
-    parser.add_argument("--bounces", type=int, default=6, help="-ab of rpict")
-    parser.add_argument("--out", type=Path, help="folder of the pictures")
-    options = parser.parse_args(arguments)
     variants.activate()
-    if options.building is None:
-        case = own_corridor(options.size)
+    if building is None:
+        case = own_corridor(size)
     else:
-        case = room_of(options.building, options.space, options.size)
+        case = room_of(building, space, size)
     scene, taus, write, rooms = case
     view, pictures = scene.view, {"this project": ours(scene, taus)}
     with tempfile.TemporaryDirectory() as folder:
-        pictures["rpict"] = by_rpict(write, view, options.bounces, Path(folder))
-    pictures["path"] = by_path(rooms, view, options.rays)
+        pictures["rpict"] = by_rpict(write, view, bounces, Path(folder))
+    pictures["path"] = by_path(rooms, view, rays)
     print_table(scene, pictures)
-    if options.out is not None:
-        options.out.mkdir(parents=True, exist_ok=True)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
         for name, picture in pictures.items():
-            write_hdr(options.out / f"{name.replace(' ', '_')}.hdr", picture, view=view)
-        show(pictures, options.out / "pictures.png")
+            write_hdr(out / f"{name.replace(' ', '_')}.hdr", picture, view=view)
+        show(pictures, out / "pictures.png")
 
 
 def print_table(scene: DaylightScene, pictures: dict[str, NDArray[np.float64]]) -> None:
@@ -187,7 +190,3 @@ def print_table(scene: DaylightScene, pictures: dict[str, NDArray[np.float64]]) 
             f"| {mine / rpict:.3f} | {mine / path:.3f} |",
             flush=True,
         )
-
-
-if __name__ == "__main__":
-    main()

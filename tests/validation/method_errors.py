@@ -11,12 +11,12 @@ compares what the table says of it with what was measured.
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from dataclasses import asdict, replace
 from datetime import date
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,10 +30,12 @@ from mitsuba_cfs.bsdf.resample import klems_of
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods import METHODS
-from mitsuba_cfs.methods.by_name import traced_scene, values, with_systems
+from mitsuba_cfs.methods.glare import metric_values
+from mitsuba_cfs.methods.light import daylight
 from mitsuba_cfs.methods.optics import BsdfOptics
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, phase_matrices
+from mitsuba_cfs.methods.point_in_time import PathLight
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import SkySeries, sky_series
@@ -137,17 +139,25 @@ def with_sun(scene: DaylightScene, series: SkySeries) -> NDArray[np.bool_]:
     return seen
 
 
+def method_matrices(
+    method: str, scene: DaylightScene, sampling: Sampling | None = None
+) -> PhaseMatrices | None:
+    """The matrices of a scene that a method takes for every glare metric."""
+    if method == "point-in-time":
+        return None
+    return phase_matrices(scene, sampling, five_phase=method == "five-phase", needs=GLARE)
+
+
 def measured(scene: DaylightScene, traced: dict, bsdf: Bsdf, lit: AnnualSky) -> dict[str, float]:
     """Relative root mean square error of DGP of each method and metric."""
     optics = [[BsdfOptics(klems_of(bsdf), bsdf)]]
     many = Sampling(picture_samples=REFERENCE_SAMPLES, seed=REFERENCE_SEED)
-    judge = values(
-        with_systems(traced_scene("point-in-time", scene, many), optics).light(lit), "DGP"
-    )
+    judge = metric_values(PathLight(scene, optics, lit, many), "DGP")
     found = {}
     for method in METHODS:
         for metric in GLARE:
-            dgp = values(with_systems(traced[method], optics).light(lit), metric)
+            light = daylight(scene, optics, lit, method=method, needs=(), matrices=traced[method])
+            dgp = metric_values(light, metric)
             found[f"{method} {metric}"] = float(np.sqrt(np.mean((dgp / judge - 1) ** 2)))
     return found
 
@@ -169,7 +179,7 @@ def made(hours: int, size: int, out: Path) -> MeasuredErrors:
     filled = systems()
     for place, (scene, in_view) in rooms(size).items():
         lit = sky(scene, hours, in_view)
-        traced = {method: traced_scene(method, scene) for method in METHODS}
+        traced = {method: method_matrices(method, scene) for method in METHODS}
         for name, bsdf in filled.items():
             if (place, name) in known:
                 continue
@@ -229,19 +239,15 @@ def print_check(table: MeasuredErrors) -> None:
         )
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    *,
+    out: Path = FILE,
+    hours: int = 4,
+    size: Annotated[int, "pixels of a side"] = 96,
+    check: Annotated[bool, "read `out` instead of measuring"] = False,
+) -> None:
     """Measure or check."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=FILE)
-    parser.add_argument("--hours", type=int, default=4)
-    parser.add_argument("--size", type=int, default=96, help="pixels of a side")
-    parser.add_argument("--check", type=Path, nargs="?", const=FILE)
-    options = parser.parse_args(arguments)
-    if options.check is None:
+    if not check:
         variants.activate()
-        made(options.hours, options.size, options.out)
-    print_check(MeasuredErrors.read(options.check or options.out))
-
-
-if __name__ == "__main__":
-    main()
+        made(hours, size, out)
+    print_check(MeasuredErrors.read(out))

@@ -11,10 +11,11 @@ measured errors are those of `method_errors`, expected ones those of the table t
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -27,7 +28,6 @@ from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods import METHODS
-from mitsuba_cfs.methods.by_name import traced_scene
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.epw import read_epw
@@ -35,7 +35,14 @@ from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.calibration.errors import FILE, LEAST, MeasuredErrors
-from tests.validation.method_errors import BARS, BRIGHT, measured, traits_of, with_sun
+from tests.validation.method_errors import (
+    BARS,
+    BRIGHT,
+    measured,
+    method_matrices,
+    traits_of,
+    with_sun,
+)
 
 NEAR = [WindowRectangle(x, 0.8, 1.6, 1.7) for x in (0.3, 2.2, 4.1)]
 DEEP = [WindowRectangle(0.2, 1.9, 3.1, 0.8)]
@@ -84,7 +91,7 @@ def visible(path: Path) -> Bsdf:
 def compared(scene: DaylightScene, lit: AnnualSky, files: list[Path], room: str) -> list[dict]:
     """Expected and measured error of every method and metric, for each file."""
     table = MeasuredErrors.read(FILE)
-    traced = {method: traced_scene(method, scene) for method in METHODS}
+    traced = {method: method_matrices(method, scene) for method in METHODS}
     rows = []
     for path in files:
         bsdf = visible(path)
@@ -116,27 +123,23 @@ def print_table(rows: list[dict]) -> None:
           f"{np.quantile(ratio, 0.9):.2f}")  # fmt: skip
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    files: Sequence[Path],
+    *,
+    weather: Path,
+    rooms_: Annotated[Sequence[str], ("near", "deep")] = ("near", "deep"),
+    hours: int = 4,
+    sun_in_view: Annotated[bool, "in a window before the eye"] = False,
+    size: Annotated[int, "pixels of a side"] = 96,
+    json_: Path | None = None,
+) -> None:
     """Measure and compare."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("files", type=Path, nargs="+")
-    parser.add_argument("--weather", type=Path, required=True)
-    parser.add_argument("--rooms", nargs="+", choices=("near", "deep"), default=["near", "deep"])
-    parser.add_argument("--hours", type=int, default=4)
-    parser.add_argument("--sun-in-view", action="store_true", help="in a window before the eye")
-    parser.add_argument("--size", type=int, default=96, help="pixels of a side")
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args(arguments)
     variants.activate()
-    known, weather, rows = rooms(options.size), read_epw(options.weather), []
-    for name in options.rooms:
+    known, weather, rows = rooms(size), read_epw(weather), []
+    for name in rooms_:
         scene = known[name]
-        lit = fresh_hours(weather, options.hours, scene if options.sun_in_view else None)
-        rows += compared(scene, lit, options.files, name)
+        lit = fresh_hours(weather, hours, scene if sun_in_view else None)
+        rows += compared(scene, lit, files, name)
     print_table(rows)
-    if options.json is not None:
-        options.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+    if json_ is not None:
+        json_.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")

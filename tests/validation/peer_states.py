@@ -10,7 +10,6 @@ done with them.
 
 from __future__ import annotations
 
-import argparse
 import json
 import subprocess
 import tempfile
@@ -167,25 +166,17 @@ def _write(folder: Path, room: StatedRoom, weather: Weather) -> None:
     np.save(folder / "daylight_hours.npy", room.total.sum(axis=0)[daylight_hours(weather)].T)
 
 
-def main() -> None:
+def main(*, peer: Path | None = None, out: Path = STORED.parent) -> None:
     """Compare, and store the peer's figures where it is given."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--peer", type=Path)
-    parser.add_argument("--out", type=Path, default=STORED.parent)
-    chosen = parser.parse_args()
     weather = read_epw(WEATHER)
     made = list(rooms(weather))
-    if chosen.peer is not None:
-        found = ask_peer(chosen.peer, made, weather)
-        (chosen.out / STORED.name).write_text(json.dumps(found, indent=1) + "\n")
-    peer = json.loads((chosen.out / STORED.name).read_text())
+    if peer is not None:
+        found = ask_peer(peer, made, weather)
+        (out / STORED.name).write_text(json.dumps(found, indent=1) + "\n")
+    stored = json.loads((out / STORED.name).read_text())
     for room in made:
         own = figures(room, weather)
-        for part, values in peer[room.name].items():
+        for part, values in stored[room.name].items():
             for name, value in values.items():
                 line = f"{own[part][name]:7.2f} {value:7.2f} {own[part][name] - value:6.2f}"
                 print(f"{room.name:20s} {part:10s} {name:4s} {line}")
-
-
-if __name__ == "__main__":
-    main()

@@ -19,12 +19,12 @@ is part of.
 
 from __future__ import annotations
 
-import argparse
 from collections import defaultdict
 from collections.abc import Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import ifcopenshell
 import ifcopenshell.util.element as element_of
@@ -182,20 +182,18 @@ def _share(part: float, whole: float) -> str:
     return f"{100 * part / whole:.1f} %" if whole > EXACT else "-"
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(
+    files: Sequence[Path], *, misses: Annotated[bool, "name the elements that differ"] = False
+) -> None:
     """Print the table, and with `--misses` the elements that miss."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("files", nargs="+", type=Path)
-    parser.add_argument("--misses", action="store_true", help="name the elements that differ")
-    options = parser.parse_args(arguments)
     rows = []
-    for path in options.files:
+    for path in files:
         with process_pool(1) as pool:
             try:
                 rows.append(pool.submit(counted, path).result())
             except BrokenProcessPool:
                 rows.append(Counted(path.name, refused="its process was ended"))
-        if options.misses:
+        if misses:
             print(
                 rows[-1].file,
                 f"phantom {rows[-1].phantom:.2f} (down {rows[-1].down:.2f}, "
@@ -205,7 +203,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 flush=True,
             )
     print(table(rows))
-
-
-if __name__ == "__main__":
-    main()

@@ -14,11 +14,11 @@ takes it to be linear between the patches' middles, which the last line shows.
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import drjit as dr
 import mitsuba as mi
@@ -143,20 +143,21 @@ def _sky(room: Room, options: str) -> NDArray[np.float64]:
     return np.loadtxt(run(command, room.files.script.parent).decode().splitlines())
 
 
-def main() -> None:
+def main(
+    file: Path,
+    name: str,
+    folder: Path,
+    *,
+    runs: int = 3,
+    indoors: int = 5000,
+    outdoors: int = 400,
+    weather: Annotated[Path | None, "EPW; the hours of three days besides"] = None,
+) -> None:
     """Print the comparison."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("file", type=Path)
-    parser.add_argument("room")
-    parser.add_argument("folder", type=Path)
-    for name, value in (("--runs", 3), ("--indoors", 5000), ("--outdoors", 400)):
-        parser.add_argument(name, type=int, default=value)
-    parser.add_argument("--weather", type=Path, help="EPW; the hours of three days besides")
-    given = parser.parse_args()
-    room = Room.exported(given.file, given.room, given.folder, given.weather)
-    radiance = [theirs(room, given.indoors, given.outdoors) for _ in range(given.runs)]
-    found = [ours(room, seed) for seed in range(given.runs)]
-    a, b = (np.array([whole for whole, _ in runs]) for runs in (found, radiance))
+    room = Room.exported(file, name, folder, weather)
+    radiance = [theirs(room, indoors, outdoors) for _ in range(runs)]
+    found = [ours(room, seed) for seed in range(runs)]
+    a, b = (np.array([whole for whole, _ in each]) for each in (found, radiance))
     print(f"{room.space.label}: {a.shape[1]} sensors, {os.cpu_count()} cores")
     patches = np.arange(a.shape[2])
     skies = {
@@ -165,16 +166,16 @@ def main() -> None:
         "the other half": patches % 30 >= 15,
         "the ground alone": patches == 0,
     }
-    for name, sky in skies.items():
-        _print(name, a @ sky.astype(float), b @ sky.astype(float))
+    for label, sky in skies.items():
+        _print(label, a @ sky.astype(float), b @ sky.astype(float))
     if room.weather is not None:
-        a, b = (np.array([hours for _, hours in runs]) for runs in (found, radiance))
+        a, b = (np.array([hours for _, hours in each]) for each in (found, radiance))
         bright = b.mean(axis=0) > LEAST
         _print(f"{bright.sum()} sensor-hours by five phases", a[:, bright], b[:, bright])
-        linear = np.array([ours(room, seed, even=False)[1] for seed in range(given.runs)])
+        linear = np.array([ours(room, seed, even=False)[1] for seed in range(runs)])
         _print("the same, beams between patches", linear[:, bright], b[:, bright])
-    rays = given.indoors, given.outdoors
-    coloured = [theirs(room, *rays, materials="materials.rad") for _ in range(given.runs)]
+    rays = indoors, outdoors
+    coloured = [theirs(room, *rays, materials="materials.rad") for _ in range(runs)]
     b = np.array([whole.sum(axis=1) for whole, _ in coloured])
     _print("uniform, in colours", np.array([whole.sum(axis=1) for whole, _ in found]), b)
 
@@ -192,7 +193,3 @@ def _print(name: str, a: NDArray[np.float64], b: NDArray[np.float64]) -> None:
 
 def _rms(values: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-if __name__ == "__main__":
-    main()

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.bsdf.pane_stack import hemispherical_mean
 from mitsuba_cfs.directions import incident_azimuth
 from scenes.fenestration.layer_sun import sun_in_layers
+from tests.validation.ashrae140_sun import ANGLES, glass
 from thermal.blackbox import (
     R_INNER,
     R_OUTER,
@@ -73,6 +74,23 @@ class ReferenceSystem:
     direct: LayerAbsorptances  # [K]
     diffuse: LayerAbsorptances  # [2] sky, ground
     back_layers: tuple[float, float]  # room-side absorptances of the outer and inner layer
+
+
+def clear_double() -> ReferenceSystem:
+    """The clear double glazing of `glass("double")` as a system of the reference room."""
+    pane = glass("double")
+    tau, outer, inner = pane.diffuse
+    rho = 1.0 - tau - outer - inner
+    share = {"rho_back": pane.back[0]}
+    diffuse = np.array([[tau, rho, 0.0]] * 2)  # g is not needed any more
+    dark = np.zeros_like(ANGLES)
+    optics = Optics(ANGLES, None, pane.tau, dark, dark, diffuse, None, share)
+    both = LayerAbsorptances(np.full(2, outer), np.full(2, inner), 0.0)
+    direct = LayerAbsorptances(pane.outer, pane.inner, 0.0)
+    # light that the glass passes as beam: `reference_room` knows clear glass by this name
+    plain = pane.fenestration
+    fenestration = Fenestration("dgu", plain.u_value, resistance=plain.resistance)
+    return ReferenceSystem(fenestration, optics, direct, both, (pane.back[1], pane.back[2]))
 
 
 def read_optics(folder: Path, name: str) -> Optics:

@@ -13,11 +13,11 @@ ours of the picture alone.
 
 from __future__ import annotations
 
-import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import mitsuba as mi
 import numpy as np
@@ -43,7 +43,7 @@ from scenes.cost import room
 from tests.benchmarks import radiance
 from tests.benchmarks.annual_product import SYSTEM, WEATHER
 from tests.validation.rendered_scene import RenderedScene
-from tests.validation.scene_rows import add_row_options, show_rows
+from tests.validation.scene_rows import show_rows
 
 EYE, DIRECTION = (1.8, 2.0, 1.2), (0.0, -1.0, 0.0)
 SIZE = 200  # [px] of the pictures
@@ -201,23 +201,15 @@ def line(row: Outcome) -> str:
     )
 
 
-def main() -> None:
+def main(
+    *,
+    systems: Sequence[str] = ("glass", "blind", "tree"),
+    weather: Path = WEATHER,
+    size: int = SIZE,
+    every: Annotated[int, "moments from one to the next"] = 1,
+    json_: Path | None = None,
+) -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--systems", nargs="+", default=["glass", "blind", "tree"])
-    parser.add_argument("--weather", type=Path, default=WEATHER)
-    parser.add_argument("--size", type=int, default=SIZE)
-    parser.add_argument("--every", type=int, default=1, help="moments from one to the next")
-    add_row_options(parser)
-    options = parser.parse_args()
     variants.activate()
-    chosen = moments(read_epw(options.weather))[:: options.every]
-    show_rows(
-        options,
-        lambda folder: outcomes(options.systems, chosen, folder, size=options.size),
-        line,
-    )
-
-
-if __name__ == "__main__":
-    main()
+    chosen = moments(read_epw(weather))[::every]
+    show_rows(json_, lambda folder: outcomes(systems, chosen, folder, size=size), line)

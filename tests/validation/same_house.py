@@ -9,7 +9,6 @@ by kind of face and by what follows, reveals and frames apart.
 
 from __future__ import annotations
 
-import argparse
 from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
@@ -35,13 +34,9 @@ def areas_and_losses(building: Building) -> dict[tuple[str, str], tuple[float, f
     return dict(sums)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(files: Sequence[Path]) -> None:
     """Print a line for each kind of face."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("files", nargs=2, type=Path)
-    one, other = (
-        areas_and_losses(read_building_file(path)) for path in parser.parse_args(arguments).files
-    )
+    one, other = (areas_and_losses(read_building_file(path)) for path in files)
     print("| face | towards | area [m2] | of the other | U [W/(m2 K)] | of the other |")
     print("|---|---|---|---|---|---|")
     for kind, towards in sorted({*one, *other}):
@@ -51,7 +46,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
         areas = " | ".join(f"{area:.1f}" for area, _ in pair)
         means = " | ".join(f"{loss / area:.3f}" if area else "none" for area, loss in pair)
         print(f"| {kind} | {towards} | {areas} | {means} |")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,8 +1,7 @@
-"""What scripts that render scenes share: a folder for these, rows as they come, a file of them."""
+"""Rows of scripts that render scenes: made in a folder, printed as they come, written to a file."""
 
 from __future__ import annotations
 
-import argparse
 import json
 import tempfile
 from collections.abc import Callable, Iterable
@@ -13,24 +12,14 @@ from typing import TypeVar
 Row = TypeVar("Row")
 
 
-def add_row_options(parser: argparse.ArgumentParser) -> None:
-    """Options that `show_rows` reads."""
-    parser.add_argument("--keep", type=Path, help="folder for scenes and pictures")
-    parser.add_argument("--json", type=Path)
-
-
 def show_rows(
-    options: argparse.Namespace,
-    rows: Callable[[Path], Iterable[Row]],
-    line: Callable[[Row], str],
+    file: Path | None, rows: Callable[[Path], Iterable[Row]], line: Callable[[Row], str]
 ) -> None:
-    """Print a line of each row, which are dataclasses, made in a folder; write them to `--json`."""
+    """Print a line of each row, which are dataclasses, made in a folder; write them to a file."""
     found = []
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = (options.keep or Path(temporary)).resolve()
-        folder.mkdir(parents=True, exist_ok=True)
-        for row in rows(folder):
+    with tempfile.TemporaryDirectory() as folder:
+        for row in rows(Path(folder).resolve()):
             found.append(asdict(row))
             print(line(row), flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(found, indent=1))
+    if file:
+        file.write_text(json.dumps(found, indent=1))

@@ -10,7 +10,6 @@ study: it is put beside the directions that every command takes.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -109,16 +108,12 @@ def sun_angles(reference: Path) -> np.ndarray:
     return np.degrees(np.arccos(cosine))[altitude > LOW]
 
 
-def main(reference: Path, folder: Path, only: Sequence[str]) -> str:
-    """The tables as text; written to FOLDER as CSV too."""
+def main(reference: Path, folder: Path, only: Sequence[str] = ()) -> dict[str, pd.DataFrame]:
+    """The tables, written to FOLDER as CSV too; only: numbers of TF09's variants."""
     tables = {"walls": step_response(), "sunlit": compare(reference, only=only)}
     folder.mkdir(parents=True, exist_ok=True)
     for name, table in tables.items():
         table.to_csv(folder / f"{name}.csv", index=False)
     angles = sun_angles(reference)
-    said = f"TF01: {angles.mean():.2f} degrees in the mean, {angles.max():.2f} at most\n"
-    return "\n".join([*(t.round(3).to_string(index=False) for t in tables.values()), said])
-
-
-if __name__ == "__main__":
-    sys.stdout.write(main(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3:]))
+    said = f"TF01: {angles.mean():.2f} degrees in the mean, {angles.max():.2f} at most"
+    return tables | {said: pd.DataFrame()}

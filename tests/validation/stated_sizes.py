@@ -9,7 +9,6 @@ flat, or to look along its wall, shows.  Named are those more than a quarter off
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -43,11 +42,9 @@ def compared(path: Path) -> tuple[int, list[str]]:
     return count, off
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(files: Sequence[Path]) -> None:
     """Print a line for each file, and below it those that differ."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("files", nargs="+", type=Path)
-    for path in parser.parse_args(arguments).files:
+    for path in files:
         try:
             count, off = compared(path)
         except CfsError as error:
@@ -56,7 +53,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"{path.name}: {count} state their size, {len(off)} differ", flush=True)
         for line in off:
             print(f"  {line}")
-
-
-if __name__ == "__main__":
-    main()

@@ -10,20 +10,21 @@ root mean squares; the processor time over that with the window in one part.
 
 from __future__ import annotations
 
-import argparse
 import time
+from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.methods.light import illuminance, illuminance_with_error
 from mitsuba_cfs.methods.optics import BsdfOptics
-from mitsuba_cfs.methods.path_light import PathSystems
-from mitsuba_cfs.methods.phase_light import PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.point_in_time import PathLight
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky, given_sky
 from mitsuba_cfs.surfaces import Surfaces
 from tests.validation.cut_groups import (
@@ -54,8 +55,8 @@ def by_phases(
     """Illuminance [S, H], processor time [s] and number of parts."""
     start = time.process_time()
     sampling = Sampling(window_parts=parts, seed=seed)
-    traced = PhaseScene(scene, sampling, five_phase=five_phase)
-    values = PhaseSystems(traced, [[BsdfOptics(glass)]]).light(sunny()).illuminance()
+    traced = phase_matrices(scene, sampling, five_phase=five_phase)
+    values = illuminance(phase_light(traced, [[BsdfOptics(glass)]], sunny()))
     return values, time.process_time() - start, len(traced.parts.groups)
 
 
@@ -64,10 +65,10 @@ def by_paths(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Illuminance [S, H] and its standard error."""
     values, errors = [], []
-    light = PathSystems(scene, [[BsdfOptics(glass)]], Sampling(hour_samples=paths))
+    optics, sampling = [[BsdfOptics(glass)]], Sampling(hour_samples=paths)
     for hour in range(len(SUNS)):
-        one = light.light(sunny().part([hour]))
-        found, error = one.estimate()
+        one = PathLight(scene, optics, sunny().part([hour]), sampling)
+        found, error = illuminance_with_error(one)
         values.append(found[:, 0])
         errors.append(error * found[:, 0])
     return np.stack(values, axis=1), np.stack(errors, axis=1)
@@ -99,12 +100,12 @@ def row(name: str, glass: KlemsBsdf, paths: int) -> str:
     )
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    *,
+    cases: Annotated[Sequence[str], CASES] = tuple(CASES),
+    paths: Annotated[int, "of a sensor in an hour"] = 131_072,
+) -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", nargs="+", choices=CASES, default=list(CASES))
-    parser.add_argument("--paths", type=int, default=131_072, help="of a sensor in an hour")
-    options = parser.parse_args(arguments)
     glass = specular_klems(Glazing("double", 0.78, 0.14, 0.14), KLEMS_FULL)
     interior, group = room()
     compiled = DaylightScene(interior, surfaces(CASES["fins"]), [group], POINTS, UP)
@@ -114,9 +115,5 @@ def main(arguments: list[str] | None = None) -> None:
         "| before the window | 5-phase | within 3 % | 3-phase | 5-phase's noise | paths' error, "
         "largest | parts | time, times |\n|---|---|---|---|---|---|---|---|"
     )
-    for name in options.cases:
-        print(row(name, glass, options.paths), flush=True)
-
-
-if __name__ == "__main__":
-    main()
+    for name in cases:
+        print(row(name, glass, paths), flush=True)

@@ -11,10 +11,10 @@ sun that passes straight on: in the tree, and between the layer's own slats or t
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import drjit as dr
 import mitsuba as mi
@@ -32,6 +32,7 @@ from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.glare.annual import full_picture
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.images.view import View, fisheye
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.sampling import lattice_2d
@@ -40,7 +41,7 @@ from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks.annual_product import WEATHER
 from tests.validation import rendered_pictures as rendered
-from tests.validation.scene_rows import add_row_options, show_rows
+from tests.validation.scene_rows import show_rows
 
 SLAT_RAYS = 1 << 16
 PATHS = 1 << 32  # of a tree, over all pairs of incident and outgoing cells
@@ -142,8 +143,8 @@ def five_phase(
     sun[stands, np.arange(n)] = strength / reinhart.solid_angles[stands]
     sky = cfs.AnnualSky(patches + sun, towards, strength, np.arange(n), 8760, sun=sun)
     scene = cfs.DaylightScene(room.room(), room.NOTHING, room.window_groups(), view=view)
-    traced = cfs.PhaseScene(scene, cfs.Sampling(subdivision=rendered.SUBDIVISION))
-    shown = cfs.PhaseSystems(traced, [[optics]]).light(sky).pictures(np.arange(n), [0])
+    traced = cfs.phase_matrices(scene, cfs.Sampling(subdivision=rendered.SUBDIVISION))
+    shown = pictures_in_state(cfs.phase_light(traced, [[optics]], sky), np.arange(n), [0])
     values = shown.values(np.arange(n))
     return [full_picture(row, shown.pixels, view) for row in values]
 
@@ -172,22 +173,17 @@ def line(row: Outcome) -> str:
     )
 
 
-def main() -> None:
+def main(
+    *,
+    tree: Annotated[Path | None, "BSDF XML"] = None,
+    layer: Annotated[str, LAYERS, "where there is no file"] = "blind",
+    levels: Annotated[int, "of the layer's tree"] = 5,
+    every: Annotated[int, "moments from one to the next"] = 1,
+    size: Annotated[int, "[px]"] = 120,
+    json_: Path | None = None,
+) -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--tree", type=Path, help="BSDF XML")
-    parser.add_argument("--layer", choices=LAYERS, default="blind", help="where there is no file")
-    parser.add_argument("--levels", type=int, default=5, help="of the layer's tree")
-    parser.add_argument("--every", type=int, default=1, help="moments from one to the next")
-    parser.add_argument("--size", type=int, default=120, help="[px]")
-    add_row_options(parser)
-    options = parser.parse_args()
     variants.activate()
-    chosen = rendered.moments(cfs.read_epw(WEATHER))[:: options.every]
-    view = fisheye(rendered.EYE, rendered.DIRECTION, options.size)
-    given = options.tree, options.layer, options.levels
-    show_rows(options, lambda folder: outcomes(*given, chosen, view, folder), line)
-
-
-if __name__ == "__main__":
-    main()
+    chosen = rendered.moments(cfs.read_epw(WEATHER))[::every]
+    view = fisheye(rendered.EYE, rendered.DIRECTION, size)
+    show_rows(json_, lambda folder: outcomes(tree, layer, levels, chosen, view, folder), line)

@@ -11,11 +11,10 @@ Fraunhofer IBP, IEA EBC Annex 58.
 
 from __future__ import annotations
 
-import argparse
 import shutil
-import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
@@ -198,21 +197,14 @@ def by_phase(
     return pd.DataFrame(rows)
 
 
-def main(source: Path, folder: Path, number: int) -> str:
-    """Write, run, compare."""
-    experiment = EXPERIMENTS[number]
-    data = measured(source, experiment)
-    study = write_inputs(data, folder, experiment.study)
+def main(
+    source: Path, folder: Path, *, experiment: Annotated[int, EXPERIMENTS] = 2
+) -> dict[str, pd.DataFrame]:
+    """Write the inputs, run `cfs thermal`'s study, compare by phase."""
+    chosen = EXPERIMENTS[experiment]
+    data = measured(source, chosen)
+    study = write_inputs(data, folder, chosen.study)
     held = heat_to_hold(study, data)
     north, south = what_is_missing(data, held)
-    table = by_phase(experiment, study, data, held).round(2).to_string(index=False)
-    return f"{table}\nmissing: {north:.1f} W/K to the north, {south:.2f} m2 of the south's sun\n"
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("source", type=Path)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--experiment", type=int, choices=EXPERIMENTS, default=2)
-    chosen = parser.parse_args()
-    sys.stdout.write(main(chosen.source, chosen.folder, chosen.experiment))
+    missing = f"missing: {north:.1f} W/K to the north, {south:.2f} m2 of the south's sun"
+    return {missing: by_phase(chosen, study, data, held).round(2)}

@@ -10,10 +10,9 @@ ground reflects evenly.
 
 from __future__ import annotations
 
-import argparse
-import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
@@ -80,15 +79,7 @@ def compared(folder: Path, number: int, albedo: float) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def main() -> None:
+def main(source: Path, *, albedo: Annotated[float, "of the ground (0.2)"] = 0.2) -> pd.DataFrame:
     """Print a table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("source", type=Path)
-    parser.add_argument("--albedo", type=float, default=0.2, help="of the ground (0.2)")
-    chosen = parser.parse_args()
-    tables = [compared(chosen.source, number, chosen.albedo) for number in EXPERIMENTS]
-    sys.stdout.write(pd.concat(tables).round(1).to_string(index=False) + "\n")
-
-
-if __name__ == "__main__":
-    main()
+    tables = [compared(source, number, albedo) for number in EXPERIMENTS]
+    return pd.concat(tables).round(1)

@@ -121,6 +121,7 @@ def view() -> None:
         print(f"{name}: {value:.5f} at the most, {count} eyes")
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Both tables."""
     sunlight()
     view()

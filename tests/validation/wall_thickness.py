@@ -8,7 +8,6 @@ rooms' faces of one layer, without reveals and frames, whose layer is thicker th
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -42,11 +41,9 @@ def too_thick(building: Building) -> tuple[float, Counter[str]]:
     return total, found
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(files: Sequence[Path]) -> None:
     """Print a line for each file."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("files", nargs="+", type=Path)
-    for path in parser.parse_args(arguments).files:
+    for path in files:
         try:
             total, found = too_thick(read_building_file(path))
         except CfsError as error:
@@ -54,7 +51,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
             continue
         kinds = ", ".join(f"{kind} {area:.1f}" for kind, area in sorted(found.items())) or "none"
         print(f"{path.name}: {total:.0f} m2 of faces, too thick: {kinds} m2", flush=True)
-
-
-if __name__ == "__main__":
-    main()

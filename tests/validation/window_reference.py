@@ -16,13 +16,12 @@ double glazing; an outside shade passes 0.0454 here, 0.0439 there and 0.0451 in 
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pywincalc
@@ -237,16 +236,7 @@ def write(systems: Sequence[str], out: Path) -> None:
     (out / "blackbox_back.json").write_text(json.dumps(room_side, indent=1) + "\n")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(*, out: Path, systems: Annotated[Sequence[str], SYSTEMS] = tuple(SYSTEMS)) -> None:
     """Write the systems asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--systems", nargs="+", default=list(SYSTEMS), choices=SYSTEMS)
-    options = parser.parse_args(arguments)
-    write(options.systems, options.out)
-    sys.stdout.write(f"{options.out}\n")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    write(systems, out)
+    sys.stdout.write(f"{out}\n")

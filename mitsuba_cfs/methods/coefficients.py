@@ -1,0 +1,223 @@
+"""Daylight coefficients: illuminance of the sensors per unit luminance of each sky patch.
+
+    V T D + B - V_d diag(tau) D
+
+B is the outdoors that the sensors see straight through the direct transmittance tau of a window
+group.  It replaces V_d and D there: patches of 10 to 15 degrees blur the sky that a sensor sees
+(11 % of a sensor's light beside a small opening), and means over a group blur edges that only some
+of its points see, and the lobe of a glossy facade.  The three-phase method takes B for groups in
+parts, for glass to another room, and where the outdoors is glossy; elsewhere the sum over patches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.klems_peak import held_beams
+from mitsuba_cfs.methods.optics import States, SystemOptics
+from mitsuba_cfs.methods.phase_matrices import (
+    INDOOR_DEPTH,
+    OUTDOOR_DEPTH,
+    PhaseMatrices,
+)
+from mitsuba_cfs.methods.window_reflection import (
+    by_way_of_outdoors,
+    reflects,
+    reflects_outdoors,
+    sensor_reflection,
+    shares_before_windows,
+    through,
+    with_exchange_of,
+)
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.kernels.scattering import patch_beams
+from mitsuba_cfs.trace.matrices.adjacent import borrowed_view
+from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
+
+BATCHES = 4
+HELD = 0.98  # share of a direct transmittance that T's diagonal has at the least
+INNER_SHARE = 8  # rays of a sensor that glass to another room is looked for with, for each of V
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class StraightView:
+    """The outdoors or the adjacent room that sensors see through a group in one state."""
+
+    values: Estimate  # B [S, P]
+    direct: Array | None  # B_d [S, P], without what the outdoors reflects; None by three phases
+
+
+@dataclass(frozen=True, slots=True)
+class GroupCoefficients:
+    """Daylight coefficients of the sensors, the eye last, through one group in one state."""
+
+    optics: SystemOptics
+    beam: Array  # tau [K], the direct transmittance on T's diagonal
+    straight: StraightView | None  # None where V T D stands without it
+    whole: Array  # [S, P] V T D + B - V_d diag(tau) D
+    by_sun: Array | None  # [S, P] what is computed at the sun's own angle instead; five phases
+
+
+def group_coefficients(
+    matrices: PhaseMatrices, systems: Sequence[States]
+) -> tuple[tuple[GroupCoefficients, ...], ...]:
+    """Coefficients of each window group in each of its states [G][J].
+
+    Args: matrices: with those of the sensors; systems: the states of each window group [G].
+    """
+    return tuple(
+        tuple(_of_group(matrices, optics, g) for optics in states)
+        for g, states in enumerate(systems)
+    )
+
+
+def _of_group(matrices: PhaseMatrices, optics: SystemOptics, g: int) -> GroupCoefficients:
+    view, _ = sensor_matrices(matrices)
+    daylight, beam = matrices.daylight.values, direct_transmittance(matrices, optics, g)
+    straight = _straight_view(matrices, optics, g, beam)
+    whole = np.zeros((len(view.values), daylight.shape[-1]))
+    bare = GroupCoefficients(optics, beam, straight, whole, None)
+    for q in matrices.parts.of(g):
+        whole += without_straight(matrices, bare, q) @ daylight[q]
+    if straight is not None:
+        whole = whole + straight.values.values
+    if not matrices.five_phase:
+        return replace(bare, whole=whole)
+    return replace(bare, whole=whole, by_sun=_by_sun(matrices, bare, g))
+
+
+def _by_sun(matrices: PhaseMatrices, group: GroupCoefficients, g: int) -> Array:
+    """The part of the coefficients that five phases replace by the sun at its own angle [S, P].
+
+    V_d T D_d + (V - V_d) T_b D_d + B_d - V_d diag(tau) D_d
+    """
+    view, direct_view = sensor_matrices(matrices)
+    daylight = direct_daylight(matrices)
+    lost, beams = group.optics.transmission, beam_matrix(group.optics)
+    if group.straight is not None:
+        lost = lost - np.diag(group.beam)
+    coefficients = np.zeros((len(direct_view), daylight.shape[-1]))
+    for q in matrices.parts.of(g):
+        whole, direct = view.values[:, q], direct_view[:, q]
+        coefficients += (direct @ lost + (whole - direct) @ beams) @ daylight[q]
+    if group.straight is None or group.straight.direct is None:
+        return coefficients
+    return coefficients + group.straight.direct
+
+
+def without_straight(matrices: PhaseMatrices, group: GroupCoefficients, q: int) -> Array:
+    """Light of the sensors per unit luminance before a part of a group, without B [S, K].
+
+    V T - V_d diag(tau)
+    """
+    view, direct_view = sensor_matrices(matrices)
+    shares: Array = view.values[:, q] @ group.optics.transmission
+    if group.straight is None:
+        return shares
+    return shares - direct_view[:, q] * group.beam
+
+
+def direct_transmittance(matrices: PhaseMatrices, optics: SystemOptics, g: int) -> Array:
+    """The part of T's diagonal that goes straight on, tau [K], of a group in a state.
+
+    0 where the diagonal has less than the direct transmittance: the cells of a tensor tree span
+    patches, and what T has of it beside the diagonal would be counted twice.
+    """
+    inner = g - len(matrices.scene.outdoor_groups)
+    if inner >= 0:
+        return matrices.scene.adjacent[inner].beam
+    omega = KLEMS_FULL.projected_solid_angles()
+    beam = patch_beams([optics.scattering], KLEMS_FULL)[0]
+    held = np.minimum(beam, np.diag(optics.transmission))
+    return held if omega @ held >= HELD * (omega @ beam) else np.zeros_like(held)
+
+
+def beam_matrix(optics: SystemOptics) -> Array:
+    """The part of T that goes straight on, T_b [K, K]."""
+    beams = patch_beams([optics.scattering], KLEMS_FULL)[0]
+    return held_beams(optics.transmission, beams, KLEMS_FULL)
+
+
+def _straight_view(
+    matrices: PhaseMatrices, optics: SystemOptics, g: int, beam: Array
+) -> StraightView | None:
+    """B and B_d of a group in a state; None where the method takes none."""
+    if not beam.any():
+        return None
+    scene, chosen, stopping = matrices.scene, matrices.sampling, Stopping(batches=BATCHES)
+    inner = g - len(scene.outdoor_groups)
+    if inner >= 0:  # nothing comes straight from the sky
+        values = borrowed_view(
+            (scene.interior, scene.groups), g, beam, matrices.adjacent[inner], scene.sensors(),
+            samples=INNER_SHARE * chosen.sensor_samples // BATCHES, max_depth=INDOOR_DEPTH,
+            stopping=stopping, seed=chosen.seed, cache=matrices.cache,
+        )  # fmt: skip
+        return StraightView(values, np.zeros_like(values.values) if matrices.five_phase else None)
+    sharp = matrices.five_phase or len(matrices.parts.of(g)) > 1 or bool(scene.exterior.glossy)
+    if not sharp:
+        return None
+    scattering = [optics.scattering if i == g else None for i in range(len(scene.groups))]
+
+    def traced(depth: int) -> Estimate:
+        matrix = straight_view_matrix(
+            scene.interior, scene.exterior, scene.groups, scattering, *scene.sensors(),
+            subdivision=chosen.subdivision, samples=max(chosen.sensor_samples // BATCHES, 1),
+            max_depth=depth, stopping=stopping, seed=chosen.seed, cache=matrices.cache,
+        )  # fmt: skip
+        return matrix.part(np.s_[g])
+
+    values = traced(OUTDOOR_DEPTH)
+    if not matrices.five_phase:
+        return StraightView(values, None)
+    reflecting = len(scene.exterior.triangles) > 0
+    return StraightView(values, traced(1).values if reflecting else values.values)
+
+
+def reflection_shares(
+    matrices: PhaseMatrices, optics: Sequence[SystemOptics]
+) -> tuple[NDArray[np.floating] | None, Array | None]:
+    """Shares [S, Q * K] of the luminance before the windows that sensors get by their reflection.
+
+    All of them, and those by way of the outdoors; None where there are none.
+
+    Args: optics: of the window parts [Q].
+    """
+    view, _ = sensor_matrices(matrices)
+    matrices = with_exchange_of(matrices, optics)
+    shares: NDArray[np.floating] | None = None
+    outwards = None
+    if matrices.exchange is not None and reflects(optics):
+        inwards = sensor_reflection(view.values, matrices.exchange.values, optics)
+        shares = through(optics, inwards).astype(float)
+    if matrices.outdoor_exchange is not None and reflects_outdoors(matrices, optics):
+        before = shares_before_windows(matrices, view.values, optics)
+        outwards = by_way_of_outdoors(matrices.outdoor_exchange.values, optics, before)
+        shares = outwards if shares is None else shares + outwards
+    return shares, outwards
+
+
+def coefficients_of(matrices: PhaseMatrices, shares: NDArray[np.floating]) -> Array:
+    """Shares [n, Q * K] of the luminance before the windows as coefficients [n, P] of the sky."""
+    daylight = matrices.daylight.values
+    coefficients: Array = shares @ daylight.reshape(shares.shape[1], -1)
+    return coefficients
+
+
+def sensor_matrices(matrices: PhaseMatrices) -> tuple[Estimate, Array]:
+    """V and V_d [S, Q, K]; `ValueError` where they have not been traced."""
+    if matrices.sensors is None or matrices.direct_sensors is None:
+        raise ValueError("the matrices have none of the sensors: with_sensors(matrices)")
+    return matrices.sensors, matrices.direct_sensors
+
+
+def direct_daylight(matrices: PhaseMatrices) -> Array:
+    """D_d [Q, K, P]; `ValueError` where it has not been traced."""
+    if matrices.direct_daylight is None:
+        raise ValueError("the matrices have no D_d: with_direct_daylight(matrices)")
+    return matrices.direct_daylight

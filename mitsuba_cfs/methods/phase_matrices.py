@@ -1,0 +1,485 @@
+"""The matrices of a scene for the phase methods: V, D, V_d, D_d and their kin, traced once.
+
+They hold for all systems that may fill the windows.  `phase_matrices` traces what some metrics
+need; `with_*` gives the matrices of another eye, other outdoors or another metric, and takes over
+what does not change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs import variants
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.klems_peak import matrix_beam
+from mitsuba_cfs.images.view import View
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods import METRICS, UnknownMethodError
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+from mitsuba_cfs.methods.subdivision import CellLight, Parts, allowed, subdivided
+from mitsuba_cfs.methods.view_cache import cached_view, view_is_cached
+from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.sky.patches import ReinhartSky
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, joined
+from mitsuba_cfs.trace.kernels.patch_light import PatchLight
+from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.matrices.adjacent import LendingRoom, RoomBehind, borrowed_daylight
+from mitsuba_cfs.trace.matrices.cell_daylight import BATCHES as CELL_BATCHES
+from mitsuba_cfs.trace.matrices.cell_daylight import cell_daylight
+from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
+from mitsuba_cfs.trace.matrices.exchange import outdoor_exchange, window_exchange
+from mitsuba_cfs.trace.matrices.view import view_matrix
+from mitsuba_cfs.trace.pictures.adjacent import RoomShown, borrowed_picture
+from mitsuba_cfs.trace.pictures.annual import ViewMatrices, view_matrices
+from mitsuba_cfs.trace.sun.room_sun import SunElements, window_elements
+from mitsuba_cfs.window_parts import cut_group, even_regions, window_cells
+
+BATCHES = 8  # independent repetitions that the standard errors come from
+INDOOR_DEPTH, OUTDOOR_DEPTH = 32, 16  # segments of a path
+CELL_SHARE = 0.06  # paths of the cells that a group's parts follow from, of those of its D
+EXCHANGE_SHARE = 64  # paths of a patch for D, for each that looks into the room, in each batch
+OUTDOOR_SHARE = 4  # ... that looks outdoors: few meet a mirrored sun, and they are short
+PART_BATCHES = 2  # of D where groups are cut
+INNER_PART = 0.75  # of glass between rooms, about: in the adjacent room D changes along it [m]
+FEW = 4  # times as many patches as pictures, from which on the view is traced for these alone
+INNER_SHARE = 8  # paths of a patch for D, for each of a part of glass between rooms
+DEFAULT_NEEDS = ("illuminance",)
+
+
+@dataclass(frozen=True)
+class PhaseMatrices:
+    """Matrices of a scene's window parts Q; `None` where they have not been traced.
+
+    K are the patches of the full Klems basis, P those of the sky, S the scene's sensors and the
+    view's eye.  An open site has one part for each window group.
+    """
+
+    scene: DaylightScene
+    sampling: Sampling
+    five_phase: bool
+    cache: MatrixCache | None  # of traced matrices
+    parts: Parts  # window groups, cut where the view outdoors differs within a group
+    adjacent: tuple[LendingRoom, ...]  # rooms behind the last window groups, with their T D
+    daylight: Estimate  # D [Q, K, P]
+    direct_daylight: NDArray[np.float64] | None = None  # D_d [Q, K, P], mirrored sky included
+    straight_daylight: NDArray[np.float64] | None = None  # D_d without what mirrors show
+    sensors: Estimate | None = None  # V [S, Q, K]
+    direct_sensors: NDArray[np.float64] | None = None  # V_d [S, Q, K]
+    exchange: Estimate | None = None  # W [Q, K, Q * K] from window to window by the room
+    outdoor_exchange: Estimate | None = None  # X [q, K, q * K] by the outdoors
+    view: ViewMatrices | None = None  # V of the view's pixels
+    direct_view: ViewMatrices | None = None  # V_d of the view's pixels
+    sunlit: SunElements | None = None  # sunlit surfaces of the room that the windows see [Q * K]
+    adjacent_shown: tuple[RoomShown, ...] | None = None  # adjacent rooms in the view's pixels
+
+    @property
+    def outdoor_parts(self) -> int:
+        """How many of the parts, the first ones, look outdoors."""
+        return self.parts.outdoors(self.scene)
+
+    def behind(self) -> tuple[RoomBehind, ...]:
+        """Which parts look into which adjacent room."""
+        return _rooms_behind(self.scene, self.parts, self.adjacent)
+
+
+def phase_matrices(
+    scene: DaylightScene,
+    sampling: Sampling | None = None,
+    *,
+    five_phase: bool = True,
+    needs: Collection[str] = DEFAULT_NEEDS,
+    cache: MatrixCache | None = None,
+    progress: Progress = silent,
+) -> PhaseMatrices:
+    """Trace the matrices of a scene that some metrics need.
+
+    Args:
+        five_phase: False for the three-phase method, which needs no D_d and V_d.
+        needs: metrics (`METRICS`); none for D alone.  What is missing later is traced for each
+            call: name here, or in `with_needs`, what several calls share.
+        cache: of traced matrices, `MatrixCache.of_user()`.
+    """
+    unknown = set(needs) - set(METRICS)
+    if unknown:
+        raise UnknownMethodError(f"needs {sorted(unknown)}: expected some of {', '.join(METRICS)}")
+    sampling = sampling or Sampling()
+    parts = _parts(scene, sampling, cache)
+    matrices = _outdoors(
+        scene, sampling, parts, five_phase=five_phase, cache=cache, progress=progress
+    )
+    return with_needs(matrices, needs, progress=progress)
+
+
+def with_needs(
+    matrices: PhaseMatrices, needs: Iterable[str], *, progress: Progress = silent
+) -> PhaseMatrices:
+    """The matrices with those that some metrics need besides."""
+    for metric in needs:
+        if metric != "DGP":
+            matrices = with_sensors(matrices, progress=progress)
+        if metric in ("DGP", "eDGP"):
+            matrices = with_view_matrices(matrices, direct=metric == "eDGP", progress=progress)
+    return matrices
+
+
+def with_eye(matrices: PhaseMatrices, view: View) -> PhaseMatrices:
+    """The matrices of the same room for another eye; nothing is traced."""
+    return replace(
+        matrices, scene=replace(matrices.scene, view=view), sensors=None, direct_sensors=None,
+        view=None, direct_view=None, adjacent_shown=None,
+    )  # fmt: skip
+
+
+def with_outdoors(
+    matrices: PhaseMatrices, scene: DaylightScene, *, progress: Progress = silent
+) -> PhaseMatrices:
+    """The matrices of the same room with other outdoors, its windows cut into the same parts.
+
+    Args: scene: equal to that of the matrices but for the exterior and the adjacent rooms.
+    """
+    outdoors = _outdoors(
+        scene, matrices.sampling, matrices.parts, five_phase=matrices.five_phase,
+        cache=matrices.cache, progress=progress,
+    )  # fmt: skip
+    indoors = {
+        name: getattr(matrices, name)
+        for name in ("sensors", "direct_sensors", "exchange", "view", "direct_view", "sunlit")
+    }
+    return replace(outdoors, **indoors)
+
+
+def with_direct_daylight(matrices: PhaseMatrices, *, progress: Progress = silent) -> PhaseMatrices:
+    """The matrices with D_d, which the three-phase method needs for eDGP alone."""
+    if matrices.direct_daylight is not None:
+        return matrices
+    exterior = matrices.scene.exterior
+    direct = _direct_daylight(matrices, exterior, progress)
+    straight = direct
+    if exterior.glossy:
+        straight = _direct_daylight(matrices, replace(exterior, gloss=()), progress)
+    return replace(matrices, direct_daylight=direct, straight_daylight=straight)
+
+
+def with_sensors(matrices: PhaseMatrices, *, progress: Progress = silent) -> PhaseMatrices:
+    """The matrices with V and V_d of the scene's sensors."""
+    if matrices.sensors is not None:
+        return matrices
+    sensors = _sensors(matrices, INDOOR_DEPTH, part(progress, 0.3, 0.9, "daylight"))
+    # V_d is a part of V entry by entry: the same seed and samples
+    direct = _sensors(matrices, 1, part(progress, 0.9, 1.0, "daylight")).values
+    return replace(matrices, sensors=sensors, direct_sensors=direct)
+
+
+def with_exchange(
+    matrices: PhaseMatrices, *, indoors: bool = False, outdoors: bool = False
+) -> PhaseMatrices:
+    """The matrices with W (indoors) and X (outdoors), for windows that reflect."""
+    parts, cache = matrices.parts.groups, matrices.cache
+    common: dict[str, Any] = {
+        "stopping": Stopping(batches=2), "seed": matrices.sampling.seed, "cache": cache,
+    }  # fmt: skip
+    if indoors and matrices.exchange is None:
+        exchange = window_exchange(
+            matrices.scene.interior,
+            parts,
+            samples=_exchange_samples(matrices.sampling, parts, EXCHANGE_SHARE),
+            max_depth=INDOOR_DEPTH,
+            **common,
+        )
+        matrices = replace(matrices, exchange=exchange)
+    if outdoors and matrices.outdoor_exchange is None:
+        parts = parts[: matrices.outdoor_parts]
+        exchange = outdoor_exchange(
+            matrices.scene.exterior,
+            parts,
+            samples=_exchange_samples(matrices.sampling, parts, OUTDOOR_SHARE),
+            max_depth=OUTDOOR_DEPTH,
+            **common,
+        )
+        matrices = replace(matrices, outdoor_exchange=exchange)
+    return matrices
+
+
+def with_view_matrices(
+    matrices: PhaseMatrices, *, direct: bool = False, progress: Progress = silent
+) -> PhaseMatrices:
+    """The matrices with V of the view's pixels, or V_d if `direct`, as eDGP takes it."""
+    if direct:
+        matrices = with_direct_daylight(matrices, progress=progress)
+        if matrices.direct_view is None:
+            matrices = replace(matrices, direct_view=_view(matrices, 1, progress=progress))
+        return matrices
+    if matrices.view is None:
+        matrices = replace(matrices, view=_view(matrices, INDOOR_DEPTH, progress=progress))
+    return with_adjacent_shown(matrices)
+
+
+def with_adjacent_shown(matrices: PhaseMatrices) -> PhaseMatrices:
+    """The matrices with the adjacent rooms that the view's pixels show through glass."""
+    if not matrices.scene.adjacent or matrices.adjacent_shown is not None:
+        return matrices
+    scene, chosen = matrices.scene, matrices.sampling
+    shown = borrowed_picture(
+        scene.interior, matrices.parts.groups, matrices.behind(), scene.eye,
+        subdivision=chosen.subdivision, samples=chosen.outdoor_samples,
+        max_depth=INDOOR_DEPTH, seed=chosen.seed,
+    )  # fmt: skip
+    return replace(matrices, adjacent_shown=tuple(shown))
+
+
+def with_sunlit(matrices: PhaseMatrices) -> PhaseMatrices:
+    """The matrices with the sunlit surfaces of the room that reflecting windows see."""
+    if matrices.sunlit is not None:
+        return matrices
+    interior, parts = matrices.scene.interior, matrices.parts.groups
+    sunlit = window_elements(
+        kept_scene(interior, parts),
+        interior,
+        samples=_exchange_samples(matrices.sampling, parts, EXCHANGE_SHARE),
+        seed=matrices.sampling.seed,
+    )
+    return replace(matrices, sunlit=sunlit)
+
+
+def few_pictures(matrices: PhaseMatrices, pictures: int) -> bool:
+    """Whether to trace the view for so many pictures alone, not for all patches of the windows.
+
+    Not where V of all patches has been traced, nor with glass to other rooms or with gloss
+    indoors, which need V of each patch.
+    """
+    scene, patches = matrices.scene, len(matrices.parts.groups) * KLEMS_FULL.size
+    possible = matrices.five_phase and not scene.adjacent and not scene.interior.glossy
+    if not possible or pictures * FEW > patches or matrices.view is not None or scene.view is None:
+        return False
+    return not view_is_cached(matrices.cache, scene.view, _view_inputs(matrices, INDOOR_DEPTH))
+
+
+def view_of_light(matrices: PhaseMatrices, light: PatchLight) -> ViewMatrices:
+    """V of the view's pixels times the windows' luminance in some hours, which are its columns."""
+    return _view(matrices, INDOOR_DEPTH, light)
+
+
+def adjacent_room(
+    matrices: PhaseMatrices, transmission: Sequence[NDArray[np.float64]]
+) -> LendingRoom:
+    """The room of the matrices with T of its groups [G][K, K], as an adjacent room sees it."""
+    daylight, of_group = matrices.daylight.values, matrices.parts.group
+    pairs = zip(of_group, daylight, strict=True)
+    through = np.stack([transmission[n] @ d for n, d in pairs])
+    beam = np.zeros((len(of_group), KLEMS_FULL.size))
+    for q, n in enumerate(of_group[: matrices.outdoor_parts]):
+        beam[q] = matrix_beam(transmission[n], KLEMS_FULL)
+    scene = matrices.scene
+    return LendingRoom(
+        scene.interior, matrices.parts.groups, through, scene.exterior, beam, daylight,
+        matrices.behind(),
+    )  # fmt: skip
+
+
+def _parts(scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None) -> Parts:
+    """The window groups, cut where the view outdoors differs within a group."""
+    outdoors = _parts_of_outdoor_groups(scene, sampling, cache)
+    if not scene.adjacent:
+        return outdoors
+    inner = scene.groups[-len(scene.adjacent) :]
+    return outdoors.and_inner(cut_group(g, even_regions(g, INNER_PART)) for g in inner)
+
+
+def _parts_of_outdoor_groups(
+    scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None
+) -> Parts:
+    groups = scene.outdoor_groups
+    if not len(scene.exterior.triangles) or not groups:
+        return Parts.whole(groups)
+    cells = [window_cells(group) for group in groups]
+    paths = CELL_SHARE * sampling.patch_samples * len(cells) / sum(len(c.area) for c in cells)
+    daylight = cell_daylight(
+        scene.exterior,
+        groups,
+        cells,
+        samples=max(round(paths / CELL_BATCHES), 1),
+        max_depth=OUTDOOR_DEPTH,
+        seed=sampling.seed,
+        cache=cache,
+    )
+    lights = map(CellLight, groups, cells, daylight)
+    most, limit = sampling.window_parts or None, allowed(sampling.patch_samples)
+    return Parts.of_cells(subdivided(light, most, limit=limit) for light in lights)
+
+
+def _outdoors(
+    scene: DaylightScene,
+    sampling: Sampling,
+    parts: Parts,
+    *,
+    five_phase: bool,
+    cache: MatrixCache | None,
+    progress: Progress,
+) -> PhaseMatrices:
+    """The matrices of what is on the outer side of the windows: D, and D_d for five phases."""
+    adjacent = _adjacent_rooms(scene, sampling, cache)
+    estimates = []
+    if scene.outdoor_groups:
+        estimates.append(
+            _daylight(scene, sampling, parts, OUTDOOR_DEPTH, part(progress, 0.0, 0.2, "daylight"),
+                      cache=cache)
+        )  # fmt: skip
+    estimates += _inner_daylight(scene, sampling, parts, adjacent, cache)
+    daylight = joined(estimates) if estimates else _no_daylight(sampling)
+    matrices = PhaseMatrices(scene, sampling, five_phase, cache, parts, adjacent, daylight)
+    return with_direct_daylight(matrices, progress=progress) if five_phase else matrices
+
+
+def _no_daylight(sampling: Sampling) -> Estimate:
+    """D of a room without windows."""
+    size = ReinhartSky(sampling.subdivision).size
+    values = np.zeros((0, KLEMS_FULL.size, size))
+    return Estimate(values, values, values[..., 0], BATCHES, 0.0)
+
+
+def _daylight(
+    scene: DaylightScene,
+    sampling: Sampling,
+    parts: Parts,
+    depth: int,
+    progress: Progress,
+    *,
+    cache: MatrixCache | None,
+) -> Estimate:
+    """D [q, K, P] of the parts that look outdoors."""
+    groups, outer = scene.outdoor_groups, parts.groups[: parts.outdoors(scene)]
+    samples, batches = sampling.patch_samples, BATCHES
+    if len(outer) > len(groups):  # at about the cost of the whole groups
+        samples = samples * len(groups) // len(outer)
+        batches = PART_BATCHES
+    return daylight_matrix(
+        scene.exterior,
+        outer,
+        subdivision=sampling.subdivision,
+        samples=max(samples // batches, 1),
+        max_depth=depth,
+        stopping=Stopping(batches=batches),
+        seed=sampling.seed,
+        progress=progress,
+        cache=cache,
+    )
+
+
+def _direct_daylight(
+    matrices: PhaseMatrices, exterior: Surfaces, progress: Progress
+) -> NDArray[np.float64]:
+    """D_d [Q, K, P] past an exterior; 0 of parts that look into another room.
+
+    The sun comes through these by patches.
+    """
+    scene, daylight = matrices.scene, matrices.daylight.values
+    if not scene.adjacent and not len(exterior.triangles):  # nothing outdoors reflects
+        return daylight
+    direct, outer = np.zeros_like(daylight), matrices.outdoor_parts
+    if not len(exterior.triangles):
+        direct[:outer] = daylight[:outer]
+    elif outer:
+        direct[:outer] = _daylight(
+            replace(scene, exterior=exterior), matrices.sampling, matrices.parts, 1,
+            part(progress, 0.2, 0.3, "daylight"), cache=matrices.cache,
+        ).values  # fmt: skip
+    return direct
+
+
+def _adjacent_rooms(
+    scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None
+) -> tuple[LendingRoom, ...]:
+    """The room behind each group that looks into one, with T D of its windows' parts."""
+    rooms: dict[int, LendingRoom] = {}
+    for room in scene.adjacent:
+        if id(room.scene) not in rooms:
+            matrices = phase_matrices(room.scene, sampling, five_phase=False, needs=(), cache=cache)
+            rooms[id(room.scene)] = adjacent_room(matrices, room.transmission)
+    return tuple(rooms[id(room.scene)] for room in scene.adjacent)
+
+
+def _rooms_behind(
+    scene: DaylightScene, parts: Parts, adjacent: Sequence[LendingRoom]
+) -> tuple[RoomBehind, ...]:
+    inner = range(len(scene.outdoor_groups), len(scene.groups))
+    return tuple(
+        RoomBehind(int(parts.of(g)[0]), len(parts.of(g)), room.beam, lit)
+        for g, room, lit in zip(inner, scene.adjacent, adjacent, strict=True)
+    )
+
+
+def _inner_daylight(
+    scene: DaylightScene,
+    sampling: Sampling,
+    parts: Parts,
+    adjacent: Sequence[LendingRoom],
+    cache: MatrixCache | None,
+) -> list[Estimate]:
+    """D [q, K, P] of the parts of each group that looks into another room."""
+    return [
+        borrowed_daylight(
+            room.surfaces, room.groups, room.luminance, [parts.groups[q] for q in parts.of(g)],
+            samples=max(sampling.patch_samples // INNER_SHARE // BATCHES, 1),
+            max_depth=INDOOR_DEPTH, stopping=Stopping(batches=BATCHES), seed=sampling.seed,
+            cache=cache,
+        )
+        for g, room in enumerate(adjacent, len(scene.outdoor_groups))
+    ]  # fmt: skip
+
+
+def _sensors(matrices: PhaseMatrices, depth: int, progress: Progress) -> Estimate:
+    """V [S, Q, K], or V_d with a depth of 1."""
+    chosen = matrices.sampling
+    return view_matrix(
+        matrices.scene.interior,
+        matrices.parts.groups,
+        *matrices.scene.sensors(),
+        samples=max(chosen.sensor_samples // BATCHES, 1),
+        max_depth=depth,
+        stopping=Stopping(batches=BATCHES),
+        seed=chosen.seed,
+        progress=progress,
+        cache=matrices.cache,
+    )
+
+
+def _exchange_samples(sampling: Sampling, parts: Sequence[WindowGroup], share: int) -> int:
+    """Paths of each patch between windows: fewer the more windows there are."""
+    return max(sampling.patch_samples // share // len(parts), 8)
+
+
+def _view_inputs(matrices: PhaseMatrices, depth: int) -> tuple[object, ...]:
+    """All that the matrices of the view's pixels depend on."""
+    chosen = matrices.sampling
+    inputs = matrices.scene.interior, matrices.parts.groups, chosen.view_samples, chosen.seed, depth
+    return variants.activate(), *inputs
+
+
+def _view(
+    matrices: PhaseMatrices,
+    depth: int,
+    light: PatchLight | None = None,
+    *,
+    progress: Progress = silent,
+) -> ViewMatrices:
+    scene, chosen = matrices.scene, matrices.sampling
+    trace = partial(
+        view_matrices,
+        scene.interior,
+        matrices.parts.groups,
+        scene.eye,
+        samples=chosen.view_samples,
+        seed=chosen.seed,
+        memory=chosen.memory,
+        max_depth=depth,
+        progress=part(progress, 0.0, 1.0, "view matrices"),
+    )
+    inputs = _view_inputs(matrices, depth)
+    return cached_view(matrices.cache, scene.eye, inputs, trace, light=light)

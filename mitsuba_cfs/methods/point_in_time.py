@@ -1,0 +1,171 @@
+"""The point-in-time method: every hour is path-traced by itself, through the BSDF as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.glare.sun_disc import SunDisc
+from mitsuba_cfs.methods.optics import States, combinations, hourly_states, in_state
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.paths.disc import disc_seen, with_disc
+from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
+from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
+
+BATCHES = 4
+Array = NDArray[np.float64]
+State = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class PathLight:
+    """The light of a scene in the hours L of a sky, path-traced when a function asks for it."""
+
+    scene: DaylightScene
+    systems: Sequence[States]  # [G][J] optics of each window group in each of its states
+    sky: AnnualSky
+    sampling: Sampling = field(default_factory=Sampling)
+
+    def __post_init__(self) -> None:
+        if len(self.systems) != len(self.scene.groups):
+            raise ValueError(
+                f"systems of {len(self.systems)} groups for {len(self.scene.groups)} window groups"
+            )
+        if self.sky.sun is None:
+            raise ValueError("path tracing needs the sky's sun: annual_sky(..., sun=True)")
+
+    @property
+    def states(self) -> int:
+        """J, how many states the group has that has most."""
+        return max(map(len, self.systems))
+
+    def states_of(self, state: State | None) -> State:
+        """The state of each group in each hour [G, L]."""
+        return hourly_states(state, len(self.systems), len(self.sky.lit))
+
+
+@dataclass(frozen=True)
+class PathPicture:
+    """A luminance picture of one hour, and the sun's disc, which is not in it."""
+
+    bare: NDArray[np.float32]  # [ny, nx] [cd/m2] without the disc
+    disc: SunDisc | None
+    shown: NDArray[np.float32]  # [ny, nx] [cd/m2] with the disc in its pixels
+
+
+def path_tracing_room(
+    scene: DaylightScene, systems: Sequence[States], state: Sequence[int] | None = None
+) -> LitRoom:
+    """The room with each window group in a state [G], the first by default, ready to be traced."""
+    state = [0] * len(systems) if state is None else state
+    paths = [optics.paths for optics in in_state(systems, state)]
+    return LitRoom(scene.interior, scene.exterior, scene.groups, paths)
+
+
+def rooms_by_state(light: PathLight, rows: State) -> dict[tuple[int, ...], LitRoom]:
+    """The rooms of the combinations of states that occur in some hours [G, n]."""
+    states = [state for state, _ in combinations(rows)]
+    return {state: path_tracing_room(light.scene, light.systems, state) for state in states}
+
+
+def path_illuminance(
+    light: PathLight, state: State | None = None, *, progress: Progress = silent
+) -> tuple[Array, Array]:
+    """Illuminance of the scene's sensors [S, L] [lx], and the relative error [S] of its mean.
+
+    Args: state: [G, L] of each window group in each hour, or [L] of all; the first by default.
+    """
+    scene, rows = light.scene, light.states_of(state)
+    rooms = rooms_by_state(light, rows)
+    lit, variance = np.zeros((len(scene.points), rows.shape[1])), np.zeros(len(scene.points))
+    for hour, now in enumerate(rows.T):
+        progress("point in time", hour / rows.shape[1])
+        room = rooms[tuple(now.tolist())]
+        estimate = _sensors(light, room, scene.points, scene.normals, hour)
+        lit[:, hour] = estimate.values
+        variance += estimate.standard_error**2
+    return lit, relative_error_of_mean(lit, variance)
+
+
+def relative_error_of_mean(lit: Array, variance: Array) -> Array:
+    """Relative standard error [S] of means over hours [S, L], from the variance [S] of the sums."""
+    total = lit.sum(axis=1)
+    return np.divide(np.sqrt(variance), total, out=np.zeros_like(total), where=total > 0)
+
+
+def path_eye_illuminance(
+    light: PathLight, hours: NDArray[np.int64], state: State | None = None
+) -> Array:
+    """Illuminance at the view's eye in some hours [n], their numbers among the sky's [lx]."""
+    view, rows = light.scene.eye, light.states_of(state)[:, hours]
+    point, direction = np.atleast_2d(view.position), np.atleast_2d(view.direction)
+    rooms = rooms_by_state(light, rows)
+    return np.array(
+        [
+            float(_sensors(light, rooms[tuple(now.tolist())], point, direction, hour).values[0])
+            for hour, now in zip(hours.tolist(), rows.T, strict=True)
+        ]
+    )
+
+
+def path_picture(
+    light: PathLight, hour: int, state: Sequence[int] | None = None, **options: Any
+) -> NDArray[np.float32]:
+    """Luminance picture [ny, nx] of one hour [cd/m2], its number among the sky's.
+
+    Args: options: of `point_in_time_picture`; samples and seed are the sampling's.
+    """
+    room = path_tracing_room(light.scene, light.systems, state)
+    return picture_of_room(light, room, hour, **options)
+
+
+def picture_of_room(
+    light: PathLight, room: LitRoom, hour: int, **options: Any
+) -> NDArray[np.float32]:
+    """The same of a room in its state."""
+    chosen = light.sampling
+    options = {"samples": chosen.picture_samples, "seed": chosen.seed} | options
+    return point_in_time_picture(room, path_sky(light, hour), light.scene.eye, **options)
+
+
+def disc_of_room(light: PathLight, room: LitRoom, hour: int) -> SunDisc | None:
+    """The sun's disc in the view in one hour."""
+    return disc_seen(room, path_sky(light, hour), light.scene.eye)
+
+
+def picture_with_disc(light: PathLight, room: LitRoom, hour: int, **options: Any) -> PathPicture:
+    """The picture of one hour, the sun's disc apart and in its pixels."""
+    bare = picture_of_room(light, room, hour, disc=False, **options)
+    shown = with_disc(bare, room, path_sky(light, hour), light.scene.eye)
+    return PathPicture(bare, disc_of_room(light, room, hour), shown)
+
+
+def path_sky(light: PathLight, hour: int) -> Sky:
+    """Sky and sun of one hour."""
+    sky = light.sky
+    luminance = sky.illuminance[hour] / SUN_SOLID_ANGLE
+    return Sky(sky.without_sun(hour), sky.direction[hour], luminance)
+
+
+def _sensors(
+    light: PathLight, room: LitRoom, points: Array, directions: Array, hour: int
+) -> Estimate:
+    chosen = light.sampling
+    return point_in_time(
+        room,
+        path_sky(light, hour),
+        points,
+        directions,
+        samples=max(chosen.hour_samples // BATCHES, 1),
+        stopping=Stopping(batches=BATCHES),
+        seed=chosen.seed * light.sky.hours + int(light.sky.lit[hour]),  # hours differ
+    )
