@@ -27,7 +27,7 @@ RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 )
 @click.option(
     "--language", type=click.Choice(["en", "de", "fr"]), default="en", show_default=True,
-    help="Language of a page of several runs, or of --out.",
+    help="Language of the page; of several runs, or of --out.",
 )  # fmt: skip
 @click.option("--no-browser", is_flag=True, help="Only say the address.")
 def command(
