@@ -1,4 +1,4 @@
-"""Compiled functions, kept on disk where there is a folder for it."""
+"""Compiled functions, cached on disk if there is a folder for them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mitsuba_cfs.source_code import OWN, code_version
 
 
 class _OwnedCode(IndexDataCacheFile):
-    """Numba's kept code of a function, each file with the source and signature it is the code of.
+    """Numba's cached code of a function; each file holds its source and signature.
 
     Numba numbers the files in an index.  Two processes that compile a function at once for
     different arguments, or from different sources, give both codes one number; who called it for
@@ -28,12 +28,12 @@ class _OwnedCode(IndexDataCacheFile):
         return None  # another's, or of an older form: compiled again
 
     def kept(self) -> bool:
-        """Whether code of this source is there, for any arguments."""
+        """Whether code of this source is cached, for any arguments."""
         return any(self.load(key) is not None for key in self._load_index())
 
 
 def compiled(compiler: Callable = njit, /, *arguments, **options) -> Callable[[Callable], Callable]:
-    """A decorator: numba's `compiler` with these arguments, and what it compiles kept on disk.
+    """A decorator: numba's `compiler` with these arguments; the compiled code is cached on disk.
 
     That is `__pycache__` beside the module, else (a read-only install) the user's cache folder, or
     the one that NUMBA_CACHE_DIR names; where none can be written, each process compiles anew.

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def normalize(vectors: ArrayLike) -> NDArray[np.float64]:
-    """Vectors [..., 3] scaled to unit length; `ValueError` where one has no length."""
+    """Vectors [..., 3] scaled to unit length; `ValueError` for one without length."""
     vectors = np.asarray(vectors, dtype=float)
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     if not np.all(length > 0):
@@ -64,6 +64,6 @@ def incident_azimuth(d: ArrayLike) -> NDArray[np.float64]:
 
 
 def outgoing_azimuth(o: ArrayLike) -> NDArray[np.float64]:
-    """Azimuth [rad, 0..2 pi) of the local direction(s) [..., 3] that the light leaves along."""
+    """Azimuth [rad, 0..2 pi) of the local direction(s) [..., 3] along which light leaves."""
     o = np.asarray(o, dtype=float)
     return np.mod(np.arctan2(o[..., 1], -o[..., 0]), 2 * np.pi)

@@ -36,7 +36,7 @@ class VariantError(CfsError, RuntimeError):
 
 
 def no_such_key(key: str, known: Iterable[str]) -> str:
-    """What to say of a key that there is not: the known one that it most resembles, else all."""
+    """Message for an unknown key: the known key that resembles it most, or all known keys."""
     folded = {one.casefold(): one for one in known}
     near = get_close_matches(key.casefold(), folded, n=1)
     instead = (

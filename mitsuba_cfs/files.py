@@ -1,4 +1,4 @@
-"""Files that are whole or not there: written beside their place and renamed at the end.
+"""Atomic files: written under a temporary name beside the target and renamed at the end.
 
 A process holds a lock on what it is writing, so that what a killed one left is known and removed.
 """
@@ -47,7 +47,7 @@ def reason(error: Exception) -> str:
 
 @contextmanager
 def replacing(path: str | PathLike[str], *, field: str | None = None) -> Iterator[Path]:
-    """A temporary file beside `path` that takes its name at the end, or goes where an error comes.
+    """A temporary file beside `path`, renamed to it at the end or deleted after an error.
 
     A link is followed to the file that it names; a device or pipe is written to as it is.
 
@@ -83,7 +83,7 @@ def replacing(path: str | PathLike[str], *, field: str | None = None) -> Iterato
 
 @contextmanager
 def temporary_folder(parent: Path) -> Iterator[Path]:
-    """A folder inside `parent` to fill and then to rename; what is left of it goes at the end."""
+    """A folder inside `parent` to fill and then to rename; deleted at the end if still there."""
     part, release = _held(parent, "", Path.mkdir)
     try:
         yield part
@@ -94,7 +94,7 @@ def temporary_folder(parent: Path) -> Iterator[Path]:
 
 @contextmanager
 def unnamed_file(size: int, what: str, folder: Path | None = None) -> Iterator[IO[bytes]]:
-    """A file without a name of so many bytes, to be mapped: it is there for as long as its map.
+    """A file without a name, of so many bytes, to be mapped; it exists as long as its map.
 
     Args:
         what: the file is for, in words for the message.
@@ -115,20 +115,20 @@ def unnamed_file(size: int, what: str, folder: Path | None = None) -> Iterator[I
 
 
 def write_text(path: str | PathLike[str], text: str, *, encoding: str = "utf-8") -> None:
-    """Write a text file; it is the old one or the new one at any time."""
+    """Write a text file atomically: it is the old one or the new one at any time."""
     with replacing(path) as part:
         part.write_text(text, encoding=encoding)
 
 
 def write_bytes(path: str | PathLike[str], data: bytes) -> None:
-    """Write a file; it is the old one or the new one at any time."""
+    """Write a file atomically: it is the old one or the new one at any time."""
     with replacing(path) as part:
         part.write_bytes(data)
 
 
 @contextmanager
 def opened_arrays(path: str | PathLike[str]) -> Iterator[Any]:
-    """A NumPy archive of arrays by name; closed also where it is damaged.
+    """A NumPy archive of arrays by name, closed even if it is damaged.
 
     `np.load` of a path leaves the file open where it is no whole archive.
     """
@@ -139,7 +139,7 @@ def opened_arrays(path: str | PathLike[str]) -> Iterator[Any]:
 
 
 def write_table(table: pd.DataFrame, path: str | PathLike[str], **options: object) -> None:
-    """Write a pandas table as its suffix says, `.parquet` or text; options of its writer."""
+    """Write a pandas table by the suffix, as `.parquet` or text; options of its writer."""
     with replacing(path) as part:
         write = table.to_parquet if part.suffix == ".parquet" else table.to_csv
         write(part, **options)
@@ -148,7 +148,7 @@ def write_table(table: pd.DataFrame, path: str | PathLike[str], **options: objec
 def check_file(
     path: str | PathLike[str], *, field: str = "--out", inputs: Iterable[Path | None] = ()
 ) -> None:
-    """Raise `DataError` where a file could not be put at the end of the work, or is an input."""
+    """Raise `DataError` if a file cannot be written, or is an input."""
     if any(one is not None and _same(one, path) for one in inputs):
         raise DataError("is an input of this command", file=path, field=field)
     if os.path.isdir(path):
@@ -173,7 +173,7 @@ def remove_stale(folder: Path) -> None:
 
 
 def stale(folder: Path) -> Iterator[Path]:
-    """The temporaries in a folder that no process holds, each held while it is looked at."""
+    """Temporaries in a folder that no process holds, each locked while the caller has it."""
     with suppress(OSError):
         for part in [one for one in folder.iterdir() if TEMPORARY.fullmatch(one.name)]:
             with suppress(OSError):
@@ -188,7 +188,7 @@ def stale(folder: Path) -> Iterator[Path]:
 def _held(
     folder: Path, suffix: str, make: Callable[[Path], object]
 ) -> tuple[Path, Callable[[], None]]:
-    """A new temporary that is this process's alone, and what gives it free."""
+    """A new temporary locked by this process, and the function that unlocks it."""
     while True:
         part = folder / f".cfs-{secrets.token_hex(4)}.part{suffix}"
         make(part)
@@ -202,7 +202,7 @@ def _held(
 
 
 def _locked(handle: int, *, wait: bool) -> bool:
-    """Whether the lock is this process's now; never where the file system has no locks."""
+    """Whether this process got the lock; never on a file system without locks."""
     if fcntl is None:
         return False
     try:
@@ -238,7 +238,7 @@ def _told(
 
 
 def _write_failure(part: Path) -> OSError | None:
-    """What keeps one more block from the end of the file; None where nothing does."""
+    """Error of writing one more block at the end of the file; None if that works."""
     try:
         with open(part, "ab") as file:
             file.write(bytes(65536))

@@ -1,4 +1,4 @@
-"""The part of light that a surface reflects like a mirror, sharp or rough, as data.
+"""Specular reflection of surfaces as data: reflectance by angle, and roughness.
 
     f = rho_d / pi + rho_s(theta) |h|^2 exp(-tan^2 / alpha^2) / (pi alpha^2 (h n)^4),   h = i + o
 
@@ -25,7 +25,7 @@ FRESNEL_RATE, FRESNEL_END, FRESNEL_FROM = 5.85, 0.00202943064, 0.017999
 
 @dataclass(frozen=True, slots=True)
 class Gloss:
-    """What a surface reflects like a mirror, by angle, and how rough the mirror is."""
+    """Specular reflectance of a surface by angle of incidence, and its roughness."""
 
     specular: tuple[float, ...]  # reflectance at even steps of the cosine of incidence, 0 to 1
     roughness: float = 0.0  # Ward's alpha, Radiance's roughness: slope of the facets; 0: a mirror
@@ -58,12 +58,12 @@ def mirror(reflectance: float, roughness: float = 0.0) -> Gloss:
 
 
 def dielectric(index: float, roughness: float = 0.0) -> Gloss:
-    """The surface of a body of a refractive index that lets no light out again: water, lacquer."""
+    """The surface of an absorbing body of a refractive index: water, lacquer."""
     return Gloss(_values(_fresnel(_cosines(), index).mean(axis=0)), roughness)
 
 
 def pane(index: float = 1.52, transmissivity: float = 0.9, panes: int = 1) -> Gloss:
-    """Glass before something dark, all faces and all between; one pane is Radiance's `glass`.
+    """Panes in front of something dark, with interreflection; one pane is Radiance's `glass`.
 
     Args: transmissivity: of a pane without its faces at normal incidence; panes: that are alike,
         one behind the other.
@@ -76,7 +76,7 @@ def pane(index: float = 1.52, transmissivity: float = 0.9, panes: int = 1) -> Gl
 
 
 def lacquer(specular: float, roughness: float = 0.0) -> Gloss:
-    """Radiance's `plastic` of a specularity, which rises to grazing incidence where it is smooth.
+    """Radiance's `plastic` of a specularity, which rises towards grazing incidence if smooth.
 
     Source: `normal.c` of Radiance; it takes the rise for smooth surfaces alone, from 0.018 on.
     """
@@ -116,7 +116,7 @@ def radiance_gloss(kind: str, values: Sequence[float]) -> tuple[float, Gloss | N
 
 
 def radiance_trans(values: Sequence[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What a grey smooth Radiance `trans` passes straight on and what it scatters [STEPS].
+    """Direct and scattered transmittance of a grey smooth Radiance `trans` [STEPS].
 
     Both at even steps of the cosine of incidence, as `AngularOptics` takes them; what it reflects
     is left out.

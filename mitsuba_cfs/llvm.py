@@ -1,4 +1,4 @@
-"""Find the LLVM library that Dr.Jit loads at its first use, and keep it off the ones that abort.
+"""Find an LLVM library for Dr.Jit, and avoid the versions that abort.
 
 Dr.Jit takes the first libLLVM that it finds. On x86 processors Dr.Jit 1.5 ends the whole process
 with LLVM 15 or 16 ("Cannot select: fminimum", at the first minimum of an array), which is what
@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class LlvmLibrary:
-    """One LLVM shared library on this machine, and whether Dr.Jit can be trusted with it."""
+    """One LLVM shared library on this machine, and whether Dr.Jit runs with it."""
 
     path: Path  # as found, not resolved
     version: tuple[int, ...]  # () where neither the name nor its target tells
@@ -95,7 +95,7 @@ def is_x86() -> bool:
 
 
 def library_folders() -> list[Path]:
-    """The folders of this system that can hold an LLVM library, those of the user first."""
+    """Folders of this system that may contain an LLVM library, the user's first."""
     listed = [os.environ.get(name, "") for name in ("LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH")]
     folders = [Path(part) for value in listed for part in value.split(os.pathsep) if part]
     folders += [Path(sys.prefix) / "lib"]
@@ -129,7 +129,7 @@ def _files_in(folders: Iterable[Path]) -> list[Path]:
 
 
 def _cached_files() -> list[Path]:
-    """What the dynamic linker's cache knows (Linux only)."""
+    """LLVM libraries in the dynamic linker's cache (Linux only)."""
     if not sys.platform.startswith("linux"):
         return []
     tool = next((t for t in ("/sbin/ldconfig", "/usr/sbin/ldconfig") if Path(t).exists()), None)
@@ -153,7 +153,7 @@ def _judge(file: Path, x86: bool) -> LlvmLibrary:
 
 
 def version_of(file: Path) -> tuple[int, ...]:
-    """The LLVM version told by the file's name, that of its target, or their folders."""
+    """The LLVM version from the name of the file, of its target, or of their folders."""
     target = file.resolve()
     for name in (target.name, file.name):
         if match := _IN_NAME.match(name):

@@ -16,7 +16,7 @@ Sky: TypeAlias = ArrayLike | sparse.csr_array  # [P, H], or of few lit patches `
 
 
 def lit_rows(sky: ArrayLike) -> NDArray[Any] | sparse.csr_array:
-    """A sky [P, H] as products take it: its lit patches in each hour [H, P] where these are few."""
+    """A sky [P, H] for products: sparse [H, P] if few patches are lit in each hour."""
     sky = np.asarray(sky)
     if not sky.size or np.count_nonzero(sky) > DARK * sky.size:
         return sky
@@ -24,7 +24,7 @@ def lit_rows(sky: ArrayLike) -> NDArray[Any] | sparse.csr_array:
 
 
 def times_sky(matrix: ArrayLike, sky: Sky) -> NDArray[np.float64]:
-    """A matrix [..., P] times a sky [P, H]; of the sun alone few patches are lit in an hour."""
+    """A matrix [..., P] times a sky [P, H], sparse if it holds the sun alone."""
     matrix = np.asarray(matrix)
     lit = sky if isinstance(sky, sparse.csr_array) else lit_rows(sky)
     if isinstance(lit, np.ndarray):
@@ -80,7 +80,7 @@ def sun_beams(
     direct_daylight: ArrayLike,
     sun: Sky,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The sun's straight beam on window patches, two ways [G, K, H].
+    """The sun's straight beam on window patches, in two forms [G, K, H].
 
         T_b D_d s_d              as T D s has it, with one transmittance in a whole patch
         diag(tau(sun)) D_d s_d   at the sun's own angle, as C_ds has it

@@ -1,4 +1,4 @@
-"""Processes that work beside this one, and end with it however it ends."""
+"""Worker processes, which end with this process however it ends."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MOST_ENDED = 5  # items that end their process, one after the other, before the 
 
 
 class ProcessEnded(RuntimeError):
-    """A process of our own ended without an answer; `last`: the last that it told."""
+    """A worker process ended without an answer; `last`: its last report."""
 
     def __init__(self, reason: str, last: str) -> None:
         super().__init__(reason)
@@ -55,7 +55,7 @@ def _begin(begin: Callable[[], object] | None) -> None:
 
 
 def _end_after(parent_left: Callable[[], object]) -> None:
-    """End this process when a call returns that waits on a pipe which the parent alone holds."""
+    """End this process when its parent ends, which closes the pipe that a thread reads."""
 
     def watch() -> None:
         parent_left()
@@ -67,7 +67,7 @@ def _end_after(parent_left: Callable[[], object]) -> None:
 def answer_apart(
     function: Callable, *arguments: Any, limit_s: float, told: Told | None = None
 ) -> Any:
-    """What `function(*arguments, tell)` returns in an interpreter that may die or be stopped.
+    """Result of `function(*arguments, tell)` in a subprocess that may crash or be stopped.
 
     For native libraries that end a process by a signal, or work for hours, on some inputs. Unlike
     a process pool it does not run the main module again, so that a script needs no guard. The
@@ -91,7 +91,7 @@ def answer_apart(
 
 
 class _Apart:
-    """An interpreter that does one task after the other."""
+    """A subprocess that does one task after the other."""
 
     idle: ClassVar[list[_Apart]] = []
 
@@ -104,12 +104,12 @@ class _Apart:
         )  # fmt: skip
 
     def end(self) -> None:
-        """Kill it, if it has not died."""
+        """Kill it unless it has ended."""
         self._process.kill()
         self._process.communicate()
 
     def answer(self, task: object, limit_s: float, told: Told) -> tuple[Any, Exception | None]:
-        """Value and error of a task; `ProcessEnded` where it was stopped or died."""
+        """Value and error of a task; `ProcessEnded` if the process was stopped or crashed."""
         process, stopped = self._process, threading.Event()
         timer = threading.Timer(limit_s, lambda: (stopped.set(), process.kill()))
         timer.start()
@@ -142,7 +142,7 @@ def _end_idle() -> None:
 
 
 def each_apart(function: Callable, items: Sequence, *, limit_s: float) -> list[Any]:
-    """What `function` gives for each item, computed in one process of its own (`answer_apart`).
+    """Results of `function` for each item, computed in one subprocess (`answer_apart`).
 
     An item that ends the process gets the `ProcessEnded` in place of an answer, and the others are
     computed anew; so do all that are left after `MOST_ENDED` of these, or when the time is over.
@@ -178,7 +178,7 @@ def _each(function: Callable, items: Sequence, tell: Told) -> list[Any]:
 
 
 def how_it_ended(processes: Iterable[BaseProcess]) -> str:
-    """How the first of a broken pool's processes ended; the pool itself ended the others."""
+    """Exit of the first process of a broken pool; the pool ended the others."""
     codes = []
     for process in processes:
         process.join(ENDS_WITHIN)
@@ -198,7 +198,7 @@ def _reason(code: int, stopped: bool, limit_s: float) -> str:
 
 
 def _work() -> None:
-    """In the process of its own: do the tasks of the folders that stdin names."""
+    """In the subprocess: do the tasks of the folders that stdin names."""
     folders: queue.Queue[str] = queue.Queue()
 
     def read() -> None:

@@ -1,4 +1,4 @@
-"""How long computations tell how far they are, without knowing who listens."""
+"""Progress of long computations, reported to a callback."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LEAST = 0.05  # share of an item after which the time left is told
 
 
 class Stage(str):
-    """A stage's label that knows of which of several items alike it is a stage: room 3 of 6.
+    """Label of a stage with the number of its item, such as room 3 of 6.
 
     An empty label is that of items without stages of their own.
     """
@@ -35,12 +35,12 @@ class Stage(str):
         return stage
 
     def items_done(self, fraction: float) -> float:
-        """How many items are done with `fraction` of this stage."""
+        """Number of finished items at a `fraction` of this stage."""
         return self.number - 1 + (fraction if self.whole else 0.0)
 
 
 def silent(stage: str, fraction: float) -> None:
-    """Listen to nothing: the default of every function that reports progress."""
+    """Ignore progress: the default of every function that reports it."""
 
 
 def part(progress: Progress, start: float, end: float, stage: str | None = None) -> Progress:
@@ -59,7 +59,7 @@ def part(progress: Progress, start: float, end: float, stage: str | None = None)
 
 
 def summed(progress: Progress, stage: str, shares: Mapping[str, float]) -> Progress:
-    """A `Progress` that shows steps of known shares, which follow each other, as one stage."""
+    """A `Progress` that joins consecutive steps of known shares into one stage."""
     total, bounds, before = sum(shares.values()), {}, 0.0
     for label, share in shares.items():
         bounds[label] = before / total, (before + share) / total
@@ -73,7 +73,7 @@ def summed(progress: Progress, stage: str, shares: Mapping[str, float]) -> Progr
 
 
 def in_shares(progress: Progress, shares: Mapping[str, float]) -> Progress:
-    """A `Progress` whose stages fill only their shares, from 0; all of what has no share."""
+    """A `Progress` that scales stages with a share to it; other stages stay whole."""
 
     def inner(label: str, fraction: float) -> None:
         progress(label, shares.get(label, 1.0) * fraction)
@@ -84,7 +84,7 @@ def in_shares(progress: Progress, shares: Mapping[str, float]) -> Progress:
 def item(
     progress: Progress, noun: str, number: int, total: int, name: str = "", *, whole: bool = False
 ) -> Progress:
-    """A `Progress` of item `number` (from 1) of `total` alike: rooms, views, passes.
+    """A `Progress` of item `number` (from 1) of `total` similar ones: rooms, views, passes.
 
     Args:
         name: set before the label of each stage.
@@ -102,7 +102,7 @@ def item(
 
 
 class TimeLeft:
-    """How long the items that are left will take, from what those before took."""
+    """Estimate of the remaining time from the durations of finished items."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -110,7 +110,7 @@ class TimeLeft:
         self._last = (0.0, 0.0)
 
     def seconds(self, stage: Stage, fraction: float) -> float | None:
-        """Seconds left; None before enough of the first item is done to tell."""
+        """Remaining seconds; None before enough of the first item is done."""
         done, now = stage.items_done(fraction), self._clock()
         if self._first is None:
             self._first = self._last = (done, now)
@@ -124,7 +124,7 @@ class TimeLeft:
 
 
 def spoken_left(seconds: float | None) -> str:
-    """The time left in words, as rough as it is known; empty for None."""
+    """The remaining time in words, rounded to its accuracy; empty for None."""
     if seconds is None:
         return ""
     if seconds < 95:

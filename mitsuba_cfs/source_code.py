@@ -1,4 +1,4 @@
-"""The version of a computation: a hash of the source that computes it, found by its imports.
+"""The version of a computation: a hash of its source and of all modules that it imports.
 
 What is kept on disk (matrices, finished cases of a study) is served again only to the code that
 made it.  That code is the module that computes, and every module of this program that it imports,
@@ -22,7 +22,7 @@ OWN = ("mitsuba_cfs", "bim", "thermal", "scenes")  # packages that are read, not
 
 @cache
 def code_version(*modules: str) -> str:
-    """A hash of the modules, of all of this program's that they import, and of other packages.
+    """A hash of modules, of all own modules that they import, and of versions of other packages.
 
     Args: modules: dotted names, such as `__name__`.
     """
@@ -61,7 +61,7 @@ def import_closure(modules: tuple[str, ...], root: Path = ROOT) -> frozenset[str
 
 
 def _imported(source: bytes, root: Path) -> Iterator[str]:
-    """What a source imports: own modules whole, of other packages the first name."""
+    """Imports of a source: own modules in full, other packages by their first name."""
     for module, name in _import_statements(source):
         whole = f"{module}.{name}"
         own = bool(name) and module.partition(".")[0] in OWN
@@ -70,7 +70,7 @@ def _imported(source: bytes, root: Path) -> Iterator[str]:
 
 @cache
 def _import_statements(source: bytes) -> tuple[tuple[str, str], ...]:
-    """What a source imports, as (module, name in it); no name for `import module`."""
+    """Imports of a source as (module, name in it); no name for `import module`."""
     found: list[tuple[str, str]] = []
     for node in _computing(ast.parse(source), b"import_module" in source):
         if isinstance(node, ast.Import):
@@ -84,7 +84,7 @@ def _import_statements(source: bytes) -> tuple[tuple[str, str], ...]:
 
 
 def _computing(tree: ast.Module, expressions: bool) -> Iterator[ast.AST]:
-    """The statements of a module without what stands under `if TYPE_CHECKING`.
+    """The statements of a module without those under `if TYPE_CHECKING`.
 
     Args: expressions: with these too; they are nine tenths of a module.
     """
@@ -113,7 +113,7 @@ def _modules(name: str, root: Path) -> Iterator[str]:
 
 
 def _file(name: str, root: Path) -> Path | None:
-    """The source of an own module; None for what is not one."""
+    """The source of an own module; None for others."""
     if name.partition(".")[0] not in OWN:
         return None
     stem = root.joinpath(*name.split("."))

@@ -1,4 +1,4 @@
-"""Big arrays held on disk until they are looked at: what a building's rooms yield is gigabytes."""
+"""Large arrays stored on disk until they are used: the rooms of a building yield gigabytes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PASSED = 8  # things that are looked at until their arrays are out of memory aga
 
 
 class StoredArrays:
-    """Files without names that hold arrays; these are read when they are looked at.
+    """Unnamed files of arrays, which are read when they are used.
 
     What has been looked at is out of memory again when the next file is begun, and by `each`.
 
@@ -26,17 +26,17 @@ class StoredArrays:
     """
 
     def __init__(self) -> None:
-        """No file is made before there is an array."""
+        """Empty; the first array creates a file."""
         self._maps: list[weakref.ref[mmap.mmap]] = []
         self._last: mmap.mmap | None = None
         self._next = 0  # where the next array begins in the last file
 
     def kept(self, thing: T) -> T:
-        """A copy of a thing whose big arrays are read only and on disk; pickle must know it."""
+        """A copy of a picklable object with its large arrays read-only on disk."""
         buffers: list[pickle.PickleBuffer] = []
 
         def within(buffer: pickle.PickleBuffer) -> bool:
-            """Whether an array stays in memory, with all else; the big ones are put aside."""
+            """Whether an array stays in memory, as small ones do."""
             small = buffer.raw().nbytes < LEAST
             if not small:
                 buffers.append(buffer)
@@ -46,7 +46,7 @@ class StoredArrays:
         return pickle.loads(rest, buffers=[self._stored(buffer.raw()) for buffer in buffers])
 
     def each(self, things: Iterable[T]) -> Iterator[T]:
-        """The things, whose arrays do not stay in memory once they are passed."""
+        """The objects one after the other; their arrays do not stay in memory."""
         for number, thing in enumerate(things, 1):
             yield thing
             if number % PASSED == 0:
@@ -54,7 +54,7 @@ class StoredArrays:
         self.forget()
 
     def forget(self) -> None:
-        """Let what has been looked at be out of memory until it is looked at again."""
+        """Release arrays from memory until they are used again."""
         found = [(one, map_) for one in self._maps if (map_ := one()) is not None]
         self._maps = [one for one, _ in found]
         for _, map_ in found:
@@ -75,10 +75,10 @@ class StoredArrays:
 
 
 class PassedArrays(Sequence[T]):
-    """Things whose arrays are in a store, out of memory again once they are passed."""
+    """Objects whose arrays are in a store; each leaves memory once the iteration has passed it."""
 
     def __init__(self, store: StoredArrays, things: Sequence[T]) -> None:
-        """From things that `kept` has given, or that have its arrays."""
+        """From objects of `kept`, or objects with its arrays."""
         self._store, self._things = store, things
 
     def __len__(self) -> int:
@@ -96,6 +96,6 @@ class PassedArrays(Sequence[T]):
 
 
 def _file(size: int) -> mmap.mmap:
-    """A file without a name of so many bytes, there for as long as anything shows its arrays."""
+    """An unnamed file of so many bytes, which exists as long as an array refers to it."""
     with unnamed_file(size, f"results of {size / 1e9:.2f} GB") as file:
         return mmap.mmap(file.fileno(), size)

@@ -1,4 +1,4 @@
-"""What the tracer knows of a building: opaque triangles, and windows in their groups."""
+"""Geometry for tracing: opaque triangles, and windows in groups."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mitsuba_cfs.gloss import Gloss
 
 @dataclass(frozen=True, slots=True)
 class Surfaces:
-    """Opaque triangles that reflect alike on both sides, in one spectral band.
+    """Opaque triangles with equal reflectance on both sides, in one spectral band.
 
     They reflect diffusely; a surface with a `Gloss` has that besides, and its diffuse reflectance
     falls with what the gloss takes more towards grazing incidence.

@@ -35,7 +35,7 @@ class Choice:
 
 
 def activate(preferred: str | None = None, *, vectorised: bool = True) -> str:
-    """The name of the Mitsuba variant, now active; quick, and harmless when called again.
+    """Activate the Mitsuba variant and return its name; repeated calls are fast.
 
     Without a preference the variant that is active already stays; else CUDA where a GPU is
     usable, else LLVM.
@@ -88,7 +88,7 @@ def return_memory() -> None:
 
 
 def choose(*, vectorised: bool = True) -> Choice:
-    """The variant that suits this machine, with the reason; activates nothing."""
+    """The variant for this machine, with the reason; activates nothing."""
     gpu_fault = cuda_fault()
     if gpu_fault is None:
         return Choice(CUDA, "a GPU is usable")
@@ -116,7 +116,7 @@ def register(callback: Callable[[str], None]) -> None:
 
 
 def cuda_fault() -> str | None:
-    """What keeps this machine from tracing on a GPU; None if nothing does."""
+    """Why this machine cannot trace on a GPU; None if it can."""
     windows = sys.platform == "win32"
     driver = os.environ.get("DRJIT_LIBCUDA_PATH", "nvcuda.dll" if windows else "libcuda.so.1")
     if not _loads(driver):  # asked first: Dr.Jit starts LLVM too, and complains if it cannot
@@ -129,7 +129,7 @@ def cuda_fault() -> str | None:
 
 
 def llvm_fault() -> str | None:
-    """What keeps this machine from tracing with LLVM; None if nothing does."""
+    """Why this machine cannot trace with LLVM; None if it can."""
     dr = _tracer("drjit")  # raises where Dr.Jit itself cannot be loaded
     library = llvm.select_library()
     if library is None:
@@ -166,7 +166,7 @@ def _loads(library: str) -> bool:
 
 
 def _exists(library: Path) -> bool:
-    """A bare file name is left to the system's linker."""
+    """Whether a library exists; a bare file name is left to the system's linker."""
     return library.name == str(library) or library.is_file()
 
 

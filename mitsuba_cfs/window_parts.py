@@ -1,4 +1,4 @@
-"""Windows cut by the planes of their group's frame: cells for an estimate, parts for matrices."""
+"""Windows cut by planes of their group's frame, into cells or into parts with own matrices."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Region:
         return Region(self.low, high), Region(low, self.high)
 
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which points [n, 3] of the frame lie in the box [n]."""
+        """Which points [n, 3] of the frame are in the box [n]."""
         return np.all((points >= self.low) & (points < self.high), axis=1)
 
 
@@ -55,7 +55,7 @@ def even_regions(group: WindowGroup, size: float) -> list[Region]:
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """Rectangles C that the windows of a group are seen as."""
+    """Rectangles C that approximate the windows of a group."""
 
     corner: NDArray[np.float64]  # [C, 3] in the frame of the group [m]
     sides: NDArray[np.float64]  # [C, 2] along x and y [m]
@@ -63,7 +63,7 @@ class Cells:
 
     @property
     def centre(self) -> NDArray[np.float64]:
-        """Middles [C, 3] in the frame of the group [m]."""
+        """Centres [C, 3] in the frame of the group [m]."""
         return self.corner + np.pad(0.5 * self.sides, ((0, 0), (0, 1)))
 
 
@@ -91,7 +91,7 @@ def window_cells(group: WindowGroup) -> Cells:
 
 
 def cut_group(group: WindowGroup, regions: Sequence[Region]) -> list[WindowGroup]:
-    """What of a group's windows lies in each of the regions, a group for each that holds any."""
+    """The parts of a group's windows in each region: one group for each region with any."""
     if len(regions) == 1:
         return [group]
     found = []
@@ -103,7 +103,7 @@ def cut_group(group: WindowGroup, regions: Sequence[Region]) -> list[WindowGroup
 
 
 def _cut_window(window: WindowSurface, group: WindowGroup, region: Region) -> WindowSurface | None:
-    """What of a window lies in a region; None where nothing does."""
+    """The part of a window in a region; None if empty."""
     triangles = window.triangles @ group.frame.T
     depth = triangles[..., 2].mean()
     if not region.low[2] <= depth < region.high[2]:
@@ -115,7 +115,7 @@ def _cut_window(window: WindowSurface, group: WindowGroup, region: Region) -> Wi
 
 
 def _polygons(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """A window's outline [n, 3] where it is convex, so that a cut makes few triangles; else these.
+    """The outline [n, 3] of a convex window, so that a cut makes few triangles; else its triangles.
 
     Args: triangles: [T, 3, 3] in the frame of the group.
     """
@@ -132,7 +132,7 @@ def _polygons(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
 
 
 def _cut(polygon: NDArray[np.float64], region: Region) -> NDArray[np.float64]:
-    """What of a convex polygon [n, 3] lies between a region's bounds across x and y.
+    """The part of a convex polygon [n, 3] between a region's bounds in x and y.
 
     Source: Sutherland, Hodgman 1974, "Reentrant polygon clipping".
     """

@@ -1,4 +1,4 @@
-"""Matrices kept on disk by the hash of everything they depend on, finished or half done.
+"""Matrices cached on disk by the hash of everything they depend on, finished or half done.
 
 A file holds the state of `mitsuba_cfs.trace.kernels.estimate.accumulate`: a finished matrix is read
 back, a killed run goes on after the last batch that was saved.
@@ -14,7 +14,7 @@ import zipfile
 import zlib
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +27,7 @@ from mitsuba_cfs.source_code import code_version
 
 VARIABLE = "CFS_CACHE"  # environment variable with the folder
 DEFAULT_LIMIT = 4 << 30  # [bytes] of all files; the longest unused go first
-KEPT_HASHES = 32  # of dataclasses
+RECENT_HASHES = 32  # of dataclasses
 PLAIN = {type(None), bool, int, float, str, bytes}  # whose `repr` tells values apart
 UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
 
@@ -60,12 +60,38 @@ def default_folder() -> Path:
     return user_cache_path("cfs", appauthor=False)
 
 
+class RecentHashes:
+    """Hashes of the dataclasses that were hashed last, which nobody writes to.
+
+    The keys of a room's matrices contain the same surfaces some fifteen times, those of a whole
+    building among them.
+    """
+
+    def __init__(self) -> None:
+        """Empty."""
+        # with the objects whose ids are the keys, so that no other object gets these ids
+        self._hashes: OrderedDict[int, tuple[object, bytes]] = OrderedDict()
+
+    def __reduce__(self) -> tuple[type[RecentHashes], tuple[()]]:
+        """Another process gets none of the objects."""
+        return RecentHashes, ()
+
+    def of(self, value: object) -> bytes:
+        """The hash of a dataclass, computed or recalled."""
+        recent = self._hashes.pop(id(value), None) or (value, _hash_of(value))
+        self._hashes[id(value)] = recent
+        while len(self._hashes) > RECENT_HASHES:
+            self._hashes.popitem(last=False)
+        return recent[1]
+
+
 @dataclass(frozen=True, slots=True)
 class MatrixCache:
     """A folder of matrices."""
 
     folder: Path
     limit: int = DEFAULT_LIMIT  # [bytes]
+    hashes: RecentHashes = field(default_factory=RecentHashes, compare=False, repr=False)
 
     @classmethod
     def of_user(cls) -> MatrixCache:
@@ -73,11 +99,11 @@ class MatrixCache:
         return cls(default_folder())
 
     def entry(self, label: str, *inputs: object, by: str) -> CacheEntry:
-        """The place of the matrix that a module computes from these inputs.
+        """The file of the matrix that a module computes from these inputs.
 
         Args: by: the module's dotted name; its source and what it imports are an input too.
         """
-        key = digest(label, code_version(by), *inputs)
+        key = digest(label, code_version(by), *inputs, hashes=self.hashes)
         return CacheEntry(self, self.folder / f"{label.replace(' ', '-')}-{key[:40]}.npz")
 
     def trim(self, keep: Path | None = None) -> None:
@@ -103,7 +129,7 @@ class CacheEntry:
     path: Path
 
     def load(self) -> BatchMean | None:
-        """What is there; None where there is nothing, or nothing readable."""
+        """The stored state; None if there is none, or none that can be read."""
         try:
             with opened_arrays(self.path) as data:
                 state = BatchMean(
@@ -147,55 +173,42 @@ class CacheEntry:
             if state.finished:
                 self.cache.trim(keep=self.path)
         except (OSError, DataError) as error:
-            log.warning("the matrix is not kept: %s", error)
+            log.warning("the matrix is not cached: %s", error)
 
 
-def kept_or_found(
-    entry: CacheEntry | None, find: Callable[[], NDArray[np.float64]]
+def cached_or_computed(
+    entry: CacheEntry | None, compute: Callable[[], NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """A matrix that is found in one go: the one that is kept, else it is found and kept."""
-    kept = None if entry is None else entry.load()
-    if kept is not None and kept.finished:
-        return kept.mean
+    """Return the cached matrix, or compute and store it: for matrices without batches."""
+    cached = None if entry is None else entry.load()
+    if cached is not None and cached.finished:
+        return cached.mean
     start = time.monotonic()
-    found = find()
+    matrix = compute()
     if entry is not None:
-        none, seconds = np.zeros_like(found), time.monotonic() - start
-        entry.save(BatchMean(1, found, none, none[..., 0], seconds, finished=True))
-    return found
+        none, seconds = np.zeros_like(matrix), time.monotonic() - start
+        entry.save(BatchMean(1, matrix, none, none[..., 0], seconds, finished=True))
+    return matrix
 
 
-def digest(*values: object) -> str:
+def digest(*values: object, hashes: RecentHashes | None = None) -> str:
     """A hash of numbers, texts, arrays, dataclasses and sequences of them, by value.
 
-    Dataclasses are not written to once they were hashed: of the last ones the hash is kept. A
-    room's matrices have the same surfaces in their keys some fifteen times, those of a whole
-    building among them.
+    Args: hashes: of dataclasses that earlier calls hashed.
     """
     state = hashlib.sha256()
     for value in values:
         if is_dataclass(value) and not isinstance(value, type):
-            state.update(b"record;" + _kept_hash(value))
+            state.update(b"record;" + (_hash_of(value) if hashes is None else hashes.of(value)))
         else:
             _feed(state, value)
     return state.hexdigest()
 
 
-def _kept_hash(value: object) -> bytes:
-    """The hash of a dataclass, found again while it is among the last that were hashed."""
-    kept = _last_hashed.pop(id(value), None)
-    if kept is None:
-        state = hashlib.sha256()
-        _feed(state, value)
-        kept = value, state.digest()
-    _last_hashed[id(value)] = kept
-    while len(_last_hashed) > KEPT_HASHES:
-        _last_hashed.popitem(last=False)
-    return kept[1]
-
-
-# with the objects whose ids are the keys, which so stay theirs
-_last_hashed: OrderedDict[int, tuple[object, bytes]] = OrderedDict()
+def _hash_of(value: object) -> bytes:
+    state = hashlib.sha256()
+    _feed(state, value)
+    return state.digest()
 
 
 def _feed(state: hashlib._Hash, value: object) -> None:
@@ -205,8 +218,8 @@ def _feed(state: hashlib._Hash, value: object) -> None:
         state.update(np.ascontiguousarray(value).tobytes())
     elif is_dataclass(value) and not isinstance(value, type):
         state.update(f"{type(value).__qualname__} {len(fields(value))};".encode())
-        for field in fields(value):
-            _feed(state, getattr(value, field.name))
+        for item in fields(value):
+            _feed(state, getattr(value, item.name))
     elif isinstance(value, (list, tuple)):
         plain = set(map(type, value)) <= PLAIN
         state.update(f"{'plain ' if plain else ''}sequence {len(value)};".encode())

@@ -28,7 +28,7 @@ ASCII_DIGITS = 9  # enough for a float32 to come back the same
 
 @dataclass(frozen=True, slots=True)
 class MatrixHeader:
-    """What the header of a Radiance matrix says."""
+    """Header of a Radiance matrix."""
 
     rows: int
     columns: int
@@ -65,7 +65,7 @@ def read_matrix(path: str | PathLike[str]) -> NDArray[np.float64]:
 
 
 def read_header(path: str | PathLike[str]) -> MatrixHeader:
-    """What the header of a Radiance matrix file says."""
+    """Read the header of a Radiance matrix file."""
     try:
         with open(path, "rb") as file:
             return _read_header(file, path)

@@ -36,7 +36,7 @@ from mitsuba_cfs.methods.window_reflection import (
 )
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.kernels.scattering import patch_beams
-from mitsuba_cfs.trace.matrices.adjacent import borrowed_view
+from mitsuba_cfs.trace.matrices.adjacent import adjacent_view
 from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
 
 BATCHES = 4
@@ -153,10 +153,11 @@ def _straight_view(
     scene, chosen, stopping = matrices.scene, matrices.sampling, Stopping(batches=BATCHES)
     inner = g - len(scene.outdoor_groups)
     if inner >= 0:  # nothing comes straight from the sky
-        values = borrowed_view(
+        values = adjacent_view(
             (scene.interior, scene.groups), g, beam, matrices.adjacent[inner], scene.sensors(),
             samples=INNER_SHARE * chosen.sensor_samples // BATCHES, max_depth=INDOOR_DEPTH,
             stopping=stopping, seed=chosen.seed, cache=matrices.cache,
+            scenes=matrices.scenes,
         )  # fmt: skip
         return StraightView(values, np.zeros_like(values.values) if matrices.five_phase else None)
     sharp = matrices.five_phase or len(matrices.parts.of(g)) > 1 or bool(scene.exterior.glossy)
@@ -169,6 +170,7 @@ def _straight_view(
             scene.interior, scene.exterior, scene.groups, scattering, *scene.sensors(),
             subdivision=chosen.subdivision, samples=max(chosen.sensor_samples // BATCHES, 1),
             max_depth=depth, stopping=stopping, seed=chosen.seed, cache=matrices.cache,
+            scenes=matrices.scenes,
         )  # fmt: skip
         return matrix.part(np.s_[g])
 

@@ -25,7 +25,7 @@ from mitsuba_cfs.glare.dgp_error import dgp_errors, hours_by_halves
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.glare.sun_disc import SunDisc
-from mitsuba_cfs.matrices.cache import CacheEntry, kept_or_found
+from mitsuba_cfs.matrices.cache import CacheEntry, cached_or_computed
 from mitsuba_cfs.methods import METRICS, UnknownMethodError
 from mitsuba_cfs.methods.light import (
     Light,
@@ -111,7 +111,7 @@ def hourly_glare(
         columns = np.flatnonzero(kind.ravel() == i)
         entry = None if cached is None else cached(combination)
         if len(columns) == len(chosen):
-            table[:, columns] = kept_or_found(entry, partial(rated, i, columns))
+            table[:, columns] = cached_or_computed(entry, partial(rated, i, columns))
         else:
             stored = None if entry is None else entry.load()
             table[:, columns] = rated(i, columns) if stored is None else stored.mean[:, columns]

@@ -19,7 +19,7 @@ from mitsuba_cfs.trace.kernels.scattering import (
     Scattering,
     sun_scattering,
 )
-from mitsuba_cfs.trace.paths.scene import PathOptics, lit_system, without_peaks
+from mitsuba_cfs.trace.paths.scene import PathOptics, path_optics, without_peaks
 
 PATCH_ANGLES = 32  # of incidence in each patch, for its mean
 OVER = 1e-3  # by which shares may be more than 1, for rounding
@@ -86,7 +86,7 @@ class BsdfOptics:
     @cached_property
     def paths(self) -> PathOptics:
         """See `SystemOptics`."""
-        return lit_system(self._fine, self._angular)
+        return path_optics(self._fine, self._angular)
 
     @cached_property
     def reflection(self) -> NDArray[np.float64] | None:
@@ -159,7 +159,7 @@ class AngularOptics:
         mirror = AngularBeam(self._mirrored) if self._mirrored.any() else None
         rest = None
         if self._scattered.any() or self._reflected.any():
-            rest = lit_system(self._klems()).bsdf
+            rest = path_optics(self._klems()).bsdf
         return PathOptics(rest, AngularBeam(self._straight), (None, mirror))
 
     @cached_property

@@ -59,7 +59,6 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.kernels.scattering import patch_beams, through_beams
-from mitsuba_cfs.trace.kernels.scene import kept_scene
 from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
 from mitsuba_cfs.trace.sun.specular_paths import shining
 
@@ -353,7 +352,7 @@ def _direct_sun(
                 window_points=max(chosen.sun_points // SUN_BATCHES, 1),
                 stopping=Stopping(batches=SUN_BATCHES), seed=chosen.seed, by_group=True,
                 progress=part(progress, j / light.states, (j + 1) / light.states, "daylight"),
-                cache=light.matrices.cache,
+                cache=light.matrices.cache, scenes=light.matrices.scenes,
             )
         )  # fmt: skip
     return matrices
@@ -364,7 +363,7 @@ def _shining_hours(light: PhaseLight) -> NDArray[np.int64]:
     scene, sky = light.scene, light.sky
     facing, lit = np.stack([g.frame[2] for g in scene.groups]), sky.illuminance > 0
     if scene.exterior.glossy:
-        outside = kept_scene(scene.exterior, scene.groups)
+        outside = light.matrices.scenes.scene(scene.exterior, scene.groups)
         return np.flatnonzero(shining(outside, facing, sky.direction) & lit)
     return np.flatnonzero(np.any(sky.direction @ facing.T > 0, axis=1) & lit)
 

@@ -8,7 +8,7 @@ what does not change.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -29,14 +29,14 @@ from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, joined
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
-from mitsuba_cfs.trace.kernels.scene import kept_scene
-from mitsuba_cfs.trace.matrices.adjacent import LendingRoom, RoomBehind, borrowed_daylight
+from mitsuba_cfs.trace.kernels.scene import SceneCache
+from mitsuba_cfs.trace.matrices.adjacent import AdjacentRoomLight, GlassToRoom, adjacent_daylight
 from mitsuba_cfs.trace.matrices.cell_daylight import BATCHES as CELL_BATCHES
 from mitsuba_cfs.trace.matrices.cell_daylight import cell_daylight
 from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 from mitsuba_cfs.trace.matrices.exchange import outdoor_exchange, window_exchange
 from mitsuba_cfs.trace.matrices.view import view_matrix
-from mitsuba_cfs.trace.pictures.adjacent import RoomShown, borrowed_picture
+from mitsuba_cfs.trace.pictures.adjacent import RoomShown, adjacent_picture
 from mitsuba_cfs.trace.pictures.annual import ViewMatrices, view_matrices
 from mitsuba_cfs.trace.sun.room_sun import SunElements, window_elements
 from mitsuba_cfs.window_parts import cut_group, even_regions, window_cells
@@ -66,7 +66,7 @@ class PhaseMatrices:
     five_phase: bool
     cache: MatrixCache | None  # of traced matrices
     parts: Parts  # window groups, cut where the view outdoors differs within a group
-    adjacent: tuple[LendingRoom, ...]  # rooms behind the last window groups, with their T D
+    adjacent: tuple[AdjacentRoomLight, ...]  # rooms behind the last window groups, with their T D
     daylight: Estimate  # D [Q, K, P]
     direct_daylight: NDArray[np.float64] | None = None  # D_d [Q, K, P], mirrored sky included
     straight_daylight: NDArray[np.float64] | None = None  # D_d without what mirrors show
@@ -78,13 +78,14 @@ class PhaseMatrices:
     direct_view: ViewMatrices | None = None  # V_d of the view's pixels
     sunlit: SunElements | None = None  # sunlit surfaces of the room that the windows see [Q * K]
     adjacent_shown: tuple[RoomShown, ...] | None = None  # adjacent rooms in the view's pixels
+    scenes: SceneCache = field(default_factory=SceneCache, compare=False, repr=False)
 
     @property
     def outdoor_parts(self) -> int:
         """How many of the parts, the first ones, look outdoors."""
         return self.parts.outdoors(self.scene)
 
-    def behind(self) -> tuple[RoomBehind, ...]:
+    def behind(self) -> tuple[GlassToRoom, ...]:
         """Which parts look into which adjacent room."""
         return _rooms_behind(self.scene, self.parts, self.adjacent)
 
@@ -96,6 +97,7 @@ def phase_matrices(
     five_phase: bool = True,
     needs: Collection[str] = DEFAULT_NEEDS,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
     progress: Progress = silent,
 ) -> PhaseMatrices:
     """Trace the matrices of a scene that some metrics need.
@@ -105,14 +107,16 @@ def phase_matrices(
         needs: metrics (`METRICS`); none for D alone.  What is missing later is traced for each
             call: name here, or in `with_needs`, what several calls share.
         cache: of traced matrices, `MatrixCache.of_user()`.
+        scenes: of traced scenes, to share with the matrices of other rooms.
     """
     unknown = set(needs) - set(METRICS)
     if unknown:
         raise UnknownMethodError(f"needs {sorted(unknown)}: expected some of {', '.join(METRICS)}")
     sampling = sampling or Sampling()
-    parts = _parts(scene, sampling, cache)
+    scenes = SceneCache() if scenes is None else scenes
+    parts = _parts(scene, sampling, cache, scenes)
     matrices = _outdoors(
-        scene, sampling, parts, five_phase=five_phase, cache=cache, progress=progress
+        scene, sampling, parts, five_phase=five_phase, cache=cache, scenes=scenes, progress=progress
     )
     return with_needs(matrices, needs, progress=progress)
 
@@ -146,7 +150,7 @@ def with_outdoors(
     """
     outdoors = _outdoors(
         scene, matrices.sampling, matrices.parts, five_phase=matrices.five_phase,
-        cache=matrices.cache, progress=progress,
+        cache=matrices.cache, scenes=matrices.scenes, progress=progress,
     )  # fmt: skip
     indoors = {
         name: getattr(matrices, name)
@@ -181,9 +185,10 @@ def with_exchange(
     matrices: PhaseMatrices, *, indoors: bool = False, outdoors: bool = False
 ) -> PhaseMatrices:
     """The matrices with W (indoors) and X (outdoors), for windows that reflect."""
-    parts, cache = matrices.parts.groups, matrices.cache
+    parts = matrices.parts.groups
     common: dict[str, Any] = {
-        "stopping": Stopping(batches=2), "seed": matrices.sampling.seed, "cache": cache,
+        "stopping": Stopping(batches=2), "seed": matrices.sampling.seed,
+        "cache": matrices.cache, "scenes": matrices.scenes,
     }  # fmt: skip
     if indoors and matrices.exchange is None:
         exchange = window_exchange(
@@ -226,10 +231,10 @@ def with_adjacent_shown(matrices: PhaseMatrices) -> PhaseMatrices:
     if not matrices.scene.adjacent or matrices.adjacent_shown is not None:
         return matrices
     scene, chosen = matrices.scene, matrices.sampling
-    shown = borrowed_picture(
+    shown = adjacent_picture(
         scene.interior, matrices.parts.groups, matrices.behind(), scene.eye,
         subdivision=chosen.subdivision, samples=chosen.outdoor_samples,
-        max_depth=INDOOR_DEPTH, seed=chosen.seed,
+        max_depth=INDOOR_DEPTH, seed=chosen.seed, scenes=matrices.scenes,
     )  # fmt: skip
     return replace(matrices, adjacent_shown=tuple(shown))
 
@@ -240,7 +245,7 @@ def with_sunlit(matrices: PhaseMatrices) -> PhaseMatrices:
         return matrices
     interior, parts = matrices.scene.interior, matrices.parts.groups
     sunlit = window_elements(
-        kept_scene(interior, parts),
+        matrices.scenes.scene(interior, parts),
         interior,
         samples=_exchange_samples(matrices.sampling, parts, EXCHANGE_SHARE),
         seed=matrices.sampling.seed,
@@ -268,7 +273,7 @@ def view_of_light(matrices: PhaseMatrices, light: PatchLight) -> ViewMatrices:
 
 def adjacent_room(
     matrices: PhaseMatrices, transmission: Sequence[NDArray[np.float64]]
-) -> LendingRoom:
+) -> AdjacentRoomLight:
     """The room of the matrices with T of its groups [G][K, K], as an adjacent room sees it."""
     daylight, of_group = matrices.daylight.values, matrices.parts.group
     pairs = zip(of_group, daylight, strict=True)
@@ -277,15 +282,17 @@ def adjacent_room(
     for q, n in enumerate(of_group[: matrices.outdoor_parts]):
         beam[q] = matrix_beam(transmission[n], KLEMS_FULL)
     scene = matrices.scene
-    return LendingRoom(
+    return AdjacentRoomLight(
         scene.interior, matrices.parts.groups, through, scene.exterior, beam, daylight,
         matrices.behind(),
     )  # fmt: skip
 
 
-def _parts(scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None) -> Parts:
+def _parts(
+    scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None, scenes: SceneCache
+) -> Parts:
     """The window groups, cut where the view outdoors differs within a group."""
-    outdoors = _parts_of_outdoor_groups(scene, sampling, cache)
+    outdoors = _parts_of_outdoor_groups(scene, sampling, cache, scenes)
     if not scene.adjacent:
         return outdoors
     inner = scene.groups[-len(scene.adjacent) :]
@@ -293,7 +300,7 @@ def _parts(scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None) 
 
 
 def _parts_of_outdoor_groups(
-    scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None
+    scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None, scenes: SceneCache
 ) -> Parts:
     groups = scene.outdoor_groups
     if not len(scene.exterior.triangles) or not groups:
@@ -308,6 +315,7 @@ def _parts_of_outdoor_groups(
         max_depth=OUTDOOR_DEPTH,
         seed=sampling.seed,
         cache=cache,
+        scenes=scenes,
     )
     lights = map(CellLight, groups, cells, daylight)
     most, limit = sampling.window_parts or None, allowed(sampling.patch_samples)
@@ -321,19 +329,22 @@ def _outdoors(
     *,
     five_phase: bool,
     cache: MatrixCache | None,
+    scenes: SceneCache,
     progress: Progress,
 ) -> PhaseMatrices:
     """The matrices of what is on the outer side of the windows: D, and D_d for five phases."""
-    adjacent = _adjacent_rooms(scene, sampling, cache)
+    adjacent = _adjacent_rooms(scene, sampling, cache, scenes)
     estimates = []
     if scene.outdoor_groups:
         estimates.append(
             _daylight(scene, sampling, parts, OUTDOOR_DEPTH, part(progress, 0.0, 0.2, "daylight"),
-                      cache=cache)
+                      cache=cache, scenes=scenes)
         )  # fmt: skip
-    estimates += _inner_daylight(scene, sampling, parts, adjacent, cache)
+    estimates += _inner_daylight(scene, sampling, parts, adjacent, cache, scenes)
     daylight = joined(estimates) if estimates else _no_daylight(sampling)
-    matrices = PhaseMatrices(scene, sampling, five_phase, cache, parts, adjacent, daylight)
+    matrices = PhaseMatrices(
+        scene, sampling, five_phase, cache, parts, adjacent, daylight, scenes=scenes
+    )
     return with_direct_daylight(matrices, progress=progress) if five_phase else matrices
 
 
@@ -352,6 +363,7 @@ def _daylight(
     progress: Progress,
     *,
     cache: MatrixCache | None,
+    scenes: SceneCache,
 ) -> Estimate:
     """D [q, K, P] of the parts that look outdoors."""
     groups, outer = scene.outdoor_groups, parts.groups[: parts.outdoors(scene)]
@@ -369,6 +381,7 @@ def _daylight(
         seed=sampling.seed,
         progress=progress,
         cache=cache,
+        scenes=scenes,
     )
 
 
@@ -388,29 +401,36 @@ def _direct_daylight(
     elif outer:
         direct[:outer] = _daylight(
             replace(scene, exterior=exterior), matrices.sampling, matrices.parts, 1,
-            part(progress, 0.2, 0.3, "daylight"), cache=matrices.cache,
+            part(progress, 0.2, 0.3, "daylight"), cache=matrices.cache, scenes=matrices.scenes,
         ).values  # fmt: skip
     return direct
 
 
 def _adjacent_rooms(
-    scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None
-) -> tuple[LendingRoom, ...]:
+    scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None, scenes: SceneCache
+) -> tuple[AdjacentRoomLight, ...]:
     """The room behind each group that looks into one, with T D of its windows' parts."""
-    rooms: dict[int, LendingRoom] = {}
+    rooms: dict[int, AdjacentRoomLight] = {}
     for room in scene.adjacent:
         if id(room.scene) not in rooms:
-            matrices = phase_matrices(room.scene, sampling, five_phase=False, needs=(), cache=cache)
+            matrices = phase_matrices(
+                room.scene,
+                sampling,
+                five_phase=False,
+                needs=(),
+                cache=cache,
+                scenes=scenes,
+            )
             rooms[id(room.scene)] = adjacent_room(matrices, room.transmission)
     return tuple(rooms[id(room.scene)] for room in scene.adjacent)
 
 
 def _rooms_behind(
-    scene: DaylightScene, parts: Parts, adjacent: Sequence[LendingRoom]
-) -> tuple[RoomBehind, ...]:
+    scene: DaylightScene, parts: Parts, adjacent: Sequence[AdjacentRoomLight]
+) -> tuple[GlassToRoom, ...]:
     inner = range(len(scene.outdoor_groups), len(scene.groups))
     return tuple(
-        RoomBehind(int(parts.of(g)[0]), len(parts.of(g)), room.beam, lit)
+        GlassToRoom(int(parts.of(g)[0]), len(parts.of(g)), room.beam, lit)
         for g, room, lit in zip(inner, scene.adjacent, adjacent, strict=True)
     )
 
@@ -419,16 +439,17 @@ def _inner_daylight(
     scene: DaylightScene,
     sampling: Sampling,
     parts: Parts,
-    adjacent: Sequence[LendingRoom],
+    adjacent: Sequence[AdjacentRoomLight],
     cache: MatrixCache | None,
+    scenes: SceneCache,
 ) -> list[Estimate]:
     """D [q, K, P] of the parts of each group that looks into another room."""
     return [
-        borrowed_daylight(
+        adjacent_daylight(
             room.surfaces, room.groups, room.luminance, [parts.groups[q] for q in parts.of(g)],
             samples=max(sampling.patch_samples // INNER_SHARE // BATCHES, 1),
             max_depth=INDOOR_DEPTH, stopping=Stopping(batches=BATCHES), seed=sampling.seed,
-            cache=cache,
+            cache=cache, scenes=scenes,
         )
         for g, room in enumerate(adjacent, len(scene.outdoor_groups))
     ]  # fmt: skip
@@ -447,6 +468,7 @@ def _sensors(matrices: PhaseMatrices, depth: int, progress: Progress) -> Estimat
         seed=chosen.seed,
         progress=progress,
         cache=matrices.cache,
+        scenes=matrices.scenes,
     )
 
 
@@ -478,6 +500,7 @@ def _view(
         samples=chosen.view_samples,
         seed=chosen.seed,
         memory=chosen.memory,
+        scenes=matrices.scenes,
         max_depth=depth,
         progress=part(progress, 0.0, 1.0, "view matrices"),
     )

@@ -45,7 +45,7 @@ from mitsuba_cfs.methods.window_reflection import (
 )
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
-from mitsuba_cfs.trace.matrices.adjacent import RoomBehind
+from mitsuba_cfs.trace.matrices.adjacent import GlassToRoom
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown
 from mitsuba_cfs.trace.pictures.annual import FivePhasePictures, ViewMatrices
 from mitsuba_cfs.trace.pictures.outdoors import outdoors
@@ -128,7 +128,7 @@ def _five_phase_pictures(
     windows, interior = _windows(light, hours, state), matrices.scene.interior
     exterior, parts = matrices.scene.exterior, matrices.parts.groups
     scattering, eye = [o.scattering for o in optics], matrices.scene.eye
-    sun = PictureSun(interior, exterior, parts, scattering, eye)
+    sun = PictureSun(interior, exterior, parts, scattering, eye, scenes=matrices.scenes)
     if direct:
         luminance = _direct_luminance(light, hours, state)
     else:
@@ -140,6 +140,7 @@ def _five_phase_pictures(
     seen = outdoors(
         interior, exterior, parts, scattering, eye, subdivision=matrices.sampling.subdivision,
         samples=matrices.sampling.outdoor_samples, seed=matrices.sampling.seed,
+        scenes=matrices.scenes,
     )  # fmt: skip
     daylight = direct_daylight(matrices) if direct else matrices.daylight.values
     pictures.show_outdoors(
@@ -223,6 +224,7 @@ def _beam_light(matrices: PhaseMatrices, optics: Sequence[SystemOptics]) -> Beam
     return beam_light(
         scene.interior, scene.exterior, parts.groups, scattering, np.stack(beams), scene.eye,
         subdivision=matrices.sampling.subdivision, seed=matrices.sampling.seed,
+        scenes=matrices.scenes,
     )  # fmt: skip
 
 
@@ -261,7 +263,7 @@ class AdjacentRoomPictures:
     pictures: Pictures  # of hours [h], in which the glass shows its patches
     rooms: Sequence[RoomShown]
     seen: sparse.csr_array  # [n, Q * K] share of each patch of the windows in each pixel
-    behind: Sequence[RoomBehind]  # which of the windows look into the rooms
+    behind: Sequence[GlassToRoom]  # which of the windows look into the rooms
     daylight: NDArray[np.float32]  # D [Q, K, P]
     sky: NDArray[np.float32]  # [P, h] of the hours
 

@@ -18,7 +18,7 @@ from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.paths.disc import disc_seen, with_disc
 from mitsuba_cfs.trace.paths.point_in_time import point_in_time
-from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
+from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
 BATCHES = 4
@@ -64,14 +64,14 @@ class PathPicture:
 
 def path_tracing_room(
     scene: DaylightScene, systems: Sequence[States], state: Sequence[int] | None = None
-) -> LitRoom:
+) -> PathTracingScene:
     """The room with each window group in a state [G], the first by default, ready to be traced."""
     state = [0] * len(systems) if state is None else state
     paths = [optics.paths for optics in in_state(systems, state)]
-    return LitRoom(scene.interior, scene.exterior, scene.groups, paths)
+    return PathTracingScene(scene.interior, scene.exterior, scene.groups, paths)
 
 
-def rooms_by_state(light: PathLight, rows: State) -> dict[tuple[int, ...], LitRoom]:
+def rooms_by_state(light: PathLight, rows: State) -> dict[tuple[int, ...], PathTracingScene]:
     """The rooms of the combinations of states that occur in some hours [G, n]."""
     states = [state for state, _ in combinations(rows)]
     return {state: path_tracing_room(light.scene, light.systems, state) for state in states}
@@ -129,7 +129,7 @@ def path_picture(
 
 
 def picture_of_room(
-    light: PathLight, room: LitRoom, hour: int, **options: Any
+    light: PathLight, room: PathTracingScene, hour: int, **options: Any
 ) -> NDArray[np.float32]:
     """The same of a room in its state."""
     chosen = light.sampling
@@ -137,12 +137,14 @@ def picture_of_room(
     return point_in_time_picture(room, path_sky(light, hour), light.scene.eye, **options)
 
 
-def disc_of_room(light: PathLight, room: LitRoom, hour: int) -> SunDisc | None:
+def disc_of_room(light: PathLight, room: PathTracingScene, hour: int) -> SunDisc | None:
     """The sun's disc in the view in one hour."""
     return disc_seen(room, path_sky(light, hour), light.scene.eye)
 
 
-def picture_with_disc(light: PathLight, room: LitRoom, hour: int, **options: Any) -> PathPicture:
+def picture_with_disc(
+    light: PathLight, room: PathTracingScene, hour: int, **options: Any
+) -> PathPicture:
     """The picture of one hour, the sun's disc apart and in its pixels."""
     bare = picture_of_room(light, room, hour, disc=False, **options)
     shown = with_disc(bare, room, path_sky(light, hour), light.scene.eye)
@@ -157,7 +159,7 @@ def path_sky(light: PathLight, hour: int) -> Sky:
 
 
 def _sensors(
-    light: PathLight, room: LitRoom, points: Array, directions: Array, hour: int
+    light: PathLight, room: PathTracingScene, points: Array, directions: Array, hour: int
 ) -> Estimate:
     chosen = light.sampling
     return point_in_time(

@@ -29,7 +29,7 @@ from mitsuba_cfs.methods.phase_matrices import PhaseMatrices
 from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
-from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.reflected import outdoor_light, view_shares, window_shares
 from mitsuba_cfs.trace.sun.room_beam import room_cells, room_light, room_shares
 from mitsuba_cfs.trace.sun.room_cells import RoomCells
@@ -70,8 +70,8 @@ def reflected_sun(matrices: PhaseMatrices, sky: AnnualSky) -> ReflectedSun:
     """The sun reflected to the windows in the hours of a sky, in place of patches."""
     scene, sampling, parts = matrices.scene, matrices.sampling, matrices.parts.groups
     shining = np.flatnonzero((sky.illuminance > 0) & (sky.direction[:, 2] > 0))
-    inside = kept_scene(scene.interior, scene.groups)
-    outside = kept_scene(scene.exterior, parts, centre=inside.centre)
+    inside = matrices.scenes.scene(scene.interior, scene.groups)
+    outside = matrices.scenes.scene(scene.exterior, parts, centre=inside.centre)
     by_patches = matrices.daylight.values - direct_daylight(matrices)
     if not len(scene.exterior.triangles):
         return ReflectedSun(sky, shining, inside, outside, (), by_patches)

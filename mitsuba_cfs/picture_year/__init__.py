@@ -1,1 +1,1 @@
-"""Every picture of a view in a year, small enough to be looked at in a browser."""
+"""All pictures of a view in a year, compressed for a browser."""

@@ -1,4 +1,4 @@
-"""Sharp parts of a picture as a byte a pixel: few levels, each the mean of what it stands for.
+"""Sharp parts of a picture as one byte per pixel: few levels, each the mean of its values.
 
 Sunlit patches have true edges and nearly one luminance on each face, so that the bytes of a picture
 deflate to a thousandth of it.
@@ -20,18 +20,18 @@ SMALL = 1e-3  # of the logarithm: what levels of one step may leave out
 
 @dataclass(frozen=True, slots=True)
 class Codes:
-    """A level for each place, 0 where there is none."""
+    """One level for each pixel, 0 for none."""
 
     level: NDArray[np.float32]  # [k] level of the codes 1..k
     code: NDArray[np.uint8]  # [n]
 
     def values(self, otherwise: float) -> NDArray[np.float32]:
-        """The level [n] of each place, `otherwise` where it has none."""
+        """The level [n] of each pixel, `otherwise` for none."""
         return np.append(np.float32(otherwise), self.level)[self.code]
 
 
 def coded(values: NDArray[np.floating], chosen: NDArray[np.bool_]) -> Codes:
-    """Codes of positive values [n] at the chosen places [n]."""
+    """Codes of positive values [n] at chosen pixels [n]."""
     code = np.zeros(len(values), dtype=np.uint8)
     if not chosen.any():
         return Codes(np.empty(0, dtype=np.float32), code)
@@ -47,7 +47,7 @@ def coded(values: NDArray[np.floating], chosen: NDArray[np.bool_]) -> Codes:
 
 
 def packed(*parts: Codes) -> bytes:
-    """Codes of the same or of different places, one after the other, deflated; b"" for none.
+    """Several codes, concatenated and deflated; b"" for none.
 
     Counts of levels (16 bits each), levels (32-bit numbers), then a byte for each place; little
     end first.
@@ -62,7 +62,7 @@ def packed(*parts: Codes) -> bytes:
 
 
 def unpacked(data: bytes, sizes: tuple[int, ...]) -> list[Codes]:
-    """The codes of `packed` for parts of these numbers of places."""
+    """The codes in `packed` for parts of these lengths."""
     if not data:
         empty = np.empty(0, dtype=np.float32)
         return [Codes(empty, np.zeros(size, dtype=np.uint8)) for size in sizes]

@@ -1,4 +1,4 @@
-"""Values that vary little from hour to hour: a few patterns, and how much of each an hour has.
+"""Low-rank form of values that vary slowly from hour to hour: patterns, and amounts by hour.
 
     x[h, i] = scale[h] typical[i] sum over r of amount[h, r] pattern[r, i]
 
@@ -22,7 +22,7 @@ MOST = 32767  # of a whole number of 16 bits
 
 @dataclass(frozen=True, slots=True)
 class Patterns:
-    """What the hours of one view are made of."""
+    """The patterns of one view's hours."""
 
     typical: NDArray[np.float32]  # [n]
     weight: NDArray[np.float64]  # [n] of a place, in the sums over places
@@ -33,7 +33,7 @@ class Patterns:
 
     @property
     def rank(self) -> int:
-        """How many patterns there are."""
+        """Number of patterns."""
         return len(self.pattern)
 
     def amounts(self, values: NDArray[np.floating]) -> tuple[NDArray, NDArray]:
@@ -43,7 +43,7 @@ class Patterns:
         return scale, (relative @ self.axes.T) / self.spread
 
     def values(self, scale: NDArray, amounts: NDArray) -> NDArray[np.float32]:
-        """Hours [h, n] again, none of them negative."""
+        """Values of hours [h, n], reconstructed and non-negative."""
         relative = amounts.astype(np.float32) @ (self.pattern.astype(np.float32) * self.step)
         return np.maximum(relative, 0.0) * self.typical * scale[:, None].astype(np.float32)
 

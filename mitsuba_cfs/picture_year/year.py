@@ -1,4 +1,4 @@
-"""A year of a view's pictures: patterns for what varies slowly, codes for what is sharp.
+"""Pictures of a view for a year: patterns for slowly varying light, codes for sharp light.
 
     L[pixel] = share reflected[row]            surfaces, by patterns
              + window[pixel] ratio[pixel]      pixels that show windows, by patterns and their error
@@ -37,7 +37,7 @@ BATCH_BYTES = 64 * 2**20  # of the pictures of a batch of hours
 
 @dataclass(frozen=True, slots=True)
 class DgpCheck:
-    """DGP of some hours by the pictures themselves and by what is kept of them."""
+    """DGP of some hours from the pictures and from their compressed form."""
 
     hours: NDArray[np.int64]  # [c] numbers among the hours of the year's pictures
     dgp: NDArray[np.float64]  # [c]
@@ -86,7 +86,7 @@ class PictureYear:
 
 
 def picture_year(pictures: Pictures, *, seed: int = 0, progress: Progress = silent) -> PictureYear:
-    """All pictures of a view's hours, compressed, and what that changes of DGP in some of them.
+    """Compress all pictures of a view, and compare DGP in some hours.
 
     Args: seed: of the hours that the patterns are found from, and of those that are compared.
     """
@@ -118,7 +118,7 @@ def _batches(pictures: Pictures) -> Iterator[NDArray[np.int64]]:
 
 
 class _Work:
-    """What is found of the hours, batch by batch."""
+    """Accumulates the compressed hours, batch by batch."""
 
     def __init__(self, pictures: Pictures, seed: int) -> None:
         self._pictures = pictures
@@ -152,7 +152,7 @@ class _Work:
         return np.concatenate(rows), np.concatenate(own)
 
     def add(self, batch: NDArray[np.int64], rows: NDArray, own: NDArray) -> None:
-        """Keep a batch of hours: luminance of rows [h, m] and of the pixels' own [h, n]."""
+        """Add a batch of hours: luminance of rows [h, m] and of pixels [h, n]."""
         shown = own[:, self.window]
         known = self._fitted(0, batch, rows), self._fitted(1, batch, shown)
         self.floor[batch] = FLOOR * shown.mean(axis=1) if shown.size else 0.0
@@ -166,7 +166,7 @@ class _Work:
             self.discs[hour] = disc
 
     def _fitted(self, which: int, batch: NDArray[np.int64], values: NDArray) -> NDArray:
-        """The hours [h, ..] as the patterns have them, with the illuminance at the eye kept."""
+        """The hours [h, ..] by the patterns, with the original illuminance at the eye."""
         patterns, weight = self.patterns[which], self._weights[which]
         scale, amounts = patterns.amounts(values)
         known = patterns.values(scale, amounts)
@@ -182,7 +182,7 @@ class _Work:
         return evaluate(picture, self._geometry, disc=disc).dgp
 
     def year(self, check: DgpCheck | None = None) -> PictureYear:
-        """What has been kept."""
+        """The compressed pictures."""
         steps = [np.abs(a).max(axis=0, initial=1e-12) / MOST for a in self._amounts]
         whole = [
             np.round(a / s).astype(np.int16) for a, s in zip(self._amounts, steps, strict=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bim.model import Space
 from bim.sensors import view_point
 from bim.to_thermal import ThermalRoom
-from mitsuba_cfs.matrices.cache import MatrixCache, kept_or_found
+from mitsuba_cfs.matrices.cache import MatrixCache, cached_or_computed
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import cache_entry
 from mitsuba_cfs.trace.matrices.view_factors import person_view_factors, view_factors
@@ -65,7 +65,7 @@ def _view_factors(
         person = person_view_factors(parts, place, facing, samples=samples, seed=seed)
         return np.vstack([among, person])
 
-    rows = kept_or_found(entry, traced)
+    rows = cached_or_computed(entry, traced)
     return rows[:-1], rows[-1]
 
 

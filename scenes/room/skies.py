@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.matrices.cache import MatrixCache, kept_or_found
+from mitsuba_cfs.matrices.cache import MatrixCache, cached_or_computed
 from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.sun import sun_directions
@@ -46,4 +46,4 @@ def cached_sun_directions(
         "sun directions", *place, weather.turned_deg, model, times, *air,
         by=sun_directions.__module__,
     )  # fmt: skip
-    return kept_or_found(entry, lambda: sun_directions(weather, model=model))
+    return cached_or_computed(entry, lambda: sun_directions(weather, model=model))

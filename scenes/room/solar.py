@@ -25,6 +25,7 @@ from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import Stopping
+from mitsuba_cfs.trace.kernels.scene import SceneCache
 from mitsuba_cfs.trace.matrices.absorption import absorption_matrix
 from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
 from scenes.fenestration.thermal_system import ThermalSystem
@@ -87,19 +88,23 @@ def seasonal_outdoors(
     ):  # fmt: skip
         matrices = light.matrices
     else:
-        matrices = _traced_outdoors(room, first, progress)
+        traced = None if light is None else light.matrices.scenes
+        matrices = _traced_outdoors(room, first, traced, progress)
     of_daylight = replace(matrices, five_phase=False)  # no D_d
     scenes = [replace(matrices.scene, exterior=exterior) for exterior in others]
     later = (with_outdoors(of_daylight, scene) for scene in scenes)
     return SeasonalOutdoors([matrices, *later], room.season)
 
 
-def _traced_outdoors(room: RoomInputs, exterior: Surfaces, progress: Progress) -> PhaseMatrices:
+def _traced_outdoors(
+    room: RoomInputs, exterior: Surfaces, scenes: SceneCache | None, progress: Progress
+) -> PhaseMatrices:
     scene = DaylightScene(Surfaces.none(), exterior, room.windows.groups)
     steps = part(progress, 0.0, 1.0, "sun")
     matrices = phase_matrices(
-        scene, room.options.sampling, five_phase=False, needs=(), cache=room.cache, progress=steps
-    )
+        scene, room.options.sampling, five_phase=False, needs=(), cache=room.cache,
+        scenes=scenes, progress=steps,
+    )  # fmt: skip
     steps("sun", 1.0)
     return matrices
 

@@ -19,7 +19,7 @@ from bim.to_thermal import (
 )
 from mitsuba_cfs.compiled import must_compile
 from mitsuba_cfs.errors import RoomError
-from mitsuba_cfs.matrices.cache import MatrixCache, kept_or_found
+from mitsuba_cfs.matrices.cache import MatrixCache, cached_or_computed
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.stored_arrays import StoredArrays
@@ -250,7 +250,7 @@ def with_sky_view(
     def sky_view(exterior: Surfaces) -> NDArray[np.float64]:
         inputs, by = (exterior.triangles, points, normals, SKY_SAMPLES, seed), sky_shares.__module__
         entry = cache_entry(cache, "sky shares", *inputs, by=by, stopping=None)
-        return kept_or_found(
+        return cached_or_computed(
             entry,
             lambda: sky_shares(exterior, points, normals, samples=SKY_SAMPLES, seed=seed)[:, None],
         )[:, 0]

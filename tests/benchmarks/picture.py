@@ -48,11 +48,13 @@ class PictureScene:
     """The room, its blind and its sky, for both programs."""
 
     def __init__(self, folder: Path) -> None:
-        from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
+        from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
 
         fenestration = PicturedSystem("blind", folder)
         moment = moments(read_epw(WEATHER))[MOMENT]
-        self.room = LitRoom(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
+        self.room = PathTracingScene(
+            room.room(), room.NOTHING, room.window_groups(), [fenestration.system]
+        )
         self.sky = Sky(moment.patches, moment.sun, moment.sun_luminance)
         self.folder = folder
         set_moment(rendered_room(folder, fenestration), moment)

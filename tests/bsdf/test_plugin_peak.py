@@ -241,7 +241,7 @@ def test_the_sun_and_paths_have_the_beam_and_the_rest_of_a_tree(variant, real_da
     import mitsuba as mi
 
     from mitsuba_cfs.trace.kernels.scattering import sun_scattering
-    from mitsuba_cfs.trace.paths.scene import lit_system
+    from mitsuba_cfs.trace.paths.scene import path_optics
 
     if rank == 3:
         tree = TensorTreeBsdf(transmission_front=isotropic_glass(0.5, 0.2))
@@ -253,7 +253,7 @@ def test_the_sun_and_paths_have_the_beam_and_the_rest_of_a_tree(variant, real_da
     u = np.random.default_rng(3).random((2, 100_000))
     r, phi = np.sqrt(u[0]), 2 * np.pi * u[1]
     outward = mi.Vector3f(np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - u[0])]))
-    way, paths, beams = sun_scattering(tree), lit_system(tree), []
+    way, paths, beams = sun_scattering(tree), path_optics(tree), []
     for given, passed in zip(suns, whole, strict=True):
         sun = mi.Vector3f(*map(float, given))
         beam = float(way.through(sun).numpy()[0])

@@ -140,11 +140,13 @@ def test_the_disc_ends_where_the_eye_does(beyond, share):
 def test_paths_see_the_same_disc():
     from mitsuba_cfs.trace.kernels.scattering import AngularBeam
     from mitsuba_cfs.trace.paths.disc import disc_seen, with_disc
-    from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky
+    from mitsuba_cfs.trace.paths.scene import PathOptics, PathTracingScene, Sky
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     room, groups = rooms.test_room()
-    lit = LitRoom(room, rooms.NOTHING, groups, [PathOptics(None, AngularBeam(np.full(16, 0.8)))])
+    lit = PathTracingScene(
+        room, rooms.NOTHING, groups, [PathOptics(None, AngularBeam(np.full(16, 0.8)))]
+    )
     sky = Sky(np.full(146, 1000.0), SUN, LUX[0] / SUN_SOLID_ANGLE)
     disc = disc_seen(lit, sky, VIEW)
     assert disc.luminance == pytest.approx(source(clear()).luminance, rel=1e-5)
@@ -261,7 +263,7 @@ def test_pictures_are_rated_as_traced_ones(kind, obstructed):
     import mitsuba as mi
 
     from mitsuba_cfs.trace.kernels.scattering import AngularBeam
-    from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky
+    from mitsuba_cfs.trace.paths.scene import PathOptics, PathTracingScene, Sky
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
     from mitsuba_cfs.trace.sun.direct import SUN_SOLID_ANGLE
     from tests.trace.test_point_in_time import diffuser as diffusing_system
@@ -281,7 +283,7 @@ def test_pictures_are_rated_as_traced_ones(kind, obstructed):
     pictures = five_phase(way, transmission, (sky + direct, direct), HIGH, lux, obstacle=obstacle)
     found = annual_glare(pictures)
     room, groups = rooms.test_room()
-    traced = LitRoom(room, obstacle or rooms.NOTHING, groups, [system])
+    traced = PathTracingScene(room, obstacle or rooms.NOTHING, groups, [system])
     picture = point_in_time_picture(
         traced, Sky(sky, HIGH, lux[0] / SUN_SOLID_ANGLE), VIEW, samples=128
     )

@@ -48,10 +48,10 @@ def clear():
 def traced(exterior, sky, *, interior=None, samples=16384, points=POINTS, normals=UP):
     from mitsuba_cfs.trace.kernels.estimate import Stopping
     from mitsuba_cfs.trace.paths.point_in_time import point_in_time
-    from mitsuba_cfs.trace.paths.scene import LitRoom
+    from mitsuba_cfs.trace.paths.scene import PathTracingScene
 
     room, groups = rooms.test_room()
-    lit = LitRoom(room if interior is None else interior, exterior, groups, [clear()])
+    lit = PathTracingScene(room if interior is None else interior, exterior, groups, [clear()])
     options = {"samples": samples, "stopping": Stopping(batches=4)}
     return point_in_time(lit, sky, points, normals, **options)
 

@@ -123,7 +123,7 @@ def test_five_phases_of_clear_glass_are_never_five_per_cent_above_its_paths():
     from mitsuba_cfs.trace.kernels.estimate import Stopping
     from mitsuba_cfs.trace.kernels.scattering import AngularBeam
     from mitsuba_cfs.trace.paths.point_in_time import point_in_time
-    from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky
+    from mitsuba_cfs.trace.paths.scene import PathOptics, PathTracingScene, Sky
 
     diffuse = 300.0  # cd/m2 of a uniform sky and ground
     sky, sun = suns_at([(62, 0.3), (74, 0.9), (86, 0.3)], diffuse)
@@ -133,7 +133,7 @@ def test_five_phases_of_clear_glass_are_never_five_per_cent_above_its_paths():
     found = lit(matrices, [[glass()]], sun)
     beam = AngularBeam(glass_transmittance(np.linspace(0, 1, 128)))
     behind, luminance = (
-        LitRoom(room, rooms.NOTHING, groups, [PathOptics(None, beam)]),
+        PathTracingScene(room, rooms.NOTHING, groups, [PathOptics(None, beam)]),
         1e5 / SUN_SOLID_ANGLE,
     )
     for h, direction in enumerate(sun.direction):

@@ -51,13 +51,13 @@ def test_the_sun_in_a_mirror_is_a_sun_to_the_direct_matrix():
 
 def test_a_mirror_behind_the_windows_sends_them_no_sun():
     from mitsuba_cfs.trace.kernels.scene import TracedScene
-    from mitsuba_cfs.trace.sun.specular_paths import sun_ways
+    from mitsuba_cfs.trace.sun.specular_paths import specular_sun_paths
 
     _, groups = rooms.test_room()
     for shift, ways in ((0.0, 2), (30.0, 1)):  # before the window, and behind the house
         there = facade(mirror(0.8))
         there = replace(there, triangles=there.triangles + np.array([0.0, shift, 0.0]))
-        assert len(sun_ways(TracedScene(there, groups, windows_block=False))) == ways
+        assert len(specular_sun_paths(TracedScene(there, groups, windows_block=False))) == ways
 
 
 @pytest.mark.slow
@@ -84,13 +84,13 @@ def test_five_phases_have_the_sun_of_a_mirror_facade():
 def test_a_picture_by_paths_shows_the_suns_disc_in_a_mirror():
     from mitsuba_cfs.images.view import fisheye
     from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-    from mitsuba_cfs.trace.paths.scene import LitRoom
+    from mitsuba_cfs.trace.paths.scene import PathTracingScene
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     sky = lit_by(np.zeros(146), SUN, 50_000.0 / SUN_SOLID_ANGLE)
     view = fisheye(EYE, (0.0, -1.0, 0.0), 32)
     for outdoors, expected in ((facade(mirror(0.8)), IMAGE), (hidden_sun(mirror(0.8)), 0.0)):
-        lit = LitRoom(black_room(None)[0], outdoors, rooms.test_room()[1], [clear()])
+        lit = PathTracingScene(black_room(None)[0], outdoors, rooms.test_room()[1], [clear()])
         picture = point_in_time_picture(lit, sky, view, samples=4, disc=False)
         assert normal_illuminance(picture, view) == pytest.approx(expected, rel=0.01)
 
@@ -164,16 +164,16 @@ def test_window_patches_have_the_sun_of_a_rough_facade_in_its_lobe(alpha):
 
 def test_the_sun_on_a_smooth_mirror_is_counted_by_its_image_alone():
     from mitsuba_cfs.trace.kernels.scene import TracedScene
-    from mitsuba_cfs.trace.sun.lit_points import Places, reflecting_places
+    from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, reflecting_points
 
     normals = np.tile(np.float32([0, -1, 0]), (4096, 1))
     for gloss, diffuse, expected in (
         (mirror(0.8), 0.0, 0.0), (mirror(0.5), 0.3, 0.3), (mirror(0.6, 0.1), 0.3, 0.9),
     ):  # fmt: skip
         outside = TracedScene(facade(gloss, diffuse), rooms.test_room()[1])
-        start = Places(np.zeros((4096, 3), np.float32), normals)
-        whole = reflecting_places(outside, start, 0, 1)
-        some = reflecting_places(outside, start, 0, 1, mirrored=True)
+        start = SurfacePoints(np.zeros((4096, 3), np.float32), normals)
+        whole = reflecting_points(outside, start, 0, 1)
+        some = reflecting_points(outside, start, 0, 1, mirrored=True)
         assert whole.weight.mean() == pytest.approx(gloss.at_normal + diffuse, rel=1e-3)
         assert some.weight.sum() / 4096 == pytest.approx(expected, rel=0.01)  # some pass the edge
 

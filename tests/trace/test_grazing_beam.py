@@ -22,13 +22,13 @@ def beam_of(bsdf, theta) -> dict:
     import mitsuba as mi
 
     from mitsuba_cfs.trace.kernels.scattering import sun_scattering
-    from mitsuba_cfs.trace.paths.scene import lit_system
+    from mitsuba_cfs.trace.paths.scene import path_optics
 
     local = np.stack([np.sin(theta) * 0.6, np.sin(theta) * 0.8, np.cos(theta)])
     towards = mi.Vector3f(local.astype(np.float32))
     return {
         "sun": sun_scattering(bsdf).through(towards).numpy(),
-        "paths": lit_system(bsdf).straight(towards).numpy(),
+        "paths": path_optics(bsdf).straight(towards).numpy(),
     }
 
 

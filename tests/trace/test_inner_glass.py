@@ -28,7 +28,7 @@ PATHS = {2: [148.4, 109.7, 86.7, 74.1, 93.8], 3: [21.9, 18.0, 16.0, 16.4, 16.4]}
 def test_straight_on_the_glass_has_what_the_window_before_it_has() -> None:
     """Both normal patches: nothing between, so the glass has T D of the window, and no more."""
     from mitsuba_cfs.trace.kernels.estimate import Stopping
-    from mitsuba_cfs.trace.matrices.adjacent import borrowed_daylight
+    from mitsuba_cfs.trace.matrices.adjacent import adjacent_daylight
 
     def group(name: str, y: float, place: tuple) -> WindowGroup:
         return WindowGroup(name, (WindowSurface(name, upright(y, place, north=False)),))
@@ -36,7 +36,7 @@ def test_straight_on_the_glass_has_what_the_window_before_it_has() -> None:
     wide = group("window", FIRST - 0.5, ((-3, 7), (-3, 6)))
     patches = np.arange(1.0, KLEMS_FULL.size + 1)[None, :, None]
     black = surfaces([(upright(FIRST, GLASS, north=True), 0.0)])
-    found = borrowed_daylight(
+    found = adjacent_daylight(
         black, [wide], patches, [group("glass", FIRST, GLASS)], samples=64, stopping=Stopping(2)
     ).values[0, :, 0]
     # up to 60 degrees every ray meets the window, which has the same patches there

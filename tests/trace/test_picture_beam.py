@@ -13,7 +13,7 @@ import mitsuba_cfs as cfs
 from mitsuba_cfs.images.view import pixel_directions
 from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, tile_size
 from mitsuba_cfs.trace.kernels.sampling import vectors
-from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
 from mitsuba_cfs.trace.sun.picture_beam import beam_light
 from scenes.cost import room as box
@@ -29,7 +29,7 @@ def test_a_slit_of_sky_lights_a_wall_evenly() -> None:
     scene, way = lit.scene, lit.systems[0][0].scattering
     around = scene.interior, scene.exterior, scene.groups, [way]
     light = beam_light(*around, np.ones((1, 145)), scene.view)
-    inside = kept_scene(scene.interior, scene.groups)
+    inside = TracedScene(scene.interior, scene.groups)
     rows = PictureRows.of_view(inside, scene.view, tile_size(scene.view))
     directions = pixel_directions(scene.view)[0].reshape(-1, 3)[rows.pixels]
     eye, towards = inside.place(scene.view.position), vectors(directions)

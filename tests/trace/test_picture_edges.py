@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.images.view import View
-from mitsuba_cfs.trace.kernels.sampling import pixel_places
-from mitsuba_cfs.trace.sun.pixels import EDGE_PLACES, edge_pixels
+from mitsuba_cfs.trace.kernels.sampling import pixel_positions
+from mitsuba_cfs.trace.sun.pixels import EDGE_SAMPLES, edge_pixels
 
 VIEW = View(width=9, height=6)
 
@@ -42,6 +42,6 @@ def test_no_hour_has_no_edges() -> None:
 @pytest.mark.parametrize("turn", np.radians([0, 20, 45, 70, 90, 120, 150]))
 def test_a_strip_of_sun_across_a_pixel_is_as_wide_as_it_is(turn: float) -> None:
     """A twentieth of the pixel, wherever it lies; by 8 places up to a quarter."""
-    across = pixel_places(EDGE_PLACES) @ [np.cos(turn), np.sin(turn)]
+    across = pixel_positions(EDGE_SAMPLES) @ [np.cos(turn), np.sin(turn)]
     for middle in np.linspace(across.min(), across.max(), 40):
         assert (np.abs(across - middle) < 0.025).mean() < 0.16

@@ -23,11 +23,13 @@ DARK = np.zeros(146)
 
 
 def picture(systems, sky, scene, view=VIEW, **options):
-    from mitsuba_cfs.trace.paths.scene import LitRoom
+    from mitsuba_cfs.trace.paths.scene import PathTracingScene
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     interior, groups, exterior = scene
-    return point_in_time_picture(LitRoom(interior, exterior, groups, systems), sky, view, **options)
+    return point_in_time_picture(
+        PathTracingScene(interior, exterior, groups, systems), sky, view, **options
+    )
 
 
 def eye_illuminance(values, view=VIEW) -> float:
@@ -83,7 +85,7 @@ def test_a_picture_has_the_illuminance_of_a_sensor_at_its_eye(kind):
     from mitsuba_cfs.trace.kernels.estimate import Stopping
     from mitsuba_cfs.trace.kernels.scattering import AngularBeam
     from mitsuba_cfs.trace.paths.point_in_time import point_in_time
-    from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky
+    from mitsuba_cfs.trace.paths.scene import PathOptics, PathTracingScene, Sky
 
     half = AngularBeam(np.full(16, 0.3))
     system = {
@@ -94,7 +96,7 @@ def test_a_picture_has_the_illuminance_of_a_sensor_at_its_eye(kind):
     interior, groups = rooms.test_room()
     scene, sky = (interior, groups, rooms.obstruction()), Sky(SKY, SUN, SUN_LUMINANCE)
     found = eye_illuminance(picture([system], sky, scene, samples=32))
-    room = LitRoom(*scene[::2], groups, [system])
+    room = PathTracingScene(*scene[::2], groups, [system])
     sensor = point_in_time(
         room, sky, [EYE], [VIEW.direction], samples=65536, stopping=Stopping(batches=8)
     )
@@ -159,11 +161,11 @@ def test_noise_of_few_paths_makes_no_glare_sources():
 
 def test_a_colour_picture_has_the_bands_luminance():
     from mitsuba_cfs.images.hdr import EFFICACY, LUMINANCE_WEIGHTS, luminance
-    from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
+    from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
     from mitsuba_cfs.trace.pictures.point_in_time import colour_picture
 
     interior, groups = rooms.test_room()
-    room = LitRoom(interior, rooms.NOTHING, groups, [glass(0.7)])
+    room = PathTracingScene(interior, rooms.NOTHING, groups, [glass(0.7)])
     view = fisheye(EYE, (0.0, -1.0, 0.0), 60)
     white = Sky(SKY / EFFICACY, SUN, SUN_LUMINANCE / EFFICACY)
     red = Sky(2 * SKY / EFFICACY, SUN, 2 * SUN_LUMINANCE / EFFICACY)
@@ -226,7 +228,7 @@ def test_windows_reflect_the_rooms_light_in_the_phase_methods():
 def test_sun_of_several_groups_with_trees_is_that_of_paths():
     """Two windows, a tensor tree in one and glass in the other, before a wall that shades."""
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering, sun_scattering
-    from mitsuba_cfs.trace.paths.scene import Sky, lit_system
+    from mitsuba_cfs.trace.paths.scene import Sky, path_optics
     from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
     K = KLEMS_FULL.size
@@ -238,7 +240,7 @@ def test_sun_of_several_groups_with_trees_is_that_of_paths():
     lux = SUN_LUMINANCE * 2 * np.pi * (1 - np.cos(np.radians(0.2665)))
     view = fisheye((2.0, 3.0, 1.3), (-0.7, -0.7, 0.0), 120)
     for order in (1, -1):
-        ways, systems = ([sun_scattering(tree), clear], [lit_system(tree), glass(0.7)])
+        ways, systems = ([sun_scattering(tree), clear], [path_optics(tree), glass(0.7)])
         scene = interior, groups, exterior
         found = PictureSun(interior, exterior, groups, ways[::order], view)
         values = np.zeros((1, len(found.pixels)), dtype=np.float32)

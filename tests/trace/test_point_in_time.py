@@ -24,10 +24,10 @@ NO_SUN = [0, 0, -1]
 def traced(systems, sky, *, scene=None, **options):
     from mitsuba_cfs.trace.kernels.estimate import Stopping
     from mitsuba_cfs.trace.paths.point_in_time import point_in_time
-    from mitsuba_cfs.trace.paths.scene import LitRoom
+    from mitsuba_cfs.trace.paths.scene import PathTracingScene
 
     interior, groups, exterior = scene or (*rooms.test_room(), rooms.NOTHING)
-    room = LitRoom(interior, exterior, groups, systems)
+    room = PathTracingScene(interior, exterior, groups, systems)
     stopping = Stopping(batches=8)
     return point_in_time(room, sky, POINTS, UP, samples=32768, stopping=stopping, **options)
 
@@ -133,11 +133,11 @@ def test_an_obstacle_before_one_of_two_windows_does_not_bias_the_paths():
 
 def test_picture_shows_sky_ground_and_the_suns_disc():
     from mitsuba_cfs.images.view import fisheye, pixel_directions, pixel_solid_angles
-    from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
+    from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     interior, groups = rooms.test_room()
-    room = LitRoom(interior, rooms.NOTHING, groups, [glass(0.5)])
+    room = PathTracingScene(interior, rooms.NOTHING, groups, [glass(0.5)])
     view = fisheye((1.8, 2.5, 1.2), (0, -1, 0), 128)
     sun = np.array([0.0, -1.0, 0.3]) / np.hypot(1, 0.3)
     picture = point_in_time_picture(room, Sky(SKY, sun, SUN_LUMINANCE), view, samples=256)
@@ -169,12 +169,12 @@ def test_daylight_coefficients_of_a_diffuser_are_the_three_phase_matrix():
     from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
     from mitsuba_cfs.trace.matrices.view import view_matrix
     from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
-    from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
+    from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
 
     interior, groups = rooms.test_room()
     exterior = rooms.NOTHING  # something near lights parts of the window: V T D knows their mean
     system = diffuser(0.5)
-    room = LitRoom(interior, exterior, groups, [system])
+    room = PathTracingScene(interior, exterior, groups, [system])
     found = daylight_coefficients(
         room, POINTS, UP, subdivision=1, samples=32768, stopping=Stopping(batches=8)
     )

@@ -50,18 +50,22 @@ def test_discs_that_no_window_can_show_are_those_of_all_pairs(monkeypatch):
 def test_rays_that_pass_the_box_of_a_mirror_are_all_that_meet_it(monkeypatch):
     from mitsuba_cfs.surfaces import Surfaces
     from mitsuba_cfs.trace.kernels.scene import TracedScene
-    from mitsuba_cfs.trace.sun.lit_points import Places, sunlight
-    from mitsuba_cfs.trace.sun.specular_paths import SunWay
+    from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, sunlight
+    from mitsuba_cfs.trace.sun.specular_paths import SpecularPath
 
     pane = rooms.quad((0, -10, 0), (4, -11, 0), (4, -11, 3), (0, -10, 3))
     there = Surfaces(pane, np.zeros(2), np.zeros(2, dtype=int), (), (mirror(0.8),))
     outside = TracedScene(there, rooms.test_room()[1])
     rng = np.random.default_rng(3)
     point = rng.uniform((-2, -9, 0), (6, -1, 4), (400, 3)).astype(np.float32)
-    places = Places((point - outside.centre).astype(np.float32), np.tile([0, -1, 0.0], (400, 1)))
+    places = SurfacePoints(
+        (point - outside.centre).astype(np.float32), np.tile([0, -1, 0.0], (400, 1))
+    )
     suns = directions(64) * [1, -1, 1]
     some = sunlight(outside, places, suns)
-    monkeypatch.setattr(SunWay, "_may_meet", lambda self, ray: dr.full(type(ray.o.x > 0), True))
+    monkeypatch.setattr(
+        SpecularPath, "_may_meet", lambda self, ray: dr.full(type(ray.o.x > 0), True)
+    )
     np.testing.assert_array_equal(some, sunlight(outside, places, suns))
     assert 0.02 < np.mean(some > 0) < 0.5
 

@@ -105,7 +105,7 @@ def test_each_place_stands_for_those_of_its_own_face():
 
 def test_a_row_with_little_light_has_as_many_places_as_one_with_much():
     """A sensor in the depth had a twentieth of the places of one by the window, and their noise."""
-    from mitsuba_cfs.trace.sun.lit_points import Places
+    from mitsuba_cfs.trace.sun.lit_points import SurfacePoints
     from mitsuba_cfs.trace.sun.reflected import PLACES, SunShares, _Met
 
     count = 8192
@@ -113,7 +113,9 @@ def test_a_row_with_little_light_has_as_many_places_as_one_with_much():
     points[count:, 0] += 5.0
     up = np.tile(np.float32([0, 0, 1]), (2 * count, 1))
     row, weight = np.repeat([0, 1], count), np.repeat([1.0, 0.02], count)
-    found = SunShares.of([_Met(row, weight, Places(points.astype(np.float32), up), [])], 2, 0)
+    found = SunShares.of(
+        [_Met(row, weight, SurfacePoints(points.astype(np.float32), up), [])], 2, 0
+    )
     assert found.share.sum(axis=1) == pytest.approx([count, 0.02 * count])
     assert np.diff(found.share.indptr) == pytest.approx([PLACES / 2, PLACES / 2], rel=0.05)
 

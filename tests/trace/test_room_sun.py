@@ -14,14 +14,14 @@ from mitsuba_cfs.images.view import pixel_directions
 from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
 from mitsuba_cfs.trace.kernels.pixel_rows import MOST_TIMES, PictureRows, tile_size
 from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
-from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.matrices.pixel_view import picture_matrix_blocks
-from mitsuba_cfs.trace.sun.lit_points import Places
+from mitsuba_cfs.trace.sun.lit_points import SurfacePoints
 from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 from mitsuba_cfs.trace.sun.room_cells import RoomCells
 from mitsuba_cfs.trace.sun.room_sun import (
     FACE_STEPS,
-    EdgePlaces,
+    EdgePoints,
     _beside,
     _elements,
     _Hits,
@@ -44,7 +44,7 @@ def strip_on_cells(cells: RoomCells, tracer: TracedScene) -> np.ndarray:
     y, z = np.meshgrid(np.linspace(0, box.DEPTH, 4001)[1:], STRIP * (np.arange(40) + 0.5) / 40)
     at = np.stack([np.zeros(y.size), y.ravel(), z.ravel()], axis=1) - tracer.centre
     at[:, 0] += tracer.epsilon[0]
-    points = Places(at.astype(np.float32), np.tile(np.float32([1, 0, 0]), (len(at), 1)))
+    points = SurfacePoints(at.astype(np.float32), np.tile(np.float32([1, 0, 0]), (len(at), 1)))
     cell = cells.numbers(points)
     assert (cell >= 0).all()
     return np.bincount(cell, minlength=cells.size) * (box.DEPTH * STRIP / y.size) / cells.area
@@ -54,7 +54,7 @@ def test_a_strip_of_sun_at_a_walls_foot_lights_the_floor_beside_it_evenly() -> N
     """Tile by tile as a strip of infinite length does: (1 - cos of its height as an angle) / 2."""
     view = cfs.fisheye(tuple(EYE), (0.0, 0.05, -1.0), 100)
     interior = box.room()
-    tracer = kept_scene(interior, box.window_groups())
+    tracer = TracedScene(interior, box.window_groups())
     rows = PictureRows.of_view(tracer, view, tile_size(view))
     times = np.ones(len(rows.pixels), dtype=np.int64)
     elements, _ = sun_elements(tracer, interior, view, rows, times)
@@ -83,7 +83,7 @@ def test_a_window_low_above_a_wide_floor_sees_the_sun_on_it_in_half_of_its_view(
     interior = rooms.surfaces([(floor, 0.4)])
     pane = rooms.quad((-0.1, 0, 0.1), (0.1, 0, 0.1), (0.1, 0, 0.3), (-0.1, 0, 0.3))
     groups = [WindowGroup("low", (WindowSurface("low", pane),))]
-    found = window_elements(kept_scene(interior, groups), interior, samples=64)
+    found = window_elements(TracedScene(interior, groups), interior, samples=64)
     luminance = found.far_rows(np.ones((found.cells.size, 1), dtype=np.float32))[:, 0]
     # E = rho / pi * pi * the floor's half of the view
     lux = KLEMS_FULL.projected_solid_angles() @ luminance
@@ -96,7 +96,7 @@ def test_a_window_low_above_a_wide_floor_sees_the_sun_on_it_in_half_of_its_view(
 
 def test_rows_of_few_pixels_have_more_paths() -> None:
     view = cfs.fisheye((1.8, 1.0, 1.5), (0.0, -1.0, 0.0), 120)
-    tracer = kept_scene(box.room(), box.window_groups())
+    tracer = TracedScene(box.room(), box.window_groups())
     rows = PictureRows.of_view(tracer, view, tile_size(view))
     count = np.bincount(rows.row)[rows.row]
     alone, smoothed = rows.times(smoothed=False), rows.times(smoothed=True)
@@ -126,7 +126,7 @@ def test_sun_near_by_is_what_all_places_of_each_element_say(monkeypatch) -> None
     """Though only those elements are asked at all places that the edge of a spot crosses."""
     view = cfs.fisheye((1.8, 1.0, 1.5), (0.0, -1.0, 0.0), 60)
     interior, groups = box.room(), box.window_groups()
-    tracer = kept_scene(interior, groups)
+    tracer = TracedScene(interior, groups)
     rows = PictureRows.of_view(tracer, view, 4)
     times = np.ones(len(rows.pixels), dtype=np.int64)
     elements, _ = sun_elements(tracer, interior, view, rows, times)
@@ -137,7 +137,7 @@ def test_sun_near_by_is_what_all_places_of_each_element_say(monkeypatch) -> None
     suns = [np.cos(height) * np.sin(turn), -np.cos(height) * np.cos(turn), np.sin(height)]
     hours = np.stack(suns, axis=-1).reshape(-1, 3), np.full(height.size, 1e5)
     found = sun.on_elements(elements, *hours)
-    monkeypatch.setattr(EdgePlaces, "crossed", lambda _, light: np.nonzero(light > -1))
+    monkeypatch.setattr(EdgePoints, "crossed", lambda _, light: np.nonzero(light > -1))
     every = sun.on_elements(elements, *hours)
     assert found.mean() == pytest.approx(every.mean(), rel=0.005)
     # 0.006; by the first place of each element alone 0.20
@@ -150,7 +150,7 @@ def test_elements_are_asked_again_where_one_beside_or_around_is_lit_unlike() -> 
     cubes[:, 0], cubes[:, 6], cubes[:, 3] = [0, 1, 2, 3, 0, 1], [1, 1, 1, 1, 0, 1], [1] * 5 + [2]
     order = np.lexsort(cubes.T[::-1])
     name = np.argsort(order)
-    edges = EdgePlaces(Places.joined([]), _beside(cubes[order]))
+    edges = EdgePoints(SurfacePoints.joined([]), _beside(cubes[order]))
     for lit, expected in (([0], [0, 1, 4]), ([2], [1, 2, 3]), ([4], [0, 1, 4]), ([5], [])):
         light = np.zeros((6, 1), dtype=np.float32)
         light[name[lit]] = 1
@@ -178,7 +178,7 @@ def test_elements_are_numbered_in_the_order_of_their_cubes() -> None:
     sides = np.eye(3, dtype=np.float32)[random.integers(0, 3, n)]
     sides *= random.choice([-1, 1], (n, 1)).astype(np.float32)
     halvings = random.integers(0, 3, n).astype(np.int8)
-    some = _Hits(np.zeros(n, dtype=np.int64), np.ones(n), Places(points, sides), halvings)
+    some = _Hits(np.zeros(n, dtype=np.int64), np.ones(n), SurfacePoints(points, sides), halvings)
     element, order, cubes = _elements(some, edge)
     table = np.vstack(
         [

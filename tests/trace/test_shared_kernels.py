@@ -98,27 +98,28 @@ def test_second_room_compiles_nothing(traced):
 
 
 def test_scene_of_the_same_objects_is_found_again_and_no_other():
-    from mitsuba_cfs.trace.kernels.scene import KEPT, kept_scene
+    from mitsuba_cfs.trace.kernels.scene import SCENES, SceneCache
 
-    interior, groups = rooms.test_room()
-    first = kept_scene(interior, groups)
-    assert kept_scene(interior, list(groups)) is first
+    (interior, groups), cache = rooms.test_room(), SceneCache()
+    first = cache.scene(interior, groups)
+    assert cache.scene(interior, list(groups)) is first
+    assert SceneCache().scene(interior, groups) is not first
     others = [
-        kept_scene(interior, groups, windows_block=False),
-        kept_scene(interior, groups, window_reflectance=[0.2]),
-        kept_scene(interior, groups, window_reflectance=[0.4]),
-        kept_scene(rooms.test_room()[0], groups),
+        cache.scene(interior, groups, windows_block=False),
+        cache.scene(interior, groups, window_reflectance=[0.2]),
+        cache.scene(interior, groups, window_reflectance=[0.4]),
+        cache.scene(rooms.test_room()[0], groups),
     ]
     assert len({id(scene) for scene in (first, *others)}) == 5
-    for _ in range(KEPT):
-        kept_scene(rooms.test_room()[0], groups)
-    assert kept_scene(interior, groups) is not first
+    for _ in range(SCENES):
+        cache.scene(rooms.test_room()[0], groups)
+    assert cache.scene(interior, groups) is not first
 
 
 def test_a_scene_is_found_again_whether_its_centre_is_said_or_not() -> None:
-    from mitsuba_cfs.trace.kernels.scene import kept_scene
+    from mitsuba_cfs.trace.kernels.scene import SceneCache
 
-    interior, groups = rooms.test_room()
-    found = kept_scene(interior, groups)
-    assert kept_scene(interior, groups, centre=found.centre) is found
-    assert kept_scene(interior, groups, centre=found.centre + 1e-3) is not found
+    (interior, groups), cache = rooms.test_room(), SceneCache()
+    found = cache.scene(interior, groups)
+    assert cache.scene(interior, groups, centre=found.centre) is found
+    assert cache.scene(interior, groups, centre=found.centre + 1e-3) is not found

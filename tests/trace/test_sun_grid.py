@@ -31,12 +31,12 @@ def outdoors(surfaces: Surfaces):
 
 
 def floor_places(outside, count: int, seed: int = 0):
-    """Places on the ground before the test room, looking up."""
-    from mitsuba_cfs.trace.sun.lit_points import Places
+    """Points on the ground before the test room, looking up."""
+    from mitsuba_cfs.trace.sun.lit_points import SurfacePoints
 
     point = np.random.default_rng(seed).uniform((-3, -9, 0), (6, -2, 0), (count, 3))
     up = np.tile(np.float32([0, 0, 1]), (count, 1))
-    return Places((point - outside.centre).astype(np.float32), up)
+    return SurfacePoints((point - outside.centre).astype(np.float32), up)
 
 
 def both(surfaces: Surfaces, count: int, suns: np.ndarray):

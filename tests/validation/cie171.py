@@ -28,7 +28,7 @@ from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
-from mitsuba_cfs.trace.paths.scene import LitRoom
+from mitsuba_cfs.trace.paths.scene import PathTracingScene
 from tests.validation.cie171_cases import GLASS, SKIES, Case, cases, cie_sky, reported
 from tests.validation.cie171_quadrature import INDEX, Array
 
@@ -66,7 +66,7 @@ def computed(case: Case, method: str, glass: str, sampling: Sampling = SAMPLING)
     sky = cie_sky(sampling.subdivision)
     group, filled = case.group(), optics(case, glass)
     if method == "two-phase":
-        room = LitRoom(Surfaces.none(), case.exterior(), [group], [filled.paths])
+        room = PathTracingScene(Surfaces.none(), case.exterior(), [group], [filled.paths])
         found = daylight_coefficients(
             room, case.points, case.normals, subdivision=sampling.subdivision,
             samples=MORE * sampling.hour_samples // BATCHES, stopping=Stopping(batches=BATCHES),

@@ -42,7 +42,7 @@ from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 from mitsuba_cfs.trace.matrices.view import view_matrix
 from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
 from mitsuba_cfs.trace.paths.point_in_time import point_in_time
-from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky, lit_system
+from mitsuba_cfs.trace.paths.scene import PathOptics, PathTracingScene, Sky, path_optics
 from tests.validation.blind_room import (
     TILTS,
     BlindRoom,
@@ -125,7 +125,7 @@ def by_fine_matrix(scene: BlindRoom, tilt_deg: float | None, sky: AnnualSky) -> 
 
 def by_coefficients(scene: BlindRoom, system: PathOptics, sky: AnnualSky) -> NDArray[np.float64]:
     """Illuminance [S, H] by two phases: daylight coefficients through the system's BSDF."""
-    room = LitRoom(scene.interior, empty(), scene.groups, [system])
+    room = PathTracingScene(scene.interior, empty(), scene.groups, [system])
     coefficients = daylight_coefficients(
         room, scene.points, scene.up, subdivision=SUBDIVISION, samples=COEFFICIENT_PATHS
     )
@@ -136,7 +136,7 @@ def by_paths(
     scene: BlindRoom, exterior: Surfaces, system: PathOptics, sky: AnnualSky, samples: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Illuminance [S, H] by point-in-time paths, and its standard error."""
-    room = LitRoom(scene.interior, exterior, scene.groups, [system])
+    room = PathTracingScene(scene.interior, exterior, scene.groups, [system])
     runs = []
     for h in range(len(sky.lit)):
         luminance = sky.illuminance[h] / SUN_SOLID_ANGLE
@@ -195,7 +195,7 @@ def one_case(scene: BlindRoom, sky: AnnualSky, tilt_deg: float | None, samples: 
     """All methods against the explicit geometry for one system."""
     exterior = empty() if tilt_deg is None else slats(scene.groups[0], tilt_deg)
     klems = known_klems(tilt_deg, KLEMS_FULL, 65536)
-    ways, systems = {"Klems": sun_scattering(klems)}, {"Klems": lit_system(klems)}
+    ways, systems = {"Klems": sun_scattering(klems)}, {"Klems": path_optics(klems)}
     if tilt_deg is not None:
         tree = known_system(blind_layer(tilt_deg))
         ways["tensor tree"], systems["tensor tree"] = tree.scattering, tree.paths

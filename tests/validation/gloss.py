@@ -35,7 +35,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.kernels.scattering import AngularBeam
 from mitsuba_cfs.trace.paths.point_in_time import point_in_time
-from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky
+from mitsuba_cfs.trace.paths.scene import PathOptics, PathTracingScene, Sky
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks import radiance
@@ -80,10 +80,10 @@ class Case:
         return Sky(self.patches, SUN, self.sun_luminance)
 
     @property
-    def lit(self) -> LitRoom:
+    def lit(self) -> PathTracingScene:
         """The room behind a clear opening."""
         clear = [PathOptics(None, AngularBeam(np.ones(16)))]
-        return LitRoom(self.interior, self.exterior, self.groups, clear)
+        return PathTracingScene(self.interior, self.exterior, self.groups, clear)
 
 
 @dataclass(frozen=True)

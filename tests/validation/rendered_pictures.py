@@ -37,7 +37,7 @@ from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE, is_up
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.trace.kernels.scattering import AngularBeam
-from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky, lit_system
+from mitsuba_cfs.trace.paths.scene import PathOptics, PathTracingScene, Sky, path_optics
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks import radiance
@@ -122,7 +122,7 @@ class PicturedSystem:
             if not (folder / "tree.xml").exists():
                 write_bsdf_xml(blind_tree(), folder / "tree.xml")
             self.material = "void aBSDF window\n5 tree.xml 0 0 1 .\n0\n0\n"
-            self.system = lit_system(read_bsdf_xml(folder / "tree.xml").band("Visible"))
+            self.system = path_optics(read_bsdf_xml(folder / "tree.xml").band("Visible"))
 
 
 def _normal_values() -> tuple[float, float]:
@@ -168,7 +168,9 @@ def outcomes(
     for name in systems:
         fenestration = PicturedSystem(name, folder)
         peer = rendered_room(folder, fenestration)
-        lit = LitRoom(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
+        lit = PathTracingScene(
+            room.room(), room.NOTHING, room.window_groups(), [fenestration.system]
+        )
         for moment in chosen:
             start = time.perf_counter()
             sky = Sky(moment.patches, moment.sun, moment.sun_luminance)

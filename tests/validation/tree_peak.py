@@ -36,7 +36,7 @@ from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.sampling import lattice_2d
-from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
+from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks.annual_product import WEATHER
@@ -98,7 +98,7 @@ def outcomes(
     peer = replace(rendered.rendered_room(folder, fenestration), of_points=POINT)
     bsdf = read_bsdf_xml(file).band("Visible")
     optics, group = cfs.BsdfOptics(klems_of(bsdf), bsdf), room.window_groups()[0]
-    lit = LitRoom(room.room(), room.NOTHING, [group], [fenestration.system])
+    lit = PathTracingScene(room.room(), room.NOTHING, [group], [fenestration.system])
     phases = five_phase(optics, chosen, view)
     for moment, third in zip(chosen, phases, strict=True):
         local = group.frame @ moment.sun

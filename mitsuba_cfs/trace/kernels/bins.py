@@ -13,7 +13,7 @@ from mitsuba_cfs.sky.patches import ReinhartSky
 
 
 def _around(place: mi.Int32, count: mi.Int32) -> mi.Int32:
-    """A place of a ring of `count` that is at most one turn off; 0 for none (as `cell`)."""
+    """Index in a ring of `count`, wrapped by one turn at most; 0 if invalid (as `cell`)."""
     place = dr.select(place < 0, place + count, place)
     return dr.maximum(dr.select(place >= count, place - count, place), 0)
 
@@ -59,7 +59,7 @@ class DirectionBins:
         return dr.gather(mi.UInt32, self._first, ring) + mi.UInt32(place)
 
     def between(self, values: mi.Float, local: mi.Vector3f, *, ends: bool = True) -> mi.Float:
-        """Transmittance at local direction(s) with z > 0 from those of the patches' middles [K].
+        """Transmittance at local direction(s) with z > 0, interpolated from the patch centres [K].
 
         Linear in polar angle between the rings and in azimuth within a ring.
 

@@ -72,13 +72,17 @@ class Stopping:
 
 
 def joined(estimates: Sequence[Estimate]) -> Estimate:
-    """Estimates of rows one after the other as one."""
+    """One estimate from several, stacked along the first axis."""
     first = estimates[0]
     if len(estimates) == 1:
         return first
-    names = ("values", "standard_error", "sum_error")
-    arrays = {name: np.concatenate([getattr(e, name) for e in estimates]) for name in names}
-    return replace(first, seconds=sum(e.seconds for e in estimates), **arrays)
+    return Estimate(
+        np.concatenate([e.values for e in estimates]),
+        np.concatenate([e.standard_error for e in estimates]),
+        np.concatenate([e.sum_error for e in estimates]),
+        first.batches,
+        sum(e.seconds for e in estimates),
+    )
 
 
 def accumulate(
@@ -95,8 +99,8 @@ def accumulate(
     `stopping.batches` are run; with one, at least 4 and until the condition holds.
 
     Args:
-        entry: where the result is kept, see `mitsuba_cfs.matrices.cache`.  What is finished there
-            is returned; what is half done is gone on with, as if it had never stopped.
+        entry: in the cache of matrices.  A finished result there is returned; an unfinished one is
+            continued as if it had never stopped.
     """
     stopping = stopping or Stopping()
     start = time.monotonic()
@@ -104,14 +108,14 @@ def accumulate(
     if state is not None and state.finished:
         progress(label, 1.0)
         return _estimate(state)
-    mean, spread, sum_spread, count, before = 0.0, 0.0, 0.0, 0, 0.0
+    mean = spread = sum_spread = np.zeros(())
+    count, before = 0, 0.0
     if state is not None:
         mean, spread, sum_spread = state.mean, state.spread, state.sum_spread
         count, before = state.count, state.seconds
     keeper = _Keeper(entry, count)
-    finished = False
     try:
-        while not finished:
+        while True:
             values = batch(count)
             mean, spread, sum_spread = _with_another(values, mean, spread, sum_spread, count)
             count += 1
@@ -119,14 +123,14 @@ def accumulate(
                 count, mean, spread, sum_spread, before + time.monotonic() - start, False
             )
             fraction = _fraction_done(state, stopping)
-            finished = fraction >= 1.0 or count >= stopping.max_batches
-            if not finished:
-                keeper.offer(state)
             progress(label, min(fraction, 1.0))
+            if fraction >= 1.0 or count >= stopping.max_batches:
+                break
+            keeper.offer(state)
     except BaseException:
         keeper.save(state)
         raise
-    # nothing is added any more: seven digits of the error are enough to keep, and to give
+    # no batch follows: seven digits of the error are enough
     state = replace(state, finished=True, spread=state.spread.astype(np.float32))
     keeper.save(state)
     return _estimate(state)
@@ -135,7 +139,7 @@ def accumulate(
 def cache_entry(
     cache: MatrixCache | None, label: str, *inputs: object, by: str, stopping: Stopping | None
 ) -> CacheEntry | None:
-    """The place of a traced matrix in the cache, if there is one.
+    """The cache entry of a traced matrix; None without a cache.
 
     The variant is an input too: CUDA and LLVM round differently.
 
@@ -147,7 +151,7 @@ def cache_entry(
 
 
 class _Keeper:
-    """Saves states, not so often that saving costs more than a small share of the time."""
+    """Saves states, seldom enough that saving takes a small share of the time."""
 
     def __init__(self, entry: CacheEntry | None, count: int) -> None:
         self._entry = entry
@@ -194,7 +198,7 @@ def _estimate(state: BatchMean) -> Estimate:
 
 
 def _fraction_done(state: BatchMean, stopping: Stopping) -> float:
-    """How near the batches are to the first of the stopping conditions, 1 when it holds."""
+    """Progress towards the first stopping condition, 1 when it holds."""
     if stopping.time_limit is None and stopping.target_error is None:
         return state.count / stopping.batches
     if state.count < LEAST_BATCHES:

@@ -18,13 +18,13 @@ NO_PLANE = -1
 
 
 class TracedGloss:
-    """Tables by triangle and by orientation of the surfaces that reflect like a mirror.
+    """Tables of gloss by triangle and by mirror plane.
 
     A mirror plane is an orientation and a gloss: all mirrors of one show the sun in one direction.
     """
 
     def __init__(self, surfaces: Surfaces, normals: NDArray[np.float64], windows: int) -> None:
-        """Of opaque triangles [N] with normals [N, 3], which `windows` glazed ones follow."""
+        """From opaque triangles [N] with normals [N, 3], followed by `windows` glazed ones."""
         kinds = list(dict.fromkeys(surfaces.gloss[i] for i in surfaces.glossy))
         of_surface = np.zeros(len(surfaces.gloss), dtype=np.int64)
         for i in surfaces.glossy:
@@ -59,7 +59,7 @@ class TracedGloss:
         return dr.lerp(a, b, place - mi.Float(low))
 
     def diffuse_share(self, triangle: mi.UInt32, cosine: mi.Float, active: mi.Bool) -> mi.Float:
-        """What is left at an angle of the diffuse reflectance at normal incidence."""
+        """Diffuse reflectance at an angle over that at normal incidence."""
         kind = dr.gather(mi.UInt32, self._kind, triangle, active)
         rest = 1 - dr.gather(mi.Float, self._normal, kind, active)
         left = (1 - self.specular(triangle, cosine, active)) / dr.maximum(rest, 1e-6)
@@ -108,7 +108,7 @@ class TracedGloss:
         generator: mi.PCG32,
         active: mi.Bool,
     ) -> tuple[mi.Bool, mi.Vector3f, mi.Float]:
-        """Whether a path goes on by the gloss, where to then, and its weight by either part.
+        """Whether a path continues by the gloss, its direction then, the weight of the chosen part.
 
         The part is chosen in proportion to what it reflects.
         """

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import atexit
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs import variants
 from mitsuba_cfs.surfaces import triangle_areas
 from mitsuba_cfs.trace.kernels.sampling import opaque, opaque_vector
 
-KEPT = 4  # meshes that are found again: what stands before a room, by season, and its neighbours'
-FROM = 2048  # triangles; fewer are built anew in less time than a second structure takes to trace
+FROM = 2048  # triangles; a smaller mesh takes less time to build than a second structure to trace
 FARTHEST = 256.0  # from the common origin, where float32 has steps of 3e-5 m [m]
 
 
-class KeptMesh:
-    """Opaque triangles about their own middle: slivers left out, normals, the structure of all."""
+class SolidMesh:
+    """Opaque triangles without slivers, their normals, and their acceleration structure."""
 
     def __init__(self, triangles: NDArray[np.float64]) -> None:
-        """Of triangles [N, 3, 3] [m]; nothing is built before it is asked for."""
+        """From triangles [N, 3, 3] [m]; the structure is built at its first use."""
         self.triangles = triangles
         self.keep = triangle_areas(triangles) > 1e-10  # [N] [m2] slivers have no normal
         solid = triangles[self.keep]
@@ -33,13 +29,13 @@ class KeptMesh:
 
     @property
     def is_shared(self) -> bool:
-        """Whether scenes share its structure: big enough, and near enough to its middle."""
+        """Whether scenes share its structure: large enough, and close enough to its centre."""
         big = np.count_nonzero(self.keep) >= FROM
         return bool(big and np.ptp(self.bounds, axis=0).max() < 2 * FARTHEST)
 
     @property
     def middle(self) -> NDArray[np.float64]:
-        """The origin [3] of the structure's coordinates, the same whichever scene asks first."""
+        """Origin [3] of the structure's coordinates, the same for all scenes."""
         return self.bounds.mean(axis=0)
 
     @property
@@ -55,10 +51,10 @@ class KeptMesh:
 
 
 class SharedScene:
-    """Rays in a scene's coordinates before a mesh in its own, and before the scene's panes."""
+    """A shared mesh in its own coordinates and the panes of one scene, for rays of the scene."""
 
     def __init__(
-        self, mesh: KeptMesh, panes: NDArray[np.float64], centre: NDArray[np.float64]
+        self, mesh: SolidMesh, panes: NDArray[np.float64], centre: NDArray[np.float64]
     ) -> None:
         """Of panes [N, 3, 3] in coordinates about the centre; they are numbered after the mesh."""
         self._solid = mesh.scene
@@ -81,7 +77,7 @@ class SharedScene:
         return dr.select(nearer, pane, hit)
 
     def ray_test(self, ray: mi.Ray3f, coherent: bool = False, active: mi.Bool = True) -> mi.Bool:
-        """Whether anything stands before rays."""
+        """Whether rays meet anything."""
         blocked = self._solid.ray_test(self._moved(ray), coherent, active)
         if self._panes is None:
             return blocked
@@ -91,24 +87,6 @@ class SharedScene:
         moved = mi.Ray3f(ray)
         moved.o = mi.Point3f(ray.o + self._shift)
         return moved
-
-
-def kept_mesh(triangles: NDArray[np.float64]) -> KeptMesh:
-    """The mesh of triangles [N, 3, 3]; that of equal ones is found again among the last."""
-    variant = variants.activate()
-    for place, (of, mesh) in enumerate(_last):
-        if of == variant and np.array_equal(mesh.triangles, triangles):
-            _last.append(_last.pop(place))
-            return mesh
-    mesh = KeptMesh(triangles)
-    if mesh.is_shared:
-        _last.append((variant, mesh))
-        del _last[:-KEPT]
-    return mesh
-
-
-_last: list[tuple[str, KeptMesh]] = []  # the last used at the end; empty before Dr.Jit ends
-atexit.register(_last.clear)
 
 
 def unit_normals(triangles: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -24,7 +24,7 @@ class PatchLight:
     """
 
     def __init__(self, lit: NDArray[np.float32], later: NDArray[np.float32]) -> None:
-        """From luminances [G * K, h] of what one reflection shows, and of what more do [cd/m2]."""
+        """From luminances [G * K, h] for light after one reflection, and after more [cd/m2]."""
         if lit.shape != later.shape or lit.ndim != 2:
             raise ValueError(f"luminances {lit.shape} and {later.shape}: expected [G * K, h] twice")
         self.lit, self.later = lit, later
@@ -34,7 +34,7 @@ class PatchLight:
 
     @staticmethod
     def joined(parts: Sequence[PatchLight]) -> PatchLight:
-        """The hours of several, one after the other."""
+        """All hours of several, concatenated."""
         return PatchLight(*(np.hstack([getattr(p, name) for p in parts]) for name in PARTS))
 
     @dr.syntax
@@ -47,7 +47,7 @@ class PatchLight:
         other: mi.UInt32,
         other_value: mi.Float,
     ) -> None:
-        """Add what two patches give, value * L[patch, h], to the sums [rows * h] of a row.
+        """Add value * L[patch, h] of two patches to the sums [rows * h] of a row.
 
         Args: patch, other: numbers, by that of all patches more after the first reflection.
         """

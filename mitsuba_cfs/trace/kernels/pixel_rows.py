@@ -288,7 +288,7 @@ class PictureRows:
         return found.astype(np.float32)
 
 
-def shown_hits(
+def pixel_hits(
     tracer: TracedScene, view: View, pixels: NDArray[np.int64], samples: int
 ) -> tuple[mi.Point3f, mi.Vector3f, Any, mi.Bool]:
     """Rays spread over pixels [n]: eye, directions, first hits [n * samples], validity."""

@@ -160,7 +160,7 @@ class DiscreteDistribution:
         return low, (u - before) / share
 
 
-def pixel_places(samples: int) -> NDArray[np.float64]:
+def pixel_positions(samples: int) -> NDArray[np.float64]:
     """Positions [n, 2] within a pixel, evenly spread (R2 sequence)."""
     return even_numbers(samples)
 
@@ -169,5 +169,5 @@ def spread_rays(
     view: View, pixels: NDArray[np.int64], samples: int
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Rays [n * samples, 3] evenly spread over some pixels [n], and which of them exist."""
-    across, down = np.tile(pixel_places(samples), (len(pixels), 1)).T
+    across, down = np.tile(pixel_positions(samples), (len(pixels), 1)).T
     return pixel_rays(view, np.repeat(pixels, samples), across, down)

@@ -1,4 +1,4 @@
-"""How window systems pass light inside kernels: scattered light and the straight beam, apart."""
+"""Transmission of window systems in kernels: scattered light and the straight beam, separately."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ WINDOW_UP = (0, 1, 0)  # of a plugin that is asked in the window's own frame
 
 
 class Scattering(Protocol):
-    """How a window group passes the sun, in its local frame (z outdoors), inside a kernel.
+    """Transmission of a window group in its local frame (z outdoors), in a kernel.
 
-    `key` is what its values follow from, for `mitsuba_cfs.matrices.cache.digest`.
+    `key` identifies its values, for `mitsuba_cfs.matrices.cache.digest`.
     """
 
     key: object
@@ -44,9 +44,9 @@ class Scattering(Protocol):
 
 
 def sun_scattering(bsdf: Bsdf, angular: AngularTable | None = None) -> Scattering:
-    """How a system passes the sun, its through beam kept apart.
+    """Transmission of a system for the sun, scattered light and straight beam separately.
 
-    Args: angular: what the beam of a specular system has, in place of the data's patches.
+    Args: angular: transmittance of a specular system's beam, in place of the data's patches.
     """
     if isinstance(bsdf, TensorTreeBsdf):
         found: Scattering = TreeScattering(bsdf)
@@ -59,7 +59,7 @@ def sun_scattering(bsdf: Bsdf, angular: AngularTable | None = None) -> Scatterin
 
 
 class AngularBeam:
-    """A share of light that keeps its beam, by the angle of incidence alone (clear glass)."""
+    """Transmittance of the straight beam by the angle of incidence alone (clear glass)."""
 
     def __init__(self, values: ArrayLike) -> None:
         """From the shares [n] at n angles of incidence evenly spaced in cosine, 0 to 1."""
@@ -76,7 +76,7 @@ class AngularBeam:
 
 
 class PatchBeam:
-    """A share of light that keeps its beam, between the Klems patches of the outdoor direction."""
+    """Transmittance of the straight beam, interpolated between Klems patches."""
 
     def __init__(self, basis: KlemsBasis, values: ArrayLike, exponent: float | None = None) -> None:
         """From the shares [K].
@@ -101,10 +101,10 @@ class PatchBeam:
 
 
 class KlemsScattering:
-    """A Klems transmission block, its through peak kept apart.
+    """A Klems transmission block without its through peak, and the peak as a straight beam.
 
-    What scatters is constant in a patch.  What goes straight on is known at the patches' middles
-    and linear between them: clear glass passes less from one end of a ring to the other.
+    Scattered light is constant in a patch.  The straight beam is interpolated between the patch
+    centres, as clear glass transmits less and less across a ring.
     """
 
     def __init__(
@@ -158,10 +158,10 @@ class PluginScattering:
 
 
 class SpecularScattering:
-    """A specular system by its exact function; what scatters is the data's."""
+    """A specular system with an exact angular function; scattered light from the data."""
 
     def __init__(self, rest: Scattering, angular: AngularTable) -> None:
-        """From the data's way and the system's function."""
+        """From the data's transmission and the exact angular function."""
         shares = angular.by_cosine()
         self._rest, self._beam = rest, AngularBeam(shares)
         self.key: object = ("specular", rest.key, shares)
@@ -176,7 +176,7 @@ class SpecularScattering:
 
 
 class AngularScattering:
-    """What passes by its angle of incidence alone: straight on, and scattered evenly."""
+    """Transmission by the angle of incidence alone: a straight beam and diffuse light."""
 
     def __init__(self, straight: ArrayLike, scattered: ArrayLike) -> None:
         """From shares [n], [m] at even steps of the cosine of incidence, 0 to 1."""
@@ -193,7 +193,7 @@ class AngularScattering:
 
 
 class TreeBeam:
-    """The share of light that keeps its beam in a tensor tree."""
+    """Transmittance of the straight beam in a tensor tree."""
 
     def __init__(self, tree: TensorTreeBsdf) -> None:
         self.bsdf = loaded(tensor_tree_plugin(tree, up=WINDOW_UP, peak=True))
@@ -205,7 +205,7 @@ class TreeBeam:
 
 
 class TreeScattering(PluginScattering):
-    """A tensor tree in window axes, its through beam kept apart."""
+    """A tensor tree in window axes without its straight beam, and the beam."""
 
     def __init__(self, tree: TensorTreeBsdf) -> None:
         self._beam = TreeBeam(tree)
@@ -231,10 +231,10 @@ def through_beams(
 
 
 def patch_beams(scattering: Sequence[Scattering | None], basis: KlemsBasis) -> NDArray[np.float64]:
-    """What T's diagonal has of each group's straight beam [G, K].
+    """Part of each group's straight beam in the diagonal of T [G, K].
 
-    Of Klems data their own values; of others the mean over each patch in cos(theta) d_omega: clear
-    glass at the middle of the last ring passes a fifth less than that.
+    For Klems data their own values; for others the mean over each patch in cos(theta) d_omega: at
+    the centre of the last ring clear glass transmits a fifth less than that.
     """
     return np.stack([_beam_of_patches(way, basis) for way in scattering])
 
@@ -254,5 +254,5 @@ def _beam_of_patches(way: Scattering | None, basis: KlemsBasis) -> NDArray[np.fl
 
 
 def loaded(entry: dict) -> mi.BSDF:
-    """The BSDF of a `load_dict` entry; making the entry has chosen the variant."""
+    """The BSDF of a `load_dict` entry; making the entry has activated the variant."""
     return mi.load_dict(entry)

@@ -1,8 +1,8 @@
-"""Triangles, reflectances and windows as one Mitsuba mesh with tables that kernels gather from."""
+"""Surfaces and windows as one Mitsuba mesh, with tables that kernels gather from."""
 
 from __future__ import annotations
 
-import atexit
+import weakref
 from collections import OrderedDict
 from collections.abc import Sequence
 from functools import cached_property
@@ -16,9 +16,8 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, triangle_areas
 from mitsuba_cfs.trace.kernels.gloss import TracedGloss
 from mitsuba_cfs.trace.kernels.mesh import (
-    KeptMesh,
     SharedScene,
-    kept_mesh,
+    SolidMesh,
     scene_of,
     unit_normals,
 )
@@ -31,20 +30,21 @@ from mitsuba_cfs.trace.kernels.sampling import (
     vectors,
 )
 
-KEPT = 8  # scenes that are found again: what one room is traced by, indoors and outdoors
+SCENES = 8  # kept: what one room is traced by, indoors and outdoors
+MESHES = 4  # kept: surroundings of a room, by season, and of its neighbours
 OPAQUE = -1  # window index of a triangle that is not glazed
 SERIES_GAP = 1.0  # widest between a screen and its panes [m]
-SERIES_PLACES = 256  # on each window group, from which they are looked for
+SERIES_PLACES = 256  # test points on each window group
 
 
 class TracedScene:
     """A Mitsuba scene of opaque triangles and window apertures, in coordinates about its centre.
 
-    To a view path windows are black: what arrives there is counted and the path ends.  One mesh
-    holds all: the triangle number of a hit gathers the normal, the reflectance and the window.
+    View paths end at windows, which are black to them.  One mesh holds all triangles: the triangle
+    number of a hit selects the normal, the reflectance and the window group.
 
-    No number of a scene may stand in a kernel as a literal (`opaque`): each room would compile
-    all kernels for itself.
+    No number of a scene is a literal in a kernel (`opaque`), or each room would compile all kernels
+    again.
     """
 
     def __init__(
@@ -55,6 +55,7 @@ class TracedScene:
         windows_block: bool = True,
         window_reflectance: ArrayLike | None = None,
         centre: ArrayLike | None = None,
+        mesh: SolidMesh | None = None,
     ) -> None:
         """Build the scene.
 
@@ -62,6 +63,7 @@ class TracedScene:
             windows_block: if false, a ray passes through the windows.
             window_reflectance: [G] diffuse, of the windows from the room; 0 by default.
             centre: [3] origin of the scene's coordinates; the middle of the windows by default.
+            mesh: of the surfaces' triangles, which other scenes share.
         """
         variants.activate()
         windows = [(g, window) for g, group in enumerate(groups) for window in group.windows]
@@ -78,8 +80,9 @@ class TracedScene:
             window_reflectance = np.zeros(len(groups))
         glazed_reflectance = np.asarray(window_reflectance, float)[glazed_group.astype(int)]
         blocking = slice(None) if windows_block else slice(0)
+        mesh = SolidMesh(surfaces.triangles) if mesh is None else mesh
         self._load_mesh(
-            surfaces, glazed[blocking], glazed_group[blocking], glazed_reflectance[blocking]
+            surfaces, mesh, glazed[blocking], glazed_group[blocking], glazed_reflectance[blocking]
         )
         if windows:
             self._load_windows(glazed, glazed_group)
@@ -87,16 +90,16 @@ class TracedScene:
     def _load_mesh(
         self,
         surfaces: Surfaces,
+        mesh: SolidMesh,
         glazed: NDArray[np.float64],
         glazed_group: NDArray[np.int64],
         glazed_reflectance: NDArray[np.float64],
     ) -> None:
         """The mesh, and its tables by triangle: normal, reflectance, surface, window group."""
-        mesh = kept_mesh(surfaces.triangles)
         solid = surfaces if mesh.keep.all() else surfaces.some(mesh.keep)
         if not len(solid.triangles) + len(glazed):
             solid = _speck(self.centre)
-            mesh = KeptMesh(solid.triangles)
+            mesh = SolidMesh(solid.triangles)
         panes = glazed - self.centre
         normals = np.concatenate([mesh.normals, unit_normals(panes)])
         reflectance = np.concatenate([solid.reflectance, glazed_reflectance])
@@ -140,7 +143,7 @@ class TracedScene:
         ]
 
     def sample_window(self, u: mi.Point2f, active: mi.Bool) -> tuple[mi.Point3f, mi.Int32]:
-        """A point uniform over the area of all windows, and the group it lies in."""
+        """A point uniform over the area of all windows, and its group."""
         triangle, reused = self._glazed.sample_reuse(u.x, active)
         return self._point(triangle, mi.Point2f(reused, u.y), active), dr.gather(
             mi.Int32, self._glazed_group, triangle, active
@@ -172,7 +175,7 @@ class TracedScene:
         direction: mi.Vector3f,
         active: mi.Bool,
     ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
-        """Where a ray meets a surface, a step clear of it; the normal it sees; the reflectance.
+        """Point of a hit, offset off the surface; normal towards the ray; diffuse reflectance.
 
         The reflectance is the diffuse one, where there is a gloss that for the ray's angle.
         """
@@ -189,7 +192,7 @@ class TracedScene:
         return rho * self.gloss.diffuse_share(triangle, cosine, active)
 
     def whole(self, triangle: mi.UInt32, direction: mi.Vector3f, active: mi.Bool) -> mi.Float:
-        """Reflectance of a triangle for a ray along a direction, diffuse and by its gloss."""
+        """Total reflectance of a triangle for a ray along a direction, diffuse and specular."""
         if self.gloss is None:
             return dr.gather(mi.Float, self.reflectance, triangle, active)
         normal = dr.gather(mi.Vector3f, self.normal, triangle, active)
@@ -200,7 +203,7 @@ class TracedScene:
     def without_mirrors(
         self, triangle: mi.UInt32, direction: mi.Vector3f, active: mi.Bool
     ) -> mi.Float:
-        """The same without what a smooth mirror reflects."""
+        """The same without the specular part of smooth mirrors."""
         if self.gloss is None:
             return self.whole(triangle, direction, active)
         normal = dr.gather(mi.Vector3f, self.normal, triangle, active)
@@ -217,7 +220,7 @@ class TracedScene:
         generator: mi.PCG32,
         active: mi.Bool,
     ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.Bool]:
-        """Where a ray meets a surface, where it goes on to, its weight, if by a mirror."""
+        """Point of a hit, direction after it, weight, and whether the reflection is specular."""
         position, face, weight = self.surface_at(hit, origin, direction, active)
         away, mirrored = diffuse_direction(face, generator), mi.Bool(False)
         if self.gloss is not None:
@@ -231,7 +234,7 @@ class TracedScene:
     def leaves(
         self, hit: mi.PreliminaryIntersection3f, direction: mi.Vector3f, active: mi.Bool
     ) -> mi.Bool:
-        """Which active rays meet a window from the room's side."""
+        """Which active rays meet a window from its room side."""
         active = active & hit.is_valid()
         outwards = dr.gather(mi.Vector3f, self.normal, hit.prim_index, active)
         window = dr.gather(mi.Int32, self.group, hit.prim_index, active) != OPAQUE
@@ -239,7 +242,7 @@ class TracedScene:
 
     @cached_property
     def panes_in_series(self) -> bool:
-        """Whether panes stand close before windows (a screen behind them): both are one way out."""
+        """Whether other panes, such as a screen, are close in front of windows."""
         if not self._panes:
             return False
         number = dr.arange(mi.UInt32, SERIES_PLACES)
@@ -255,9 +258,9 @@ class TracedScene:
     def met_outdoors(
         self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool
     ) -> tuple[mi.PreliminaryIntersection3f, mi.Point3f]:
-        """What rays on their way out meet beyond the panes that they pass; whence they last went.
+        """First hits of outgoing rays beyond the panes that they pass, and the last origins.
 
-        The panes are those met from the room's side: that the ray starts on, others before it.
+        They pass panes met from the room side: the one that they start on, and others outside it.
         """
         origin = mi.Point3f(origin)
         hit = self._met(origin, direction, active)
@@ -270,7 +273,7 @@ class TracedScene:
         return hit, origin
 
     def hides(self, ray: mi.Ray3f, active: mi.Bool, *, coherent: bool = False) -> mi.Bool:
-        """Whether anything stands in the way out of rays; panes as of `met_outdoors`."""
+        """Whether anything outdoors hides rays; they pass panes as in `met_outdoors`."""
         if self._panes:
             return self.met_outdoors(ray.o, ray.d, active)[0].is_valid()
         return self.scene.ray_test(ray, coherent=coherent, active=active)
@@ -300,7 +303,7 @@ class TracedScene:
         return mi.Point3f(opaque_vector(np.asarray(point, dtype=float) - self.centre))
 
     def outward(self, group: mi.Int32, active: mi.Bool) -> mi.Vector3f:
-        """A step off a window towards outdoors that keeps a ray clear of its pane."""
+        """Offset off a window towards outdoors that keeps a ray clear of its pane."""
         return dr.gather(mi.Vector3f, self._frame_rows[2], group, active) * self.epsilon
 
     def to_world_any(self, group: mi.Int32, v: mi.Vector3f) -> mi.Vector3f:
@@ -314,42 +317,67 @@ class TracedScene:
         return x * v.x + y * v.y + z * v.z
 
 
-def kept_scene(
-    surfaces: Surfaces,
-    groups: Sequence[WindowGroup] = (),
-    *,
-    windows_block: bool = True,
-    window_reflectance: ArrayLike | None = None,
-    centre: ArrayLike | None = None,
-) -> TracedScene:
-    """A `TracedScene` of its arguments; that of the same objects is found again among the last.
+class SceneCache:
+    """Traced scenes that several functions share; the last used ones are kept.
 
-    A room's matrices are traced by some twenty functions, and the outdoors of a building has tens
-    of thousands of triangles.
+    Some twenty functions trace the matrices of one room, and the surroundings of a building have
+    tens of thousands of triangles.  Whoever calls several of these functions makes one cache and
+    passes it to all of them (`scenes=`).
     """
-    # said or not, one centre is one scene
-    values = (window_reflectance, _middle(groups) if centre is None and groups else centre)
-    arrays = [None if value is None else np.asarray(value, float) for value in values]
-    inputs = (surfaces, *groups)
-    key = (
-        variants.activate(), windows_block, *(None if a is None else a.tobytes() for a in arrays),
-        *map(id, inputs),
-    )  # fmt: skip
-    if key not in _last_scenes:
-        reflectance, middle = arrays
-        options = {
-            "windows_block": windows_block, "window_reflectance": reflectance, "centre": middle,
-        }  # fmt: skip
-        _last_scenes[key] = inputs, TracedScene(surfaces, groups, **options)
-    _last_scenes.move_to_end(key)
-    while len(_last_scenes) > KEPT:
-        _last_scenes.popitem(last=False)
-    return _last_scenes[key][1]
 
+    def __init__(self, scenes: int = SCENES, meshes: int = MESHES) -> None:
+        """Empty; `scenes` and `meshes`: how many to keep."""
+        self._most_scenes, self._most_meshes = scenes, meshes
+        # with the objects whose ids are in the key, so that no other object gets these ids
+        self._scenes: OrderedDict[tuple, tuple[tuple, TracedScene]] = OrderedDict()
+        self._meshes: list[tuple[str, SolidMesh]] = []
+        for store in (self._scenes, self._meshes):  # at exit: before Dr.Jit ends
+            weakref.finalize(self, store.clear)
 
-# with the objects whose ids are in the key, which so stay theirs; empty before Dr.Jit ends
-_last_scenes: OrderedDict[tuple, tuple[tuple, TracedScene]] = OrderedDict()
-atexit.register(_last_scenes.clear)
+    def scene(
+        self,
+        surfaces: Surfaces,
+        groups: Sequence[WindowGroup] = (),
+        *,
+        windows_block: bool = True,
+        window_reflectance: ArrayLike | None = None,
+        centre: ArrayLike | None = None,
+    ) -> TracedScene:
+        """The `TracedScene` of these arguments, built if it is not in the cache.
+
+        Surfaces and groups are compared by identity.
+        """
+        # given or not, one centre is one scene
+        values = (window_reflectance, _middle(groups) if centre is None and groups else centre)
+        arrays = [None if value is None else np.asarray(value, float) for value in values]
+        inputs = (surfaces, *groups)
+        key = (
+            variants.activate(), windows_block,
+            *(None if a is None else a.tobytes() for a in arrays), *map(id, inputs),
+        )  # fmt: skip
+        if key not in self._scenes:
+            reflectance, middle = arrays
+            self._scenes[key] = inputs, TracedScene(
+                surfaces, groups, windows_block=windows_block, window_reflectance=reflectance,
+                centre=middle, mesh=self._mesh(surfaces.triangles),
+            )  # fmt: skip
+        self._scenes.move_to_end(key)
+        while len(self._scenes) > self._most_scenes:
+            self._scenes.popitem(last=False)
+        return self._scenes[key][1]
+
+    def _mesh(self, triangles: NDArray[np.float64]) -> SolidMesh:
+        """The mesh of triangles [N, 3, 3]; equal triangles share one if it is large."""
+        variant = variants.activate()
+        for place, (of, mesh) in enumerate(self._meshes):
+            if of == variant and np.array_equal(mesh.triangles, triangles):
+                self._meshes.append(self._meshes.pop(place))
+                return mesh
+        mesh = SolidMesh(triangles)
+        if mesh.is_shared:
+            self._meshes.append((variant, mesh))
+            del self._meshes[: -self._most_meshes]
+        return mesh
 
 
 def _middle(groups: Sequence[WindowGroup]) -> NDArray[np.float64]:
@@ -363,6 +391,6 @@ def _greatest(coordinates: NDArray[np.float64]) -> float:
 
 
 def _speck(centre: NDArray[np.float64]) -> Surfaces:
-    """A black triangle of a square millimetre far below: tables and scenes must not be empty."""
+    """A black triangle of a square millimetre far below, for scenes without any surface."""
     corners = 1e-3 * np.eye(3) + centre - [0, 0, 1e3]
     return Surfaces(corners[None], np.zeros(1), np.zeros(1, dtype=np.int64))

@@ -1,4 +1,4 @@
-"""Random walks of view rays through a room, counted where they meet the windows' patches."""
+"""Random walks of view rays through a room, scored at the window patches that they meet."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def add_mirrored(
     max_depth: mi.UInt32,
     active: mi.Bool,
 ) -> None:
-    """Add what the gloss of surfaces shows that rays meet; they are traced to `hit` already."""
+    """Add the light that the gloss of surfaces reflects to rays with first hits `hit`."""
     position, face, _ = tracer.surface_at(hit, origin, direction, active)
     glossy, onwards, weight = tracer.gloss.leave(
         hit.prim_index, face, direction, mi.Float(0), generator, active

@@ -1,4 +1,4 @@
-"""Where the light that enters through a window patch is absorbed in the room."""
+"""Absorption matrices: where light that enters through a window patch is absorbed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mitsuba_cfs.trace.kernels.bins import DirectionBins
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
 from mitsuba_cfs.trace.kernels.sampling import opaque
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 
 
@@ -27,7 +27,7 @@ def _absorption_kernel(
     matrix: mi.Float64,  # [K * (F + G)], accumulated in place
     starts: PathStarts,  # on the window, into the room; rows are its patches
 ) -> None:
-    """Random walk of a unit of flux: each surface and window takes what it does not reflect."""
+    """Random walk of a unit of flux; each surface and window absorbs what it does not reflect."""
     row, position, direction = starts.row, starts.position, starts.direction
     generator, max_depth, active = starts.generator, starts.max_depth, starts.active
     F = opaque(tracer.surface_count, mi.UInt32)
@@ -67,6 +67,7 @@ def absorption_matrix(
     seed: int = 0,
     progress: Progress = silent,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Absorption matrices [G, K, F + G]: where a unit of flux of each window patch is absorbed.
 
@@ -80,11 +81,12 @@ def absorption_matrix(
         surfaces: the room in the solar band; `surfaces.surface` names the F surfaces.
         window_reflectance: [G] diffuse solar reflectance of the windows from the room, 0 if none.
         samples: paths for each window patch in each batch.
-        cache: where the matrix is kept and found again, `MatrixCache.of_user()`; none by default.
+        cache: of traced matrices, `MatrixCache.of_user()`; none by default.
     """
+    scenes = SceneCache() if scenes is None else scenes
     reflectance = np.zeros(len(groups)) if window_reflectance is None else window_reflectance
     reflectance = np.asarray(reflectance, dtype=float)
-    tracer = kept_scene(surfaces, groups, window_reflectance=reflectance)
+    tracer = scenes.scene(surfaces, groups, window_reflectance=reflectance)
     bins = DirectionBins(basis)
     n = int(samples)
     width = tracer.surface_count + len(groups)

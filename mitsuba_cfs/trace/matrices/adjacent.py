@@ -1,6 +1,6 @@
 """Light through glass between rooms, from the windows of the adjacent room.
 
-`borrowed_daylight` is the daylight matrix D of the glass; `borrowed_view` the irradiance of sensors
+`adjacent_daylight` is the daylight matrix D of the glass; `adjacent_view` the irradiance of sensors
 by the beam that passes it straight.
 """
 
@@ -30,12 +30,12 @@ from mitsuba_cfs.trace.kernels.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.kernels.scene import SceneCache
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 from mitsuba_cfs.trace.matrices.pixel_view import add_seen_and_reflected
 
 
-def borrowed_daylight(
+def adjacent_daylight(
     surfaces: Surfaces,
     groups: Sequence[WindowGroup],
     luminance: NDArray[np.float64],
@@ -47,6 +47,7 @@ def borrowed_daylight(
     stopping: Stopping | None = None,
     seed: int = 0,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Daylight matrices [I, K, P] of glass to an adjacent room: radiance per unit sky radiance.
 
@@ -62,8 +63,9 @@ def borrowed_daylight(
         inner: the glass, with normals into the adjacent room.
         samples: paths of a patch of each piece of glass in each batch.
     """
-    tracer, bins, n = kept_scene(surfaces, groups), DirectionBins(basis), int(samples)
-    starts = kept_scene(Surfaces.none(), inner, windows_block=False, centre=tracer.centre)
+    scenes = SceneCache() if scenes is None else scenes
+    tracer, bins, n = scenes.scene(surfaces, groups), DirectionBins(basis), int(samples)
+    starts = scenes.scene(Surfaces.none(), inner, windows_block=False, centre=tracer.centre)
     flat = luminance.reshape(-1, luminance.shape[-1])
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
@@ -87,9 +89,9 @@ def borrowed_daylight(
     return accumulate(
         lambda number: view(number) @ flat,
         stopping=stopping,
-        label="borrowed daylight",
+        label="adjacent daylight",
         entry=cache_entry(
-            cache, "borrowed daylight", surfaces, groups, flat, inner, basis, n, max_depth, seed,
+            cache, "adjacent daylight", surfaces, groups, flat, inner, basis, n, max_depth, seed,
             by=__name__, stopping=stopping,
         ),
     )  # fmt: skip
@@ -99,7 +101,7 @@ Room = tuple[Surfaces, Sequence[WindowGroup]]
 
 
 @dataclass(frozen=True, slots=True)
-class LendingRoom:
+class AdjacentRoomLight:
     """An adjacent room with the light of its windows."""
 
     surfaces: Surfaces
@@ -108,9 +110,9 @@ class LendingRoom:
     exterior: Surfaces  # in front of the first groups, which look outdoors
     beam: NDArray[np.float64]  # [G, K] transmittance of the straight beam; 0 of glass to rooms
     daylight: NDArray[np.float64]  # D of these [G, K, P]
-    onward: tuple[RoomBehind, ...] = ()  # rooms behind the last groups
+    onward: tuple[GlassToRoom, ...] = ()  # rooms behind the last groups
 
-    def rooms(self) -> Iterator[LendingRoom]:
+    def rooms(self) -> Iterator[AdjacentRoomLight]:
         """The room itself and all rooms behind it."""
         yield self
         for behind in self.onward:
@@ -118,20 +120,20 @@ class LendingRoom:
 
 
 @dataclass(frozen=True, slots=True)
-class RoomBehind:
+class GlassToRoom:
     """The room behind some window groups, which are parts of one pane."""
 
     first: int  # number of the first group
     count: int
     beam: NDArray[np.float64]  # [K] transmittance of their straight beam
-    room: LendingRoom
+    room: AdjacentRoomLight
 
 
-def borrowed_view(
+def adjacent_view(
     room: Room,
     group: int,
     beam: NDArray[np.float64],
-    beyond: LendingRoom,
+    beyond: AdjacentRoomLight,
     sensors: tuple[ArrayLike, ArrayLike],
     *,
     samples: int = 4096,
@@ -139,6 +141,7 @@ def borrowed_view(
     stopping: Stopping | None = None,
     seed: int = 0,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Irradiance at sensors straight through a window group [S, P], per unit sky radiance.
 
@@ -153,8 +156,9 @@ def borrowed_view(
         sensors: positions [S, 3] [m] and normals [S, 3].
         samples: paths of a sensor in each batch.
     """
+    scenes = SceneCache() if scenes is None else scenes
     points, directions = sensors_of(*sensors)
-    here, bins, n, S = kept_scene(*room), DirectionBins(KLEMS_FULL), int(samples), len(points)
+    here, bins, n, S = scenes.scene(*room), DirectionBins(KLEMS_FULL), int(samples), len(points)
     flat = [one.luminance.reshape(-1, one.luminance.shape[-1]) for one in beyond.rooms()]
     place, normal = vectors(points - here.centre, mi.Point3f), vectors(directions)
     passed = mi.Float(np.asarray(beam, dtype=np.float32))
@@ -176,7 +180,8 @@ def borrowed_view(
         start = start + away * hit.t + here.exterior_normal(group) * here.epsilon
         _add_paths(
             beyond, iter(sums), bins, start, mi.Vector3f(away), active,
-            centre=here.centre, row=sensor, stream=stream, sample=sample, generator=generator,
+            scenes=scenes, centre=here.centre, row=sensor, stream=stream, sample=sample,
+            generator=generator,
             max_depth=dr.opaque(mi.UInt32, max_depth),
         )  # fmt: skip
         dr.eval(*sums)
@@ -186,28 +191,29 @@ def borrowed_view(
     return accumulate(
         batch,
         stopping=stopping,
-        label="borrowed view",
+        label="adjacent view",
         entry=cache_entry(
-            cache, "borrowed view", room, group, beam, beyond, points, directions, n,
+            cache, "adjacent view", room, group, beam, beyond, points, directions, n,
             max_depth, seed, by=__name__, stopping=stopping,
         ),
     )  # fmt: skip
 
 
 def _add_paths(
-    room: LendingRoom,
+    room: AdjacentRoomLight,
     sums: Iterator[mi.Float64],
     bins: DirectionBins,
     start: mi.Point3f,
     direction: mi.Vector3f,
     active: mi.Bool,
     *,
+    scenes: SceneCache,
     centre: NDArray[np.float64],
     generator: mi.PCG32,
     **paths: Any,
 ) -> None:
     """Add the light that rays meet in a room, and through its glass in the rooms behind it."""
-    tracer, matrix = kept_scene(room.surfaces, room.groups, centre=centre), next(sums)
+    tracer, matrix = scenes.scene(room.surfaces, room.groups, centre=centre), next(sums)
     if room.onward:
         ray = mi.Ray3f(start, direction)
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
@@ -222,7 +228,7 @@ def _add_paths(
         outside = tracer.exterior_normal(behind.first) * tracer.epsilon
         _add_paths(
             behind.room, sums, bins, start + direction * hit.t + outside, direction, through,
-            centre=centre, generator=generator, **paths,
+            scenes=scenes, centre=centre, generator=generator, **paths,
         )  # fmt: skip
         active &= ~met
     add_seen_and_reflected(

@@ -1,4 +1,4 @@
-"""Daylight matrices of cells of a window, with few paths that all cells have in common."""
+"""Daylight matrices of the cells of a window, from few paths that all cells share."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.kernels.scene import SceneCache
 from mitsuba_cfs.trace.matrices.daylight import add_daylight_paths
 from mitsuba_cfs.window_parts import Cells
 
@@ -42,6 +42,7 @@ def cell_daylight(
     max_depth: int = 16,
     seed: int = 0,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> list[NDArray[np.float64]]:
     """Daylight matrices [C, K, P] of the cells of each window group, as `daylight_matrix`.
 
@@ -50,7 +51,8 @@ def cell_daylight(
 
     Args: samples: paths of each cell and patch in each of 2 batches.
     """
-    tracer = kept_scene(surfaces, groups)
+    scenes = SceneCache() if scenes is None else scenes
+    tracer = scenes.scene(surfaces, groups)
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     frames, corner, across, up = _places(groups, cells, tracer.centre)
     C, K, P, n = len(corner), bins.size, sky.size, int(samples)
@@ -97,7 +99,7 @@ def cell_daylight(
 def _places(
     groups: Sequence[WindowGroup], cells: Sequence[Cells], centre: NDArray[np.float64]
 ) -> Iterator[NDArray[np.float64]]:
-    """Of all cells: frames [C, 3, 3], corners from the centre, and both sides [C, 3]."""
+    """Frames [C, 3, 3], corners from the centre and both sides [C, 3] of all cells."""
     pairs = list(zip(groups, cells, strict=True))
     for values in (
         [np.tile(g.frame, (len(c.area), 1, 1)) for g, c in pairs],

@@ -31,7 +31,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import SceneCache, TracedScene
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 
 ENTRIES = 4096  # of the inverse distribution
@@ -128,6 +128,7 @@ def daylight_matrix(
     seed: int = 0,
     progress: Progress = silent,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Daylight matrices [G, K, P]: mean radiance of each window patch per unit sky radiance.
 
@@ -147,8 +148,9 @@ def daylight_matrix(
 
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
     """
+    scenes = SceneCache() if scenes is None else scenes
     something = len(surfaces.triangles) > 0  # light comes back to the windows
-    tracer = kept_scene(surfaces, groups, windows_block=something)
+    tracer = scenes.scene(surfaces, groups, windows_block=something)
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     n = int(samples)
 

@@ -1,4 +1,4 @@
-"""What of a sensor's view leaves a room through no window: holes of the model."""
+"""Leaks of a room's model: the share of a sensor's view that leaves it through no window."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 
 SIDES = ("west", "east", "south", "north", "floor", "ceiling")  # of the box round a room
 FIGURES = 4  # share, and share times x, y, z
@@ -34,7 +34,7 @@ BATCHES = 4
 
 @dataclass(frozen=True, slots=True)
 class Escape:
-    """Shares of the sensors' view, direct and reflected, that end nowhere."""
+    """Shares of the sensors' view, direct and reflected, that leave the room through leaks."""
 
     share: NDArray[np.float64]  # [S] of what a sensor sees
     error: NDArray[np.float64]  # [S] standard error
@@ -53,8 +53,9 @@ def escaped_view(
     seed: int = 0,
     progress: Progress = silent,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Escape:
-    """The share of each sensor's view that meets neither a surface nor a window, and where.
+    """Share of each sensor's view that meets neither a surface nor a window, and its points.
 
         share[s] = 1/pi integral over the directions that leave, + rho times that of the hits
 
@@ -65,8 +66,9 @@ def escaped_view(
         surfaces, groups, points, directions: as of `view_matrix`.
         samples: paths of each sensor in each of 4 batches.
     """
+    scenes = SceneCache() if scenes is None else scenes
     points, directions = sensors_of(points, directions)
-    tracer = kept_scene(surfaces, groups)
+    tracer = scenes.scene(surfaces, groups)
     corners = np.concatenate(
         [surfaces.triangles, *(w.triangles for group in groups for w in group.windows)]
     ).reshape(-1, 3)
@@ -109,7 +111,7 @@ def escaped_view(
 
 
 def _escape(found: Estimate, centre: NDArray[np.float64]) -> Escape:
-    """Shares and places from the sums [S, 6, 4]."""
+    """Shares and points from the sums [S, 6, 4]."""
     by_side = found.values[..., 0]
     total = found.values.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -126,7 +128,7 @@ def _add_escapes(
     sums: mi.Float64,  # [rows * 6 * 4], accumulated in place
     starts: PathStarts,
 ) -> None:
-    """Follow each path until it meets a window or nothing, is absorbed or too long."""
+    """Follow each path until it meets a window or nothing, is absorbed or too deep."""
     row, position, direction = starts.row, starts.position, starts.direction
     generator, max_depth, active = starts.generator, starts.max_depth, starts.active
     beta = mi.Float(1.0)  # product of reflectances

@@ -1,4 +1,4 @@
-"""What windows see of what they light themselves, either side: for the light that they reflect."""
+"""Exchange matrices between windows, by the room or the outdoors, for windows that reflect."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
-from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.kernels.scene import SceneCache
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 from mitsuba_cfs.trace.matrices.pixel_view import add_seen_and_reflected
 
@@ -29,6 +29,7 @@ def window_exchange(
     stopping: Stopping | None = None,
     seed: int = 0,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Radiance that meets the windows from the room, per unit radiance of a patch [G, K, G * K].
 
@@ -41,7 +42,8 @@ def window_exchange(
         surfaces: what the room is made of, in the band of the radiances.
         samples: paths for each patch in each batch.
     """
-    tracer, bins, n = kept_scene(surfaces, groups), DirectionBins(basis), int(samples)
+    scenes = SceneCache() if scenes is None else scenes
+    tracer, bins, n = scenes.scene(surfaces, groups), DirectionBins(basis), int(samples)
     columns = len(groups) * bins.size
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
@@ -82,6 +84,7 @@ def outdoor_exchange(
     stopping: Stopping | None = None,
     seed: int = 0,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Radiance that meets the windows from outdoors, per unit that they send there [G, K, G * K].
 
@@ -91,7 +94,7 @@ def outdoor_exchange(
     """
     found = window_exchange(
         surfaces, [_turned(group) for group in groups], samples=samples, max_depth=max_depth,
-        stopping=stopping, seed=seed, cache=cache,
+        stopping=stopping, seed=seed, cache=cache, scenes=scenes,
     )  # fmt: skip
     theta, phi = KLEMS_FULL.centres()
     patch = KLEMS_FULL.index(theta, np.pi - phi)  # x of the turned windows is that of the others, -
@@ -105,6 +108,6 @@ def outdoor_exchange(
 
 
 def _turned(group: WindowGroup) -> WindowGroup:
-    """The same windows looked at from the room: their exterior is on that side."""
+    """The same windows facing the other way: their exterior side is the room."""
     turned = (replace(w, triangles=w.triangles[:, ::-1]) for w in group.windows)
     return replace(group, windows=tuple(turned))

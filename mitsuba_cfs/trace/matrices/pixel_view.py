@@ -1,4 +1,4 @@
-"""Luminance pictures of a room lit through its windows, one matrix row for each pixel."""
+"""View matrices of the pixels of a picture, and luminance pictures by them."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from mitsuba_cfs.trace.kernels.sampling import (
     empty_sums,
     opaque,
     path_generator,
-    pixel_places,
+    pixel_positions,
     sums_of,
     tables,
     vectors,
 )
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 from mitsuba_cfs.trace.kernels.view_paths import add_mirrored, add_view_paths
 
 BLOCK_BYTES = 128 * 2**20  # of the matrix that is held at a time
@@ -83,17 +83,16 @@ def picture_matrix_blocks(
 
 @dataclass(frozen=True, slots=True)
 class PictureBlock:
-    """Rows of the view matrix of some pixels [n], by what the light has met before the eye.
+    """Rows of the view matrix of some pixels [n], by the number of reflections.
 
-    Under the patches' luminances in some hours, what surfaces reflect has hours, c of them, in
-    place of the patches G * K.
+    With a `PatchLight` the reflected parts have its c hours in place of the patches G * K.
     """
 
     pixels: NDArray[np.int64]  # [n] row * width + column
-    seen: sparse.csr_array  # [n, G * K] the windows that a pixel shows, few of all
+    seen: sparse.csr_array  # [n, G * K] window patches that a pixel shows directly
     row: NDArray[np.int64]  # [b] numbers of the rows that pixels share
-    lit: NDArray[np.float32]  # [b, c] what surfaces that they show reflect of the windows' light
-    later: NDArray[np.float32]  # [b, c] what comes after more reflections
+    lit: NDArray[np.float32]  # [b, c] light of the windows after one reflection
+    later: NDArray[np.float32]  # [b, c] light after more reflections
 
 
 def picture_part_blocks(
@@ -111,22 +110,26 @@ def picture_part_blocks(
     weight: NDArray[np.floating] | None = None,
     light: PatchLight | None = None,
     progress: Progress = silent,
+    scenes: SceneCache | None = None,
 ) -> Iterator[PictureBlock]:
-    """Blocks of the view matrix of a picture in its parts, of the same paths.
+    """Blocks of the view matrix of a picture, by parts.
 
     Pixels that show nothing are left out.  Results do not depend on the block size.
 
     Args:
         samples: paths for each pixel, at as many places within it.
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
-        pixels: [n] those to trace; one that comes again has other paths, stratified with its first.
-        row: [n] that each pixel adds what it shows by reflection to; by default one of its own.
-        weight: [n] of each pixel's light in its rows; 1 by default.
-        light: luminances of hours that the paths add up, not the patches; not of glossy rooms.
+        pixels: [n] to trace; repeated pixels get new paths, stratified with the first ones.
+        row: [n] row of reflected light that each pixel adds to; by default one of its own.
+        weight: [n] of each pixel in its row; 1 by default.
+        light: luminances of hours to accumulate in place of patches; not for glossy rooms.
     """
-    tracer = kept_scene(surfaces, groups, window_reflectance=window_reflectance)
+    scenes = SceneCache() if scenes is None else scenes
+    tracer = scenes.scene(surfaces, groups, window_reflectance=window_reflectance)
     if light is not None and tracer.gloss is not None:
-        raise ValueError("what gloss shows of the patches is held patch by patch, not by hours")
+        raise ValueError(
+            "light: expected None for a room with gloss, whose matrix is stored by patches"
+        )
     bins = DirectionBins(basis)
     shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1)) if pixels is None else pixels
     row = np.arange(len(shown)) if row is None else row
@@ -156,9 +159,9 @@ def _block(
     seed: int,
     light: PatchLight | None,
 ) -> PictureBlock:
-    """The rows of some pixels.
+    """Rows of some pixels.
 
-    Args: chosen: pixels [n], each for the first time (0) or again [n], their rows and weights [n].
+    Args: chosen: pixels [n], their repetition numbers from 0 [n], rows and weights [n].
     """
     pixels, time, row, weight = chosen
     rows, place = np.unique(row, return_inverse=True)
@@ -171,7 +174,7 @@ def _block(
     number, first = column(pixels, mi.UInt32), column(time * samples, mi.UInt32)
     lit, again = column(own + place, mi.UInt32), dr.opaque(mi.UInt32, b)
     path = column(pixels + time * view.width * view.height & 0xFFFFFFFF, mi.UInt32)
-    places = pixel_places((int(time.max(initial=0)) + 1) * samples)
+    places = pixel_positions((int(time.max(initial=0)) + 1) * samples)
     for j in range(samples):
         dx, dy = places[time * samples + j].T
         directions, exists = pixel_rays(view, pixels, dx, dy)
@@ -206,7 +209,7 @@ def _block(
 def _shares(
     patches: NDArray[np.int32], weight: NDArray[np.floating], columns: int
 ) -> sparse.csr_array:
-    """What pixels [n] have of patches [n, columns] that their rays [samples, n] meet or do not."""
+    """Share of each patch in each pixel [n, columns], from the patches of its rays [samples, n]."""
     _, pixel = found = np.nonzero(patches != NO_PATCH)
     entries = weight[pixel], (pixel, patches[found])
     shares = sparse.coo_array(entries, shape=(len(weight), columns))
@@ -220,7 +223,7 @@ def seen_patch(
     direction: mi.Vector3f,
     active: mi.Bool,
 ) -> tuple[mi.PreliminaryIntersection3f, mi.UInt32, mi.Bool]:
-    """What rays meet first, and the patch of all windows that they show, where it is one."""
+    """First hits of rays, the window patch that each shows, and whether it shows one."""
     ray = mi.Ray3f(eye, direction)
     hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
     met = active & hit.is_valid()
@@ -242,7 +245,7 @@ def add_seen_and_reflected(
     beta: mi.Float,
     **paths: Any,
 ) -> None:
-    """What rays show in one row each: the patch that they meet, L = 1, or what a surface reflects.
+    """Add what each ray shows to its row: the window patch that it meets, or reflected light.
 
     Args: paths: `stream` to `max_depth` of `add_picture_paths`.
     """
@@ -264,9 +267,9 @@ def add_picture_paths(
     hit: mi.PreliminaryIntersection3f,  # of `seen_patch`
     *,
     active: mi.Bool,  # as of that
-    row: mi.UInt32,  # of what gloss shows
-    lit: mi.UInt32,  # row of what that reflects of the windows' light
-    later: mi.UInt32,  # row of what comes after more reflections
+    row: mi.UInt32,  # of specular reflections
+    lit: mi.UInt32,  # row of light after one reflection
+    later: mi.UInt32,  # row of light after more reflections
     beta: mi.Float,  # weight of the path
     stream: mi.UInt32,  # of the stratified samples: a pixel
     sample: mi.UInt32,
@@ -274,13 +277,13 @@ def add_picture_paths(
     max_depth: mi.UInt32,
     light: PatchLight | None,  # of `add_view_paths`; without gloss alone
 ) -> None:
-    """One path for each lane: rho / pi E of the surface that is met, nothing of a patch.
+    """Add rho / pi E of the surface that each lane meets, by one path; nothing for a window.
 
-    The three rows may be one.
+    The three rows may be the same.
     """
     active = active & hit.is_valid()
     position, face, reflectance = tracer.surface_at(hit, eye, direction, active)
-    mirrors = mi.PCG32(generator)  # a copy: the loop changes what it is given
+    mirrors = mi.PCG32(generator)  # a copy, as the loop changes it
     add_view_paths(
         tracer,
         bins,

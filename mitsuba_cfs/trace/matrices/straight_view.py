@@ -1,7 +1,7 @@
-"""What sensors see of the outdoors through the windows' straight beam, point by point.
+"""View of the outdoors through the windows' straight beam, point by point, at sensors.
 
-The phase methods have the outdoors in the patches of a Klems basis, 10 to 15 degrees wide, and as
-the mean over a window.  Behind clear glass a sensor sees the edge of a roof sharply.
+The phase methods resolve the outdoors by Klems patches, 10 to 15 degrees wide, and by the mean over
+a window.  Behind clear glass a sensor sees the edge of a roof sharply.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     vectors,
 )
 from mitsuba_cfs.trace.kernels.scattering import Scattering
-from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import SceneCache, TracedScene
 from mitsuba_cfs.trace.matrices.daylight import add_daylight_paths
 
 
@@ -48,21 +48,23 @@ def straight_view_matrix(
     stopping: Stopping | None = None,
     seed: int = 0,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Illuminance at each sensor per unit luminance of each sky patch [G, S, P] [sr, projected].
 
-        B[g, s, p] = integral over what s sees of g, of cosine tau(omega) R(x, omega, p) d omega
+        B[g, s, p] = integral over the visible part of g of cosine tau(omega) R(x, omega, p) d omega
 
-    R is what leaves the outdoors along omega to x for a unit of the patch, all reflections there
-    included; the room reflects nothing.
+    R is the radiance that arrives from outdoors along omega at x per unit of the patch, with all
+    reflections outdoors; the room reflects nothing.
 
     Args:
-        scattering: how each group passes light; None for a group that is left out.
+        scattering: of each group's system; None leaves a group out.
         samples: points on each group for each sensor in each batch.
-        max_depth: 1: what the sky sends itself.
+        max_depth: 1 for direct sky light only.
     """
+    scenes = SceneCache() if scenes is None else scenes
     points, directions = sensors_of(points, directions)
-    inside, outside = kept_scene(interior, groups), kept_scene(exterior, groups)
+    inside, outside = scenes.scene(interior, groups), scenes.scene(exterior, groups)
     sky, S, n = SkyBins(ReinhartSky(subdivision)), len(points), int(samples)
 
     def one_group(g: int, way: Scattering, key: mi.UInt32) -> NDArray[np.float64]:
@@ -109,12 +111,12 @@ def straight_rays(
     samples: int,
     key: mi.UInt32,
 ) -> tuple[mi.UInt32, mi.Point3f, mi.Vector3f, mi.Float]:
-    """Rays of sensors [S * samples] through a window group that go straight on.
+    """Rays of sensors [S * samples] straight through a window group.
 
     Args: sensors: positions and normals [S, 3].
 
-    Returns: sensor, start just outdoors, direction; the light [sr, projected] that a ray stands
-    for, times the samples, or 0 where the sensor does not see the window there.
+    Returns: sensor, start just outdoors, direction; the weight [sr, projected] of a
+    ray times the samples, 0 where the sensor does not see the window.
     """
     place, normal = (np.atleast_2d(v) for v in sensors)
     count = dr.opaque(mi.UInt32, samples)

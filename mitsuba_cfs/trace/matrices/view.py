@@ -32,7 +32,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 from mitsuba_cfs.trace.kernels.view_paths import add_mirrored, add_view_paths
 
 MOST_SENSORS = 64  # that share hits; more cost more than they save
@@ -309,6 +309,7 @@ def view_matrix(
     seed: int = 0,
     progress: Progress = silent,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Estimate:
     """View matrices [S, G, K]: irradiance at each sensor per unit radiance of a window patch.
 
@@ -329,8 +330,9 @@ def view_matrix(
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method);
     balance heuristic of Veach, Guibas 1995.
     """
+    scenes = SceneCache() if scenes is None else scenes
     points, directions = sensors_of(points, directions)
-    tracer = kept_scene(surfaces, groups)
+    tracer = scenes.scene(surfaces, groups)
     bins = DirectionBins(basis)
     S, n = len(points), int(samples)
     if S * n >= 2**32:

@@ -18,7 +18,7 @@ SEATED = (0.30, 0.30, 0.22, 0.22, 0.18, 0.18)
 
 
 def view_factors(surfaces: Surfaces, *, samples: int = 16384, seed: int = 0) -> FloatArray:
-    """View factors F [N, N]: the share of what leaves surface i diffusely that reaches surface j.
+    """View factors F [N, N]: share of the diffuse radiation of surface i that reaches surface j.
 
     Args:
         surfaces: every part of the enclosure, windows included, its triangles counter-clockwise
@@ -81,7 +81,7 @@ def sky_shares(
     samples: int = 4096,
     seed: int = 0,
 ) -> FloatArray:
-    """Share [S] that planes outdoors see of the sky that they would see with nothing before them.
+    """Sky view of planes outdoors [S] over that without obstructions.
 
     The view factor to the sky over (1 + cos tilt) / 2; 1 where a plane looks straight down.
 
@@ -104,7 +104,7 @@ def sky_shares(
 
 
 class _Plan:
-    """Low-discrepancy numbers: scrambled anew for every part, all from one seed."""
+    """Low-discrepancy numbers, scrambled independently for every part."""
 
     def __init__(self, samples: int, seed: int) -> None:
         if samples < 1:
@@ -121,14 +121,14 @@ class _Plan:
 
 
 def _cosine(frames: FloatArray, u: FloatArray) -> FloatArray:
-    """Directions [n, 3] about the third row of frames [n or 1, 3, 3], by the cosine."""
+    """Cosine-distributed directions [n, 3] about the third row of frames [n or 1, 3, 3]."""
     radius, angle = np.sqrt(u[:, 0]), 2 * np.pi * u[:, 1]
     local = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.sqrt(1 - u[:, 0])], axis=1)
     return np.einsum("ni,nij->nj", local, np.broadcast_to(frames, (len(u), 3, 3)))
 
 
 def _hits(surfaces: Surfaces, origins: FloatArray, directions: FloatArray) -> NDArray[np.int64]:
-    """The part that each ray meets first, -1 where it meets none."""
+    """The part that each ray meets first, -1 for none."""
     centre = surfaces.triangles.mean(axis=(0, 1))
     tracer = TracedScene(surfaces, centre=centre)
     towards = vectors(directions)

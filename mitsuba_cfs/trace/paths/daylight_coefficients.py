@@ -9,11 +9,11 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.paths.point_in_time import sensor_batches
-from mitsuba_cfs.trace.paths.scene import LitRoom, PatchSky
+from mitsuba_cfs.trace.paths.scene import PatchSky, PathTracingScene
 
 
 def daylight_coefficients(
-    room: LitRoom,
+    room: PathTracingScene,
     points: ArrayLike,
     directions: ArrayLike,
     *,

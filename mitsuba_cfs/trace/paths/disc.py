@@ -1,4 +1,4 @@
-"""The sun's disc in path-traced pictures: in their pixels, or apart for its glare."""
+"""The sun's disc in path-traced pictures: in their pixels, or as a separate glare source."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from mitsuba_cfs.glare.sun_disc import SunDisc, seen_disc
 from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles
 from mitsuba_cfs.trace.kernels.sampling import vectors
 from mitsuba_cfs.trace.kernels.scene import TracedScene
-from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
+from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
 from mitsuba_cfs.trace.paths.sun import by_plane, straight_to_sky
 from mitsuba_cfs.trace.sun.pixels import before_eye, disc_in_view, disc_parts, disc_rays, disc_reach
 
 DISC_STEP = np.radians(0.005)  # between rays to the sun's disc
 
 
-def disc_seen(room: LitRoom, sky: Sky, view: View) -> SunDisc | None:
+def disc_seen(room: PathTracingScene, sky: Sky, view: View) -> SunDisc | None:
     """The sun's disc as the eye sees it through the straight beam; None where it is hidden."""
     sun, radiance = sky.sun.numpy().ravel(), float(sky.sun_radiance.numpy()[0])
     directions, counts = pixel_directions(view)
@@ -32,22 +32,24 @@ def disc_seen(room: LitRoom, sky: Sky, view: View) -> SunDisc | None:
 
 
 def with_disc(
-    picture: NDArray[np.float32], room: LitRoom, sky: Sky, view: View
+    picture: NDArray[np.float32], room: PathTracingScene, sky: Sky, view: View
 ) -> NDArray[np.float32]:
-    """A picture [ny, nx] that was made without the disc, with it in its pixels."""
+    """A picture [ny, nx] with the disc added to its pixels."""
     whole = picture.astype(float).ravel()
     add_disc(whole, room, sky, view)
     return whole.astype(np.float32).reshape(picture.shape)
 
 
-def add_disc(picture: NDArray[np.float64], room: LitRoom, sky: Sky, view: View) -> None:
+def add_disc(picture: NDArray[np.float64], room: PathTracingScene, sky: Sky, view: View) -> None:
     """Add the disc seen through the straight beam to pixels [ny * nx], by its share of each."""
     sun = sky.sun.numpy().ravel()
     _add(picture, sky, view, sun, lambda ways: _straight(room, view, ways))
 
 
-def add_mirrored_discs(picture: NDArray[np.float64], room: LitRoom, sky: Sky, view: View) -> None:
-    """Add the discs that smooth mirrors show to pixels [ny * nx]."""
+def add_mirrored_discs(
+    picture: NDArray[np.float64], room: PathTracingScene, sky: Sky, view: View
+) -> None:
+    """Add the images of the disc in smooth mirrors to pixels [ny * nx]."""
     sun = sky.sun.numpy().ravel()
     for tracer in (room.inside, room.outside):
         for plane in [] if tracer.gloss is None else tracer.gloss.mirrors:
@@ -57,9 +59,9 @@ def add_mirrored_discs(picture: NDArray[np.float64], room: LitRoom, sky: Sky, vi
 
 
 def _by_plane(
-    room: LitRoom, view: View, tracer: TracedScene, plane: int
+    room: PathTracingScene, view: View, tracer: TracedScene, plane: int
 ) -> Callable[[NDArray[np.float64]], NDArray[np.float32]]:
-    """Transmittance [n] of ways [n, 3] from the eye by a mirror plane to the sky."""
+    """Transmittance [n] from the eye in directions [n, 3] by a mirror plane to the sky."""
     normal = tracer.gloss.normals[plane]
 
     def shown(ways: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -80,7 +82,7 @@ def _add(
     sun: NDArray[np.float64],
     passed: Callable[[NDArray[np.float64]], NDArray[np.float32]],
 ) -> None:
-    """Add a disc round `sun`; `passed`: what of its radiance comes from each direction."""
+    """Add a disc about `sun`; `passed`: transmittance in each direction."""
     size = pixel_size(view)
     directions, counts = pixel_directions(view)
     shown = np.flatnonzero(counts.reshape(-1))
@@ -92,8 +94,8 @@ def _add(
     picture[near] += seen * share * sky.sun_radiance.numpy()[0]
 
 
-def _straight(room: LitRoom, view: View, ways: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Transmittance [n] of the straight way from the eye to the sky in directions [n, 3]."""
+def _straight(room: PathTracingScene, view: View, ways: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Transmittance [n] from the eye straight to the sky in directions [n, 3]."""
     towards = vectors(ways)
     active = dr.full(mi.Bool, True, len(ways))
     return straight_to_sky(room, eye_of(room, view), towards, mi.Bool(False), active).numpy()
@@ -104,6 +106,6 @@ def pixel_size(view: View) -> float:
     return float(np.sqrt(pixel_solid_angles(view).max()))
 
 
-def eye_of(room: LitRoom, view: View) -> mi.Point3f:
+def eye_of(room: PathTracingScene, view: View) -> mi.Point3f:
     """The eye in the tracer's coordinates."""
     return room.inside.place(view.position)

@@ -16,7 +16,7 @@ from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
 from mitsuba_cfs.trace.kernels.sampling import batch_key, path_generator, vectors
 from mitsuba_cfs.trace.kernels.scene import OPAQUE
-from mitsuba_cfs.trace.paths.scene import LitRoom, PatchSky, Sky
+from mitsuba_cfs.trace.paths.scene import PatchSky, PathTracingScene, Sky
 from mitsuba_cfs.trace.paths.sun import (
     Vertex,
     leave_by_gloss,
@@ -33,8 +33,10 @@ CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that pa
 TO_WINDOW, TO_SUN = (0.5, 0.2), (0.15, 0.05)  # (first, later)
 
 
-def _interaction(room: LitRoom, group: int, direction: mi.Vector3f) -> mi.SurfaceInteraction3f:
-    """What a plugin needs to know of a ray along `direction` that meets a window from the room."""
+def _interaction(
+    room: PathTracingScene, group: int, direction: mi.Vector3f
+) -> mi.SurfaceInteraction3f:
+    """Interaction record of a ray along `direction` that meets a window from the room."""
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(direction))
     normal = mi.Normal3f(*map(float, room.inside.groups[group].frame[2]))
     si.n = normal
@@ -44,7 +46,7 @@ def _interaction(room: LitRoom, group: int, direction: mi.Vector3f) -> mi.Surfac
 
 
 def leave(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky,
     vertex: Vertex,
     u: mi.Point2f,
@@ -55,8 +57,8 @@ def leave(
 ) -> tuple[mi.Vector3f, mi.Bool]:
     """A direction from a diffuse vertex, and whether it aims at a window.
 
-    Directions follow the cosine; in the room some aim at the windows and some round the sun.
-    `later`: fewer, as from a path's vertices after its first.
+    Cosine-distributed; in the room some directions aim at the windows and some near the sun, fewer
+    from `later` vertices of a path.
     """
     window_share, sun_share = TO_WINDOW[later], TO_SUN[later]
     choice = dr.select(vertex.outdoors, 1.0, choice)
@@ -71,7 +73,7 @@ def leave(
 
 
 def _density(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky,
     cosine: mi.Float,
     direction: mi.Vector3f,
@@ -80,10 +82,10 @@ def _density(
     glass_cosine: mi.Float,  # of the window that was met, 0 for none
     later: mi.Bool,
 ) -> mi.Float:
-    """Density [1/sr] of the directions that `leave` gives in the room.
+    """Density [1/sr] of the directions of `leave` in the room.
 
-    A path that aims at a window and meets something before it is given up, so only directions
-    that meet a window have that part of the density.
+    A path that aims at a window and meets something else first is dropped, so only directions that
+    meet a window have that part of the density.
     """
     window = dr.select(
         glass_cosine > 1e-4,
@@ -99,7 +101,7 @@ def _density(
 
 
 def window_parts(
-    room: LitRoom,
+    room: PathTracingScene,
     group: mi.Int32,
     direction: mi.Vector3f,
     towards: mi.Vector3f,
@@ -108,10 +110,10 @@ def window_parts(
     choice: mi.Float,
     glazed: mi.Bool,
 ) -> tuple[mi.Float, mi.Float, mi.Float, mi.Vector3f, mi.Float, mi.Vector3f]:
-    """What a window does to a ray along `direction` that meets it, from either side.
+    """Optics of a window for a ray along `direction` from either side.
 
     Returns: light scattered from the sun `towards` [1/sr, cosine included]; the straight beam's
-    transmittance; the mirror's reflectance and direction; weight and direction of what scatters.
+    transmittance; the mirror's reflectance and direction; weight and direction of scattered light.
     """
     straight, mirrored, rest = (mi.Float(0) for _ in range(3))
     mirror, away = mi.Vector3f(direction), mi.Vector3f(direction)
@@ -132,13 +134,13 @@ def window_parts(
 
 
 def scattered_at(
-    room: LitRoom,
+    room: PathTracingScene,
     group: mi.Int32,
     direction: mi.Vector3f,
     towards: mi.Vector3f,
     glazed: mi.Bool,
 ) -> mi.Float:
-    """Light that windows scatter from the sun `towards` against `direction`, cosine included."""
+    """Light of the sun at `towards` that windows scatter to -`direction`, cosine included."""
     scattered = mi.Float(0)
     for g, system in enumerate(room.systems):
         if system.bsdf is not None:
@@ -150,7 +152,7 @@ def scattered_at(
 
 
 def window_sun(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky | PatchSky,
     place: mi.Point3f,  # outdoors of the window
     group: mi.Int32,
@@ -159,7 +161,7 @@ def window_sun(
     generator: mi.PCG32,
     glazed: mi.Bool,
 ) -> mi.Float:
-    """Radiance that windows scatter of the sun in smooth mirrors outdoors."""
+    """Radiance of the sun in smooth mirrors outdoors that windows scatter."""
     found = mi.Float(0)
     if all(system.bsdf is None for system in room.systems) or room.outside.gloss is None:
         return found
@@ -172,17 +174,17 @@ def window_sun(
 
 
 def _at_window(
-    room: LitRoom,
+    room: PathTracingScene,
     group: mi.Int32,
     direction: mi.Vector3f,
     towards: mi.Vector3f,
     generator: mi.PCG32,
     glazed: mi.Bool,
 ) -> tuple[mi.Float, mi.Vector3f, mi.Float, mi.Bool]:
-    """Light scattered from the sun, see `window_parts`; where a path goes on, and its weight.
+    """Light scattered from the sun, see `window_parts`; new direction and weight of a path.
 
-    It takes the beam, the mirror or the rest in proportion to what each carries; the last value
-    is whether it takes the beam.
+    The path takes the beam, the specular reflection or the rest in proportion to their weights; the
+    last value is whether it takes the beam.
     """
     u = mi.Point2f(generator.next_float32(), generator.next_float32())
     scattered, straight, mirrored, mirror, rest, away = window_parts(
@@ -197,20 +199,20 @@ def _at_window(
 
 @dr.syntax
 def add_paths(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky | PatchSky,
     result: mi.Float64,  # [rows], or [rows * P] of a `PatchSky`, accumulated in place
     starts: PathStarts,
     *,
-    cosine: mi.Float,  # at the room's diffuse vertex that the path starts on; 0 where it is none
-    came: mi.Float,  # cosine over pi at a diffuse vertex anywhere; 0 where it is none
+    cosine: mi.Float,  # at the diffuse vertex in the room that the path starts on; 0 for none
+    came: mi.Float,  # cosine over pi at a diffuse vertex anywhere; 0 for none
     aimed: mi.Bool,  # whether the first direction aims at a window
-    beta: mi.Float,  # what the path carries when it starts
+    beta: mi.Float,  # initial weight of the path
     outdoors: mi.Bool,  # where the path starts
 ) -> None:
-    """Follow each path and add what it carries from sun, sky and ground to its row.
+    """Follow each path and add the light of sun, sky and ground to its row.
 
-    The sun's disc itself is not seen at the end of a path, only where it scatters or shines.
+    A path never meets the sun's disc: next-event estimation has the sun at surfaces and windows.
     """
     row, origin, direction = starts.row, starts.position, starts.direction
     generator, max_depth, active = starts.generator, starts.max_depth, starts.active
@@ -234,7 +236,7 @@ def add_paths(
         glazed = active & (group != OPAQUE)
         active &= glazed | ~(aimed & diffuse)
         local = room.inside.to_local(group, direction, glazed)
-        facing = dr.select(outdoors, -local.z, local.z) > 1e-4  # a window has no other side
+        facing = dr.select(outdoors, -local.z, local.z) > 1e-4  # windows are one-sided
         active &= ~glazed | facing
         glazed &= facing
         glass_cosine = dr.select(glazed & ~outdoors, local.z, 0.0)
@@ -311,7 +313,7 @@ def add_paths(
 
 
 def point_in_time(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky,
     points: ArrayLike,
     directions: ArrayLike,
@@ -324,8 +326,8 @@ def point_in_time(
 ) -> Estimate:
     """Illuminance (irradiance) at sensors [S] under one sky.
 
-    Paths from the sensors meet windows, whose BSDF sends them outdoors or back; the sun's disc is
-    looked for at every vertex and at every window, the sky is met.
+    Paths from the sensors meet windows, whose BSDF sends them outdoors or back, and end in the sky;
+    every vertex and window gets a shadow ray to the sun's disc.
 
     Args:
         points, directions: [S, 3] sensor positions [m] and normals.
@@ -343,7 +345,7 @@ def point_in_time(
 
 
 def sensor_batches(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky | PatchSky,
     points: ArrayLike,
     directions: ArrayLike,

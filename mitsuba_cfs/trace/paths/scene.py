@@ -1,7 +1,4 @@
-"""A room ready to be traced under one sky: both sides of its windows, their systems, the sky.
-
-A fenestration system's BSDF as path tracing takes it.
-"""
+"""Scenes, window systems and skies for path tracing under one sky."""
 
 from __future__ import annotations
 
@@ -30,7 +27,7 @@ from mitsuba_cfs.trace.kernels.scene import TracedScene
 
 
 class PathOptics:
-    """How a window group passes light: a straight beam, mirrors, and a BSDF for the rest."""
+    """Optics of a window group: a straight beam, specular reflectances, and a BSDF for the rest."""
 
     def __init__(
         self,
@@ -38,7 +35,7 @@ class PathOptics:
         beam: AngularBeam | PatchBeam | None = None,
         mirrors: tuple[AngularBeam | None, AngularBeam | None] = (None, None),
     ) -> None:
-        """From a plugin that scatters, without the peak that `beam` stands for.
+        """From the plugin of the scattered light, without the straight `beam`.
 
         Args: mirrors: specular reflectance of the front (outdoors) and of the back.
         """
@@ -55,7 +52,7 @@ class PathOptics:
 
 
 class Sky:
-    """A sky without its sun on Reinhart patches, and the sun as a disc: one value for each row."""
+    """A sky on Reinhart patches without its sun, and the sun as a disc: one value for each row."""
 
     columns = 1
 
@@ -72,13 +69,13 @@ class Sky:
         self, result: mi.Float64, row: mi.UInt32, direction: mi.Vector3f, beta: mi.Float,
         active: mi.Bool,
     ) -> None:  # fmt: skip
-        """Add what paths that leave to the sky bring to their rows of `result`."""
+        """Add the light of paths that leave to the sky to their rows of `result`."""
         light = dr.gather(mi.Float, self.radiance, self.bins.index(direction), active)
         dr.scatter_add(result, mi.Float64(beta * light), row, active)
 
 
 class PatchSky:
-    """A sky of unit radiance without a sun, told apart by its patches: P values for each row."""
+    """A sky of unit radiance without a sun, by patches: P values for each row."""
 
     def __init__(self, subdivision: int) -> None:
         """From Reinhart's MF."""
@@ -90,13 +87,13 @@ class PatchSky:
         self, result: mi.Float64, row: mi.UInt32, direction: mi.Vector3f, beta: mi.Float,
         active: mi.Bool,
     ) -> None:  # fmt: skip
-        """Add what paths bring to the patch of their row that they leave to."""
+        """Add the weight of paths to the sky patch of their row that they leave to."""
         slot = row * self.columns + self.bins.index(direction)
         dr.scatter_add(result, mi.Float64(beta), slot, active)
 
 
-class LitRoom:
-    """The scenes on both sides of the windows, and the systems in them."""
+class PathTracingScene:
+    """The scenes on both sides of the windows, and the systems in the windows."""
 
     def __init__(
         self,
@@ -114,12 +111,12 @@ class LitRoom:
         self.glossy = self.inside.gloss is not None or self.outside.gloss is not None
 
 
-def lit_system(bsdf: Bsdf, angular: AngularTable | None = None) -> PathOptics:
-    """A system for paths that cross it either way, its through beam kept apart.
+def path_optics(bsdf: Bsdf, angular: AngularTable | None = None) -> PathOptics:
+    """Optics of a system for paths in both directions, its straight beam separate.
 
-    The beam towards the room stands for that of the other direction too.
+    The transmittance of the beam is that of light towards the room in both directions.
 
-    Args: angular: as for `sun_scattering`; reflectances that it has are those of mirrors.
+    Args: angular: as for `sun_scattering`; its reflectances are specular.
     """
     if angular is not None:
         return _specular_system(bsdf, angular)
@@ -131,7 +128,7 @@ def lit_system(bsdf: Bsdf, angular: AngularTable | None = None) -> PathOptics:
 
 
 def without_peaks(bsdf: KlemsBsdf, *kinds: str) -> KlemsBsdf:
-    """Klems matrices without what goes straight on ("transmission") or is mirrored."""
+    """Klems matrices without the peak in "transmission", "reflection" or both."""
     full = bsdf.filled()
     blocks = {f"{kind}_{side}": None for kind in kinds for side in ("front", "back")}
     for name in blocks:
@@ -141,7 +138,7 @@ def without_peaks(bsdf: KlemsBsdf, *kinds: str) -> KlemsBsdf:
 
 
 def _specular_system(bsdf: Bsdf, angular: AngularTable) -> PathOptics:
-    """A specular system by its exact function; only what scatters is left to the data."""
+    """A specular system by its exact angular function; scattered light from the data."""
     mirrors, kinds = [], ["transmission"]
     for values in (angular.reflectance_front, angular.reflectance_back):
         mirrors.append(None if values is None else AngularBeam(angular.by_cosine(values, 1.0)))

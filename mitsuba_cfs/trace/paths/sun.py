@@ -20,7 +20,7 @@ import numpy as np
 from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.gloss import TracedGloss, facet_density, facets
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene
-from mitsuba_cfs.trace.paths.scene import LitRoom, PatchSky, Sky
+from mitsuba_cfs.trace.paths.scene import PatchSky, PathTracingScene, Sky
 
 MOST_IMAGES = 8  # mirror planes asked at a vertex; of more, so many are drawn
 
@@ -48,7 +48,7 @@ def on_disc(sky: Sky | PatchSky, u: mi.Point2f) -> mi.Vector3f:
 
 
 def through_window(
-    room: LitRoom,
+    room: PathTracingScene,
     position: mi.Point3f,
     towards: mi.Vector3f,
     outdoors: mi.Bool,
@@ -73,13 +73,13 @@ def through_window(
 
 
 def straight_to_sky(
-    room: LitRoom,
+    room: PathTracingScene,
     position: mi.Point3f,
     towards: mi.Vector3f,
     outdoors: mi.Bool,
     active: mi.Bool,
 ) -> mi.Float:
-    """Transmittance of the straight way to the sky: 1 outdoors, a window's beam; 0 if hidden."""
+    """Transmittance straight to the sky: 1 outdoors, a window's beam indoors; 0 if hidden."""
     tau, start = mi.Float(1), position
     if any(system.beam is not None for system in room.systems):
         tau, start = through_window(room, position, towards, outdoors, active)
@@ -92,9 +92,9 @@ def straight_to_sky(
 
 
 def sun_at(
-    room: LitRoom, sky: Sky | PatchSky, vertex: Vertex, u: mi.Point2f, active: mi.Bool
+    room: PathTracingScene, sky: Sky | PatchSky, vertex: Vertex, u: mi.Point2f, active: mi.Bool
 ) -> mi.Float:
-    """Irradiance straight from the sun: outdoors, or in the room through a window's beam."""
+    """Irradiance directly from the sun, outdoors or through a window's straight beam."""
     towards = on_disc(sky, u)
     cosine = dr.dot(vertex.normal, towards)
     active = active & (cosine > 0) & (sky.sun_radiance > 0)
@@ -103,7 +103,7 @@ def sun_at(
 
 
 def sun_images(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky | PatchSky,
     vertex: Vertex,
     generator: mi.PCG32,
@@ -111,9 +111,9 @@ def sun_images(
     *,
     rough: bool = True,
 ) -> Iterator[SunImage]:
-    """The sun as mirrors show it to vertices, one image after the other.
+    """Images of the sun in mirror planes, one after the other.
 
-    Args: rough: those of rough planes too; their strength is for a diffuse vertex.
+    Args: rough: include rough planes, whose strength is for a diffuse vertex.
     """
     for tracer in () if isinstance(sky, PatchSky) else (room.inside, room.outside):
         gloss = tracer.gloss
@@ -134,7 +134,7 @@ def sun_images(
 
 
 def _image(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky | PatchSky,
     tracer: TracedScene,
     number: mi.UInt32,
@@ -143,7 +143,7 @@ def _image(
     u: tuple[mi.Point2f, mi.Point2f],
     active: mi.Bool,
 ) -> SunImage:
-    """The image of one mirror plane."""
+    """The image of the sun in one mirror plane."""
     gloss = tracer.gloss
     sun = on_disc(sky, u[0])
     normal, alpha = gloss.plane(number)
@@ -169,7 +169,7 @@ def _image(
 
 
 def by_plane(
-    room: LitRoom,
+    room: PathTracingScene,
     tracer: TracedScene,  # the room's inside or outside
     number: mi.Int32,
     position: mi.Point3f,
@@ -179,7 +179,7 @@ def by_plane(
     outdoors: mi.Bool,
     active: mi.Bool,
 ) -> mi.Float:
-    """Transmittance of the way by a mirror plane to the sky, its reflectance included."""
+    """Transmittance by a mirror plane to the sky, with its reflectance."""
     gloss, outside = tracer.gloss, tracer is room.outside
     active, tau, origin = mi.Bool(active), mi.Float(1), position
     if outside:
@@ -200,7 +200,7 @@ def by_plane(
 
 
 def _drawn(gloss: TracedGloss) -> float:
-    """How many planes stand for each that is asked."""
+    """Number of planes that each sampled plane represents."""
     return max(gloss.plane_count / MOST_IMAGES, 1.0)
 
 
@@ -212,7 +212,7 @@ def _image_density(
 
 
 def surface_sun(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky | PatchSky,
     vertex: Vertex,
     triangle: mi.UInt32,
@@ -224,7 +224,7 @@ def surface_sun(
     generator: mi.PCG32,
     active: mi.Bool,
 ) -> mi.Float:
-    """Radiance that a surface reflects of the sun to where a path came from."""
+    """Radiance of the sun that a surface reflects back along a path."""
     found = rho * dr.inv_pi * sun_at(room, sky, vertex, u, active)
     if not room.glossy:
         return found
@@ -257,9 +257,13 @@ def surface_sun(
 
 
 def diffuse_share(
-    room: LitRoom, vertex: Vertex, triangle: mi.UInt32, towards: mi.Vector3f, active: mi.Bool
+    room: PathTracingScene,
+    vertex: Vertex,
+    triangle: mi.UInt32,
+    towards: mi.Vector3f,
+    active: mi.Bool,
 ) -> mi.Float:
-    """What is left of the diffuse reflectance for light from a direction."""
+    """Diffuse reflectance for light from a direction over that at normal incidence."""
     cosine = dr.dot(vertex.normal, towards)
     rest = _by_side(
         room,
@@ -271,7 +275,7 @@ def diffuse_share(
 
 
 def leave_by_gloss(
-    room: LitRoom,
+    room: PathTracingScene,
     vertex: Vertex,
     triangle: mi.UInt32,
     direction: mi.Vector3f,
@@ -280,7 +284,7 @@ def leave_by_gloss(
     generator: mi.PCG32,
     active: mi.Bool,
 ) -> tuple[mi.Bool, mi.Vector3f, mi.Float]:
-    """Whether a path goes on by the gloss, where to then, and its weight by either part."""
+    """Whether a path continues by the gloss, its direction then, the weight of the chosen part."""
     glossy, towards, weight = mi.Bool(False), mi.Vector3f(direction), mi.Float(rho)
     for tracer, here in ((room.inside, ~vertex.outdoors), (room.outside, vertex.outdoors)):
         if tracer.gloss is not None:
@@ -304,7 +308,7 @@ def _own_weight(
     came: mi.Float,
     active: mi.Bool,
 ) -> mi.Float:
-    """Weight of the sun that a path finds at a rough surface, against that vertex' images."""
+    """MIS weight of the sun that a path meets at a rough surface, against the vertex's images."""
     plane, alpha = gloss.plane(mi.UInt32(dr.maximum(gloss.plane_of(triangle, active), 0)))
     half = dr.normalize(sun - direction)
     slope, along = dr.abs(dr.dot(half, plane)), dr.dot(half, sun)
@@ -313,7 +317,7 @@ def _own_weight(
 
 
 def _by_side(
-    room: LitRoom,
+    room: PathTracingScene,
     outdoors: mi.Bool,
     active: mi.Bool,
     value: Callable[[TracedGloss, mi.Bool], mi.Float],

@@ -1,7 +1,7 @@
-"""What a view shows of other rooms straight through glass between rooms, pixel by pixel.
+"""Adjacent rooms in a view, straight through glass between rooms, pixel by pixel.
 
-The phase methods have the room beyond in the patches of a Klems basis, 10 to 15 degrees wide, and
-as the mean over a part of the glass: a bright window there is smeared over the wall around it.
+The phase methods resolve the adjacent room by Klems patches, 10 to 15 degrees wide, and by the mean
+over a part of the glass, which smears a bright window there over the wall around it.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from mitsuba_cfs.trace.kernels.sampling import (
     vectors,
 )
 from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
-from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import SceneCache, TracedScene
 from mitsuba_cfs.trace.kernels.view_paths import add_view_paths
-from mitsuba_cfs.trace.matrices.adjacent import LendingRoom, RoomBehind
+from mitsuba_cfs.trace.matrices.adjacent import AdjacentRoomLight, GlassToRoom
 from mitsuba_cfs.trace.pictures.outdoors import (
     RAYS,
     SeenOutdoors,
     through_windows,
     view_lanes,
 )
-from mitsuba_cfs.trace.sun.lit_points import Places, face_places
-from mitsuba_cfs.trace.sun.outdoors import MOST_MIRRORS, Lanes, mirrored
+from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_points
+from mitsuba_cfs.trace.sun.outdoors import MOST_MIRRORS, PixelRays, mirrored
 
 BLOCK_BYTES = 128 * 2**20
 LEAST_PATHS = 64  # of a face in a tile: slivers have few rays
@@ -72,10 +72,10 @@ class RoomShown:
         values += found.T
 
 
-def borrowed_picture(
+def adjacent_picture(
     interior: Surfaces,
     groups: Sequence[WindowGroup],
-    behind: Sequence[RoomBehind],
+    behind: Sequence[GlassToRoom],
     view: View,
     *,
     subdivision: int = 4,
@@ -83,23 +83,27 @@ def borrowed_picture(
     tile: int | None = None,
     max_depth: int = 32,
     seed: int = 0,
+    scenes: SceneCache | None = None,
 ) -> list[RoomShown]:
-    """The rooms that a view shows straight through panes, and through panes of these.
+    """The rooms that a view shows straight through glass, and through glass of these.
 
     Args:
         interior, groups: of the eye's room.
-        behind: the rooms behind its panes.
+        behind: the rooms behind its glass.
         subdivision: Reinhart's MF of the sky.
         samples: rays of each pixel.
-        tile: pixels across of the squares that share what surfaces reflect, as of `tile_size`.
+        tile: pixels across of the squares that share reflected light, by default `tile_size`.
         max_depth: segments of a path in a room.
     """
-    inside, nodes = kept_scene(interior, groups), _all_behind(behind)
-    tracers = [kept_scene(b.room.surfaces, b.room.groups, centre=inside.centre) for _, b in nodes]
+    scenes = SceneCache() if scenes is None else scenes
+    inside, nodes = scenes.scene(interior, groups), _all_behind(behind)
+    tracers = [scenes.scene(b.room.surfaces, b.room.groups, centre=inside.centre) for _, b in nodes]
     pixels = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
     tiles = Tiles(tile_size(view) if tile is None else tile, view.width)
     sky = SkyBins(ReinhartSky(subdivision))
-    met = [_MetInRoom(b.room, t, tiles, sky) for (_, b), t in zip(nodes, tracers, strict=True)]
+    met = [
+        _MetInRoom(b.room, t, tiles, sky, scenes) for (_, b), t in zip(nodes, tracers, strict=True)
+    ]
     step = max(256, RAYS // samples)
     for start in range(0, len(pixels), step):
         block = pixels[start : start + step]
@@ -111,10 +115,10 @@ def borrowed_picture(
     return [one.shown(len(pixels), max_depth, seed) for one in met]
 
 
-def _all_behind(behind: Sequence[RoomBehind]) -> list[tuple[int, RoomBehind]]:
-    """The rooms behind panes and those behind them, each with its place's number in this list.
+def _all_behind(behind: Sequence[GlassToRoom]) -> list[tuple[int, GlassToRoom]]:
+    """All rooms behind glass, each with the number in this list of the room in front of it.
 
-    The number is that of the room that it is behind; -1: the eye's.
+    -1: the eye's room.
     """
     found = [(-1, one) for one in behind]
     for i, (_, one) in enumerate(found):  # grows as it is read
@@ -122,18 +126,18 @@ def _all_behind(behind: Sequence[RoomBehind]) -> list[tuple[int, RoomBehind]]:
     return found
 
 
-def _into_room(tracer: TracedScene, behind: RoomBehind, lanes: Lanes) -> Lanes:
-    """Rays in a room that go straight on into one behind it, a step clear of its panes."""
+def _into_room(tracer: TracedScene, behind: GlassToRoom, lanes: PixelRays) -> PixelRays:
+    """Rays in a room that pass straight into a room behind it, offset off the glass."""
     beams = np.zeros((len(tracer.groups), KLEMS_FULL.size))
     beams[behind.first : behind.first + behind.count] = behind.beam
     found = through_windows(tracer, _panes(beams), lanes)
     outwards = tracer.groups[behind.first].frame[2] * tracer.epsilon.numpy()
     origin = (found.origin + outwards[:, None]).astype(np.float32)
-    return Lanes(found.row, origin, found.way, found.weight)
+    return PixelRays(found.row, origin, found.way, found.weight)
 
 
 def _panes(beams: NDArray[np.float64]) -> list[KlemsScattering]:
-    """What passes straight on through window groups, by their patches [G, K]."""
+    """Straight beams through window groups, by their patches [G, K]."""
     dark, found = np.zeros((KLEMS_FULL.size, KLEMS_FULL.size)), {}
     for beam in beams:
         if beam.tobytes() not in found:
@@ -145,20 +149,27 @@ def _panes(beams: NDArray[np.float64]) -> list[KlemsScattering]:
 
 
 class _MetInRoom:
-    """What rays find in a room, and behind its windows: patches, and places on surfaces."""
+    """Accumulates hits of rays in a room and behind its windows: patches, points on surfaces."""
 
-    def __init__(self, room: LendingRoom, tracer: TracedScene, tiles: Tiles, sky: SkyBins) -> None:
+    def __init__(
+        self,
+        room: AdjacentRoomLight,
+        tracer: TracedScene,
+        tiles: Tiles,
+        sky: SkyBins,
+        scenes: SceneCache,
+    ) -> None:
         self.room, self.tracer, self.bins = room, tracer, DirectionBins(KLEMS_FULL)
         self._tiles, self._columns = tiles, len(room.groups) * KLEMS_FULL.size
         self._faces = face_numbers(tracer.surface.numpy(), tables(tracer.normal)[0])
         self._outdoors = room.onward[0].first if room.onward else len(room.groups)
-        outside = kept_scene(room.exterior, room.groups[: self._outdoors], centre=tracer.centre)
+        outside = scenes.scene(room.exterior, room.groups[: self._outdoors], centre=tracer.centre)
         self._beyond = SeenOutdoors(outside, sky, tiles)
         self._pixel, self._slot, self._share = [], [], []
-        self._shown: list[tuple[NDArray, NDArray, NDArray, Places]] = []
+        self._shown: list[tuple[NDArray, NDArray, NDArray, SurfacePoints]] = []
 
-    def add(self, lanes: Lanes, block: NDArray[np.int64], start: int) -> None:
-        """Add what some of a block's rays find, those by gloss too; panes onward show nothing."""
+    def add(self, lanes: PixelRays, block: NDArray[np.int64], start: int) -> None:
+        """Add the hits of a block's rays and their specular reflections; glass onwards is black."""
         tracer = self.tracer
         self._beyond.add(through_windows(tracer, _panes(self.room.beam), lanes), block, start)
         for bounce in range(MOST_MIRRORS + 1):
@@ -173,14 +184,19 @@ class _MetInRoom:
             patch = self.bins.index(tracer.to_local(group, way, window))
             cosine = dr.abs(dr.dot(dr.gather(mi.Vector3f, tracer.normal, hit.prim_index), way))
             rho = tracer.diffuse(hit.prim_index, cosine, found)
-            places, *of_hits = face_places(
+            places, *of_hits = hit_points(
                 tracer, origin, way, hit, found, found, window, group, patch, rho, hit.prim_index
             )
             self._sort(lanes, places, of_hits, block, start)
             lanes = mirrored(tracer, lanes, hit, bounce)
 
     def _sort(
-        self, lanes: Lanes, places: Places, of_hits: list[NDArray], block: NDArray, start: int
+        self,
+        lanes: PixelRays,
+        places: SurfacePoints,
+        of_hits: list[NDArray],
+        block: NDArray,
+        start: int,
     ) -> None:
         found, window, group, patch, rho, triangle = of_hits
         lit = np.flatnonzero(window & (group < self._outdoors))
@@ -199,7 +215,7 @@ class _MetInRoom:
         pixel, tile, share = (_joined([s[k] for s in self._shown]) for k in range(3))
         keys, tile = np.unique(tile.astype(np.int64), return_inverse=True)
         size = np.bincount(tile, minlength=len(keys))
-        places = Places.joined([s[3] for s in self._shown])
+        places = SurfacePoints.joined([s[3] for s in self._shown])
         light = self._irradiance(tile, places, size, max_depth, seed)
         luminance, beam, daylight = (
             np.asarray(part, dtype=np.float32)
@@ -219,9 +235,14 @@ class _MetInRoom:
         )
 
     def _irradiance(
-        self, tile: NDArray[np.int64], places: Places, size: NDArray, max_depth: int, seed: int
+        self,
+        tile: NDArray[np.int64],
+        places: SurfacePoints,
+        size: NDArray,
+        max_depth: int,
+        seed: int,
     ) -> NDArray[np.float32]:
-        """Mean irradiance at the places of each tile per unit luminance of the windows [C, N]."""
+        """Mean irradiance at the points of each tile per unit luminance of the windows [C, N]."""
         again = np.ceil(LEAST_PATHS / np.maximum(size, 1)).astype(np.int64)
         order = np.argsort(tile, kind="stable")
         order = np.repeat(order, again[tile[order]])
@@ -240,7 +261,7 @@ class _MetInRoom:
 
     def _add_paths(
         self, matrix: mi.Float64, path: NDArray[np.int64], row: NDArray[np.int64],
-        places: Places, max_depth: int, seed: int,
+        places: SurfacePoints, max_depth: int, seed: int,
     ) -> None:  # fmt: skip
         key, rows = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF), column(row, mi.UInt32)
         first = path[np.unique(row, return_index=True)[1]]  # of each row, for its stream
@@ -262,7 +283,7 @@ def _joined(parts: Sequence[NDArray]) -> NDArray:
 def _shares(
     share: NDArray, place: tuple[NDArray, NDArray], shape: tuple[int, int]
 ) -> sparse.csr_array:
-    """A matrix with entries at rows and columns, those that come again summed."""
+    """A sparse matrix from entries at rows and columns, repeated ones summed."""
     rows, columns = (part.astype(np.int64) for part in place)
     entries = share.astype(np.float32), (rows, columns)
     return sparse.csr_array(sparse.coo_array(entries, shape=shape))

@@ -1,4 +1,4 @@
-"""A year of pictures of one view by the phase methods: the matrices that are traced for it.
+"""Pictures of one view for a year by the phase methods, and the traced matrices of the view.
 
 Three-phase   L = V T D s
 Five-phase    L = V T D s - V_d T D_d s_d + direct sun, with the sun's true disc
@@ -25,7 +25,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, tile_size
-from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.kernels.scene import SceneCache
 from mitsuba_cfs.trace.matrices.pixel_view import PictureBlock, picture_part_blocks
 from mitsuba_cfs.trace.pictures.outdoors import OutdoorCoefficients
 from mitsuba_cfs.trace.sun.picture_beam import BeamLight, faces_luminance
@@ -38,10 +38,9 @@ NEGATIVE = 1e-4  # of the largest luminance: what rounding may leave below zero
 
 @dataclass(frozen=True, slots=True)
 class ViewNoise:
-    """Half the difference of the matrices that two halves of the paths give; axes as theirs.
+    """Half the difference of the matrices of two halves of the pixels (a chequerboard).
 
-    The halves are the squares of a chequerboard of pixels.  A picture of the sum of both differs
-    from the truth, in its root mean square, by as much as the halves differ from it.
+    It estimates the RMS error of the mean of both halves.
     """
 
     indirect: NDArray[np.float32]  # [m, G * K]
@@ -50,21 +49,21 @@ class ViewNoise:
 
 @dataclass(frozen=True, slots=True)
 class ViewMatrices:
-    """A view's matrix in three parts, none of which is negative: V = indirect + lit + seen.
+    """The matrix of a view in three non-negative parts: V = indirect + lit + seen.
 
-    Of hours, the first two hold what the pixels show of the windows' luminance in each of them.
+    With a `PatchLight` the columns of `indirect` and `lit` are its hours in place of patches.
     """
 
     view: View
     pixels: NDArray[np.int64]  # [n] row * width + column of the pixels that show something
     indirect: PictureMatrix  # light after two reflections or more, V - V_d
-    lit: PictureMatrix  # light of the windows that falls on what the pixel shows, in V_d
+    lit: PictureMatrix  # light of the windows on the surface that the pixel shows, in V_d
     seen: sparse.csr_array  # [n, G * K] share of each window patch in each pixel, in V_d
     noise: ViewNoise
     elements: SunlitRows | None = None  # of the rows of `indirect`, for the sun's beam
 
     def of_columns(self, part: slice) -> ViewMatrices:
-        """The same of some columns alone: of some of the hours, where these are the columns."""
+        """The same for some columns: for some hours where hours are the columns."""
         parts = [PictureMatrix(p.rows[:, part], p.row, p.share) for p in (self.indirect, self.lit)]
         of_halves = {name: getattr(self.noise, name)[:, part] for name in ("indirect", "lit")}
         noise = replace(self.noise, **of_halves)
@@ -90,29 +89,31 @@ def view_matrices(
     light: PatchLight | None = None,
     elements: SunlitRows | None = None,
     progress: Progress = silent,
+    scenes: SceneCache | None = None,
     **options: Any,
 ) -> ViewMatrices:
-    """The matrices of a picture's pixels, in memory or, where they are too large, on disk.
+    """The matrices of a picture's pixels, in memory or, if they are too large, on disk.
 
     Args:
-        tile: pixels across of the squares that share their reflected light, each face of each
-            surface for itself, by default as of `tile_size`; 1: every pixel has its own.
+        tile: pixels across of the squares whose pixels share reflected light, separately for each
+            face of each surface, by default `tile_size`; 1: every pixel has its own.
         memory: budget [bytes]; 800 x 800 pixels and a window group take 83 MB, without tiles 1160.
-        folder: of the files where they lie on disk (they go with the process); the system's
-            temporary folder by default.
+        folder: of the files on disk, which end with the process; the system's temporary folder by
+            default.
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
-        light: of hours, which the matrices' columns are then and not the patches.
-        elements: of the same view and options under any light, which are not traced again.
+        light: of hours, which become the columns in place of patches.
+        elements: of the same view and options, traced before under any light.
         options: basis, samples, max_depth, seed of `picture_part_blocks`.
     """
-    tracer = kept_scene(surfaces, groups, window_reflectance=window_reflectance)
+    scenes = SceneCache() if scenes is None else scenes
+    tracer = scenes.scene(surfaces, groups, window_reflectance=window_reflectance)
     tile = tile_size(view) if tile is None else tile
     shared = PictureRows.of_view(tracer, view, tile)
     pixels, row, half, m = shared.pixels, shared.row, shared.half, len(shared.keys)
     patches = len(groups) * options.get("basis", KLEMS_FULL).size
     shape = (2 * m, patches if light is None else light.hours)
     sums = [_storage(shape, 8 * math.prod(shape) > memory, folder) for _ in range(2)]
-    options.update(window_reflectance=window_reflectance, light=light)
+    options.update(window_reflectance=window_reflectance, light=light, scenes=scenes)
     times = shared.times(smoothed=True)
     number = np.repeat(np.arange(len(pixels)), times)
     options.update(pixels=pixels[number], row=half[number], weight=(1 / times)[number])
@@ -139,9 +140,9 @@ def view_matrices(
 def _summed(
     blocks: Iterator[PictureBlock], number: NDArray[np.int64], sums: Sequence[NDArray[np.float32]]
 ) -> sparse.csr_array:
-    """Add what comes after more reflections, and after one, to the rows' sums; what is seen.
+    """Add the light after several reflections, and after one, to the sums; return the direct part.
 
-    Args: number: of the view's pixel that each of the blocks' is.
+    Args: number: of the view's pixel for each pixel of the blocks.
     """
     seen = []
     for block in blocks:
@@ -162,9 +163,9 @@ def _smooth(
     least: float,
     close: NDArray[np.bool_] | None,
 ) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]:
-    """Turn sums by halves [2 m, N] into rows [m] and, below them, their noise [m], both smoothed.
+    """Turn sums by halves [2 m, N] in place into rows [m] and their noise [m], both smoothed.
 
-    Returns: from halves to rows and to their noise [m, 2 m], and the first sums' smoothing [m, m].
+    Returns: matrices from halves to rows and to their noise [m, 2 m], and the smoothing [m, m].
     """
     smooth = shared.smoothing(share, least)
     # sharper for the windows' light, which changes fastest where other surfaces are close
@@ -186,12 +187,12 @@ class FivePhasePictures:
           = indirect (T D s - b) + (lit + seen) (T D s - T D_d s_d) + lit L_s
             + what the room reflects of the sun's beam + sun in each pixel
 
-    b is the sun's beam as the patches have it; what the room reflects of it more than once comes
-    from elements of the surfaces instead, lit by the true disc at its own angle (`room_sun`).
-    L_s is the sun that the windows scatter, on Klems patches; in a pixel that shows a window it is
-    the BSDF's value for the sun and that pixel, and the sun's beam falls on each pixel for itself.
-    With `show_outdoors` what a window's straight beam shows is no mean over patches either, nor is
-    what it lights.
+    b is the sun's beam in patches; its light after several reflections comes from cells of the
+    surfaces instead, lit by the true disc at its own angle (`room_sun`).  L_s is the sunlight that
+    the windows scatter, by Klems patches; a pixel that shows a window has the BSDF's value for the
+    sun and that pixel, and the beam is tested for each pixel.  With `show_outdoors` the outdoors
+    seen through the straight beam, and the beam's light on surfaces, are not means over patches
+    either.
     """
 
     def __init__(
@@ -247,12 +248,12 @@ class FivePhasePictures:
         *,
         light: BeamLight | None = None,
     ) -> None:
-        """See the outdoors through the windows' straight beam pixel by pixel.
+        """Show the outdoors through the windows' straight beam pixel by pixel.
 
         Args:
             daylight, direct_daylight: D and D_d [G, K, P].
             sky, sun: [P, H] the sky without the sun, and the sun alone: s = sky + sun.
-            light: of the beam on the room's surfaces; by patches without it.
+            light: of the beam on the room's surfaces; without it, by patches.
         """
         sky, sun = np.asarray(sky), np.asarray(sun)
         daylight, direct = np.asarray(daylight), np.asarray(direct_daylight)
@@ -267,7 +268,7 @@ class FivePhasePictures:
             self._light = light
 
     def light(self, batch: NDArray[np.int64]) -> PatchLight:
-        """What the view's paths meet in the windows in some hours."""
+        """Window luminances for the view's paths in some hours."""
         rest, suns, strength = (
             self._lighting[:, batch], self._directions[batch], self._illuminance[batch]
         )  # fmt: skip
@@ -275,7 +276,7 @@ class FivePhasePictures:
         return PatchLight(rest + scattered.reshape(rest.shape), self._reflected[:, batch])
 
     def see_by(self, matrices: ViewMatrices) -> None:
-        """Take matrices whose columns are the hours, traced under `light` of them all."""
+        """Set matrices whose columns are the hours, traced with `light` of all hours."""
         self._matrices, self._of_hours = matrices, True
 
     @property
@@ -352,7 +353,7 @@ class FivePhasePictures:
         return rows, values
 
     def _columns(self, batch: NDArray[np.int64]) -> tuple[NDArray, NDArray]:
-        """What the columns of `lit` and of `indirect` are in some hours [.., h]."""
+        """Factors of the columns of `lit` and `indirect` in some hours [.., h]."""
         if self._of_hours:
             own = np.eye(self.hours, dtype=np.float32)[:, batch]
             return own, own

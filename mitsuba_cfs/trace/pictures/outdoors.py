@@ -1,7 +1,7 @@
-"""What a view shows of the outdoors straight through its windows, pixel by pixel.
+"""The outdoors in a view, straight through the windows, pixel by pixel.
 
-The phase methods see the sky through a window in the window's Klems patches, 10 to 15 degrees wide,
-and as the mean over the window.  What the system's straight beam shows is known better than that.
+The phase methods resolve the sky through a window by Klems patches, 10 to 15 degrees wide, and by
+the mean over the window.  Here each ray of a pixel follows the straight beam outdoors.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from mitsuba_cfs.trace.kernels.sampling import (
     vectors,
 )
 from mitsuba_cfs.trace.kernels.scattering import Scattering
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 from mitsuba_cfs.trace.matrices.daylight import add_daylight_paths
-from mitsuba_cfs.trace.sun.lit_points import Places, face_places
+from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_points
 from mitsuba_cfs.trace.sun.outdoors import (
     MOST_MIRRORS,
-    Lanes,
     OutdoorSun,
+    PixelRays,
     RoughFaces,
     RoughSun,
     ShownFaces,
@@ -50,17 +50,19 @@ BLOCK_BYTES = 128 * 2**20
 PATCH_POINTS = 16  # directions in each window patch, for its mean transmittance
 MAX_DEPTH = 16
 RAYS = 2**20  # at once
-_Met = tuple[Lanes, NDArray[np.int64], NDArray[np.float32], Places]  # and triangle, reflectance
+_Met = tuple[
+    PixelRays, NDArray[np.int64], NDArray[np.float32], SurfacePoints
+]  # and triangle, reflectance
 
 
 @dataclass(frozen=True)
 class OutdoorCoefficients:
     """Luminance of the pixels through the windows' straight beam, per unit luminance of the sky.
 
-    What surfaces reflect is added by `sun`; `sky` and `reflected` are for the sky without the sun.
+    `sun` has the sunlight on surfaces; `sky` and `reflected` are for the sky without the sun.
     """
 
-    sky: sparse.csr_array  # [n, P] sky and ground that the pixel shows itself
+    sky: sparse.csr_array  # [n, P] sky and ground that the pixel shows directly
     reflected: sparse.csr_array  # [C, P] irradiance of the faces in each tile
     beam: NDArray[np.float64]  # [G, K] transmittance of the beam, mean over each window patch
     sun: OutdoorSun
@@ -79,17 +81,19 @@ def outdoors(
     samples: int = 8,
     tile: int | None = None,
     seed: int = 0,
+    scenes: SceneCache | None = None,
 ) -> OutdoorCoefficients:
     """Trace every pixel through the windows to the sky; arguments as for `direct_sun_matrix`.
 
     Args:
         subdivision: Reinhart's MF of the sky.
-        samples: paths for each pixel, at as many places within it.
-        tile: pixels across of the squares that share what varies slowly over a face, by default
-            as of `tile_size`.
+        samples: paths for each pixel.
+        tile: pixels across of the squares that share slowly varying light on a face, by default
+            `tile_size`.
     """
-    inside = kept_scene(interior, groups)
-    outside = kept_scene(exterior, groups)
+    scenes = SceneCache() if scenes is None else scenes
+    inside = scenes.scene(interior, groups)
+    outside = scenes.scene(exterior, groups)
     sky, tile = SkyBins(ReinhartSky(subdivision)), tile_size(view) if tile is None else tile
     pixels = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
     rays_at_once = max(256, RAYS // samples)
@@ -106,34 +110,34 @@ def outdoors(
 
 
 class SeenOutdoors:
-    """What rays of a view's pixels find outdoors, block by block."""
+    """Accumulates hits of the pixels' rays outdoors, block by block."""
 
     def __init__(self, outside: TracedScene, sky: SkyBins, tiles: Tiles) -> None:
-        """Nothing yet."""
+        """Empty."""
         self._outside, self._sky, self._tiles = outside, sky, tiles
         self._face = face_numbers(outside.surface.numpy(), tables(outside.normal)[0])
         self._free: list[sparse.csr_array] = []
         self._shown: list[ShownFaces] = []
         self._rough: list[RoughFaces] = []
 
-    def add(self, lanes: Lanes, block: NDArray[np.int64], start: int) -> None:
-        """Add what rays of a block of pixels, the first of them number `start`, find."""
+    def add(self, lanes: PixelRays, block: NDArray[np.int64], start: int) -> None:
+        """Add the hits of a block of pixels, the first of which is number `start`."""
         rows = sparse.csr_array((len(block), self._sky.size), dtype=np.float32)
         for bounce in range(MOST_MIRRORS + 1):
             if not len(lanes.row):
                 break
-            seen, met, lanes = _looked_at(self._outside, self._sky, lanes, len(block), bounce)
+            seen, met, lanes = _sky_and_hits(self._outside, self._sky, lanes, len(block), bounce)
             rows = rows + seen
             self._shown.append(_with_faces(met, block, start, self._face, self._tiles))
             self._rough += _rough_faces(self._outside, met, start)
         self._free.append(rows)
 
     def sky(self) -> sparse.csr_array:
-        """Sky and ground that each pixel shows itself [n, P]."""
+        """Sky and ground that each pixel shows directly [n, P]."""
         return sparse.csr_array(sparse.vstack(self._free))
 
     def faces(self, seed: int) -> tuple[ShownFaces, sparse.csr_array, sparse.csr_array]:
-        """The faces by tile, what smooths them [C, C], and their irradiance [C, P], smoothed."""
+        """The faces by tile, their smoothing [C, C], and their smoothed irradiance [C, P]."""
         found, keys = _joined(self._shown)
         count = np.bincount(found.tile, minlength=len(keys))
         smooth = smoothing(self._tiles, keys, count)
@@ -145,31 +149,37 @@ class SeenOutdoors:
         return RoughSun(self._outside, RoughFaces.joined(self._rough)) if self._rough else None
 
 
-def view_lanes(inside: TracedScene, view: View, pixels: NDArray[np.int64], samples: int) -> Lanes:
+def view_lanes(
+    inside: TracedScene, view: View, pixels: NDArray[np.int64], samples: int
+) -> PixelRays:
     """Rays of a block's pixels from the eye."""
     eye = np.asarray(view.position) - inside.centre
     row = np.repeat(np.arange(len(pixels)), samples)
     directions, exists = spread_rays(view, pixels, samples)
     start = np.tile(eye[:, None], len(row)).astype(np.float32)
     share = np.full(len(row), 1.0 / samples)
-    return Lanes(row, start, directions.T.astype(np.float32), share).some(np.flatnonzero(exists))
+    return PixelRays(row, start, directions.T.astype(np.float32), share).some(
+        np.flatnonzero(exists)
+    )
 
 
-def through_windows(inside: TracedScene, scattering: Sequence[Scattering], lanes: Lanes) -> Lanes:
-    """Those of a block's rays in a room that meet a window, and go straight on, at the window."""
+def through_windows(
+    inside: TracedScene, scattering: Sequence[Scattering], lanes: PixelRays
+) -> PixelRays:
+    """Rays of a block that pass a window straight, at the window."""
     found = []
     for bounce in range(MOST_MIRRORS + 1):
         if not len(lanes.row):
             break
         passed, lanes = _passed(inside, scattering, lanes, bounce)
         found.append(passed)
-    return Lanes.joined(found)
+    return PixelRays.joined(found)
 
 
 def _passed(
-    inside: TracedScene, scattering: Sequence[Scattering], lanes: Lanes, bounce: int
-) -> tuple[Lanes, Lanes]:
-    """Rays that go straight on through windows, and those that go on by glossy surfaces."""
+    inside: TracedScene, scattering: Sequence[Scattering], lanes: PixelRays, bounce: int
+) -> tuple[PixelRays, PixelRays]:
+    """Rays that pass windows straight, and those reflected by glossy surfaces."""
     origin, way = vectors(lanes.origin.T, mi.Point3f), vectors(lanes.way.T)
     hit = inside.scene.ray_intersect_preliminary(mi.Ray3f(origin, way), coherent=not bounce)
     active = hit.is_valid()
@@ -184,20 +194,20 @@ def _passed(
     tau = np.broadcast_to(tau, len(lanes.row)).astype(float)
     lit = np.flatnonzero(tau > 0)
     place = np.broadcast_to(place, (len(lanes.row), 3)).T[:, lit]
-    passed = Lanes(lanes.row[lit], place, lanes.way[:, lit], (lanes.weight * tau)[lit])
+    passed = PixelRays(lanes.row[lit], place, lanes.way[:, lit], (lanes.weight * tau)[lit])
     return passed, mirrored(inside, lanes, hit, bounce)
 
 
-def _looked_at(
-    outside: TracedScene, sky: SkyBins, lanes: Lanes, count: int, bounce: int
-) -> tuple[sparse.csr_array, _Met, Lanes]:
-    """Rows [count, P] of what is sky; what the other lanes met; lanes that go on by its gloss."""
+def _sky_and_hits(
+    outside: TracedScene, sky: SkyBins, lanes: PixelRays, count: int, bounce: int
+) -> tuple[sparse.csr_array, _Met, PixelRays]:
+    """Sky in the rays by row [count, P]; hits of the others; rays reflected by gloss."""
     origin, way = vectors(lanes.origin.T, mi.Point3f), vectors(lanes.way.T)
     hit, origin = outside.met_outdoors(origin, way, mi.Bool(True))
     found = hit.is_valid()
     face = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, found)
     rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(face, way)), found)
-    places, met, rho, patch, prim = face_places(
+    places, met, rho, patch, prim = hit_points(
         outside, origin, way, hit, found, found, rho, sky.index(way), hit.prim_index
     )
     patch = patch.astype(np.int64)
@@ -209,7 +219,7 @@ def _looked_at(
 
 
 def _rough_faces(outside: TracedScene, met: _Met, start: int) -> list[RoughFaces]:
-    """Those of the faces that rays met whose gloss is rough."""
+    """Hits on faces with rough gloss."""
     lanes, prim, _, places = met
     if outside.gloss is None or not len(prim):
         return []
@@ -220,21 +230,21 @@ def _rough_faces(outside: TracedScene, met: _Met, start: int) -> list[RoughFaces
 
 
 def _with_faces(met: _Met, block: NDArray, start: int, faces: NDArray, tiles: Tiles) -> ShownFaces:
-    """What a block's rays met, by face and tile."""
+    """Hits of a block's rays by face and tile."""
     lanes, prim, rho, places = met
     tile = tiles.of_pixels(block[lanes.row], faces[prim])
     return ShownFaces(start + lanes.row, tile, lanes.weight * rho / np.pi, places)
 
 
 def _joined(shown: Sequence[ShownFaces]) -> tuple[ShownFaces, NDArray[np.int64]]:
-    """The faces of all blocks, their tiles numbered from 0, and the keys of these."""
+    """The faces of all blocks with tiles numbered from 0, and the keys of the tiles."""
     none, nothing = np.empty(0, dtype=np.int64), np.empty(0)
     pixel, tile = (
         np.concatenate([none, *(getattr(s, name) for s in shown)]) for name in ("pixel", "tile")
     )
     value = np.concatenate([nothing, *(s.value for s in shown)])
     numbers, tile = np.unique(tile, return_inverse=True)
-    return ShownFaces(pixel, tile, value, Places.joined([s.places for s in shown])), numbers
+    return ShownFaces(pixel, tile, value, SurfacePoints.joined([s.places for s in shown])), numbers
 
 
 def _reflected(

@@ -4,11 +4,8 @@
 
 Sharp, from the pixel's own rays: the sun's disc, its beam on surfaces, the sun that a window
 scatters towards the eye, sky and outdoors through the straight beam, what the glass mirrors.
-Shared (`picture_sharing`), as it varies slowly over a face and its noise would make false glare
-sources: light that reaches a surface after one reflection or more or from the windows, and
-the sky that a window scatters.
-
-What changes from pixel to pixel on a surface in a picture: the sun on it, and its gloss.
+Shared (`pixel_rows`), because it varies slowly over a face and its noise would make false glare
+sources: light on a surface from windows or after reflections, and the sky that a window scatters.
 """
 
 from __future__ import annotations
@@ -31,14 +28,14 @@ from mitsuba_cfs.trace.kernels.sampling import (
     lattice,
     lattice_2d,
     path_generator,
-    pixel_places,
+    pixel_positions,
     tables,
     vectors,
 )
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.paths.disc import add_disc, add_mirrored_discs, eye_of
 from mitsuba_cfs.trace.paths.point_in_time import add_paths, leave, window_parts, window_sun
-from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
+from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
 from mitsuba_cfs.trace.paths.sun import Vertex, on_disc, surface_sun
 
 BLOCK = 2**19  # paths traced at a time
@@ -46,7 +43,7 @@ WINDOW_STEPS = (1,)  # [tiles] of the smoothing where windows scatter
 
 
 def _sharp_light(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky,
     vertex: Vertex,
     triangle: mi.UInt32,
@@ -58,7 +55,7 @@ def _sharp_light(
     depth: mi.UInt32,
     active: mi.Bool,
 ) -> mi.Float64:
-    """Radiance of surfaces by the sun itself, and by what their gloss shows, for each ray."""
+    """Radiance of surfaces by the direct sun and by their gloss, for each ray."""
     sun = surface_sun(
         room, sky, vertex, triangle, direction,
         rho=rho, came=mi.Float(0), u=u_sun, generator=generator, active=active,
@@ -86,7 +83,7 @@ def _sharp_light(
 
 
 def point_in_time_picture(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky,
     view: View,
     *,
@@ -134,7 +131,7 @@ def point_in_time_picture(
 
 
 def colour_picture(
-    rooms: Sequence[LitRoom], skies: Sequence[Sky], view: View, **options: Any
+    rooms: Sequence[PathTracingScene], skies: Sequence[Sky], view: View, **options: Any
 ) -> NDArray[np.float32]:
     """Radiance picture [ny, nx, 3] [W/m2/sr] of red, green and blue.
 
@@ -168,9 +165,9 @@ def _add_shared(
 
 
 class _Faces:
-    """Numbers of the faces of a room: windows, both sides of faces indoors, then outdoors."""
+    """Numbers of faces: windows, then both sides of faces indoors, then outdoors."""
 
-    def __init__(self, room: LitRoom) -> None:
+    def __init__(self, room: PathTracingScene) -> None:
         self.windows = len(room.systems) + 1  # the last: windows seen from outdoors
         self._inside, count = self._table(room.inside)
         self._outside, _ = self._table(room.outside)
@@ -194,7 +191,7 @@ class _Faces:
 
 @dataclass(frozen=True)
 class _Light:
-    """What the rays [n] of a block share: a face each, its weight in the ray, the path's light."""
+    """Shared light of the rays [n] of a block: face, its weight in the ray, the path's light."""
 
     face: NDArray[np.int64]
     weight: NDArray[np.float64]  # 0 where the ray shows no such face
@@ -224,7 +221,7 @@ class _Kernel:
 
     def __init__(
         self,
-        room: LitRoom,
+        room: PathTracingScene,
         sky: Sky,
         view: View,
         faces: _Faces,
@@ -236,7 +233,7 @@ class _Kernel:
     ) -> None:
         self._room, self._sky, self._view, self._faces = room, sky, view, faces
         self._tiles = tiles
-        self._samples, self._places = samples, pixel_places(samples)
+        self._samples, self._places = samples, pixel_positions(samples)
         self._eye = eye_of(room, view)
         self._depth = dr.opaque(mi.UInt32, max_depth)
         self._key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
@@ -244,7 +241,7 @@ class _Kernel:
         self._mirrors = any(m is not None for system in room.systems for m in system.mirrors)
 
     def trace(self, pixels: NDArray, shifts: NDArray) -> tuple[NDArray, list[_Light]]:
-        """The pixels' own light [n], and the light of their rays that is to be shared."""
+        """Sharp light of the pixels [n], and the light of their rays to share."""
         n = self._samples
         number = np.repeat(pixels, n)
         across, down = np.mod(self._places + shifts[:, None], 1.0).reshape(-1, 2).T
@@ -262,7 +259,7 @@ class _Kernel:
         return sharp.numpy().reshape(-1, n).mean(axis=1), lights
 
     def _strata(self, number: NDArray) -> tuple[mi.UInt32, mi.UInt32]:
-        """Tile of each ray of pixels, and its number in the tile: what is shared is stratified."""
+        """Tile of each ray, and its number in the tile, to stratify the shared light."""
         size, n = self._tiles.size, self._samples
         row, column = np.divmod(number, self._view.width)
         tile = self._tiles.of_pixels(number, np.zeros_like(number))
@@ -362,7 +359,7 @@ class _Kernel:
         return sharp, shared
 
     def _scatters(self, group: mi.Int32) -> mi.Bool:
-        """Which window groups do more than pass a beam."""
+        """Which window groups scatter light."""
         found = mi.Bool(False)
         for g, system in enumerate(self._room.systems):
             found |= (group == g) & (system.bsdf is not None)
@@ -377,7 +374,7 @@ class _Kernel:
         generator: mi.PCG32,
         active: mi.Bool,
     ) -> tuple[mi.Float64, tuple[mi.UInt32, mi.Float, mi.Float64]]:
-        """What rays that go straight on show: sky, and sun on outdoor surfaces; these to share."""
+        """Sharp light of rays straight outdoors, and their light to share."""
         room, sky = self._room, self._sky
         outside = room.outside
         lane, outdoors = dr.arange(mi.UInt32, dr.width(direction)), mi.Bool(True)

@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.sky.sun import SUN_RADIUS
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, path_generator, tables, vectors
 from mitsuba_cfs.trace.kernels.scene import TracedScene
-from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SunWay, sun_ways
+from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SpecularPath, specular_sun_paths
 
 BOUNCES = 5  # surfaces that a path meets at most
 ROULETTE = 0.5  # share of light below which paths are thinned out
@@ -50,7 +50,7 @@ KEY = 2**32  # of a node's number along one axis, to hold both
 
 
 @dataclass(frozen=True)
-class Places:
+class SurfacePoints:
     """Points on surfaces, each with the normal of the side that is meant."""
 
     point: NDArray[np.float32]  # [m, 3] in the tracer's coordinates, clear of the surface
@@ -61,10 +61,10 @@ class Places:
         """Number of points."""
         return len(self.point)
 
-    def some(self, chosen: NDArray) -> Places:
+    def some(self, chosen: NDArray) -> SurfacePoints:
         """Some of the points, by number or mask."""
         number = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
-        return Places(self.point.take(number, axis=0), self.normal.take(number, axis=0))
+        return SurfacePoints(self.point.take(number, axis=0), self.normal.take(number, axis=0))
 
     def points(self) -> mi.Point3f:
         """The points as a kernel takes them."""
@@ -75,33 +75,33 @@ class Places:
         return vectors(self.normal)
 
     @staticmethod
-    def joined(parts: list[Places]) -> Places:
+    def joined(parts: list[SurfacePoints]) -> SurfacePoints:
         """The points of all parts."""
         nowhere = np.empty((0, 3), dtype=np.float32)
-        return Places(
+        return SurfacePoints(
             np.concatenate([nowhere, *(p.point for p in parts)]),
             np.concatenate([nowhere, *(p.normal for p in parts)]),
         )
 
 
 @dataclass(frozen=True)
-class ReflectingPlaces:
+class ReflectingPoints:
     """Points that paths meet; axis q."""
 
     path: NDArray[np.int64]  # [q] number of the path
     weight: NDArray[np.float64]  # [q] product of reflectances, the point's own included
-    places: Places  # [q]
+    places: SurfacePoints  # [q]
     first: int  # number of points that the paths meet first; the others follow these
 
 
-def reflecting_places(
+def reflecting_points(
     tracer: TracedScene,
-    start: Places,
+    start: SurfacePoints,
     seed: int,
     bounces: int = BOUNCES,
     *,
     mirrored: bool = False,
-) -> ReflectingPlaces:
+) -> ReflectingPoints:
     """The points that one path from each start meets, one after the other.
 
     Args: mirrored: whether E_sun includes the sun in smooth mirrors.
@@ -124,12 +124,12 @@ def reflecting_places(
         path, places, weight = path[on], places.some(on), weight[on] / survival[on]
     first = met[0].size if met else 0
     path, weight = np.concatenate(paths), np.concatenate(weights)
-    return ReflectingPlaces(path, weight, Places.joined(met), first)
+    return ReflectingPoints(path, weight, SurfacePoints.joined(met), first)
 
 
 def _next(
-    tracer: TracedScene, places: Places, generator: mi.PCG32
-) -> tuple[NDArray[np.bool_], Places, NDArray[np.float32], NDArray[np.float32]]:
+    tracer: TracedScene, places: SurfacePoints, generator: mi.PCG32
+) -> tuple[NDArray[np.bool_], SurfacePoints, NDArray[np.float32], NDArray[np.float32]]:
     """Which paths meet a reflecting surface, the points, reflectances, random numbers for roulette.
 
     The reflectances [2, m] are the total one, and that without smooth mirrors.
@@ -142,12 +142,12 @@ def _next(
     rho = tracer.whole(hit.prim_index, way, found)
     own = tracer.without_mirrors(hit.prim_index, way, found)
     others = found, rho, own, luck
-    after, found, rho, own, luck = face_places(tracer, point, way, hit, found, *others)
+    after, found, rho, own, luck = hit_points(tracer, point, way, hit, found, *others)
     kept = found & (rho > 0)
     return kept, after.some(kept), np.stack([rho, own])[:, kept], luck[kept]
 
 
-def face_places(
+def hit_points(
     tracer: TracedScene,
     origin: mi.Point3f,
     way: mi.Vector3f,
@@ -159,13 +159,13 @@ def face_places(
 
     Args: others: values of the same kernel, which one launch computes together with the points.
 
-    Returns: the `Places`, then the others as arrays.
+    Returns: the `SurfacePoints`, then the others as arrays.
     """
-    point, face, *others = tables(*met_faces(tracer, origin, way, hit, found), *others)
-    return Places(point, face), *others
+    point, face, *others = tables(*hit_faces(tracer, origin, way, hit, found), *others)
+    return SurfacePoints(point, face), *others
 
 
-def met_faces(
+def hit_faces(
     tracer: TracedScene,
     origin: mi.Point3f,
     way: mi.Vector3f,
@@ -185,8 +185,8 @@ def on_disc_of(centre: mi.Vector3f, number: mi.UInt32) -> mi.Vector3f:
     return mi.Frame3f(centre).to_world(local)
 
 
-def place_and_hour(
-    places: Places, suns: NDArray[np.float64], pair: mi.UInt32 | None = None
+def points_and_suns(
+    places: SurfacePoints, suns: NDArray[np.float64], pair: mi.UInt32 | None = None
 ) -> tuple[mi.Point3f, mi.Vector3f, mi.Vector3f]:
     """Point, normal and direction to the sun of pairs of points and hours, of all [m * h]."""
     lane = dr.arange(mi.UInt32, places.size * len(suns)) if pair is None else pair
@@ -198,34 +198,34 @@ def place_and_hour(
 
 
 def sunlight(
-    outside: TracedScene, places: Places, suns: NDArray[np.float64]
+    outside: TracedScene, places: SurfacePoints, suns: NDArray[np.float64]
 ) -> NDArray[np.float32]:
     """Irradiance of points outdoors per unit normal to the sun, mirrored sun included [m, h]."""
     light = mi.Float(0)
-    for way in sun_ways(outside):
-        turned = way.turned(suns)
-        point, normal, to_sun = place_and_hour(places, turned)
+    for way in specular_sun_paths(outside):
+        turned = way.apparent(suns)
+        point, normal, to_sun = points_and_suns(places, turned)
         middle = column((places.normal @ turned.T).ravel())
         light += _shone(way, point, normal, to_sun, middle)
     return light.numpy().reshape(places.size, len(suns))
 
 
 def sunlight_of_pairs(
-    way: SunWay, places: Places, suns: NDArray[np.float64], pair: mi.UInt32
+    way: SpecularPath, places: SurfacePoints, suns: NDArray[np.float64], pair: mi.UInt32
 ) -> mi.Float:
     """The same of some pairs by one specular path; suns: [h, 3] apparent directions."""
-    point, normal, to_sun = place_and_hour(places, suns, pair)
+    point, normal, to_sun = points_and_suns(places, suns, pair)
     middle = dr.gather(mi.Vector3f, vectors(suns), pair % dr.opaque(mi.UInt32, len(suns)))
     return _shone(way, point, normal, to_sun, dr.dot(normal, middle))
 
 
 def sunlight_of_each(
-    outside: TracedScene, places: Places, suns: NDArray[np.float64]
+    outside: TracedScene, places: SurfacePoints, suns: NDArray[np.float64]
 ) -> NDArray[np.float32]:
     """The same of each point by a sun of its own [m, 3]: [m]."""
     light, number = mi.Float(0), dr.arange(mi.UInt32, places.size)
-    for way in sun_ways(outside):
-        turned = way.turned(suns)
+    for way in specular_sun_paths(outside):
+        turned = way.apparent(suns)
         to_sun = on_disc_of(vectors(turned), number)
         middle = column((places.normal * turned).sum(axis=1))
         light += _shone(way, places.points(), places.normals(), to_sun, middle)
@@ -233,7 +233,7 @@ def sunlight_of_each(
 
 
 def _shone(
-    way: SunWay, point: mi.Point3f, normal: mi.Vector3f, to_sun: mi.Vector3f, middle: mi.Float
+    way: SpecularPath, point: mi.Point3f, normal: mi.Vector3f, to_sun: mi.Vector3f, middle: mi.Float
 ) -> mi.Float:
     """Cosine times transmittance of a direction on the sun's disc; 0 where it is hidden.
 
@@ -242,7 +242,7 @@ def _shone(
     """
     slant = dr.dot(normal, to_sun)
     cosine = dr.select(middle > SUN_RADIUS, middle, slant)
-    share = way.reaching(mi.Ray3f(point, to_sun), slant > 0)
+    share = way.transmittance(mi.Ray3f(point, to_sun), slant > 0)
     return dr.select(cosine > 0, cosine * share, 0.0)
 
 
@@ -276,11 +276,11 @@ class SunGrid:
         mixed = (bits @ np.array([0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D], dtype=np.uint64)) >> 12
         return cls(suns, nodes, corner.reshape(-1, 3), weight, mixed.astype(np.int64) % MIRRORED)
 
-    def light(self, way: SunWay, places: Places) -> mi.Float:
+    def light(self, way: SpecularPath, places: SurfacePoints) -> mi.Float:
         """Irradiance of points by a specular path per unit normal to the suns [m * h]."""
-        nodes, suns = way.turned(self.nodes), way.turned(self.suns)
-        point, normal, to_node = place_and_hour(places, nodes)
-        at = way.reaching(mi.Ray3f(point, to_node), dr.dot(normal, to_node) > 0)
+        nodes, suns = way.apparent(self.nodes), way.apparent(self.suns)
+        point, normal, to_node = points_and_suns(places, nodes)
+        at = way.transmittance(mi.Ray3f(point, to_node), dr.dot(normal, to_node) > 0)
         dr.eval(at)
         count = dr.opaque(mi.UInt32, len(suns))
         place = dr.arange(mi.UInt32, places.size * len(suns))
@@ -312,9 +312,9 @@ class SunGrid:
 
 
 def sunlight_of_many(
-    outside: TracedScene, places: Places, suns: NDArray[np.float64]
+    outside: TracedScene, places: SurfacePoints, suns: NDArray[np.float64]
 ) -> NDArray[np.float32]:
     """`sunlight` of many points [m, h] by the grid, unbiased in the sum over the points."""
     grid = SunGrid.about(suns)
-    light = sum(grid.light(way, places) for way in sun_ways(outside))
+    light = sum(grid.light(way, places) for way in specular_sun_paths(outside))
     return light.numpy().reshape(places.size, len(suns))

@@ -23,9 +23,9 @@ from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.trace.kernels.sampling import column, path_generator, vectors
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import (
-    Places,
-    place_and_hour,
-    reflecting_places,
+    SurfacePoints,
+    points_and_suns,
+    reflecting_points,
     sunlight,
     sunlight_of_each,
 )
@@ -37,7 +37,7 @@ GATHERED = 16  # points at most that reflect the sun to a tile
 
 
 @dataclass(frozen=True)
-class Lanes:
+class PixelRays:
     """Rays of the pixels of a block; axis r."""
 
     row: NDArray[np.int64]  # [r] of the pixel in its block
@@ -45,19 +45,19 @@ class Lanes:
     way: NDArray[np.float32]  # [3, r]
     weight: NDArray[np.float64]  # [r] share of what the pixel shows
 
-    def some(self, chosen: NDArray) -> Lanes:
+    def some(self, chosen: NDArray) -> PixelRays:
         """Some of the rays."""
-        return Lanes(
+        return PixelRays(
             self.row[chosen], self.origin[:, chosen], self.way[:, chosen], self.weight[chosen]
         )
 
     @staticmethod
-    def joined(parts: list[Lanes]) -> Lanes:
+    def joined(parts: list[PixelRays]) -> PixelRays:
         """All of several."""
         if len(parts) == 1:
             return parts[0]
         none, nowhere = np.empty(0, dtype=np.int64), np.empty((3, 0), dtype=np.float32)
-        return Lanes(
+        return PixelRays(
             np.concatenate([none, *(p.row for p in parts)]),
             np.concatenate([nowhere, *(p.origin for p in parts)], axis=1),
             np.concatenate([nowhere, *(p.way for p in parts)], axis=1),
@@ -66,8 +66,8 @@ class Lanes:
 
 
 def mirrored(
-    tracer: TracedScene, lanes: Lanes, hit: mi.PreliminaryIntersection3f, bounce: int
-) -> Lanes:
+    tracer: TracedScene, lanes: PixelRays, hit: mi.PreliminaryIntersection3f, bounce: int
+) -> PixelRays:
     """The rays after a specular reflection at the surfaces that rays met; none without gloss."""
     none = np.empty(0, dtype=np.int64)
     if tracer.gloss is None or bounce >= MOST_MIRRORS or not len(lanes.row):
@@ -79,7 +79,7 @@ def mirrored(
         hit.prim_index, face, way, mi.Float(0), path_generator(lane, mi.UInt32(bounce)), found
     )
     kept = np.flatnonzero((glossy & (weight > 0)).numpy())
-    return Lanes(
+    return PixelRays(
         lanes.row[kept],
         position.numpy()[:, kept],
         towards.numpy()[:, kept],
@@ -95,7 +95,7 @@ class RoughFaces:
     weight: NDArray[np.float64]  # [r] share of the pixel
     triangle: NDArray[np.int64]  # [r]
     way: NDArray[np.float32]  # [3, r] of the rays
-    places: Places  # [r]
+    places: SurfacePoints  # [r]
 
     @staticmethod
     def joined(parts: list[RoughFaces]) -> RoughFaces:
@@ -106,7 +106,7 @@ class RoughFaces:
             np.concatenate([none.astype(float), *(p.weight for p in parts)]),
             np.concatenate([none, *(p.triangle for p in parts)]),
             np.concatenate([np.empty((3, 0), np.float32), *(p.way for p in parts)], axis=1),
-            Places.joined([p.places for p in parts]),
+            SurfacePoints.joined([p.places for p in parts]),
         )
 
     def some(self, chosen: NDArray) -> RoughFaces:
@@ -118,7 +118,7 @@ class RoughFaces:
 
     def lobes(self, outside: TracedScene, suns: NDArray[np.float64]) -> NDArray[np.float32]:
         """f cos of the sun at each face, 0 where it is hidden [r, h]."""
-        point, normal, to_sun = place_and_hour(self.places, suns)
+        point, normal, to_sun = points_and_suns(self.places, suns)
         face = dr.arange(mi.UInt32, self.places.size * len(suns)) // dr.opaque(mi.UInt32, len(suns))
         cosine = dr.dot(normal, to_sun)
         lit = cosine > 0
@@ -160,7 +160,7 @@ class ShownFaces:
     pixel: NDArray[np.int64]  # [r] row of the pixel
     tile: NDArray[np.int64]  # [r] number of the face in a tile of pixels
     value: NDArray[np.float64]  # [r] tau rho / pi over the number of the pixel's rays
-    places: Places  # [r]
+    places: SurfacePoints  # [r]
 
 
 class OutdoorSun:
@@ -215,7 +215,7 @@ class OutdoorSun:
             hours = lit[start : start + step]
             strength = illuminance[hours].astype(np.float32)
             light = sunlight(self._outside, self._places, suns[hours])
-            self._look_again(light, suns[hours])
+            self._resample_edges(light, suns[hours])
             found[:, hours] = self._pixels @ (light * strength)
             if self._reflecting.size:
                 light = sunlight(self._outside, self._reflecting, suns[hours]) * strength
@@ -224,7 +224,7 @@ class OutdoorSun:
         for hour, luminance in zip(values, found.T, strict=True):
             hour[self._shown] += luminance
 
-    def _look_again(self, light: NDArray[np.float32], suns: NDArray[np.float64]) -> None:
+    def _resample_edges(self, light: NDArray[np.float32], suns: NDArray[np.float64]) -> None:
         """Set the mean over all points of a pixel where the edge of a shadow crosses it [.., h]."""
         hour, pixel = edge_pixels((self._pixels @ light).T > 0, self._number, self._view)
         one, pair = _each(self._first[pixel], self._first[pixel + 1])
@@ -248,11 +248,11 @@ def _each(
 
 def _reflecting(
     outside: TracedScene, shown: ShownFaces, count: int, seed: int
-) -> tuple[Places, sparse.csr_array]:
+) -> tuple[SurfacePoints, sparse.csr_array]:
     """Points [q] that reflect the sun to the tiles, and each tile's share of their light [C, q]."""
     if not shown.places.size:
         return shown.places, sparse.csr_array((count, 0))
-    met = reflecting_places(outside, shown.places, seed, mirrored=True)
+    met = reflecting_points(outside, shown.places, seed, mirrored=True)
     tile = shown.tile[met.path]
     chosen, share = _thinned(tile, met.weight, np.random.default_rng(seed))
     share /= np.maximum(np.bincount(shown.tile, minlength=count), 1)[tile[chosen]]

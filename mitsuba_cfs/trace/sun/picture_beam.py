@@ -1,13 +1,13 @@
-"""The windows' straight beam on what a view's pixels show of the room, point by point.
+"""The windows' straight beam on the surfaces that a view shows, point by point.
 
     L[row] = sum over sky patches p of B[row, p] s[p]
              + sum over window patches k of F[row, k] L_outdoors[k]
 
-The view matrix has a window's light as the mean over its patches, 10 to 15 degrees wide, and over
-the window.  On a wall beside a window that is wrong by multiples: it sees the pane at grazing
-angles, where the last patch's mean passes what the glass does not, and the one part of the sky
-that a point has before it is not the window's mean.  Here each ray has the transmittance of its own
-angle, and meets the sky or a surface outdoors itself; only how bright the surface is, is a mean.
+The view matrix resolves the light of a window by patches, 10 to 15 degrees wide, and by the mean
+over the window.  On a wall beside a window this is wrong by a factor: the wall sees the pane at
+grazing angles, where the mean of the last patch transmits and the glass does not, and the part of
+the sky that a point sees is not the window's mean.  Here each ray has the transmittance at its own
+angle and meets the sky or a surface outdoors itself; only the luminance of that surface is a mean.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
-from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, shown_hits, tile_size
+from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, pixel_hits, tile_size
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, tables
 from mitsuba_cfs.trace.kernels.scattering import Scattering
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 
 SAMPLES = 128  # of each tile, each with a ray to a point of the windows and one by the cosine
 PATHS = 2**22  # of a view at most, but one of each pixel
@@ -40,7 +40,7 @@ LEAST_SHARE = 0.02  # of a window patch that surfaces fill, below which few path
 
 @dataclass(frozen=True, slots=True)
 class BeamLight:
-    """What the windows' beams bring to a picture's rows, per unit luminance outdoors."""
+    """Luminance of a picture's rows by the windows' beams, per unit luminance outdoors."""
 
     transmittance: NDArray[np.float64]  # [G, K] of the beams by patch; 0: not among them
     sky: sparse.csr_array  # [m, P] of the sky that the rows see themselves
@@ -53,12 +53,12 @@ class BeamLight:
         return (self.sky @ sky + self.faces @ faces).T
 
     def noise(self, sky: NDArray[np.float32], faces: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The noise of the same [h, m]."""
+        """Noise of these [h, m]."""
         return (self.sky_noise @ sky + self.faces_noise @ faces).T
 
 
 def faces_luminance(daylight: ArrayLike, direct: ArrayLike, sky: ArrayLike) -> NDArray[np.float32]:
-    """Mean luminance of the surfaces that each window patch sees outdoors [G * K, H].
+    """Mean luminance of the outdoor surfaces that each window patch sees [G * K, H].
 
     Args: daylight, direct: D and D_d [G, K, P]; sky: [P, H] with its sun.
     """
@@ -80,16 +80,18 @@ def beam_light(
     basis: KlemsBasis = KLEMS_FULL,
     tile: int | None = None,
     seed: int = 0,
+    scenes: SceneCache | None = None,
 ) -> BeamLight:
-    """Trace a view's pixels to the windows and straight on; rows as of `view_matrices`.
+    """Trace a view's pixels to the windows and straight through; rows as in `view_matrices`.
 
     Args:
-        scattering: how each group passes light; None for a group that is left out.
-        transmittance: [G, K] of the beams in the matrices T, of what is left out 0.
+        scattering: of each group's system; None leaves a group out.
+        transmittance: [G, K] of the beams in the matrices T; 0 for groups left out.
         subdivision: Reinhart's MF of the sky.
         tile: as of `view_matrices`.
     """
-    inside, outside = kept_scene(interior, groups), kept_scene(exterior, groups)
+    scenes = SceneCache() if scenes is None else scenes
+    inside, outside = scenes.scene(interior, groups), scenes.scene(exterior, groups)
     tile = tile_size(view) if tile is None else tile
     rows = PictureRows.of_view(inside, view, tile)
     samples = int(np.clip(PATHS // max(len(rows.pixels), 1), 1, -(-SAMPLES // tile**2)))
@@ -116,7 +118,7 @@ def beam_light(
 
 
 class _Look:
-    """Rays from what pixels show to the windows, and straight on."""
+    """Rays from the surfaces in pixels to the windows, and straight through."""
 
     def __init__(
         self,
@@ -136,9 +138,9 @@ class _Look:
     def rows(
         self, rows: PictureRows, chosen: NDArray[np.int64], shape: tuple[int, int], seed: int
     ) -> tuple[sparse.csr_array, NDArray[np.float32], NDArray[np.float64]]:
-        """Sums of some pixels [n] over the halves, the pixels' share that shows no window [n].
+        """Sums of some pixels over the halves of rows, and the pixels' share without windows [n].
 
-        And how many equal rays would carry the light of the sky that each row has [m].
+        And the effective number of rays of sky light in each row [m].
         """
         half, number = rows.half, rows.number
         found, share = sparse.csr_array(shape, dtype=np.float32), [np.empty(0, np.float32)]
@@ -198,9 +200,9 @@ class _Look:
     def _shown(
         self, pixels: NDArray[np.int64]
     ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.Bool]:
-        """What rays of pixels meet: place, normal, luminance by irradiance; if it is a window."""
+        """Hits of the pixels' rays: point, normal, luminance per irradiance; whether a window."""
         inside, samples = self._inside, self._samples
-        eye, way, hit, shown = shown_hits(inside, self._view, pixels, samples)
+        eye, way, hit, shown = pixel_hits(inside, self._view, pixels, samples)
         window = shown & (dr.gather(mi.Int32, inside.group, hit.prim_index, shown) != OPAQUE)
         position, normal, rho = inside.surface_at(hit, eye, way, shown)
         beta = dr.select(shown & ~window, rho * dr.inv_pi / samples, 0.0)
@@ -209,7 +211,7 @@ class _Look:
     def _to_point(
         self, position: mi.Point3f, normal: mi.Vector3f, u: mi.Point2f, active: mi.Bool
     ) -> tuple[mi.Vector3f, mi.Float, mi.Int32, mi.Bool]:
-        """Direction, distance and group of a point of the windows, and whether it is seen."""
+        """Direction, distance and group of a point on the windows, and whether it is visible."""
         target, group = self._inside.sample_window(u, active)
         towards = target - position
         distance = dr.norm(towards)
@@ -222,7 +224,7 @@ class _Look:
     def _by_cosine(
         self, position: mi.Point3f, normal: mi.Vector3f, u: mi.Point2f, active: mi.Bool
     ) -> tuple[mi.Vector3f, mi.Float, mi.Int32, mi.Bool]:
-        """The same of what a ray by the cosine meets."""
+        """The same of a cosine-distributed ray."""
         omega = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
         ray = mi.Ray3f(position, omega)
         hit = self._inside.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
@@ -232,7 +234,7 @@ class _Look:
         return omega, dr.select(seen, hit.t, 1.0), dr.select(seen, group, 0), seen
 
     def _through(self, group: mi.Int32, local: mi.Vector3f, active: mi.Bool) -> mi.Float:
-        """Transmittance of the beam of each lane's group, 0 of those left out."""
+        """Transmittance of the beam of each lane's group; 0 for groups left out."""
         chosen, found = dr.gather(mi.Int32, self._way, group, active), mi.Float(0)
         for i, way in enumerate(self._ways):
             mine = active & (chosen == i)

@@ -1,4 +1,4 @@
-"""The sun in the pixels of a view: its disc, its beam on surfaces, its light in the windows."""
+"""The sun in the pixels of a view: disc, beam on surfaces, scattered light in windows."""
 
 from __future__ import annotations
 
@@ -19,34 +19,34 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, opaque_vector, vectors
 from mitsuba_cfs.trace.kernels.scattering import Scattering
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, kept_scene
-from mitsuba_cfs.trace.sun.lit_points import on_disc_of, place_and_hour
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache
+from mitsuba_cfs.trace.sun.lit_points import on_disc_of, points_and_suns
 from mitsuba_cfs.trace.sun.pixels import (
-    EDGE_PLACES,
+    EDGE_SAMPLES,
     before_eye,
     disc_parts,
     disc_rays,
     disc_reach,
     edge_pixels,
-    places_in_pixels,
+    pixel_samples,
 )
 from mitsuba_cfs.trace.sun.room_cells import Beam, RoomCells
 from mitsuba_cfs.trace.sun.room_sun import EDGE_POINTS, SunElements
-from mitsuba_cfs.trace.sun.specular_paths import SunWay, sun_ways
+from mitsuba_cfs.trace.sun.specular_paths import SpecularPath, specular_sun_paths
 
 LANES = 1 << 23  # pairs of pixel and sun traced at a time
 CELL_POINTS = 4096  # on all windows, that the sun is followed from to the cells of the room
 LEAST_POINTS = 256  # on each window group
-WINDOW_POINTS = 64  # on each group, for the share of it that the sun reaches
+WINDOW_POINTS = 64  # on each group, for its sunlit share
 PATCH_POINTS = 16  # directions in each window patch, for its mean of scattered sun
 
 
 class PictureSun:
-    """What a view shows of the sun, without any reflection but the pixel's own.
+    """The sun in the pixels of a view, without reflections before the one that the pixel shows.
 
-    Every pixel is looked at through its middle, and the sun's beam falls on it or not; only pixels
-    at the edge of a shadow are looked at in several places.  The sun's disc itself is cut into
-    small pieces, so that it has its solid angle whatever the pixels' size.
+    One ray through the centre of each pixel decides whether the beam falls on it; pixels at the
+    edge of a shadow get several rays.  Small pieces of the sun's disc give it its solid angle
+    whatever the size of the pixels.
     """
 
     def __init__(
@@ -58,21 +58,25 @@ class PictureSun:
         view: View,
         *,
         basis: KlemsBasis = KLEMS_FULL,
-        way: SunWay | None = None,
+        way: SpecularPath | None = None,
+        scenes: SceneCache | None = None,
     ) -> None:
-        """Find what each pixel shows; arguments as for `direct_sun_matrix`.
+        """Trace the first hit of each pixel; arguments as for `direct_sun_matrix`.
 
-        Args: way: to the sun; by default the straight one, and then all mirrors outdoors besides.
+        Args: way: specular path to the sun; by default the direct one and all mirrors outdoors.
         """
+        scenes = SceneCache() if scenes is None else scenes
         if len(scattering) != len(groups):
             raise ValueError(f"{len(scattering)} systems for {len(groups)} window groups")
-        self._inside = kept_scene(interior, groups)
-        self._outside = kept_scene(exterior, groups, windows_block=False)
-        self._way = SunWay(self._outside) if way is None else way
+        self._inside = scenes.scene(interior, groups)
+        self._outside = scenes.scene(exterior, groups, windows_block=False)
+        self._way = SpecularPath(self._outside) if way is None else way
         self._free = self._way.free
         around = interior, exterior, groups, scattering, view
-        mirrors = sun_ways(self._outside)[1:] if way is None else []
-        self._mirrors = [PictureSun(*around, basis=basis, way=mirror) for mirror in mirrors]
+        mirrors = specular_sun_paths(self._outside)[1:] if way is None else []
+        self._mirrors = [
+            PictureSun(*around, basis=basis, way=mirror, scenes=scenes) for mirror in mirrors
+        ]
         self._scattering, self._bins = tuple(scattering), DirectionBins(basis)
         self.view = view
         directions, counts = pixel_directions(view)
@@ -85,7 +89,7 @@ class PictureSun:
         self._look()
 
     def _look(self) -> None:
-        """Trace every pixel's middle: its window group, place, normal and reflectance."""
+        """Trace the centre of every pixel: its window group, point, normal and reflectance."""
         tracer = self._inside
         direction = vectors(self._directions)
         hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(self._eye, direction), coherent=True)
@@ -116,7 +120,7 @@ class PictureSun:
     def add_to(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
         """Add the sun's light on surfaces and windows [cd/m2] to the pixels' values [h, n].
 
-        Its disc is apart: `add_disc`, `discs`.
+        Without its disc: see `add_disc` and `discs`.
 
         Args: suns: [h, 3] directions to the disc; illuminance: [h] normal to it [lx].
         """
@@ -139,7 +143,7 @@ class PictureSun:
     def on_elements(
         self, elements: SunElements, suns: NDArray, illuminance: NDArray
     ) -> NDArray[np.float32]:
-        """Luminance [m, h] of a picture's rows by the sun that parts of the room reflect."""
+        """Luminance [m, h] of a picture's rows by the sun that the surfaces of the room reflect."""
         shining = np.flatnonzero((suns[:, 2] > 0) & (illuminance > 0))
         found = np.zeros((elements.share.shape[0], len(suns)), dtype=np.float32)
         irradiance = self._on_cells(elements.cells, suns[shining], illuminance[shining])
@@ -170,13 +174,13 @@ class PictureSun:
         step = max(1, LANES // places.size)
         for start in range(0, len(lit), step):
             hours = lit[start : start + step]
-            light = self._beam_at(*place_and_hour(places, suns[hours]))
+            light = self._beam_at(*points_and_suns(places, suns[hours]))
             light = light.reshape(places.size, len(hours))
-            self._look_at_edges(elements, light, suns[hours])
+            self._resample_pieces(elements, light, suns[hours])
             found[:, hours] += elements.near @ (light * illuminance[hours].astype(np.float32))
 
-    def _look_at_edges(self, elements: SunElements, near: NDArray, suns: NDArray) -> None:
-        """Put the mean over its points on each piece near rows that the edge of sun crosses."""
+    def _resample_pieces(self, elements: SunElements, near: NDArray, suns: NDArray) -> None:
+        """Set the mean over several points of each piece that the edge of a spot of sun crosses."""
         element, hour = elements.edges.crossed(near)
         step = LANES // EDGE_POINTS
         for start in range(0, len(hour), step):
@@ -191,17 +195,17 @@ class PictureSun:
     def _beam_at(
         self, point: mi.Point3f, normal: mi.Vector3f, to_sun: mi.Vector3f
     ) -> NDArray[np.float32]:
-        """Irradiance of places through the windows, per unit normal to the sun [n]."""
+        """Irradiance of points through the windows, per unit normal to the sun [n]."""
         cosine = dr.dot(normal, to_sun)
         tau = self._straight(point, to_sun, cosine > 0)
         return dr.select(tau > 0, tau * cosine, 0.0).numpy()
 
     def _turned(self, suns: NDArray, illuminance: NDArray) -> tuple[NDArray, NDArray]:
-        """Where the light of suns comes from, and its illuminance: 0 with the sun down."""
-        return self._way.turned(suns), np.where(suns[:, 2] > 0, illuminance, 0.0)
+        """Apparent directions of suns, and their illuminance: 0 with the sun down."""
+        return self._way.apparent(suns), np.where(suns[:, 2] > 0, illuminance, 0.0)
 
     def _shining(self, suns: NDArray, illuminance: NDArray) -> NDArray[np.int64]:
-        """The hours in which the sun stands before a window."""
+        """Hours with the sun in front of a window."""
         facing = np.any([suns @ g.frame[2] > 0 for g in self._inside.groups], axis=0)
         return np.flatnonzero(facing & (illuminance > 0))
 
@@ -222,9 +226,9 @@ class PictureSun:
         return found
 
     def _add(self, values, lit, columns, suns, strength, kernel, *options, edges=False) -> None:
-        """Add what a kernel gives for pairs of hours and pixels, some hours at a time.
+        """Add the values of a kernel for pairs of hours and pixels, some hours at a time.
 
-        Args: edges: whether what it gives ends within pixels, which are then looked at again.
+        Args: edges: whether to sample pixels again that a shadow's edge crosses.
         """
         if not len(columns):
             return
@@ -239,7 +243,7 @@ class PictureSun:
             found = kernel(lane - hour * width, hour, towards, light, *options)
             found = found.numpy().reshape(-1, len(columns))
             if edges:
-                self._look_again(found, suns[part], strength[part])
+                self._resample_edges(found, suns[part], strength[part])
             for row, hour_values in zip(lit[part], found, strict=True):
                 some = np.flatnonzero(hour_values)  # the sun falls on few pixels
                 values[row, columns[some]] += hour_values[some]
@@ -254,15 +258,15 @@ class PictureSun:
         value = rho * dr.inv_pi * cosine * tau * dr.gather(mi.Float, light, hour)
         return dr.select(tau > 0, value, 0.0)
 
-    def _look_again(self, found: NDArray, suns: NDArray, light: NDArray) -> None:
-        """Put the mean over its places into each pixel [h, m] that the edge of a shadow crosses.
+    def _resample_edges(self, found: NDArray, suns: NDArray, light: NDArray) -> None:
+        """Set the mean over several rays in each pixel [h, m] that the edge of a shadow crosses.
 
-        That is where the sun falls on its middle and not on a neighbour's, or the reverse.
+        There the sun falls on the pixel's centre and not on a neighbour's, or the reverse.
         """
         hour, pixel = edge_pixels(found > 0, self.pixels[self._surface], self.view)
         order = np.argsort(pixel, kind="stable")  # each is looked at once for all of its hours
         hour, pixel = hour[order], pixel[order]
-        step = LANES // EDGE_PLACES
+        step = LANES // EDGE_SAMPLES
         for start in range(0, len(hour), step):
             some, part = pixel[start : start + step], hour[start : start + step]
             found[part, some] = self._beam_in_pixels(some, suns[part]) * light[part]
@@ -274,24 +278,24 @@ class PictureSun:
         """
         shown, row = np.unique(pixel, return_inverse=True)
         place, normal, rho = self._places_in(self.pixels[self._surface[shown]])
-        lane = dr.arange(mi.UInt32, len(pixel) * EDGE_PLACES)
-        pair = lane // EDGE_PLACES
-        number = lane - pair * EDGE_PLACES
-        at = dr.gather(mi.UInt32, column(row, mi.UInt32), pair) * EDGE_PLACES + number
-        on_disc = dr.gather(mi.UInt32, column(pixel, mi.UInt32), pair) * EDGE_PLACES + number
+        lane = dr.arange(mi.UInt32, len(pixel) * EDGE_SAMPLES)
+        pair = lane // EDGE_SAMPLES
+        number = lane - pair * EDGE_SAMPLES
+        at = dr.gather(mi.UInt32, column(row, mi.UInt32), pair) * EDGE_SAMPLES + number
+        on_disc = dr.gather(mi.UInt32, column(pixel, mi.UInt32), pair) * EDGE_SAMPLES + number
         to_sun = on_disc_of(dr.gather(mi.Vector3f, vectors(suns), pair), on_disc)
         cosine = dr.dot(dr.gather(mi.Vector3f, normal, at), to_sun)
         rho = dr.gather(mi.Float, rho, at)
         tau = self._straight(dr.gather(mi.Point3f, place, at), to_sun, (rho > 0) & (cosine > 0))
         value = dr.select(tau > 0, rho * dr.inv_pi * cosine * tau, 0.0)
-        return (dr.block_sum(value, EDGE_PLACES) / EDGE_PLACES).numpy()
+        return (dr.block_sum(value, EDGE_SAMPLES) / EDGE_SAMPLES).numpy()
 
     def _places_in(self, pixels: NDArray[np.int64]) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
-        """Surfaces that places spread over pixels [k] show, their normals and reflectances.
+        """Points, normals and reflectances of surfaces in rays spread over pixels [k].
 
-        The reflectance is 0 where they show none.
+        The reflectance is 0 where a ray shows no surface.
         """
-        tracer, direction = self._inside, vectors(places_in_pixels(self.view, pixels))
+        tracer, direction = self._inside, vectors(pixel_samples(self.view, pixels))
         ray = mi.Ray3f(self._eye, direction)
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True)
         shown = hit.is_valid()
@@ -303,21 +307,21 @@ class PictureSun:
 
     @dr.syntax
     def _straight(self, place: mi.Point3f, to_sun: mi.Vector3f, active: mi.Bool) -> mi.Float:
-        """Transmittance of the straight way from places in the room to the sun; 0 if hidden."""
+        """Transmittance from points in the room straight to the sun; 0 if hidden."""
         ray = mi.Ray3f(place, to_sun)
         hit = self._inside.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         active = active & hit.is_valid()
         group = dr.gather(mi.Int32, self._inside.group, hit.prim_index, active)
         active &= group != OPAQUE
         tau = dr.zeros(mi.Float, dr.width(active))
-        if active:  # few rays meet a window: the others skip its BSDF and the way outdoors
+        if active:  # few rays meet a window: the others skip its BSDF and the ray outdoors
             tau = self._passed(group, mi.Point3f(place + to_sun * hit.t), to_sun, active)
         return tau
 
     def _passed(
         self, group: mi.Int32, window: mi.Point3f, to_sun: mi.Vector3f, active: mi.Bool
     ) -> mi.Float:
-        """Transmittance from places on windows to the sun."""
+        """Transmittance from points on windows to the sun."""
         local = self._inside.to_local(group, to_sun, active)
         active = active & (local.z > 0)
         tau = mi.Float(0)
@@ -325,7 +329,7 @@ class PictureSun:
             tau = dr.select(active & (group == g), system.through(local), tau)
         if not self._free:
             active &= tau > 0
-            tau *= self._way.reaching(mi.Ray3f(window, to_sun), active, coherent=True)
+            tau *= self._way.transmittance(mi.Ray3f(window, to_sun), active, coherent=True)
         return tau
 
     def _scattered_in_panes(self, pixel, hour, suns, light, g: int) -> mi.Float:
@@ -336,14 +340,14 @@ class PictureSun:
         lit, share = local.z > 0, mi.Float(1)
         if not self._free:
             ray = mi.Ray3f(dr.gather(mi.Point3f, place, pixel), to_sun)
-            share = self._way.reaching(ray, lit, coherent=True)
+            share = self._way.transmittance(ray, lit, coherent=True)
         f = share * self._scattering[g].scattered(local, dr.gather(mi.Vector3f, towards, pixel))
         return dr.select(lit, f * local.z * dr.gather(mi.Float, light, hour), 0.0)
 
     def scattered_luminance(self, suns: NDArray, illuminance: NDArray) -> NDArray[np.float32]:
-        """Luminance [G, K, h] of the windows by the sun that they scatter, mean over each group.
+        """Luminance [G, K, h] of the sunlight that windows scatter, mean over each group.
 
-        f is the mean over each patch; where part of the group lies in shadow, its share counts.
+        f is the mean over each patch, times the sunlit share of the group.
         """
         K, h, G = self._bins.size, len(suns), len(self._panes)
         result = np.zeros((G, K, h), dtype=np.float32)
@@ -379,17 +383,17 @@ class PictureSun:
         )
         step = self._inside.exterior_normal(g) * self._inside.epsilon
         ray = mi.Ray3f(place + step, dr.gather(mi.Vector3f, suns, hour))
-        seen = self._way.reaching(ray, dr.full(mi.Bool, True, dr.width(lane)))
+        seen = self._way.transmittance(ray, dr.full(mi.Bool, True, dr.width(lane)))
         return seen.numpy().reshape(-1, WINDOW_POINTS).mean(axis=1)
 
     def add_disc(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
-        """Add the disc as the eye sees it, by its share of each pixel; arguments of `add_to`."""
+        """Add the visible disc to the pixels by its share of each; arguments as of `add_to`."""
         self._add_disc(values, *self._turned(suns, illuminance), None)
 
     def _add_disc(
         self, values: NDArray, suns: NDArray, illuminance: NDArray, mirror: int | None
     ) -> None:
-        """Add the disc that stands at `suns`, or that a mirror plane of the room shows there."""
+        """Add the disc at directions `suns`, or its image in a mirror plane of the room."""
         lit = self._shining(suns, illuminance) if mirror is None else np.flatnonzero(illuminance)
         suns, strength = suns[lit], illuminance[lit]
         reach = 2 * np.sin(disc_reach(self._size) / 2)
@@ -410,7 +414,7 @@ class PictureSun:
         np.add.at(values, (lit[hour], pixel), seen * strength[hour] / SUN_SOLID_ANGLE)
 
     def _by_mirror(self, towards: mi.Vector3f, plane: int) -> mi.Float:
-        """Share of the sun that comes to the eye by a mirror plane of the room."""
+        """Transmittance from the eye by a mirror plane of the room to the sun."""
         gloss = self._inside.gloss
         normal = opaque_vector(gloss.normals[plane])
         ray = mi.Ray3f(mi.Point3f(self._eye), towards)

@@ -13,7 +13,7 @@ SUBPIXEL = np.radians(0.025)  # between rays to the sun's disc, which so gets 36
 RAYS = 1 << 20  # tried at a time
 PARTS = 512  # of the disc, for its visible share: an edge across it is found to 1 %
 GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))  # [rad]
-EDGE_PLACES = 32  # rays of a pixel at an edge: 8 may show a quarter for a strip of sun of 2 %
+EDGE_SAMPLES = 32  # rays of a pixel at an edge: 8 may show a quarter for a strip of sun of 2 %
 
 
 def disc_parts(sun: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -102,6 +102,6 @@ def edge_pixels(
     return hour, np.concatenate([np.empty(0, dtype=np.int64), *found])
 
 
-def places_in_pixels(view: View, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Directions [k * EDGE_PLACES, 3] evenly spread over each of some pixels [k]."""
-    return spread_rays(view, pixels, EDGE_PLACES)[0]
+def pixel_samples(view: View, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Directions [k * EDGE_SAMPLES, 3] evenly spread over each of some pixels [k]."""
+    return spread_rays(view, pixels, EDGE_SAMPLES)[0]

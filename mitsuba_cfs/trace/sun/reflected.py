@@ -1,14 +1,14 @@
-"""The sun that surfaces outdoors reflect to windows, and to sensors straight through them.
+"""The sun that outdoor surfaces reflect to the windows, and through them straight to sensors.
 
-    L[row] = sum over places m of share[row, m] E_sun[m]
+    L[row] = sum over points m of share[row, m] E_sun[m]
              + sum over rough faces r that its paths meet, weight[r] f(path, sun) E_sun[r]
 
-Paths find the surfaces that a row has light from; a few thousand of the places they meet stand for
-all, and a shadow ray from each to the sun gives its irradiance hour by hour.  No path has to find
-the sun by itself: of a window patch's paths that a surface reflects one in five hundred does.
+Paths find the surfaces that send light to a row; a few thousand of their points represent all, and
+a shadow ray from each to the sun gives its irradiance hour by hour.  The paths need not meet the
+sun themselves: of the reflected paths of a window patch one in five hundred would.
 
-Source: Kajiya 1986, "The rendering equation", with next-event estimation of the sun; the places
-stand for others near by as the virtual lights of Keller 1997, "Instant radiosity".
+Source: Kajiya 1986, "The rendering equation", with next-event estimation of the sun; the points
+represent others nearby as the virtual lights of Keller 1997, "Instant radiosity".
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.matrices.straight_view import straight_rays
 from mitsuba_cfs.trace.sun.lit_points import (
-    Places,
-    face_places,
-    reflecting_places,
+    SurfacePoints,
+    hit_points,
+    reflecting_points,
     sunlight_of_many,
 )
-from mitsuba_cfs.trace.sun.outdoors import MOST_MIRRORS, Lanes, RoughFaces, mirrored
+from mitsuba_cfs.trace.sun.outdoors import MOST_MIRRORS, PixelRays, RoughFaces, mirrored
 
 BOUNCES = 32  # surfaces that a path meets at most; roulette ends most before
-PLACES = 1024  # that stand for all that paths meet, at most and where nothing is said
+PLACES = 1024  # largest number of points that represent the hits of paths, by default
 FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
 MORTON_BITS = 12  # along each axis
 # shifts and masks that leave two empty bits behind each of up to 16
@@ -57,22 +57,22 @@ LANES = 2**22  # shadow rays at once
 
 @dataclass(frozen=True, slots=True)
 class SunShares:
-    """Places that reflect the sun, and what rows have of their irradiance."""
+    """Points that reflect the sun, and the share that rows have of their irradiance."""
 
-    places: Places  # [m]
+    places: SurfacePoints  # [m]
     share: sparse.csr_array  # [rows, m]
     rough: RoughFaces | None = None  # whose lobes the rows see
 
     @classmethod
     def of(cls, met: Sequence[_Met], rows: int, seed: int, *, most: int = PLACES) -> SunShares:
-        """From what paths met: one of each run of near places, drawn by weight, stands for all.
+        """From hits of paths: one of each run of nearby points, drawn by weight, represents all.
 
-        The weights are shares of each row's: a sensor in the depth has as many places as one that
-        sees more.
+        Weights count relative to their row, so that a sensor deep in the room gets as many points
+        as one that sees more.
 
-        Args: most: places, at the most.
+        Args: most: largest number of points.
         """
-        places = Places.joined([m.places for m in met])
+        places = SurfacePoints.joined([m.places for m in met])
         row = np.concatenate([np.empty(0, dtype=np.int64), *(m.row for m in met)])
         weight = np.concatenate([np.empty(0), *(m.weight for m in met)])
         rough = None
@@ -89,20 +89,20 @@ class SunShares:
 
 @dataclass(frozen=True, slots=True)
 class _Met:
-    """Places that paths met, the row that each gives light to, and how much of its irradiance."""
+    """Points that paths met, with the row and weight of each."""
 
     row: NDArray[np.int64]
     weight: NDArray[np.float64]
-    places: Places
+    places: SurfacePoints
     rough: list[RoughFaces]
 
 
 def window_shares(
     outside: TracedScene, *, samples: int, places: int = PLACES, seed: int = 0
 ) -> SunShares:
-    """What window patches have of the sun on surfaces outdoors; rows [Q * K], radiance.
+    """Sunlit outdoor surfaces in the window patches; rows [Q * K], radiance.
 
-    Args: samples: paths of each patch; places: that stand for what they meet, at the most.
+    Args: samples: paths of each patch; places: largest number of points that represent the hits.
     """
     bins, starts = DirectionBins(KLEMS_FULL), []
     K, count = bins.size, len(outside.groups) * bins.size
@@ -134,7 +134,7 @@ def view_shares(
     places: int = PLACES,
     seed: int = 0,
 ) -> SunShares:
-    """What sensors see of the sun on surfaces outdoors through a group's beam; rows [S].
+    """Sunlit outdoor surfaces that sensors see through a group's straight beam; rows [S].
 
     Args:
         sensors: positions and normals [S, 3].
@@ -152,7 +152,7 @@ def outdoor_light(
     suns: NDArray[np.float64],
     strength: NDArray[np.float64],
 ) -> NDArray[np.float32]:
-    """Light of the rows [rows, h] from surfaces outdoors in the sun.
+    """Light of the rows [rows, h] from sunlit outdoor surfaces.
 
     Args: suns: [h, 3]; strength: [h] irradiance normal to it.
     """
@@ -179,13 +179,13 @@ def _met(
     way: mi.Vector3f,
     seed: int,
 ) -> _Met:
-    """The surfaces that paths from windows meet, with what they reflect [1/sr].
+    """Points that paths from windows meet, with their BRDF rho / pi as weights [1/sr].
 
-    By gloss a path goes on to what it mirrors; the sun itself in a mirror is the direct sun's.
+    Gloss sends a path on to the surfaces that it mirrors; the direct sun has the sun in a mirror.
     """
     start, along, share, of = tables(origin, way, weight, row)
     some = np.flatnonzero(share > 0)
-    lanes = Lanes(of.astype(np.int64), start.T, along.T, share.astype(float)).some(some)
+    lanes = PixelRays(of.astype(np.int64), start.T, along.T, share.astype(float)).some(some)
     rows, values, places, rough = [], [], [], []
     for bounce in range(MOST_MIRRORS + 1):
         if not len(lanes.row):
@@ -197,7 +197,7 @@ def _met(
         normal = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, met)
         rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(normal, direction)), met)
         others = met, rho, hit.prim_index, last
-        there, met, rho, prim, begun = face_places(outside, last, direction, hit, met, *others)
+        there, met, rho, prim, begun = hit_points(outside, last, direction, hit, met, *others)
         lanes = replace(lanes, origin=begun.T)
         value = lanes.weight * rho / np.pi
         kept = np.flatnonzero(met & (value > 0))
@@ -208,25 +208,29 @@ def _met(
             rough.append(_rough(outside, lanes, there, np.where(met, prim, 0), met))
         lanes = mirrored(outside, lanes, hit, bounce)
     if not rows:
-        return _Met(np.empty(0, dtype=np.int64), np.empty(0), Places.joined([]), [])
-    row_of, value, first = np.concatenate(rows), np.concatenate(values), Places.joined(places)
-    later = reflecting_places(outside, first, seed, BOUNCES, mirrored=True)
+        return _Met(np.empty(0, dtype=np.int64), np.empty(0), SurfacePoints.joined([]), [])
+    row_of, value, first = (
+        np.concatenate(rows),
+        np.concatenate(values),
+        SurfacePoints.joined(places),
+    )
+    later = reflecting_points(outside, first, seed, BOUNCES, mirrored=True)
     return _Met(
         np.concatenate([row_of, row_of[later.path]]),
         np.concatenate([value, value[later.path] * later.weight]),
-        Places.joined([first, later.places]),
+        SurfacePoints.joined([first, later.places]),
         rough,
     )
 
 
 def _rough(
     outside: TracedScene,
-    lanes: Lanes,
-    places: Places,
+    lanes: PixelRays,
+    places: SurfacePoints,
     triangle: NDArray[np.uint32],
     met: NDArray[np.bool_],
 ) -> RoughFaces:
-    """Those of the faces that rays met whose gloss is rough."""
+    """Hits on faces with rough gloss."""
     alpha = outside.gloss.roughness(column(triangle, mi.UInt32), column(met, mi.Bool)).numpy()
     found = np.flatnonzero(alpha > 0)
     some, faces = lanes.some(found), triangle[found].astype(np.int64)
@@ -234,7 +238,7 @@ def _rough(
 
 
 def _few(rough: RoughFaces) -> RoughFaces:
-    """The first `ROUGH` of those of each row, which are spread as evenly as all of them."""
+    """The first `ROUGH` faces of each row, spread as evenly as all."""
     order = np.argsort(rough.pixel, kind="stable")
     row = rough.pixel[order]
     kept = order[np.arange(len(row)) - np.searchsorted(row, row) < ROUGH]
@@ -246,11 +250,11 @@ def _few(rough: RoughFaces) -> RoughFaces:
 
 
 def _runs(
-    places: Places, weight: NDArray[np.float64], most: int, random: np.random.Generator
+    places: SurfacePoints, weight: NDArray[np.float64], most: int, random: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The run of near places, even in weight, that each is of; the one that stands for each run.
+    """Runs of nearby points, equal in weight: each point's run, and the point that represents it.
 
-    Runs follow Morton's curve over the places of one of 26 directions.
+    Runs follow Morton's curve over the points that face one of 26 directions.
     """
     facing = np.round(FACING * places.normal).astype(np.int64) @ [9, 3, 1]
     side = _numbered(facing - facing.min(initial=0))
@@ -274,13 +278,13 @@ def _runs(
 
 
 def _numbered(values: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The place of small whole numbers [m] among those of them that there are."""
+    """Rank of small whole numbers [m] among the distinct ones."""
     there = np.bincount(values) > 0
     return (np.cumsum(there) - 1)[values]
 
 
 def _morton(point: NDArray[np.float32]) -> NDArray[np.int64]:
-    """The place of points [m, 3] along Morton's curve through the box that holds them."""
+    """Position of points [m, 3] along Morton's curve through their bounding box."""
     low, size = point.min(axis=0), max(float(np.ptp(point, axis=0).max()), 1e-6)
     cell = np.minimum((point - low) / size * 2**MORTON_BITS, 2**MORTON_BITS - 1).astype(np.int64)
     for shift, mask in SPREAD_BITS:
@@ -289,6 +293,6 @@ def _morton(point: NDArray[np.float32]) -> NDArray[np.int64]:
 
 
 def _blocks(places: int, hours: int) -> list[slice]:
-    """Hours in blocks of so many shadow rays as are traced at once."""
+    """Blocks of hours whose shadow rays are traced at once."""
     step = max(1, LANES // max(places, 1))
     return [slice(start, start + step) for start in range(0, hours if places else 0, step)]

@@ -30,7 +30,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
 )
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
-from mitsuba_cfs.trace.sun.lit_points import Places, met_faces
+from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_faces
 from mitsuba_cfs.trace.sun.room_cells import POINTS, RAYS, Beam, RoomCells, surface_cells
 
 CELL_RAYS = 128  # from each cell, in each batch, at most
@@ -46,7 +46,7 @@ class ReflectingCells:
 
     cells: RoomCells  # [w]
     of: NDArray[np.int64]  # [c] which of them each narrower cell lies in
-    starts: Places  # [w * rays] evenly over each
+    starts: SurfacePoints  # [w * rays] evenly over each
 
     @property
     def rays(self) -> int:
@@ -91,7 +91,7 @@ def room_shares(
         samples: rays of each sensor.
     """
     points, normals = (np.atleast_2d(v) for v in sensors)
-    local = Places((points - inside.centre).astype(np.float32), normals.astype(np.float32))
+    local = SurfacePoints((points - inside.centre).astype(np.float32), normals.astype(np.float32))
     narrow, wide = cells[0], cells[1].cells
     every = np.arange(local.size)
     first = _reflected(
@@ -156,7 +156,7 @@ def room_light(
 def _reflected(
     cells: RoomCells,
     inside: TracedScene,
-    starts: Places,
+    starts: SurfacePoints,
     rows: NDArray[np.int64],
     count: int,
     *,
@@ -187,7 +187,7 @@ def _reflected(
         met = hit.is_valid()
         rho = inside.whole(hit.prim_index, way, met)
         met &= rho > 0
-        cell = cells.of(*met_faces(inside, point, way, hit, met), met)
+        cell = cells.of(*hit_faces(inside, point, way, hit, met), met)
         cell, rho = tables(cell, rho)
         kept = np.flatnonzero(cell >= 0)
         entries = rho[kept].astype(float) / samples, (some[kept // samples], cell[kept])

@@ -29,13 +29,13 @@ from mitsuba_cfs.trace.kernels.sampling import (
     lattice_2d,
     opaque,
     opaque_vector,
-    pixel_places,
+    pixel_positions,
     vectors,
 )  # fmt: skip
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
-from mitsuba_cfs.trace.sun.lit_points import Places, met_faces, on_disc_of
-from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SunWay, sun_ways
+from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_faces, on_disc_of
+from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SpecularPath, specular_sun_paths
 
 CELLS = 4096  # that the surfaces' area is divided into, about, on either side
 AREA_POINTS = 2**18  # that the cells' areas are counted by
@@ -88,7 +88,7 @@ class RoomCells:
         found = active & (dr.gather(mi.UInt64, self._table, low, active) == key)
         return dr.select(found, mi.Int32(low), -1)
 
-    def numbers(self, places: Places) -> NDArray[np.int32]:
+    def numbers(self, places: SurfacePoints) -> NDArray[np.int32]:
         """The cell of each place [m], -1 where there is none."""
         if not places.size or not self.size:
             return np.full(places.size, -1, dtype=np.int32)
@@ -96,21 +96,21 @@ class RoomCells:
 
 
 @dataclass(frozen=True, slots=True)
-class SurfacePoints:
+class CellPoints:
     """Points even over a room's surfaces, on both sides, in the order of their cells."""
 
     cells: RoomCells
-    places: Places
+    places: SurfacePoints
     first: NDArray[np.int64]  # [c] number of each cell's first point
     count: NDArray[np.int64]  # [c]
 
 
-def surface_cells(inside: TracedScene, interior: Surfaces) -> SurfacePoints:
+def surface_cells(inside: TracedScene, interior: Surfaces) -> CellPoints:
     """The cells of a room's surfaces, with points on each."""
     none, area = np.empty(0, dtype=np.int64), float(interior.areas.sum())
     if not area > 0:
         cells = RoomCells(1.0, np.zeros(3), 0, none, np.empty(0))
-        return SurfacePoints(cells, Places.joined([]), none, none)
+        return CellPoints(cells, SurfacePoints.joined([]), none, none)
     edge = float(np.sqrt(max(area, 1e-6) / CELLS))
     low = (interior.triangles.min(axis=(0, 1)) - inside.centre) - 0.37 * edge
     points, side = _points_on(interior, inside)
@@ -120,7 +120,7 @@ def surface_cells(inside: TracedScene, interior: Surfaces) -> SurfacePoints:
     found, first = np.unique(keys[order], return_index=True)
     count = np.diff(np.append(first, len(order)))
     cells = RoomCells(edge, low, 0, found, count * (area / AREA_POINTS))
-    return SurfacePoints(cells, points.some(order), first, count)
+    return CellPoints(cells, points.some(order), first, count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,8 +151,8 @@ class Beam:
         found = sparse.csr_array((cells.size, len(suns)))
         if not cells.size:
             return found
-        for by in sun_ways(self.scenes[1]):
-            before = by.turned(suns) @ self.scenes[0].groups[self.group].frame[2] > -SPREAD
+        for by in specular_sun_paths(self.scenes[1]):
+            before = by.apparent(suns) @ self.scenes[0].groups[self.group].frame[2] > -SPREAD
             hours = np.flatnonzero(before)
             if not len(hours):
                 continue
@@ -170,7 +170,7 @@ class Beam:
         return found
 
     def _entering(
-        self, by: SunWay, suns: NDArray[np.float64], points: int
+        self, by: SpecularPath, suns: NDArray[np.float64], points: int
     ) -> tuple[NDArray[np.float32], mi.Point3f, mi.Vector3f]:
         """Flux of rays through points of the windows [h, points], the points and ways out."""
         inside = self.scenes[0]
@@ -181,10 +181,10 @@ class Beam:
         key = dr.opaque(mi.UInt32, self.seed & 0xFFFFFFFF)
         stream = mi.sample_tea_32(opaque(self.group, mi.UInt32), key)[0]
         position = inside.sample_group(self.group, lattice_2d(point, stream, 0))
-        to_sun = on_disc_of(dr.gather(mi.Vector3f, vectors(by.turned(suns)), hour), point)
+        to_sun = on_disc_of(dr.gather(mi.Vector3f, vectors(by.apparent(suns)), hour), point)
         local = inside.to_group(self.group, to_sun)
         start = mi.Point3f(position + inside.outward(opaque(self.group, mi.Int32), mi.Bool(True)))
-        reaching = by.reaching(mi.Ray3f(start, to_sun), local.z > 0)
+        reaching = by.transmittance(mi.Ray3f(start, to_sun), local.z > 0)
         value = dr.select(local.z > 0, local.z * self.scattering.through(local) * reaching, 0.0)
         value *= opaque(inside.groups[self.group].area / points)
         return value.numpy().reshape(len(suns), points), position, to_sun
@@ -205,7 +205,7 @@ class Beam:
         ray, lit = mi.Ray3f(origin, onwards), column(flat > 0, mi.Bool)
         hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=lit)
         lit &= hit.is_valid()
-        cell = cells.of(*met_faces(inside, origin, onwards, hit, lit), lit).numpy()
+        cell = cells.of(*hit_faces(inside, origin, onwards, hit, lit), lit).numpy()
         kept = np.flatnonzero(cell >= 0)
         cell = cell[kept]
         entries = flat[kept].astype(float), (cell, hours[kept // value.shape[1]])
@@ -215,12 +215,12 @@ class Beam:
 @cache
 def _shares_of_corners() -> tuple[NDArray[np.float64], ...]:
     """What points even over a triangle have of its corners, `AREA_POINTS` in turn."""
-    u, v = pixel_places(AREA_POINTS).T[:, :, None]
+    u, v = pixel_positions(AREA_POINTS).T[:, :, None]
     root = np.sqrt(u)
     return 1 - root, root * (1 - v), root * v
 
 
-def _points_on(interior: Surfaces, inside: TracedScene) -> tuple[Places, NDArray[np.int64]]:
+def _points_on(interior: Surfaces, inside: TracedScene) -> tuple[SurfacePoints, NDArray[np.int64]]:
     """Points even over the area of the surfaces, on both of their sides; numbers of the sides."""
     share = np.cumsum(interior.areas)
     marks = (np.arange(AREA_POINTS) + 0.5) / AREA_POINTS * share[-1]
@@ -235,4 +235,4 @@ def _points_on(interior: Surfaces, inside: TracedScene) -> tuple[Places, NDArray
     side = (np.round(FACING * both).astype(np.int64) + 1) @ np.array([1, 3, 9])
     of = np.concatenate([triangle, len(share) + triangle])
     points = np.concatenate([point + off, point - off]).astype(np.float32)
-    return Places(points, both.take(of, axis=0)), side[of]
+    return SurfacePoints(points, both.take(of, axis=0)), side[of]

@@ -12,7 +12,7 @@ it is the irradiance of the room's cells, by the flux of the beam on them (`room
 that the sensors take.  What is near (the wall that meets the floor in a corner) does not: it is
 taken by rays of each tile's own, to pieces as small as they are near, far smaller than a flux could
 be counted in; the sun is asked for at one point of a piece, by a shadow ray, and at many where the
-edge of a spot of sun crosses it (`EdgePlaces`).  The weight of a place at distance d from a surface
+edge of a spot of sun crosses it (`EdgePoints`).  The weight of a place at distance d from a surface
 that is D from the eye goes over from one to the other between d = N D / 2 and N D, N the angle
 of `NEAR_TILES`.
 """
@@ -33,11 +33,11 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.images.view import View, pixel_solid_angles
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
-from mitsuba_cfs.trace.kernels.pixel_rows import FACE_STEPS, PictureRows, numbered, shown_hits
+from mitsuba_cfs.trace.kernels.pixel_rows import FACE_STEPS, PictureRows, numbered, pixel_hits
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, tables
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
-from mitsuba_cfs.trace.sun.lit_points import Places, face_places, reflecting_places
+from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_points, reflecting_points
 from mitsuba_cfs.trace.sun.room_cells import RoomCells, surface_cells
 
 PIECES = 1024  # that the surfaces' area would be divided into by pieces of the widest edge
@@ -54,10 +54,10 @@ SPARSE = ("data", "indices", "indptr", "shape")  # the parts of a sparse matrix
 
 
 @dataclass(frozen=True, slots=True)
-class EdgePlaces:
+class EdgePoints:
     """More points on the pieces near rows, for those that the edge of a spot of sun crosses."""
 
-    places: Places  # [f * EDGE_POINTS]
+    places: SurfacePoints  # [f * EDGE_POINTS]
     beside: sparse.csr_array  # [f, f] 1 for pieces that share an edge, or one holds the other
 
     def crossed(self, light: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -78,8 +78,8 @@ class SunElements:
     share: sparse.csr_array  # [m, c] of the cells
     smooth: sparse.csr_array  # [m, m] of rows, after `share`: the product of both would be full
     near: sparse.csr_array  # [m, f] of the pieces near rows, not to be smoothed
-    places: Places  # [f] one point of each piece
-    edges: EdgePlaces  # of the pieces
+    places: SurfacePoints  # [f] one point of each piece
+    edges: EdgePoints  # of the pieces
 
     def rows(
         self, cells: NDArray[np.float32] | sparse.csr_array, near: NDArray[np.float32]
@@ -133,9 +133,9 @@ class SunlitRows:
             float(data["cell_edge"]), data["cell_low"], int(data["cell_halvings"]),
             data["cell_keys"], data["cell_area"],
         )  # fmt: skip
-        places = Places(data["places_point"], data["places_normal"])
-        more = Places(data["more_point"], data["more_normal"])
-        smooth, edges = _sparse(data, "smooth"), EdgePlaces(more, _sparse(data, "beside"))
+        places = SurfacePoints(data["places_point"], data["places_normal"])
+        more = SurfacePoints(data["more_point"], data["more_normal"])
+        smooth, edges = _sparse(data, "smooth"), EdgePoints(more, _sparse(data, "beside"))
         mean, noise = (
             SunElements(
                 cells, _sparse(data, f"far{i}"), smooth, _sparse(data, f"near{i}"), places, edges
@@ -152,11 +152,11 @@ def _sparse(data: Mapping[str, NDArray[Any]], name: str) -> sparse.csr_array:
 
 @dataclass(frozen=True, slots=True)
 class _Hits:
-    """Places near rows of a picture, that reflect to them."""
+    """Points near rows of a picture, that reflect to them."""
 
     row: NDArray[np.int64]  # [q]
     weight: NDArray[np.floating]  # [q] luminance of the row per unit irradiance of the place
-    places: Places  # [q]
+    places: SurfacePoints  # [q]
     halvings: NDArray[np.int8]  # [q] of the edge of the place's piece
 
     @staticmethod
@@ -167,7 +167,7 @@ class _Hits:
         return _Hits(
             np.concatenate([none, *(p.row for p in parts)]),
             np.concatenate([nothing, *(p.weight for p in parts)]),
-            Places.joined([p.places for p in parts]),
+            SurfacePoints.joined([p.places for p in parts]),
             np.concatenate([small, *(p.halvings for p in parts)]),
         )
 
@@ -178,10 +178,10 @@ class _Shown:
 
     ray: NDArray[np.int64]  # [r] number of the pixel
     value: NDArray[np.float64]  # [r] rho / pi over the number of the pixel's rays
-    places: Places
+    places: SurfacePoints
     reach: NDArray[np.float64]  # [r] how near is near [m]
 
-    def far_share(self, path: NDArray[np.int64], met: Places) -> NDArray[np.float64]:
+    def far_share(self, path: NDArray[np.int64], met: SurfacePoints) -> NDArray[np.float64]:
         """What of the light of places met first counts as far, 0 to 1."""
         distance = np.linalg.norm(met.point - self.places.point[path], axis=1)
         return np.clip(2 * distance / self.reach[path] - 1, 0.0, 1.0)
@@ -227,7 +227,7 @@ class _Look:
     ) -> tuple[sparse.csr_array, NDArray[np.int64]]:
         """The rows' share of the cells but for what is near; the rows that something is near to."""
         shown, row = self._shown(part, samples), part.row
-        found = reflecting_places(self._tracer, shown.places, self._seed * 1_000_003 + key)
+        found = reflecting_points(self._tracer, shown.places, self._seed * 1_000_003 + key)
         weight = found.weight * shown.value[found.path]
         path, met = found.path[: found.first], found.places.some(np.arange(found.first))
         far = shown.far_share(path, met)
@@ -245,7 +245,7 @@ class _Look:
         stream = column(part.row + self._seed * 1_000_003 & 0xFFFFFFFF, mi.UInt32)
         value = dr.gather(mi.Float, column(part.weight / (np.pi * samples)), pixel)
         # ----- What the ray shows, and what is near to that -----
-        eye, way, hit, found = shown_hits(tracer, self._view, part.pixel, samples)
+        eye, way, hit, found = pixel_hits(tracer, self._view, part.pixel, samples)
         start, normal, _ = tracer.surface_at(hit, eye, way, found)
         value *= dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found)
         reach = dr.maximum(hit.t * opaque(self._near), 1e-6)
@@ -266,14 +266,14 @@ class _Look:
         dr.eval(met, found)
         some = dr.compress(found & (value > 0))
         weight, pixel, halvings, *axes = tables(*(dr.gather(type(a), a, some) for a in met))
-        places = Places(np.stack(axes[:3], axis=1), np.stack(axes[3:], axis=1))
+        places = SurfacePoints(np.stack(axes[:3], axis=1), np.stack(axes[3:], axis=1))
         return _Hits(part.row[pixel], weight, places, halvings.astype(np.int8))
 
     def _shown(self, part: _Pixels, samples: int) -> _Shown:
         tracer = self._tracer
-        eye, way, hit, found = shown_hits(tracer, self._view, part.pixel, samples)
+        eye, way, hit, found = pixel_hits(tracer, self._view, part.pixel, samples)
         rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found)
-        places, found, rho, far = face_places(tracer, eye, way, hit, found, found, rho, hit.t)
+        places, found, rho, far = hit_points(tracer, eye, way, hit, found, found, rho, hit.t)
         kept = np.flatnonzero(found & (rho > 0))
         reach = np.maximum(self._near * far[kept], 1e-6)
         value = rho[kept] * part.weight[kept // samples] / (np.pi * samples)
@@ -336,13 +336,13 @@ def window_elements(
         hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(start, inward), coherent=False)
         met = hit.is_valid()
         rho, of = tracer.whole(hit.prim_index, inward, met), paths.patch + paths.group * bins.size
-        places, met, rho, of = face_places(tracer, start, inward, hit, met, met, rho, of)
+        places, met, rho, of = hit_points(tracer, start, inward, hit, met, met, rho, of)
         kept = np.flatnonzero(met & (rho > 0))
         value, row, first = rho[kept] / (np.pi * samples), of[kept].astype(int), places.some(kept)
-        later = reflecting_places(tracer, first, seed * 1_000_003 + paths.group)
+        later = reflecting_points(tracer, first, seed * 1_000_003 + paths.group)
         rows = np.concatenate([row, row[later.path]])
         weight = np.concatenate([value, value[later.path] * later.weight])
-        both = Places.joined([first, later.places])
+        both = SurfacePoints.joined([first, later.places])
         found.append(_cell_shares(cells, rows, weight, both, shape))
 
     window_batches(tracer, bins, 1, samples, seed, follow)(0)
@@ -358,7 +358,7 @@ def _cell_shares(
     cells: RoomCells,
     row: NDArray[np.int64],
     weight: NDArray[np.floating],
-    places: Places,
+    places: SurfacePoints,
     shape: tuple[int, int],
 ) -> sparse.csr_array:
     """Weights of places [q] summed over the cells that these are in, by rows."""
@@ -384,7 +384,7 @@ def _with_pieces(
     more = near.places.some(order[chosen])
     first = more.some(np.arange(0, more.size, EDGE_POINTS))
     alone = sparse.csr_array(sparse.eye_array(far.shape[0], dtype=np.float32))
-    return SunElements(cells, far, alone, share, first, EdgePlaces(more, _beside(cubes)))
+    return SunElements(cells, far, alone, share, first, EdgePoints(more, _beside(cubes)))
 
 
 def _elements(

@@ -17,7 +17,7 @@ LEAST = 1e-9  # of a direction along an axis, to divide by
 CLEAR = 10  # steps off a surface that a box is wider by than what it holds
 
 
-class SunWay:
+class SpecularPath:
     """One specular path to the sun: its apparent direction, and its transmittance."""
 
     def __init__(self, outside: TracedScene, plane: int | None = None) -> None:
@@ -30,14 +30,14 @@ class SunWay:
         """Whether the path goes by a mirror."""
         return self._plane is not None
 
-    def turned(self, suns: NDArray[np.float64]) -> NDArray[np.float64]:
+    def apparent(self, suns: NDArray[np.float64]) -> NDArray[np.float64]:
         """Apparent directions [Q, 3] of suns [Q, 3]: mirrored in the plane."""
         if self._plane is None:
             return suns
         normal = self._outside.gloss.normals[self._plane]
         return suns - 2 * (suns @ normal)[:, None] * normal
 
-    def reaching(self, ray: mi.Ray3f, active: mi.Bool, *, coherent: bool = False) -> mi.Float:
+    def transmittance(self, ray: mi.Ray3f, active: mi.Bool, *, coherent: bool = False) -> mi.Float:
         """Transmittance of rays from points outdoors to the apparent sun; 0 where it is hidden."""
         if self._plane is None:
             hidden = self._outside.hides(ray, active, coherent=coherent)
@@ -83,10 +83,13 @@ def meets_box(
     return leaves >= dr.maximum(enters, 0)
 
 
-def sun_ways(outside: TracedScene) -> list[SunWay]:
+def specular_sun_paths(outside: TracedScene) -> list[SpecularPath]:
     """All specular paths, the direct one first, without mirrors that no window can see."""
     mirrors = [] if outside.gloss is None else outside.gloss.mirrors
-    return [SunWay(outside), *(SunWay(outside, int(p)) for p in mirrors if _seen(outside, p))]
+    return [
+        SpecularPath(outside),
+        *(SpecularPath(outside, int(p)) for p in mirrors if _seen(outside, p)),
+    ]
 
 
 def _seen(outside: TracedScene, plane: int) -> bool:
@@ -103,7 +106,7 @@ def shining(
     """Whether suns [Q, 3] are in front of a plane with normals [G, 3], directly or mirrored."""
     if not len(suns):
         return np.zeros(0, dtype=bool)
-    ways = [way.turned(suns) @ facing.T > 0 for way in sun_ways(outside)]
+    ways = [way.apparent(suns) @ facing.T > 0 for way in specular_sun_paths(outside)]
     return np.any(ways, axis=(0, 2))
 
 

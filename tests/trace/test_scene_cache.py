@@ -29,7 +29,6 @@ def apart(monkeypatch, *given, **chosen):
 
     with monkeypatch.context() as patch:
         patch.setattr(mesh, "FROM", 10**9)
-        patch.setattr(mesh, "_last", [])
         return TracedScene(*given, **chosen)
 
 
@@ -77,42 +76,37 @@ def test_rays_meet_what_they_meet_in_one_mesh(monkeypatch, blocks, half):
 
 
 def test_scenes_of_equal_triangles_share_one_structure():
-    from mitsuba_cfs.trace.kernels.mesh import kept_mesh
-    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.scene import SceneCache
 
-    first, again, groups = town(), town(), rooms.test_room()[1]
-    built = kept_mesh(first.triangles)
-    scenes = [
-        TracedScene(first, groups),
-        TracedScene(again, groups, windows_block=False),
-        TracedScene(again, centre=[3.0, 4.0, 5.0]),
+    first, again, groups, scenes = town(), town(), rooms.test_room()[1], SceneCache()
+    traced = [
+        scenes.scene(first, groups),
+        scenes.scene(again, groups, windows_block=False),
+        scenes.scene(again, centre=[3.0, 4.0, 5.0]),
     ]
-    assert kept_mesh(again.triangles) is built
-    assert {id(scene.scene._solid) for scene in scenes} == {id(built.scene)}
-    assert kept_mesh(town(side=41).triangles) is not built
+    assert len({id(scene.scene._solid) for scene in traced}) == 1
+    other = scenes.scene(town(side=41), groups), SceneCache().scene(first, groups)
+    assert not {id(scene.scene._solid) for scene in other} & {id(traced[0].scene._solid)}
 
 
 def test_what_reaches_far_or_is_small_is_built_about_each_scenes_own_middle():
-    from mitsuba_cfs.trace.kernels.mesh import kept_mesh
+    from mitsuba_cfs.trace.kernels.mesh import SolidMesh
 
-    assert kept_mesh(town().triangles).is_shared
-    assert not kept_mesh(town(spread=300.0).triangles).is_shared
-    assert not kept_mesh(rooms.obstruction().triangles).is_shared
+    assert SolidMesh(town().triangles).is_shared
+    assert not SolidMesh(town(spread=300.0).triangles).is_shared
+    assert not SolidMesh(rooms.obstruction().triangles).is_shared
 
 
 def test_matrix_does_not_know_whether_the_structure_is_shared(monkeypatch):
-    from mitsuba_cfs.trace.kernels import mesh, scene
+    from mitsuba_cfs.trace.kernels import mesh
     from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 
     def traced():
-        scene._last_scenes.clear()
         few = {"samples": 64, "subdivision": 1, "stopping": Stopping(batches=2)}
         return daylight_matrix(town(), rooms.test_room()[1], **few).values
 
     shared = traced()
     monkeypatch.setattr(mesh, "FROM", 10**9)
-    monkeypatch.setattr(mesh, "_last", [])
     alone = traced()
-    scene._last_scenes.clear()
     # of 9,280 paths some ten meet another tile at an edge, and each carries 1/64 of its row at most
     assert np.abs(shared - alone).sum() < 2e-3 * alone.sum()
