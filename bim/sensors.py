@@ -259,8 +259,8 @@ def polygon_sensors(
     Source: the dissertation, section 2.5, with d_Y and d_Z in their places (printed: d_X three
     times); winding number: Sunday 2001.
     """
-    spacing = np.asarray(spacing, dtype=float)
-    if spacing.shape != (3,) or spacing.min() <= 0:
+    steps = np.asarray(spacing, dtype=float)
+    if steps.shape != (3,) or steps.min() <= 0:
         raise ValueError("spacing: expected three positive lengths, along X, Y and Z")
     vector = newell_normal(ring)
     if not np.linalg.norm(vector) > 0:
@@ -270,7 +270,7 @@ def polygon_sensors(
     flat = [plane.to_plane(one)[:, :2] for one in (ring, *holes)]
     edges = np.concatenate([np.stack([one, np.roll(one, -1, axis=0)], axis=1) for one in flat])
     low, high = flat[0].min(axis=0), flat[0].max(axis=0)
-    du, dv = (np.linalg.norm(axis * spacing) for axis in plane.axes[:2])
+    du, dv = (np.linalg.norm(axis * steps) for axis in plane.axes[:2])
     u = np.arange(low[0] + du / 2, high[0], du)
     v = np.arange(low[1] + dv / 2, high[1], dv)
     grid = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
