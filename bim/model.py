@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bim.account import Account
 from bim.colours import GREY, Colour
-from bim.fenestration import ShadingState
+from bim.fenestration import PlainGlass, ShadingState
 from bim.georeference import Georeference
 from bim.held_sensors import ModelGrid, ModelView
 from bim.names import AmbiguousName, UnknownName, found_by_name, label_of
@@ -139,6 +139,7 @@ class Window:
     panes: int | None = None  # of the glazing, as the file states it
     states: tuple[ShadingState, ...] = ()  # of a file that is no IFC: what it holds of the window
     is_open: bool = False  # no glass: a doorway, or where two rooms touch with nothing between
+    glass: PlainGlass | None = None  # where the file describes the glazing as a single pane
     normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, outdoors
     area: float = field(init=False)  # of the glass [m2]
 

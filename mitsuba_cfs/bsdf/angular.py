@@ -1,4 +1,4 @@
-"""Specular systems by their angle of incidence: a table, a formula, or panes behind each other."""
+"""Angular functions of specular systems: a table, a formula, or a stack of panes."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, polarised_values
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.pane_stack import PaneOptics, pane_optics, stack
+from mitsuba_cfs.gloss import polarised_shares
 
 FloatArray = NDArray[np.float64]
 ANGLES = np.radians(np.arange(0.0, 90.25, 0.5))  # that formulas are tabulated at
@@ -21,9 +22,9 @@ OVER = 1e-3  # by which transmittance and reflectance may be more than 1, for ro
 
 @dataclass(frozen=True, slots=True)
 class AngularTable:
-    """How a specular system passes and reflects light, by the angle of incidence alone, one band.
+    """Transmittance and reflectance of a specular system by angle of incidence, one band.
 
-    Between its angles the values are monotone cubics.  At 90 degrees nothing passes and all is
+    Between its angles the values are monotone cubics.  At 90 degrees all light is
     reflected, whether the table has that line or not.
     """
 
@@ -58,7 +59,7 @@ class AngularTable:
         return None if values is None else self._at(values, 1.0, theta)
 
     def by_cosine(self, values: FloatArray | None = None, end: float = 0.0) -> FloatArray:
-        """Shares [STEPS] at even steps of the cosine, 0 to 1; the transmittance by default."""
+        """Shares [STEPS] at uniform steps of the cosine, 0 to 1; the transmittance by default."""
         values = self.transmittance if values is None else values
         return self._at(values, end, np.arccos(np.linspace(0.0, 1.0, STEPS)))
 
@@ -95,13 +96,33 @@ def roos_table(glazing: Glazing) -> AngularTable:
     return AngularTable(ANGLES, tau, front, back)
 
 
-def stack_table(panes: Sequence[Pane]) -> AngularTable:
-    """Panes behind each other, the outer one first.
+def glass_table(panes: Sequence[tuple[float, float]]) -> AngularTable:
+    """Panes of uncoated glass behind each other, absorbing or not, the outer one first.
 
-    All reflections between them are added up by intensity, each polarisation by itself.  Uncoated
-    panes follow Fresnel's equations, coated ones LBNL's shape, alike for either polarisation.
+    Args: panes: transmissivity of each, of one way through the glass at normal incidence without
+        reflections, and its index of refraction.
+
+    Source: Fresnel's equations with all reflections between the faces, each polarisation by
+    itself; a single pane is Radiance's material `glass` ("The RADIANCE 5.1 Synthetic Imaging
+    System", 3.2).
     """
-    whole = stack([_by_polarisation(pane) for pane in panes])
+    cosine = np.cos(ANGLES)
+    shares = [polarised_shares(cosine, index, passed) for passed, index in panes]
+    return _table_of([PaneOptics(tau, rho, rho) for tau, rho in shares])
+
+
+def stack_table(panes: Sequence[Pane]) -> AngularTable:
+    """Angular function of a stack of panes, the outer one first.
+
+    All interreflections are added by intensity, for each polarisation separately.  Uncoated
+    panes follow Fresnel's equations, coated ones LBNL's shape, equal for both polarisations.
+    """
+    return _table_of([_by_polarisation(pane) for pane in panes])
+
+
+def _table_of(panes: Sequence[PaneOptics]) -> AngularTable:
+    """The mean of both polarisations of panes [2, N] behind each other."""
+    whole = stack(panes)
     values = (whole.tau, whole.rho_front, whole.rho_back)
     tau, front, back = (np.clip(one.mean(axis=0), 0, 1) for one in values)
     return AngularTable(ANGLES, tau, front, back)

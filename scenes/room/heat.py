@@ -237,7 +237,7 @@ def heat_of(
         thermal = thermal_result(room, balance, weather, felt_by(comfort, balance, humidity))
         operation = None if room.operation is None else operated_year(room, balance, weather)
         heat = thermal, operation
-        heats.append(heat if store is None else store.kept(heat))
+        heats.append(heat if store is None else store.stored(heat))
     return heats
 
 

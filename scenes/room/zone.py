@@ -117,7 +117,7 @@ def balances(
     return simulate_zones(
         zones, climate(weather), suns, step_s=min(step_s, row_s), row_s=row_s,
         air_links=air_links, transfers=transfers, options=BalanceOptions(terrain=terrain),
-        kept=None if store is None else store.kept,
+        storage=None if store is None else store.stored,
     )  # fmt: skip
 
 

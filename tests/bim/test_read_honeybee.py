@@ -200,8 +200,9 @@ def test_states_of_glass_are_states_of_the_window(tmp_path):
     f = (0.52 / 2.52) ** 2
     for state, t in zip(found.states, (0.9, 0.2), strict=True):
         passed = (1 - f) ** 2 * t / (1 - f**2 * t**2)
+        assert state.angular.transmitted(0.0) == pytest.approx(passed, rel=1e-9)
         through = (one := state.bands["Visible"]).direct_hemispherical(one.transmission_front)[0]
-        assert through == pytest.approx(passed, rel=1e-3)
+        assert through == pytest.approx(passed, rel=2e-3)  # mean of a patch of 5 degrees
         assert state.u_value == 1.1
     assert found.states[0].g_normal == 0.5 and found.states[1].g_normal is None
     (lost,) = of_code(building, "states-not-optical")
@@ -273,7 +274,7 @@ def test_a_bsdf_comes_along(tmp_path):
     from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
     from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-    from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
+    from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 
     clear = specular_klems(Glazing("clear", 0.6, 0.1, 0.1), KLEMS_FULL)
     write_bsdf_xml(BsdfFile({"Visible": clear, "Solar": clear}), tmp_path / "clear.xml")
