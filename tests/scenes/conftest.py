@@ -57,4 +57,4 @@ def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Stubs of rooms' results have no arrays that a run could hold on disk."""
     from scenes.run import rooms
 
-    monkeypatch.setattr(rooms.StoredArrays, "kept", lambda self, room: room)
+    monkeypatch.setattr(rooms.StoredArrays, "stored", lambda self, room: room)
