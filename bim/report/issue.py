@@ -16,14 +16,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 from mitsuba_cfs.notes import Note
 
 Severity = Literal["loss", "warning", "unused", "assumption", "info"]
 Audience = Literal["python", "command"]  # whom a fix is for: an argument, or a flag
 Fill = Callable[..., str]  # of a template's text, by name the values of its fields
-Value = "str | int | float | tuple[str | Phrase, ...] | Phrase"
 SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 CATALOGUE = Path(__file__).parent / "catalogue.toml"
 LISTED = 6  # names that a text lists before it counts the rest
@@ -158,7 +157,7 @@ def issue_rows(
     fill: Fill = str.format,
 ) -> list[tuple[str, str, str, str, str]]:
     """Rows of `COLUMNS`; the consequence is the effect with the fix."""
-    rows = []
+    rows: list[tuple[str, str, str, str, str]] = []
     for issue in issues:
         what, consequence = issue_text(issue, audience, fill).pair
         rows.append((issue.where, what, consequence, issue.code, issue.severity))
@@ -190,11 +189,11 @@ def _fields(template: str) -> frozenset[str]:
 
 
 @cache
-def _tables() -> Mapping[str, dict]:
+def _tables() -> Mapping[str, dict[str, Any]]:
     return tomllib.loads(CATALOGUE.read_text(encoding="utf-8"))
 
 
-def _template(code: str, table: Mapping) -> Template:
+def _template(code: str, table: Mapping[str, Any]) -> Template:
     if table["severity"] not in SEVERITIES:
         raise ValueError(f"issue {code}: severity {table['severity']!r} is none of {SEVERITIES}")
     texts = {key.replace("-", "_"): value for key, value in table.items() if key != "group"}

@@ -223,7 +223,7 @@ def test_the_building_is_a_mean_over_the_floor_area(calendar):
     assert mean.values == pytest.approx([0.25] * 3) and mean.reached == NOT_MET
     assert all_rooms.values == pytest.approx([0.25]) and all_rooms.reached == NOT_MET
     mean, all_rooms = assess_building([room(1.0), room(0.55)], [10.0, 30.0])
-    assert mean.reached == "2 points" and all_rooms.reached.startswith("1 more point")
+    assert mean.reached == "2 points" and all_rooms.reached.startswith("1 additional point")
     mean, _ = assess_building([room(1.0), room(None)], [10.0, 30.0])
     assert mean.reached == NOT_COMPUTED
 
