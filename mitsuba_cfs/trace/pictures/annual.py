@@ -190,9 +190,9 @@ class FivePhasePictures:
     b is the sun's beam in patches; its light after several reflections comes from cells of the
     surfaces instead, lit by the true disc at its own angle (`sunlit_rows`).  L_s is the sunlight
     that the windows scatter, by Klems patches; a pixel that shows a window has the BSDF's value
-    for the sun and that pixel, and the beam is tested for each pixel.  With `show_outdoors` the outdoors
-    seen through the straight beam, and the beam's light on surfaces, are not means over patches
-    either.
+    for the sun and that pixel, and the beam is tested for each pixel.  With `show_outdoors` the
+    outdoors seen through the straight beam, and the beam's light on surfaces, are not means over
+    patches either.
     """
 
     def __init__(

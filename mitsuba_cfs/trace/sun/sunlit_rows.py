@@ -236,7 +236,7 @@ class _Look:
     def far(
         self, part: _Pixels, samples: int, key: int, shape: tuple[int, int]
     ) -> tuple[sparse.csr_array, NDArray[np.int64]]:
-        """Share of the cells in the rows, near surfaces apart; the rows close to another surface."""
+        """Share of the cells in the rows, except near ones; the rows close to another surface."""
         shown, row = self._shown(part, samples), part.row
         found = reflecting_points(self._tracer, shown.places, self._seed * 1_000_003 + key)
         weight = found.weight * shown.value[found.path]
