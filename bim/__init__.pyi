@@ -1,7 +1,7 @@
 """The names of `import bim`, and the modules that they come from."""
 
 from .account import Account as Account
-from .context.surroundings import with_surroundings as with_surroundings
+from .surroundings.placement import with_surroundings as with_surroundings
 from .fenestration import ShadingState as ShadingState
 from .gbxml.building import read_gbxml as read_gbxml
 from .gbxml.write import write_gbxml as write_gbxml

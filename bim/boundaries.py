@@ -19,10 +19,10 @@ from bim.defaults import (
     default_construction,
 )
 from bim.model import Construction, Face, MaterialLayer, Window
+from bim.neighbours import THICKEST_SPAN, Beyond
 from bim.planes import area_vectors
 from bim.rooms import Piece
 from bim.shell import conforming_triangles
-from bim.surroundings import THICKEST_SPAN, Beyond
 from mitsuba_cfs.gloss import Gloss
 
 SHALLOWEST_GAP = 0.01  # air between two elements from this on is a layer [m]

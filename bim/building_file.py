@@ -15,7 +15,7 @@ from bim.fenestration import ShadingState
 from bim.ifc.corrections import corrections_beside, corrections_file
 from bim.ifc.head import check_head
 from bim.model import Building, Window
-from bim.standing import Standing, selected
+from bim.outdoor_model import OutdoorModel, selected
 from mitsuba_cfs.errors import DataError
 
 Progress = Callable[[str, float], None]
@@ -75,7 +75,7 @@ def read_standing_file(
     reflectance: float | None = None,
     selected_in: str | Path = "",
     progress: Progress | None = None,
-) -> Standing:
+) -> OutdoorModel:
     """All elements of a file of any format, and those that selectors choose.
 
     Args:
@@ -88,7 +88,7 @@ def read_standing_file(
     """
     if is_ifc(path):
         from bim.ifc.corrections import corrections_beside
-        from bim.ifc.standing import read_standing
+        from bim.ifc.outdoor_model import read_outdoor_model
 
         beside = corrections_beside(path)
         corrections = replace(
@@ -96,7 +96,7 @@ def read_standing_file(
             leave_out=(*beside.leave_out, *leave_out),
             surroundings=beside.surroundings if reflectance is None else reflectance,
         )
-        return read_standing(
+        return read_outdoor_model(
             path, select, corrections=corrections, selected_in=selected_in, progress=progress
         )
     options = options or ReadOptions()
@@ -114,7 +114,7 @@ def read_standing_file(
     if reflectance is not None:
         both = {"reflectance_visible": reflectance, "reflectance_solar": reflectance}
         elements = tuple(replace(element, **both) for element in elements)
-    return Standing(elements, chosen, tuple(issues), name)
+    return OutdoorModel(elements, chosen, tuple(issues), name)
 
 
 def surrounded(
@@ -123,7 +123,7 @@ def surrounded(
     """The building with what files hold of its surroundings, if there are any."""
     if not files:
         return building
-    from bim.context.surroundings import with_surroundings
+    from bim.surroundings.placement import with_surroundings
 
     return with_surroundings(building, files, offset)
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from bim.account import Account, StoreyAccount
-from bim.coarser import coarser
 from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE
+from bim.mesh_simplification import simplified
 from bim.model import Building, Element, Space
 from bim.names import JOINT, AmbiguousName, UnknownName, found_by_name, label_of
 from bim.outdoors import shut_in_area, unblinded
@@ -63,7 +63,7 @@ def drawn_building(
     issues += more
     elements = [*_envelope(rooms, spaces), *model.elements]
     outdoors = unblinded(elements, spaces)
-    traced, fine = coarser(list(outdoors.elements))
+    traced, fine = simplified(list(outdoors.elements))
     issues += [*outdoors.issues, *fine]
     return Building(
         model.name, tuple(spaces), tuple(traced), tuple(dict.fromkeys(issues)),

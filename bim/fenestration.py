@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.bsdf.angular import AngularTable
+from mitsuba_cfs.bsdf.angular import AngularTable, glass_table
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
@@ -27,6 +27,23 @@ class AngularGValue:
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.polar), len(self.azimuth)):
             raise ValueError("g-values: expected one for each polar angle and azimuth")
+
+
+@dataclass(frozen=True, slots=True)
+class PlainGlass:
+    """Panes of uncoated glass behind each other, as Radiance's material `glass` describes each."""
+
+    panes: tuple[tuple[float, float], ...]  # transmissivity and index of each, the outer one first
+
+    @property
+    def table(self) -> AngularTable:
+        """Visible transmittance and reflectance by the angle of incidence."""
+        return glass_table(self.panes)
+
+    @property
+    def transmittance(self) -> float:
+        """Visible transmittance at normal incidence, with all reflections between the faces."""
+        return float(self.table.transmittance[0])
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from mitsuba_cfs.images.view import View
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HeldGrid:
+class ModelGrid:
     """A sensor grid of the file."""
 
     name: str
@@ -24,7 +24,7 @@ class HeldGrid:
 
 
 @dataclass(frozen=True, slots=True)
-class HeldView:
+class ModelView:
     """A view of the file."""
 
     name: str

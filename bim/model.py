@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from bim.account import Account
 from bim.colours import GREY, Colour
-from bim.fenestration import ShadingState
+from bim.fenestration import PlainGlass, ShadingState
 from bim.georeference import Georeference
-from bim.held_sensors import HeldGrid, HeldView
+from bim.held_sensors import ModelGrid, ModelView
 from bim.names import AmbiguousName, UnknownName, found_by_name, label_of
 from bim.report.issue import Issue
 from bim.use import StatedUse
@@ -139,6 +139,7 @@ class Window:
     panes: int | None = None  # of the glazing, as the file states it
     states: tuple[ShadingState, ...] = ()  # of a file that is no IFC: what it holds of the window
     is_open: bool = False  # no glass: a doorway, or where two rooms touch with nothing between
+    glass: PlainGlass | None = None  # where the file describes the glazing as a single pane
     normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, outdoors
     area: float = field(init=False)  # of the glass [m2]
 
@@ -245,8 +246,8 @@ class Building:
     georeference: Georeference | None = None  # where it lies on a map, as its file states it
     from_model: NDArray[np.float64] | None = None  # [4, 4] of its file's own axes [m] to these
     uses: Mapping[str, StatedUse] = field(default_factory=dict)  # of rooms, by the space's GUID
-    grids: tuple[HeldGrid, ...] = ()  # sensors that the file holds
-    views: tuple[HeldView, ...] = ()  # that the file holds
+    grids: tuple[ModelGrid, ...] = ()  # sensors that the file holds
+    views: tuple[ModelView, ...] = ()  # that the file holds
 
     @property
     def windows(self) -> tuple[Window, ...]:

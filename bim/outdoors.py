@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from trimesh.intersections import slice_faces_plane
 
 from bim.defaults import CLEAR_GLAZING, GLASS_REFLECTANCE
-from bim.guarded import Outline, opened
+from bim.isolated_solids import Outline, opened
 from bim.model import Element, Space, Window
 from bim.planes import area_vectors, merged_polygons, plane_through
 from bim.rays import hemisphere, ray_mesh

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from bim.boundaries import floor_area
 from bim.defaults import EMISSIVITY, GLASS_REFLECTANCE, ROOM_REFLECTANCE, default_construction
-from bim.fenestration import ShadingState
+from bim.fenestration import PlainGlass, ShadingState
 from bim.mesh_repair import wound_alike
 from bim.model import Construction, Face, MaterialLayer, Space, Window
 from bim.planes import Facet, Plane, newell_normal, plane_through, polygons_of, triangulated
@@ -63,6 +63,7 @@ class GlazingValues:
     solar: float | None = None
     panes: int | None = None
     name: str = ""
+    glass: PlainGlass | None = None  # of which `visible` is the transmittance
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,7 +305,7 @@ def _window(parts: Sequence[tuple[_Part, NDArray[np.float64]]]) -> Window:
         opening.guid, opening.name, triangles, part.face.guid,
         float(sum(one.facet.polygon.area for one, _ in parts)),
         values.u_value, values.g_value, values.visible, values.name, values.solar, values.panes,
-        opening.states,
+        opening.states, glass=values.glass,
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ import shapely.ops
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from bim.held_sensors import HeldGrid, HeldView
+from bim.held_sensors import ModelGrid, ModelView
 from bim.model import Building, Space
 from bim.planes import SMALLEST_AREA
 from bim.shell import welded
@@ -223,17 +223,17 @@ def in_room(space: Space, points: NDArray[np.float64]) -> NDArray[np.bool_]:
     return found
 
 
-def held_grids(building: Building, space: Space) -> list[HeldGrid]:
+def model_grids(building: Building, space: Space) -> list[ModelGrid]:
     """The sensors of the building's file that lie in a room, by grid."""
     found = []
     for grid in building.grids:
         own = in_room(space, grid.points)
         if own.any():
-            found.append(HeldGrid(grid.name, grid.points[own], grid.directions[own]))
+            found.append(ModelGrid(grid.name, grid.points[own], grid.directions[own]))
     return found
 
 
-def held_views(building: Building, space: Space) -> list[HeldView]:
+def model_views(building: Building, space: Space) -> list[ModelView]:
     """The views of the building's file whose eye is in a room."""
     if not building.views:
         return []

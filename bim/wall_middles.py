@@ -10,10 +10,10 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.boundaries import ElementRecord
+from bim.neighbours import Beyond
 from bim.planes import rings_of
 from bim.rooms import Piece
 from bim.sensors import horizontal_section
-from bim.surroundings import Beyond
 
 SECTION = 1.0  # height above the floor at which the outline is taken [m]
 SMOOTH = 0.002  # vertices this near a straight side are left out [m]

@@ -11,7 +11,7 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.model import Building, Space
-from bim.sensors import held_views, horizontal_section, sensor_grid, view_point
+from bim.sensors import horizontal_section, model_views, sensor_grid, view_point
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
 from mitsuba_cfs.images.view import View, fisheye, fitted, parse_view
@@ -56,13 +56,13 @@ def given_views(text: str, size: int = 800) -> list[NamedView]:
 
 def held_fisheyes(building: Building, space: Space, size: int) -> list[NamedView]:
     """The fisheye views of a room that the building's file holds, in which glare can be rated."""
-    views = [held for held in held_views(building, space) if held.view.covers_hemisphere]
+    views = [held for held in model_views(building, space) if held.view.covers_hemisphere]
     return [NamedView(held.name, fitted(held.view, size)) for held in views]
 
 
 def held_view(building: Building, space: Space) -> NamedView | None:
     """The first view of a room that the building's file holds and a picture can be of."""
-    views = [held for held in held_views(building, space) if held.view.kind != "parallel"]
+    views = [held for held in model_views(building, space) if held.view.kind != "parallel"]
     return NamedView(views[0].name, views[0].view) if views else None
 
 

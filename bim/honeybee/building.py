@@ -15,7 +15,7 @@ import numpy as np
 
 from bim.defaults import FACADE_REFLECTANCE
 from bim.drawn_building import DrawnModel, drawn_building
-from bim.fenestration import ShadingState
+from bim.fenestration import PlainGlass, ShadingState
 from bim.honeybee.energy import EnergyLibrary, OpaqueValues
 from bim.honeybee.library import OUTDOORS, PARTS
 from bim.honeybee.radiance import ModifierLibrary
@@ -44,7 +44,6 @@ from bim.polygon_rooms import (
 )
 from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.gloss import pane_shares
 
 ADJACENCY = {"Outdoors": "outside", "Ground": "ground", "Surface": "space"}
 KINDS = {"Wall": "wall", "Floor": "floor"}  # the others by their slope
@@ -204,7 +203,7 @@ class _Reader:
     def _by_modifier(
         self, one: HoneybeeAperture, values: GlazingValues, modifier: str | None
     ) -> GlazingValues:
-        """The values with the visible transmittance of a glass."""
+        """The values with the visible transmittance of a glass, and its law of the angle."""
         material = None if modifier is None else self.light.material(modifier)
         if material is None or material.kind == "BSDF":
             return values
@@ -212,11 +211,10 @@ class _Reader:
             known = {"element": one.label, "modifier": modifier, "type": material.kind}
             self.issues.append(Issue("modifier-not-glass", one.identifier, known))
             return values
-        tau, _ = pane_shares(1.0, material.index, material.transmissivity)
-        return GlazingValues(
-            values.u_value, values.g_value, float(tau), values.solar, values.panes,
-            values.name or material.name,
-        )  # fmt: skip
+        glass = PlainGlass(((material.transmissivity, material.index),))
+        return replace(
+            values, visible=glass.transmittance, name=values.name or material.name, glass=glass
+        )
 
     def _states(
         self, one: HoneybeeAperture, modifier: str | None, values: GlazingValues

@@ -18,12 +18,11 @@ from bim.honeybee.library import NamedObjects
 from bim.polygon_rooms import GlazingValues
 from bim.radiance.materials import RadianceMaterial, material_of
 from bim.radiance.primitives import VOID, Primitive
-from mitsuba_cfs.bsdf.angular import roos_table
+from mitsuba_cfs.bsdf.angular import glass_table, specular_matrices
 from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.gloss import pane_shares
 
 COLOURS = ("r", "g", "b")
 OPAQUE_FIELDS = {
@@ -90,19 +89,14 @@ class ModifierLibrary:
         material = self.material(name)
         if material is None or material.kind != "glass":
             return None
-        tau, rho = map(float, pane_shares(1.0, material.index, material.transmissivity))
-        ratio = 1.0
+        table = glass_table([(material.transmissivity, material.index)])
+        bands = {"Visible": specular_matrices(table)}
         if values.solar is not None and values.visible:
-            ratio = values.solar / values.visible
-        through = min(tau * ratio, 1.0 - rho)
-        panes = values.panes or 2
-        clear = Glazing(name, tau, rho, rho, panes)
-        sun = Glazing(name, through, rho, rho, panes)
-        bands = {
-            "Visible": specular_klems(clear, KLEMS_FULL),
-            "Solar": specular_klems(sun, KLEMS_FULL),
-        }
-        return ShadingState(name=label, bands=bands, angular=roos_table(clear))
+            tau, rho = float(table.transmittance[0]), float(table.reflectance_front[0])
+            through = min(tau * values.solar / values.visible, 1.0 - rho)
+            sun = Glazing(name, through, rho, rho, values.panes or 2)
+            bands["Solar"] = specular_klems(sun, KLEMS_FULL)
+        return ShadingState(name=label, bands=bands, angular=table)
 
     def _bsdf(self, modifier: Mapping[str, Any]) -> ShadingState:
         name, data = modifier["identifier"], modifier.get("bsdf_data")

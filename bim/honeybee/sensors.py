@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bim.held_sensors import HeldGrid, HeldView
+from bim.held_sensors import ModelGrid, ModelView
 from bim.honeybee.schema import HoneybeeModel, Shade, ShadeMesh
 from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
@@ -22,7 +22,7 @@ class SensorReader:
         self.radiance, self.scale, self.file = model.properties.radiance, model.scale, file
         self.issues: list[Issue] = []
 
-    def grids(self) -> tuple[HeldGrid, ...]:
+    def grids(self) -> tuple[ModelGrid, ...]:
         """The sensor grids [m].
 
         Raises: `DataError` that names the grid.
@@ -39,10 +39,10 @@ class SensorReader:
             except (KeyError, TypeError, ValueError, OverflowError):
                 message = "expected sensors, each with pos and dir of three numbers"
                 raise DataError(message, file=self.file, element=name, field="sensors") from None
-            found.append(HeldGrid(name, self.scale * points, towards / lengths))
+            found.append(ModelGrid(name, self.scale * points, towards / lengths))
         return tuple(found)
 
-    def views(self) -> tuple[HeldView, ...]:
+    def views(self) -> tuple[ModelView, ...]:
         """The views [m] that can be made; the others are named in the issues."""
         found = []
         for view in _objects(self.radiance, "views"):
@@ -51,7 +51,7 @@ class SensorReader:
             if made is None:
                 self.issues.append(Issue("view-unreadable", self.file.name, {"view": name}))
             else:
-                found.append(HeldView(name, made))
+                found.append(ModelView(name, made))
         return tuple(found)
 
 

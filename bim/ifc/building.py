@@ -14,32 +14,32 @@ import shapely
 
 from bim.bodies import Bodies
 from bim.boundaries import ElementRecord, Finishes, faces_and_windows, floor_area
-from bim.coarser import coarser
 from bim.defaults import CLEAR_GLAZING
-from bim.guarded import RoomBoundary, room_boundaries
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.defects import DRAWN_TWICE, model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
-from bim.ifc.found_rooms import found_rooms
 from bim.ifc.furniture import furnished
 from bim.ifc.glass_of_rooms import apertures_in, glass_of_rooms, lost_glass
 from bim.ifc.joining import joined_rooms
 from bim.ifc.map_conversion import map_georeference
 from bim.ifc.passages import Passage, open_apertures
 from bim.ifc.raised_rooms import raised_rooms
+from bim.ifc.rooms_from_geometry import rooms_from_geometry
 from bim.ifc.schemes import one_of_each
 from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
 from bim.ifc.space_boundaries import boundary_issues
 from bim.ifc.spaces import SpaceRecord, enclosed_spaces, read_spaces
+from bim.isolated_solids import RoomBoundary, room_boundaries
+from bim.mesh_simplification import simplified
 from bim.model import Building, Element, Space
+from bim.neighbours import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
 from bim.outdoors import lifted_sites, mirrors_in_view, unblinded
 from bim.rays import RayMesh, ray_mesh
 from bim.report.issue import Effect, Issue
 from bim.solids import triangles_of
 from bim.soundness import agree, soundness_issues
-from bim.surroundings import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
 from bim.wall_middles import area_to_wall_middles
 from mitsuba_cfs.errors import RoomError
 
@@ -138,7 +138,7 @@ def _rooms(
     records, ways, more = joined_rooms(source, read, apertures, mesh.triangles)
     issues += more
     if not records:
-        read, more = found_rooms(source, tell)
+        read, more = rooms_from_geometry(source, tell)
         records = read
         issues += more
     return _Rooms(read, records, repeated, ways), issues
@@ -160,7 +160,7 @@ def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, .
     elements, issues_of_panes = mirrors_in_view(elements, windows)
     elements, more = lifted_sites(elements, windows)
     outdoors = unblinded(elements, spaces)
-    traced, fine = coarser(list(outdoors.elements))
+    traced, fine = simplified(list(outdoors.elements))
     return tuple(traced), [*issues, *issues_of_panes, *more, *outdoors.issues, *fine]
 
 

@@ -9,8 +9,8 @@ import ifcopenshell
 import numpy as np
 
 from bim.apertures import main_direction
-from bim.guarded import gaps_between, solids_of
 from bim.ifc.shapes import Shape
+from bim.isolated_solids import gaps_between, solids_of
 from bim.planes import area_vectors
 from bim.report.issue import Issue, Phrase
 from bim.solids import PackedSolid, Solid, packed

@@ -15,11 +15,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.coarser import coarser
 from bim.defaults import FURNITURE_REFLECTANCE
 from bim.drawn_shades import hangs_at, is_named_shade
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source, painted
+from bim.mesh_simplification import simplified
 from bim.model import Element, Space
 from bim.planes import area_vectors
 from bim.rays import RayMesh, ray_mesh
@@ -54,7 +54,7 @@ def furnished(
         place, issue = _placed(shape, spaces, meshes)
         issues += [] if issue is None else [issue]
         if place is not None:
-            pieces, more = coarser(_elements(shape))
+            pieces, more = simplified(_elements(shape))
             found.setdefault(place, []).extend(pieces)
             issues += more
     result = _with(spaces, found)

@@ -25,11 +25,11 @@ from bim.ifc.spaces import SpaceRecord
 from bim.ifc.transparent import is_phantom
 from bim.model import Space
 from bim.names import plain_text
+from bim.neighbours import is_open
 from bim.planes import plane_through, polygons_of, triangulated
 from bim.rays import RayMesh
 from bim.report.issue import Effect, Issue, Phrase
 from bim.rooms import Attachment, attachments_of
-from bim.surroundings import is_open
 
 SMALLEST_OPENING = 0.1  # smaller ones are for ducts [m2]
 DOOR_SILL, DOOR_WIDTH = 0.3, 1.3  # an opening to the floor up to this width is a door [m]

@@ -10,11 +10,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from bim.apertures import Aperture
-from bim.guarded import united
 from bim.ifc.corrections import corrections_file
 from bim.ifc.passages import LARGEST_DOOR, Passage, passages
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
+from bim.isolated_solids import united
 from bim.names import JOINT, AmbiguousName, UnknownName, found_by_name
 from bim.report.issue import Issue, Phrase
 from bim.rooms import room_solid

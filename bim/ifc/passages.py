@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from trimesh.intersections import slice_faces_plane
 
 from bim.apertures import Aperture, Filling, aperture_of, shadow
-from bim.guarded import Outline
 from bim.ifc.fillings import beside_opening, unfilled_openings
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
+from bim.isolated_solids import Outline
 from bim.planes import GRID, Facet, Plane, polygons_of, triangulated
 from bim.rooms import OVERLAP, Attachment, RoomSolid, attachments_of
 

@@ -20,13 +20,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from bim.guarded import solids_of
 from bim.ifc.glass_of_rooms import GlassOfRooms
 from bim.ifc.project import psets_of
 from bim.ifc.quantities import BASE_SETS
 from bim.ifc.shapes import read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
+from bim.isolated_solids import solids_of
 from bim.report.issue import Issue, Phrase
 from bim.room_tops import Body, raised_body
 from bim.rooms import room_solid

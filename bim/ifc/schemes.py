@@ -15,8 +15,8 @@ from collections.abc import Callable, Sequence
 import ifcopenshell
 import numpy as np
 
-from bim.guarded import shared_volumes
 from bim.ifc.spaces import OVERLAPPING, SpaceRecord
+from bim.isolated_solids import shared_volumes
 from bim.report.issue import Issue, Phrase
 from bim.solids import packed
 from mitsuba_cfs.processes import ProcessEnded

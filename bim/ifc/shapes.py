@@ -12,7 +12,7 @@ import ifcopenshell.geom
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.ifc.looks import Look, look_of
+from bim.ifc.surface_styles import SurfaceStyle, surface_style
 from bim.rays import RayMesh, ray_mesh
 from bim.report.issue import Issue
 
@@ -59,7 +59,7 @@ class Shape:
     ifc_class: str
     name: str
     triangles: NDArray[np.float64]  # [N, 3, 3]
-    looks: tuple[Look, ...]
+    looks: tuple[SurfaceStyle, ...]
     look: NDArray[np.int64]  # [N] index into looks, -1 where the file has no style
     item: NDArray[np.int64]  # [N] STEP id of the representation item of each triangle
     is_painted: bool = False  # whether its reflectances come from the user's corrections
@@ -165,15 +165,15 @@ class _Styles:
 
     def __init__(self, model: ifcopenshell.file) -> None:
         self._model = model
-        self._looks: dict[str, Look] = {}
+        self._looks: dict[str, SurfaceStyle] = {}
 
-    def look(self, style) -> Look:
+    def look(self, style) -> SurfaceStyle:
         """The look of a style of the geometry engine."""
         if style.name not in self._looks:
             colour = style.diffuse
             values = colour.components if hasattr(colour, "components") else colour
             transparency = style.transparency if np.isfinite(style.transparency) else 0.0
-            self._looks[style.name] = look_of(
+            self._looks[style.name] = surface_style(
                 self._model, style.name, tuple(values)[:3], transparency
             )
         return self._looks[style.name]

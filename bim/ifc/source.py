@@ -12,7 +12,6 @@ import numpy as np
 from bim.colours import GREY
 from bim.ifc.corrections import Corrections, Paint
 from bim.ifc.damage import Damage
-from bim.ifc.looks import Look
 from bim.ifc.placing import Placed, ground_level, in_world
 from bim.ifc.project import (
     area_scale,
@@ -25,6 +24,7 @@ from bim.ifc.project import (
 )
 from bim.ifc.quantities import QuantityScales
 from bim.ifc.shapes import NO_ELEMENTS, Shape, read_shapes
+from bim.ifc.surface_styles import SurfaceStyle
 from bim.ifc.transparent import judged_transparent
 from bim.report.issue import Issue
 
@@ -130,6 +130,6 @@ def painted(shape: Shape, paint: Paint) -> Shape:
         else replace(look, **values)
         for look in shape.looks
     )
-    plain = Look("correction", paint.visible, 0.0, None, paint.solar, paint.gloss)
+    plain = SurfaceStyle("correction", paint.visible, 0.0, None, paint.solar, paint.gloss)
     index = np.where(shape.look < 0, len(looks), shape.look)
     return replace(shape, looks=(*looks, plain), look=index, is_painted=True)

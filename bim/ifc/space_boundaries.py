@@ -1,6 +1,6 @@
 """Second-level space boundaries of an IFC file beside those found from geometry.
 
-Neighbours and areas are always our own (`bim.surroundings`); the file's are compared with them by
+Neighbours and areas are always our own (`bim.neighbours`); the file's are compared with them by
 room and element, so that a reader sees where an energy tool that takes the file's would differ.
 Compared are the areas, and whether the open air or the ground lies beyond.  A wall's boundary holds
 its windows and doors in some files and not in others: either agrees.

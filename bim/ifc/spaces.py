@@ -9,17 +9,17 @@ import ifcopenshell
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.guarded import spaces_of
 from bim.ifc.damage import Damage, type_of
 from bim.ifc.project import psets_of, storey_of
 from bim.ifc.quantities import QuantityScales, checked_volume, stated_quantities
 from bim.ifc.shapes import Shape
+from bim.isolated_solids import spaces_of
 from bim.names import label_of
+from bim.neighbours import sample_points
 from bim.planes import Facet
 from bim.rays import RayMesh
 from bim.report.issue import Effect, Issue, Phrase
 from bim.rooms import RoomSolid, room_solid
-from bim.surroundings import sample_points
 from mitsuba_cfs.processes import ProcessEnded
 
 SMALLEST_SPACE = 0.2  # smaller spaces are beams or ducts of the wrong class [m3]

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from bim.defaults import default_construction
 from bim.model import Building, Element, Face, Space, Window
 from bim.names import numbered
-from bim.radiance.daylight import held_states, opaque_objects, scene_windows
+from bim.radiance.daylight import held_states, opaque_objects, plain_glass
 from bim.radiance.indoors import THICK, Indoors, indoors_of
 from bim.radiance.materials import SYSTEMS
+from bim.radiance.panes import panes_of
 from bim.radiance.scene import RadianceObject, RadianceScene, read_radiance
 from bim.report.issue import Issue
 from bim.shell import enclosed_volume, open_edges
@@ -37,17 +38,24 @@ def read_radiance_building(
     Raises: `DataError` for what is no scene, has no such material, or shows no room.
     """
     scene = read_radiance(path)
-    named = apertures or _clear(scene, path, facades)
-    panes, surfaces = scene.of_modifiers(named), scene_windows(scene, named)
-    names = numbered([surface.name for surface in surfaces])
+    panes = panes_of(
+        scene, apertures or _clear(scene, path, facades), facades, named=bool(apertures)
+    )
+    if not panes.windows:
+        message = "no pane has a room behind it: name the windows' material"
+        raise DataError(message, file=path, field="aperture")
+    names = numbered([window.surface.name for window in panes.windows])
     windows = tuple(
         Window(
-            name, name, surface.triangles, opening_area=_area(surface.triangles),
-            type_name=pane.material.name, states=held_states(pane),
+            name, name, triangles, opening_area=_area(triangles),
+            visible_transmittance=None if glass is None else glass.transmittance,
+            type_name=inner.material.name, states=held_states(inner), glass=glass,
         )
-        for name, surface, pane in zip(names, surfaces, panes, strict=True)
+        for name, window in zip(names, panes.windows, strict=True)
+        for triangles, inner in ((window.surface.triangles, window.panes[-1]),)
+        for glass in (plain_glass([pane.material for pane in window.panes]),)
     )  # fmt: skip
-    objects = opaque_objects(scene, facades)
+    objects = opaque_objects(scene, scene.of_modifiers(facades))
     if not objects:
         raise DataError("has no opaque surface", file=path)
     indoors = indoors_of(objects, windows)
@@ -59,7 +67,7 @@ def read_radiance_building(
         for i, thing in enumerate(objects)
         if not indoors.stands[indoors.owner == i].any()
     )
-    found = (*scene.issues, *issues)
+    found = (*scene.issues, *panes.issues, *_material_issues(scene), *issues)
     return Building(path.stem, (space,), elements, found, file=path)
 
 
@@ -71,7 +79,7 @@ def read_radiance_elements(
     Args: facades: as of `read_radiance_building`.
     """
     scene = read_radiance(path)
-    objects = opaque_objects(scene, facades)
+    objects = opaque_objects(scene, scene.of_modifiers(facades))
     names = numbered([thing.name for thing in objects])
     elements = tuple(
         _element(name, thing, thing.triangles) for name, thing in zip(names, objects, strict=True)
@@ -92,6 +100,20 @@ def _clear(scene: RadianceScene, path: Path, facades: Sequence[str]) -> list[str
         message = f"has no glass and no BSDF: name the windows' material, there are {there}"
         raise DataError(message, file=path, field="aperture")
     return sorted(names)
+
+
+def _material_issues(scene: RadianceScene) -> list[Issue]:
+    """Materials that pass or emit light and are simulated as opaque and dark ones."""
+    codes = {"trans": "trans-as-opaque", "trans2": "trans-as-opaque"}
+    codes |= dict.fromkeys(("light", "glow", "illum", "spotlight"), "light-source-dark")
+    by_material = {o.material.name: o for o in scene.objects if o.material.kind in codes}
+    return [
+        Issue(
+            codes[thing.material.kind], f"{thing.primitive.file}:{thing.primitive.line}",
+            {"material": thing.material.name, "type": thing.material.kind},
+        )
+        for thing in by_material.values()
+    ]  # fmt: skip
 
 
 def _space(

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.fenestration import ShadingState
+from bim.fenestration import PlainGlass, ShadingState
 from bim.radiance.materials import SYSTEMS, RadianceMaterial
 from bim.radiance.scene import RadianceObject, RadianceScene
 from bim.rays import RayMesh, hemisphere, ray_mesh
-from mitsuba_cfs.bsdf.angular import AngularTable, specular_matrices
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import pane_shares
@@ -30,7 +30,7 @@ def opaque_surfaces(scene: RadianceScene, facades: Iterable[str] = ()) -> Surfac
     Args: facades: materials or modifiers of panes that stand before something dark: they mirror
         what is before them, and nothing passes.
     """
-    parts = opaque_objects(scene, facades)
+    parts = opaque_objects(scene, scene.of_modifiers(facades))
     if not parts:
         return Surfaces.none()
     counts = [len(part.triangles) for part in parts]
@@ -44,9 +44,11 @@ def opaque_surfaces(scene: RadianceScene, facades: Iterable[str] = ()) -> Surfac
     )
 
 
-def opaque_objects(scene: RadianceScene, facades: Iterable[str] = ()) -> list[RadianceObject]:
+def opaque_objects(
+    scene: RadianceScene, facades: Iterable[RadianceObject] = ()
+) -> list[RadianceObject]:
     """The objects of `opaque_surfaces`, in its order."""
-    dark = {id(thing) for thing in scene.of_modifiers(facades)}
+    dark = {id(thing) for thing in facades}
     return [o for o in scene.objects if o.material.is_opaque or id(o) in dark]
 
 
@@ -59,10 +61,15 @@ def scene_windows(scene: RadianceScene, modifiers: Iterable[str]) -> list[Window
     Raises: `DataError` for a modifier that no surface has, and for a surface that sees about as
         much sky on either side.
     """
+    return list(map(pane_sides(scene), scene.of_modifiers(modifiers)))
+
+
+def pane_sides(scene: RadianceScene) -> Callable[[RadianceObject], WindowSurface]:
+    """A function from a pane of the scene to its surface seen from outdoors."""
     solid = ray_mesh(opaque_surfaces(scene).triangles)
     clear = [o.triangles for o in scene.objects if not o.material.is_opaque]
     panes = ray_mesh(np.concatenate([np.empty((0, 3, 3)), *clear]))
-    return [_window(thing, solid, panes) for thing in scene.of_modifiers(modifiers)]
+    return partial(_window, solid=solid, panes=panes)
 
 
 def _window(thing: RadianceObject, solid: RayMesh, panes: RayMesh) -> WindowSurface:
@@ -91,20 +98,19 @@ def _sky_seen(
 
 
 def held_states(thing: RadianceObject) -> tuple[ShadingState, ...]:
-    """What the material of a window says of its optics: glass at every angle, or a BSDF file.
-
-    The file's front is outdoors; none for other materials.
-    """
+    """The BSDF file of a window's material, its front outdoors; none for other materials."""
     material = thing.material
     if material.kind in SYSTEMS:
         path = thing.primitive.file.parent / material.bsdf
         return (ShadingState(bands=dict(read_bsdf_xml(path).bands), file=path),)
-    if material.kind != "glass":
-        return ()
-    passed, mirrored = (shares[::-1].copy() for shares in glass_shares(material))
-    theta = np.arccos(np.linspace(0.0, 1.0, ANGLES))[::-1].copy()
-    table = AngularTable(theta, passed, mirrored, mirrored)
-    return (ShadingState(bands={"Visible": specular_matrices(table)}, angular=table),)
+    return ()
+
+
+def plain_glass(materials: Sequence[RadianceMaterial]) -> PlainGlass | None:
+    """The panes of a window, the outer one first; None where one is no `glass`."""
+    if any(material.kind != "glass" for material in materials):
+        return None
+    return PlainGlass(tuple((one.transmissivity, one.index) for one in materials))
 
 
 def glass_shares(

@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 
 from bim.radiance import shapes
 from bim.radiance.generators import GENERATORS, Polygon
-from bim.radiance.materials import MATERIALS, PATTERNS, RadianceMaterial, material_of
+from bim.radiance.materials import (
+    CLEAR,
+    MATERIALS,
+    PATTERNS,
+    SYSTEMS,
+    RadianceMaterial,
+    material_of,
+)
 from bim.radiance.primitives import VOID, Command, Primitive, read_statements
 from bim.radiance.xform import Xform, read_xform
 from bim.report.issue import Issue
@@ -195,7 +202,9 @@ class _Reader:
                 modifier = definition.strings[0]
             elif definition.kind in MATERIALS:
                 if definition.modifier != VOID:
-                    self._leave_out("material-patterns-left-out", definition)
+                    opaque = definition.kind not in (*CLEAR, *SYSTEMS)
+                    code = "material-patterns-left-out" if opaque else "glass-patterns-left-out"
+                    self._leave_out(code, definition)
                 return replace(material_of(definition), name=definition.name), tuple(names)
             elif definition.kind in PATTERNS:
                 self._leave_out("pattern-left-out", definition, definition.kind)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, polarised_values
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.pane_stack import PaneOptics, pane_optics, stack
+from mitsuba_cfs.gloss import polarised_shares
 
 FloatArray = NDArray[np.float64]
 ANGLES = np.radians(np.arange(0.0, 90.25, 0.5))  # that formulas are tabulated at
@@ -95,13 +96,33 @@ def roos_table(glazing: Glazing) -> AngularTable:
     return AngularTable(ANGLES, tau, front, back)
 
 
+def glass_table(panes: Sequence[tuple[float, float]]) -> AngularTable:
+    """Panes of uncoated glass behind each other, absorbing or not, the outer one first.
+
+    Args: panes: transmissivity of each, of one way through the glass at normal incidence without
+        reflections, and its index of refraction.
+
+    Source: Fresnel's equations with all reflections between the faces, each polarisation by
+    itself; a single pane is Radiance's material `glass` ("The RADIANCE 5.1 Synthetic Imaging
+    System", 3.2).
+    """
+    cosine = np.cos(ANGLES)
+    shares = [polarised_shares(cosine, index, passed) for passed, index in panes]
+    return _table_of([PaneOptics(tau, rho, rho) for tau, rho in shares])
+
+
 def stack_table(panes: Sequence[Pane]) -> AngularTable:
     """Panes behind each other, the outer one first.
 
     All reflections between them are added up by intensity, each polarisation by itself.  Uncoated
     panes follow Fresnel's equations, coated ones LBNL's shape, alike for either polarisation.
     """
-    whole = stack([_by_polarisation(pane) for pane in panes])
+    return _table_of([_by_polarisation(pane) for pane in panes])
+
+
+def _table_of(panes: Sequence[PaneOptics]) -> AngularTable:
+    """The mean of both polarisations of panes [2, N] behind each other."""
+    whole = stack(panes)
     values = (whole.tau, whole.rho_front, whole.rho_back)
     tau, front, back = (np.clip(one.mean(axis=0), 0, 1) for one in values)
     return AngularTable(ANGLES, tau, front, back)

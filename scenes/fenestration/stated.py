@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from bim.fenestration import PlainGlass
 from bim.model import Window
-from mitsuba_cfs.bsdf.angular import roos_table
+from mitsuba_cfs.bsdf.angular import roos_table, specular_matrices
 from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.simple_glazing import (
@@ -35,11 +36,13 @@ class StatedValues:
     u_value: float | None  # [W/(m2 K)]
     panes: int | None
     shade: bool = False  # there is one, of which no BSDF is known
+    glass: PlainGlass | None = None  # a single pane, whose law of the angle is known
 
     def missing(self, light_only: bool) -> str:
         """What is needed and not stated, in words; empty where nothing is missing."""
         needed = {"no visible transmittance": self.visible is None}
-        needed["no g"] = self.g_value is None and not light_only
+        known = light_only or self.g_value is not None or self.glass is not None
+        needed["no g"] = not known
         needed = [name for name, is_missing in needed.items() if is_missing]
         if self.shade:
             return "for its shade"
@@ -77,10 +80,12 @@ def stated_values(
         _first(overrides.u_value, thermal.get("u_value"), window.u_value),
         window.panes if window.panes in PANES else None,
         any(state.shading_position not in NO_SHADE for state in states),
+        window.glass,
     )
     for name in ("visible", "solar", "g_value"):
         value = getattr(values, name)
-        if value is not None and not 0 < value <= 1:
+        is_black = name == "visible" and value == 0 and values.glass is not None
+        if value is not None and not (0 < value <= 1 or is_black):
             what = name if name == "g_value" else f"{name} transmittance"
             message = f"states {value:g} as its {what}: expected more than 0, at most 1"
             raise DataError(message, file=path, element=f"window {window.name or window.guid}")
@@ -92,19 +97,26 @@ def _first(*values: float | None) -> float | None:
 
 
 def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
-    """The clear glazing of some values at normal incidence, which falls with the angle after Roos.
+    """A glazing of known values at normal incidence.
 
-    What is not stated follows from U and g by the simple window model
-    (`mitsuba_cfs.bsdf.simple_glazing`): solar transmittance, reflectances.
+    Light: a single pane whose transmissivity and index are known follows Fresnel's equations, any
+    other glazing falls with the angle after Roos et al. 2001. Sun: what is not stated follows from
+    U and g by the simple window model (`mitsuba_cfs.bsdf.simple_glazing`).
     """
     u = TYPICAL_SYSTEMS["none"][0] if values.u_value is None else values.u_value
     panes = values.panes or (1 if u > HIGH_U else 2)
-    front, back = visible_reflectances(values.visible)
     name = "glazing, " + _in_words(values)
-    clear = Glazing(name, values.visible, front, back, panes)
-    visible = specular_klems(clear, KLEMS_FULL)
+    if values.glass is None:
+        front, back = visible_reflectances(values.visible)
+        clear = Glazing(name, values.visible, front, back, panes)
+        visible, table = specular_klems(clear, KLEMS_FULL), roos_table(clear)
+        notes = [f"{name}: no BSDF, a clear glazing of {panes} pane(s) after Roos et al. 2001."]
+    else:
+        table = values.glass.table
+        visible = specular_matrices(table)
+        count = len(values.glass.panes)
+        notes = [f"{name}: {count} pane(s) of uncoated glass by Fresnel's equations."]
     solar, tau, g = visible, values.solar, values.g_value
-    notes = [f"{name}: no BSDF, a clear glazing of {panes} pane(s) after Roos et al. 2001."]
     if g is not None:
         tau = solar_transmittance(u, g) if tau is None else tau
         rho = solar_reflectance(u, g, tau)
@@ -113,9 +125,11 @@ def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
             notes.append(
                 f"{name}: solar transmittance {tau:.2f} from U and g (Arasteh et al. 2009)."
             )
+    elif values.glass is not None:
+        notes.append(f"{name} has no Solar band: its Visible band stands in for it.")
     return FenestrationSystem(
         name, visible, solar, u_value=values.u_value, g_value=g, shading_position="none",
-        notes=tuple(notes), source=f"the values stated in {file}", angular=roos_table(clear),
+        notes=tuple(notes), source=f"the values stated in {file}", angular=table,
     )  # fmt: skip
 
 

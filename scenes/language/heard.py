@@ -51,6 +51,7 @@ HEARD = (
     N_("Windows {names}: {system}, from {source}."),
     N_("Window {names}: {system}, from {source}."),
     N_("{name}: no BSDF, a clear glazing of {panes} pane(s) after Roos et al. 2001."),
+    N_("{name}: {count} pane(s) of uncoated glass by Fresnel's equations."),
     N_("{name}: solar transmittance {tau} from U and g (Arasteh et al. 2009)."),
     N_("{name} has no {band} band: its {other} band stands in for it."),
     N_("{name}: window model: {model}."),

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from bim.building_file import read_standing_file
+from bim.outdoor_model import OutdoorModel
 from bim.report.issue import Issue
-from bim.standing import Standing
 from bim.to_tracer import COMPASS
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -33,7 +33,7 @@ FLAT = 30.0  # a face tilted less looks up [degrees]
 class PvResult:
     """All that came out."""
 
-    standing: Standing
+    standing: OutdoorModel
     modules: tuple[PvModule, ...]
     subsystems: tuple[Subsystem, ...]
     irradiance: CellIrradiance
@@ -144,7 +144,7 @@ def run_pv(
 
 
 def _subsystems(
-    study: PvStudy, standing: Standing, modules: Sequence[PvModule], file: Path | None
+    study: PvStudy, standing: OutdoorModel, modules: Sequence[PvModule], file: Path | None
 ) -> tuple[tuple[Subsystem, ...], list[Issue]]:
     """Modules of each stated subsystem; without any, those of each orientation."""
     issues = _unalike(modules)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.held_sensors import HeldGrid
+from bim.held_sensors import ModelGrid
 from bim.model import Building, Space
 from bim.seasons import Season, season_of, seasons
-from bim.sensors import held_grids, held_views
+from bim.sensors import model_grids, model_views
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.metrics.schedules import working_hours
@@ -29,14 +29,14 @@ from scenes.room.windows import RoomWindows, room_windows
 class FileSensors:
     """Sensor grids and the glare view of a room that the building's file contains."""
 
-    grids: tuple[HeldGrid, ...] = ()
+    grids: tuple[ModelGrid, ...] = ()
     view: View | None = None  # the first fisheye of the whole hemisphere
 
     @classmethod
     def of(cls, building: Building, space: Space) -> FileSensors:
         """The sensors of a room."""
-        fisheyes = [one.view for one in held_views(building, space) if one.view.covers_hemisphere]
-        return cls(tuple(held_grids(building, space)), fisheyes[0] if fisheyes else None)
+        fisheyes = [one.view for one in model_views(building, space) if one.view.covers_hemisphere]
+        return cls(tuple(model_grids(building, space)), fisheyes[0] if fisheyes else None)
 
 
 NO_SENSORS = FileSensors()

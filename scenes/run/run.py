@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from bim.model import Space
 from bim.report.issue import Issue, issue_text
-from bim.sensors import held_grids
+from bim.sensors import model_grids
 from bim.templates import same_hues
 from bim.to_thermal import same_surfaces
 from mitsuba_cfs import variants
@@ -215,7 +215,7 @@ def _series(
         options.building,
         lambda one, other: (
             not borrows(one, other)
-            and not any(held_grids(inputs.building, space) for space in (one, other))
+            and not any(model_grids(inputs.building, space) for space in (one, other))
             and _operated_alike(inputs, one, other)
             and (not options.colour or same_hues(one, other))
             and alike(one, other)

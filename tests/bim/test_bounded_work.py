@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 import bim.enclosure
-import bim.guarded
 import bim.ifc.building
-import bim.ifc.found_rooms
 import bim.ifc.head
+import bim.ifc.rooms_from_geometry
 import bim.ifc.survey
+import bim.isolated_solids
 from bim.enclosure import rooms_enclosed_by
-from bim.guarded import _boundary as boundary
-from bim.guarded import _space as space_here
 from bim.ifc.building import read_ifc
-from bim.ifc.found_rooms import first_rooms_enclosed as search
+from bim.ifc.rooms_from_geometry import first_rooms_enclosed as search
 from bim.ifc.survey import _surveyed as survey_one
+from bim.isolated_solids import _boundary as boundary
+from bim.isolated_solids import _space as space_here
 from bim.mesh_repair import closed_faces
 from bim.rooms import room_pieces
 from bim.solids import solid_of
@@ -108,7 +108,7 @@ def dies_of_a_recess(room, attachments):
 
 
 def boundary_that_dies(item):
-    bim.guarded.room_pieces = dies_of_a_recess
+    bim.isolated_solids.room_pieces = dies_of_a_recess
     return boundary(item)
 
 
@@ -124,7 +124,7 @@ def space_that_dies(body):
 
 
 def test_room_whose_booleans_end_the_process_is_named_and_the_others_stay(tmp_path, monkeypatch):
-    monkeypatch.setattr(bim.guarded, "_boundary", boundary_that_dies)
+    monkeypatch.setattr(bim.isolated_solids, "_boundary", boundary_that_dies)
     small, _ = box_model(space=False)
     for name, y in (("A", 0.0), ("B", 3.0)):
         small.box("IfcSpace", name, (0.0, y, 0.0), (WIDTH, 3.0, HEIGHT))
@@ -139,7 +139,7 @@ def test_room_whose_booleans_end_the_process_is_named_and_the_others_stay(tmp_pa
 
 
 def test_walls_whose_distance_ends_the_process_are_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(bim.guarded, "_gaps", gaps_that_die)
+    monkeypatch.setattr(bim.isolated_solids, "_gaps", gaps_that_die)
     path = tmp_path / "model.ifc"
     box_room().write(str(path))
     building = read_ifc(path)
@@ -157,7 +157,7 @@ def two_spaces(path, **more):
 
 
 def test_space_whose_solid_ends_the_process_is_named_and_the_others_stay(tmp_path, monkeypatch):
-    monkeypatch.setattr(bim.guarded, "_space", space_that_dies)
+    monkeypatch.setattr(bim.isolated_solids, "_space", space_that_dies)
     building = two_spaces(tmp_path / "model.ifc")
     assert [space.name for space in building.spaces] == ["A"]
     (named,) = of_code(building, "space-not-computed")
@@ -174,7 +174,7 @@ def test_space_whose_solid_ends_the_process_is_named_and_the_others_stay(tmp_pat
     ],
 )
 def test_boolean_that_ends_the_process_is_named(tmp_path, monkeypatch, function, code, values):
-    monkeypatch.setattr(bim.guarded, function, gaps_that_die)
+    monkeypatch.setattr(bim.isolated_solids, function, gaps_that_die)
     building = two_spaces(tmp_path / "model.ifc", join=["A + B"])
     (named, *_) = (i for i in of_code(building, code) if values.items() <= i.values.items())
     assert "SIGSEGV" in named.values["reason"]
@@ -187,7 +187,7 @@ def test_wall_whose_opening_ends_the_process_is_left_out_and_named(tmp_path, mon
     small.box("IfcWall", "before", (-1.0, -WALL - 0.3, 0.0), (6.0, 0.2, 3.0))
     small.model.write(str(path))
     assert of_code(read_ifc(path), "element-cut-open")
-    monkeypatch.setattr(bim.guarded, "_opened", gaps_that_die)
+    monkeypatch.setattr(bim.isolated_solids, "_opened", gaps_that_die)
     (named,) = of_code(read_ifc(path), "element-not-cut-open")
     assert named.values["reason"].startswith("a library ended its process by signal SIGSEGV")
 
@@ -241,7 +241,7 @@ def test_faces_drawn_again_count_once(more):
 
 
 def test_element_that_ends_the_search_is_named_and_the_rest_gives_the_room(tmp_path, monkeypatch):
-    monkeypatch.setattr(bim.ifc.found_rooms, "first_rooms_enclosed", dies_of_a_post)
+    monkeypatch.setattr(bim.ifc.rooms_from_geometry, "first_rooms_enclosed", dies_of_a_post)
     path = tmp_path / "model.ifc"
     box_room(space=False, post=True).write(str(path))
     building = read_ifc(path)
@@ -252,7 +252,7 @@ def test_element_that_ends_the_search_is_named_and_the_rest_gives_the_room(tmp_p
 
 
 def test_search_that_takes_too_long_is_stopped_and_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(bim.ifc.found_rooms, "LIMIT_S", 0.0)  # no search is as fast
+    monkeypatch.setattr(bim.ifc.rooms_from_geometry, "LIMIT_S", 0.0)  # no search is as fast
     path = tmp_path / "model.ifc"
     box_room(space=False).write(str(path))
     building = read_ifc(path)

@@ -10,11 +10,11 @@ import pytest
 from bim_fuzz import mutations, refusals
 
 from bim import xml_elements
-from bim.context import citygml
-from bim.context.surroundings import read_context, with_surroundings
 from bim.georeference import Georeference, crs_name
 from bim.shell import enclosed_volume
 from bim.shoebox import shoebox
+from bim.surroundings import citygml
+from bim.surroundings.placement import read_surroundings, with_surroundings
 from mitsuba_cfs.errors import DataError
 
 GERMAN = "urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH"
@@ -182,7 +182,7 @@ def house():
 def test_two_houses_are_those_of_city_json(tmp_path, house):
     """A gable house of 6 x 8 x (5 + 3 / 2) m3, and a block of 100 - 16 m2 by 6 m."""
     gml, other = written(tmp_path, model(WHOLE, PART)), as_city_json(tmp_path)
-    found, expected = read_context(gml), read_context(other)
+    found, expected = read_surroundings(gml), read_surroundings(other)
     assert (found.crs, found.left_out) == (expected.crs, expected.left_out) == ("EPSG:25832", ())
     assert [one.name for one in found.objects] == ["gable", "court"]
     volumes = [enclosed_volume(one.triangles - CORNER) for one in found.objects]
@@ -197,7 +197,7 @@ def test_two_houses_are_those_of_city_json(tmp_path, house):
 
 
 def test_boundary_surfaces_stand_for_a_solid(tmp_path):
-    (one,) = read_context(written(tmp_path, model(gable(BOUNDARIES)))).objects
+    (one,) = read_surroundings(written(tmp_path, model(gable(BOUNDARIES)))).objects
     assert enclosed_volume(one.triangles - CORNER) == pytest.approx(312.0, rel=1e-6)
 
 
@@ -206,15 +206,15 @@ def test_a_solid_is_made_of_the_surfaces_that_it_names(tmp_path):
     *linked, last = GABLE
     inner = solid(2, [*LINKS[:-1], member(GABLE[last])])
     body = inner + "".join(map(boundary, linked))
-    (one,) = read_context(written(tmp_path, model(gable(body)))).objects
+    (one,) = read_surroundings(written(tmp_path, model(gable(body)))).objects
     assert enclosed_volume(one.triangles - CORNER) == pytest.approx(312.0, rel=1e-6)
 
 
 def test_links_that_lead_nowhere_leave_the_next_complete_geometry(tmp_path):
     whole = gable(solid(2, [*LINKS[:-1], '<gml:surfaceMember xlink:href="#no"/>']) + BOUNDARIES)
-    (one,) = read_context(written(tmp_path, model(whole))).objects
+    (one,) = read_surroundings(written(tmp_path, model(whole))).objects
     assert enclosed_volume(one.triangles - CORNER) == pytest.approx(312.0, rel=1e-6)
-    context = read_context(written(tmp_path, model(gable(solid(2, LINKS)))))
+    context = read_surroundings(written(tmp_path, model(gable(solid(2, LINKS)))))
     assert context.left_out == ((citygml.NOT_FOUND, 7),)
     assert not context.objects
 
@@ -225,12 +225,12 @@ def test_links_in_a_circle_end(tmp_path):
         + member(GABLE["floor"]) + '<gml:surfaceMember xlink:href="#m"/>' * 3
         + "</gml:MultiSurface></bldg:lod2MultiSurface>"
     )  # fmt: skip
-    (one,) = read_context(written(tmp_path, model(gable(circle)))).objects
+    (one,) = read_surroundings(written(tmp_path, model(gable(circle)))).objects
     assert len(one.triangles) == 2
 
 
 def test_terrain_is_terrain_and_what_is_finer_is_told(tmp_path):
-    context = read_context(written(tmp_path, model(RELIEF, DETAILED)))
+    context = read_surroundings(written(tmp_path, model(RELIEF, DETAILED)))
     (one,) = context.objects
     assert (one.name, one.ifc_class, len(one.triangles)) == ("ground", "IfcGeographicElement", 1)
     assert context.left_out == (("object(s) without geometry below LoD 3", 1),)
@@ -246,7 +246,7 @@ def test_version_three_has_other_names(tmp_path):
     )
     part = PART.replace("consistsOfBuildingPart", "buildingPart")
     content = model(gable(body), part, version="3.0", gml="http://www.opengis.net/gml/3.2")
-    gable_house, court = read_context(written(tmp_path, content)).objects
+    gable_house, court = read_surroundings(written(tmp_path, content)).objects
     assert enclosed_volume(gable_house.triangles - CORNER) == pytest.approx(312.0, rel=1e-6)
     assert enclosed_volume(court.triangles - CORNER) == pytest.approx(504.0, rel=1e-6)
 
@@ -297,28 +297,28 @@ FLOOR = '<gml:posList srsDimension="3">456000.000'
 def test_faults_are_one_line(tmp_path, old, new, said):
     path = written(tmp_path, model(WHOLE, PART).replace(old, new))
     with pytest.raises(DataError) as caught:
-        read_context(path)
+        read_surroundings(path)
     assert str(caught.value).startswith(f"{path}: {said}") and "\n" not in str(caught.value)
 
 
 def test_a_big_file_is_refused(tmp_path, monkeypatch):
     path = written(tmp_path, model(WHOLE))
     monkeypatch.setattr(citygml, "MOST_BYTES", path.stat().st_size)
-    assert read_context(path).objects
+    assert read_surroundings(path).objects
     monkeypatch.setattr(citygml, "MOST_BYTES", path.stat().st_size - 1)
     with pytest.raises(DataError, match="too big: at most"):
-        read_context(path)
+        read_surroundings(path)
 
 
 def test_pieces_of_a_file_are_put_together(tmp_path, monkeypatch):
     path = written(tmp_path, model(WHOLE, PART))
-    whole = read_context(path).objects
+    whole = read_surroundings(path).objects
     monkeypatch.setattr(xml_elements, "CHUNK", 7)
-    for one, same in zip(read_context(path).objects, whole, strict=True):
+    for one, same in zip(read_surroundings(path).objects, whole, strict=True):
         np.testing.assert_array_equal(one.triangles, same.triangles)
 
 
 def test_random_bytes_give_one_line(tmp_path):
     path = tmp_path / "spoilt.gml"
-    refused = refusals(path, mutations(model(WHOLE, PART, RELIEF).encode(), 150), read_context)
+    refused = refusals(path, mutations(model(WHOLE, PART, RELIEF).encode(), 150), read_surroundings)
     assert refused

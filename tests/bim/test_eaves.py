@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from bim.bodies import Bodies
+from bim.neighbours import Surroundings, what_lies_beyond
 from bim.planes import planar_facets
 from bim.rays import ray_mesh
 from bim.rooms import Piece
-from bim.surroundings import Surroundings, what_lies_beyond
 
 SOUTH, UP = np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 ROOM = ((0.0, 0.0, 0.0), (4.0, 5.0, 2.7))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import shapely
 
-from bim.guarded import united
 from bim.ifc.building import read_ifc
+from bim.isolated_solids import united
 from bim.model import Building
 from bim.planes import plane_through
 from bim.report.issue import issue_text

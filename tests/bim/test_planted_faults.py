@@ -93,7 +93,7 @@ PLACES: list[tuple[Callable[[Path], object], str]] = [
     (ifc, "bim.ifc.fillings:_frame_width"),
     (ifc, "bim.ifc.fillings:_panel"),
     (ifc, "bim.ifc.elements:cad_layers_of"),
-    (ifc, "bim.ifc.looks:_reflected"),
+    (ifc, "bim.ifc.surface_styles:_reflected"),
     (ifc, "bim.ifc.space_boundaries:_area"),
     (ifc, "bim.ifc.spaces:label_of"),
     (states, "bim.ifc.fenestration_read:KlemsBasis"),
@@ -106,10 +106,10 @@ PLACES: list[tuple[Callable[[Path], object], str]] = [
     (gbxml, "bim.gbxml.constructions:resistance_layer"),
     (radiance, "bim.radiance.scene:material_of"),
     (radiance, "bim.radiance.shapes:triangles_of"),
-    (around, "bim.context.cityjson:triangles_of_surfaces"),
-    (around, "bim.context.cityjson:_surfaces"),
-    (around, "bim.context.footprints:crs_name"),
-    (around, "bim.context.surroundings:horizon_wall"),
+    (around, "bim.surroundings.cityjson:triangles_of_surfaces"),
+    (around, "bim.surroundings.cityjson:_surfaces"),
+    (around, "bim.surroundings.footprints:crs_name"),
+    (around, "bim.surroundings.placement:horizon_wall"),
 ]
 
 

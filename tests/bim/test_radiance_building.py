@@ -11,6 +11,8 @@ from bim.building_file import ReadOptions, check_building_file, held_states, rea
 from bim.sensors import sensor_grid, view_point
 from bim.shell import enclosed_volume
 from mitsuba_cfs.errors import DataError
+from scenes.fenestration.stated import glazing_system, stated_values
+from scenes.fenestration.systems import WindowOverrides
 
 OFFICE = Path(__file__).parents[2] / "docs/tutorials/office.rad"
 DESK = "\n!genbox plaster desk 1.6 0.8 0.04 | xform -t 1.2 2.6 0.78\n"
@@ -73,18 +75,23 @@ def test_what_lies_in_a_cavity_does_not_bound_the_room(tmp_path):
     assert points[:, 0].min() > 0.1
 
 
+LIGHT = WindowOverrides((), light_only=True)
+
+
 def test_a_pane_passes_what_radiance_says(office):
     import bim
 
-    (state,) = held_states(office.windows, office.file)[office.windows[0].guid]
+    table, name = office.windows[0].glass.table, office.windows[0].guid
+    assert not held_states(office.windows, office.file).get(name)
+    klems = glazing_system(stated_values({}, office.windows[0], OFFICE, LIGHT), "x.rad").visible
     scene = bim.read_radiance(OFFICE)
     passed, mirrored = bim.glass_shares(scene.of_modifiers(["glazing"])[0].material)
     angles = np.arccos(np.linspace(0, 1, len(passed)))
-    assert state.angular.transmitted(angles) == pytest.approx(passed, abs=1e-3)
-    assert state.angular.reflected("back", angles) == pytest.approx(mirrored, abs=1e-3)
-    assert state.bands["Visible"].direct_hemispherical(state.bands["Visible"].transmission_front)[
-        0
-    ] == pytest.approx(passed[-1], rel=0.01)
+    assert table.transmitted(angles) == pytest.approx(passed, abs=1e-3)
+    assert table.reflected("back", angles) == pytest.approx(mirrored, abs=1e-3)
+    assert klems.direct_hemispherical(klems.transmission_front)[0] == pytest.approx(
+        passed[-1], rel=0.01
+    )
 
 
 def test_windows_are_of_the_named_material(tmp_path):
@@ -108,3 +115,86 @@ def test_options_of_other_formats_are_refused(tmp_path):
         read_building_file("house.ifc", ReadOptions(apertures=("glass",)))
     with pytest.raises(DataError, match="no such file"):
         check_building_file(tmp_path / "missing.rad")
+
+
+TINTED = "\nvoid glass tinted\n0\n0\n3 .4 .4 .4\n"
+
+
+def pane(name: str, y: float, x=(0.5, 3.5), z=(0.8, 2.6), material: str = "tinted") -> str:
+    """A vertical pane parallel to the window of the office, which lies at y = 0."""
+    corners = [(x[0], z[0]), (x[1], z[0]), (x[1], z[1]), (x[0], z[1])]
+    numbers = "  ".join(f"{a} {y} {b}" for a, b in corners)
+    return f"{material} polygon {name}\n0\n0\n12  {numbers}\n"
+
+
+def issue_of(building, code: str):
+    return [issue for issue in building.issues if issue.code == code]
+
+
+def test_panes_behind_each_other_are_one_glazing(tmp_path):
+    """Closed form of two panes at normal incidence: t1 t2 / (1 - r1 r2)."""
+    from mitsuba_cfs.gloss import pane_shares
+
+    building = read(tmp_path, TINTED + pane("outer", -0.05))
+    (window,) = building.windows
+    (t1, r1), (t2, r2) = (map(float, pane_shares(1.0, 1.52, t)) for t in (0.4, 0.87))
+    assert window.visible_transmittance == pytest.approx(t1 * t2 / (1 - r1 * r2), rel=1e-6)
+    passed = [t for t, _ in window.glass.panes]
+    assert passed == pytest.approx([0.4, 0.87])  # the outer one first
+    assert not issue_of(building, "pane-before-window")
+
+
+@pytest.mark.parametrize(
+    ("text", "distance", "share"),
+    [
+        (pane("outer", -0.8), 0.8, 100),  # too far for one glazing
+        (pane("outer", -0.05, x=(0.5, 2.0)), 0.05, 50),  # in front of half of it
+    ],
+)
+def test_a_pane_that_is_no_layer_of_the_window_is_reported(tmp_path, text, distance, share):
+    building = read(tmp_path, TINTED + text)
+    (window,) = building.windows
+    assert len(window.glass.panes) == 1
+    (issue,) = issue_of(building, "pane-before-window")
+    assert issue.severity == "loss" and issue.effect.glass == pytest.approx(window.area)
+    assert issue.values["distance"] == pytest.approx(distance)
+    assert issue.values["share"] == pytest.approx(share, abs=1)
+    assert issue.where.startswith(str(building.file)) and issue.where.rpartition(":")[2].isdigit()
+
+
+def test_a_pane_without_a_room_behind_it_is_reported(tmp_path):
+    """It was a window of the room; as a facade, which the user names, it mirrors."""
+    text = TINTED + pane("opposite", -12.0, x=(-6.0, 10.0), z=(0.0, 9.0))
+    building = read(tmp_path, text)
+    assert len(building.windows) == 1
+    (issue,) = issue_of(building, "clear-surface-left-out")
+    assert issue.severity == "loss" and issue.values["area"] == pytest.approx(144)
+    options = ReadOptions(facade_panes=("tinted",))
+    facade = read_building_file(building.file, options)
+    (element,) = [one for one in facade.elements if one.name.startswith("opposite")]
+    assert element.gloss is not None and not issue_of(facade, "clear-surface-left-out")
+
+
+@pytest.mark.parametrize(
+    ("material", "code"),
+    [
+        ("void BRTDfunc cloth\n10 0 0 0 .3 .3 .3 0 0 0 .\n0\n9 .1 .1 .1 .2 .2 .2 .3 .3 .3\n",
+         "clear-surface-left-out"),
+        ("void trans cloth\n0\n0\n7 .8 .8 .8 0 0 .6 .2\n", "trans-as-opaque"),
+        ("void light cloth\n0\n0\n3 9 9 9\n", "light-source-dark"),
+    ],
+)  # fmt: skip
+def test_materials_that_are_not_simulated_as_they_are_have_an_issue(tmp_path, material, code):
+    sheet = pane("sheet", 3.0, material="cloth")
+    (issue,) = issue_of(read(tmp_path, "\n" + material + sheet), code)
+    assert issue.values["material"] == "cloth"
+    assert issue.severity == ("unused" if code == "light-source-dark" else "loss")
+
+
+def test_a_pattern_on_glass_is_a_loss(tmp_path):
+    text = OFFICE.read_text().replace("void glass glazing", "frit glass glazing")
+    frit = "void brightfunc frit\n2 if(mod(Pz*20,1)-.5,1,.1) .\n0\n0\n\n"
+    path = tmp_path / "frit.rad"
+    path.write_text(frit + text)
+    (issue,) = issue_of(read_building_file(path), "glass-patterns-left-out")
+    assert issue.severity == "loss"

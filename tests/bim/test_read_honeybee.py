@@ -200,8 +200,9 @@ def test_states_of_glass_are_states_of_the_window(tmp_path):
     f = (0.52 / 2.52) ** 2
     for state, t in zip(found.states, (0.9, 0.2), strict=True):
         passed = (1 - f) ** 2 * t / (1 - f**2 * t**2)
+        assert state.angular.transmitted(0.0) == pytest.approx(passed, rel=1e-9)
         through = (one := state.bands["Visible"]).direct_hemispherical(one.transmission_front)[0]
-        assert through == pytest.approx(passed, rel=1e-3)
+        assert through == pytest.approx(passed, rel=2e-3)  # mean of a patch of 5 degrees
         assert state.u_value == 1.1
     assert found.states[0].g_normal == 0.5 and found.states[1].g_normal is None
     (lost,) = of_code(building, "states-not-optical")

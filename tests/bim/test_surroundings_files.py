@@ -10,12 +10,12 @@ import pytest
 import trimesh
 from bim_fuzz import mutations, refusals
 
-from bim.context.horizon import horizon_wall, read_horizon
-from bim.context.surroundings import read_context, with_surroundings
 from bim.georeference import Georeference, crs_name, local_metres
 from bim.ifc.building import read_ifc
 from bim.shell import enclosed_volume
 from bim.shoebox import WindowRectangle, shoebox
+from bim.surroundings.horizon import horizon_wall, read_horizon
+from bim.surroundings.placement import read_surroundings, with_surroundings
 from mitsuba_cfs.errors import DataError
 from tests.bim.small_ifc import box_room
 from tests.issues import of_code
@@ -113,7 +113,7 @@ def test_what_lies_beyond_all_sight_is_left_out(house, tmp_path):
 
 def test_solids_of_a_quarter_keep_their_volume(tmp_path):
     path = written(tmp_path, city({"a": ((5, 5, 0), (15, 25, 12))}), "a.city.json")
-    (one,) = read_context(path).objects
+    (one,) = read_surroundings(path).objects
     assert enclosed_volume(one.triangles) == pytest.approx(10 * 20 * 12, rel=1e-6)
 
 
@@ -234,8 +234,8 @@ def test_random_bytes_give_one_line(tmp_path, suffix):
         whole = whole.encode() if isinstance(whole, str) else whole
     path = tmp_path / f"spoilt.{suffix}"
     path.write_bytes(whole)
-    assert read_context(path).objects
-    refused = refusals(path, mutations(whole, 40), read_context)
+    assert read_surroundings(path).objects
+    refused = refusals(path, mutations(whole, 40), read_surroundings)
     assert refused
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from bim_fuzz import mutations
 
-from bim.context.surroundings import read_context, with_surroundings
-from bim.context.terrain import graded
 from bim.georeference import Georeference
 from bim.rays import ray_mesh
 from bim.shoebox import WindowRectangle, shoebox
+from bim.surroundings.placement import read_surroundings, with_surroundings
+from bim.surroundings.terrain import graded
 from mitsuba_cfs.errors import DataError
 
 HEAD = "ncols 4\nnrows 3\nxllcorner 500000\nyllcorner 5600000\ncellsize 50\nNODATA_value -9999\n"
@@ -45,7 +45,7 @@ def test_nodes_stand_where_the_map_says(house, tmp_path, kind):
         text = text.replace("corner 500000", "center 500025").replace("corner 56", "CENTER 56")
         text = text.replace("5600000", "5600025")
     if kind == "xyz":
-        nodes = read_context(written(tmp_path, text)).objects[0].nodes.reshape(-1, 3)
+        nodes = read_surroundings(written(tmp_path, text)).objects[0].nodes.reshape(-1, 3)
         nodes = np.random.default_rng(1).permutation(nodes[np.isfinite(nodes[:, 2])])
         text, name = listed(nodes), "hill.xyz"
     found = with_surroundings(house, [written(tmp_path, text, name)])
@@ -117,7 +117,7 @@ def test_a_bad_grid_is_one_line(house, tmp_path, text, said):
 )
 def test_a_bad_list_is_one_line(tmp_path, text):
     with pytest.raises(DataError, match=r"hill\.xyz") as caught:
-        read_context(written(tmp_path, text, "hill.xyz"))
+        read_surroundings(written(tmp_path, text, "hill.xyz"))
     assert "\n" not in str(caught.value)
 
 

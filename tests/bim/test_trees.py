@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from bim.context.crowns import crown_elements
-from bim.context.surroundings import read_context, with_surroundings
-from bim.context.trees import BARE, LEAFED, monthly_transmittance, tree_of
 from bim.rays import ray_mesh
 from bim.report.issue import issue_text
 from bim.seasons import in_month, season_of, seasons
 from bim.shoebox import WindowRectangle, shoebox
+from bim.surroundings.crowns import crown_elements
+from bim.surroundings.placement import read_surroundings, with_surroundings
+from bim.surroundings.trees import BARE, LEAFED, monthly_transmittance, tree_of
 from mitsuba_cfs.errors import DataError
 from tests.issues import of_code
 
@@ -136,7 +136,7 @@ def test_an_object_of_another_file_is_a_crown(house, tmp_path):
     mesh = tmp_path / "oak.obj"
     mesh.write_text("o oak\n" + body.export(file_type="obj"))
     trees = listed(tmp_path, '[[tree]]\nobject = "oak"\ntransmittance = 0.3\n')
-    name = read_context(mesh).objects[0].name
+    name = read_surroundings(mesh).objects[0].name
     trees.write_text(trees.read_text().replace("oak", name))
     found = with_surroundings(house, [mesh, trees])
     (leaves,) = [e for e in found.elements if e.name == name]
@@ -194,7 +194,7 @@ def test_any_fields_are_a_tree_or_refused(tmp_path):
             tmp_path, json.dumps({"type": "FeatureCollection", "features": [point]}), "a.geojson"
         )
         try:
-            read += np.isfinite(read_context(path).objects[0].triangles).all()
+            read += np.isfinite(read_surroundings(path).objects[0].triangles).all()
         except DataError as error:
             assert "\n" not in str(error)
     assert 20 < read < 380

@@ -7,10 +7,10 @@ import pytest
 import shapely
 
 from bim.bodies import Bodies
+from bim.neighbours import Beyond, Surroundings, what_lies_beyond
 from bim.planes import Facet, planar_facets, plane_through
 from bim.rays import ray_mesh
 from bim.rooms import Piece
-from bim.surroundings import Beyond, Surroundings, what_lies_beyond
 from tests.bim.test_eaves import ROOM, SOUTH, body
 
 

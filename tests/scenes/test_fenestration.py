@@ -9,8 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bim.building_file import read_building_file
 from bim.ifc.building import read_ifc
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
+from mitsuba_cfs.bsdf.simple_glazing import solar_transmittance
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
@@ -21,7 +23,9 @@ from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.resolver import fill_windows, windows_named
 from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system
 from scenes.fenestration.thermal_system import thermal_system
+from tests.bim.honeybee_models import two_rooms, write
 from tests.bim.small_ifc import box_room
+from tests.conftest import REPOSITORY
 from tests.scenes.fenestration_models import (
     COMMON,
     GLAZING,
@@ -375,3 +379,44 @@ def test_windows_of_one_name_are_counted():
     listed = windows_named(names).partition(" and ")
     shown = len(listed[0].split(", ")) + 1  # "n" stands for two
     assert listed[2] == f"{len(names) - shown} more"
+
+
+def tinted_honeybee(folder: Path) -> Path:
+    """The two rooms with a tinted pane in the office, U 1.1 and g 0.5 by its construction."""
+    model = two_rooms()
+    model["properties"]["radiance"]["modifiers"].append(
+        {"type": "Glass", "identifier": "tinted", **{f"{c}_transmissivity": 0.1745 for c in "rgb"}}
+    )
+    window = model["rooms"][0]["faces"][0]["apertures"][0]
+    window["properties"]["radiance"] = {"modifier": "tinted"}
+    return write(model, folder)
+
+
+def test_a_tinted_pane_of_a_honeybee_model_falls_with_the_angle_as_fresnel_says(tmp_path) -> None:
+    """By hand: through tinted glass the way is longer askew; Radiance's `glass`, n = 1.52."""
+    path = tinted_honeybee(tmp_path)
+    windows = read_building_file(path).space("Office").windows
+    (system,) = {id(s[0]): s[0] for s in fill_windows(windows, WindowOverrides(), path).values()}\
+        .values()  # fmt: skip
+    assert (system.u_value, system.g_value) == (1.1, 0.5)
+    for degrees in (0.0, 40.0, 60.0, 75.0):
+        theta = np.radians(degrees)
+        inner = np.arcsin(np.sin(theta) / 1.52)
+        inside = 0.1745 ** (1 / np.cos(inner))
+        rs = (np.sin(theta - inner) / np.sin(theta + inner)) ** 2 if degrees else (0.52 / 2.52) ** 2
+        rp = (np.tan(theta - inner) / np.tan(theta + inner)) ** 2 if degrees else rs
+        passed = np.mean([(1 - r) ** 2 * inside / (1 - (r * inside) ** 2) for r in (rs, rp)])
+        assert system.angular.transmitted(theta) == pytest.approx(passed, rel=0.01)
+
+
+def test_u_and_g_given_for_a_radiance_scene_make_its_solar_transmittance(tmp_path) -> None:
+    """As for every stated glazing; g may lie below the visible transmittance (coated glass)."""
+    scene = REPOSITORY / "docs/tutorials/office.rad"
+    windows = read_building_file(scene).spaces[0].windows
+    given = WindowOverrides(u_value=1.1, g_value=0.4)
+    (system,) = {id(s[0]): s[0] for s in fill_windows(windows, given, scene).values()}.values()
+    light = system.visible.direct_hemispherical(system.visible.transmission_front)[0]
+    sun = system.solar.direct_hemispherical(system.solar.transmission_front)[0]
+    assert sun == pytest.approx(solar_transmittance(1.1, 0.4), rel=1e-3) and sun < 0.4 < light
+    alone = fill_windows(windows, WindowOverrides(), scene)[windows[0].guid][0]
+    assert alone.solar is alone.visible and any("Solar band" in note for note in alone.notes)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bim.held_sensors import HeldGrid, HeldView
+from bim.held_sensors import ModelGrid, ModelView
 from bim.honeybee.building import read_honeybee
 from bim.use import ALWAYS, ScheduledValue, StatedUse, YearSchedule
 from mitsuba_cfs.errors import DataError
@@ -100,10 +100,10 @@ def test_values_that_cannot_be_name_the_file(used):
 def test_fisheyes_of_the_file_are_the_views_of_its_room(used):
     """One in the office, one in the hall, one outdoors; glare needs the whole hemisphere."""
     views = (
-        HeldView("wide", View("perspective", (2, 4, 1.2), (0, -1, 0))),
-        HeldView("desk", fisheye((2, 4, 1.2), (0, -1, 0))),
-        HeldView("hall", fisheye((7, 4, 1.2), (0, -1, 0))),
-        HeldView("lawn", fisheye((2, -4, 1.2), (0, 1, 0))),
+        ModelView("wide", View("perspective", (2, 4, 1.2), (0, -1, 0))),
+        ModelView("desk", fisheye((2, 4, 1.2), (0, -1, 0))),
+        ModelView("hall", fisheye((7, 4, 1.2), (0, -1, 0))),
+        ModelView("lawn", fisheye((2, -4, 1.2), (0, 1, 0))),
     )
     building = replace(used, views=views)
     office, hall = (building.space(name) for name in ("Office", "Hall"))
@@ -133,8 +133,8 @@ def test_a_grid_of_the_file_has_the_light_of_its_own_sensors(used, weather, vari
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     outside = np.array([[2.0, -3.0, 0.8]])
     grids = (
-        HeldGrid("plane", np.concatenate([points, outside]), np.concatenate([up, up[:1]])),
-        HeldGrid("walls", points[:2], np.tile([0.0, -1.0, 0.0], (2, 1))),
+        ModelGrid("plane", np.concatenate([points, outside]), np.concatenate([up, up[:1]])),
+        ModelGrid("walls", points[:2], np.tile([0.0, -1.0, 0.0], (2, 1))),
     )
     building = replace(used, grids=grids)
     systems = fill_windows(office.windows, WindowOverrides(), building.file)
@@ -169,7 +169,7 @@ def test_cfs_thermal_has_the_files_set_points(tmp_path):
 
 def test_commands_with_rules_of_their_own_say_what_they_leave_out(used):
     """`cfs comply` has the uses, sensors and eyes of its rules."""
-    said = unused_notes(replace(used, grids=(HeldGrid("g", np.zeros((1, 3)), np.eye(3)[2:]),)))
+    said = unused_notes(replace(used, grids=(ModelGrid("g", np.zeros((1, 3)), np.eye(3)[2:]),)))
     assert said[-1] == "used.hbjson holds 2 uses of rooms, 1 sensor grids: not used here."
     assert "set points (Hall): not used: the room has no system." in said
     assert not unused_notes(read_honeybee(TWO_ROOMS))

@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bim.context.crowns import _attenuations
-from bim.context.surroundings import with_surroundings
-from bim.context.trees import read_trees
 from bim.model import Building
 from bim.rays import ray_mesh
 from bim.seasons import seasons
+from bim.surroundings.crowns import _attenuations
+from bim.surroundings.placement import with_surroundings
+from bim.surroundings.trees import read_trees
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods.light import direct_sun
 from scenes import cli

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from bim.context.objects import ContextFile, ContextObject, read_bytes
+from bim.surroundings.objects import SurroundingObject, SurroundingsFile, read_bytes
 from mitsuba_cfs.errors import DataError
 
 SUFFIXES = (".obj", ".stl", ".ply", ".glb", ".gltf")
@@ -41,7 +41,7 @@ class _NoFiles(trimesh.resolvers.Resolver):
         return self
 
 
-def read_meshes(path: Path) -> ContextFile:
+def read_meshes(path: Path) -> SurroundingsFile:
     """The objects of a mesh file in metres, z up; glTF, which has y up by its standard, turned.
 
     Raises: `DataError` for a file that is no mesh, or keeps its data in other files.
@@ -72,10 +72,10 @@ def read_meshes(path: Path) -> ContextFile:
             raise DataError("has coordinates that are no numbers", file=path)
         if len(triangles):
             name = str(named or f"{path.stem} {number}")
-            objects.append(ContextObject(name, triangles))
+            objects.append(SurroundingObject(name, triangles))
     if not objects:
         raise DataError("holds no triangles", file=path)
-    return ContextFile(path, tuple(objects))
+    return SurroundingsFile(path, tuple(objects))
 
 
 def _check_data(content: bytes, path: Path) -> None:

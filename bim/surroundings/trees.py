@@ -23,7 +23,13 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from bim.context.objects import ContextFile, ContextObject, Foliage, is_number, read_bytes
+from bim.surroundings.objects import (
+    Foliage,
+    SurroundingObject,
+    SurroundingsFile,
+    is_number,
+    read_bytes,
+)
 from mitsuba_cfs.errors import DataError
 
 # Middles of the ranges of Konarska et al. 2014, doi:10.1007/s00704-013-1000-3, five deciduous
@@ -36,7 +42,7 @@ FIELDS = ("at", "object", "name", "height", "crown_radius", "crown_base", "trans
 ROUND = 3  # subdivisions of an icosahedron: 1,280 triangles
 
 
-def read_trees(path: Path) -> ContextFile:
+def read_trees(path: Path) -> SurroundingsFile:
     """The trees of a TOML list; those that are objects of other files by their names.
 
     Raises: `DataError` that names file, tree and field.
@@ -47,7 +53,7 @@ def read_trees(path: Path) -> ContextFile:
         raise DataError(f"is no TOML: {error}", file=path) from None
     if not isinstance(listed, list) or not listed or not all(isinstance(t, dict) for t in listed):
         raise DataError("expected tables [[tree]]", file=path, field="tree")
-    objects: list[ContextObject] = []
+    objects: list[SurroundingObject] = []
     crowns: list[tuple[str, Foliage]] = []
     for number, fields in enumerate(listed):
         element = f"tree {number}"
@@ -66,12 +72,12 @@ def read_trees(path: Path) -> ContextFile:
             message = "expected [x, y] or [x, y, z] in metres"
             raise DataError(message, file=path, element=element, field="at")
         objects.append(tree_of(fields, at, element, path))
-    return ContextFile(path, tuple(objects), crowns=tuple(crowns))
+    return SurroundingsFile(path, tuple(objects), crowns=tuple(crowns))
 
 
 def tree_of(
     fields: dict[str, Any], at: list[float], element: str, path: Path, *, scale: Any = 1.0
-) -> ContextObject:
+) -> SurroundingObject:
     """A tree at [x, y] or [x, y, z] as the ellipsoid of its crown.
 
     Args: scale: [2] or one, of metres in the coordinates of `at`.
@@ -88,7 +94,7 @@ def tree_of(
     triangles = corners * [radius, radius, half] + [0.0, 0.0, foot + base + half]
     triangles[..., :2] = triangles[..., :2] * scale + np.asarray(at[:2], dtype=float)
     label = str(fields.get("name") or element)[:60]
-    return ContextObject(label, triangles, foliage=foliage_of(fields, element, path))
+    return SurroundingObject(label, triangles, foliage=foliage_of(fields, element, path))
 
 
 def foliage_of(fields: dict[str, Any], element: str, path: Path) -> Foliage:

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.context.city import FINEST, NO_GEOMETRY, city_object, triangles_of_surfaces
-from bim.context.objects import ContextFile, read_object
 from bim.georeference import crs_name
+from bim.surroundings.city import FINEST, NO_GEOMETRY, city_object, triangles_of_surfaces
+from bim.surroundings.objects import SurroundingsFile, read_object
 from mitsuba_cfs.errors import DataError
 
 DEPTH = {"MultiSurface": 1, "CompositeSurface": 1, "Solid": 2, "MultiSolid": 3, "CompositeSolid": 3}
 
 
-def read_cityjson(path: Path) -> ContextFile:
+def read_cityjson(path: Path) -> SurroundingsFile:
     """The objects of a CityJSON file; each in its finest level of detail below 3.
 
     Raises: `DataError` that names file, object and field.
@@ -45,7 +45,7 @@ def read_cityjson(path: Path) -> ContextFile:
             objects.append(city_object(name, str(thing.get("type")), triangles))
     metadata = content.get("metadata")
     system = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
-    return ContextFile(
+    return SurroundingsFile(
         path, tuple(objects), crs_name(system) if isinstance(system, str) else None,
         left_out=tuple((what, count) for what, count in left_out.items() if count),
     )  # fmt: skip

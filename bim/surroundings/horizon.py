@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.context.objects import read_bytes, read_object
+from bim.surroundings.objects import read_bytes, read_object
 from mitsuba_cfs.errors import DataError
 
 WIDTHS_AWAY = 100.0  # distance of the wall in sizes of the building: 0.6 degrees of parallax

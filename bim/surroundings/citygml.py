@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.context.city import FINEST, NO_GEOMETRY, city_object, triangles_of_surfaces
-from bim.context.objects import MOST_BYTES, ContextFile, ContextObject
 from bim.georeference import crs_name
+from bim.surroundings.city import FINEST, NO_GEOMETRY, city_object, triangles_of_surfaces
+from bim.surroundings.objects import MOST_BYTES, SurroundingObject, SurroundingsFile
 from bim.xml_elements import xml_elements
 from mitsuba_cfs.errors import DataError
 
@@ -41,18 +41,18 @@ class _Member:
     path: Path
     line: int
     by_id: dict[str, Element]
-    objects: list[ContextObject] = field(default_factory=list)
+    objects: list[SurroundingObject] = field(default_factory=list)
     left_out: Counter[str] = field(default_factory=Counter)
 
 
-def read_citygml(path: Path) -> ContextFile:
+def read_citygml(path: Path) -> SurroundingsFile:
     """The objects of a CityGML file; each in its finest level of detail below 3.
 
     A BuildingPart is an object of its own.  Surfaces named by xlink are those of the same member.
 
     Raises: `DataError` that names file, gml:id or line, and field.
     """
-    objects: list[ContextObject] = []
+    objects: list[SurroundingObject] = []
     systems: dict[str, None] = {}
     left_out: Counter[str] = Counter()
     for element, line in xml_elements(path, "CityModel", depth=2, most_bytes=MOST_BYTES):
@@ -69,7 +69,7 @@ def read_citygml(path: Path) -> ContextFile:
                 member.left_out[NO_GEOMETRY] += 1
         objects += member.objects
         left_out += member.left_out
-    return ContextFile(path, tuple(objects), next(iter(systems), None),
+    return SurroundingsFile(path, tuple(objects), next(iter(systems), None),
                        left_out=tuple(left_out.items()))  # fmt: skip
 
 

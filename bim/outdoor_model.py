@@ -20,7 +20,7 @@ FACET = re.compile(r'\s*(\w+)\s*(!?=)\s*("[^"]*"|/[^/]*/|[^,+]+)')
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class OutdoorModel:
     """Every element and terrain of a model, in world axes."""
 
     elements: tuple[Element, ...]

@@ -17,7 +17,7 @@ GLASS_INDEX = 1.52
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class SurfaceStyle:
     """How a surface style reflects and whether it is glass."""
 
     name: str
@@ -39,9 +39,9 @@ class Look:
         return self.transparency > CLEAR
 
 
-def look_of(
+def surface_style(
     model: ifcopenshell.file, name: str, colour: Sequence[float], transparency: float
-) -> Look:
+) -> SurfaceStyle:
     """The look of a style that the geometry engine names "<class>-<STEP id>".
 
     In this order: IfcSurfaceStyleLighting.DiffuseReflectionColour and a DiffuseColour given as a
@@ -64,7 +64,7 @@ def look_of(
     stated = None if bounded == value else value
     transparency = min(max(float(transparency), 0.0), 1.0)
     diffuse, gloss = _gloss(shading, bounded, transparency > CLEAR)
-    return Look(label, diffuse, transparency, stated, None, gloss, hue_of(linear))
+    return SurfaceStyle(label, diffuse, transparency, stated, None, gloss, hue_of(linear))
 
 
 def _shading(model: ifcopenshell.file, name: str) -> ifcopenshell.entity_instance | None:

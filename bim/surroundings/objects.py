@@ -19,7 +19,7 @@ Foliage = str | tuple[float, ...]  # a kind of tree, or what its crown passes in
 
 
 @dataclass(frozen=True, slots=True)
-class ContextObject:
+class SurroundingObject:
     """A building, tree or piece of terrain."""
 
     name: str
@@ -30,11 +30,11 @@ class ContextObject:
 
 
 @dataclass(frozen=True, slots=True)
-class ContextFile:
+class SurroundingsFile:
     """The objects of a file and the map that they lie on."""
 
     path: Path
-    objects: tuple[ContextObject, ...]
+    objects: tuple[SurroundingObject, ...]
     crs: str | None = None  # None: a local system in metres
     from_ground: bool = False  # heights start at the ground, not at the sea
     left_out: tuple[tuple[str, int], ...] = ()  # codes of issues, and how many there are of each

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.context.objects import TERRAIN, ContextFile, ContextObject, read_bytes
+from bim.surroundings.objects import TERRAIN, SurroundingObject, SurroundingsFile, read_bytes
 from mitsuba_cfs.errors import DataError
 
 FloatArray = NDArray[np.float64]
@@ -24,7 +24,7 @@ OFF_GRID = 0.01  # of a step: nodes of an XYZ list may lie beside their place
 NODATA = -9999.0  # where no header says another
 
 
-def read_terrain(path: Path) -> ContextFile:
+def read_terrain(path: Path) -> SurroundingsFile:
     """The terrain of a file, its nodes in the map of the building, heights above the sea.
 
     Raises: `DataError` that names file and field, or line.
@@ -36,8 +36,8 @@ def read_terrain(path: Path) -> ContextFile:
     nodes = _ascii_grid(text, path) if path.suffix.lower() == ".asc" else _list(text, path)
     if np.isfinite(nodes[..., 2]).sum() < 4:
         raise DataError("has no heights", file=path)
-    terrain = ContextObject("terrain", np.empty((0, 3, 3)), TERRAIN, nodes=nodes)
-    return ContextFile(path, (terrain,), on_own_map=True)
+    terrain = SurroundingObject("terrain", np.empty((0, 3, 3)), TERRAIN, nodes=nodes)
+    return SurroundingsFile(path, (terrain,), on_own_map=True)
 
 
 def graded(nodes: FloatArray, centre: FloatArray, steps_deg: float) -> tuple[FloatArray, float]:

@@ -13,11 +13,11 @@ import shapely
 import shapely.errors
 import shapely.geometry
 
-from bim.context.objects import ContextFile, ContextObject, is_number, read_object
-from bim.context.trees import tree_of
 from bim.georeference import LONGITUDE_LATITUDE, crs_name, local_metres
 from bim.planes import plane_through, polygons_of
 from bim.solids import prism, triangles_of
+from bim.surroundings.objects import SurroundingObject, SurroundingsFile, is_number, read_object
+from bim.surroundings.trees import tree_of
 from mitsuba_cfs.errors import DataError
 
 HEIGHTS = ("height", "building:height", "measuredHeight", "measuredheight", "Height", "HEIGHT")
@@ -27,10 +27,10 @@ SMALL_DEG = 1e-4  # of which the metres at a place are taken
 STOREY = 3.0  # height of one, where only their number is stated [m]
 
 
-def read_footprints(path: Path) -> ContextFile:
+def read_footprints(path: Path) -> SurroundingsFile:
     """The polygons of a GeoJSON file that state a height, their corners in its coordinates.
 
-    Points that state a `crown_radius` are trees, with the fields of `bim.context.trees`.
+    Points that state a `crown_radius` are trees, with the fields of `bim.surroundings.trees`.
 
     Raises: `DataError` that names file, feature and field; a file without any height.
     """
@@ -38,7 +38,7 @@ def read_footprints(path: Path) -> ContextFile:
     features = content.get("features")
     if content.get("type") != "FeatureCollection" or not isinstance(features, list):
         raise DataError("expected a FeatureCollection of GeoJSON", file=path, field="type")
-    objects: list[ContextObject] = []
+    objects: list[SurroundingObject] = []
     without, crs = 0, _crs(content)
     for number, feature in enumerate(features):
         element = f"feature {number}"
@@ -49,7 +49,7 @@ def read_footprints(path: Path) -> ContextFile:
         message = f"no polygon states a height ({', '.join(HEIGHTS[:3])}, or {LEVELS[0]})"
         raise DataError(message, file=path, field="properties")
     left_out = (("features-without-height", without),) if without else ()
-    return ContextFile(path, tuple(objects), crs, True, left_out)
+    return SurroundingsFile(path, tuple(objects), crs, True, left_out)
 
 
 def _crs(content: dict[str, Any]) -> str:
@@ -61,7 +61,7 @@ def _crs(content: dict[str, Any]) -> str:
     return crs_name(name)
 
 
-def _block(feature: Any, name: str, path: Path) -> list[ContextObject]:
+def _block(feature: Any, name: str, path: Path) -> list[SurroundingObject]:
     """A feature's polygons from base to top; none without a height."""
     if not isinstance(feature, dict) or not isinstance(feature.get("properties") or {}, dict):
         raise DataError("expected a feature", file=path, element=name)
@@ -83,13 +83,13 @@ def _block(feature: Any, name: str, path: Path) -> list[ContextObject]:
         raise DataError("is no polygon", file=path, element=name, field="geometry.coordinates")
     label = str(fields.get("name") or fields.get("id") or name)[:60]
     return [
-        ContextObject(label, triangles)
+        SurroundingObject(label, triangles)
         for polygon in shapely.get_parts(shape)
         if polygon.geom_type == "Polygon" and len(triangles := _prism(polygon, base, top))
     ]
 
 
-def _tree(feature: dict[str, Any], crs: str, name: str, path: Path) -> list[ContextObject]:
+def _tree(feature: dict[str, Any], crs: str, name: str, path: Path) -> list[SurroundingObject]:
     """A point that states a crown."""
     fields, geometry = feature.get("properties") or {}, feature.get("geometry") or {}
     if not isinstance(geometry, dict) or geometry.get("type") != "Point":

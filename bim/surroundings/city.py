@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.context.objects import BODY, TERRAIN, ContextObject
 from bim.polygon_rooms import triangles_of_rings
+from bim.surroundings.objects import BODY, TERRAIN, SurroundingObject
 
 TERRAINS = ("TINRelief", "Road", "LandUse", "WaterBody", "Railway", "TransportSquare", "Square",
             "PlantCover")  # fmt: skip
@@ -16,9 +16,9 @@ FINEST = 3.0  # level of detail below which geometry is taken: 2.2 is, 3 (with o
 NO_GEOMETRY = "objects-without-geometry"  # code of the issue
 
 
-def city_object(name: str, kind: str, triangles: NDArray[np.float64]) -> ContextObject:
+def city_object(name: str, kind: str, triangles: NDArray[np.float64]) -> SurroundingObject:
     """An object of triangles [T, 3, 3]; some of its kinds are terrain."""
-    return ContextObject(name, triangles, TERRAIN if kind in TERRAINS else BODY)
+    return SurroundingObject(name, triangles, TERRAIN if kind in TERRAINS else BODY)
 
 
 def triangles_of_surfaces(

@@ -8,17 +8,17 @@ from pathlib import Path
 from bim.ifc.corrections import Corrections, chosen, corrections_beside
 from bim.ifc.elements import outdoor_elements
 from bim.ifc.source import Progress, read_source
-from bim.standing import Standing
+from bim.outdoor_model import OutdoorModel
 
 
-def read_standing(
+def read_outdoor_model(
     path: str | Path,
     select: Sequence[str] = (),
     *,
     corrections: Corrections | None = None,
     selected_in: str | Path = "",
     progress: Progress | None = None,
-) -> Standing:
+) -> OutdoorModel:
     """All elements of an IFC file, and those that selectors choose by GUID, type, material, name.
 
     Args:
@@ -34,4 +34,4 @@ def read_standing(
         frozenset(source.model.by_id(i).GlobalId for i in chosen(source.model, query, selected_in))
         for query in select
     )
-    return Standing(tuple(elements), found, source.issues, source.name)
+    return OutdoorModel(tuple(elements), found, source.issues, source.name)

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.enclosure import GAP, LIMIT_S, Enclosed, first_rooms_enclosed
-from bim.guarded import solids_of
 from bim.ifc.damage import placement_of
 from bim.ifc.project import length_scale
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
+from bim.isolated_solids import solids_of
 from bim.report.issue import Effect, Issue, Phrase
 from bim.rooms import room_solid
 from bim.solids import Solid
@@ -45,7 +45,7 @@ Body = NDArray[np.float64]
 Tell = Callable[[float], None]
 
 
-def found_rooms(source: Source, tell: Tell) -> tuple[list[SpaceRecord], list[Issue]]:
+def rooms_from_geometry(source: Source, tell: Tell) -> tuple[list[SpaceRecord], list[Issue]]:
     """Rooms between the building elements, and what had to be closed to find them.
 
     Args: tell: is told the fraction done.

@@ -12,23 +12,23 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bim.coarser import coarser_mesh
-from bim.context.citygml import SUFFIXES as CITYGML
-from bim.context.citygml import read_citygml
-from bim.context.cityjson import read_cityjson
-from bim.context.crowns import crown_elements
-from bim.context.footprints import read_footprints
-from bim.context.horizon import horizon_wall, read_horizon
-from bim.context.meshes import SUFFIXES, read_meshes
-from bim.context.objects import ContextFile, ContextObject, Foliage
-from bim.context.terrain import SUFFIXES as GRIDS
-from bim.context.terrain import graded, read_terrain
-from bim.context.trees import monthly_transmittance, read_trees
 from bim.defaults import FACADE_REFLECTANCE, SITE_REFLECTANCE
 from bim.georeference import LONGITUDE_LATITUDE, local_metres, transformed
+from bim.mesh_simplification import simplified_mesh
 from bim.model import Building, Element
 from bim.outdoors import lifted_sites, shut_in_area, unblinded
 from bim.report.issue import Issue, Phrase
+from bim.surroundings.citygml import SUFFIXES as CITYGML
+from bim.surroundings.citygml import read_citygml
+from bim.surroundings.cityjson import read_cityjson
+from bim.surroundings.crowns import crown_elements
+from bim.surroundings.footprints import read_footprints
+from bim.surroundings.horizon import horizon_wall, read_horizon
+from bim.surroundings.meshes import SUFFIXES, read_meshes
+from bim.surroundings.objects import Foliage, SurroundingObject, SurroundingsFile
+from bim.surroundings.terrain import SUFFIXES as GRIDS
+from bim.surroundings.terrain import graded, read_terrain
+from bim.surroundings.trees import monthly_transmittance, read_trees
 from mitsuba_cfs.errors import DataError
 
 READ = (*SUFFIXES, ".city.json", *CITYGML, ".geojson", ".json", ".csv", ".toml", *GRIDS)
@@ -47,9 +47,10 @@ def with_surroundings(
     """The building with what files hold of its surroundings.
 
     OBJ, STL, PLY, glTF, CityJSON, CityGML, GeoJSON footprints with heights, terrain as a grid; the
-    horizon of PVGIS; trees as leaves (`bim.context.crowns`), some in some months only.  Objects
-    on a map are placed by the building's map conversion, else by its latitude and longitude, which
-    are then taken as those of its origin; others lie in the building's own metres.  What the
+    horizon of PVGIS; trees as leaves (`bim.surroundings.crowns`), some in some months only.
+    Objects on a map are placed by the building's map conversion, else by its latitude and
+    longitude, which are then taken as those of its origin; others lie in the building's own metres.
+    What the
     surroundings hold of the building itself is left out.  Corners of far objects are merged by
     less than 0.2 degrees as seen from the building.
 
@@ -64,7 +65,7 @@ def with_surroundings(
     centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
     size = float(np.linalg.norm(np.ptp(corners, axis=0)))
     elements: list[Element] = []
-    trees: list[tuple[ContextObject, str]] = []  # each with its GUID
+    trees: list[tuple[SurroundingObject, str]] = []  # each with its GUID
     issues: list[Issue] = []
     named = _named_crowns([Path(file) for file in files])
     for file in map(Path, files):
@@ -72,9 +73,9 @@ def with_surroundings(
             walls, radius = horizon_wall(read_horizon(file), centre, size)
             values = {"file": file.name, "radius": radius}
             issues.append(Issue("horizon-as-wall", file.name, values))
-            elements.append(_element(ContextObject("horizon", walls), file, len(elements)))
+            elements.append(_element(SurroundingObject("horizon", walls), file, len(elements)))
             continue
-        context = read_context(file)
+        context = read_surroundings(file)
         placed = [
             replace(one, foliage=named.get(one.name, one.foliage))
             for one in _placed(context, building, offset)
@@ -103,7 +104,7 @@ def with_surroundings(
     )
 
 
-def read_context(path: Path) -> ContextFile:
+def read_surroundings(path: Path) -> SurroundingsFile:
     """The objects of a file by its name's ending.
 
     Raises: `DataError` for an ending that is not read.
@@ -132,7 +133,7 @@ def _named_crowns(files: Sequence[Path]) -> dict[str, Foliage]:
     for file in lists:
         found |= dict(read_trees(file).crowns)
     if found:
-        known = {one.name for file in bodies for one in read_context(file).objects}
+        known = {one.name for file in bodies for one in read_surroundings(file).objects}
         missing = next((name for name in found if name not in known), None)
         if missing is not None:
             message = f"{missing!r} is no object of the other files of surroundings"
@@ -141,7 +142,7 @@ def _named_crowns(files: Sequence[Path]) -> dict[str, Foliage]:
 
 
 def _leaves(
-    trees: Sequence[tuple[ContextObject, str]],
+    trees: Sequence[tuple[SurroundingObject, str]],
     building: Building,
     centre: NDArray[np.float64],
     size: float,
@@ -192,8 +193,8 @@ def _is_horizon(path: Path) -> bool:
 
 
 def _placed(
-    context: ContextFile, building: Building, offset: Sequence[float] | None
-) -> list[ContextObject]:
+    context: SurroundingsFile, building: Building, offset: Sequence[float] | None
+) -> list[SurroundingObject]:
     """The file's objects in the building's world."""
     if offset is not None:
         moved = np.asarray(offset, dtype=float)
@@ -213,8 +214,8 @@ def _placed(
 
 
 def _each(
-    one: ContextObject, move: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-) -> ContextObject:
+    one: SurroundingObject, move: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+) -> SurroundingObject:
     """An object with its points [N, 3] moved."""
     triangles = move(one.triangles.reshape(-1, 3)).reshape(-1, 3, 3)
     if one.nodes is None:
@@ -226,8 +227,8 @@ def _each(
 
 
 def _meshed(
-    objects: Sequence[ContextObject], centre: NDArray[np.float64], file: Path
-) -> tuple[list[ContextObject], list[Issue]]:
+    objects: Sequence[SurroundingObject], centre: NDArray[np.float64], file: Path
+) -> tuple[list[SurroundingObject], list[Issue]]:
     """Grids as triangles, the further the coarser."""
     found, issues = [], []
     for one in objects:
@@ -244,7 +245,7 @@ def _meshed(
 
 
 def _to_world(
-    points: NDArray[np.float64], context: ContextFile, building: Building
+    points: NDArray[np.float64], context: SurroundingsFile, building: Building
 ) -> NDArray[np.float64]:
     file, place = str(context.path), building.georeference
     if place is not None:
@@ -267,11 +268,11 @@ def _to_world(
 
 
 def _beside(
-    objects: Sequence[ContextObject],
-    context: ContextFile,
+    objects: Sequence[SurroundingObject],
+    context: SurroundingsFile,
     building: Building,
     centre: NDArray[np.float64],
-) -> tuple[list[ContextObject], list[Issue]]:
+) -> tuple[list[SurroundingObject], list[Issue]]:
     """The objects that are not the building itself and not beyond all sight."""
     rooms = [
         (shapely.MultiPoint(s.shell.reshape(-1, 3)[:, :2]).convex_hull, s.shell.reshape(-1, 3))
@@ -297,10 +298,10 @@ def _beside(
 
 
 def _is_building_itself(
-    one: ContextObject, rooms: Sequence[tuple[shapely.Geometry, NDArray[np.float64]]]
+    one: SurroundingObject, rooms: Sequence[tuple[shapely.Geometry, NDArray[np.float64]]]
 ) -> bool:
     corners = one.triangles.reshape(-1, 3)
-    if one.ifc_class != ContextObject.__dataclass_fields__["ifc_class"].default:
+    if one.ifc_class != SurroundingObject.__dataclass_fields__["ifc_class"].default:
         return False
     outline = shapely.MultiPoint(corners[:, :2]).convex_hull
     low, high = corners[:, 2].min(), corners[:, 2].max()
@@ -313,8 +314,8 @@ def _is_building_itself(
 
 
 def _as_seen(
-    objects: Sequence[ContextObject], centre: NDArray[np.float64], size: float, file: Path
-) -> tuple[list[ContextObject], list[Issue]]:
+    objects: Sequence[SurroundingObject], centre: NDArray[np.float64], size: float, file: Path
+) -> tuple[list[SurroundingObject], list[Issue]]:
     """Objects of many triangles with corners merged as far as it cannot be seen."""
     kept, before, after, worst = [], 0, 0, 0.0
     for one in objects:
@@ -323,7 +324,7 @@ def _as_seen(
         if len(one.triangles) > PLAIN and gap > size:
             step = gap * np.tan(np.radians(SEEN_DEG)) / np.sqrt(3)
             steps = tuple(step * part for part in (0.125, 0.25, 0.5, 1.0))
-            fewer, moved = coarser_mesh(one.triangles, PLAIN, steps)
+            fewer, moved = simplified_mesh(one.triangles, PLAIN, steps)
             if len(fewer) < len(one.triangles):
                 before, after = before + len(one.triangles), after + len(fewer)
                 worst = max(worst, float(np.degrees(np.arctan2(moved, gap))))
@@ -335,7 +336,7 @@ def _as_seen(
     return kept, [Issue("far-objects-simplified", file.name, values)]
 
 
-def _element(one: ContextObject, file: Path, number: int) -> Element:
+def _element(one: SurroundingObject, file: Path, number: int) -> Element:
     terrain = one.ifc_class.startswith("IfcGeographic") or one.name == "horizon"
     value = SITE_REFLECTANCE if terrain else FACADE_REFLECTANCE
     guid = f"{file.stem}-{number}"

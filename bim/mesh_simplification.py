@@ -22,11 +22,11 @@ STEPS = (0.002, 0.005, 0.01, 0.02)  # of the grids [m]
 KEPT_AREA = 0.9  # share of the surface that has to be left: slats and bars must not vanish
 
 
-def coarser(elements: list[Element]) -> tuple[list[Element], list[Issue]]:
+def simplified(elements: list[Element]) -> tuple[list[Element], list[Issue]]:
     """The elements, those of many triangles made coarser, and how far vertices were moved."""
     result, issues = [], []
     for element in elements:
-        triangles, error = coarser_mesh(element.triangles)
+        triangles, error = simplified_mesh(element.triangles)
         if len(triangles) < len(element.triangles):
             values = {
                 "element": f"{element.ifc_class} {element.name}",
@@ -39,7 +39,7 @@ def coarser(elements: list[Element]) -> tuple[list[Element], list[Issue]]:
     return result, issues
 
 
-def coarser_mesh(
+def simplified_mesh(
     triangles: NDArray[np.float64], most: int = FINE, steps: Sequence[float] = STEPS
 ) -> tuple[NDArray[np.float64], float]:
     """Triangles [M, 3, 3], at most `most` where that can be, and how far a vertex moved [m].

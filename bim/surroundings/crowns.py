@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from bim.context.objects import ContextObject
 from bim.defaults import TREE_LAYER
 from bim.model import Element
 from bim.rays import RayMesh, ray_mesh
 from bim.shell import enclosed_volume
+from bim.surroundings.objects import SurroundingObject
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.surfaces import even_numbers
 
@@ -44,7 +44,7 @@ TRIES = 200  # draws of points for the leaves
 
 
 def crown_elements(
-    crown: ContextObject, transmittance: Sequence[float], guid: str, distance: float
+    crown: SurroundingObject, transmittance: Sequence[float], guid: str, distance: float
 ) -> list[Element]:
     """The leaves of a crown as elements, each of the months in which it stands.
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from bim.coarser import FINE, STEPS, coarser, coarser_mesh
+from bim.mesh_simplification import FINE, STEPS, simplified, simplified_mesh
 from bim.model import Element
 from bim.planes import area_vectors
 
@@ -29,10 +29,10 @@ def bars(count: int, width: float) -> np.ndarray:
 
 def test_vertices_move_by_no_more_than_is_said():
     fine = sphere(150)
-    (element,), (said,) = coarser([Element("g", "Palm", "IfcFurniture", fine, 0.5, 0.5)])
+    (element,), (said,) = simplified([Element("g", "Palm", "IfcFurniture", fine, 0.5, 0.5)])
     assert len(element.triangles) <= FINE < len(fine)
     assert said.values["after"] == len(element.triangles)
-    corners, error = element.triangles.reshape(-1, 3), coarser_mesh(fine)[1]
+    corners, error = element.triangles.reshape(-1, 3), simplified_mesh(fine)[1]
     assert 0 < error <= STEPS[-1] * np.sqrt(3)
     assert said.values["moved_mm"] == pytest.approx(1000 * error)
     away = cKDTree(corners).query(fine.reshape(-1, 3))[0]  # to where a vertex may have gone
@@ -43,12 +43,12 @@ def test_vertices_move_by_no_more_than_is_said():
 
 def test_few_triangles_stay_as_they_are():
     few = sphere(20)
-    assert coarser_mesh(few)[0] is few
-    assert coarser([Element("g", "Ball", "IfcFurniture", few, 0.5, 0.5)])[1] == []
+    assert simplified_mesh(few)[0] is few
+    assert simplified([Element("g", "Ball", "IfcFurniture", few, 0.5, 0.5)])[1] == []
 
 
 def test_thin_bars_do_not_vanish():
     thin = bars(4000, 0.004)
     area = np.linalg.norm(area_vectors(thin), axis=1).sum()
-    left = np.linalg.norm(area_vectors(coarser_mesh(thin)[0]), axis=1).sum()
+    left = np.linalg.norm(area_vectors(simplified_mesh(thin)[0]), axis=1).sum()
     assert left >= 0.9 * area
