@@ -194,3 +194,28 @@ def test_elements_are_numbered_in_the_order_of_their_cubes() -> None:
     np.testing.assert_array_equal(order, np.argsort(numbers.ravel(), kind="stable"))
     wide = np.array([2**62, 3, 2**62, 0])  # no room for the places beside the numbers
     np.testing.assert_array_equal(_order(wide), [3, 1, 0, 2])
+
+
+def test_grazing_sun_lights_a_picture_by_its_flux() -> None:
+    """The mean over all rows has the flux's noise, not that of a few points in a narrow spot."""
+    view = cfs.fisheye((1.8, 2.0, 1.5), (0.0, -1.0, 0.0), 60)
+    interior, groups = box.room(), box.window_groups()
+    tracer = TracedScene(interior, groups)
+    rows = PictureRows.of_view(tracer, view, tile_size(view))
+    clear = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.ones(145))
+    sun = PictureSun(interior, box.NOTHING, groups, [clear], view)
+    height = np.radians([8.0, 20.0, 35.0, 50.0])
+    east = np.cos(height) * np.sin(np.radians(-80))
+    south = -np.cos(height) * np.cos(np.radians(-80))
+    hours = np.stack([east, south, np.sin(height)], axis=-1), np.full(len(height), 1e5)
+    mean, _ = rows.of_halves(np.ones(len(rows.pixels), dtype=np.float32), 0.01)
+    found = []
+    for seed in range(4):
+        shares, _ = picture_sunlit_shares(
+            tracer, interior, view, rows, rows.times(smoothed=True), seed=seed
+        )
+        luminance = mean @ sun.sunlit_luminance(shares, *hours)
+        found.append(np.average(luminance, axis=0, weights=np.bincount(rows.row)))
+    noise = np.std(found, axis=0, ddof=1) / np.mean(found, axis=0)
+    # 0.01 in each hour; four shadow rays to each of 1,024 parts of the surfaces gave 0.04 to 0.13
+    assert noise.max() < 0.03
