@@ -72,7 +72,7 @@ def _view_file(
 
 
 def _sunlit_file(cache: MatrixCache, view: View, inputs: tuple[object, ...]) -> Path:
-    return cache.entry("sunlit view", view, *inputs, by=view_matrices.__module__).path
+    return cache.entry("view sunlit", view, *inputs, by=view_matrices.__module__).path
 
 
 def _read_or_none(path: Path, read: Callable[[Path], T]) -> T | None:

@@ -152,7 +152,7 @@ def arrays(value: Any) -> list[np.ndarray]:
 
 @pytest.fixture
 def elements_traced(monkeypatch) -> list[int]:
-    """Grows by one each time that sunlit sunlit are traced."""
+    """Grows by one each time that shares of the sunlit surfaces are traced."""
     from mitsuba_cfs.trace.pictures import annual
 
     calls, trace = [], annual.picture_sunlit_shares
