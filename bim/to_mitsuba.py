@@ -16,7 +16,7 @@ from bim.model import Building, Space, Window
 from bim.sensors import view_point
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
-from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
+from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.files import replacing, write_bytes
 from mitsuba_cfs.gloss import Gloss

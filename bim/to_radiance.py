@@ -19,7 +19,7 @@ from bim.sensors import sensor_grid, view_point
 from bim.surface_sensors import surface_sensors
 from bim.to_tracer import window_groups
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
-from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
+from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.files import write_text
 from mitsuba_cfs.gloss import Gloss, radiance_material
 from mitsuba_cfs.surfaces import WindowGroup

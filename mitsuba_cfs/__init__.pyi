@@ -23,7 +23,7 @@ from .bsdf.resample import klems_of as klems_of
 from .bsdf.tensor_plugin import tensor_tree_plugin as tensor_tree_plugin
 from .bsdf.tensor_tree import TensorTreeBsdf as TensorTreeBsdf
 from .bsdf.xml import read_bsdf_xml as read_bsdf_xml
-from .bsdf.xml_write import write_bsdf_xml as write_bsdf_xml
+from .bsdf.xml import write_bsdf_xml as write_bsdf_xml
 from .errors import CfsError as CfsError, DataError as DataError, VariantError as VariantError
 from .glare.annual import AnnualGlare as AnnualGlare
 from .glare.classes import glare_class as glare_class, protection_level as protection_level

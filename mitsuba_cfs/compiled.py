@@ -27,7 +27,7 @@ class _OwnedCode(IndexDataCacheFile):
                 return data
         return None  # another's, or of an older form: compiled again
 
-    def kept(self) -> bool:
+    def cached(self) -> bool:
         """Whether code of this source is cached, for any arguments."""
         return any(self.load(key) is not None for key in self._load_index())
 
@@ -36,7 +36,7 @@ def compiled(compiler: Callable = njit, /, *arguments, **options) -> Callable[[C
     """A decorator: numba's `compiler` with these arguments; the compiled code is cached on disk.
 
     That is `__pycache__` beside the module, else (a read-only install) the user's cache folder, or
-    the one that NUMBA_CACHE_DIR names; where none can be written, each process compiles anew.
+    the one that NUMBA_CACHE_DIR names; where none can be written, each process compiles again.
     Code is found again while its module and all that this imports, whose functions may be inlined
     into it, are as they were.
     """
@@ -61,4 +61,4 @@ def must_compile(function: Callable) -> bool:
     if function.signatures:
         return False
     file = getattr(function._cache, "_cache_file", None)  # none where nothing can be kept
-    return file is None or not file.kept()
+    return file is None or not file.cached()

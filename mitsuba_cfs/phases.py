@@ -89,7 +89,7 @@ def sun_beams(
     too.  It takes away no more than V T D s - V_d T D_d s_d holds.
 
     Args:
-        beams: for each group what of its T goes straight on, T_b [K, K],
+        beams: for each group the direct part of its T, T_b [K, K],
             `mitsuba_cfs.bsdf.klems_peak.held_beams`.
         through_sun: [G, H] tau(sun), `mitsuba_cfs.trace.sun.direct.through_beams`.
         direct_daylight: D_d [G, K, P].

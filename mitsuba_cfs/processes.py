@@ -142,10 +142,10 @@ def _end_idle() -> None:
 
 
 def each_apart(function: Callable, items: Sequence, *, limit_s: float) -> list[Any]:
-    """Results of `function` for each item, computed in one subprocess (`answer_apart`).
+    """Results of `function` for each item, computed in one separate process (`answer_apart`).
 
     An item that ends the process gets the `ProcessEnded` in place of an answer, and the others are
-    computed anew; so do all that are left after `MOST_ENDED` of these, or when the time is over.
+    computed again; so do all that are left after `MOST_ENDED` of these, or when the time is over.
 
     Args: function: of a module, of one item; what it raises is raised.
     """

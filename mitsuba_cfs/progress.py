@@ -11,7 +11,7 @@ Progress = Callable[[str, float], None]
 A stage is gone through once: its fraction does not fall, and what is done again has another label.
 """
 
-LEAST = 0.05  # share of an item after which the time left is told
+LEAST = 0.05  # share of an item after which the remaining time is shown
 
 
 class Stage(str):

@@ -84,7 +84,7 @@ def _import_statements(source: bytes) -> tuple[tuple[str, str], ...]:
 
 
 def _computing(tree: ast.Module, expressions: bool) -> Iterator[ast.AST]:
-    """The statements of a module without those under `if TYPE_CHECKING`.
+    """Statements of a module, without those under `if TYPE_CHECKING`.
 
     Args: expressions: with these too; they are nine tenths of a module.
     """

@@ -31,7 +31,7 @@ class StoredArrays:
         self._last: mmap.mmap | None = None
         self._next = 0  # where the next array begins in the last file
 
-    def kept(self, thing: T) -> T:
+    def stored(self, thing: T) -> T:
         """A copy of a picklable object with its large arrays read-only on disk."""
         buffers: list[pickle.PickleBuffer] = []
 

@@ -40,7 +40,7 @@ def thing(number: int) -> Thing:
 def test_arrays_are_as_they_were_whatever_file_they_are_in(monkeypatch):
     monkeypatch.setattr(stored_arrays, "BLOCK", 30_000)
     things, store = [thing(number) for number in range(5)], StoredArrays()
-    kept = PassedArrays(store, [store.kept(one) for one in things])
+    kept = PassedArrays(store, [store.stored(one) for one in things])
     del store
     gc.collect()
     assert len(kept) == 5 and [one.name for one in kept[1:3]] == ["thing 1", "thing 2"]
@@ -60,7 +60,7 @@ def test_arrays_of_which_none_are_shown_take_no_file(monkeypatch):
     one, store = thing(1), StoredArrays()
     before = len(os.listdir("/proc/self/fd"))
     for _ in range(20):
-        store.kept(one)
+        store.stored(one)
     gc.collect()
     assert len(os.listdir("/proc/self/fd")) <= before + 2
 
@@ -70,7 +70,7 @@ def test_what_is_passed_is_out_of_memory(monkeypatch):
     """Of 64 arrays of 1 MB no more than those of `PASSED` and of a file or two are in memory."""
     monkeypatch.setattr(stored_arrays, "BLOCK", 2**23)
     store, before = StoredArrays(), _resident()
-    arrays = [store.kept(np.full(2**17, float(number))) for number in range(64)]
+    arrays = [store.stored(np.full(2**17, float(number))) for number in range(64)]
     written, most = _resident() - before, 0.0
     kept = PassedArrays(store, arrays)
     for number, values in enumerate(kept):
@@ -89,7 +89,7 @@ def test_a_full_disk_is_said_before_anything_is_written(monkeypatch):
 
     monkeypatch.setattr(os, "posix_fallocate", full)
     with pytest.raises(DataError, match=r"no room for results of 0\.07 GB: the disk is full"):
-        StoredArrays().kept(np.zeros(1000))
+        StoredArrays().stored(np.zeros(1000))
 
 
 def _resident() -> float:

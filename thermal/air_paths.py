@@ -18,7 +18,7 @@ _SHUT = WindowAiring(0.0, 0.0, share=0.0)
 
 
 class AirPaths(NamedTuple):
-    """How air comes into the zones Z."""
+    """Air flows into the zones Z."""
 
     leak: NDArray[np.float64]  # [Z, 8] a, b, c, d, s, m, w, n of `Leakage`
     wind: NDArray[np.float64]  # [Z] of the weather's, at the zone's height
@@ -34,7 +34,7 @@ class AirPaths(NamedTuple):
 
 
 class Emitters(NamedTuple):
-    """What heats and cools the zones Z."""
+    """Heating and cooling of the zones Z."""
 
     radiant: NDArray[np.float64]  # [Z, 2] share of heating and cooling
     slab: NDArray[np.int64]  # [Z] face, -1 without

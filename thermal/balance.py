@@ -20,7 +20,7 @@ from thermal.zone import Zone
 
 HOUR = 3600.0  # [s]
 AIR_GAS_CONSTANT = 287.055  # [J/(kg K)]
-STRETCH = 744  # rows, a month of hours: of all zones no more lie in memory at a time
+STRETCH = 744  # rows, a month of hours: the part of all zones in memory at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class ZoneResult:
     warm_up_days: int
 
 
-Kept = Callable[[ZoneResult], ZoneResult]
+Storage = Callable[[ZoneResult], ZoneResult]
 
 
 class ZoneYears(Sequence[ZoneResult]):
@@ -136,19 +136,20 @@ def simulate_zones(
     air_links: ArrayLike | None = None,
     transfers: Sequence[AirTransfer] = (),
     progress: Callable[[float], None] | None = None,
-    kept: Kept | None = None,
+    storage: Storage | None = None,
 ) -> Sequence[ZoneResult]:
-    """The years of zones that exchange heat through their partitions and openings.
+    """Annual results of zones that exchange heat through partitions and openings.
 
     Args:
         zones, solar: one entry per zone, windows and surfaces in the zone's order.
         step_s: a whole fraction of a row [s]; backward Euler: any length is stable.
-        row_s: length [s] of the climate's rows, which everywhere else are said to be hours.
+        row_s: length [s] of the climate's rows, which other docstrings call hours.
         air_links: [Z, Z] air exchanged between zones through openings [m3/s], symmetric.
-        transfers: air that flows one way from zone to zone.
+        transfers: one-way air flows between zones.
         progress: called with shares of the year, from 0 to 1.
-        kept: what is held of a zone's result in each stretch, on disk for example; the year of a
-            zone is put together each time it is looked at then, and before it returns without.
+        storage: maps the result of a zone in each stretch to a stored copy, for example on disk;
+        the
+            year of a zone is then assembled at each access, otherwise before returning.
 
     Returns: one result per zone.
 
@@ -176,13 +177,13 @@ def simulate_zones(
         means = kernel.hourly_means(stretch.size, state)
         kernel.advance(net, state, work, weather, drive, method, stretch.size, means)
         np.divide(means.terms, steps, out=means.terms)
-        found = (
+        results = (
             _result(zone, net, z, means, days=days, state=drive.state)
             for z, zone in enumerate(zones)
         )
-        years.append([*map(kept or (lambda result: result), found)])
+        years.append([*map(storage or (lambda result: result), results)])
         told(stretch.last / climate.hours)
-    if kept is not None:
+    if storage is not None:
         return ZoneYears(years)
     whole = [_joined([zones.pop() for zones in years]) for _ in zones]  # each goes as it is joined
     return tuple(reversed(whole))

@@ -1,4 +1,4 @@
-"""What surrounds a zone, hour by hour: weather, and the sun as its windows and walls absorb it.
+"""Hourly boundary conditions of a zone: weather, and solar radiation absorbed by windows and walls.
 
 Time stamps follow EPW: hour h is (h-1, h]; temperatures and wind are values at its end, solar
 arrays are means over it.

@@ -1,4 +1,4 @@
-"""How the Blackbox of a fenestration system is closed: what its resistance and films follow.
+"""Closure of the Blackbox model: layer resistance and film resistances.
 
 The best that the data allow, each named in the result with the error that it had in 128 cases
 against EnergyPlus (docs/thermal.md):
@@ -52,7 +52,7 @@ ERRORS: dict[str, dict[str, tuple[float, float]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Closure:
-    """What is known of a system besides U and g."""
+    """Thermal data of a system besides U and g."""
 
     u_model: str = "constant"  # one of U_MODELS
     gap: Gap | None = None  # for "gap"
@@ -85,14 +85,14 @@ class Closure:
         )
 
     def for_place(self, place: str) -> Closure:
-        """The closure with the films that a shade in that place typically has, unless stated."""
+        """Closure with the typical film resistances of a shade in that position, unless stated."""
         if self.unit is not None or self.states_films or place not in TYPICAL_FILMS:
             return self
         inner, outer = TYPICAL_FILMS[place]
         return replace(self, realised_inner_resistance=inner, realised_outer_resistance=outer)
 
     def layers(self, u_value: float | None) -> Iso15099Data | None:
-        """What ISO 15099 says of the layers, at the level of a given U; None without layers."""
+        """ISO 15099 data of the layers, shifted to a given U; None without layers."""
         return None if self.unit is None else iso15099_data(self.unit, u_value)
 
     def close(self, plain: Fenestration) -> Fenestration:

@@ -127,7 +127,7 @@ def adaptive_comfort(
 def comfort_by_outdoors(
     operative_c: ArrayLike, outdoor_c: ArrayLike, band: str, *, per_day: int
 ) -> AdaptiveComfort:
-    """Operative temperatures [H] against a band that follows the weather as its standard says.
+    """Operative temperatures [H] against the adaptive comfort band of a standard.
 
     Args: outdoor_c: [H] of whole days with so many values each.
     """

@@ -1,4 +1,4 @@
-"""What acts on zones in every hour or step, checked and laid out for the compiled loop."""
+"""Inputs of zones in every hour or step, checked and arranged for the compiled loop."""
 
 from __future__ import annotations
 

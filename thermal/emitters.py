@@ -1,4 +1,4 @@
-"""What heats and cools a zone: an ideal plant with shares, and a slab with pipes in it."""
+"""Heating and cooling of a zone: ideal plant with radiant shares, and slabs with pipes."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class IdealLoads:
 
 @dataclass(frozen=True, slots=True)
 class HeatedSlab:
-    """Pipes or wires in a construction, their power in proportion to what the air lacks.
+    """Pipes or wires in a construction; power proportional to the deviation of the air temperature.
 
     Full power at half a band below the heating set point, none at half a band above it; cooling
     likewise.  Source: EnergyPlus Engineering Reference, "Low Temperature Radiant System".

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class ThermalInputError(ValueError):
-    """Thermal data that cannot be used: names the item and says what was expected and what came."""
+    """Invalid thermal data: names the item, the expected and the actual value."""
 
     def __init__(self, item: str, message: str) -> None:
         self.item, self.message = item, message

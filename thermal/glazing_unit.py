@@ -17,7 +17,7 @@ LEAST_OPENING = 1e-6  # [m2] for one that is shut
 
 @dataclass(frozen=True, slots=True)
 class Openings:
-    """What a shade leaves open to the air: at its edges [m], and through itself.
+    """Openings of a shade to the air flow: at its edges [m], and through the shade.
 
     ISO 15099's areas are these: the width of each edge times its length; `front` is the effective
     open share of the shade's area (see `thermal.shade_layers`).
@@ -35,7 +35,7 @@ class Openings:
         require_range(self.front, 0.0, 1.0, "opening front")
 
     def impedance(self, gap: float, width: float, height: float) -> float:
-        """Z_in + Z_out of a gap [m] behind a shade of that width and height [m].
+        """Z_in + Z_out of a gap [m] at a shade of that width and height [m].
 
         Z = (A_gap/(0.6 A_eq) - 1)^2, A_eq = A_bottom + A_top (A_left + A_right + A_front) /
         (2 (A_bottom + A_top)), and the other way round.  Source: ISO 15099:2003, 7.4.2.
@@ -76,7 +76,7 @@ class GlazingLayer:
 
 @dataclass(frozen=True, slots=True)
 class GasGap:
-    """The space behind a layer: its width, its gas, and air blown through it."""
+    """Gas space on the room side of a layer: width, gas, forced air flow."""
 
     width: float  # [m]
     gas: tuple[tuple[str, float], ...] = AIR  # (name, volume fraction)
@@ -123,11 +123,11 @@ class GlazingUnit:
         shades = [layer.openings is not None for layer in self.layers]
         require(not all(shades), "glazing", "has no pane: a shade alone closes nothing")
         beside = any(a and b for a, b in pairwise(shades))
-        require(not beside, "glazing", "two shades beside each other: their gap is not modelled")
+        require(not beside, "glazing", "two adjacent shades: their gap is not modelled")
 
     @property
     def shade_place(self) -> str:
-        """Where the shade is: "none", "external", "internal" or "integrated"."""
+        """Position of the shade: "none", "external", "internal" or "integrated"."""
         shades = [layer.openings is not None for layer in self.layers]
         if shades[-1] and len(shades) > 1:
             return "internal"

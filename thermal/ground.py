@@ -1,6 +1,6 @@
-"""Heat flow to the ground by ISO 13370:2017: slabs, suspended floors, basements, with their phase.
+"""Heat flow to the ground by ISO 13370:2017: slabs, suspended floors, basements, with phase lag.
 
-Per element of a building: U, what of the flow follows the year's swing outdoors (H_pe), and the
+Per element of a building: U, the periodic heat transfer coefficient outdoors (H_pe), and the
 virtual layer and temperature that a transient balance puts below the construction (annex F).
 """
 
@@ -67,7 +67,7 @@ class Footprint:
 
 @dataclass(frozen=True, slots=True)
 class GroundElement:
-    """A floor or wall to the ground; its heat flow: U (T_i - mean T_e) and what swings."""
+    """Floor or wall to the ground; heat flow: U (T_i - mean T_e) plus a periodic part."""
 
     u_value: float  # [W/(m2 K)] to the mean of outdoors
     swing: float  # H_pe/A [W/(m2 K)] of the outdoor swing

@@ -1,7 +1,7 @@
 """g per direction where it was not measured: from one g, from rules, or for a shade on a glazing.
 
-What a user of a BSDF file has is the solar transmittance and reflectance per direction; what the
-Blackbox needs besides is g per direction and U.
+A BSDF file contains the solar transmittance and reflectance by direction; the Blackbox model
+also needs U and g by direction.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _SHADES = {
 
 @dataclass(frozen=True, slots=True)
 class ThermalData:
-    """U and g per direction of a system, and what had to be assumed."""
+    """U and g by direction of a system, and the assumptions made."""
 
     u_value: float  # [W/(m2 K)]
     g_value: NDArray[np.float64]  # [...] as the transmittance
@@ -57,9 +57,9 @@ def thermal_data(
     shading_position: str = "none",
     item: str = "fenestration",
 ) -> ThermalData:
-    """U and g per direction from a BSDF and what else is known.
+    """U and g by direction from a BSDF and further thermal data.
 
-    g follows from g at one direction by keeping the inward share N of what is absorbed:
+    g follows from g at one direction with a constant inward share N of the absorption:
     g = tau + N alpha, N = (g_n - tau_n)/alpha_n.  Without g, N and U are those of a typical system
     with its shade "none", "external", "internal" or "integrated"; the assumptions say so.
 
@@ -98,7 +98,7 @@ def inward_share(
     require_range(g_value, 0.0, 1.0, f"{item}: g")
     message = (
         f"{g_value:g} is below the solar transmittance {transmittance:.3f}, the least that g can "
-        "be: g = tau + what of the absorbed sun goes inwards"
+        "be: g = tau + secondary heat gain"
     )
     require(g_value >= transmittance - 0.01, f"{item}: g", message)
     absorptance = 1.0 - transmittance - reflectance
@@ -175,7 +175,7 @@ def integrated_shade_g(
 
 @dataclass(frozen=True, slots=True)
 class InternalShade:
-    """Solar properties of a glazing and an interior shade behind it; arrays per direction."""
+    """Solar properties of a glazing with an interior shade; arrays by direction."""
 
     tau_glazing: NDArray[np.float64] | float  # [...]
     rho_glazing: NDArray[np.float64] | float  # [...] outside

@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 CONVECTION_OUTSIDE, CONVECTION_INSIDE = 20.0, 2.7  # [W/(m2 K)]; with radiation about 25 and 7.7
 U_STATE_C = (0.0, 20.0)  # outdoors and indoors
 # Outdoors and indoors [degC], sun [W/m2]: the reference and the summer state of ISO 52022-3.  The
-# g of a shade hangs on the state, as the air behind it does: a year is given the mean of both
+# g of a shade depends on the state through its air flow: a year uses the mean of both
 G_STATES = ((5.0, 20.0, 300.0), (25.0, 25.0, 500.0))
 OUTDOOR_C = (-25.0, -15.0, -5.0, 5.0, 15.0, 25.0, 35.0, 45.0)  # grid of R(T_m, dT)
 INDOOR_C = (5.0, 15.0, 25.0, 35.0, 45.0)
@@ -151,7 +151,7 @@ def _yearly_g(unit: GlazingUnit, tau: bytes, absorbed: bytes) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Iso15099Data:
-    """What the Blackbox needs of a system."""
+    """Data of a system for the Blackbox model."""
 
     u_value: float  # [W/(m2 K)] at U_STATE_C
     r_outer: float  # [m2 K/W] realised in that state: face to environment
@@ -163,7 +163,7 @@ class Iso15099Data:
 def iso15099_data(unit: GlazingUnit, u_value: float | None = None) -> Iso15099Data:
     """U, realised films and R(T_m, dT) of a unit, films prescribed.
 
-    Args: u_value: measured [W/(m2 K)]; R is shifted by what it differs from the computed one.
+    Args: u_value: measured [W/(m2 K)]; R is shifted by the difference to the computed one.
     """
     found, r_outer, _, r_inner, _ = _dark_state(unit, *U_STATE_C)
     states = [_dark_state(unit, e, i) for e in OUTDOOR_C for i in INDOOR_C if abs(i - e) > 5.0]

@@ -54,7 +54,7 @@ class UnitArrays(NamedTuple):
 
 
 class UnitState(NamedTuple):
-    """What the kernel fills."""
+    """Outputs of the kernel."""
 
     faces: NDArray[np.float64]  # [2 N] [K]
     radiosity: NDArray[np.float64]  # [2 N] [W/m2]

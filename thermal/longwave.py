@@ -76,7 +76,7 @@ def area_view_factors(area: ArrayLike, normals: ArrayLike) -> NDArray[np.float64
 
 
 def outside_factors(normal_z: float, sky_seen: float = 1.0) -> tuple[float, float, float]:
-    """Shares (sky, air, below) of the hemisphere that an outside face exchanges longwave with.
+    """Shares (sky, air, ground) of the longwave exchange of an outside face.
 
     The sky half of a tilted face splits into sky and air by beta = sqrt((1 + cos tilt)/2)
     (Walton 1983; EnergyPlus).  What hides the sky counts with the ground, at the temperature of
@@ -84,7 +84,7 @@ def outside_factors(normal_z: float, sky_seen: float = 1.0) -> tuple[float, floa
     sky's share with obstacles off).
 
     Args: normal_z: z component of the exterior normal; sky_seen: share of the sky that is not
-        hidden by what stands outdoors.
+        hidden by obstructions.
     """
     half = 0.5 * (1.0 + normal_z)
     beta, seen = np.sqrt(half), half * sky_seen

@@ -53,7 +53,7 @@ def relative_humidity(ratio: ArrayLike, temperature_c: ArrayLike, pressure: Arra
 
 @dataclass(frozen=True, slots=True)
 class MoistZone:
-    """What the moisture of a zone's air depends on."""
+    """Inputs of the moisture balance of a zone's air."""
 
     volume: float  # [m3]
     air_c: FloatArray  # [H]

@@ -1,4 +1,4 @@
-"""What the compiled time loop is given and fills: records of arrays, one entry per axis letter.
+"""Inputs and outputs of the compiled time loop: records of arrays, one entry per axis letter.
 
 N inside faces, M modes of walls, Z zones, W windows, H hours, T time steps; U = N + Z
 unknowns of a step's linear system, E entries below its diagonal.
@@ -45,7 +45,7 @@ class OutdoorConditions(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """What acts on the zones; R is the solar time axis (hours or steps)."""
+    """Inputs of the zones; R is the solar time axis (hours or steps)."""
 
     inner: NDArray[np.float64]  # [R, N] absorbed at the inside faces [W]
     outer: NDArray[np.float64]  # [R, N] absorbed at the outside faces or outer layers [W/m2]
@@ -68,7 +68,7 @@ class Drive(NamedTuple):
 
 
 class State(NamedTuple):
-    """Temperatures [degC], changed in place."""
+    """Temperatures [degC], modified in place."""
 
     inner: NDArray[np.float64]  # [N] inside faces
     outer: NDArray[np.float64]  # [N] outside faces
@@ -107,7 +107,7 @@ class Workspace(NamedTuple):
 
 
 class Means(NamedTuple):
-    """What the loop fills."""
+    """Outputs of the loop."""
 
     inner: NDArray[np.float64]  # [H, N] inside faces [degC]
     outer: NDArray[np.float64]  # [H, N] outside faces [degC]

@@ -60,15 +60,15 @@ def spread_evenly(
 
 
 def window_share(
-    kept: ArrayLike, tau_back: float, alpha_back_inner: float, rho_back: float
+    absorbed: ArrayLike, tau_back: float, alpha_back_inner: float, rho_back: float
 ) -> NDArray[np.float64]:
-    """Part [...] of the light that a window keeps from the room which warms its inner layer.
+    """Part [...] of the room's light absorbed by a window that heats its inner layer.
 
-    kept: [...] light not reflected into the room; the rest, tau_back and the outer panes' share,
-    is lost.  alpha_back_inner: room-side diffuse absorptance of the inner layer.
+    absorbed: [...] light not reflected into the room; the rest, tau_back and the outer panes'
+    share, is lost.  alpha_back_inner: room-side diffuse absorptance of the inner layer.
     """
     whole = 1.0 - rho_back
     require(whole > 0, "window", "reflects all light of the room")
     fits = alpha_back_inner + tau_back <= whole + 1e-6
     require(fits, "window", "room-side absorptance and transmittance exceed 1 - reflectance")
-    return np.asarray(kept, dtype=float) * (alpha_back_inner / whole)
+    return np.asarray(absorbed, dtype=float) * (alpha_back_inner / whole)

@@ -133,7 +133,7 @@ class Gains:
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """A room (or several with one air node): its faces, its air, what heats it."""
+    """A room (or several with one air node): faces, air, heat sources."""
 
     name: str
     volume: float  # [m3] of air

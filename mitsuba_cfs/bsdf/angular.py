@@ -1,4 +1,4 @@
-"""Specular systems by their angle of incidence: a table, a formula, or panes behind each other."""
+"""Angular functions of specular systems: a table, a formula, or a stack of panes."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ OVER = 1e-3  # by which transmittance and reflectance may be more than 1, for ro
 
 @dataclass(frozen=True, slots=True)
 class AngularTable:
-    """How a specular system passes and reflects light, by the angle of incidence alone, one band.
+    """Transmittance and reflectance of a specular system by angle of incidence, one band.
 
-    Between its angles the values are monotone cubics.  At 90 degrees nothing passes and all is
+    Between its angles the values are monotone cubics.  At 90 degrees all light is
     reflected, whether the table has that line or not.
     """
 
@@ -59,7 +59,7 @@ class AngularTable:
         return None if values is None else self._at(values, 1.0, theta)
 
     def by_cosine(self, values: FloatArray | None = None, end: float = 0.0) -> FloatArray:
-        """Shares [STEPS] at even steps of the cosine, 0 to 1; the transmittance by default."""
+        """Shares [STEPS] at uniform steps of the cosine, 0 to 1; the transmittance by default."""
         values = self.transmittance if values is None else values
         return self._at(values, end, np.arccos(np.linspace(0.0, 1.0, STEPS)))
 
@@ -112,10 +112,10 @@ def glass_table(panes: Sequence[tuple[float, float]]) -> AngularTable:
 
 
 def stack_table(panes: Sequence[Pane]) -> AngularTable:
-    """Panes behind each other, the outer one first.
+    """Angular function of a stack of panes, the outer one first.
 
-    All reflections between them are added up by intensity, each polarisation by itself.  Uncoated
-    panes follow Fresnel's equations, coated ones LBNL's shape, alike for either polarisation.
+    All interreflections are added by intensity, for each polarisation separately.  Uncoated
+    panes follow Fresnel's equations, coated ones LBNL's shape, equal for both polarisations.
     """
     return _table_of([_by_polarisation(pane) for pane in panes])
 

@@ -30,7 +30,7 @@ def venetian_blind(
         radius: radius of curvature, the hollow side down; infinite for a flat slat [m].
         thickness: thickness of the slat; zero for a sheet [m].
         segments: number of flat strips that a curved slat is made of.
-        width: width of the cell, along the slats; of no effect on what the layer does [m].
+        width: width of the cell, along the slats; does not affect the result [m].
     """
     profile = slat_profile(depth, radius, thickness, 1 if np.isinf(radius) else segments)
     c, s = np.cos(tilt), np.sin(tilt)

@@ -12,7 +12,7 @@ Bsdf = KlemsBsdf | TensorTreeBsdf
 
 @dataclass(frozen=True)
 class BsdfFile:
-    """What a BSDF XML file says: the layer's description and its BSDF in each spectral band."""
+    """Contents of a BSDF XML file: description of the layer and its BSDF in each spectral band."""
 
     bands: dict[str, Bsdf]  # by "Visible", "Solar", "CIE-X", ...
     name: str = ""
@@ -25,7 +25,7 @@ class BsdfFile:
     emissivity_back: float | None = None
     infrared_transmittance: float | None = None
     conductivity: float | None = None  # [W/(m K)]
-    notes: tuple[str, ...] = ()  # what the reader had to make up or leave out
+    notes: tuple[str, ...] = ()  # what the reader assumed or ignored
 
     def band(self, name: str) -> Bsdf:
         """The BSDF of band `name`; `ValueError` where the file has none."""

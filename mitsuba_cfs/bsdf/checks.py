@@ -1,4 +1,4 @@
-"""What is wrong with a BSDF file, or worth knowing, each with its consequence."""
+"""Checks of a BSDF file: findings with their consequences."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RECIPROCITY_SLACK = 0.05  # relative difference that traced or measured data may
 
 @dataclass(frozen=True)
 class Finding:
-    """One fact about a file and what follows from it."""
+    """One finding about a file and its consequence."""
 
     severity: str  # "error", "warning" or "note"
     where: str
@@ -28,7 +28,7 @@ class Finding:
 
 
 def check_bsdf(file: BsdfFile) -> list[Finding]:
-    """The findings about a file that could be read."""
+    """Findings about a BSDF file."""
     findings = [
         Finding("warning", "file", note, "the values used differ from those in the file")
         for note in file.notes
@@ -113,7 +113,7 @@ def _check_reciprocity(band: str, bsdf: Bsdf) -> list[Finding]:
 def reciprocity_error(bsdf: Bsdf, there: str, back: str) -> float | None:
     """Mean absolute difference of f(i -> o) and f(o -> i) as a share of the mean.
 
-    Weighted by projected solid angles; None where it cannot be told.
+    Weighted by projected solid angles; None if it cannot be computed.
     """
     forth, reverse = getattr(bsdf, there), getattr(bsdf, back)
     if bsdf.is_dummy(forth) or bsdf.is_dummy(reverse):

@@ -57,7 +57,7 @@ def primary_spectra() -> NDArray[np.float64]:
     """Spectra [3, N] of the primaries at `WAVELENGTHS_NM`: smooth, in 0..1, that add up to one.
 
     Under D65 each looks as its primary, so that r, g, b times them has the colour (r, g, b), and
-    what is grey is grey at all wavelengths.
+    grey is constant over the wavelength.
 
     Source: after Mallett and Yuksel 2019, "Spectral primary decomposition for rendering with sRGB
     reflectance", EGSR (their conditions; solved here).

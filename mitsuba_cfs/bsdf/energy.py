@@ -1,4 +1,4 @@
-"""Whether a BSDF scatters more light than it gets: a little is noted, too much is refused."""
+"""Energy conservation of a BSDF: small excess is noted, large excess is refused."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ ENERGY_SLACK = 1e-3  # above 1 by which rounded files may be
 def check_energy(
     bsdf: Bsdf, limit: float, *, file: str | PathLike[str], band: str
 ) -> tuple[str, ...]:
-    """What is to be noted; `DataError` where a side scatters more light than it gets.
+    """Notes on energy conservation; `DataError` where a side scatters more light than it receives.
 
-    Grazing directions of measured and computed data often do by a few per cent, and hold little of
-    the light: they are noted.  Refused is a side that scatters more than `limit` of the light of a
-    whole even hemisphere, or of any direction more than 1.5 times that.
+    Grazing directions of measured and computed data often do so by a few per cent, and contain
+    little of the light: they are noted.  Refused is a side that scatters more than `limit` of the
+    light of a uniform hemisphere, or of any direction more than 1.5 times that.
     """
     notes = []
     for side in ("front", "back"):
@@ -42,13 +42,13 @@ def check_energy(
 
 
 def gains_energy(bsdf: Bsdf, share: NDArray[np.float64], limit: float) -> bool:
-    """Whether `share` [incident] of the light is too much to be believed."""
+    """Whether the scattered `share` [incident] of the light is implausibly large."""
     mean = np.average(share, weights=bsdf.incident_weights(len(share)))
     return bool(mean > limit or share.max() > DIRECTION_LIMIT * limit)
 
 
 def excess(share: NDArray[np.float64], slack: float) -> str:
-    """How many directions scatter more than they get, and the worst of them."""
+    """Number of directions that scatter more than they receive, and the largest share."""
     worst = int(np.argmax(share))
     return (
         f"{np.count_nonzero(share > 1 + slack)} of {len(share)} directions scatter more than they "

@@ -1,4 +1,4 @@
-"""BSDF values and hemispherical shares for directions, whatever form the data have."""
+"""BSDF values and hemispherical shares for directions, from either form of data."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ISOTROPIC_EDGE = 0.5 - 1e-6  # of (1 - sin(theta)) / 2: normal incidence lies wi
 
 
 def bsdf_values(bsdf: Bsdf, incident: ArrayLike, outgoing: ArrayLike) -> NDArray[np.float64]:
-    """BSDF [N] [1/sr] for unit vectors to the light and along which it leaves [N, 3].
+    """BSDF [N] [1/sr] for unit vectors to the light source and along the outgoing light [N, 3].
 
     Both in the window frame; which of the four blocks applies follows from their sides.
     """
@@ -34,7 +34,7 @@ def bsdf_values(bsdf: Bsdf, incident: ArrayLike, outgoing: ArrayLike) -> NDArray
 
 
 def direct_hemispherical(bsdf: Bsdf, block: str, incident: ArrayLike) -> NDArray[np.float64]:
-    """Share [N] of the light from the directions [N, 3] that `block` sends on."""
+    """Share [N] of the light from the directions [N, 3] that `block` scatters."""
     incident = np.atleast_2d(incident)
     if isinstance(bsdf, KlemsBsdf):
         full = bsdf.filled()

@@ -1,11 +1,11 @@
-"""Fabrics of roller blinds: the BSDF of what a data sheet states at normal incidence.
+"""Fabrics of roller blinds: BSDF from a data sheet's values at normal incidence.
 
-A share of the beam goes straight on through the holes, the rest of what passes is scattered.  By
-angle both fall as Kotey, Wright and Collins 2009 measured ("Determining off-normal solar optical
-properties of roller blinds", ASHRAE Transactions 115(1)); that model is also ASHRAE 1311-RP's and
-EnergyPlus' (WindowMaterial:Shade:EquivalentLayer).  What is scattered leaves by the same fall, so
-that the BSDF is reciprocal; the model itself has it leave evenly.  Reflection is even and does not
-depend on the angle.
+A share of the beam is transmitted directly through the holes, the rest of the transmission is
+scattered. Both decrease with the angle as Kotey, Wright and Collins 2009 measured ("Determining
+off-normal solar optical properties of roller blinds", ASHRAE Transactions 115(1)); that model is
+also ASHRAE 1311-RP's and EnergyPlus' (WindowMaterial:Shade:EquivalentLayer).  The
+scattered part leaves with the same angular decrease, so that the BSDF is reciprocal; in the model
+itself it is diffuse.  Reflection is diffuse and does not depend on the angle.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class FabricBand:
 
 
 def fabric_transmittances(band: FabricBand, theta: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Transmittance [..] and what of it goes straight on [..] at angles of incidence [rad]."""
+    """Transmittance [..] and its direct part [..] at angles of incidence [rad]."""
     theta = np.asarray(theta, dtype=float)
     if band.direct >= 1:
         return np.ones_like(theta), np.ones_like(theta)

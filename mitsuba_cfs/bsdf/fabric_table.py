@@ -51,7 +51,7 @@ UNIT = re.compile(r"[\[(]\s*(%|-|mm|m)\s*[\])]|(%)\s*$")
 
 @dataclass(frozen=True, slots=True)
 class FabricShade:
-    """A fabric as its row states it; front is outdoors, None is what is not stated."""
+    """Fabric of one row; front is outdoors, None is not stated."""
 
     name: str
     manufacturer: str
@@ -63,13 +63,13 @@ class FabricShade:
     ultraviolet: float | None  # transmittance
     thickness: float | None  # [m]
     line: int
-    notes: tuple[str, ...]  # what the row leaves open and what stands for it
+    notes: tuple[str, ...]  # values that the row does not state, and their replacements
 
 
 @dataclass(frozen=True, slots=True)
 class _Column:
     quantity: str  # of TEXTS, SHARES with a side, or "thickness"
-    title: str  # as it stands there
+    title: str  # as written in the file
     unit: str | None
     place: int
 
@@ -89,7 +89,7 @@ class _Row:
 
 
 def read_fabric_table(path: str | PathLike[str]) -> tuple[list[FabricShade], tuple[str, ...]]:
-    """The fabrics of a table, and what is to be said of its columns.
+    """Fabrics of a table, and notes on its columns.
 
     Raises: `DataError` that names file, line and column.
     """
@@ -172,7 +172,7 @@ def _columns(path: Path, line: int, titles: list[str]) -> tuple[list[_Column], l
 
 
 def _quantity(title: str) -> str | None:
-    """What a column states, with " back" for a back side; None where it is not known."""
+    """Quantity of a column, with " back" for a back side; None if unknown."""
     text = UNIT.sub(" ", title.casefold())
     for letter, word in GREEK.items():
         text = text.replace(letter, word)
@@ -187,7 +187,7 @@ def _quantity(title: str) -> str | None:
 
 
 def _row(path: Path, line: int, cells: list[str], columns: list[_Column]) -> _Row:
-    """A row with its numbers as they stand there; those with a % of their own as shares of 1."""
+    """Row with its numbers as written; those with their own % as shares of 1."""
     by_quantity = {one.quantity: cells[one.place] for one in columns}
     row = _Row(path, line, by_quantity, {one.quantity: one.title for one in columns}, {})
     for one in columns:
@@ -208,7 +208,7 @@ def _scale(
 
     A column without a unit is in percent where it has values above 1; if all its values are 0 to
     1 while others are in percent, it could be either and is refused.  Emissivities are each by
-    themselves: data sheets have them as shares beside percents.
+    themselves: data sheets state them as shares even if other columns are in percent.
 
     Returns: titles without a unit that are in percent by their values; that are shares.
     """
@@ -232,7 +232,7 @@ def _scale(
 
 
 def _bare(column: _Column, rows: list[_Row]) -> list[float]:
-    """The numbers of a column that no unit is written to, neither in its title nor behind them."""
+    """Numbers of a column without a unit, neither in its title nor after the numbers."""
     if column.unit is not None:
         return []
     name = column.quantity
@@ -282,7 +282,7 @@ def _shade(row: _Row) -> FabricShade:
 
 
 def _direct(row: _Row) -> tuple[float, str]:
-    """What of the light goes straight on, and which column says so."""
+    """Direct transmittance, and the column that states it."""
     at = row.values
     if "openness" in at and at["openness"] > at["tau_v"] + ROUNDING:
         message = f"{at['openness']:.3f} is open, but tau_v is {at['tau_v']:.3f}"
@@ -301,7 +301,7 @@ def _direct(row: _Row) -> tuple[float, str]:
 def _band(row: _Row, band: str, direct: float, source: str, notes: list[str]) -> FabricBand:
     """Solar ("e") or visible ("v") values at normal incidence, checked.
 
-    Args: direct, source: what goes straight on, and the quantity that says so.
+    Args: direct, source: direct transmittance, and the quantity that states it.
     """
     at, tau, rho = row.values, f"tau_{band}", f"rho_{band}"
     if direct > at[tau] + ROUNDING:

@@ -1,7 +1,7 @@
 """A virtual goniophotometer: Klems and tensor tree BSDFs of a periodic layer, by Dr.Jit.
 
-Light enters evenly over the layer and over each incident patch (in cos(theta) d_omega), is
-followed from sheet to sheet, and is counted in the patch that it leaves through:
+Light enters uniformly over the layer and over each incident patch (in cos(theta) d_omega), is
+traced from sheet to sheet, and is counted in the patch in which it leaves:
 
     f[o, i] = E[weight that leaves in o] / omega_o
 
@@ -86,12 +86,12 @@ def generate_tensor_tree(
 
     Args:
         levels: 4^levels cells a hemisphere (6: 4096), as genBSDF's `-t4` and `-t3`.
-        rank: 4, or 3 for the mean over all azimuths of what is alike turned about the normal.
+        rank: 4, or 3 for the mean over all azimuths of a layer that is isotropic about the normal.
         samples: paths for each incident cell and side.
         cull: share of the cells that are merged away; see `culled_tree`.
     """
     variants.activate()
-    from mitsuba_cfs.bsdf.traced_squares import TracedRings, TracedSquares
+    from mitsuba_cfs.bsdf.traced_tree import TracedRings, TracedSquares
 
     if rank not in (3, 4):
         raise ValueError(f"rank: expected 3 or 4, got {rank}")
@@ -169,7 +169,7 @@ def trace_bins(
         lanes = min(LANES, total - start)
         _count(work, sums, start, lanes)
         dr.eval(sums)
-        dr.sync_thread()  # what is reported is done
+        dr.sync_thread()  # progress reports finished work
         progress("goniophotometer", (start + lanes) / total)
     return [np.array(each).reshape(shape) for each in sums], per_row
 
@@ -177,8 +177,8 @@ def trace_bins(
 def _reciprocal(values: NDArray[np.float64], basis: KlemsBasis) -> NDArray[np.float64]:
     """Values [batch, side in, patch in, side out, patch out] that the light's way back helps.
 
-    The mean of both ways is half as noisy from patch to patch, but not in what a direction
-    scatters in all, which the way there knows best: each is scaled to that.
+    The mean of both directions has half the variance per patch, but not for the total that a
+    direction scatters, which the forward direction gives best: each is scaled to that total.
     """
     turn, area = basis.opposite(), basis.projected_solid_angles()
     back = np.moveaxis(values, (1, 2), (3, 4))[:, :, turn][..., turn]
@@ -201,7 +201,7 @@ def _klems(basis: KlemsBasis, values: NDArray[np.float64]) -> KlemsBsdf:
 
 @dataclass(frozen=True)
 class _Work:
-    """What the kernel of `trace_bins` needs."""
+    """Inputs of the kernel of `trace_bins`."""
 
     layer: TracedLayer
     incident: object
@@ -214,7 +214,7 @@ class _Work:
 
 
 def _count(work: _Work, sums: list, start: int, lanes: int) -> None:
-    """Follow the paths numbered from `start` and add what leaves to its bins."""
+    """Trace the paths numbered from `start` and add the outgoing weights to their bins."""
     index = dr.arange(mi.UInt32, lanes) + dr.opaque(mi.UInt32, start)
     count = dr.opaque(mi.UInt32, work.per_row)
     row = index // count  # (repetition, side in, bin in)
@@ -224,7 +224,7 @@ def _count(work: _Work, sums: list, start: int, lanes: int) -> None:
     x, y, z = work.incident.direction(patch, u[0], u[1])
     front = side == 0
     towards = mi.Vector3f(x, -y, dr.select(front, z, -z))
-    # both numbers are raised by the lane: what a path draws depends on its own number only
+    # both numbers are raised by the lane: the samples of a path depend on its own number only
     first = mi.UInt64(dr.opaque(mi.UInt32, start))
     random = mi.PCG32(lanes, first + (mi.UInt64(work.seed) << 32), first)
     start_at = mi.Point2f(random.next_float32(), u[2])

@@ -1,4 +1,4 @@
-"""Clear panes: how transmittance and reflectance fall with the angle of incidence."""
+"""Clear panes: transmittance and reflectance by angle of incidence."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def coated_values(
     """Transmittance, front and back reflectance [..] of a coated pane at `theta` [rad].
 
     tau = tau_n t(theta), rho = rho_n (1 - r(theta)) + r(theta), with the shape of clear or bronze
-    glass for t and r; what the pane was measured at is kept at the normal.
+    glass for t and r; the measured values are kept at normal incidence.
 
     Args: clear: whether the shape is that of clear glass; by default where tau_n is above
         `CLEAR_ABOVE`.
@@ -148,8 +148,8 @@ class Glazing:
 def glazing_values(glazing: Glazing, theta: ArrayLike) -> tuple[NDArray[np.float64], ...]:
     """Transmittance, front and back reflectance [..] of a glazing unit at `theta` [rad].
 
-    Transmittance after Roos; what is absorbed stays as at normal incidence up to 75 degrees and
-    falls to nothing at 90 (Kuhn 2006, "Solar control: a general evaluation method for facades with
+    Transmittance after Roos; the absorptance stays as at normal incidence up to 75 degrees and
+    decreases to zero at 90 (Kuhn 2006, "Solar control: a general evaluation method for facades with
     venetian blinds or other solar control systems", Energy and Buildings 38).
     """
     theta = np.asarray(theta, dtype=float)

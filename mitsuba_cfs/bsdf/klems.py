@@ -17,7 +17,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# A transmission block that passes less than this of any direction's light is a place holder
+# A transmission block that transmits less than this of any direction's light is a placeholder
 # (the threshold below which Radiance drops a component).
 DUMMY_HEMISPHERICAL = 1e-3
 
@@ -82,7 +82,7 @@ class KlemsBasis:
     def angles_within(
         self, patch: ArrayLike, u: ArrayLike, v: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Polar angle, azimuth [..] [rad] at (u, v) in 0..1 of `patch`, even in cos(theta) dw."""
+        """Polar angle, azimuth [..] [rad] at (u, v) of `patch`, uniform in cos(theta) d_omega."""
         ring = self.rings[np.asarray(patch)]
         count = np.asarray(self.phi_counts)[ring]
         sine2 = np.sin(np.asarray(self.theta_bounds)) ** 2
@@ -140,7 +140,7 @@ class KlemsBsdf:
     """BSDF values [1/sr] of one spectral band on Klems bases, indexed [outgoing, incident].
 
     "Front" is the exterior: `transmission_front` is light from outside to the room.  A block that
-    the file does not have is None; `filled` says what stands in for it.
+    the file does not have is None; `filled` gives its replacement.
     """
 
     basis_in: KlemsBasis
@@ -176,14 +176,15 @@ class KlemsBsdf:
         return self.basis_in.projected_solid_angles()
 
     def is_dummy(self, block: NDArray[np.float64] | None) -> bool:
-        """Whether a block passes nothing, so that it is taken for absent as Radiance does."""
+        """Whether a block transmits nothing and is treated as absent, as in Radiance."""
         return block is None or self.direct_hemispherical(block).max() <= DUMMY_HEMISPHERICAL
 
     def filled(self) -> KlemsBsdf:
         """The same system with all four blocks.
 
-        A transmission that is absent or a place holder is the other side's by reciprocity,
-        f(i -> o) = f(o -> i); an absent reflection is zero.  That is how Radiance reads such files.
+        A transmission that is absent or a placeholder is replaced by the other side's by
+        reciprocity, f(i -> o) = f(o -> i); an absent reflection is zero.  That is how Radiance
+        reads such files.
         """
         front, back = self.transmission_front, self.transmission_back
         if self.is_dummy(front) and not self.is_dummy(back):

@@ -1,4 +1,4 @@
-"""Layers one behind the other: Klems matrix algebra, with what each layer absorbs.
+"""Layers in series: Klems matrix algebra, with the absorptance of each layer.
 
 In the window frame light that passes straight through keeps its patch, and so does light that
 one layer throws back to the next: the patch that it leaves a layer by is the one it arrives by.

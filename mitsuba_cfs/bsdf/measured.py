@@ -64,7 +64,7 @@ class Pattern:
 
     @cached_property
     def image(self) -> FloatArray:
-        """BSDF [bands, PIXELS, PIXELS] [1/sr] at even steps of y and x from -1 to 1."""
+        """BSDF [bands, PIXELS, PIXELS] [1/sr] at uniform steps of y and x from -1 to 1."""
         from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
         from scipy.spatial import QhullError
 
@@ -94,7 +94,7 @@ class Pattern:
     def noise(self) -> tuple[float, float]:
         """Standard deviation of a value, relative to it, and of the share; of the last band but X.
 
-        From what is left of each value beside a quadratic fit to its neighbours: features narrower
+        From the residual of each value to a quadratic fit of its neighbours: features narrower
         than a few steps of the measurement count as noise.
         """
         from scipy.spatial import cKDTree
@@ -156,7 +156,7 @@ def patterns_of(measurements: Sequence[Measurement], block: str) -> list[Pattern
 
 
 def symmetry_of(patterns: Sequence[Pattern]) -> str:
-    """The symmetry, a key of `MIRRORS`, that the azimuths of the incident light stand for."""
+    """The symmetry, a key of `MIRRORS`, that the azimuths of the incident light imply."""
     points = np.array([pattern.incident for pattern in patterns])
     points = points[np.hypot(*points.T) > MIRROR_TOLERANCE]
     units = points / np.linalg.norm(points, axis=1, keepdims=True)
@@ -202,7 +202,7 @@ class ScatteringInterpolant:
         """Means [bands, K out, K in] [1/sr] over pairs of Klems patches.
 
         Args: points: of incident light in all patches, at least four in each; each is met by all
-            points of outgoing light, so that a lobe narrower than a patch is met wherever it goes.
+            points of outgoing light, so that a lobe narrower than a patch is always sampled.
         """
         disk_in, disk_out = (
             _patch_points(basis, _even_points(total / basis.size))
@@ -231,7 +231,7 @@ class ScatteringInterpolant:
         """BSDF [bands, N] [1/sr] for one incident direction, scaled to its share of light.
 
         `disk_in` [2] and `disk_out` [N, 2] in the axes of trees and Klems bases; `areas` [N] of
-        the disk that the points stand for.
+        the disk that each point represents.
         """
         incident, outgoing = disk_in * [1.0, -1.0], disk_out * [-1.0, 1.0]
         value: FloatArray = np.zeros((self.patterns[0].values.shape[1], len(outgoing)))
@@ -299,7 +299,7 @@ class ScatteringInterpolant:
         """Triangles of azimuth and radius, all round and a turn more; the measured point of each.
 
         On the disk itself triangles of a few azimuths would leave out what lies between these near
-        the rim.  Normal incidence stands at each azimuth of the others.
+        the rim.  Normal incidence is repeated at each azimuth of the others.
         """
         from scipy.spatial import Delaunay, QhullError
 
@@ -330,6 +330,6 @@ def _even_points(count: float) -> FloatArray:
 
 
 def _patch_points(basis: KlemsBasis, square: FloatArray) -> FloatArray:
-    """Points [K, n, 2] on the disk of each patch, even in its area, of points [n, 2] in 0..1."""
+    """Points [K, n, 2] on the disk of each patch, uniform in its area, of points [n, 2] in 0..1."""
     theta, phi = basis.angles_within(np.arange(basis.size)[:, None], *square.T)
     return np.sin(theta)[..., None] * np.stack([np.cos(phi), np.sin(phi)], axis=-1)

@@ -34,7 +34,7 @@ HEADER = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """What was measured for the light from one direction, in the window frame."""
+    """Measurement for the light from one direction, in the window frame."""
 
     path: Path
     name: str

@@ -35,7 +35,7 @@ Key = float | str  # a wavelength [nm] or an integral's name
 
 @dataclass(frozen=True, slots=True)
 class OpticalData:
-    """Values of a pane near normal incidence; None is what the file does not state."""
+    """Values of a pane near normal incidence; None is not stated."""
 
     name: str | None
     rows: list[list[float]]  # wavelength [nm], transmittance, front and back reflectance
@@ -56,7 +56,7 @@ class _Point:
     side: str
     result: str
     emergence: str  # "direct", "diffuse" or "hemispherical"
-    polar: float  # of the incident light [degrees], -1 where it comes from everywhere
+    polar: float  # of the incident light [degrees], -1 for hemispherical light
     value: float
 
 
@@ -122,7 +122,7 @@ def _only(found: Any, field: str, path: Path) -> dict[str, Any]:
 
 
 def _blocks(data: dict[str, Any], path: Path) -> Iterator[tuple[str, tuple[str, ...], list[Any]]]:
-    """Where each block of data stands, its sides and its data points."""
+    """Path of each block of data, its sides and its data points."""
     blocks = data.get("data", [data] if "dataPoints" in data else None)
     if not isinstance(blocks, list) or not blocks:
         raise DataError("expected a list of data points", file=path, field="data")
@@ -142,7 +142,7 @@ def _blocks(data: dict[str, Any], path: Path) -> Iterator[tuple[str, tuple[str, 
 
 
 def _points(block: str, sides: tuple[str, ...], points: list[Any], path: Path) -> Iterator[_Point]:
-    """What the data points of a block say near normal incidence."""
+    """Values of a block's data points near normal incidence."""
     for number, point in enumerate(points, 1):
         where = f"{block}, data point {number}"
         if not isinstance(point, dict):

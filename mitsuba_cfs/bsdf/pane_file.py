@@ -26,7 +26,7 @@ UNCOATED = ("neither", "none", "na", "n/a", "")
 
 @dataclass(frozen=True, slots=True)
 class PaneFile:
-    """What the file of a pane says of it; front is its own front, None is what it does not say."""
+    """Data in the file of a pane; front is the file's front, None is not stated."""
 
     path: Path
     name: str
@@ -44,7 +44,7 @@ class PaneFile:
     def visible_pane(self) -> Pane:
         """The pane in the visible band: by the values that are stated, else by its spectrum.
 
-        One without a coating has the mean of what its two faces were measured at.
+        A pane without a coating has the mean of its two measured faces.
         """
         tau, front, back = self.visible or self._of_spectrum()
         if not self.coated:
@@ -144,9 +144,9 @@ def _optical(document: dict[str, Any], path: Path) -> PaneFile:
 
 
 def product_pane(product: dict[str, Any], path: Path, *, material: bool = False) -> PaneFile:
-    """A product of the IGSDB: its measured data, and what it states of daylight.
+    """Product of the IGSDB: measured data and visible values.
 
-    Args: material: of a shade, whose sides are kept apart; else a pane is asked for.
+    Args: material: of a shade, whose sides are kept separate; otherwise a pane is required.
     """
     measured = product.get("measured_data")
     if not isinstance(measured, dict) or not measured:

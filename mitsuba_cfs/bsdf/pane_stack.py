@@ -1,4 +1,4 @@
-"""Panes of glass one behind the other: what passes, comes back and stays in each."""
+"""Panes of glass in series: transmittance, reflectance, and absorptance of each."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def pane_optics(pane: Pane, theta: ArrayLike) -> PaneOptics:
 def stack(panes: Sequence[PaneOptics]) -> StackOptics:
     """Panes from outside to inside as one glazing, all reflections between them counted.
 
-    Intensities are added, so each polarisation or wavelength is to have a place of its own in the
+    Intensities are added, so each polarisation or wavelength needs its own index in the
     arrays where it matters.
 
     Source: EN 410:2011, formulas (1) to (4), extended pane by pane.
@@ -57,7 +57,7 @@ def stack(panes: Sequence[PaneOptics]) -> StackOptics:
     tau, front, back = first.tau, first.rho_front, first.rho_back
     absorbed, from_inside = [1 - tau - front], [1 - tau - back]
     for pane in panes[1:]:
-        # two mirrors at 90 degrees send nothing on: what passed the outer one is 0 there
+        # two mirrors at 90 degrees transmit nothing: the denominator is 0 there
         bounce = 1 / np.maximum(1 - back * pane.rho_front, 1e-12)
         inward, kept = tau * bounce, 1 - pane.tau - pane.rho_front
         outward = inward * pane.rho_front
@@ -89,12 +89,12 @@ def absorbed_by_layers(
 ) -> FloatArray:
     """Absorptance of every layer [K, N] of a system; its sum is 1 - tau - rho of the system.
 
-    The panes before the shade absorb of the beam, and of what the shade throws back, which is
-    known from what leaves the system: (rho - rho_o)/tau_o,dif.  The panes behind it absorb in
-    proportion to what passes them: tau a_i/tau_i,dif.  The shade has the rest.
+    The panes on the outer side of the shade absorb part of the beam and of the light that the shade
+    reflects, (rho - rho_o)/tau_o,dif.  The panes on its room side absorb in
+    proportion to the transmission: tau a_i/tau_i,dif.  The shade absorbs the rest.
 
     Args:
-        layers: from outside to inside; None stands for a shade, of which there is at most one.
+        layers: from outside to inside; None is a shade, of which there is at most one.
         transmittance, reflectance: [K] of the whole system, direction to hemisphere.
         theta: angles of incidence [K] [rad].
     """

@@ -136,7 +136,7 @@ def clear_pane(
 
 
 def stacked(layers: list[PeriodicLayer], gaps: list[float]) -> PeriodicLayer:
-    """Layers one behind the other as one, the exterior one first, all on cells of one size.
+    """Layers in series as one layer, the exterior one first, all on cells of one size.
 
     Args:
         gaps: clear distance between neighbouring layers [m].

@@ -43,8 +43,8 @@ def klems_plugin(
     Args:
         colour: its CIE-X and CIE-Z bands, for variants of colour.
         up: [3] world vector of the system's up.
-        peak: let what goes straight on pass undisturbed.
-        angular: what passes so of a specular system at every angle, in place of the data's patches.
+        peak: transmit the direct part undisturbed.
+        angular: direct transmittance of a specular system by angle, instead of the data's patches.
     """
     variants.activate(vectorised=False)
     import mitsuba as mi
@@ -138,7 +138,7 @@ def _register(variant: str) -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from mitsuba_cfs.bsdf.traced_colour import TracedColour, sees_colour
+    from mitsuba_cfs.bsdf.plugin_data import TracedColour, sees_colour
     from mitsuba_cfs.bsdf.traced_klems import TracedBasis, gather, table
 
     class KlemsBsdfPlugin(window_bsdf()):

@@ -1,4 +1,4 @@
-"""What every BSDF plugin of a window shares: its frame, the two kinds of scattering, the contract.
+"""Base of the BSDF plugins of a window: frame, reflection and transmission, required methods.
 
 The shape's normal points outdoors (to the file's Front); `up` is the world vector that the file's
 up means, north where the pane is level.  A plugin says, for directions in the window frame,
@@ -6,9 +6,9 @@ up means, north where the pane is level.  A plugin says, for directions in the w
 - `values(ctx, known, other, active)`: f [1/sr], its density in place of f when it is sampled, and
   the table entry that it comes from;
 - `draw(ctx, known, through, u, point, active)`: another direction, and f, density and entry there;
-- `totals(ctx, known, active)`: what of `known` is reflected and transmitted, by that density;
-- `through(ctx, known, active)`: with `peak`, the share that goes straight on, unscattered: a beam
-  of its own (a null component), which `values` and `totals` leave out;
+- `totals(ctx, known, active)`: reflected and transmitted share of `known`, by that density;
+- `through(ctx, known, active)`: with `peak`, the directly transmitted share: a separate beam
+  (a null component), which `values` and `totals` exclude;
 - `through_entry(ctx, known, active)`: the table entry of that beam.
 
 With `angular`, shares at even steps of the cosine of incidence from 0 to 1, that beam is this

@@ -1,11 +1,15 @@
-"""The band of a BSDF file that a plugin's properties name, with its colour."""
+"""Data of a BSDF plugin: the band of a file, and its colour on Mitsuba's types."""
 
 from __future__ import annotations
 
+import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
-from mitsuba_cfs.bsdf.colour import COLOUR_BANDS
+from mitsuba_cfs.bsdf.colour import COLOUR_BANDS, WAVELENGTHS_NM, primary_spectra
+from mitsuba_cfs.bsdf.traced_klems import cell, gather, table
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 
@@ -28,3 +32,38 @@ def read_band(props, kind: type[Bsdf]) -> tuple[Bsdf, tuple[Bsdf, Bsdf] | None]:
     if band != "Visible" or not all(name in bands for name in COLOUR_BANDS):
         return bsdf, None
     return bsdf, (bands[COLOUR_BANDS[0]], bands[COLOUR_BANDS[1]])
+
+
+def sees_colour() -> bool:
+    """Whether the active variant renders colours."""
+    return "rgb" in mi.variant() or "spectral" in mi.variant()
+
+
+class TracedColour:
+    """Linear sRGB over the grey value, by table entry."""
+
+    def __init__(self, relative: NDArray[np.float64]) -> None:
+        """`relative` [E, 3], see `mitsuba_cfs.bsdf.colour.relative_rgb`."""
+        self.channels = [table(channel) for channel in relative.T]
+        if "spectral" in mi.variant():
+            self.primaries = [table(spectrum) for spectrum in primary_spectra()]
+
+    def spectrum(self, value, entry, si, active=True):
+        """The value [1/sr] of `entry` in colour, at the interaction's wavelengths if it has any."""
+        rgb = [value * gather(channel, entry, active) for channel in self.channels]
+        if "spectral" not in mi.variant():
+            return mi.Spectrum(mi.Color3f(*rgb))
+        step = WAVELENGTHS_NM[1] - WAVELENGTHS_NM[0]
+        last = len(WAVELENGTHS_NM) - 2
+        seen = []
+        for nm in si.wavelengths:
+            place = dr.clip((nm - WAVELENGTHS_NM[0]) / step, 0.0, last + 0.999)
+            below = cell(place, last)
+            above = place - mi.Float(below)
+            parts = [
+                gather(spectrum, below, active) * (1 - above)
+                + gather(spectrum, below + 1, active) * above
+                for spectrum in self.primaries
+            ]
+            seen.append(rgb[0] * parts[0] + rgb[1] * parts[1] + rgb[2] * parts[2])
+        return mi.Spectrum(*seen)

@@ -1,4 +1,4 @@
-"""What `tensor_tree_bsdf` looks values up in and draws directions from, by system."""
+"""Tables of `tensor_tree_bsdf` for evaluation and sampling, by system."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FLOOR = 0.02  # share of its mean that the density of a resampled tree never fal
 
 @dataclass(frozen=True)
 class PluginTrees:
-    """What the plugin looks values up in and draws directions from."""
+    """Tables of the plugin for evaluation and sampling."""
 
     valued: SamplingTree  # rank 4: the drawn ones; rank 3: the four forward ones
     drawn: SamplingTree  # four forward, then four backward trees
@@ -63,7 +63,7 @@ def _without_peaks(
         if own is not None and name.startswith("transmission"):
             if tree.rank == 4:
                 tree, share = through_peak(tree)
-            else:  # the beam of the other side is alike
+            else:  # the beam of the other side is equal
                 tree, share = through_peak(own)
                 tree = tree.reversed() if turned else tree
         rest.append(tree)
@@ -82,7 +82,7 @@ def leaf_colours(y: TensorTree, x: TensorTree, z: TensorTree) -> NDArray[np.floa
 
 
 def forward_trees(bsdf: TensorTreeBsdf) -> list[TensorTree]:
-    """The trees of `BLOCKS`, light to where it goes, what is absent filled in."""
+    """Trees of `BLOCKS` from incident to outgoing light, with absent blocks filled."""
     rank = next(iter(bsdf.blocks().values())).rank
     trees = []
     for name in BLOCKS:
@@ -94,7 +94,7 @@ def forward_trees(bsdf: TensorTreeBsdf) -> list[TensorTree]:
 
 
 def backward_trees(forward: list[TensorTree]) -> list[TensorTree]:
-    """The trees read from where the light goes to where it came from, by the side it leaves on."""
+    """Reversed trees, from outgoing to incident light, by outgoing side."""
     reflection_front, reflection_back, front, back = forward
     return [tree.reversed() for tree in (reflection_front, reflection_back, back, front)]
 

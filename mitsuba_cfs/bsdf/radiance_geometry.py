@@ -15,7 +15,7 @@ from mitsuba_cfs.files import reason
 def read_radiance_layer(path: str | PathLike[str], period: tuple[float, float]) -> PeriodicLayer:
     """The layer of a Radiance scene in genBSDF's frame (z into the room, y up), [m].
 
-    Red, green and blue are the spectral channels.  `DataError` for what is no convex polygon of
+    Red, green and blue are the spectral channels.  `DataError` for anything but a convex polygon of
     opaque `plastic`: other primitives, commands, undefined modifiers.
     """
     materials: dict[str, SlatMaterial] = {}

@@ -1,4 +1,4 @@
-"""Klems matrices of any BSDF: what the matrix methods use of a tensor tree."""
+"""Klems matrices of any BSDF, for the matrix methods."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def klems_of(bsdf: Bsdf, basis: KlemsBasis = KLEMS_FULL, *, samples: int = 64) -
 
     Each column is scaled to the share of light that the block sends on from its patch, which is
     known better than the mean of so many pairs.  The through beam of a tree, whose cells lie across
-    patches, is all on the diagonal: there the matrix methods look for what goes straight on.
+    patches, is all on the diagonal, where the matrix methods expect direct transmission.
 
     Args: samples: pairs of directions for each pair of patches.
     """

@@ -23,7 +23,7 @@ def perforated_screen(
         spacing: distance of the holes' centres [m].
         openness: share of the area that is hole, up to pi / 4.
         thickness: of the sheet; the walls of the holes have its material [m].
-        segments: corners of the polygon that stands for a hole, its area that of the circle.
+        segments: corners of the polygon that represents a hole, with the area of the circle.
     """
     if not 0 < openness < np.pi / 4:
         raise ValueError(f"openness: expected above 0 and below pi / 4, got {openness}")
@@ -45,7 +45,8 @@ def woven_screen(
 ) -> PeriodicLayer:
     """Square holes between flat threads, the sheet `thickness` thick: a roller shade's fabric.
 
-    Source: the square-mesh model of roller fabrics; openness is what normal light passes.
+    Source: the square-mesh model of roller fabrics; openness is the direct transmittance at normal
+    incidence.
     """
     if not 0 < openness < 1:
         raise ValueError(f"openness: expected above 0 and below 1, got {openness}")
@@ -63,7 +64,7 @@ def thread_screen(
     Args:
         diameter: of a thread [m].
         spacing: distance of the threads' axes [m].
-        segments: corners of the polygon that stands for a thread, as wide as it.
+        segments: corners of the polygon that represents a thread, with its width.
     """
     if not 0 < diameter < spacing:
         raise ValueError(f"diameter: expected above 0 and below {spacing}, got {diameter}")

@@ -32,7 +32,7 @@ LONGEST_MM = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class ShadeFile:
-    """What the file of a shade says of it."""
+    """Data in the file of a shade."""
 
     path: Path
     name: str
@@ -77,7 +77,7 @@ class ShadeFile:
 
     @property
     def openness(self) -> float:
-        """Share of a sheet that normal light passes through; 0 of a blind."""
+        """Direct transmittance of a sheet at normal incidence; 0 for a blind."""
         size = self.geometry
         if self.kind == "venetian":
             return 0.0

@@ -1,4 +1,4 @@
-"""What a glazing's U and g say of its transmittance and reflectance: the simple window model.
+"""Transmittance and reflectance of a glazing from U and g: the simple window model.
 
 Source: Arasteh, Kohler, Griffith 2009, "Modeling windows in EnergyPlus with simple performance
 indices", LBNL-2804E; as EnergyPlus' WindowMaterial:SimpleGlazingSystem (Engineering Reference,
@@ -35,7 +35,8 @@ def solar_transmittance(u_value: float, g_value: float) -> float:
 def solar_reflectance(u_value: float, g_value: float, transmittance: float) -> float:
     """Solar reflectance at normal incidence: rho = 1 - tau - (g - tau)/N, not below 0.
 
-    N is the inward share of what one layer in the middle absorbs, with the films of summer.
+    N is the inward share of the absorption in one layer in the middle, with summer film
+    coefficients.
     """
     gain = g_value - transmittance
     inner = 1 / _between(
@@ -52,7 +53,7 @@ def solar_reflectance(u_value: float, g_value: float, transmittance: float) -> f
 
 
 def visible_reflectances(transmittance: float) -> tuple[float, float]:
-    """Front and back visible reflectance at normal incidence of a glazing that passes so much."""
+    """Front and back visible reflectance at normal incidence for a visible transmittance."""
     powers = transmittance ** np.arange(4)
     front = float(powers @ (0.2399, -0.4169, 0.4277, -0.0622))
     back = float(powers @ (0.4547, -1.2299, 1.6531, -0.7409))

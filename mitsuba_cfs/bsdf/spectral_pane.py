@@ -90,7 +90,7 @@ def spectral_glazing(
 ) -> Mapping[str, BandValues]:
     """Panes from outside to inside as one glazing in "Solar" and "Visible", by wavelength.
 
-    Every wavelength goes through all panes and back before it is averaged: a coated pane behind a
+    Each wavelength is combined over all panes before averaging: a coated pane with a
     clear one meets other light than the sun's.
 
     Args: theta: angles of incidence [A] [rad]; spectrum: of the sun, of `SPECTRA` or as rows of
@@ -111,16 +111,17 @@ def spectral_glazing(
 
 @dataclass(frozen=True, slots=True)
 class SpectralRating:
-    """What EN 410 says of a glazing's transmitted light besides its solar and visible shares."""
+    """UV transmittance and colour rendering of a glazing by EN 410."""
 
     ultraviolet: float  # transmittance, 300 to 380 nm
     colour_rendering: float  # R_a of daylight D65 through it
 
 
 def spectral_rating(panes: Sequence[SpectralPane]) -> SpectralRating:
-    """UV transmittance and colour rendering of panes one behind the other, at normal incidence.
+    """UV transmittance and colour rendering of panes in series, at normal incidence.
 
-    Raises: `ValueError` for spectra that do not reach from 300 to 780 nm, or that no light passes.
+    Raises: `ValueError` for spectra that do not reach from 300 to 780 nm, or without transmitted
+    light.
 
     Source: EN 410:2011, 5.5 and 5.6.
     """
@@ -138,15 +139,17 @@ Average = Callable[[FloatArray, FloatArray], float]
 
 
 def solar_average(spectrum: str | FloatArray) -> Average:
-    """What averages spectral data [N] over the sun: EN 410's shares or a spectrum by trapezoids."""
+    """Solar average of spectral data [N]: EN 410's weights, or a spectrum by trapezoids."""
     if isinstance(spectrum, str) and spectrum == "EN 410":
         return solar_value
     if isinstance(spectrum, str) and spectrum not in SPECTRA:
         raise ValueError(f"spectrum {spectrum!r} is not of {', '.join(SPECTRA)}")
     nm, sun = _g173(spectrum.split()[-1]) if isinstance(spectrum, str) else spectrum.T
 
-    def average(given: FloatArray, value: FloatArray) -> float:
-        return float(np.trapezoid(np.interp(nm, given, value) * sun, nm) / np.trapezoid(sun, nm))
+    def average(wavelength: FloatArray, value: FloatArray) -> float:
+        return float(
+            np.trapezoid(np.interp(nm, wavelength, value) * sun, nm) / np.trapezoid(sun, nm)
+        )
 
     return average
 
@@ -161,7 +164,7 @@ def _g173(kind: str) -> tuple[FloatArray, FloatArray]:
 
 
 def _whole(panes: Sequence[SpectralPane], theta: FloatArray) -> tuple[FloatArray, StackOptics]:
-    """Wavelengths [nm] [N] and what the panes do together at angles, [N, A]."""
+    """Wavelengths [nm] [N] and the optics of all panes together at angles, [N, A]."""
     nm = np.unique(np.concatenate([pane.wavelength_nm for pane in panes]))
     nm = nm[(nm >= 280.0) & (nm <= 4100.0)]
     return nm, stack([_at_angles(pane, nm, theta) for pane in panes])

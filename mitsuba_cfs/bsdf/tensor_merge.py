@@ -21,7 +21,7 @@ def merged_tree(
 ) -> TensorTree:
     """The tree of a dense grid [2^n] * rank [1/sr] within an error bound.
 
-    Every leaf is the mean of the cells that it stands for, so that energy is kept, and none of
+    Every leaf is the mean of its cells, so that energy is conserved, and none of
     those, nor of the leaves that would divide it, differs from it by more than
 
         max(relative x leaf, absolute) + 3 sqrt(noise x leaf / cells).
@@ -92,15 +92,15 @@ def reciprocal_means(
 ) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
     """Two dense rank 4 grids, each the mean of itself and of the other one reversed.
 
-    What each incident cell scatters in all stays its own: it is known better.
+    The total that each incident cell scatters is kept, because it is more accurate.
     """
 
     def reverse(grid: NDArray[np.floating]) -> NDArray[np.floating]:
         return grid[::-1, ::-1, ::-1, ::-1].transpose(2, 3, 0, 1)
 
-    def kept(mean: NDArray[np.floating], own: NDArray[np.floating]) -> NDArray[np.floating]:
+    def rescaled(mean: NDArray[np.floating], own: NDArray[np.floating]) -> NDArray[np.floating]:
         total, shared = (v.mean(axis=(2, 3), keepdims=True) for v in (own, mean))
         return mean * np.divide(total, shared, out=np.ones_like(total), where=shared > 0)
 
     mean = 0.5 * (there + reverse(back))
-    return kept(mean, there), kept(reverse(mean), back)
+    return rescaled(mean, there), rescaled(reverse(mean), back)

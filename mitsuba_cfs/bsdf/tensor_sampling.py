@@ -20,7 +20,7 @@ from mitsuba_cfs.bsdf.tensor_tree import TensorTree
 
 @dataclass(frozen=True)
 class SamplingTree:
-    """One tree's tables, or several ones' behind one another."""
+    """Tables of one tree, or of several concatenated ones."""
 
     rank: int
     children: NDArray[np.int32]  # [N 2^rank] node, or -1 - leaf

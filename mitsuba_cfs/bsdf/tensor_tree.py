@@ -112,7 +112,7 @@ class TensorTree:
 
     @cached_property
     def _hemispherical(self) -> NDArray[np.float64]:
-        """What `hemispherical` gives, once for each tree: every check of a file asks for it.
+        """`hemispherical`, cached for each tree, because every check of a file needs it.
 
         Every leaf adds value x outgoing projected solid angle to the block of incident cells that
         it spans; the blocks are summed through their corners.
@@ -230,13 +230,14 @@ class TensorTreeBsdf:
         return sine[:-1] ** 2 - sine[1:] ** 2
 
     def is_dummy(self, block: TensorTree | None) -> bool:
-        """Whether a tree passes nothing, so that it is taken for absent as Radiance does."""
+        """Whether a tree transmits nothing and is treated as absent, as in Radiance."""
         return block is None or self.direct_hemispherical(block).max() <= DUMMY_HEMISPHERICAL
 
     def lookup(self, name: str) -> tuple[TensorTree | None, bool]:
-        """The tree that stands for block `name`, and whether it is to be read the other way.
+        """Tree used for block `name`, and whether it is read in reverse.
 
-        A transmission that is absent or a place holder is the other side's by reciprocity.
+        A transmission that is absent or a placeholder is replaced by the other side's by
+        reciprocity.
         """
         own = getattr(self, name)
         kind, side = name.split("_")

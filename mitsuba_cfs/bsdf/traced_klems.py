@@ -27,7 +27,7 @@ def cell(place, last: int):
     """The whole number at or below a place in a table, 0 to `last`.
 
     Also where the place is no number, as of a ray that met nothing: clipped before it is a whole
-    number it stays none, and what is then gathered lies outside the table, on AVX2 a signal.
+    number it stays NaN, and the gather would read outside the table: a signal on AVX2.
     """
     return mi.UInt32(dr.clip(mi.Int32(place), 0, last))
 
@@ -55,7 +55,7 @@ class TracedBasis:
         return mi.UInt32(gather(self.starts, ring) + within)
 
     def direction(self, patch, u, v):
-        """(x, y, |z|) of the point (u, v) of a patch, even in cos(theta) d_omega."""
+        """(x, y, |z|) of the point (u, v) of a patch, uniform in cos(theta) d_omega."""
         ring = mi.UInt32(gather(self.rings, patch))
         low = gather(self.sine2, ring)
         sine2 = dr.fma(u, gather(self.sine2, ring + 1) - low, low)

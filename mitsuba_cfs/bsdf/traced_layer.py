@@ -56,7 +56,7 @@ def follow(layer: TracedLayer, start, direction, front, random):
     """Direction in which each path leaves the layer, and its weight in each channel.
 
     Args:
-        start: point of the unit square that stands for the tile's entrance plane.
+        start: point of the unit square that represents the tile's entrance plane.
         direction: unit vector along which the light travels.
         front: whether it enters at the exterior plane.
         random: a generator for each path.

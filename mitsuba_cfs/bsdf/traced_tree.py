@@ -8,7 +8,7 @@ import numpy as np
 
 from mitsuba_cfs.bsdf.plugin_base import ONE_BELOW, TINY
 from mitsuba_cfs.bsdf.tensor_sampling import SamplingTree
-from mitsuba_cfs.bsdf.traced_klems import gather, table
+from mitsuba_cfs.bsdf.traced_klems import cell, gather, table
 
 QUARTER = np.pi / 4
 
@@ -82,7 +82,7 @@ class TracedTrees:
         return gather(self.values, leaf, active), leaf
 
     def straight(self, root, incident, active=True):
-        """Leaf that holds what goes straight on: rank 4 to the same point, rank 3 opposite."""
+        """Leaf of the straight direction: rank 4 the same point, rank 3 opposite."""
         outgoing = incident if self.known == 2 else (1 - incident[0], mi.Float(0.5))
         return self.leaf(root, incident, outgoing, active)
 
@@ -125,8 +125,8 @@ class TracedTrees:
     def sample(self, root, incident, u, v, active=True):
         """Point of the outgoing square in proportion to the values there, the value and its leaf.
 
-        At each level one coordinate's half is chosen by `u`, then the other's by `v`; what is left
-        of them places the point in the leaf.
+        At each level one coordinate's half is chosen by `u`, then the other's by `v`; their
+        remainders place the point in the leaf.
         """
         node, inside = mi.Int32(root), mi.Mask(active)
         leaf, size = mi.Int32(0), mi.Float(1.0)
@@ -151,7 +151,7 @@ class TracedTrees:
         return low_u + u * size, low_v + v * size, value, leaf
 
     def _choose(self, u, first, second, inside):
-        """Whether `u` chooses the second of two masses, and what is left of it."""
+        """Whether `u` chooses the second of two masses, and its remainder."""
         total = first + second
         share = dr.select(total > 0, first / dr.maximum(total, TINY), 0.5)
         second_half = u >= share
@@ -160,3 +160,35 @@ class TracedTrees:
         )
         rest = dr.clip(rest, 0.0, ONE_BELOW)
         return inside & second_half, dr.select(inside, rest, u)
+
+
+class TracedSquares:
+    """The square in 2^levels x 2^levels cells, numbered row by row."""
+
+    def __init__(self, levels: int) -> None:
+        self.width = 1 << levels
+
+    def patch(self, x, y, z):
+        """Cell of the direction with cosines (x, y); z does not matter."""
+        u, v = (cell(p * self.width, self.width - 1) for p in disk_to_square(x, y))
+        return u * self.width + v
+
+    def direction(self, patch, u, v):
+        """(x, y, |z|) of the point (u, v) of a cell."""
+        row = patch // self.width
+        column = patch - row * self.width
+        x, y = square_to_disk((mi.Float(row) + u) / self.width, (mi.Float(column) + v) / self.width)
+        return x, y, dr.safe_sqrt(1.0 - x * x - y * y)
+
+
+class TracedRings:
+    """Incident cells of rank 3: (1 - sin(theta)) / 2 below 0.5, in 2^(levels - 1) steps."""
+
+    def __init__(self, levels: int) -> None:
+        self.width = 1 << (levels - 1)
+
+    def direction(self, patch, u, v):
+        """(x, y, |z|) of the point `u` of a step, at azimuth 2 pi `v`; uniform in u."""
+        sine = 1.0 - (mi.Float(patch) + u) / self.width
+        s, c = dr.sincos(2 * dr.pi * v)
+        return sine * c, sine * s, dr.safe_sqrt(1.0 - sine * sine)

@@ -1,7 +1,7 @@
-"""Glare of one view in every hour of a year, from matrices: pictures are made, rated and dropped.
+"""Glare of one view in every hour of a year, from matrices.
 
-A picture is a matrix of pixels times the luminance of the windows' patches in that hour.  Hours are
-taken in batches, so that each batch is one product of matrices; only the ratings are kept.
+A picture is a matrix of pixels times the luminance of the windows' patches in that hour.  Each
+batch of hours is one product of matrices; its pictures are rated and discarded.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.progress import Progress, silent
 
 BATCH_BYTES = 128 * 2**20  # of the pictures of a batch of hours
-ROW_BYTES = 16 * 2**20  # of a matrix that lies on disk, read at a time
+ROW_BYTES = 16 * 2**20  # read at a time of a matrix on disk
 FIGURES = (
     "dgp", "Ev", "dgi", "ugr", "cgi", "vcp", "sources", "background_luminance",
     "dgp_standard_error",
@@ -39,14 +39,14 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class PictureMatrix:
-    """What a view's surfaces reflect per unit luminance of each window patch.
+    """Luminance of a view's surfaces per unit luminance of each window patch.
 
-    Pixels beside one another that show the same face share a row: reflected light varies slowly.
+    Neighbouring pixels that show the same face share a row: reflected light varies slowly.
     """
 
     rows: NDArray[np.float32]  # [m, N] in memory or on disk (numpy.memmap); N = groups x patches
     row: NDArray[np.int64]  # [n] row of each pixel
-    share: NDArray[np.float32]  # [n] of the pixel that shows surfaces, the rest shows windows
+    share: NDArray[np.float32]  # [n] of the pixel that shows surfaces; the rest shows windows
 
     def __post_init__(self) -> None:
         if self.rows.ndim != 2 or self.row.shape != self.share.shape or self.row.ndim != 1:
@@ -56,33 +56,33 @@ class PictureMatrix:
             )
 
     def with_rows(self, rows: NDArray[np.float32]) -> PictureMatrix:
-        """The same pixels of other rows."""
+        """The same pixels with other rows."""
         return PictureMatrix(rows, self.row, self.share)
 
     def add_rows(self, values: NDArray[np.float32], of_rows: NDArray[np.float32]) -> None:
         """Add the luminance [h, m] of the rows to the pixels' values [h, n], by their shares."""
         of_pixels = np.empty(len(self.row), dtype=np.float32)  # one for all hours
-        for hour, found in zip(values, of_rows, strict=True):
-            np.take(found, self.row, out=of_pixels, mode="clip")  # "raise" would copy
+        for hour, rows in zip(values, of_rows, strict=True):
+            np.take(rows, self.row, out=of_pixels, mode="clip")  # "raise" would copy
             of_pixels *= self.share
             hour += of_pixels
 
     def of_rows(self, luminance: NDArray[np.float32]) -> NDArray[np.float32]:
         """Luminance [h, m] of the rows under patch luminances [N, h]."""
         across = np.ascontiguousarray(luminance.T, dtype=np.float32)
-        found = np.empty((len(across), len(self.rows)), dtype=np.float32)
+        products = np.empty((len(across), len(self.rows)), dtype=np.float32)
         step = len(self.rows)
         if isinstance(self.rows, np.memmap):
             step = max(1, ROW_BYTES // (4 * self.rows.shape[1]))
         for start in range(0, len(self.rows), step):
             rows = np.asarray(self.rows[start : start + step])
-            np.matmul(across, rows.T, out=found[:, start : start + step])
-        return found
+            np.matmul(across, rows.T, out=products[:, start : start + step])
+        return products
 
 
 @dataclass(frozen=True, slots=True)
 class AnnualGlare:
-    """Glare of one view in the hours that were rated; every array is [H]."""
+    """Glare of one view in the rated hours; every array is [H]."""
 
     dgp: NDArray[np.float64]
     Ev: NDArray[np.float64]  # illuminance at the eye, of the picture [lx]
@@ -92,8 +92,8 @@ class AnnualGlare:
     vcp: NDArray[np.float64]  # [%]
     sources: NDArray[np.float64]  # number of glare sources
     background_luminance: NDArray[np.float64]  # [cd/m2]
-    dgp_standard_error: NDArray[np.float64]  # from the noise of the pictures; NaN: not known
-    rule: str = GlareOptions().rule  # what its sources are
+    dgp_standard_error: NDArray[np.float64]  # from the noise of the pictures; NaN: unknown
+    rule: str = GlareOptions().rule  # how glare sources are detected
 
     def worst(self, count: int) -> NDArray[np.int64]:
         """The hours [count] of the highest DGP, the worst first."""
@@ -101,7 +101,7 @@ class AnnualGlare:
 
 
 class Pictures(Protocol):
-    """The luminance of a view's pixels in every hour, worked out when asked for."""
+    """The luminance of a view's pixels in every hour, computed batch by batch."""
 
     @property
     def view(self) -> View:
@@ -109,7 +109,7 @@ class Pictures(Protocol):
 
     @property
     def pixels(self) -> NDArray[np.int64]:
-        """Numbers [n], row * width + column, of the pixels that show something."""
+        """Numbers [n], row * width + column, of the pixels inside the view."""
 
     @property
     def hours(self) -> int:
@@ -121,26 +121,26 @@ class Pictures(Protocol):
     def without_disc(
         self, batch: NDArray[np.int64]
     ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
-        """The same without the sun's disc, and the disc [h] as far as it is seen."""
+        """The same without the sun's disc, and the visible part of the disc [h]."""
 
     def add_disc(self, values: NDArray[np.float32], batch: NDArray[np.int64]) -> None:
-        """Add the sun's disc to luminances [h, n] without it: that makes them `values`."""
+        """Add the sun's disc to the luminances [h, n] of `without_disc`, which gives `values`."""
 
     @property
     def shared(self) -> PictureMatrix:
-        """Which pixels share a row of what surfaces reflect."""
+        """The pixels that share a row of reflected light."""
 
     def by_rows(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """The two parts of `without_disc`: of the shared rows [h, m], and of each pixel [h, n].
 
-        A pixel is its row's luminance times its share, and its own.
+        A pixel's luminance is that of its row times its share, plus its own part.
         """
 
     def discs(self, batch: NDArray[np.int64]) -> list[SunDisc | None]:
-        """The sun's disc [h] as far as it is seen."""
+        """The visible part of the sun's disc [h]."""
 
     def noise(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
-        """Half of what pictures [h, n] of two halves of the paths differ by [cd/m2]."""
+        """Half the difference of pictures [h, n] by two halves of the paths [cd/m2]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,9 +152,8 @@ class ThreePhasePictures:
     reflected: PictureMatrix  # of n pixels
     seen: sparse.csr_array  # [n, G * K] share of each window patch in each pixel
     luminance: NDArray[np.float32]  # [G, K, H] of the windows towards the room, T D s [cd/m2]
-    unlike: NDArray[np.float32] | None = (
-        None  # [m, G * K] half of what halves of `reflected` differ
-    )
+    # [m, G * K] half the difference of `reflected.rows` by two halves of the paths
+    row_noise: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
         n, N = len(self.pixels), self.reflected.rows.shape[1]
@@ -188,22 +187,22 @@ class ThreePhasePictures:
     def without_disc(
         self, batch: NDArray[np.int64]
     ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
-        """See `Pictures`; the sun is part of the patches."""
+        """See `Pictures`; the patches include the sun."""
         return self.values(batch), self.discs(batch)
 
     def add_disc(self, values: NDArray[np.float32], batch: NDArray[np.int64]) -> None:
-        """See `Pictures`; nothing, for the sun is part of the patches."""
+        """See `Pictures`; adds nothing, because the patches include the sun."""
 
     def discs(self, batch: NDArray[np.int64]) -> list[SunDisc | None]:
-        """See `Pictures`; none, for the sun is part of the patches."""
+        """See `Pictures`; none, because the patches include the sun."""
         return [None] * len(batch)
 
     def noise(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
-        """See `Pictures`; none where the halves are not known."""
+        """See `Pictures`; 0 where the halves are unknown."""
         values = np.zeros((len(batch), len(self.pixels)), dtype=np.float32)
-        if self.unlike is not None:
+        if self.row_noise is not None:
             luminance = flat(self.luminance, self.seen.shape[1])[:, batch]
-            rows = self.reflected.with_rows(self.unlike).of_rows(luminance)
+            rows = self.reflected.with_rows(self.row_noise).of_rows(luminance)
             self.reflected.add_rows(values, rows)
         return values
 
@@ -221,10 +220,10 @@ def annual_glare(
     """Glare of every hour of one view.
 
     Args:
-        geometry: of the pictures' view, where it is at hand.
-        options: how glare is rated, see `mitsuba_cfs.glare.evaluation`.
-        illuminance: [H] at the eye from its own calculation, for DGP [lx]: with pictures of direct
-            light alone the result is eDGP.
+        geometry: of the pictures' view; computed by default.
+        options: how glare sources are detected and rated, see `mitsuba_cfs.glare.evaluation`.
+        illuminance: [H] at the eye from a separate calculation, for DGP [lx]: with pictures of
+            direct light alone the result is eDGP.
         threads: pictures rated at a time; the processor's cores by default.
         checkpoint: file of the ratings so far: a killed run continues from it.  The caller names it
             so that other inputs have another file.
@@ -270,10 +269,7 @@ def annual_glare(
 
 
 def finished_glare(checkpoint: Path, hours: int) -> AnnualGlare | None:
-    """The finished ratings of a run of `annual_glare` by the rule that holds without a choice.
-
-    None where hours are missing.
-    """
+    """Ratings in a checkpoint of `annual_glare` by its default rule; None: hours are missing."""
     table = _begin(checkpoint, hours)
     return None if np.isnan(table).any() else AnnualGlare(*table.T)
 
@@ -281,7 +277,7 @@ def finished_glare(checkpoint: Path, hours: int) -> AnnualGlare | None:
 def full_picture(
     values: NDArray[np.float32], pixels: NDArray[np.int64], view: View
 ) -> NDArray[np.float32]:
-    """A picture [ny, nx] from the luminance [n] of the pixels that show something."""
+    """A picture [ny, nx] from the luminance [n] of the pixels inside the view."""
     picture = np.zeros(view.height * view.width, dtype=np.float32)
     picture[pixels] = values
     return picture.reshape(view.height, view.width)
@@ -290,11 +286,11 @@ def full_picture(
 def add_seen(
     values: NDArray[np.float32], shares: sparse.csr_array, luminance: NDArray[np.float32]
 ) -> None:
-    """Add what pixels show of patches to values [h, n]; shares [n, N], luminance [N, h]."""
+    """Add the patches that pixels show to values [h, n]; shares [n, N], luminance [N, h]."""
     some = np.flatnonzero(np.diff(shares.indptr))  # most pixels show none
     shown = np.ascontiguousarray((shares[some] @ luminance).T)
-    for hour, found in zip(values, shown, strict=True):
-        hour[some] += found
+    for hour, added in zip(values, shown, strict=True):
+        hour[some] += added
 
 
 def flat(window_luminance: ArrayLike, columns: int) -> NDArray[np.float32]:
@@ -323,13 +319,13 @@ def _begin(checkpoint: Path | None, hours: int) -> NDArray[np.float64]:
         with open(checkpoint, "rb") as file:
             start = file.read(len(MAGIC))
         if start.strip(b"\0") and start != MAGIC[: len(start)]:
-            raise DataError("is no file of ratings", file=checkpoint) from error
-        log.warning("%s: ignored, it is cut off or damaged; the hours are rated again", checkpoint)
+            raise DataError("is not a file of glare ratings", file=checkpoint) from error
+        log.warning("%s: truncated or damaged; the hours are rated again", checkpoint)
         checkpoint.unlink()
         return empty
     if table.shape != empty.shape:
         raise DataError(
-            f"ratings of shape {table.shape}, expected {empty.shape}: of another year (delete it)",
+            f"ratings of shape {table.shape}, expected {empty.shape}: from another year, delete it",
             file=checkpoint,
         )
     return table

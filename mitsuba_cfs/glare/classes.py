@@ -20,7 +20,7 @@ def glare_class(dgp: float) -> str:
 
 
 def exceeded_share(dgp: ArrayLike, limit: float) -> float:
-    """Share of the hours dgp [H] in which it is above a limit; all hours count alike."""
+    """Share of the hours dgp [H] above a limit, unweighted."""
     dgp = np.asarray(dgp, dtype=float)
     if dgp.ndim != 1 or dgp.size == 0 or not np.all(np.isfinite(dgp)):
         raise ValueError("expected DGP [H] of the hours of use, all finite")

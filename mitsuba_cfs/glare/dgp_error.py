@@ -15,7 +15,7 @@ TOGETHER = 5  # neighbours in the order of DGP whose mean square is taken
 
 
 def hours_by_halves(dgp: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Hours [n] spread evenly over the order of DGP [H] that are to be rated by halves, rising."""
+    """Hours [n] evenly spread over the order of DGP [H], to be evaluated in halves; ascending."""
     count = min(len(dgp), int(np.clip(len(dgp) // SHARE, FEWEST, MOST)))
     order = np.argsort(dgp, kind="stable")
     return order[np.round(np.linspace(0, len(dgp) - 1, count)).astype(np.int64)]
@@ -26,7 +26,8 @@ def dgp_errors(
 ) -> NDArray[np.float64]:
     """Standard error of the DGP of every hour [H] from those of some.
 
-    Args: hours: [n] as of `hours_by_halves`; errors: [n] half of what the DGP of two halves differ.
+    Args: hours: [n] as of `hours_by_halves`; errors: [n] half the difference of the DGP of two
+    halves.
     """
     if not len(hours):
         return np.full(len(dgp), np.nan)

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.glare import indices, passes
 from mitsuba_cfs.glare.areas import Zones, angles_to, split_by_zone
-from mitsuba_cfs.glare.field_of_view import seen
-from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order
+from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order, seen
 from mitsuba_cfs.glare.position_index import position_index, view_angles
 from mitsuba_cfs.glare.sources import Sources, glare_sources, pixel_sources, with_disc
 from mitsuba_cfs.glare.sun_disc import SunDisc
@@ -70,7 +69,7 @@ class GlareOptions:
 
     @property
     def rule(self) -> str:
-        """What the sources are, in words."""
+        """Definition of the glare sources as text."""
         own = "a source of its own" if self.sun == "source" else "part of its pixels"
         return f"sources: {GROUPINGS[self.grouping]}; the sun's disc: {own}"
 
@@ -141,7 +140,7 @@ def evaluate(
 
     Args:
         luminance: [ny, nx] row 0 at the top [cd/m2].
-        view: the picture's view, or its `GlareView`, worked out once for many pictures.
+        view: the picture's view, or its `GlareView`, computed once for many pictures.
         options: how glare is rated; `changes` are single options by name.
         disc: the sun, where the picture's pixels are without it.
 
@@ -249,12 +248,12 @@ def _positions(
 ) -> NDArray[np.float64]:
     """Position index [n] of pixels in directions [n, 3]."""
     if options.position_model == "guth" and options.grouping == "pixels":
-        return geometry.guth[pixel]  # worked out once for all pictures of the view
+        return geometry.guth[pixel]  # computed once for all pictures of the view
     return position_index(direction, geometry.view, model=options.position_model)
 
 
 def _in_field(disc: SunDisc, geometry: GlareView, options: GlareOptions) -> bool:
-    """Whether the disc stands in what counts as the field of view."""
+    """Whether the disc is in the evaluated field of view."""
     if options.field_of_view == "all":
         return True
     return bool(seen(geometry, options.field_of_view)[geometry.pixel_at(disc.direction)])

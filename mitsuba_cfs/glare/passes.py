@@ -58,7 +58,7 @@ def brightest_of(labels, luminance, size):
 
 @compiled(nogil=True)
 def renumber(labels, numbers, luminance, projected, count):
-    """Replace labels [nx, ny] by numbers[label]; illuminance [count] [lx] of what is numbered."""
+    """Replace labels [nx, ny] by numbers[label]; illuminance [count] [lx] of each number."""
     illuminance = np.zeros(count + 1)
     nx, ny = labels.shape
     for x in range(nx):

@@ -1,4 +1,4 @@
-"""Position index: how much a source disturbs less when it is away from the line of sight.
+"""Position index: weight of a glare source away from the line of sight.
 
 sigma is the angle between the source and the line of sight, tau the angle between the vertical and
 the plane that holds both, so that tau = 0 straight above and 180 degrees straight below.

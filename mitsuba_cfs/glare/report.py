@@ -58,7 +58,7 @@ def source_lines(result: GlareResult) -> list[str]:
 
 
 def _of_picture(result: GlareResult) -> tuple[float, ...]:
-    """What each line says of the whole picture."""
+    """Quantities of the whole picture, one per output line."""
     return (
         result.background_luminance,
         result.task_luminance,

@@ -72,7 +72,7 @@ def glare_sources(
 
 
 def pixel_sources(luminance: NDArray[np.float64], geometry: GlareView, threshold: float) -> Sources:
-    """Every bright pixel as a source of its own; arguments as for `glare_sources`.
+    """Every bright pixel as a separate source; arguments as for `glare_sources`.
 
     The sum of L^2 omega / P^2 is then that of raytools and raytraverse: none is averaged away, and
     each pixel has its own position index.

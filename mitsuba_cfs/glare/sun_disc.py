@@ -12,9 +12,9 @@ from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 
 @dataclass(frozen=True, slots=True)
 class SunDisc:
-    """What of the disc nothing covers, dimmed by what it shines through."""
+    """Visible part of the sun's disc, attenuated by the glazing."""
 
-    direction: NDArray[np.float64]  # [3] unit vector to the middle of what is seen
+    direction: NDArray[np.float64]  # [3] unit vector to the centre of the visible part
     luminance: float  # [cd/m2]
     solid_angle: float  # [sr]
 

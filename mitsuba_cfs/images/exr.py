@@ -63,7 +63,7 @@ def read_exr(path: str | PathLike[str]) -> tuple[NDArray[np.float32], View | Non
 
 @contextmanager
 def _a_second_thread() -> Iterator[None]:
-    """OpenEXR, in Mitsuba, waits for ever for a thread besides the caller's; one core has none."""
+    """OpenEXR, in Mitsuba, waits forever for a second thread on a single core; provide one."""
     count = dr.thread_count()
     if count < 2:
         dr.set_thread_count(2)

@@ -3,7 +3,7 @@
 The pixels of a file are radiance times every EXPOSURE in its header (there may be several); a
 reader divides by their product.  Luminance [cd/m2] = 179 (0.265 R + 0.670 G + 0.065 B), or the Y of
 an XYZ picture, which is in photometric units.  Header lines that start with a tab belong to the
-pictures that this one was made from, and say nothing about this one.
+pictures that this one was made from, and do not apply to this one.
 
 Source: Radiance file format notes and the behaviour of `getinfo`, `pvalue`, `vwrays` (tested).
 """
@@ -49,7 +49,7 @@ class Picture:
 
     @property
     def misplaced_exposure(self) -> bool:
-        """Whether an EXPOSURE entry stands behind a tab, as `pcomb` leaves it: it is unknown."""
+        """Whether an EXPOSURE entry follows a tab (`pcomb`): the exposure is unknown."""
         return any("EXPOSURE=" in line and "\t" in line for line in self.header)
 
 
@@ -62,7 +62,7 @@ def luminance(pixels: ArrayLike, colours: str = "rgb") -> NDArray[np.float64]:
 
 
 def read_hdr(path: str | PathLike[str]) -> Picture:
-    """The picture in a Radiance file: any orientation, any of its codes, RGB or XYZ.
+    """Picture of a Radiance file in any orientation and encoding, RGB or XYZ.
 
     Raises:
         DataError: no such file, not a Radiance picture, or one that ends too early.
@@ -146,7 +146,7 @@ def _exposure(
 
 
 def _view(header: tuple[str, ...], width: int, height: int) -> View | None:
-    """The view that the header's lines add up to, later lines over earlier ones."""
+    """View of the header's lines; later lines override earlier ones."""
     changes: dict = {}
     for line in header:
         program = line.split(None, 1)[0].rsplit("/", 1)[-1] if line[:1].strip() else ""
@@ -179,8 +179,8 @@ def write_hdr(
     Args:
         pixels: luminance [ny, nx] [cd/m2], written as grey; or radiance [ny, nx, 3] [W/m2/sr].
         view: for the VIEW= line.
-        exposure: the file holds radiance times this and says so; readers divide by it.
-        colours: what the three channels are, "rgb" or "xyz".
+        exposure: the file holds radiance times this factor; readers divide by it.
+        colours: meaning of the three channels, "rgb" or "xyz".
         comments: lines for the header, for example the command that made the picture.
     """
     pixels = np.asarray(pixels)

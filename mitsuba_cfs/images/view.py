@@ -1,4 +1,4 @@
-"""A view: where the eye is, what each pixel of its picture looks at, and Radiance's syntax for it.
+"""View: eye, direction of each pixel of its picture, and Radiance's syntax.
 
 Pictures are arrays [ny, nx]; row 0 is the top, column 0 the left of the picture.  Image coordinates
 (x to the right, y up) run from 0 to 1 over the picture; pixel (row, column) has its centre at
@@ -31,7 +31,7 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """One picture's projection.  Hashable; vectors are stored as tuples of three numbers."""
+    """Projection of a picture.  Hashable; vectors are stored as tuples of three numbers."""
 
     kind: str = "perspective"
     position: Triple = (0.0, 0.0, 0.0)  # [3] eye [m]
@@ -72,12 +72,12 @@ class View:
 
     @property
     def covers_hemisphere(self) -> bool:
-        """Whether it is a fisheye of all before the eye, the least that glare can be rated in."""
+        """Whether it is a fisheye of at least the hemisphere, which glare evaluation needs."""
         return self.is_fisheye and min(self.horizontal_deg, self.vertical_deg) >= 180
 
     @property
     def is_disc(self) -> bool:
-        """Whether it is a fisheye of the hemisphere and nothing else, whose picture is a disc."""
+        """Whether it is a fisheye of exactly the hemisphere, whose picture is a disc."""
         return self.is_fisheye and self.horizontal_deg == self.vertical_deg == 180
 
 
@@ -103,7 +103,7 @@ def _unit(vector: ArrayLike, name: str) -> NDArray[np.float64]:
 
 
 def fisheye(position: ArrayLike, direction: ArrayLike, size: int = 800, **changes: Any) -> View:
-    """The 180 degree angular fisheye (`-vta -vh 180 -vv 180`), upright, that glare is rated in."""
+    """Upright 180 degree angular fisheye (`-vta -vh 180 -vv 180`) for glare evaluation."""
     eye, towards = _triple(position, "position"), _triple(direction, "direction")
     plain = View("angular", eye, towards, (0, 0, 1), 180, 180, size, size)
     return replace(plain, **changes)
@@ -132,7 +132,7 @@ def frame(view: View) -> NDArray[np.float64]:
 
 
 def rays(view: View, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Unit vectors [..., 3] seen at image coordinates x, y [...] in 0..1, and where there is one.
+    """Unit vectors [..., 3] at image coordinates x, y [...] in 0..1, and whether they exist.
 
     Returns:
         directions [..., 3] in the world, zero where the projection has none; exists [...] bool.
@@ -156,7 +156,7 @@ def rays(view: View, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[Any], NDArray[
 def pixel_rays(
     view: View, pixels: NDArray[np.int64], across: ArrayLike, down: ArrayLike
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Unit vectors [..., 3] through places in pixels, and where there is one, as of `rays`.
+    """Unit vectors [..., 3] through points in pixels, and whether they exist, as `rays`.
 
     Args: pixels: [...] row * width + column; across, down: [...] from their left, top corner, 0..1.
     """
@@ -165,7 +165,7 @@ def pixel_rays(
 
 
 # Projections: coordinates x, y from the centre to the parts of the ray along right, up and forward,
-# where there is one, and the lengths of right and up.  What they give need only broadcast.
+# where there is one, and the lengths of right and up.  Their results need only broadcast.
 
 
 def _half_sizes(view: View) -> tuple[float, float]:
@@ -329,7 +329,7 @@ def _numbers(words: list[str], at: int, count: int) -> tuple[float, ...] | None:
 def parse_view(text: str, width: int = 800, height: int = 800) -> View:
     """The view that Radiance's syntax describes (`-vta -vp 0 0 1.2 -vd 0 1 0 -vh 180 -vv 180`).
 
-    What is not said has Radiance's default: a perspective of 45 degrees from the origin to +y.
+    Radiance's defaults apply to missing options: a perspective of 45 degrees from the origin to +y.
     `ValueError` where the text sets nothing or the view cannot be.
     """
     changes = view_changes(text)

@@ -170,8 +170,9 @@ def illuminance_with_error(
     if isinstance(light, PathLight):
         return path_illuminance(light, state, progress=progress)
     if isinstance(light, PhaseLight):
-        light = with_sensor_light(light, progress=progress)
-        return illuminance(light, state), relative_standard_error(light, state)
+        light, count = with_sensor_light(light, progress=progress), len(light.scene.points)
+        whole = illuminance_of_all(light, state)
+        return whole[:count], relative_standard_error(light, state, whole)[:count]
     rows = _states(light, state)
     lit = np.zeros((len(light.scene.points), len(light.sky.lit)))
     variance = np.zeros(len(lit))

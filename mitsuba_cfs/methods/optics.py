@@ -1,10 +1,10 @@
-"""A fenestration system in one state, as each method takes it."""
+"""Optics of a fenestration system in one shading state, in the form that each method needs."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.resample import klems_of
 from mitsuba_cfs.trace.kernels.scattering import (
     AngularBeam,
     AngularScattering,
@@ -21,8 +22,8 @@ from mitsuba_cfs.trace.kernels.scattering import (
 )
 from mitsuba_cfs.trace.paths.scene import PathOptics, path_optics, without_peaks
 
-PATCH_ANGLES = 32  # of incidence in each patch, for its mean
-OVER = 1e-3  # by which shares may be more than 1, for rounding
+PATCH_ANGLES = 32  # angles of incidence in each patch, for its mean
+ROUNDING = 1e-3  # by which the sum of shares may exceed 1
 
 
 class SystemOptics(Protocol):
@@ -34,39 +35,44 @@ class SystemOptics(Protocol):
 
     @property
     def scattering(self) -> Scattering:
-        """How the five-phase method's sun passes it."""
+        """Transmission of the sun's disc, for the five-phase method."""
 
     @property
     def paths(self) -> PathOptics:
-        """What paths meet, from either side."""
+        """BSDF, direct beam and mirrors for path tracing, from either side."""
 
     @property
     def reflection(self) -> NDArray[np.float64] | None:
-        """Radiance back into the room for radiance from it [K out, K in]; None: black."""
+        """Reflection of the room's light [K out, K in]; None: black."""
 
     @property
     def outdoor_reflection(self) -> NDArray[np.float64] | None:
-        """The same outdoors."""
+        """Reflection of outdoor light [K out, K in]; None: black."""
 
 
-States = Sequence[SystemOptics]  # of a window group, such as from open to closed
+States = Sequence[SystemOptics]  # shading states of a window group, such as open and closed
 
 
 class BsdfOptics:
-    """The optics of BSDF data; each method's form is made when it is first asked for."""
+    """The optics of BSDF data; the form of each method is made at its first use."""
 
     def __init__(
-        self, coarse: KlemsBsdf, fine: Bsdf | None = None, angular: AngularTable | None = None
+        self, bsdf: Bsdf, fine: Bsdf | None = None, angular: AngularTable | None = None
     ) -> None:
-        """From Klems matrices, and the same as finely as it is known.
+        """From one band of a BSDF file.
 
         Args:
-            fine: a tensor tree.
-            angular: of a specular system its beam and its mirrors at every angle; the matrices
-                then have its means over their patches.
+            bsdf: a tensor tree is averaged over Klems patches for the matrices.
+            fine: tensor tree of the same system, where `bsdf` is its Klems matrices.
+            angular: transmittance and reflectances of a specular system by angle; the matrices
+                have their means over patches.
         """
-        self._coarse, self._fine = coarse, coarse if fine is None else fine
-        self._angular = angular
+        self._coarse = bsdf if isinstance(bsdf, KlemsBsdf) else klems_of(bsdf)
+        self._fine, self._angular = bsdf if fine is None else fine, angular
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
+        """Pickle the data without the forms that have been made."""
+        return BsdfOptics, (self._coarse, self._fine, self._angular)
 
     @cached_property
     def transmission(self) -> NDArray[np.float64]:
@@ -99,7 +105,7 @@ class BsdfOptics:
         return self._reflected("front")
 
     def _reflected(self, side: str) -> NDArray[np.float64] | None:
-        """Radiance that a side reflects [K out, K in]."""
+        """Reflection of a side [K out, K in]."""
         full, mirror, name = self._coarse.filled(), None, f"reflectance_{side}"
         if self._angular is not None and getattr(self._angular, name) is not None:
             full = without_peaks(full, "reflection")
@@ -113,10 +119,10 @@ class BsdfOptics:
 
 
 class AngularOptics:
-    """The optics of a layer that passes light by its angle of incidence alone: glass, a weave.
+    """The optics of a layer that depends on the angle of incidence alone: glass, a woven shade.
 
-    Exact at every angle for the direct sun, in pictures and for paths; the matrices take the mean
-    of each patch.
+    The direct sun, pictures and paths have its value at every angle; matrices have the mean of each
+    patch.
     """
 
     def __init__(
@@ -127,21 +133,35 @@ class AngularOptics:
         mirrored: ArrayLike = (0.0, 0.0),
         reflected: ArrayLike = (0.0, 0.0),
     ) -> None:
-        """From shares [n] each, at even steps of the cosine of incidence, 0 to 1.
+        """From shares [n] of the light, at even steps of the cosine of incidence, 0 to 1.
 
         Args:
-            straight: that keeps its beam; scattered: that leaves evenly to all sides.
-            mirrored, reflected: of light from the room, straight and evenly.
+            straight: transmitted directly; scattered: transmitted diffusely (Lambertian).
+            mirrored, reflected: of light from the room, reflected specularly and diffusely.
         """
-        shares = (straight, scattered, mirrored, reflected)
-        given = [np.asarray(one, dtype=float) for one in shares]
-        if any(one.ndim != 1 or len(one) < 2 or (one < 0).any() for one in given):
-            raise ValueError("expected shares of at least two angles each, not negative")
-        even = np.linspace(0.0, 1.0, max(len(one) for one in given))
-        total = sum(np.interp(even, np.linspace(0, 1, len(one)), one) for one in given)
-        if total.max() > 1 + OVER:
-            raise ValueError(f"more leaves than comes, {total.max():.3f} times")
-        self._straight, self._scattered, self._mirrored, self._reflected = given
+        shares = {
+            name: np.asarray(values, dtype=float)
+            for name, values in (
+                ("straight", straight), ("scattered", scattered),
+                ("mirrored", mirrored), ("reflected", reflected),
+            )
+        }  # fmt: skip
+        for name, values in shares.items():
+            if values.ndim != 1 or len(values) < 2 or (values < 0).any():
+                raise ValueError(
+                    f"{name}: expected shares of two angles or more, none negative, got {values}"
+                )
+        cosine = np.linspace(0.0, 1.0, max(map(len, shares.values())))
+        each = [np.interp(cosine, np.linspace(0, 1, len(v)), v) for v in shares.values()]
+        total = np.sum(each, axis=0)
+        if total.max() > 1 + ROUNDING:
+            raise ValueError(f"the shares of an angle sum to {total.max():.3f}: expected at most 1")
+        self._straight, self._scattered, self._mirrored, self._reflected = shares.values()
+
+    def __reduce__(self) -> tuple[Callable[..., object], tuple[object, ...]]:
+        """Pickle the shares without the forms that have been made."""
+        back = partial(AngularOptics, mirrored=self._mirrored, reflected=self._reflected)
+        return back, (self._straight, self._scattered)
 
     @cached_property
     def transmission(self) -> NDArray[np.float64]:
@@ -173,10 +193,10 @@ class AngularOptics:
 
     @property
     def outdoor_reflection(self) -> None:
-        """See `SystemOptics`; what the front reflects is not among the shares."""
+        """See `SystemOptics`; the shares do not include it."""
 
     def _klems(self) -> KlemsBsdf:
-        """What is scattered, from either side, and what the room's side reflects."""
+        """Diffuse transmission from either side, and diffuse reflection of the room's side."""
         passed, back = (
             np.tile(self._patch_means(shares) / np.pi, (KLEMS_FULL.size, 1))
             for shares in (self._scattered, self._reflected)
@@ -186,15 +206,15 @@ class AngularOptics:
     @staticmethod
     def _patch_means(shares: NDArray[np.float64]) -> NDArray[np.float64]:
         """Mean [K] over each patch's projected solid angle."""
-        places = (np.arange(PATCH_ANGLES) + 0.5) / PATCH_ANGLES
-        theta, _ = KLEMS_FULL.angles_within(np.arange(KLEMS_FULL.size)[:, None], places, 0.5)
+        middles = (np.arange(PATCH_ANGLES) + 0.5) / PATCH_ANGLES
+        theta, _ = KLEMS_FULL.angles_within(np.arange(KLEMS_FULL.size)[:, None], middles, 0.5)
         steps = np.linspace(0.0, 1.0, len(shares))
         return np.interp(np.cos(theta), steps, shares).mean(axis=1)
 
 
 @dataclass(frozen=True)
 class MatrixOptics:
-    """Optics given for each method by itself; what is not given must not be asked for."""
+    """Optics stated for each method by themselves; a method uses its own alone."""
 
     transmission: NDArray[np.float64] | None = None  # [K, K]
     scattering: Scattering | None = None
@@ -214,6 +234,8 @@ def hourly_states(state: ArrayLike | None, groups: int, hours: int) -> NDArray[n
     rows = np.tile(rows, (groups, 1)) if rows.ndim == 1 else rows
     if rows.shape != (groups, hours):
         raise ValueError(f"state {rows.shape}: expected [{groups}, {hours}]")
+    if rows.min(initial=0) < 0:
+        raise ValueError(f"state {rows.min()}: expected 0 or more, the number of a system")
     return rows
 
 

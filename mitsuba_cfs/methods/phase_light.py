@@ -47,6 +47,7 @@ from mitsuba_cfs.methods.phase_matrices import (
 )
 from mitsuba_cfs.methods.reflected_sun import (
     ReflectedSun,
+    SunlitRoom,
     reflected_sun,
     reflected_to_sensors,
     replaced_before,
@@ -176,26 +177,12 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
         )
     hours = _shining_hours(light)
     suns = _direct_sun(light, hours, progress)
-    beams = [[bool(beam_matrix(one.optics).any()) for one in group] for group in coefficients]
-    room, groups = None, []
-    outdoors = len(light.scene.outdoor_groups)
-    if light.reflected is not None and any(any(group) for group in beams[:outdoors]):
-        room = sunlit_room(light.matrices, light.reflected)
-    for g, group in enumerate(coefficients):
-        of_states = []
-        for j, one in enumerate(group):
-            added: Array | None = None
-            error: Array | float = 0.0
-            if light.reflected is None:
-                added = _beam_in_room(light, one, g) if beams[g][j] else None
-            elif g < outdoors:
-                cells = room if beams[g][j] else None
-                more = reflected_to_sensors(light.matrices, light.reflected, cells, one, g)
-                added, error = more.values, more.sum_error
-            of_states.append(_with_direct_sun(light, SensorLight(one, added, None, error),
-                                              g, suns[j], hours))  # fmt: skip
-        groups.append(tuple(of_states))
-    return replace(light, sensors=tuple(groups))
+    room = _sunlit_room(light, coefficients)
+    sensors = tuple(
+        tuple(_sensor_light(light, one, g, room, (suns[j], hours)) for j, one in enumerate(group))
+        for g, group in enumerate(coefficients)
+    )
+    return replace(light, sensors=sensors)
 
 
 def sensor_light(light: PhaseLight) -> tuple[tuple[SensorLight, ...], ...]:
@@ -368,20 +355,45 @@ def _shining_hours(light: PhaseLight) -> NDArray[np.int64]:
     return np.flatnonzero(np.any(sky.direction @ facing.T > 0, axis=1) & lit)
 
 
-def _with_direct_sun(
+def _sunlit_room(
+    light: PhaseLight, coefficients: Sequence[Sequence[GroupCoefficients]]
+) -> SunlitRoom | None:
+    """The room that the sun's beam lights; None where no group passes one."""
+    outdoors = coefficients[: len(light.scene.outdoor_groups)]
+    if light.reflected is None or not any(_passes_beam(one) for group in outdoors for one in group):
+        return None
+    return sunlit_room(light.matrices, light.reflected)
+
+
+def _passes_beam(one: GroupCoefficients) -> bool:
+    return bool(beam_matrix(one.optics).any())
+
+
+def _sensor_light(
     light: PhaseLight,
-    one: SensorLight,
+    one: GroupCoefficients,
     g: int,
-    matrix: Estimate | None,
-    hours: NDArray[np.int64],
+    room: SunlitRoom | None,
+    direct: tuple[Estimate | None, NDArray[np.int64]],
 ) -> SensorLight:
-    sun = np.zeros((len(one.coefficients.whole), len(light.sky.lit)))
+    """The light of the sensors through a group in a state, by five phases.
+
+    Args: direct: C_ds [G, S, h], and the hours h that it is of.
+    """
+    beam, added = _passes_beam(one), None
+    error: Array | float = 0.0
+    if light.reflected is None:
+        added = _beam_in_room(light, one, g) if beam else None
+    elif g < len(light.scene.outdoor_groups):
+        cells = room if beam else None
+        more = reflected_to_sensors(light.matrices, light.reflected, cells, one, g)
+        added, error = more.values, more.sum_error
+    sun, (matrix, hours) = np.zeros((len(one.whole), len(light.sky.lit))), direct
     if matrix is None:
-        return replace(one, sun=sun)
-    luminance = light.sky.illuminance[hours] / SUN_SOLID_ANGLE
-    of_group = matrix.part(np.s_[g])
+        return SensorLight(one, added, sun, error)
+    luminance, of_group = light.sky.illuminance[hours] / SUN_SOLID_ANGLE, matrix.part(np.s_[g])
     sun[:, hours] = of_group.values * luminance
-    return replace(one, sun=sun, sun_error=np.hypot(one.sun_error, of_group.error_of(luminance)))
+    return SensorLight(one, added, sun, np.hypot(error, of_group.error_of(luminance)))
 
 
 def _beam_in_room(light: PhaseLight, one: GroupCoefficients, g: int) -> Array:

@@ -18,7 +18,6 @@ from mitsuba_cfs.methods.optics import SystemOptics, combinations
 from mitsuba_cfs.methods.phase_light import (
     PhaseLight,
     State,
-    illuminance_of_all,
     sensor_light,
     states_of,
 )
@@ -36,12 +35,14 @@ from mitsuba_cfs.methods.window_reflection import (
 Array = NDArray[np.float64]
 
 
-def relative_standard_error(light: PhaseLight, state: State | None = None) -> Array:
-    """Relative standard error of each sensor's mean over the hours [S].
+def relative_standard_error(light: PhaseLight, state: State | None, illuminance: Array) -> Array:
+    """Relative standard error of each sensor's mean over the hours [S + 1], the eye last.
 
     That of V, D, B, C_ds, the reflected sun, and W and X of what windows reflect; those of
     different groups and states are taken as independent.  The error that D leaves as a mean over a
     part of a group is included (`mitsuba_cfs.methods.subdivision`).
+
+    Args: illuminance: that of the sensors in this state, the eye last [S + 1, L] [lx].
     """
     rows, sensors = states_of(light, state), sensor_light(light)
     variance = _matrix_variance(light, rows)
@@ -51,9 +52,8 @@ def relative_standard_error(light: PhaseLight, state: State | None = None) -> Ar
         variance = variance + (sun / len(row)) ** 2
     for kind, hours in combinations(rows):
         variance = variance + _exchange_variance(light, light.optics(kind), hours)
-    mean = illuminance_of_all(light, state).mean(axis=1)
-    error = np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
-    return error[: len(light.scene.points)]
+    mean = illuminance.mean(axis=1)
+    return np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
 
 
 def _matrix_variance(light: PhaseLight, rows: State) -> Array:

@@ -65,7 +65,7 @@ def area_share(met: ArrayLike, areas: ArrayLike | None = None) -> float:
 
 
 def sensor_weights(areas: ArrayLike | None, count: int) -> FloatArray:
-    """Share of the area [S] that each of `count` sensors stands for; sums to 1."""
+    """Share of the area [S] of each of `count` sensors; sums to 1."""
     if count == 0:
         raise ValueError("expected at least one sensor")
     if areas is None:

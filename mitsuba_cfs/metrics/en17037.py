@@ -1,4 +1,4 @@
-"""EN 17037: what decides the level of daylight provision; the levels are data of a rule file."""
+"""EN 17037: quantities of daylight provision; the levels are data of a rule file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RULES = ("hourly", "sensor")
 
 @dataclass(frozen=True, slots=True)
 class DaylightProvision:
-    """What decides the level of a room."""
+    """Quantities that determine a room's level of daylight provision."""
 
     target_illuminance: (
         float  # [lx] reached on half the area (95 % under rooflights), half the time

@@ -84,11 +84,11 @@ def blinds_operated(
     threshold: float = ASE_THRESHOLD,
     most_area: float = BLIND_AREA,
 ) -> NDArray[np.bool_]:
-    """Time steps [G, H] in which the blinds of each window group are closed, as LM-83 moves them.
+    """Time steps [G, H] in which the blinds of each window group are closed by LM-83.
 
     Blinds close whenever more than 2 % of the points have direct sun, in that combination of groups
     that leaves most of it but no more than 2 %; of equals, the one that closes the last groups.
-    Closed blinds pass no direct sun: the standard's direct sun is that of open ones.
+    Closed blinds transmit no direct sun: the standard's direct sun is that of open blinds.
 
     Args: direct_illuminance: [G][H, S] [lx] straight from the sun through each group alone, open.
 

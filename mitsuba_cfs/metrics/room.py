@@ -28,7 +28,7 @@ class RoomMetrics:
     spatial_daylight_autonomy: float  # sDA300/50%
     annual_sunlight_exposure: float | None  # ASE1000,250h; None without direct illuminance
     daylight_provision: DaylightProvision  # EN 17037
-    areas: FloatArray  # [S] share of the room that each sensor stands for
+    areas: FloatArray  # [S] share of the room's area of each sensor
 
     def by_sensor(self) -> pd.DataFrame:
         """One row per sensor S."""
@@ -74,7 +74,7 @@ def room_metrics(
     areas: ArrayLike | None = None,
     horizontal_openings: bool = False,
 ) -> RoomMetrics:
-    """The metrics of a room whose sensors have this illuminance, each by its standard's schedule.
+    """Daylight metrics of a room, each with the schedule of its standard.
 
     Args:
         illuminance: [H, S] [lx] of every time step of the weather (`schedules.whole_year` puts

@@ -1,4 +1,4 @@
-"""Which time steps of a year a metric counts: working hours, LM-83's ten, EN 17037's half year."""
+"""Schedules of daylight metrics: working hours, LM-83's ten hours, EN 17037's half year."""
 
 from __future__ import annotations
 

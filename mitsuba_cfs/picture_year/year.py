@@ -41,12 +41,12 @@ class DgpCheck:
 
     hours: NDArray[np.int64]  # [c] numbers among the hours of the year's pictures
     dgp: NDArray[np.float64]  # [c]
-    kept: NDArray[np.float64]  # [c]
+    compressed_dgp: NDArray[np.float64]  # [c]
 
     @property
     def largest(self) -> float:
         """The largest difference."""
-        return float(np.abs(self.kept - self.dgp).max(initial=0.0))
+        return float(np.abs(self.compressed_dgp - self.dgp).max(initial=0.0))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Moist air and sky longwave: what stands in for missing fields of a weather file."""
+"""Moist air and longwave sky radiation: replacements for missing fields of a weather file."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from mitsuba_cfs.sky.matrix import (
     DEFAULT_ALBEDO,
     DEFAULT_DEW_POINT_C,
     SkySeries,
-    given_series,
+    series_for_suns,
     series_matrix,
     sky_series,
 )
@@ -154,8 +154,8 @@ def given_sky(
     """
     given = direction, direct_normal, diffuse_horizontal
     moment: dict[str, Any] = {"day_of_year": day_of_year, "dew_point_c": dew_point_c}
-    visible = given_series(*given, **moment)
-    radiance = three_part(given_series(*given, "solar", **moment)) if solar else None
+    visible = series_for_suns(*given, **moment)
+    radiance = three_part(series_for_suns(*given, "solar", **moment)) if solar else None
     return _of_series(
         visible,
         radiance,

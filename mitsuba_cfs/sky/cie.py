@@ -102,7 +102,7 @@ def cie_patches(
     Args:
         diffuse_horizontal: illuminance [lx] of the sky on a horizontal plane; the patches give it
             exactly.  With [W/m2] the result is radiance.
-        direct_horizontal: what the sun adds on the ground.
+        direct_horizontal: horizontal irradiance of the sun alone.
     """
     if not diffuse_horizontal >= 0 or not direct_horizontal >= 0:
         raise ValueError("expected illuminances that are not negative")

@@ -1,6 +1,6 @@
-"""The luminance of the ground to the horizon, as far as nothing modelled stands or lies on it.
+"""Luminance of the ground up to the horizon, without modelled surroundings.
 
-`reflected`   what a diffuse plain reflects of sky and sun, rho E_gh / pi (gendaymtx)
+`reflected`   diffuse reflection of sky and sun, rho E_gh / pi (gendaymtx)
 `gendaylit`   gendaylit's: its share of the sky is that of a CIE sky of the same zenith luminance
 """
 

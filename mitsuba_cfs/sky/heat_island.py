@@ -41,7 +41,7 @@ def maximum_heat_island(
     Raises: `ValueError` out of the range that the equation was tried on, and without wind.
     Source: Theeuwes, Steeneveld, Ronda, Holtslag 2017, "A diagnostic equation for the daily maximum
     urban heat island effect for cities in northwestern Europe", Int. J. Climatology 37,
-    doi 10.1002/joc.4717; the range from memory, as the paper was not at hand.
+    doi 10.1002/joc.4717; the range from memory, as the paper was not available.
     """
     for name, value, (low, high) in (
         ("sky_view", sky_view, SKY_VIEW), ("vegetation", vegetation, VEGETATION),

@@ -78,7 +78,7 @@ class SkySeries:
         return relative_luminance(self.model.coefficients[:, hours], directions[:, 2], cosine)
 
 
-def given_series(
+def series_for_suns(
     sun: ArrayLike,
     direct_normal: ArrayLike,
     diffuse_horizontal: ArrayLike,
@@ -128,7 +128,7 @@ def sky_series(
     """
     if towards is None:
         towards = sun_module.sun_directions(weather, model=sun_model)
-    series = given_series(
+    series = series_for_suns(
         sun_module.rotated(towards, rotation_deg),
         weather.direct_normal,
         weather.diffuse_horizontal,
@@ -179,7 +179,7 @@ def sky_matrix(
     """Perez sky on Reinhart patches [P, H]: luminance [cd/m2], or radiance [W/m2/sr] if `solar`.
 
     The illuminance (irradiance) of a plane is the sum over patches of value, solid angle and
-    cosine.  Patch 0 is the ground: what it reflects of sky and sun, uniform over its hemisphere.
+    cosine.  Patch 0 is the ground: its reflection of sky and sun, uniform over its hemisphere.
 
     Args:
         parts: `all`; `sky` without the sun (its light on the ground stays, as in `gendaymtx -s`);
@@ -279,7 +279,7 @@ def sun_matrix(
 ) -> sparse.csc_array:
     """Sun of each time step [P, H] as the luminance (radiance) of a 0.533 degree disc.
 
-    One entry per sunlit step, at the nearest patch: the disc stands at that patch's centre, so a
+    One entry per sunlit step, at the nearest patch: the disc is at that patch's centre, so a
     direct-sun matrix C_ds traced from discs of unit luminance at the centres times this matrix is
     the sun's part of the five-phase method.  As `gendaymtx -5 0.533 -d -m 6`.
     """

@@ -31,7 +31,7 @@ def measured_weather(
     """`site` (place and times) with the direct normal irradiance that two measurements imply.
 
     DNI = (global - diffuse)/sin(altitude) in the middle of each interval, 0 below
-    `least_altitude_deg`; there the whole global value counts as diffuse, so that it is kept.
+    `least_altitude_deg`; there the whole global value counts as diffuse.
     """
     whole = np.asarray(global_horizontal, dtype=float)
     diffuse = np.asarray(diffuse_horizontal, dtype=float)

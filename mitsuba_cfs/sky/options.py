@@ -1,6 +1,6 @@
-"""What the user may choose about sun and sky, and the defaults.
+"""Options of sun and sky, and their defaults.
 
-Apart from what computes them, so that a command's options are known before anything is loaded.
+A module of its own, so that a command's options are known before anything heavy is imported.
 """
 
 from __future__ import annotations

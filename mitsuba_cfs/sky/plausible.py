@@ -1,4 +1,4 @@
-"""Whether a weather file's radiation is that of the sun at the place and clock that it states."""
+"""Consistency of a weather file's radiation with its stated location and clock."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ LEAST_CLEARNESS, MOST_CLEARNESS = 0.02, 1.3  # of the 1 % clearest hours; sound:
 
 
 def checked_sun(weather: Weather, file: str | PathLike[str]) -> Weather:
-    """The weather with a note for each thing that its own radiation contradicts.
+    """Weather with a note for each statement that its own radiation contradicts.
 
     A wrong time zone, a wrong sign of the longitude or the latitude, another unit of the radiation
-    leave the numbers whole and put the sun elsewhere.  They show in the radiation itself: by when
-    its day is centred, how the length of its days goes with the season, and what share it is of
-    that outside the atmosphere.
+    leave the numbers valid but move the sun.  They show in the radiation itself: by the hour about
+    which days are centred, by the seasonal variation of the day length, and by the share of the
+    extraterrestrial radiation.
 
     Raises: `DataError` where the sun would be more than 1.5 h off, the seasons are the other
-        hemisphere's, or the radiation is 1/50 or less of what the clearest hours have.
+        hemisphere's, or the radiation is at most 1/50 of that of clear hours.
     """
     days = whole_days(weather)
     if days is None:
@@ -46,11 +46,11 @@ def checked_sun(weather: Weather, file: str | PathLike[str]) -> Weather:
 
 
 def whole_days(weather: Weather) -> Days | None:
-    """Radiation, declination and solar hour [days, steps] of whole days; None where they are few.
+    """Radiation, declination and solar hour [days, steps] of complete days; None if too few.
 
-    Whole are days that are there from midnight to midnight and have light.
+    Complete days cover midnight to midnight and have light.
     The radiation is the global horizontal, or where there is none the direct normal and diffuse
-    together: no sun position must enter it.
+    together: the sun position must not enter it.
     """
     steps = weather.per_day
     _, index, count = np.unique(
@@ -68,7 +68,7 @@ def whole_days(weather: Weather) -> Days | None:
 
 
 def _clock(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]:
-    """What is wrong with zone or longitude by the hour about which clear days are even."""
+    """Error of zone or longitude from the hour about which clear days are symmetric."""
     late = noon_offset(weather.latitude_deg, *days)
     if abs(late) < NOTED_H or (abs(late) < REFUSED_H and len(days[0]) < MANY_DAYS):
         return _far_zone(weather)
@@ -87,7 +87,7 @@ def _clock(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]
 
 
 def _fitting(weather: Weather, late: float) -> dict[str, float]:
-    """The time zone, and the longitude of the other sign, that would bring noon where it is."""
+    """Time zone, and longitude with the other sign, that agree with the noon of the radiation."""
     found = {}
     zone = round(2 * late) / 2
     if abs(late - zone) < SAME_H:
@@ -123,7 +123,7 @@ def height_of_sun(latitude_deg: float, declination: FloatArray, hour: FloatArray
 
 
 def _far_zone(weather: Weather) -> list[str]:
-    """A zone that is far from its longitude, though the radiation agrees with both."""
+    """Note on a time zone far from its longitude although the radiation agrees with both."""
     apart = _wrapped(weather.timezone_h - weather.longitude_deg / 15)
     if abs(apart) <= FAR_ZONE_H:
         return []
@@ -134,7 +134,7 @@ def _far_zone(weather: Weather) -> list[str]:
 
 
 def _seasons(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]:
-    """What is wrong with the latitude by how the length of the days goes with the season."""
+    """Error of the latitude from the seasonal variation of the day length."""
     radiation, declination, _ = days
     if len(radiation) < 300 or abs(weather.latitude_deg) < JUDGED_LATITUDE_DEG:
         return []
@@ -155,7 +155,7 @@ def _seasons(weather: Weather, days: Days, file: str | PathLike[str]) -> list[st
 
 
 def _amount(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]:
-    """What is wrong with the unit of the radiation by what comes of that outside the atmosphere."""
+    """Error of the unit of the radiation from its share of the extraterrestrial radiation."""
     if weather.global_horizontal is None or len(days[0]) < MANY_DAYS:
         return []
     radiation, declination, hour = days

@@ -1,4 +1,4 @@
-"""Where the sun is, in the middle of each interval; world frame x east, y north, z up."""
+"""Sun position in the middle of each interval; world frame x east, y north, z up."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ SOLAR_CONSTANT = 1361.0  # [W/m2]
 def sun_directions(weather: Weather, *, model: str = "spa") -> NDArray[np.float64]:
     """Unit vectors [H, 3] towards the sun in the middle of each interval.
 
-    `spa` (the default): NREL's Solar Position Algorithm, good to 0.0003 deg, seen through the
-    refracting air.  `radiance`: the formula of gensky and gendaymtx, 0.45 deg off on average and
-    1.5 deg at worst, for agreement with them.
+    `spa` (the default): NREL's Solar Position Algorithm, uncertainty 0.0003 deg, with
+    atmospheric refraction.  `radiance`: the formula of gensky and gendaymtx, 0.45 deg off on
+    average and 1.5 deg at worst, for agreement with them.
 
     Source: Reda and Andreas 2004, Solar Energy 76:577 (pvlib's implementation); Radiance `sun.c`.
     """
@@ -126,7 +126,7 @@ def direct_normal_from_global(
     """Direct normal irradiance [H] [W/m2]: (global - diffuse)/sin(altitude), 0 at low sun.
 
     Below `least_altitude_deg` the quotient of two small measured numbers is noise, so the beam is
-    taken as 0; a diffuse reading above the global one gives 0 too.  Never more than the sun gives
+    taken as 0; a diffuse reading above the global one gives 0 too.  Limited to the radiation
     outside the atmosphere.
     """
     beam = np.asarray(global_horizontal, dtype=float) - np.asarray(diffuse_horizontal, dtype=float)

@@ -1,11 +1,11 @@
-"""Perez's sky of three parts (1990) on patches: an even dome, light around the sun, the horizon.
+"""Perez's three-part sky (1990) on patches: uniform dome, circumsolar part, horizon band.
 
     E = D [ (1 - F1) (1 + cos tilt)/2  +  F1 a/b  +  F2 sin tilt ]
 
 with D the diffuse horizontal irradiance, a the cosine at the plane and b that at the ground, at
-least cos 85 degrees.  It is the irradiance that the sky gives to tilted planes, measured as such,
-where the all-weather luminance (1993) is what a luminance meter sees: heat follows the one, light
-the other.  docs/validation.md has both beside measured facades.
+least cos 85 degrees.  This model is fitted to measured irradiance on tilted planes; the all-weather
+luminance (1993) is fitted to a luminance scanner.  Heat uses the former, light the latter;
+docs/validation.md compares both with measured facades.
 
 Source: Perez, Ineichen, Seals, Michalsky, Stewart 1990, Solar Energy 44:271, equations 7 to 10 and
 table 6.
@@ -45,7 +45,7 @@ BRIGHTENING = np.array(
 
 @dataclass(frozen=True, slots=True)
 class ThreePartSeries(SkySeries):
-    """A series whose sky has the irradiances of tilted planes (Perez 1990)."""
+    """Series with the sky radiance for tilted planes (Perez 1990)."""
 
     def brightening(self, hours: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
         """F1 (around the sun, at least 0) and F2 (horizon) of some of the moments [h]."""
@@ -59,7 +59,7 @@ class ThreePartSeries(SkySeries):
         """Patch radiance [P - 1, h], without ground and sun.
 
         Dome and band together give level ground D (1 - F1) and upright planes D ((1 - F1)/2 + F2),
-        the mean over all azimuths; a band darker than nothing is black.
+        the mean over all azimuths; a negative band is set to 0.
         """
         around, horizon = self.brightening(hours)
         diffuse = self.diffuse_horizontal[hours]
@@ -78,7 +78,7 @@ class ThreePartSeries(SkySeries):
 
 
 def three_part(series: SkySeries) -> ThreePartSeries:
-    """A series of the solar band under the sky of three parts."""
+    """Series of the solar band with the three-part sky."""
     return ThreePartSeries(
         series.sun, series.model, series.diffuse_horizontal, series.direct_normal
     )

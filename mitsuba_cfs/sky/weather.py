@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 class Weather:
     """Weather of one site; every array is over the time steps H.
 
-    A value stands for its interval, which ends at `times`.  What a file does not have is None.
+    A value is the mean of its interval, which ends at `times`.  Missing series are None.
     """
 
     site: str

@@ -148,7 +148,7 @@ def epw_location(head: list[str], path: FilePath) -> Location:
 
 
 def epw_first_weekday(head: list[str]) -> int | None:
-    """The day on which the data begin, Monday 0; None where the line of their period says none."""
+    """Weekday of the first data row, Monday 0; None if the header does not state it."""
     parts = [part.strip().casefold() for part in head[7].split(",")]
     return WEEK.index(parts[4]) if len(parts) > 4 and parts[4] in WEEK else None
 
@@ -191,7 +191,7 @@ class EpwColumns:
                 )
 
     def error(self, field: str, row: int, message: str) -> DataError:
-        """The error for one field of one row, which says the date too."""
+        """Error for one field of one row, with its date."""
         month, day, hour = (part.strip() for part in self.rows[row][1:4])
         return DataError(
             f"{message} (month {month}, day {day}, hour {hour})",

@@ -48,7 +48,7 @@ def interpolate(
     error that the noise of the values gives it, and what was taken for symmetry.
     """
     from mitsuba_cfs.bsdf.measured_file import read_measurement
-    from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
+    from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 
     check_file(out, inputs=files)
     measured = [read_measurement(path, normal=normal) for path in files]

@@ -247,8 +247,7 @@ def notices(result: GlareResult) -> list[str]:
 
 def _write_cut(luminance, geometry: GlareView, cut: int, request: Request) -> None:
     """The picture with its field of view cut, for -g."""
-    from mitsuba_cfs.glare.field_of_view import seen
-    from mitsuba_cfs.glare.glare_view import in_picture_order
+    from mitsuba_cfs.glare.glare_view import in_picture_order, seen
     from mitsuba_cfs.images.hdr import write_hdr
 
     if cut not in CUTS or "-c" not in request.given:

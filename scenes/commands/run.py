@@ -136,7 +136,7 @@ def run_to_folder(
     from scenes.report import write_report
     from scenes.result_folder import EXPLORER
     from scenes.run.outputs import write_results
-    from scenes.run.rooms_apart import Workers
+    from scenes.run.rooms import Workers
     from scenes.run.run import run_job
 
     beside = processes > 1 or scheduler is not None

@@ -69,7 +69,7 @@ def measure(
     Kernels are compiled before, in a small picture: that is paid once on a machine.
 
     Args:
-        sky: at least one hour; best with the sun before the windows.  They are repeated as needed.
+        sky: at least one hour; best with the sun facing the windows.  They are repeated as needed.
         clock: elapsed seconds; `time.process_time` gives processor seconds of all threads, which
             other work on the machine disturbs less.
     """

@@ -28,7 +28,7 @@ from scenes.cost.measure import Cost, measure
 from scenes.demo import VENETIAN_BLIND, WEATHER
 
 EYE, DIRECTION = (1.8, 2.0, 1.2), (0.0, -1.0, 0.0)
-DIRECT = 20_000.0  # [lx] normal to the sun: the timed hours have the sun before the window
+DIRECT = 20_000.0  # [lx] direct normal illuminance: the timed hours have the sun facing the window
 
 
 def reference_scene(size: int = 800) -> DaylightScene:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import operator
 from dataclasses import dataclass
 
 import ifcopenshell
@@ -68,7 +70,9 @@ def thickness(name: str) -> float:
 
 def u_value(name: str) -> float:
     """Thermal transmittance of a construction of `LAYERS` [W/(m2 K)], EN ISO 6946."""
-    resistance = sum(depth / substance.conductivity for substance, depth in LAYERS[name])
+    # `sum` adds with compensation from Python 3.12 on: the file's last digits would differ
+    layers = (depth / substance.conductivity for substance, depth in LAYERS[name])
+    resistance = functools.reduce(operator.add, layers)
     return 1.0 / (SURFACE_RESISTANCES + resistance)
 
 

@@ -75,7 +75,7 @@ def explorer_of(results: Path) -> Path:
 
 
 def join_explorers(folders: Sequence[Path], target: Path) -> None:
-    """Write one explorer of several; each one's data lie in a folder of their own.
+    """Write one explorer of several, with the data of each in its own folder.
 
     Raises: `DataError` where their years are not of one length.
     """

@@ -111,7 +111,7 @@ def _check(year: PictureYear) -> dict[str, Any] | None:
     check = year.check
     if check is None or not len(check.hours):
         return None
-    difference = np.abs(check.kept - check.dgp)
+    difference = np.abs(check.compressed_dgp - check.dgp)
     return {
         "hours": check.hours.tolist(),
         "dgp": np.round(check.dgp, 6).tolist(),

@@ -76,8 +76,9 @@ def room_humidity(
         index = {room.zone.name: z for z, room in enumerate(rooms)}
         for one in transfers:
             between[:, index[one.target], index[one.source]] += one.flow
+    outdoors = outdoor_humidity(weather)
     return zone_humidity(
-        zones, outdoor_humidity(weather), weather.dry_bulb_c, weather.pressure_pa, between,
+        zones, outdoors, weather.dry_bulb_c, weather.pressure_pa, between,
         row_s=3600.0 * weather.step_h,
     )  # fmt: skip
 
@@ -131,9 +132,10 @@ def thermal_result(
 
     Args: felt: `felt_by`.
     """
+    temperatures = _temperatures(result, room.zone, weather).assign(**felt)
     comfort, summary = _comfort(result, weather, room.occupied)
     return ThermalResult(
-        _temperatures(result, room.zone, weather).assign(**felt),
+        temperatures,
         pd.DataFrame(room.gains, index=weather.midpoints).rename_axis("time"),
         comfort,
         summary,
@@ -237,7 +239,7 @@ def heat_of(
         thermal = thermal_result(room, balance, weather, felt_by(comfort, balance, humidity))
         operation = None if room.operation is None else operated_year(room, balance, weather)
         heat = thermal, operation
-        heats.append(heat if store is None else store.kept(heat))
+        heats.append(heat if store is None else store.stored(heat))
     return heats
 
 

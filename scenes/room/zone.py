@@ -113,11 +113,11 @@ def balances(
         progress(COMPILING, 0.0)
     passed = iter if store is None else store.each
     zones, suns = [r.zone for r in rooms], [per_window(r.solar, r.zone) for r in passed(rooms)]
-    row_s = 3600.0 * weather.step_h
+    row_s, outdoors = 3600.0 * weather.step_h, climate(weather)
     return simulate_zones(
-        zones, climate(weather), suns, step_s=min(step_s, row_s), row_s=row_s,
+        zones, outdoors, suns, step_s=min(step_s, row_s), row_s=row_s,
         air_links=air_links, transfers=transfers, options=BalanceOptions(terrain=terrain),
-        kept=None if store is None else store.kept,
+        storage=None if store is None else store.stored,
     )  # fmt: skip
 
 

@@ -17,8 +17,7 @@ from bim.ifc.targets import Targets
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.klems import KLEMS_QUARTER, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
-from mitsuba_cfs.bsdf.xml import read_bsdf_xml
-from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from scenes.commands.ifc import command
 from tests.bim.small_ifc import box_room

@@ -274,7 +274,7 @@ def test_a_bsdf_comes_along(tmp_path):
     from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
     from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-    from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
+    from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 
     clear = specular_klems(Glazing("clear", 0.6, 0.1, 0.1), KLEMS_FULL)
     write_bsdf_xml(BsdfFile({"Visible": clear, "Solar": clear}), tmp_path / "clear.xml")

@@ -31,7 +31,7 @@ def test_every_state_is_walked_and_agrees(run, folder, tmp_path) -> None:
     years = run.spaces[0].explored.pictures
     assert len(found) == len(years) == 2
     for state, year in zip(found, years, strict=True):
-        assert state.dgp == pytest.approx(year.check.kept, abs=1e-6)
+        assert state.dgp == pytest.approx(year.check.compressed_dgp, abs=1e-6)
         assert np.abs(state.dgp - state.own).max() < 0.002
         assert np.all(state.milliseconds >= state.picture + state.glare)
         assert f"{len(year.check.hours)} hours" in str(state)

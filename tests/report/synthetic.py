@@ -272,7 +272,7 @@ def manifest() -> dict:
             "system": {"path": "venetian45.xml", "sha256": "77de" * 16},
         },
         "options": {"weather": "x.epw", "sky_subdivision": 1, "sensor_spacing": 0.5, "spaces": []},
-        "versions": {"mitsuba-cfs": "0.1.0", "mitsuba": "3.9.1", "drjit": "1.5.0"},
+        "versions": {"mitsuba-cfs": "0.2.0", "mitsuba": "3.9.1", "drjit": "1.5.0"},
         "seed": 1,
         "variant": "llvm_ad_mono",
         "seconds": 51.0,

@@ -11,7 +11,7 @@ from mitsuba_cfs.bsdf.angular import roos_table, stack_table
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
+from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from scenes.fenestration.systems import read_system
 from scenes.fenestration.thermal_file import files_beside

@@ -24,7 +24,7 @@ from scenes.room.operation_tables import OperationTables
 from scenes.room.room import operated_zone
 from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
-from scenes.run import run
+from scenes.run import rooms
 from scenes.run.options import JobOptions
 from tests.scenes.small_box import SMALL
 
@@ -95,7 +95,7 @@ def _shared(room: DaylitRoom) -> int:
 def test_rooms_held_on_disk_have_the_same_year(variant, weather, skies) -> None:
     rooms = [lit(s, {"loads": WARM} if s.name == "w" else {}, weather, skies) for s in two_boxes()]
     store = StoredArrays()
-    held = [store.kept(room) for room in rooms]
+    held = [store.stored(room) for room in rooms]
     found, _ = coupled_years(rooms, weather, 3600.0, OperationTables())
     again, _ = coupled_years(held, weather, 3600.0, OperationTables(), store=store)
     for one, other in zip(found, again, strict=True):
@@ -152,12 +152,12 @@ def test_a_run_has_the_temperatures_of_a_coupled_study(variant, weather, blind, 
     building = read_ifc(OFFICE)
     systems = in_all_windows(building, blind)
     operation = read_operation(tmp_path / "operation.toml")
-    inputs = run.Inputs(building, list(building.spaces), weather, systems, operation)
+    inputs = rooms.Inputs(building, list(building.spaces), weather, systems, operation)
     room = study.options.changed(picture_size=32, picture_samples=1, picture_count=1)
     skies = skies_for(weather, room.method, room.sampling, **room.sky)
     options = JobOptions(OFFICE, WEATHER, cache=False, room=room)
     heard: list[str] = []
-    found, issues, notes = run._rooms(
+    found, issues, notes = rooms.computed_rooms(
         inputs, skies, options, silent,
         on_light=lambda room: heard.append(f"light of {room.space.name}"),
         on_room=lambda room: heard.append(room.space.name),

@@ -13,8 +13,7 @@ from bim.building_file import read_building_file
 from bim.ifc.building import read_ifc
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.simple_glazing import solar_transmittance
-from mitsuba_cfs.bsdf.xml import read_bsdf_xml
-from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import write_text
 from mitsuba_cfs.images.exr import read_exr

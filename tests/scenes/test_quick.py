@@ -19,7 +19,7 @@ from scenes.heat import study_file as heat_file
 from scenes.room import series as rooms_of_a_run
 from scenes.room.glare import default_hours
 from scenes.room.options import RoomOptions
-from scenes.run import run as job
+from scenes.run import rooms
 from scenes.run.options import JobOptions
 from scenes.study.study_file import read_study
 from scenes.year_of_glare.options import YearOptions
@@ -175,12 +175,12 @@ def three_rooms(monkeypatch: pytest.MonkeyPatch, no_pictures: None) -> SimpleNam
 def test_each_room_is_told_when_it_is_computed_in_their_order(three_rooms, monkeypatch) -> None:
     said: list[str] = []
     monkeypatch.setattr(
-        job, "compute_room",
+        rooms, "compute_room",
         lambda building, space, *_, **__: said.append(f"computed {space.guid}") or space,
     )  # fmt: skip
     told = lambda room: said.append(f"told {room.guid}")  # noqa: E731
     options = replace(JobOptions(OFFICE, WEATHER), cache=False, coupled_heat=False)
-    results, _, _ = job._rooms(three_rooms, None, options, lambda *_: None, on_room=told)
+    results, _, _ = rooms.computed_rooms(three_rooms, None, options, lambda *_: None, on_room=told)
     assert said == [f"{what} {room}" for room in "abc" for what in ("computed", "told")]
     assert [room.guid for room in results] == ["a", "b", "c"]
 
@@ -188,12 +188,12 @@ def test_each_room_is_told_when_it_is_computed_in_their_order(three_rooms, monke
 def test_progress_counts_the_rooms(three_rooms, monkeypatch) -> None:
     seen = []
     monkeypatch.setattr(
-        job, "compute_room",
+        rooms, "compute_room",
         lambda building, space, *_, progress, **__: progress("light", 0.5) or space,
     )  # fmt: skip
     options = replace(JobOptions(OFFICE, WEATHER), cache=False, coupled_heat=False)
     progress = lambda stage, _: seen.append((stage.number, stage.total, stage))  # noqa: E731
-    job._rooms(three_rooms, None, options, progress, on_room=lambda room: None)
+    rooms.computed_rooms(three_rooms, None, options, progress, on_room=lambda room: None)
     assert seen == [(1, 3, "A: light"), (2, 3, "B: light"), (3, 3, "C: light")]
 
 

@@ -21,7 +21,7 @@ from scenes.room.room import compute_room
 from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 from scenes.room.zone import zone_surfaces
-from scenes.run import run as job
+from scenes.run import rooms as job
 from scenes.run.options import JobOptions
 from scenes.study import schedule
 
@@ -63,7 +63,7 @@ def only_high_rooms_are_made_up(monkeypatch: pytest.MonkeyPatch) -> None:
 def rooms_of(inputs: job.Inputs):
     room = OPTIONS.room
     skies = skies_for(inputs.weather, room.method, room.sampling)
-    return job._rooms(inputs, skies, OPTIONS, silent)
+    return job.computed_rooms(inputs, skies, OPTIONS, silent)
 
 
 def test_a_room_too_low_for_its_sensors_is_left_out(variant, monkeypatch, no_pictures) -> None:

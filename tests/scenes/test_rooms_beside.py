@@ -24,9 +24,9 @@ from scenes.inputs import Inputs, read_inputs
 from scenes.room import series
 from scenes.room.options import RoomOptions
 from scenes.room.series import RoomSeries
-from scenes.run import outputs, rooms_apart
+from scenes.run import outputs, rooms
 from scenes.run.options import JobOptions
-from scenes.run.rooms_apart import Workers
+from scenes.run.rooms import Workers
 from scenes.run.run import run_inputs, run_job
 from scenes.workers import Tasks
 from tests.conftest import REPOSITORY
@@ -114,16 +114,17 @@ def test_a_folder_that_cannot_be_written_ends_the_processes(tmp_path):
 
 
 @pytest.mark.usefixtures("variant")
-def test_a_worker_with_other_files_than_the_command_has_computes_nothing(tmp_path):
+def test_a_worker_with_other_files_than_the_command_has_computes_nothing(tmp_path, monkeypatch):
     """Nor does one that read them before they were changed."""
     building = tmp_path / "rooms.hbjson"
     text = (REPOSITORY / "docs" / "tutorials" / "two_rooms.hbjson").read_text()
     building.write_text(text)
     options = JobOptions(building, WEATHER, VENETIAN_BLIND, cache=False, room=SMALL)
+    monkeypatch.setattr(rooms, "compute_room", lambda *_, **__: text)
 
-    def command() -> rooms_apart._FromFiles:
-        run = rooms_apart._identity(options, read_inputs(options))
-        return rooms_apart._FromFiles(lambda building, space, *rest, **more: text, options, run)
+    def command() -> rooms._FromFiles:
+        run = rooms._identity(options, read_inputs(options))
+        return rooms._FromFiles(True, options, run)
 
     before = command()
     (name,) = {space.guid for space in read_inputs(options).spaces if "Hall" in space.label}

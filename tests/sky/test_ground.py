@@ -10,7 +10,7 @@ import pytest
 from mitsuba_cfs.sky.annual import annual_sky, given_sky
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.ground import gendaylit_ground
-from mitsuba_cfs.sky.matrix import given_series, sky_series
+from mitsuba_cfs.sky.matrix import series_for_suns, sky_series
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.perez import relative_luminance
 from mitsuba_cfs.sky.sun import direction
@@ -44,7 +44,7 @@ def moments(**options):
 
 
 def moments_series():
-    return given_series(sun(), *MOMENTS.T[1:], day_of_year=NEW_YEAR)
+    return series_for_suns(sun(), *MOMENTS.T[1:], day_of_year=NEW_YEAR)
 
 
 @pytest.mark.peer

@@ -7,7 +7,7 @@ import pytest
 from pvlib import irradiance
 
 from mitsuba_cfs.sky.annual import given_sky
-from mitsuba_cfs.sky.matrix import given_series
+from mitsuba_cfs.sky.matrix import series_for_suns
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.perez import SOLAR_CONSTANT, air_mass, eccentricity
 from mitsuba_cfs.sky.three_part import three_part
@@ -24,7 +24,7 @@ PLANES = {"north": 0.0, "east": 90.0, "south": 180.0, "west": 270.0}
 
 def _sky(subdivision: int) -> tuple[ReinhartSky, np.ndarray]:
     sky = ReinhartSky(subdivision)
-    series = three_part(given_series(SUN, DIRECT, DIFFUSE, "solar", day_of_year=DAY))
+    series = three_part(series_for_suns(SUN, DIRECT, DIFFUSE, "solar", day_of_year=DAY))
     return sky, series.patches(sky, np.arange(len(SUN)))
 
 
@@ -57,7 +57,7 @@ def test_level_ground_has_the_diffuse_irradiance() -> None:
 def test_no_patch_is_darker_than_black() -> None:
     """A dark overcast sky asks for less than nothing at the horizon; level ground keeps 2 %."""
     sky = ReinhartSky(4)
-    dark = given_series(SUN[1:2], [0.0], [30.0], "solar", day_of_year=DAY)
+    dark = series_for_suns(SUN[1:2], [0.0], [30.0], "solar", day_of_year=DAY)
     radiance = three_part(dark).patches(sky, np.arange(1))
     assert radiance.min() == 0.0
     np.testing.assert_allclose(sky.horizontal_weights[1:] @ radiance, 30.0, rtol=0.02)

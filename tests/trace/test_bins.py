@@ -16,7 +16,7 @@ def test_a_direction_that_is_none_is_looked_up_inside_the_tables():
 
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL
     from mitsuba_cfs.bsdf.traced_klems import TracedBasis, cell
-    from mitsuba_cfs.bsdf.traced_squares import TracedSquares
+    from mitsuba_cfs.bsdf.traced_tree import TracedSquares
     from mitsuba_cfs.sky.patches import ReinhartSky
     from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
     from mitsuba_cfs.trace.kernels.scattering import AngularBeam

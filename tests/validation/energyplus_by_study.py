@@ -19,7 +19,7 @@ import pandas as pd
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
-from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
+from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from scenes.study.study import run_study
 from scenes.study.study_file import read_study
 from tests.validation.differences import rmse_and_bias

@@ -21,7 +21,7 @@ import pandas as pd
 
 from mitsuba_cfs.bsdf.angular import AngularTable, specular_matrices
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
-from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
+from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.progress import silent
 from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study

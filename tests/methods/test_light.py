@@ -1,0 +1,116 @@
+"""Light and matrices as values: what another eye or other outdoors share, and wrong calls."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml
+from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.methods.glare import hourly_glare, pictures, rated_pictures
+from mitsuba_cfs.methods.light import (
+    daylight,
+    eye_illuminance,
+    illuminance,
+    illuminance_with_error,
+    with_view,
+)
+from mitsuba_cfs.methods.optics import AngularOptics, BsdfOptics
+from mitsuba_cfs.methods.phase_matrices import phase_matrices, with_outdoors
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+from mitsuba_cfs.sky.annual import given_sky
+from scenes.demo import VENETIAN_BLIND
+from tests.trace import rooms
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+FEW = Sampling(
+    sensor_samples=64, patch_samples=64, sun_points=16, view_samples=1, outdoor_samples=1,
+    hour_samples=16, picture_samples=1, subdivision=1, window_parts=1,
+)  # fmt: skip
+SKY = given_sky([[0.0, -0.8, 0.6]], [800.0], [90.0], 1, day_of_year=172)
+VIEW = fisheye((1.8, 2.5, 1.2), (0.5, -1.0, 0.0), 24)
+POINTS, UP = np.array([[1.8, 1.0, 0.8], [1.8, 3.0, 0.8]]), np.tile([0.0, 0.0, 1.0], (2, 1))
+
+
+def scene(view=VIEW) -> DaylightScene:
+    room, groups = rooms.test_room()
+    return DaylightScene(room, rooms.obstruction(), groups, POINTS, UP, view)
+
+
+def glass() -> list[list[AngularOptics]]:
+    return [[AngularOptics([0.0, 0.7, 0.7])]]
+
+
+@pytest.mark.parametrize("method", ["three-phase", "five-phase", "point-in-time"])
+def test_without_a_view_the_eye_and_its_glare_are_refused(method) -> None:
+    """The last sensor's illuminance was given for the eye's."""
+    light = daylight(scene(view=None), glass(), SKY, method=method, sampling=FEW)
+    assert illuminance(light).shape == (2, 1)
+    calls = (
+        eye_illuminance, hourly_glare, lambda one: hourly_glare(one, "sDGP"),
+        lambda one: hourly_glare(one, "eDGP"), lambda one: pictures(one, [0]),
+        lambda one: rated_pictures(one, [0]),
+    )  # fmt: skip
+    for call in calls:
+        with pytest.raises(ValueError, match="no view"):
+            call(light)
+
+
+def test_another_eye_shares_what_depends_on_the_windows_alone() -> None:
+    light = daylight(scene(), glass(), SKY, sampling=FEW)
+    other = with_view(light, replace(VIEW, position=(1.0, 3.0, 1.2)))
+    assert other.matrices.daylight is light.matrices.daylight
+    assert other.matrices.sensors is None and light.matrices.sensors is not None
+    eyes = eye_illuminance(light), eye_illuminance(other)
+    assert eyes[0] != pytest.approx(eyes[1], rel=0.01)
+    alone = daylight(other.scene, glass(), SKY, sampling=FEW)
+    np.testing.assert_array_equal(eyes[1], eye_illuminance(alone))
+    with pytest.raises(FrozenInstanceError):
+        light.sky = SKY
+
+
+def test_other_outdoors_share_what_is_indoors() -> None:
+    matrices = phase_matrices(scene(), FEW)
+    free = replace(scene(), exterior=rooms.NOTHING)
+    other = with_outdoors(matrices, free)
+    assert other.sensors is matrices.sensors and other.parts is matrices.parts
+    assert other.daylight.values.sum() > 1.05 * matrices.daylight.values.sum()
+    np.testing.assert_array_equal(other.daylight.values, phase_matrices(free, FEW).daylight.values)
+
+
+def test_what_is_not_needed_is_not_traced_and_comes_out_the_same_later() -> None:
+    bare = daylight(scene(), glass(), SKY, sampling=FEW, needs=())
+    assert bare.matrices.sensors is None and bare.matrices.view is None and bare.sensors is None
+    whole = daylight(scene(), glass(), SKY, sampling=FEW, needs=("illuminance", "DGP"))
+    assert whole.matrices.view is not None
+    for one, other in zip(illuminance_with_error(bare), illuminance_with_error(whole), strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert hourly_glare(bare).dgp == hourly_glare(whole).dgp
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("sensor_samples", -1), ("patch_samples", 0), ("subdivision", 0), ("seed", -1),
+     ("window_parts", -2), ("memory", -1.0)],
+)  # fmt: skip
+def test_a_sampling_that_cannot_be_is_refused(name, value) -> None:
+    with pytest.raises(ValueError, match=name):
+        Sampling(**{name: value})
+
+
+def test_a_state_below_zero_is_refused() -> None:
+    light = daylight(scene(), [[*glass()[0], AngularOptics([0.0, 0.1])]], SKY, sampling=FEW)
+    with pytest.raises(ValueError, match="0 or more"):
+        illuminance(light, np.array([-1]))
+
+
+def test_optics_go_to_another_process_after_their_use() -> None:
+    known = BsdfOptics(read_bsdf_xml(VENETIAN_BLIND).band("Visible")), glass()[0][0]
+    for optics in known:
+        _ = optics.paths, optics.scattering
+        again = pickle.loads(pickle.dumps(optics))
+        np.testing.assert_array_equal(again.transmission, optics.transmission)
