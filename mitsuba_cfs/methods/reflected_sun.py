@@ -8,8 +8,8 @@ place, and few paths of a window meet the sun's patch after a reflection.  In pl
     (V - V_d) diag(tau) D_d s_d    the sun's beam that the room reflects
 
 the five-phase method computes this light at points that represent the outdoor surfaces
-(`mitsuba_cfs.trace.reflected_sun`) and in cells of the room (`mitsuba_cfs.trace.room_beam`), in
-independent batches, which give its standard error.
+(`mitsuba_cfs.trace.sun.reflected`) and in cells of the room
+(`mitsuba_cfs.trace.sun.sunlit_sensors`), in independent batches, which give its standard error.
 """
 
 from __future__ import annotations
