@@ -81,6 +81,17 @@ class Head:
 NO_HEAD = Head(())
 
 
+def record_lines(record: Mapping[str, list]) -> tuple[str, ...]:
+    """The lines of a head from its record in a JSON file."""
+    issues = (
+        f"{label}: {one['text']}"
+        for severity, label in LABELS.items()
+        for one in record["issues"]
+        if one["severity"] == severity
+    )
+    return (*record["model"], *issues, *(f"assumed: {text}" for text in record["assumed"]))
+
+
 def joined(heads: Iterable[Head]) -> Head:
     """One head of several results, each line once."""
     heads = list(heads)

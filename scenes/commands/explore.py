@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 import webbrowser
 from collections.abc import Sequence
@@ -35,6 +36,8 @@ def command(results: Sequence[Path], out: Path | None, port: int, no_browser: bo
     from scenes.result_folder import ResultFolder
 
     folders = [explorer_of(one) for one in results]
+    for one in results:
+        _print_head(one, several=len(results) > 1)
     if out is not None:
         with ResultFolder(out, "explore", inputs=results).replaced() as place:
             join_explorers(results, place)
@@ -46,6 +49,20 @@ def command(results: Sequence[Path], out: Path | None, port: int, no_browser: bo
             folder = Path(place)
             join_explorers(results, folder)
         _serve(folder, port, open_it=not no_browser)
+
+
+def _print_head(results: Path, *, several: bool) -> None:
+    """What was left out and assumed of the inputs of a run."""
+    from scenes.head import record_lines
+
+    try:
+        record = json.loads((results / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):  # an explorer that was copied without its run
+        return
+    if several:
+        click.echo(f"{results}:")
+    for line in record_lines(record["head"]) if "head" in record else ():
+        click.echo(line)
 
 
 def _serve(folder: Path, port: int, *, open_it: bool) -> None:

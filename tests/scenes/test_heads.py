@@ -14,6 +14,7 @@ from bim.report.issue import issue_text
 from mitsuba_cfs.errors import DataError
 from scenes import cli
 from scenes.demo import VENETIAN_BLIND, WEATHER
+from scenes.explore.folder import write_explorer
 from scenes.head import Head, head_of, joined
 from scenes.input_files import read_files
 from scenes.input_options import InputOptions
@@ -21,6 +22,7 @@ from scenes.inputs import read_inputs
 from tests.bim.honeybee_models import two_rooms, write
 from tests.bim.small_ifc import box_model
 from tests.conftest import REPOSITORY
+from tests.explore.synthetic import explored_run
 
 STOP = "stopped before anything is traced"
 RAD = REPOSITORY / "docs/tutorials/office.rad"
@@ -196,10 +198,24 @@ def test_panes_before_dark_rooms_mirror(tmp_path: Path) -> None:
     path.write_text(
         RAD.read_text() + f"\nvoid glass across\n0\n0\n3 .8 .8 .8\nacross polygon p\n{pane}\n"
     )
-    with pytest.raises(DataError, match="which one is outdoors"):
-        read_building_file(path)
+    code = "clear-surface-left-out"
+    assert [issue for issue in read_building_file(path).issues if issue.code == code]
     options = InputOptions(path, None, facade_panes=("across",))
     building = read_building_file(path, options.read)
     assert len(building.windows) == 1
     (pane,) = (one for one in building.elements if one.material == "across")
     assert pane.gloss is not None and pane.reflectance_visible == 0
+    assert not [issue for issue in building.issues if issue.code == code]
+
+
+def test_the_explorer_shows_the_head_of_its_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    results = tmp_path / "results"
+    write_explorer(explored_run(), results / "explore")
+    head = head_of(read_building_file(ifc(tmp_path)))
+    (results / "run.json").write_text(json.dumps({"head": head.record}))
+    assert cli.run(["explore", str(results), "--out", str(tmp_path / "page")]) == 0
+    output = capsys.readouterr().out
+    assert all(line in output for line in head.model)
+    assert "left out: IfcWindow W above has no room behind it" in output

@@ -130,7 +130,7 @@ def test_operation_through_the_command(tmp_path, blind, capsys) -> None:
         assert loads[f"{name}_kwh"] == pytest.approx(hours[f"{name}_w"].sum() / 1e3, rel=1e-4)
         assert f"{name} {loads[f'{name}_kwh']:.0f} kWh" in said
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "Shading state" in page and "three-phase method" in page and "five-phase" not in page
+    assert "Shading state" in page and "Three-phase method" in page and "ive-phase" not in page
 
 
 def test_a_run_keeps_its_matrices_unless_told_not_to(tmp_path, blind, monkeypatch) -> None:
