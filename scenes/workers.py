@@ -1,8 +1,8 @@
-"""Who computes which task when: this process, processes beside each other, or a Dask cluster.
+"""Tasks computed in this process, in parallel processes, or on a Dask cluster.
 
-The first task of a scene goes before its others, which then find the scene's matrices in the cache.
-A process that ends by itself (a library's fault, too little memory) takes nothing with it: the
-tasks that were at work are done again, each alone, and one that ends its process then has failed.
+The first task of a scene runs before the others, which then read the scene's matrices from the
+cache. If a process crashes (fault of a library, out of memory), its tasks are repeated one by one;
+a task that crashes a process of its own has failed.
 """
 
 from __future__ import annotations
@@ -36,44 +36,44 @@ from scenes.user_errors import one_line
 T = TypeVar("T")
 R = TypeVar("R")
 CONNECT_SECONDS = 10
-AHEAD = 2  # tasks for each process: one at work, one for when its result is being looked at
-FETCHED = 8  # results of a cluster that are here before they are looked at
+AHEAD = 2  # tasks submitted for each process: one that runs and one that waits
+FETCHED = 8  # results of a cluster that are fetched ahead of their use
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
 class Tasks(Generic[T, R]):
-    """What is to be computed; a task that fails has its failure for a result."""
+    """Tasks to compute; a failed task has `failed` of its error for a result."""
 
     items: Sequence[T]
-    compute: Callable[[T], R]  # each process of this machine gets it once
+    compute: Callable[[T], R]  # sent to each process of this machine once
     failed: Callable[[T, BaseException], R]
-    key: Callable[[T], str]  # of each item once
+    key: Callable[[T], str]  # unique
     scene: Callable[[T], str]
 
     def results(self, *, processes: int = 1, scheduler: str | None = None) -> Generator[R]:
-        """The result of each task in the order in which they are ready.
+        """The result of each task, in the order in which the tasks end.
 
-        Closing the generator ends the work: a consumer that may stop before the end uses
-        `contextlib.closing`, or the processes work on for as long as its exception is held.
+        Closing the generator ends the processes. A consumer that may stop early uses
+        `contextlib.closing`, because otherwise they run as long as its exception is referenced.
 
         Args:
-            processes: how many tasks at a time on this machine.
-            scheduler: address of a Dask scheduler, whose workers then do the work.
+            processes: number of parallel tasks on this machine.
+            scheduler: address of a Dask scheduler, whose workers replace the processes.
 
-        Raises: `DataError` where no scheduler answers, or a process ends by itself.
+        Raises: `DataError` if no scheduler answers, or if processes crash repeatedly.
         """
         if scheduler is not None:
             yield from self._on_cluster(scheduler)
         elif processes > 1:
-            yield from self._beside_each_other(processes)
+            yield from self._in_parallel(processes)
         else:
             for item in self.items:
                 yield _attempted(self.compute, self.failed, item)
 
     def _waves(self) -> tuple[list[T], dict[str, list[T]]]:
-        """The first task of each scene, and by the key of that one those that follow it."""
+        """The first task of each scene, and by its key the other tasks of the scene."""
         leader: dict[str, str] = {}
         first, followers = [], defaultdict(list)
         for item in self.items:
@@ -84,7 +84,7 @@ class Tasks(Generic[T, R]):
                 followers[leader[scene]].append(item)
         return first, followers
 
-    def _beside_each_other(self, processes: int) -> Iterator[R]:
+    def _in_parallel(self, processes: int) -> Iterator[R]:
         leaders, followers = self._waves()
         left, again, ended = deque(leaders), deque[T](), 0
         crew = _Crew[T](processes, (self.compute, self.failed))
@@ -116,7 +116,7 @@ class Tasks(Generic[T, R]):
             crew.end()
 
     def _collected(self, result: Callable[[], R], item: T) -> R:
-        """A future's result; that of a worker lost for good is a failure of the task."""
+        """A future's result; a worker that is lost for good is a failure of the task."""
         try:
             return result()
         except (Exception, CancelledError) as error:
@@ -136,7 +136,7 @@ class Tasks(Generic[T, R]):
         held: dict[str, Any] = {}
 
         def begin(some: Sequence[T]) -> list:
-            # one task for each key, whoever runs it: a worker that dies has its tasks run again
+            # one task for each key: Dask repeats the tasks of a worker that dies
             started = [
                 client.submit(
                     _attempted, self.compute, self.failed, item, key=self._name(item), pure=True
@@ -151,7 +151,7 @@ class Tasks(Generic[T, R]):
             for future in done:
                 item = by_key[future.key]
                 result = self._collected(future.result, item)
-                held.pop(future.key).release()  # or a dying worker would have it done again
+                held.pop(future.key).release()  # else a dying worker would make Dask repeat it
                 done.update(begin(followers.pop(self.key(item), [])))
                 yield result
 
@@ -163,9 +163,9 @@ class Tasks(Generic[T, R]):
 
 
 def _fetched(ready: Iterator[R], cancel: Callable[[], object]) -> Iterator[R]:
-    """What is ready, fetched while what came before is being looked at.
+    """Results fetched while the consumer uses earlier ones.
 
-    A worker that dies takes with it what it has done and nobody has fetched.
+    Results that are not fetched are lost if their worker dies.
     """
     end = object()
     with ThreadPoolExecutor(1) as thread:
@@ -177,31 +177,31 @@ def _fetched(ready: Iterator[R], cancel: Callable[[], object]) -> Iterator[R]:
         finally:
             for one in asked:
                 one.cancel()
-            cancel()  # the one that is being waited for ends, too
+            cancel()  # ends the pending fetch too
 
 
 def check_dask() -> None:
-    """Raise `DataError` where Dask is not installed; it is not loaded."""
+    """Raise `DataError` if Dask is not installed; Dask is not imported."""
     if find_spec("distributed") is None:
         message = "needs Dask: pip install 'mitsuba-cfs[distributed]'"
         raise DataError(message, field="--scheduler")
 
 
 class _Work:
-    """What a process of the pool does with every task that it gets."""
+    """The computation of the tasks in a process of the pool."""
 
-    _kept: ClassVar[tuple[Callable, Callable]]
+    _work: ClassVar[tuple[Callable, Callable]]
 
     @classmethod
-    def keep(cls, file: Path, processes: int) -> None:
-        """Begin one of so many processes with what a file holds."""
+    def load(cls, file: Path, processes: int) -> None:
+        """Start one of `processes` processes with the pickled computation of a file."""
         share_cores(processes)
-        cls._kept = pickle.loads(file.read_bytes())
+        cls._work = pickle.loads(file.read_bytes())
 
     @classmethod
     def attempted(cls, item: T) -> Any:
         """The result of a task."""
-        return _attempted(*cls._kept, item)
+        return _attempted(*cls._work, item)
 
 
 def _attempted(compute: Callable[[T], R], failed: Callable[[T, BaseException], R], item: T) -> R:
@@ -213,37 +213,37 @@ def _attempted(compute: Callable[[T], R], failed: Callable[[T, BaseException], R
 
 
 class _Crew(Generic[T]):
-    """So many processes, and the tasks that one of them takes with it when it ends.
+    """A pool of processes and its running tasks.
 
-    They get their work by a file: one that is killed while it starts does not read to its end what
-    this process writes to it, which then waits for ever.
+    The computation is passed by a file: a pipe to a process that is killed while it starts would
+    block this process forever.
     """
 
     def __init__(self, processes: int, work: tuple[Callable, Callable]) -> None:
-        given = pickle.dumps(work)
+        pickled = pickle.dumps(work)
         self._folder = TemporaryDirectory()
         file = Path(self._folder.name) / "work"
-        file.write_bytes(given)
-        self._processes, self._first = processes, partial(_Work.keep, file, processes)
+        file.write_bytes(pickled)
+        self._processes, self._first = processes, partial(_Work.load, file, processes)
         self._pool = process_pool(processes, self._first)
         self._started: dict[int | None, BaseProcess] = {}
         self.at_work: dict[Future, T] = {}
 
     def begin(self, tasks: deque[T], most: int) -> None:
-        """Begin the first of these until so many have begun."""
+        """Submit the first of the tasks until `most` are at work."""
         while tasks and len(self.at_work) < most:
             try:
                 future = self._pool.submit(_Work.attempted, tasks[0])
-            except BrokenProcessPool as error:  # ended with nothing to do, or just now
+            except BrokenProcessPool as error:  # crashed while idle, or just now
                 future = Future()
                 future.set_exception(error)
             self.at_work[future] = tasks.popleft()
             self._started |= self._pool._processes or {}
 
     def wait(self) -> tuple[list[tuple[T, Callable[[], Any]]], list[T]]:
-        """Tasks that are ready, with what gives their results; those that went with a process."""
+        """Finished tasks with functions that return their results; tasks of crashed processes."""
         ready, _ = wait(self.at_work, return_when=FIRST_COMPLETED)
-        if any(map(_lost, ready)):  # then no task of this pool will end any more
+        if any(map(_lost, ready)):  # then no other task of this pool ends
             ready, _ = wait(self.at_work)
         items = {
             future: self.at_work.pop(future) for future in list(self.at_work) if future in ready
@@ -252,14 +252,14 @@ class _Crew(Generic[T]):
         return done, [item for future, item in items.items() if _lost(future)]
 
     def renew(self) -> str:
-        """Fresh processes in place of those of which one ended; how it did."""
+        """Replace the processes after a crash; returns the reason of the crash."""
         _end(self._pool)
         reason = how_it_ended(self._started.values())
         self._pool, self._started = process_pool(self._processes, self._first), {}
         return reason
 
     def end(self) -> None:
-        """End the processes now, without waiting for the tasks under way."""
+        """Terminate the processes without waiting for their tasks."""
         _end(self._pool)
         self._folder.cleanup()
 
