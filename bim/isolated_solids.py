@@ -1,7 +1,7 @@
-"""Solids, their booleans and distances, worked out in a process that may die.
+"""Boolean operations and distances of solids, run in a subprocess because the kernel may crash.
 
-The library of solids has ended whole processes by a signal on meshes that passed every check.  Here
-such a mesh costs its own room, wall or pair, and no more.
+The geometry kernel has ended whole processes by a signal on meshes that passed every check.  In a
+subprocess, such a mesh affects its own room, wall or pair only.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Outline = tuple[shapely.Geometry, Plane, float, float]  # of a prism: see `bim.s
 
 @dataclass(frozen=True, slots=True)
 class RoomBoundary:
-    """What `bim.rooms.room_pieces` gives for a room."""
+    """The pieces that close a room, from `bim.rooms.room_pieces`."""
 
     pieces: list[Piece]
     volume: float  # of the air with the recesses of its windows [m3]

@@ -1,8 +1,8 @@
-"""Meshes that are far finer than light needs, with fewer triangles and a stated error.
+"""Simplified meshes of elements that are far finer than daylight needs, with a stated error.
 
-Vertices are merged on ever wider grids until few enough triangles are left; what a vertex has moved
-by at the most is the error.  Only what stands outdoors and in rooms is made coarser, never what
-bounds a room.
+Vertices are merged on ever wider grids until few enough triangles remain; the error is the largest
+displacement of a vertex.  Only outdoor elements and furniture are simplified, never the boundary of
+a room.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ KEPT_AREA = 0.9  # share of the surface that has to be left: slats and bars must
 
 
 def simplified(elements: list[Element]) -> tuple[list[Element], list[Issue]]:
-    """The elements, those of many triangles made coarser, and how far vertices were moved."""
+    """The elements, those of many triangles simplified, and an issue for each of these."""
     result, issues = [], []
     for element in elements:
         triangles, error = simplified_mesh(element.triangles)

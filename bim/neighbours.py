@@ -1,4 +1,4 @@
-"""What lies behind each piece of a room's boundary: elements, other rooms, ground or open air."""
+"""Adjacency of each piece of a room's boundary: element, other room, ground or outdoor air."""
 
 from __future__ import annotations
 

@@ -15,8 +15,7 @@ from bim.colours import GREY, Colour, radiance_colour
 from bim.model import Building, Element, Face, Space
 from bim.outdoors import before_windows
 from bim.radiance_script import LUMINANCE, makefile, run_script
-from bim.sensors import sensor_grid, view_point
-from bim.surface_sensors import surface_sensors
+from bim.sensors import sensor_grid, surface_sensors, view_point
 from bim.to_tracer import window_groups
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.xml import write_bsdf_xml

@@ -106,7 +106,7 @@ def called(main: Callable[..., Any], options: argparse.Namespace) -> Any:
 
 
 def show(result: Any) -> None:
-    """Print a table with three decimals, several with their titles, or a text."""
+    """Print a table with four decimals, several with their titles, or a text."""
     import pandas as pd
 
     if isinstance(result, dict):
@@ -115,6 +115,6 @@ def show(result: Any) -> None:
             show(table)
     elif isinstance(result, pd.DataFrame):
         named = result.index.names != [None] or result.index.dtype == object
-        print(result.round(3).to_string(index=named))
+        print(result.round(4).to_string(index=named))
     elif result is not None:
         print(result)

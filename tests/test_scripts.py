@@ -78,6 +78,6 @@ def test_commands_of_the_documentation_exist(command):
 
 def test_the_list_names_all_and_an_unknown_name_is_refused(capsys):
     assert run_script("tests.validation", []) == 0
-    assert "geneva_office" in capsys.readouterr().out
+    assert "geneva" in capsys.readouterr().out
     assert run_script("tests.validation", ["nothing"]) == 2
     assert "there is no 'nothing'" in capsys.readouterr().err

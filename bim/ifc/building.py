@@ -22,8 +22,8 @@ from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.furniture import furnished
 from bim.ifc.glass_of_rooms import apertures_in, glass_of_rooms, lost_glass
 from bim.ifc.joining import joined_rooms
-from bim.ifc.map_conversion import map_georeference
 from bim.ifc.passages import Passage, open_apertures
+from bim.ifc.placing import map_georeference
 from bim.ifc.raised_rooms import raised_rooms
 from bim.ifc.rooms_from_geometry import rooms_from_geometry
 from bim.ifc.schemes import one_of_each

@@ -60,9 +60,14 @@ class Damage:
 
     def _report(self, of: ifcopenshell.entity_instance | None, data: str, error: Exception) -> None:
         guid = "project" if of is None else str(getattr(of, "GlobalId", None) or f"#{of.id()}")
-        label = "The project" if of is None else f"{of.is_a()} {getattr(of, 'Name', None) or ''}"
+        named = getattr(of, "Name", None) or ""
+        label = "The project" if of is None else f"{of.is_a()} {named}"
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        values = {"element": label, "data": Phrase(f"data-{data}"), "reason": reason}
+        values: dict[str, str | Phrase] = {
+            "element": label,
+            "data": Phrase(f"data-{data}"),
+            "reason": reason,
+        }
         self._issues.setdefault((guid, data), Issue("damaged-data", guid, values))
 
 

@@ -18,7 +18,7 @@ GLASS_INDEX = 1.52
 
 @dataclass(frozen=True, slots=True)
 class SurfaceStyle:
-    """How a surface style reflects and whether it is glass."""
+    """Reflectance, gloss and transparency of a surface style."""
 
     name: str
     reflectance: float  # diffuse, visible
@@ -35,14 +35,14 @@ class SurfaceStyle:
 
     @property
     def is_glass(self) -> bool:
-        """Whether one sees through it."""
+        """Whether the style is transparent."""
         return self.transparency > CLEAR
 
 
 def surface_style(
     model: ifcopenshell.file, name: str, colour: Sequence[float], transparency: float
 ) -> SurfaceStyle:
-    """The look of a style that the geometry engine names "<class>-<STEP id>".
+    """The surface style that the geometry engine names "<class>-<STEP id>".
 
     In this order: IfcSurfaceStyleLighting.DiffuseReflectionColour and a DiffuseColour given as a
     colour are coefficients of reflection as the schema defines them; else the surface colour is

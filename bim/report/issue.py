@@ -16,12 +16,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 Severity = Literal["loss", "warning", "unused", "assumption", "info"]
 Audience = Literal["python", "command"]  # whom a fix is for: an argument, or a flag
 Translate = Callable[[str], str]
-Value = "str | int | float | tuple[str | Phrase, ...] | Phrase"
 SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 CATALOGUE = Path(__file__).parent / "catalogue.toml"
 LISTED = 6  # names that a text lists before it counts the rest
@@ -149,7 +148,7 @@ def issue_rows(
     translate: Translate = lambda text: text,
 ) -> list[tuple[str, str, str, str, str]]:
     """Rows of `COLUMNS`; the consequence is the effect with the fix."""
-    rows = []
+    rows: list[tuple[str, str, str, str, str]] = []
     for issue in issues:
         what, consequence = issue_text(issue, audience, translate).pair
         rows.append((issue.where, what, consequence, issue.code, issue.severity))
@@ -181,11 +180,11 @@ def _fields(template: str) -> frozenset[str]:
 
 
 @cache
-def _tables() -> Mapping[str, dict]:
+def _tables() -> Mapping[str, dict[str, Any]]:
     return tomllib.loads(CATALOGUE.read_text(encoding="utf-8"))
 
 
-def _template(code: str, table: Mapping) -> Template:
+def _template(code: str, table: Mapping[str, Any]) -> Template:
     if table["severity"] not in SEVERITIES:
         raise ValueError(f"issue {code}: severity {table['severity']!r} is none of {SEVERITIES}")
     texts = {key.replace("-", "_"): value for key, value in table.items() if key != "group"}

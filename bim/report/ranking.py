@@ -40,7 +40,7 @@ class Ranked:
 
 def ranked(issues: Sequence[Issue]) -> list[Ranked]:
     """Issues by area of glass, then lost rooms and windows, then by number."""
-    groups: dict[tuple, list[Issue]] = {}
+    groups: dict[tuple[object, ...], list[Issue]] = {}
     for issue in issues:
         groups.setdefault(_kind(issue), []).append(issue)
     result = [
@@ -50,7 +50,7 @@ def ranked(issues: Sequence[Issue]) -> list[Ranked]:
     return sorted(result, key=lambda r: (-r.glass, -LOST.get(r.first.effect.lost, 0), -r.count))
 
 
-def _kind(issue: Issue) -> tuple:
+def _kind(issue: Issue) -> tuple[object, ...]:
     """The code, the loss, and the values that tell issues of the code apart."""
     values = (issue.values[name] for name in catalogue()[issue.code].group)
     keys = (value.key if isinstance(value, Phrase) else value for value in values)

@@ -233,7 +233,7 @@ def test_terrain_is_terrain_and_what_is_finer_is_told(tmp_path):
     context = read_surroundings(written(tmp_path, model(RELIEF, DETAILED)))
     (one,) = context.objects
     assert (one.name, one.ifc_class, len(one.triangles)) == ("ground", "IfcGeographicElement", 1)
-    assert context.left_out == (("object(s) without geometry below LoD 3", 1),)
+    assert context.left_out == (("objects-without-geometry", 1),)
 
 
 def test_version_three_has_other_names(tmp_path):

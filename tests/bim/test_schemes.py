@@ -59,7 +59,7 @@ def test_cupboard_drawn_inside_a_room_is_kept_and_named(tmp_path):
     cupboard = ((0.5, 3.0, 0.0), (1.0, 1.0, HEIGHT))
     building = read(tmp_path, drawn(("room", NET, ""), ("cupboard", cupboard, "")))
     assert len(building.spaces) == 2
-    assert building.account.overlapping == ("spaces room and cupboard overlap by 3.00 m3",)
+    assert building.account.overlapping == ("room + cupboard (3.00 m3)",)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 from bim.ifc.building import read_ifc
 from tests.bim.small_ifc import DEPTH, HEIGHT, WALL, WIDTH, box_room
 from tests.bim.test_joining import THICK, two_rooms
-from tests.issues import texts
+from tests.issues import of_code, texts
 
 
 def state(path, areas: dict[str, float]) -> None:
@@ -33,7 +33,8 @@ def test_area_to_the_middle_of_the_walls_is_recognised(tmp_path, cut):
     # 1e-6: overlays of polygons are rounded to a micrometre
     assert north.area_to_middles == pytest.approx(middles, rel=1e-5)
     assert north.floor_area == pytest.approx(WIDTH * half, rel=1e-6)
-    assert "North: states" in texts(building) and "South: states" not in texts(building)
+    (issue,) = of_code(building, "area-to-wall-middles")
+    assert issue.values["room"] == "North" and not of_code(building, "floor-area-differs")
 
 
 def test_area_of_no_definition_is_reported(tmp_path):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bim.sensors import polygon_sensors, surface_sensors
 from bim.shoebox import WindowRectangle, shoebox
-from bim.surface_sensors import polygon_sensors, surface_sensors
 
 WALL = np.array([[0, 0, 0], [7, 0, 0], [7, 0, 3], [0, 0, 3]], dtype=float)
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,9 @@ from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
 from tests.validation import ashrae140_cases, ashrae140_sun, ashrae140_sunspace
 from tests.validation.facade_sun import SunSteps, sun_steps
+from tests.validation.reference_room import climate
 from thermal.balance import BalanceOptions, ZoneResult, simulate
-from thermal.climate import Climate, sky_temperature
+from thermal.climate import Climate
 
 WEATHER = "725650TYCST.epw"
 RANGES = "bestest_ranges.json"
@@ -28,14 +30,7 @@ LOADS = {"heating": "B8-1", "cooling": "B8-2", "peak heating": "B8-3", "peak coo
 
 def ground_climate(weather: Weather) -> Climate:
     """The weather with the standard's ground temperature."""
-    return Climate(
-        outdoor_c=weather.dry_bulb_c,
-        sky_c=sky_temperature(weather.horizontal_infrared),
-        wind_speed=weather.wind_speed,
-        wind_direction_deg=weather.wind_direction_deg,
-        ground_c=np.full(len(weather.times), ashrae140_cases.GROUND_C),
-        pressure=weather.pressure_pa,
-    )
+    return replace(climate(weather), ground_c=np.full(len(weather.times), ashrae140_cases.GROUND_C))
 
 
 def run_case(
@@ -64,17 +59,17 @@ def figures(name: str, result: ZoneResult) -> dict[str, float]:
 def compare(reference: Path, only: Sequence[str] = ()) -> pd.DataFrame:
     """One row per case and output: ours, and the range of the example programs."""
     weather = read_epw(reference / WEATHER)
-    steps, climate = sun_steps(weather, STEPS), ground_climate(weather)
+    steps, outdoors = sun_steps(weather, STEPS), ground_climate(weather)
     ranges = json.loads((reference / RANGES).read_text())
     rows: list[dict[str, object]] = []
     for name, case in ashrae140_cases.cases().items():
         if only and name not in only:
             continue
-        result, light = run_case(case, climate, steps)
+        result, light = run_case(case, outdoors, steps)
         rows += judged_figures(name, figures(name, result), ranges)
         rows += _transmitted_rows(name, case, light, ranges)
     if not only or "960" in only:
-        back, sunspace = ashrae140_sunspace.run(climate, steps, OPTIONS, 3600.0 / STEPS)
+        back, sunspace = ashrae140_sunspace.run(outdoors, steps, OPTIONS, 3600.0 / STEPS)
         rows += [_row("960", k, v, ranges) for k, v in figures("960", back).items()]
         floating = figures("960FF", sunspace)
         rows += [_row("960 Sunspace", k, v, ranges) for k, v in floating.items()]

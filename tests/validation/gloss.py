@@ -39,8 +39,7 @@ from mitsuba_cfs.trace.paths.scene import PathOptics, PathTracingScene, Sky
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks import radiance
-from tests.validation.rendered_scene import RenderedScene
-from tests.validation.scene_rows import show_rows
+from tests.validation.rendered_scene import RenderedScene, show_rows
 
 EYE, DIRECTION = (-1.8, -2.0, 1.2), (0.0, 1.0, 0.0)
 TURN = np.array([-1.0, -1.0, 1.0])  # of the room, its window to the north

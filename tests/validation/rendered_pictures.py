@@ -42,8 +42,7 @@ from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks import radiance
 from tests.benchmarks.annual_product import SYSTEM, WEATHER
-from tests.validation.rendered_scene import RenderedScene
-from tests.validation.scene_rows import show_rows
+from tests.validation.rendered_scene import RenderedScene, show_rows
 
 EYE, DIRECTION = (1.8, 2.0, 1.2), (0.0, -1.0, 0.0)
 SIZE = 200  # [px] of the pictures

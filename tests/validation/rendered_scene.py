@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+import tempfile
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,3 +77,19 @@ class RenderedScene:
         lines = radiance.run(command, self.folder, given).decode().split()
         values = np.array(lines, dtype=float).reshape(points, -1)[:, 0] * EFFICACY
         return float(values.mean()), float(values.std(ddof=1) / np.sqrt(points))
+
+
+Row = TypeVar("Row")
+
+
+def show_rows(
+    file: Path | None, rows: Callable[[Path], Iterable[Row]], line: Callable[[Row], str]
+) -> None:
+    """Print a line of each row, which are dataclasses, made in a folder; write them to a file."""
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        for row in rows(Path(folder).resolve()):
+            found.append(asdict(row))
+            print(line(row), flush=True)
+    if file:
+        file.write_text(json.dumps(found, indent=1))

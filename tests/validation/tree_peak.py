@@ -41,7 +41,7 @@ from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks.annual_product import WEATHER
 from tests.validation import rendered_pictures as rendered
-from tests.validation.scene_rows import show_rows
+from tests.validation.rendered_scene import show_rows
 
 SLAT_RAYS = 1 << 16
 PATHS = 1 << 32  # of a tree, over all pairs of incident and outgoing cells
