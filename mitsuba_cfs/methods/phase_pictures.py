@@ -123,7 +123,7 @@ def _five_phase_pictures(
     *,
     direct: bool = False,
 ) -> FivePhasePictures:
-    """Pictures by five phases; without the view's matrices they are to be given (`see_by`)."""
+    """Pictures by five phases; without `view` the caller sets the matrices (`see_by`)."""
     matrices, sky, optics = light.matrices, light.sky, light.optics(state)
     windows, interior = _windows(light, hours, state), matrices.scene.interior
     exterior, parts = matrices.scene.exterior, matrices.parts.groups

@@ -50,7 +50,7 @@ class ReflectedSun:
     inside: TracedScene
     outside: TracedScene  # what is in front of the window parts, in the room's coordinates
     before: tuple[NDArray[np.float32], ...]  # [BATCHES][Q, K, h] luminance before the windows
-    by_patches: Array  # D - D_d [Q, K, P], in whose place it is taken; 0 without outdoor surfaces
+    by_patches: Array  # D - D_d [Q, K, P], which it replaces; 0 without outdoor surfaces
 
     @property
     def suns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
