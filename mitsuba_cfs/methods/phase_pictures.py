@@ -190,9 +190,9 @@ def _window_luminance(
     if matrices.exchange is not None and reflects(optics):
         in_sun = None
         if sun is not None:
-            elements = with_sunlit(matrices).sunlit
+            sunlit = with_sunlit(matrices).sunlit
             suns, strength = light.sky.direction[hours], light.sky.illuminance[hours]
-            met = sun.on_elements(_traced(elements), suns, strength)
+            met = sun.sunlit_luminance(_traced(sunlit), suns, strength)
             in_sun = _beams(windows, luminance.shape), met
         exchange = matrices.exchange.values
         luminance = luminance + reflected_luminance(exchange, optics, luminance, in_sun)
