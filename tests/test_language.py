@@ -68,7 +68,6 @@ NOT_CLEAN: set[str] = {
     "bim/ifc",
     "bim/radiance",
     "bim/surroundings",
-    "mitsuba_cfs/glare",
     "mitsuba_cfs/methods",
     "mitsuba_cfs/trace",
     "scenes",

@@ -9,6 +9,7 @@ colour-science.
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,7 +62,7 @@ def colour_rendering_index(wavelength_nm: ArrayLike, value: ArrayLike) -> float:
     nm, light, cmfs, samples = _colour_tables()
     given = _rising(wavelength_nm)
     _check_reach(given, nm, cmfs.sum(axis=1) * light)
-    spectrum = light * np.interp(nm, given, value)
+    spectrum = light * np.interp(nm, given, np.asarray(value, dtype=float))
     reference, test = _tristimulus(light, cmfs), _tristimulus(spectrum, cmfs)
     if not test[1] > 0:
         raise ValueError("colour rendering of what passes no light is not defined")
@@ -76,14 +77,16 @@ def colour_rendering_index(wavelength_nm: ArrayLike, value: ArrayLike) -> float:
     return float(np.mean(indices))
 
 
-def _weighted(wavelength_nm: ArrayLike, value: ArrayLike, nm: NDArray, weight: NDArray) -> float:
+def _weighted(
+    wavelength_nm: ArrayLike, value: ArrayLike, nm: NDArray[Any], weight: NDArray[Any]
+) -> float:
     """Mean of the data at `nm` by `weight`; the data must reach over where the weight is."""
     given = _rising(wavelength_nm)
     _check_reach(given, nm, weight)
-    return float(np.interp(nm, given, value) @ weight / weight.sum())
+    return float(np.interp(nm, given, np.asarray(value, dtype=float)) @ weight / weight.sum())
 
 
-def _check_reach(given: NDArray, nm: NDArray, weight: NDArray) -> None:
+def _check_reach(given: NDArray[Any], nm: NDArray[Any], weight: NDArray[Any]) -> None:
     """Raise `ValueError` for data that leave out more than `LEFT_OUT` of the weight."""
     beyond = (nm < given[0] - 1e-6) | (nm > given[-1] + 1e-6)
     if weight[beyond].sum() > LEFT_OUT * weight.sum():
@@ -101,7 +104,7 @@ def _rising(wavelength_nm: ArrayLike) -> NDArray[np.float64]:
 
 
 @cache
-def _colour_tables() -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def _colour_tables() -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
     """Wavelengths 380 to 780 nm by 5 [N], D65 [N], 1931 observer [N, 3], test colours [8, N]."""
     import colour
     from colour.quality.datasets import SDS_TCS
@@ -114,17 +117,17 @@ def _colour_tables() -> tuple[NDArray, NDArray, NDArray, NDArray]:
     return shape.wavelengths, light, cmfs, np.array(samples)
 
 
-def _tristimulus(spectrum: NDArray, cmfs: NDArray) -> NDArray[np.float64]:
+def _tristimulus(spectrum: NDArray[Any], cmfs: NDArray[Any]) -> NDArray[np.float64]:
     return spectrum @ cmfs
 
 
-def _uv(xyz: NDArray) -> NDArray[np.float64]:
+def _uv(xyz: NDArray[Any]) -> NDArray[np.float64]:
     """CIE 1960 u, v."""
     x, y, z = xyz
     return np.array([4 * x, 6 * y]) / (x + 15 * y + 3 * z)
 
 
-def _adapted(uv: NDArray, own: NDArray, white: NDArray) -> NDArray[np.float64]:
+def _adapted(uv: NDArray[Any], own: NDArray[Any], white: NDArray[Any]) -> NDArray[np.float64]:
     """u, v seen under `own` as it would be under `white` (CIE 13.3)."""
     (c, d), (c_own, d_own), (c_white, d_white) = (
         ((4 - u - 10 * v) / v, (1.708 * v + 0.404 - 1.481 * u) / v) for u, v in (uv, own, white)
@@ -133,7 +136,7 @@ def _adapted(uv: NDArray, own: NDArray, white: NDArray) -> NDArray[np.float64]:
     return np.array([10.872 + 0.404 * c - 4 * d, 5.520]) / (16.518 + 1.481 * c - d)
 
 
-def _uvw(uv: NDArray, luminance: float, white: NDArray) -> NDArray[np.float64]:
+def _uvw(uv: NDArray[Any], luminance: float, white: NDArray[Any]) -> NDArray[np.float64]:
     """CIE 1964 W*, U*, V*."""
     w = 25 * np.cbrt(luminance) - 17
     return np.array([w, *(13 * w * (uv - white))])

@@ -145,7 +145,8 @@ def stacked(layers: list[PeriodicLayer], gaps: list[float]) -> PeriodicLayer:
         raise ValueError("expected a positive gap between each two layers")
     if len({layer.period for layer in layers}) != 1:
         raise ValueError("the layers' cells are of different sizes")
-    triangles, material, materials = [], [], ()
+    triangles, material = [], []
+    materials: tuple[SlatMaterial, ...] = ()
     top = 0.0
     for layer, gap in zip(layers, [*gaps, 0.0], strict=True):
         triangles.append(layer.triangles + np.array([0, 0, top - layer.depth_range[1]]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -143,7 +145,7 @@ def prism_panel(
     )
 
 
-def _sheet(triangles: NDArray, material: SlatMaterial, spacing: float) -> PeriodicLayer:
+def _sheet(triangles: NDArray[Any], material: SlatMaterial, spacing: float) -> PeriodicLayer:
     """The layer of a cell drawn round the origin."""
     return PeriodicLayer(
         triangles + np.array([spacing / 2, spacing / 2, 0.0]),
@@ -157,7 +159,7 @@ def _faces(thickness: float) -> tuple[float, ...]:
     return (0.0,) if thickness == 0 else (thickness / 2, -thickness / 2)
 
 
-def _ring(inner: NDArray, outer: NDArray, half: float) -> NDArray[np.float64]:
+def _ring(inner: NDArray[Any], outer: NDArray[Any], half: float) -> NDArray[np.float64]:
     """Triangles [.., 3, 2] between a hole's outline and the square cell's border."""
     triangles = []
     count = len(inner)
@@ -170,7 +172,7 @@ def _ring(inner: NDArray, outer: NDArray, half: float) -> NDArray[np.float64]:
     return np.array(triangles)
 
 
-def _walls(outline: NDArray, thickness: float) -> NDArray[np.float64]:
+def _walls(outline: NDArray[Any], thickness: float) -> NDArray[np.float64]:
     """Triangles of the walls of a hole, from one face to the other."""
     top = np.concatenate([outline, np.full((len(outline), 1), thickness / 2)], -1)
     bottom = top * [1, 1, -1]

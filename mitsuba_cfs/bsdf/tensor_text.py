@@ -7,6 +7,7 @@ values: a dense grid, the last axis running fastest.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +53,10 @@ def _grid_levels(counts: NDArray[np.int64], rank: int) -> NDArray[np.int64]:
     return levels
 
 
-def _check_nesting(opening, nesting, is_grid, depths, rank: int) -> None:
+def _check_nesting(
+    opening: NDArray[Any], nesting: NDArray[Any], is_grid: NDArray[Any], depths: NDArray[Any],
+    rank: int,
+) -> None:  # fmt: skip
     """Every branch has 2^rank children: the volumes of what is inside it add up to its own."""
     deepest = int(nesting.max())
     volume = np.zeros(len(opening), dtype=np.int64)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,7 +39,7 @@ class AreaStatistics:
     illuminance: float  # at the eye [lx]
 
 
-def statistics(luminance: NDArray, area: NDArray, geometry: GlareView) -> AreaStatistics:
+def statistics(luminance: NDArray[Any], area: NDArray[Any], geometry: GlareView) -> AreaStatistics:
     """Statistics of luminance [nx, ny] over an area [nx, ny] bool, both in scan order."""
     area = area & geometry.valid
     values, weights = luminance[area], geometry.solid_angle[area]
@@ -59,7 +60,7 @@ def statistics(luminance: NDArray, area: NDArray, geometry: GlareView) -> AreaSt
     )
 
 
-def _percentile(ordered: NDArray, share: float) -> float:
+def _percentile(ordered: NDArray[Any], share: float) -> float:
     """evalglare's percentile: the mean of the two values around place n x share."""
     place = ordered.size * share
     return float(ordered[int(place)] + ordered[max(int(place - 1), 0)]) / 2
@@ -89,7 +90,7 @@ def zone_map(zones: Zones, geometry: GlareView) -> NDArray[np.int64]:
 
 
 def split_by_zone(
-    sources: Sources, zones: Zones, luminance: NDArray, geometry: GlareView
+    sources: Sources, zones: Zones, luminance: NDArray[Any], geometry: GlareView
 ) -> tuple[Sources, NDArray[np.int64]]:
     """Sources cut at the zones' borders, and the zone [n] of each.
 
@@ -112,7 +113,7 @@ def split_by_zone(
     x, y = np.divmod(lit, luminance.shape[1])
     at_eye = light * geometry.projected.ravel()[lit]
 
-    def total(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    def total(weights: NDArray[np.float64]) -> NDArray[Any]:
         return np.bincount(mine, weights, minlength=len(pairs))
 
     flux = total(omega * light)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +12,12 @@ from mitsuba_cfs.glare.position_index import position_index, view_angles
 from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles
 
 
-def in_scan_order(picture: NDArray) -> NDArray:
+def in_scan_order(picture: NDArray[Any]) -> NDArray[Any]:
     """A picture's array [ny, nx, ...], row 0 at the top, as [nx, ny, ...] with y = 0 the bottom."""
     return np.ascontiguousarray(np.swapaxes(picture[::-1], 0, 1))
 
 
-def in_picture_order(scan: NDArray) -> NDArray:
+def in_picture_order(scan: NDArray[Any]) -> NDArray[Any]:
     """The inverse of `in_scan_order`."""
     return np.swapaxes(scan, 0, 1)[::-1]
 

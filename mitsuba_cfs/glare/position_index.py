@@ -9,6 +9,8 @@ Osterhaus (2010) in the form of CIE 2010 below it; Kim, Han and Kim (2009) as an
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -57,7 +59,9 @@ def kim_index(sigma: ArrayLike, tau: ArrayLike) -> NDArray[np.float64]:
     return np.exp((s - middle) / width)
 
 
-def view_angles(directions: ArrayLike, view: View) -> tuple[NDArray, NDArray, NDArray]:
+def view_angles(
+    directions: ArrayLike, view: View
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """sigma, tau [...] [rad] and whether below the line of sight, of unit directions [..., 3].
 
     tau is measured from the view's up vector as it was given, not from its part across the line of

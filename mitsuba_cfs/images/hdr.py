@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -147,7 +148,7 @@ def _exposure(
 
 def _view(header: tuple[str, ...], width: int, height: int) -> View | None:
     """View of the header's lines; later lines override earlier ones."""
-    changes: dict = {}
+    changes: dict[str, Any] = {}
     for line in header:
         program = line.split(None, 1)[0].rsplit("/", 1)[-1] if line[:1].strip() else ""
         if program.startswith(VIEW_PROGRAMS):

@@ -12,6 +12,7 @@ import pytest
 
 from scenes.figures.plan import plan_frame
 from scenes.figures.rose import RoseWedge, roses
+from scenes.head import NO_HEAD
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.page import write_page
 from tests.devtools import Page, chromium
@@ -45,7 +46,7 @@ def write_glare_page(path: Path) -> None:
     options = YearOptions("office.ifc", "city.epw", grid=2.0, directions=DIRECTIONS)
     year = SimpleNamespace(
         options=options, room="101 <Open> office", space=two_rooms().spaces[0],
-        weather=SimpleNamespace(site="Lyon"), notes=("A note & more.",),
+        weather=SimpleNamespace(site="Lyon"), notes=("A note & more.",), head=NO_HEAD,
         fenestration=({"system": "Blind at 45", "source": "blind.xml", "windows": ["W"]},),
     )  # fmt: skip
     write_page(year, table(), path)
