@@ -40,7 +40,7 @@ from mitsuba_cfs.trace.matrices.adjacent import adjacent_view
 from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
 
 BATCHES = 4
-HELD = 0.98  # share of a direct transmittance that T's diagonal has at the least
+ON_DIAGONAL = 0.98  # least share of a direct transmittance that is on T's diagonal
 INNER_SHARE = 8  # rays of a sensor that glass to another room is looked for with, for each of V
 Array = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ class GroupCoefficients:
 
     optics: SystemOptics
     beam: Array  # tau [K], the direct transmittance on T's diagonal
-    straight: StraightView | None  # None where V T D stands without it
+    straight: StraightView | None  # None where the method takes V T D alone
     whole: Array  # [S, P] V T D + B - V_d diag(tau) D
     by_sun: Array | None  # [S, P] what is computed at the sun's own angle instead; five phases
 
@@ -134,8 +134,10 @@ def direct_transmittance(matrices: PhaseMatrices, optics: SystemOptics, g: int) 
         return matrices.scene.adjacent[inner].beam
     omega = KLEMS_FULL.projected_solid_angles()
     beam = patch_beams([optics.scattering], KLEMS_FULL)[0]
-    held = np.minimum(beam, np.diag(optics.transmission))
-    return held if omega @ held >= HELD * (omega @ beam) else np.zeros_like(held)
+    on_diagonal = np.minimum(beam, np.diag(optics.transmission))
+    if omega @ on_diagonal < ON_DIAGONAL * (omega @ beam):
+        return np.zeros_like(on_diagonal)
+    return on_diagonal
 
 
 def beam_matrix(optics: SystemOptics) -> Array:

@@ -89,13 +89,13 @@ def sun_colour(height: float) -> NDArray[np.float64]:
     import pvlib
 
     zenith = float(np.degrees(np.arccos(np.clip(height, LOWEST_SUN, 1.0))))
-    found = pvlib.spectrum.spectrl2(
+    spectrum = pvlib.spectrum.spectrl2(
         apparent_zenith=zenith, aoi=zenith, surface_tilt=0.0, ground_albedo=0.2,
         surface_pressure=PRESSURE_PA, precipitable_water=WATER_CM, ozone=OZONE_CM,
         relative_airmass=pvlib.atmosphere.get_relative_airmass(zenith),
         aerosol_turbidity_500nm=AEROSOL_500NM, dayofyear=1,
     )  # fmt: skip
-    beam = np.interp(NANOMETRES, found["wavelength"], np.ravel(found["dni"]))
+    beam = np.interp(NANOMETRES, spectrum["wavelength"], np.ravel(spectrum["dni"]))
     shape = colour.SpectralShape(NANOMETRES[0], NANOMETRES[-1], 5)
     observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape)
     x, y, z = beam @ observer.values
@@ -170,22 +170,22 @@ def smoothed_colour(
     """
     spline = np.array([1, 4, 6, 4, 1], dtype=np.float32) / 16
     guide = np.log(np.maximum(luminance, 1e-6)).astype(np.float32) / np.float32(ALIKE)
-    found, (ny, nx) = np.ones((4, *guide.shape), dtype=np.float32), guide.shape
-    found[:3] = np.moveaxis(rgb, -1, 0)  # and ones, which add up to the weights
+    bands, (ny, nx) = np.ones((4, *guide.shape), dtype=np.float32), guide.shape
+    bands[:3] = np.moveaxis(rgb, -1, 0)  # and ones, which add up to the weights
     for step in SMOOTHING_STEPS:
-        edge, total = 2 * step, np.zeros_like(found)
+        edge, total = 2 * step, np.zeros_like(bands)
         border = ((edge, edge), (edge, edge))
         others = np.pad(guide, border, mode="edge")
-        lit = np.pad(found * (luminance > 0), ((0, 0), *border), mode="edge")
+        lit = np.pad(bands * (luminance > 0), ((0, 0), *border), mode="edge")
         for dy, dx in np.ndindex(5, 5):
-            place = (slice(dy * step, dy * step + ny), slice(dx * step, dx * step + nx))
-            weight = others[place] - guide
+            shifted = (slice(dy * step, dy * step + ny), slice(dx * step, dx * step + nx))
+            weight = others[shifted] - guide
             np.multiply(weight, -weight, out=weight)
             np.exp(weight, out=weight)
             weight *= spline[dy] * spline[dx]
-            total += weight * lit[:, *place]
-        found[:3] = total[:3] / np.maximum(total[3], 1e-12)
-    return np.moveaxis(found[:3], 0, -1).astype(float)
+            total += weight * lit[:, *shifted]
+        bands[:3] = total[:3] / np.maximum(total[3], 1e-12)
+    return np.moveaxis(bands[:3], 0, -1).astype(float)
 
 
 def with_luminance(

@@ -202,13 +202,13 @@ def direct_sun_by_group(light: ByPhases, state: State | None = None) -> list[Arr
     """The same through each window group alone [G][S, L] [lx]."""
     if isinstance(light, PhaseLight):
         return phases.direct_sun_by_group(with_sensor_light(light), state)
-    rows, found = _states(light, state), []
+    rows, of_seasons = _states(light, state), []
     for one, hours in light.seasons():
         groups = direct_sun_by_group(_by_phases(one), rows[:, hours])
         if groups is None:
             return None
-        found.append((np.stack(groups), hours))
-    return list(in_order_of_hours(found))
+        of_seasons.append((np.stack(groups), hours))
+    return list(in_order_of_hours(of_seasons))
 
 
 def daylight_coefficients(light: ByPhases, state: int = 0) -> Array:

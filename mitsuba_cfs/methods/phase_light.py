@@ -81,7 +81,7 @@ class WindowLight:
 class SensorLight:
     """The light of the sensors, the eye last, through one window group in one state.
 
-    What the hours' skies multiply is held by their patches: the groups are added up before.
+    Factors of the sky are stored by its patches: the groups are added up before the product.
     """
 
     coefficients: GroupCoefficients

@@ -38,7 +38,7 @@ from mitsuba_cfs.trace.matrices.exchange import outdoor_exchange, window_exchang
 from mitsuba_cfs.trace.matrices.view import view_matrix
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown, adjacent_picture
 from mitsuba_cfs.trace.pictures.annual import ViewMatrices, view_matrices
-from mitsuba_cfs.trace.sun.room_sun import SunElements, window_elements
+from mitsuba_cfs.trace.sun.sunlit_rows import SunlitShares, window_sunlit_shares
 from mitsuba_cfs.window_parts import cut_group, even_regions, window_cells
 
 BATCHES = 8  # independent repetitions that the standard errors come from
@@ -76,7 +76,7 @@ class PhaseMatrices:
     outdoor_exchange: Estimate | None = None  # X [q, K, q * K] by the outdoors
     view: ViewMatrices | None = None  # V of the view's pixels
     direct_view: ViewMatrices | None = None  # V_d of the view's pixels
-    sunlit: SunElements | None = None  # sunlit surfaces of the room that the windows see [Q * K]
+    sunlit: SunlitShares | None = None  # sunlit surfaces of the room that the windows see [Q * K]
     adjacent_shown: tuple[RoomShown, ...] | None = None  # adjacent rooms in the view's pixels
     scenes: SceneCache = field(default_factory=SceneCache, compare=False, repr=False)
 
@@ -244,7 +244,7 @@ def with_sunlit(matrices: PhaseMatrices) -> PhaseMatrices:
     if matrices.sunlit is not None:
         return matrices
     interior, parts = matrices.scene.interior, matrices.parts.groups
-    sunlit = window_elements(
+    sunlit = window_sunlit_shares(
         matrices.scenes.scene(interior, parts),
         interior,
         samples=_exchange_samples(matrices.sampling, parts, EXCHANGE_SHARE),

@@ -123,7 +123,7 @@ def _five_phase_pictures(
     *,
     direct: bool = False,
 ) -> FivePhasePictures:
-    """Pictures by five phases; without the view's matrices they are to be given (`see_by`)."""
+    """Pictures by five phases; without `view` the caller sets the matrices (`see_by`)."""
     matrices, sky, optics = light.matrices, light.sky, light.optics(state)
     windows, interior = _windows(light, hours, state), matrices.scene.interior
     exterior, parts = matrices.scene.exterior, matrices.parts.groups
@@ -190,9 +190,9 @@ def _window_luminance(
     if matrices.exchange is not None and reflects(optics):
         in_sun = None
         if sun is not None:
-            elements = with_sunlit(matrices).sunlit
+            sunlit = with_sunlit(matrices).sunlit
             suns, strength = light.sky.direction[hours], light.sky.illuminance[hours]
-            met = sun.on_elements(_traced(elements), suns, strength)
+            met = sun.sunlit_luminance(_traced(sunlit), suns, strength)
             in_sun = _beams(windows, luminance.shape), met
         exchange = matrices.exchange.values
         luminance = luminance + reflected_luminance(exchange, optics, luminance, in_sun)

@@ -8,8 +8,8 @@ place, and few paths of a window meet the sun's patch after a reflection.  In pl
     (V - V_d) diag(tau) D_d s_d    the sun's beam that the room reflects
 
 the five-phase method computes this light at points that represent the outdoor surfaces
-(`mitsuba_cfs.trace.reflected_sun`) and in cells of the room (`mitsuba_cfs.trace.room_beam`), in
-independent batches, which give its standard error.
+(`mitsuba_cfs.trace.sun.reflected`) and in cells of the room
+(`mitsuba_cfs.trace.sun.sunlit_sensors`), in independent batches, which give its standard error.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.reflected import outdoor_light, view_shares, window_shares
-from mitsuba_cfs.trace.sun.room_beam import room_cells, room_light, room_shares
-from mitsuba_cfs.trace.sun.room_cells import RoomCells
+from mitsuba_cfs.trace.sun.sunlit_cells import RoomCells
+from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, room_shares
 
 BATCHES = 4  # each with its own paths and points
 WINDOW_SHARE = 32  # paths of a patch for D, for each that looks for sunlit surfaces
@@ -50,7 +50,7 @@ class ReflectedSun:
     inside: TracedScene
     outside: TracedScene  # what is in front of the window parts, in the room's coordinates
     before: tuple[NDArray[np.float32], ...]  # [BATCHES][Q, K, h] luminance before the windows
-    by_patches: Array  # D - D_d [Q, K, P], in whose place it is taken; 0 without outdoor surfaces
+    by_patches: Array  # D - D_d [Q, K, P], which it replaces; 0 without outdoor surfaces
 
     @property
     def suns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -1,8 +1,9 @@
-"""Window groups cut into parts, where what stands outdoors is not the same before all of a group.
+"""Window groups split into parts, where the view outdoors differs within a group.
 
-A daylight matrix D is a mean over its group's windows.  Below an overhang the top of a window sees
-less of the sky than its sill, and a sensor does not see all of the window alike: V times the mean
-is not the mean of V times D.  How much that is follows from D of small cells, traced cheaply.
+A daylight matrix D is a mean over the windows of its group.  Below an overhang the top of a window
+sees less sky than its sill, and a sensor sees some of the window better than the rest: V times the
+mean of D is not the mean of V times D.  The error follows from D of small cells, traced with few
+paths.
 """
 
 from __future__ import annotations
@@ -21,19 +22,19 @@ from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import WindowGroup
 from mitsuba_cfs.window_parts import Cells, Region, cut_group
 
-LIMIT = 0.01  # share of the light that D's mean may be wrong by, root mean square of the places
+LIMIT = 0.01  # error of D's means as a share of the light, root mean square over test points
 MOST_PARTS = 8  # of a group
 SKY = ReinhartSky(1)  # of the cells' matrices
-SUN_ALTITUDE = np.radians(35)  # of the clear skies that the parts are judged by
-DEPTHS = (0.5, 1.0, 2.0, 4.0)  # into the room, of the places that the parts are judged at [m]
-INDIRECT = 0.05  # of a window's exitance, falls on a place by reflection
-DARK = 1e-9  # least luminance to divide by: a window behind a wall sees none
+SUN_ALTITUDE = np.radians(35)  # of the clear skies that test the parts
+DEPTHS = (0.5, 1.0, 2.0, 4.0)  # of the test points behind the window [m]
+INDIRECT = 0.05  # share of a window's exitance that reaches a test point by reflection
+DARK = 1e-9  # least luminance to divide by: a window that faces a wall sees no sky
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class CellLight:
-    """D of the cells of a window group, and the parts that the group is cut into."""
+    """D of the cells of a window group, and the parts that the group is split into."""
 
     group: WindowGroup
     cells: Cells
@@ -41,32 +42,32 @@ class CellLight:
     regions: tuple[Region, ...] = (Region.everything(),)
 
     def error(self, points: Array, normals: Array, transmission: Array, sky: Array) -> Array:
-        """What D's means over the parts change in the light straight from the windows [S, H].
+        """Error of the direct light from the windows by D's means over the parts [S, H].
 
         Args:
             points, normals: [S, 3] sensors.
-            transmission: [K, K] of what fills the group.
+            transmission: T [K, K] of the group's system.
             sky: [P, H] luminance of Reinhart's sky of MF 1.
         """
         inside = np.einsum("kj,cjh->ckh", transmission, self.daylight @ sky, optimize=True)
-        return np.abs(Straight(self, points, normals).error(inside, self.regions))
+        return np.abs(DirectLight(self, points, normals).error(inside, self.regions))
 
 
-class Straight:
-    """The light of cells straight at sensors, nothing hidden, one direction for each pair."""
+class DirectLight:
+    """Direct light of cells at sensors, without obstructions, in one direction for each pair."""
 
     def __init__(self, light: CellLight, points: Array, normals: Array) -> None:
         """Of sensors [S, 3]."""
         self._cells, frame = light.cells, light.group.frame
-        way = light.cells.centre[None] - (np.atleast_2d(points) @ frame.T)[:, None]  # [S, C, 3]
-        distance = np.maximum(np.linalg.norm(way, axis=-1), 1e-3)
-        way = way / distance[..., None]
-        cosine = np.maximum(np.einsum("scx,sx->sc", way, np.atleast_2d(normals) @ frame.T), 0)
-        cosine = np.where(way[..., 2] > 0, cosine * way[..., 2], 0.0)
+        towards = light.cells.centre[None] - (np.atleast_2d(points) @ frame.T)[:, None]  # [S, C, 3]
+        distance = np.maximum(np.linalg.norm(towards, axis=-1), 1e-3)
+        towards = towards / distance[..., None]
+        cosine = np.maximum(np.einsum("scx,sx->sc", towards, np.atleast_2d(normals) @ frame.T), 0)
+        cosine = np.where(towards[..., 2] > 0, cosine * towards[..., 2], 0.0)
         area = light.cells.area
         self._weight = cosine * area / np.maximum(distance**2, area)
-        theta = np.arccos(np.clip(way[..., 2], 0, 1))
-        self._patch = KLEMS_FULL.index(theta, incident_azimuth(way))
+        theta = np.arccos(np.clip(towards[..., 2], 0, 1))
+        self._patch = KLEMS_FULL.index(theta, incident_azimuth(towards))
 
     def light(self, luminance: Array) -> Array:
         """Illuminance [S, H] by the luminance [C, K, H] of the cells."""
@@ -74,25 +75,25 @@ class Straight:
         return np.einsum("sc,sch->sh", self._weight, seen, optimize=True)
 
     def error(self, luminance: Array, regions: Sequence[Region]) -> Array:
-        """What changes [S, H] with the mean of each region in place of its cells' own."""
+        """Change of the illuminance [S, H] if each region has the mean luminance of its cells."""
         total = -self.light(luminance)
         for region in regions:
-            held = region.holds(self._cells.centre)
-            if held.any():
-                mean = np.tensordot(self._cells.area[held], luminance[held], 1)
-                mean /= self._cells.area[held].sum()
-                seen = mean[self._patch[:, held]]
-                total += np.einsum("sc,sch->sh", self._weight[:, held], seen, optimize=True)
+            inside = region.holds(self._cells.centre)
+            if inside.any():
+                mean = np.tensordot(self._cells.area[inside], luminance[inside], 1)
+                mean /= self._cells.area[inside].sum()
+                seen = mean[self._patch[:, inside]]
+                total += np.einsum("sc,sch->sh", self._weight[:, inside], seen, optimize=True)
         return total
 
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """The parts Q of a scene's window groups, and the cells that say what each leaves as error."""
+    """The parts Q of a scene's window groups, and the cells that their error follows from."""
 
     groups: tuple[WindowGroup, ...]  # [Q], each with matrices of its own
     group: NDArray[np.int64]  # [Q] the window group of each
-    cells: tuple[CellLight, ...] = ()  # of those that look outdoors; none where it is empty
+    cells: tuple[CellLight, ...] = ()  # of the groups that look outdoors; none on an open site
 
     @classmethod
     def whole(cls, groups: Sequence[WindowGroup]) -> Parts:
@@ -104,11 +105,11 @@ class Parts:
         """Each group in the parts of its cells."""
         cells = tuple(cells)
         pieces = [cut_group(light.group, light.regions) for light in cells]
-        group = np.repeat(np.arange(len(cells)), [len(found) for found in pieces])
-        return cls(tuple(part for found in pieces for part in found), group, cells)
+        group = np.repeat(np.arange(len(cells)), [len(parts) for parts in pieces])
+        return cls(tuple(part for parts in pieces for part in parts), group, cells)
 
     def and_inner(self, pieces: Iterable[Sequence[WindowGroup]]) -> Parts:
-        """These and the parts of groups that look into another room, which come after them."""
+        """These parts, followed by those of the groups that look into another room."""
         groups, group = list(self.groups), list(self.group)
         first = max(group, default=-1) + 1
         for g, parts in enumerate(pieces, first):
@@ -134,20 +135,20 @@ class Parts:
 
 
 def allowed(samples: int) -> float:
-    """The error that D's means may have where its patches have so many paths each.
+    """The permitted error of D's means with so many paths for each of its patches.
 
-    `LIMIT` of a full run; with fewer paths as much more as D's noise is: every part is more work.
+    `LIMIT` in a full run; with fewer paths it grows as D's noise, because every part costs paths.
     """
     return LIMIT * max(float(np.sqrt(Sampling().patch_samples / samples)), 1.0)
 
 
 def subdivided(light: CellLight, parts: int | None = None, *, limit: float = LIMIT) -> CellLight:
-    """A group cut until the error of D's means is below a limit of the light, or into `parts`.
+    """A group split until the error of D's means is below a limit of the light, or into `parts`.
 
-    Each cut is the one, across height or width or between windows of different depth, that leaves
-    least variance of what the cells see under five skies.
+    Each cut, across height or width or between windows of different depth, is the one that leaves
+    the least variance of the cells' luminance under five skies.
     """
-    outside = light.daylight @ judging_skies()  # [C, K, H]
+    outside = light.daylight @ reference_skies()  # [C, K, H]
     judge = Judge(light, outside)
     weight = np.sqrt(KLEMS_FULL.projected_solid_angles() / np.pi)[:, None]
     bright = np.maximum(level(outside), DARK)
@@ -165,35 +166,35 @@ def subdivided(light: CellLight, parts: int | None = None, *, limit: float = LIM
 
 
 class Judge:
-    """How much light behind a group D's means over some regions put in the wrong place."""
+    """Error of the light at test points behind a group by D's means over some regions."""
 
     def __init__(self, light: CellLight, outside: Array) -> None:
         """From the luminance before the cells under some skies [C, K, H]."""
-        self._straight = Straight(light, *judging_places(light.group))
+        self._direct = DirectLight(light, *reference_points(light.group))
         omega = KLEMS_FULL.projected_solid_angles()
         even = np.einsum("k,ckh->ch", omega / np.pi, outside)[:, None]
         reflected = INDIRECT * np.pi * level(outside)[0]
         self._glazings = []  # clear, and one that scatters all: luminance, and light in all
         for luminance in (outside, np.broadcast_to(even, outside.shape)):
-            whole = self._straight.light(luminance) + reflected
+            whole = self._direct.light(luminance) + reflected
             self._glazings.append((luminance, np.maximum(whole, DARK)))
 
     def error(self, regions: Sequence[Region]) -> float:
-        """Root mean square of the places, as a share of the light; worst of skies and glazings."""
-        shares = (self._straight.error(lum, regions) / whole for lum, whole in self._glazings)
+        """Root mean square over the points as a share of the light; worst sky and glazing."""
+        shares = (self._direct.error(lum, regions) / whole for lum, whole in self._glazings)
         return max(float(np.sqrt((share**2).mean(axis=0)).max()) for share in shares)
 
 
-def judging_skies() -> Array:
-    """The overcast sky, and the blue of clear ones with the sun in four quarters [P, 5]."""
+def reference_skies() -> Array:
+    """The overcast sky, and clear skies with the sun in four quarters, without its beam [P, 5]."""
     level, height = np.cos(SUN_ALTITUDE), np.sin(SUN_ALTITUDE)
     suns = [(level * x, level * y, height) for x, y in ((0, -1), (1, 0), (0, 1), (-1, 0))]
     clear = [cie_patches("clear", SKY, 1.0, sun=sun) for sun in suns]
     return np.stack([cie_patches("overcast", SKY, 1.0), *clear], axis=1)
 
 
-def judging_places(group: WindowGroup) -> tuple[Array, Array]:
-    """Places behind a group and their normals [S, 3]: looking along the panes' up, and at them."""
+def reference_points(group: WindowGroup) -> tuple[Array, Array]:
+    """Points behind a group and their normals [S, 3]: along the panes' height, and towards them."""
     corners = np.concatenate([w.triangles for w in group.windows]).reshape(-1, 3) @ group.frame.T
     low, high = corners.min(axis=0), corners.max(axis=0)
     count = int(np.clip(np.ceil((high[0] - low[0]) / 2) + 2, 3, 9))
@@ -208,7 +209,7 @@ def judging_places(group: WindowGroup) -> tuple[Array, Array]:
 
 
 def coarse_sky(sky: ArrayLike, subdivision: int) -> Array:
-    """A sky [P, H] of any subdivision as the mean luminance of the patches of MF 1."""
+    """Mean luminance of the patches of MF 1 of a sky [P, H] of any subdivision."""
     sky, fine = np.asarray(sky, dtype=float), ReinhartSky(subdivision)
     patch = SKY.index(fine.directions)
     total = np.zeros((SKY.size, sky.shape[1]))
@@ -223,18 +224,18 @@ def level(luminance: Array) -> Array:
 
 
 def _best_cut(cells: Cells, region: Region, seen: Array) -> tuple[float, Region, int, float] | None:
-    """The cut of a region that takes away most variance of what its cells see [C, N]."""
-    held = region.holds(cells.centre)
-    centre, area, values = cells.centre[held], cells.area[held], seen[held]
-    found = None
+    """The cut of a region that removes the most variance of its cells' luminance [C, N]."""
+    inside = region.holds(cells.centre)
+    centre, area, values = cells.centre[inside], cells.area[inside], seen[inside]
+    best = None
     for axis in range(3):
-        places = np.unique(np.round(centre[:, axis], 6))
-        for place in 0.5 * (places[1:] + places[:-1]):
+        positions = np.unique(np.round(centre[:, axis], 6))
+        for place in 0.5 * (positions[1:] + positions[:-1]):
             first = centre[:, axis] < place
             a, b = area[first], area[~first]
             step = np.average(values[first], 0, a) - np.average(values[~first], 0, b)
             gain = a.sum() * b.sum() / area.sum() * float(step @ step)
             gain = float(f"{gain:.6g}")  # equal ones stay so, whatever the order of summation
-            if found is None or gain > found[0]:
-                found = (gain, region, axis, float(place))
-    return found
+            if best is None or gain > best[0]:
+                best = (gain, region, axis, float(place))
+    return best

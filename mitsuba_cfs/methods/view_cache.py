@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import opened_arrays, replacing
@@ -19,9 +18,8 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import UNREADABLE, MatrixCache
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.pictures.annual import ViewMatrices, ViewNoise, view_matrices
-from mitsuba_cfs.trace.sun.room_sun import SunlitRows
+from mitsuba_cfs.trace.sun.sunlit_rows import SunlitRows, sparse_arrays, sparse_matrix
 
-SPARSE = ("data", "indices", "indptr", "shape")  # the parts of a sparse matrix
 LARGEST = 256 << 20  # [bytes] of a file; larger ones would push out all the others
 
 T = TypeVar("T")
@@ -37,22 +35,22 @@ def cached_view(
 ) -> ViewMatrices:
     """The matrices of a view from the cache; traced and stored where they are not in it.
 
-    Their sunlit elements have a file of their own, which serves every light.
+    Their shares of the sunlit surfaces have a file of their own, which serves every light.
 
     Args:
         inputs: all that they depend on besides the view and the light.
-        trace: called with `light` and the cached `elements`, None where there are none.
+        trace: called with `light` and the cached `sunlit`, None where there are none.
     """
     if cache is None:
-        return trace(light=light, elements=None)
-    path, beside = _view_file(cache, view, inputs, light), _elements_file(cache, view, inputs)
-    elements = _read_or_none(beside, _read_elements)
-    matrices = _read_or_none(path, lambda file: _read_view(file, view, elements))
+        return trace(light=light, sunlit=None)
+    path, beside = _view_file(cache, view, inputs, light), _sunlit_file(cache, view, inputs)
+    sunlit = _read_or_none(beside, _read_sunlit)
+    matrices = _read_or_none(path, lambda file: _read_view(file, view, sunlit))
     if matrices is None:
-        matrices = trace(light=light, elements=elements)
-        sunlit = matrices.elements
-        # matrices without the elements that they have would be of no use
-        if sunlit is elements or (sunlit is not None and _write(beside, sunlit.arrays())):
+        matrices = trace(light=light, sunlit=sunlit)
+        traced = matrices.sunlit
+        # the file of the view is of no use without that of its sunlit surfaces
+        if traced is sunlit or (traced is not None and _write(beside, traced.arrays())):
             _write(path, _of_view(matrices))
         cache.trim(keep=path)
     return matrices
@@ -62,7 +60,7 @@ def view_is_cached(cache: MatrixCache | None, view: View, inputs: tuple[object, 
     """Whether the cache has the matrices of a view; arguments as of `cached_view`."""
     if cache is None:
         return False
-    return all(file(cache, view, inputs).is_file() for file in (_view_file, _elements_file))
+    return all(file(cache, view, inputs).is_file() for file in (_view_file, _sunlit_file))
 
 
 def _view_file(
@@ -73,8 +71,8 @@ def _view_file(
     return cache.entry("view pictures", view, *inputs, *of_hours, by=by).path
 
 
-def _elements_file(cache: MatrixCache, view: View, inputs: tuple[object, ...]) -> Path:
-    return cache.entry("view elements", view, *inputs, by=view_matrices.__module__).path
+def _sunlit_file(cache: MatrixCache, view: View, inputs: tuple[object, ...]) -> Path:
+    return cache.entry("view sunlit", view, *inputs, by=view_matrices.__module__).path
 
 
 def _read_or_none(path: Path, read: Callable[[Path], T]) -> T | None:
@@ -90,18 +88,21 @@ def _read_or_none(path: Path, read: Callable[[Path], T]) -> T | None:
     return content
 
 
-def _read_view(path: Path, view: View, elements: SunlitRows | None) -> ViewMatrices | None:
-    """None where the matrices have elements that are missing from the cache."""
+def _read_view(path: Path, view: View, sunlit: SunlitRows | None) -> ViewMatrices | None:
+    """None where their shares of the sunlit surfaces are missing from the cache."""
     with opened_arrays(path) as data:
-        if data["sunlit"] and elements is None:
+        if data["sunlit"] and sunlit is None:
             return None
         row, share = data["row"], data["share"]
         indirect, lit = (PictureMatrix(data[name], row, share) for name in ("indirect", "lit"))
-        noise, seen = ViewNoise(data["indirect_noise"], data["lit_noise"]), _sparse(data, "seen")
-        return ViewMatrices(view, data["pixels"], indirect, lit, seen, noise, elements)
+        noise, seen = (
+            ViewNoise(data["indirect_noise"], data["lit_noise"]),
+            sparse_matrix(data, "seen"),
+        )
+        return ViewMatrices(view, data["pixels"], indirect, lit, seen, noise, sunlit)
 
 
-def _read_elements(path: Path) -> SunlitRows:
+def _read_sunlit(path: Path) -> SunlitRows:
     with opened_arrays(path) as data:
         return SunlitRows.of_arrays(data)
 
@@ -120,7 +121,7 @@ def _write(path: Path, arrays: dict[str, NDArray[Any]]) -> bool:
 
 
 def _of_view(matrices: ViewMatrices) -> dict[str, NDArray[Any]]:
-    """The matrices without their elements."""
+    """The matrices without their shares of the sunlit surfaces."""
     return {
         "pixels": matrices.pixels,
         "indirect": matrices.indirect.rows,
@@ -129,18 +130,6 @@ def _of_view(matrices: ViewMatrices) -> dict[str, NDArray[Any]]:
         "lit_noise": matrices.noise.lit,
         "row": matrices.lit.row,
         "share": matrices.lit.share,
-        "sunlit": np.array(matrices.elements is not None),
-        **_arrays("seen", matrices.seen),
+        "sunlit": np.array(matrices.sunlit is not None),
+        **sparse_arrays("seen", matrices.seen),
     }
-
-
-def _arrays(name: str, matrix: sparse.csr_array) -> dict[str, NDArray[Any]]:
-    """A sparse matrix as the arrays of a file."""
-    parts = {part: getattr(matrix, part) for part in SPARSE}
-    return {f"{name}_{part}": np.asarray(array) for part, array in parts.items()}
-
-
-def _sparse(data: Mapping[str, NDArray[Any]], name: str) -> sparse.csr_array:
-    """A sparse matrix from the arrays of a file."""
-    *parts, shape = (data[f"{name}_{part}"] for part in SPARSE)
-    return sparse.csr_array(tuple(parts), shape=tuple(shape))

@@ -70,7 +70,7 @@ def test_a_matrix_on_disk_gives_the_same(tmp_path, monkeypatch):
 def test_a_killed_run_goes_on_where_it_was(tmp_path):
     file = tmp_path / "glare.npy"
     pictures = made_up()
-    whole = annual_glare(pictures, keep=file)
+    whole = annual_glare(pictures, checkpoint=file)
     table = np.load(file)
     table[3:6] = np.nan
     np.save(file, table)
@@ -85,16 +85,16 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path):
             asked.extend(batch)
             return pictures.without_disc(batch)
 
-    again = annual_glare(Watched, keep=file)
+    again = annual_glare(Watched, checkpoint=file)
     assert asked[:3] == [3, 4, 5]  # then the hours that are rated by halves
     assert again.dgp == pytest.approx(whole.dgp, rel=1e-6)  # BLAS rounds by the batch's size
 
 
 def test_ratings_of_another_year_are_refused(tmp_path):
     file = tmp_path / "glare.npy"
-    annual_glare(made_up(hours=3), keep=file)
+    annual_glare(made_up(hours=3), checkpoint=file)
     with pytest.raises(DataError, match="another year"):
-        annual_glare(made_up(hours=4), keep=file)
+        annual_glare(made_up(hours=4), checkpoint=file)
 
 
 def test_luminance_must_fit_the_matrix():

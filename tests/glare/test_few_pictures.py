@@ -124,7 +124,7 @@ def test_the_cache_gives_few_pictures_again_and_matrices_first(tmp_path, monkeyp
 
 
 def matrices_of(*needs: str, **kept: Any) -> Any:
-    """The bare room, nothing outdoors: few paths, and elements near and far."""
+    """The bare room, nothing outdoors: few paths, and sunlit near and far."""
     import mitsuba_cfs as cfs
 
     room, groups = rooms.test_room()
@@ -152,16 +152,16 @@ def arrays(value: Any) -> list[np.ndarray]:
 
 @pytest.fixture
 def elements_traced(monkeypatch) -> list[int]:
-    """Grows by one each time that sunlit elements are traced."""
+    """Grows by one each time that shares of the sunlit surfaces are traced."""
     from mitsuba_cfs.trace.pictures import annual
 
-    calls, trace = [], annual.sun_elements
+    calls, trace = [], annual.picture_sunlit_shares
 
     def counted(*args, **options):
         calls.append(len(calls))
         return trace(*args, **options)
 
-    monkeypatch.setattr(annual, "sun_elements", counted)
+    monkeypatch.setattr(annual, "picture_sunlit_shares", counted)
     return calls
 
 
@@ -173,13 +173,13 @@ def test_sunlit_elements_are_found_again_under_any_light(tmp_path, elements_trac
     found = [view_of_light(matrices_of(cache=kept), luminance(number)) for number in (1, 2, 2)]
     found.append(matrices_of("DGP", cache=kept).view)
     assert len(elements_traced) == 1
-    assert len(list(tmp_path.glob("view-elements-*"))) == 1
+    assert len(list(tmp_path.glob("view-sunlit-*"))) == 1
     alone = [view_of_light(matrices_of(), luminance(number)) for number in (1, 2, 2)] + [
         matrices_of("DGP").view
     ]
     for one, other in zip(found, alone, strict=True):
         pairs = list(zip(arrays(one), arrays(other), strict=True))
-        assert len(pairs) > 30 and one.elements.mean.near.nnz > 0 and one.elements.close.any()
+        assert len(pairs) > 30 and one.sunlit.mean.near.nnz > 0 and one.sunlit.close.any()
         for a, b in pairs:
             assert a.dtype == b.dtype
             np.testing.assert_array_equal(a, b)
@@ -227,22 +227,22 @@ def test_elements_of_another_view_are_not_taken(tmp_path, elements_traced, name)
     other = replace(first, scene=scene, sampling=sampling, parts=Parts.whole(scene.groups))
     view_of_light(other, luminance(2))
     assert len(elements_traced) == 2
-    assert len(list(tmp_path.glob("view-elements-*"))) == 2
+    assert len(list(tmp_path.glob("view-sunlit-*"))) == 2
 
 
 def test_what_is_lost_or_too_large_is_traced_anew(tmp_path, elements_traced, monkeypatch) -> None:
-    """Pictures without their elements are none; what cannot be kept leaves no file behind."""
+    """Pictures without their sunlit are none; what cannot be kept leaves no file behind."""
     from mitsuba_cfs.matrices.cache import MatrixCache
     from mitsuba_cfs.methods import view_cache
 
     kept = MatrixCache(tmp_path)
     view_of_light(matrices_of(cache=kept), luminance(1))
-    (file,) = tmp_path.glob("view-elements-*")
+    (file,) = tmp_path.glob("view-sunlit-*")
     whole = file.read_bytes()
     for left in (None, whole[: len(whole) // 2]):
         file.unlink() if left is None else file.write_bytes(left)
         before = len(elements_traced)
-        assert view_of_light(matrices_of(cache=kept), luminance(1)).elements is not None
+        assert view_of_light(matrices_of(cache=kept), luminance(1)).sunlit is not None
         assert len(elements_traced) == before + 1
         assert file.stat().st_size == len(whole)
     for other in tmp_path.glob("view-*"):

@@ -51,7 +51,7 @@ def study_arguments(folder: Path) -> list[str]:
 
 OF_A_RUN = {
     "absorption-matrix", "cell-daylight", "daylight-matrix", "direct-sun", "escape",
-    "sky-irradiance", "straight-view", "view-elements", "view-matrix", "view-pictures",
+    "sky-irradiance", "straight-view", "view-matrix", "view-pictures", "view-sunlit",
     "window-exchange",
 }  # fmt: skip
 COMMANDS = {

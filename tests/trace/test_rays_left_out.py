@@ -72,13 +72,13 @@ def test_rays_that_pass_the_box_of_a_mirror_are_all_that_meet_it(monkeypatch):
 
 def test_cells_hold_the_places_that_their_rays_start_from_and_others_do_not_matter(monkeypatch):
     from mitsuba_cfs.trace.kernels.scene import TracedScene
-    from mitsuba_cfs.trace.sun import room_beam
+    from mitsuba_cfs.trace.sun import sunlit_sensors
 
     room, groups = rooms.test_room()
     inside = TracedScene(room, groups)
-    narrow, wide = room_beam.room_cells(inside, room)
+    narrow, wide = sunlit_sensors.room_cells(inside, room)
     starts, whole = wide.starts, dr.full(type(dr.llvm.Bool(True)), True, wide.starts.size)
-    holder = np.repeat(np.arange(wide.cells.size), room_beam.CELL_RAYS)
+    holder = np.repeat(np.arange(wide.cells.size), sunlit_sensors.CELL_RAYS)
     # at a cube's side the kernel's single precision decides for the next one
     same = wide.cells.of(starts.points(), starts.normals(), whole).numpy() == holder
     assert np.mean(~same) < 2e-5
@@ -88,14 +88,14 @@ def test_cells_hold_the_places_that_their_rays_start_from_and_others_do_not_matt
     assert len(np.unique(own)) > 0.99 * narrow.size  # from all over the wider ones
 
     sensors = np.array([[1.8, 1.0, 0.8], [1.0, 3.0, 0.8]]), np.tile([0.0, 0.0, 1.0], (2, 1))
-    share = room_beam.room_shares((narrow, wide), inside, sensors, samples=256)
-    between, sent = room_beam._between, []
+    share = sunlit_sensors.room_shares((narrow, wide), inside, sensors, samples=256)
+    between, sent = sunlit_sensors._between, []
 
     def of_all(cells, scene, met, seed):
         sent.append(len(met))
         return between(cells, scene, np.arange(cells.cells.size), seed)
 
-    monkeypatch.setattr(room_beam, "_between", of_all)
-    all_rows = room_beam.room_shares((narrow, wide), inside, sensors, samples=256)
+    monkeypatch.setattr(sunlit_sensors, "_between", of_all)
+    all_rows = sunlit_sensors.room_shares((narrow, wide), inside, sensors, samples=256)
     np.testing.assert_allclose(share, all_rows, rtol=1e-12)
     assert sent[0] < 0.6 * wide.cells.size  # the backs of walls are as many

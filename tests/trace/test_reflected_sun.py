@@ -174,7 +174,7 @@ def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
     """A closed room of one reflectance: rho / (1 - rho) of the flux over its area, on average."""
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.trace.kernels.scene import TracedScene
-    from mitsuba_cfs.trace.sun.room_beam import CELL_RAYS, room_cells, room_light, room_shares
+    from mitsuba_cfs.trace.sun.sunlit_sensors import CELL_RAYS, room_cells, room_light, room_shares
 
     room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
     group = hole()
@@ -203,7 +203,7 @@ def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
 
 def test_few_rays_of_a_sensor_ask_for_few_from_the_cells_with_the_same_light():
     from mitsuba_cfs.trace.kernels.scene import TracedScene
-    from mitsuba_cfs.trace.sun.room_beam import CELL_LEAST, CELL_RAYS, room_cells, room_shares
+    from mitsuba_cfs.trace.sun.sunlit_sensors import CELL_LEAST, CELL_RAYS, room_cells, room_shares
 
     room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
     inside = TracedScene(room, [hole()])
@@ -224,7 +224,7 @@ def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
     """
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.trace.kernels.scene import TracedScene
-    from mitsuba_cfs.trace.sun.room_beam import room_cells, room_light, room_shares
+    from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, room_shares
 
     sides = [(k, at) for k in range(3) for at in (0.0, 3.0)]
     room = rooms.surfaces([(square(k, at), 0.5 if (k, at) == (0, 0.0) else 0.0) for k, at in sides])

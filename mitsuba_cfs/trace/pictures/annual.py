@@ -30,7 +30,7 @@ from mitsuba_cfs.trace.matrices.pixel_view import PictureBlock, picture_part_blo
 from mitsuba_cfs.trace.pictures.outdoors import OutdoorCoefficients
 from mitsuba_cfs.trace.sun.picture_beam import BeamLight, faces_luminance
 from mitsuba_cfs.trace.sun.picture_sun import PictureSun
-from mitsuba_cfs.trace.sun.room_sun import SunlitRows, sun_elements
+from mitsuba_cfs.trace.sun.sunlit_rows import SunlitRows, picture_sunlit_shares
 
 MEMORY = 2 * 2**30  # [bytes] of a view's matrices; above it they lie on disk
 NEGATIVE = 1e-4  # of the largest luminance: what rounding may leave below zero
@@ -60,7 +60,7 @@ class ViewMatrices:
     lit: PictureMatrix  # light of the windows on the surface that the pixel shows, in V_d
     seen: sparse.csr_array  # [n, G * K] share of each window patch in each pixel, in V_d
     noise: ViewNoise
-    elements: SunlitRows | None = None  # of the rows of `indirect`, for the sun's beam
+    sunlit: SunlitRows | None = None  # of the rows of `indirect`, for the sun's beam
 
     def of_columns(self, part: slice) -> ViewMatrices:
         """The same for some columns: for some hours where hours are the columns."""
@@ -87,7 +87,7 @@ def view_matrices(
     folder: Path | None = None,
     window_reflectance: ArrayLike | None = None,
     light: PatchLight | None = None,
-    elements: SunlitRows | None = None,
+    sunlit: SunlitRows | None = None,
     progress: Progress = silent,
     scenes: SceneCache | None = None,
     **options: Any,
@@ -102,7 +102,7 @@ def view_matrices(
             default.
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
         light: of hours, which become the columns in place of patches.
-        elements: of the same view and options, traced before under any light.
+        sunlit: of the same view and options, traced before under any light.
         options: basis, samples, max_depth, seed of `picture_part_blocks`.
     """
     scenes = SceneCache() if scenes is None else scenes
@@ -124,17 +124,17 @@ def view_matrices(
         reflecting = np.append(np.asarray(window_reflectance) > 0, False)  # OPAQUE is the last
         share = np.where(reflecting[shared.group], 1.0, share)
     share = share.astype(np.float32)
-    found, close = None, None if elements is None else elements.close
-    if elements is None and options.get("max_depth", 2) > 1:
+    found, close = None, None if sunlit is None else sunlit.close
+    if sunlit is None and options.get("max_depth", 2) > 1:
         seed = options.get("seed", 0)
         paths = {"samples": options.get("samples", 32), "seed": seed}
-        found, close = sun_elements(tracer, surfaces, view, shared, times, **paths)
+        found, close = picture_sunlit_shares(tracer, surfaces, view, shared, times, **paths)
     mean, noise, smooth = _smooth(sums, shared, share, 0.5 / options.get("samples", 32), close)
     if found is not None:
-        elements = SunlitRows(*(found.of_rows(a, smooth) for a in (mean, noise)), close)
+        sunlit = SunlitRows(*(found.of_rows(a, smooth) for a in (mean, noise)), close)
     parts = (PictureMatrix(rows[:m], row, share) for rows in sums)
     off = ViewNoise(*(rows[m:] for rows in sums))
-    return ViewMatrices(view, pixels, *parts, seen, off, elements)
+    return ViewMatrices(view, pixels, *parts, seen, off, sunlit)
 
 
 def _summed(
@@ -188,11 +188,11 @@ class FivePhasePictures:
             + what the room reflects of the sun's beam + sun in each pixel
 
     b is the sun's beam in patches; its light after several reflections comes from cells of the
-    surfaces instead, lit by the true disc at its own angle (`room_sun`).  L_s is the sunlight that
-    the windows scatter, by Klems patches; a pixel that shows a window has the BSDF's value for the
-    sun and that pixel, and the beam is tested for each pixel.  With `show_outdoors` the outdoors
-    seen through the straight beam, and the beam's light on surfaces, are not means over patches
-    either.
+    surfaces instead, lit by the true disc at its own angle (`sunlit_rows`).  L_s is the sunlight
+    that the windows scatter, by Klems patches; a pixel that shows a window has the BSDF's value
+    for the sun and that pixel, and the beam is tested for each pixel.  With `show_outdoors` the
+    outdoors seen through the straight beam, and the beam's light on surfaces, are not means over
+    patches either.
     """
 
     def __init__(
@@ -214,7 +214,7 @@ class FivePhasePictures:
             direct_luminance: [G, K, H] T D_d s_d: D_d with `max_depth=1` and the seed and samples
                 of D, s_d the sun alone (`sky_matrix(..., parts="sun")`).
             directions: [H, 3] to the sun; illuminance: [H] normal to it [lx].
-            beam: [G, K, H] the beam's part b of T D_d s_d, which the matrices' elements replace;
+            beam: [G, K, H] the beam's part b of T D_d s_d, which the matrices' `sunlit` replaces;
                 without, the patches' stays.
         """
         self.view, self.pixels = sun.view, sun.pixels
@@ -227,8 +227,8 @@ class FivePhasePictures:
             raise ValueError("the direct sun's luminance exceeds the whole: D_d is not part of D")
         self._rest = np.maximum(rest, 0)
         self._reflected = self._whole
-        self._by_elements = beam is not None and (matrices is None or matrices.elements is not None)
-        if beam is not None and self._by_elements:  # below 0 by rounding alone
+        self._by_cells = beam is not None and (matrices is None or matrices.sunlit is not None)
+        if beam is not None and self._by_cells:  # below 0 by rounding alone
             self._reflected = np.maximum(self._whole - flat(beam, len(self._whole)), 0)
         self._scattered, self._outdoors = self._rest, None
         self._lighting, self._light = self._rest, None
@@ -316,8 +316,8 @@ class FivePhasePictures:
         lit, later = self._columns(batch)
         rows = m.indirect.with_rows(noise.indirect).of_rows(later)
         rows += m.lit.with_rows(noise.lit).of_rows(lit)
-        if self._by_elements:
-            rows += self._sun.on_elements(m.elements.noise, suns, strength).T
+        if self._by_cells:
+            rows += self._sun.sunlit_luminance(m.sunlit.noise, suns, strength).T
         if self._light is not None:
             rows += self._light.noise(self._sky[:, batch], self._faces[:, batch])
         values = np.zeros((len(batch), len(m.pixels)), dtype=np.float32)
@@ -347,8 +347,8 @@ class FivePhasePictures:
         rows += m.lit.of_rows(lit)
         if self._light is not None:
             rows += self._light.rows(self._sky[:, batch], self._faces[:, batch])
-        if self._by_elements:
-            rows += self._sun.on_elements(m.elements.mean, suns, strength).T
+        if self._by_cells:
+            rows += self._sun.sunlit_luminance(m.sunlit.mean, suns, strength).T
         self._sun.add_to(values, suns, strength)
         return rows, values
 

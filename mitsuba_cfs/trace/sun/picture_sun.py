@@ -30,9 +30,9 @@ from mitsuba_cfs.trace.sun.pixels import (
     edge_pixels,
     pixel_samples,
 )
-from mitsuba_cfs.trace.sun.room_cells import Beam, RoomCells
-from mitsuba_cfs.trace.sun.room_sun import EDGE_POINTS, SunElements
 from mitsuba_cfs.trace.sun.specular_paths import SpecularPath, specular_sun_paths
+from mitsuba_cfs.trace.sun.sunlit_cells import Beam, RoomCells
+from mitsuba_cfs.trace.sun.sunlit_rows import EDGE_POINTS, SunlitShares
 
 LANES = 1 << 23  # pairs of pixel and sun traced at a time
 CELL_POINTS = 4096  # on all windows, that the sun is followed from to the cells of the room
@@ -140,15 +140,15 @@ class PictureSun:
         for g, (pane, _, _) in enumerate(self._panes):
             self._add(values, lit, pane, towards, strength, self._scattered_in_panes, g)
 
-    def on_elements(
-        self, elements: SunElements, suns: NDArray, illuminance: NDArray
+    def sunlit_luminance(
+        self, sunlit: SunlitShares, suns: NDArray, illuminance: NDArray
     ) -> NDArray[np.float32]:
         """Luminance [m, h] of a picture's rows by the sun that the surfaces of the room reflect."""
         shining = np.flatnonzero((suns[:, 2] > 0) & (illuminance > 0))
-        found = np.zeros((elements.share.shape[0], len(suns)), dtype=np.float32)
-        irradiance = self._on_cells(elements.cells, suns[shining], illuminance[shining])
-        found[:, shining] = elements.far_rows(irradiance)
-        self._add_near(found, elements, suns, illuminance)
+        found = np.zeros((sunlit.share.shape[0], len(suns)), dtype=np.float32)
+        irradiance = self._on_cells(sunlit.cells, suns[shining], illuminance[shining])
+        found[:, shining] = sunlit.far_rows(irradiance)
+        self._add_near(found, sunlit, suns, illuminance)
         return found
 
     def _on_cells(self, cells: RoomCells, suns: NDArray, illuminance: NDArray) -> sparse.csr_array:
@@ -162,13 +162,13 @@ class PictureSun:
         return sparse.csr_array(by_area).astype(np.float32)
 
     def _add_near(
-        self, found: NDArray, elements: SunElements, suns: NDArray, illuminance: NDArray
+        self, found: NDArray, sunlit: SunlitShares, suns: NDArray, illuminance: NDArray
     ) -> None:
         """Add the luminance [m, h] of rows by the sunlit pieces near them, point by point."""
         for mirror in self._mirrors:
-            mirror._add_near(found, elements, suns, illuminance)
+            mirror._add_near(found, sunlit, suns, illuminance)
         suns, illuminance = self._turned(suns, illuminance)
-        lit, places = self._shining(suns, illuminance), elements.places
+        lit, places = self._shining(suns, illuminance), sunlit.places
         if not places.size or not len(lit):
             return
         step = max(1, LANES // places.size)
@@ -176,17 +176,17 @@ class PictureSun:
             hours = lit[start : start + step]
             light = self._beam_at(*points_and_suns(places, suns[hours]))
             light = light.reshape(places.size, len(hours))
-            self._resample_pieces(elements, light, suns[hours])
-            found[:, hours] += elements.near @ (light * illuminance[hours].astype(np.float32))
+            self._resample_pieces(sunlit, light, suns[hours])
+            found[:, hours] += sunlit.near @ (light * illuminance[hours].astype(np.float32))
 
-    def _resample_pieces(self, elements: SunElements, near: NDArray, suns: NDArray) -> None:
+    def _resample_pieces(self, sunlit: SunlitShares, near: NDArray, suns: NDArray) -> None:
         """Set the mean over several points of each piece that the edge of a spot of sun crosses."""
-        element, hour = elements.edges.crossed(near)
+        element, hour = sunlit.edges.crossed(near)
         step = LANES // EDGE_POINTS
         for start in range(0, len(hour), step):
             part = slice(start, start + step)
             number = (element[part, None] * EDGE_POINTS + np.arange(EDGE_POINTS)).ravel()
-            places = elements.edges.places.some(number)
+            places = sunlit.edges.places.some(number)
             towards = vectors(np.repeat(suns[hour[part]], EDGE_POINTS, axis=0))
             to_sun = on_disc_of(towards, column(number, mi.UInt32))
             value = self._beam_at(places.points(), places.normals(), to_sun)

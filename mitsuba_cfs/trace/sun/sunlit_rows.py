@@ -8,7 +8,7 @@ the tile white or dark.  So paths and rays only find the share that a row has of
 the sun's irradiance of the surfaces is found hour by hour.
 
 What is far from a place lights it much as it lights the places beside it, and many tiles share it:
-it is the irradiance of the room's cells, by the flux of the beam on them (`room_cells`), the same
+it is the irradiance of the room's cells, by the flux of the beam on them (`sunlit_cells`), the same
 that the sensors take.  What is near (the wall that meets the floor in a corner) does not: it is
 taken by rays of each tile's own, to pieces as small as they are near, far smaller than a flux could
 be counted in; the sun is asked for at one point of a piece, by a shadow ray, and at many where the
@@ -38,7 +38,7 @@ from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, table
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_points, reflecting_points
-from mitsuba_cfs.trace.sun.room_cells import RoomCells, surface_cells
+from mitsuba_cfs.trace.sun.sunlit_cells import RoomCells, surface_cells
 
 PIECES = 1024  # that the surfaces' area would be divided into by pieces of the widest edge
 EDGE_POINTS = 16  # on a piece near a tile that the edge of a spot of sun crosses
@@ -68,11 +68,8 @@ class EdgePoints:
 
 
 @dataclass(frozen=True, slots=True)
-class SunElements:
-    """The share that rows have of the room's sunlit surfaces: of its cells, and of pieces nearby.
-
-    Luminance of a row per unit irradiance.
-    """
+class SunlitShares:
+    """Luminance of rows per unit irradiance of the room's cells, and of pieces nearby."""
 
     cells: RoomCells
     share: sparse.csr_array  # [m, c] of the cells
@@ -88,26 +85,26 @@ class SunElements:
         return self.far_rows(cells) + self.near @ near
 
     def far_rows(self, irradiance: NDArray[np.float32] | sparse.csr_array) -> NDArray[np.float32]:
-        """Luminance [m, h] of rows by what is far, under the irradiance of the cells [c, h]."""
+        """Luminance [m, h] of rows by the cells with irradiances [c, h]."""
         found = self.share @ irradiance
         return self.smooth @ (found.toarray() if sparse.issparse(found) else found)
 
-    def of_rows(self, rows: sparse.csr_array, smooth: sparse.csr_array) -> SunElements:
-        """Of other rows [k] that these make up [k, m], with their smoothing."""
+    def of_rows(self, rows: sparse.csr_array, smooth: sparse.csr_array) -> SunlitShares:
+        """The shares of other rows [k], by `rows` [k, m] of these, with their smoothing."""
         share, near = (sparse.csr_array(rows @ part) for part in (self.share, self.near))
-        return SunElements(self.cells, share, smooth, near, self.places, self.edges)
+        return SunlitShares(self.cells, share, smooth, near, self.places, self.edges)
 
 
 @dataclass(frozen=True, slots=True)
 class SunlitRows:
-    """The share that the rows of a picture have of the sunlit surfaces, under any sky."""
+    """Shares of the sunlit surfaces in the rows of a picture, for any sky."""
 
-    mean: SunElements  # of the rows [m]
-    noise: SunElements  # half the difference of the rows' halves; the same cells and pieces
-    close: NDArray[np.bool_]  # [m] rows that show what another surface is near to
+    mean: SunlitShares  # of the rows [m]
+    noise: SunlitShares  # half the difference of the rows' halves; the same cells and pieces
+    close: NDArray[np.bool_]  # [m] rows that show a surface close to another
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """All of it as the arrays of a file."""
+        """The shares as the arrays of a file."""
         first, cells = self.mean, self.mean.cells
         arrays = {
             "close": self.close, "cell_edge": np.array(cells.edge), "cell_low": cells.low,
@@ -118,7 +115,7 @@ class SunlitRows:
         for i, rows in enumerate((first, self.noise)):
             matrices |= {f"far{i}": rows.share, f"near{i}": rows.near}
         for name, matrix in matrices.items():
-            arrays |= {f"{name}_{part}": np.asarray(getattr(matrix, part)) for part in SPARSE}
+            arrays |= sparse_arrays(name, matrix)
         for name, places in (("places", first.places), ("more", first.edges.places)):
             arrays |= {f"{name}_point": places.point, f"{name}_normal": places.normal}
         return arrays
@@ -135,24 +132,38 @@ class SunlitRows:
         )  # fmt: skip
         places = SurfacePoints(data["places_point"], data["places_normal"])
         more = SurfacePoints(data["more_point"], data["more_normal"])
-        smooth, edges = _sparse(data, "smooth"), EdgePoints(more, _sparse(data, "beside"))
+        smooth, edges = (
+            sparse_matrix(data, "smooth"),
+            EdgePoints(more, sparse_matrix(data, "beside")),
+        )
         mean, noise = (
-            SunElements(
-                cells, _sparse(data, f"far{i}"), smooth, _sparse(data, f"near{i}"), places, edges
+            SunlitShares(
+                cells,
+                sparse_matrix(data, f"far{i}"),
+                smooth,
+                sparse_matrix(data, f"near{i}"),
+                places,
+                edges,
             )
             for i in range(2)
         )
         return cls(mean, noise, data["close"])
 
 
-def _sparse(data: Mapping[str, NDArray[Any]], name: str) -> sparse.csr_array:
+def sparse_arrays(name: str, matrix: sparse.csr_array) -> dict[str, NDArray[Any]]:
+    """A sparse matrix as the arrays of a file."""
+    return {f"{name}_{part}": np.asarray(getattr(matrix, part)) for part in SPARSE}
+
+
+def sparse_matrix(data: Mapping[str, NDArray[Any]], name: str) -> sparse.csr_array:
+    """A sparse matrix from the arrays of a file."""
     *parts, shape = (data[f"{name}_{part}"] for part in SPARSE)
     return sparse.csr_array(tuple(parts), shape=tuple(shape))
 
 
 @dataclass(frozen=True, slots=True)
 class _Hits:
-    """Points near rows of a picture, that reflect to them."""
+    """Points near the rows of a picture that reflect to them."""
 
     row: NDArray[np.int64]  # [q]
     weight: NDArray[np.floating]  # [q] luminance of the row per unit irradiance of the place
@@ -174,7 +185,7 @@ class _Hits:
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
-    """Where rays of pixels meet what reflects; axis r."""
+    """Reflecting points that rays of pixels meet; axis r."""
 
     ray: NDArray[np.int64]  # [r] number of the pixel
     value: NDArray[np.float64]  # [r] rho / pi over the number of the pixel's rays
@@ -182,14 +193,14 @@ class _Shown:
     reach: NDArray[np.float64]  # [r] how near is near [m]
 
     def far_share(self, path: NDArray[np.int64], met: SurfacePoints) -> NDArray[np.float64]:
-        """What of the light of places met first counts as far, 0 to 1."""
+        """Share of the light of points met first that counts as far, 0 to 1."""
         distance = np.linalg.norm(met.point - self.places.point[path], axis=1)
         return np.clip(2 * distance / self.reach[path] - 1, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class _Pixels:
-    """Pixels to trace, some of them again and again; axis p."""
+    """Pixels to trace, some repeatedly; axis p."""
 
     pixel: NDArray[np.int64]  # [p] row * width + column
     row: NDArray[np.int64]  # [p] half of a row: 2 * row or 1 more
@@ -212,7 +223,7 @@ class _Pixels:
 
 
 class _Look:
-    """Traces a view's pixels to what reflects sun to what they show."""
+    """Traces a view's pixels to the surfaces that reflect sun to the shown ones."""
 
     def __init__(
         self, tracer: TracedScene, cells: RoomCells, view: View, tile: int, edge: float, seed: int
@@ -225,7 +236,7 @@ class _Look:
     def far(
         self, part: _Pixels, samples: int, key: int, shape: tuple[int, int]
     ) -> tuple[sparse.csr_array, NDArray[np.int64]]:
-        """The rows' share of the cells but for what is near; the rows that something is near to."""
+        """Share of the cells in the rows, except near ones; the rows close to another surface."""
         shown, row = self._shown(part, samples), part.row
         found = reflecting_points(self._tracer, shown.places, self._seed * 1_000_003 + key)
         weight = found.weight * shown.value[found.path]
@@ -237,7 +248,7 @@ class _Look:
         return share, np.unique(rows[: found.first][far < 1])
 
     def near(self, part: _Pixels, samples: int) -> _Hits:
-        """What rays of pixels find near, stratified over the pixels of a row by their number."""
+        """Hits of pixels' rays on near surfaces, stratified over the pixels of a row."""
         tracer, lane = self._tracer, dr.arange(mi.UInt32, len(part.pixel) * samples)
         pixel = lane // dr.opaque(mi.UInt32, samples)
         number = column(part.number * samples, mi.UInt32)
@@ -280,7 +291,7 @@ class _Look:
         return _Shown(kept // samples, value, places.some(kept), reach)
 
 
-def sun_elements(
+def picture_sunlit_shares(
     tracer: TracedScene,
     interior: Surfaces,
     view: View,
@@ -289,15 +300,15 @@ def sun_elements(
     *,
     samples: int = SAMPLES,
     seed: int = 0,
-) -> tuple[SunElements, NDArray[np.bool_]]:
-    """The share of the sunlit surfaces that the halves of a picture's rows have [2 m].
+) -> tuple[SunlitShares, NDArray[np.bool_]]:
+    """Share of the sunlit surfaces in the halves of a picture's rows [2 m].
 
-    By the places that paths of the pixels meet after what the pixel shows; the luminance of a half
-    is the sum of its pixels'.  And the rows [m] that show what another surface is near to.
+    By the points that paths of the pixels meet after the surface that the pixel shows; a half is
+    the sum of its pixels.  And the rows [m] that show a surface close to another.
 
     Args:
         interior: the room's surfaces.
-        rows: of the picture's pixels; times: [n] how often a pixel has paths to what is far.
+        rows: of the picture's pixels; times: [n] repetitions of each pixel.
         samples: paths of a pixel for the rest of the picture.
     """
     every, tile, share = np.arange(len(rows.pixels)), rows.tiles.size, min(samples / SAMPLES, 1.0)
@@ -317,14 +328,14 @@ def sun_elements(
     return _with_pieces(cells, far, near, edge, seed), close
 
 
-def window_elements(
+def window_sunlit_shares(
     tracer: TracedScene, interior: Surfaces, *, samples: int, seed: int = 0
-) -> SunElements:
-    """The share of the sunlit surfaces that windows see; rows [G * K]: radiance that meets them.
+) -> SunlitShares:
+    """Share of the sunlit surfaces in the light on the windows; rows [G * K]: incident radiance.
 
-    The mean over a group and over its back's incident patch; arguments as of `sun_elements`.
+    The mean over a group and over an incident patch of its back.
 
-    Args: samples: paths of each patch.
+    Args: interior: the room's surfaces; samples: paths of each patch.
     """
     bins, cells = DirectionBins(KLEMS_FULL), _far_cells(tracer, interior)
     shape = len(tracer.groups) * bins.size, cells.size
@@ -350,7 +361,7 @@ def window_elements(
 
 
 def _far_cells(tracer: TracedScene, interior: Surfaces) -> RoomCells:
-    """The room's cells, joined: from afar the wider ones are as sharp, and have less noise."""
+    """The room's cells, joined: far away the wider ones are as sharp, with less noise."""
     return surface_cells(tracer, interior).cells.joined()[0]
 
 
@@ -375,19 +386,19 @@ def _widest(interior: Surfaces) -> float:
 
 def _with_pieces(
     cells: RoomCells, far: sparse.csr_array, near: _Hits, edge: float, seed: int
-) -> SunElements:
+) -> SunlitShares:
     """The shares of the cells with those of pieces near rows, whose widest have an edge [m]."""
-    piece, order, cubes = _elements(near, edge)
+    piece, order, cubes = _pieces(near, edge)
     entries = near.weight.astype(np.float32), (near.row, piece)
     share = sparse.csr_array(sparse.coo_array(entries, shape=(far.shape[0], len(cubes))))
     chosen = _chosen(piece[order], len(cubes), EDGE_POINTS, seed)
     more = near.places.some(order[chosen])
     first = more.some(np.arange(0, more.size, EDGE_POINTS))
     alone = sparse.csr_array(sparse.eye_array(far.shape[0], dtype=np.float32))
-    return SunElements(cells, far, alone, share, first, EdgePoints(more, _beside(cubes)))
+    return SunlitShares(cells, far, alone, share, first, EdgePoints(more, _beside(cubes)))
 
 
-def _elements(
+def _pieces(
     hits: _Hits, edge: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """The piece of each place, cubes of an edge [m] by the side of the surface.

@@ -2,14 +2,14 @@
 
     E[c, h] = flux[c, h] / area[c]
 
-One discretisation of the sunlit surfaces for all that sees them: `room_beam` has the share that
-sensors have of each cell by all reflections, `room_sun` that of a picture's pixels and of the
-windows.  Rays follow the sun from points of the windows to the cells, hour by hour.  Each carries
-the same flux: a narrow strip of sun has as many rays for its light as a wide one, and no light is
-lost or doubled.
+All users share this discretisation of the sunlit surfaces: `sunlit_sensors` has the share of each
+cell in the light of the sensors, `sunlit_rows` that in the rows of a picture and in the windows.
+Rays follow the sun from points on the windows to the cells, hour by hour.  Each ray carries
+the same flux, so that a narrow strip of sun gets as many rays for its light as a wide one, and the
+flux is conserved.
 
-Only what lies close to the surface that a pixel shows is not seen by cells: there the light changes
-from pixel to pixel and needs pieces smaller than any flux could be counted in (`room_sun`).
+Pictures take surfaces close to the one that a pixel shows in finer pieces (`sunlit_rows`): there
+the light changes from pixel to pixel, and too few rays would meet a piece to count their flux.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_faces
-from mitsuba_cfs.trace.sun.room_cells import POINTS, RAYS, Beam, RoomCells, surface_cells
+from mitsuba_cfs.trace.sun.sunlit_cells import POINTS, RAYS, Beam, RoomCells, surface_cells
 
 CELL_RAYS = 128  # from each cell, in each batch, at most
 CELL_LEAST = 32  # and at the least: fewer take as long
