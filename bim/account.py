@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-USABLE, CARE, NOT_USABLE = "usable", "usable with care", "not usable"
+from mitsuba_cfs.notes import Note
+
+USABLE, CARE, NOT_USABLE = Note("usable"), Note("usable with care"), Note("not usable")
 # the rules of the verdict, stated in docs/bim.md: shares of the glass that looks out
 WHOLE = 0.98  # used from this on: nothing to say
 HALF = 0.5  # used below this: not usable
@@ -78,7 +81,7 @@ class Account:
         return CARE if self._cautions() else USABLE
 
     @property
-    def reasons(self) -> tuple[str, ...]:
+    def reasons(self) -> tuple[Note, ...]:
         """Why the verdict is not better, the gravest first."""
         return (*self._stops(), *self._cautions())
 
@@ -86,100 +89,136 @@ class Account:
     def facts(self) -> tuple[tuple[str, str], ...]:
         """The account in a few words: title and text of verdict, rooms, glass, spaces."""
         lists = (
-            ("Spaces overlapping", self.overlapping),
-            ("Rooms lower than their glass", self.low),
-            ("Rooms raised to what covers them", self.raised),
-            ("Spaces that are no rooms", self.missing),
-            ("Rooms with open edges", self.leaking),
+            (Note("Spaces overlapping"), self.overlapping),
+            (Note("Rooms lower than their glass"), self.low),
+            (Note("Rooms raised to what covers them"), self.raised),
+            (Note("Spaces that are no rooms"), self.missing),
+            (Note("Rooms with open edges"), self.leaking),
         )
-        why = "; ".join(self.reasons)
+        model = Note(self.verdict)
+        if self.reasons:
+            model = Note("{verdict}: {reasons}", verdict=model, reasons=_joined(self.reasons))
         return (
-            ("Model", self.verdict + (f": {why}" if why else "")),
-            ("Rooms read", self._rooms_line()),
-            ("Glass", self._glass_line()),
+            (Note("Model"), model),
+            (Note("Rooms read"), self._rooms_line()),
+            (Note("Glass"), self._glass_line()),
             *((title, _listed(names)) for title, names in lists if names),
         )
 
     @property
     def lines(self) -> tuple[str, ...]:
         """`facts` as lines of text."""
-        return tuple(f"{title}: {text}" for title, text in self.facts)
+        return tuple(Note("{title}: {text}", title=title, text=text) for title, text in self.facts)
 
-    def _stops(self) -> list[str]:
+    def _stops(self) -> list[Note]:
         found = []
         if self.cut_off:
-            found.append("THE FILE IS CUT OFF at its end: an unknown part of the building is lost")
+            found.append(
+                Note("THE FILE IS CUT OFF at its end: an unknown part of the building is lost")
+            )
         if not self.rooms:
-            found.append("no rooms")
+            found.append(Note("no rooms"))
         elif self.share_used < HALF:
-            found.append(f"only {_percent(self.share_used)} of the glass that looks out is used")
+            found.append(
+                Note(
+                    "only {percent:.0f} % of the exterior glass is used",
+                    percent=100 * self.share_used,
+                )
+            )
         return found
 
-    def _cautions(self) -> list[str]:
+    def _cautions(self) -> list[Note]:
         found = []
         if self.rooms and HALF <= self.share_used < WHOLE:
-            found.append(f"{_percent(self.share_used)} of the glass that looks out is used")
+            found.append(
+                Note("{percent:.0f} % of the exterior glass is used", percent=100 * self.share_used)
+            )
         if not self.glass_out:
-            found.append("no glass looks out")
+            found.append(Note("no exterior glass"))
         if self.glass_assumed > MUCH_ASSUMED * self.glass_used:
-            found.append(f"{self.glass_assumed:.1f} m2 of glass assumed")
-        for area, what in (
-            (self.phantom, "transparent but no glass"),
-            (self.closed, "openings without a window closed"),
-            (self.shut_in, "of glass with no sky or ground in sight"),
-        ):
-            if area > NOTABLE * self.glass_out:
-                found.append(f"{area:.1f} m2 {what}")
+            found.append(Note("{area:.1f} m2 of glass assumed", area=self.glass_assumed))
+        losses = (
+            Note("{area:.1f} m2 transparent but no glass", area=self.phantom),
+            Note("{area:.1f} m2 of openings without a window closed", area=self.closed),
+            Note("{area:.1f} m2 of glass without sky or ground in view", area=self.shut_in),
+        )
+        found += [note for note in losses if note.values["area"] > NOTABLE * self.glass_out]
         if self.found:
-            found.append("rooms found from geometry")
+            found.append(Note("rooms found from geometry"))
         elif self.rooms < self.spaces:
-            found.append(f"{self.spaces - self.rooms} of {self.spaces} spaces are no rooms")
-        for names, what in (
-            (self.overlapping, "pairs of spaces overlap"),
-            (self.leaking, "rooms with open edges"),
-        ):
-            if names:
-                found.append(f"{len(names)} {what}")
+            lost = self.spaces - self.rooms
+            found.append(Note("{count} of {all} spaces are no rooms", count=lost, all=self.spaces))
+        if self.overlapping:
+            found.append(Note("pairs of overlapping spaces: {count}", count=len(self.overlapping)))
+        if self.leaking:
+            found.append(Note("rooms with open edges: {count}", count=len(self.leaking)))
         return found
 
-    def _rooms_line(self) -> str:
+    def _rooms_line(self) -> Note:
         if not self.rooms and not self.spaces:
-            return "none: the file has no spaces, and no room was found between its walls"
-        if self.found:
-            by_storey = (f"{s.name or 'no storey'} {s.rooms}" for s in self.storeys)
-            return f"{self.rooms} found from geometry ({', '.join(by_storey)})"
-        by_storey = (f"{s.name or 'no storey'} {s.rooms} of {s.spaces}" for s in self.storeys)
-        return f"{self.rooms} of {self.spaces} spaces ({', '.join(by_storey)})"
-
-    def _glass_line(self) -> str:
-        parts = [
-            f"{self.glass_used:.1f} of {self.glass_out:.1f} m2 that looks out used "
-            f"({_percent(self.share_used)}; {self.windows_used} of {self.windows_out} windows)"
-            if self.glass_out > 0
-            else "none looks out of a room"
-        ]
-        for area, what in (
-            (self.glass_assumed, "assumed"),
-            (self.shut_in, "with no sky or ground in sight"),
-            (self.glass_low, "above rooms that are too low"),
-            (self.glass_missing, "with no room behind"),
-            (self.phantom, "transparent but no glass"),
-            (self.closed, "openings without a window closed"),
-        ):
-            if area >= 0.05:
-                parts.append(f"{area:.1f} m2 {what}")
-        parts += [
-            f"storey {s.name or 'without a name'} has no rooms and {lost:.1f} m2 of glass unused"
+            return Note("none: the file has no spaces, and no room was found between its walls")
+        storeys = [
+            Note("{storey} {count}", storey=_storey(s.name), count=s.rooms)
+            if self.found
+            else Note(
+                "{storey} {count} of {all}", storey=_storey(s.name), count=s.rooms, all=s.spaces
+            )
             for s in self.storeys
-            if not s.rooms and (lost := s.glass_out - s.glass_used) > 0.05
         ]
-        return ", ".join(parts)
+        listed = _joined(storeys, ", ")
+        if self.found:
+            return Note("{count} found from geometry ({storeys})", count=self.rooms, storeys=listed)
+        return Note(
+            "{count} of {all} spaces ({storeys})",
+            count=self.rooms,
+            all=self.spaces,
+            storeys=listed,
+        )
+
+    def _glass_line(self) -> Note:
+        used = Note("no exterior glass in a room")
+        if self.glass_out > 0:
+            used = Note(
+                "{used:.1f} of {all:.1f} m2 of exterior glass used ({percent:.0f} %, {windows} of "
+                "{all_windows} windows)",
+                used=self.glass_used,
+                all=self.glass_out,
+                percent=100 * self.share_used,
+                windows=self.windows_used,
+                all_windows=self.windows_out,
+            )
+        losses = [
+            Note("{area:.1f} m2 assumed", area=self.glass_assumed),
+            Note("{area:.1f} m2 without sky or ground in view", area=self.shut_in),
+            Note("{area:.1f} m2 above rooms that are too low", area=self.glass_low),
+            Note("{area:.1f} m2 without a room behind it", area=self.glass_missing),
+            Note("{area:.1f} m2 transparent but no glass", area=self.phantom),
+            Note("{area:.1f} m2 of openings without a window closed", area=self.closed),
+        ]
+        losses += [
+            Note(
+                "storey {storey} has no rooms and {area:.1f} m2 of unused glass",
+                storey=_storey(s.name),
+                area=s.glass_out - s.glass_used,
+            )
+            for s in self.storeys
+            if not s.rooms
+        ]
+        return _joined([used, *(note for note in losses if note.values["area"] >= 0.05)], ", ")
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %"
+def _storey(name: str) -> str:
+    return name or Note("(unnamed)")
+
+
+def _joined(parts: Sequence[Note], separator: str = "; ") -> Note:
+    """Notes in one line."""
+    names = [f"part{number}" for number in range(len(parts))]
+    template = separator.join(f"{{{name}}}" for name in names)
+    return Note(template, **dict(zip(names, parts, strict=True)))
 
 
 def _listed(names: tuple[str, ...]) -> str:
-    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-    return ", ".join(names[:SHOWN]) + more
+    text = ", ".join(names[:SHOWN])
+    left = len(names) - SHOWN
+    return Note("{names} and {count} more", names=text, count=left) if left > 0 else text

@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 
 from bim.account import NOT_USABLE
 from bim.model import Building, Space
-from bim.report.issue import Audience, Issue, issue_text
+from bim.report.issue import Audience, Issue, issue_note
 from bim.report.ranking import Ranked, ranked
 from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import source_notes, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
@@ -20,7 +21,8 @@ from scenes.fenestration.thermal_system import thermal_system
 
 # Labels of the issues in a head, by severity, the gravest first; "info" changes nothing
 LABELS = {
-    "loss": "left out", "warning": "warning", "unused": "not used", "assumption": "assumed",
+    "loss": Note("left out"), "warning": Note("warning"), "unused": Note("not used"),
+    "assumption": Note("assumed"),
 }  # fmt: skip
 TREES = "trees-by-month"
 NOTED = ("rooms-joined-by-size", TREES)  # codes of issues that are notes of a result's pages
@@ -51,11 +53,12 @@ class Head:
     def text(self, audience: Audience) -> tuple[str, ...]:
         """The lines of the head; audience: whom the fixes are for."""
         of_model = (
-            f"{label}: {text}"
+            Note("{label}: {text}", label=label, text=text)
             for severity, label in LABELS.items()
             for text in _issue_lines(self.issues, severity, audience)
         )
-        return (*self.model, *of_model, *(f"assumed: {text}" for text in self.assumed))
+        assumed = (Note("assumed: {text}", text=text) for text in self.assumed)
+        return (*self.model, *of_model, *assumed)
 
     def with_assumptions(self, sentences: Iterable[str]) -> Head:
         """The head with further assumptions."""
@@ -137,8 +140,8 @@ def model_lines(building: Building) -> tuple[str, ...]:
         return building.account.lines
     glass = sum(window.area for window in building.windows)
     return (
-        f"Rooms read: {len(building.spaces)}",
-        f"Glass: {glass:.1f} m2 in {len(building.windows)} windows",
+        Note("Rooms read: {count}", count=len(building.spaces)),
+        Note("Glass: {area:.1f} m2 in {count} windows", area=glass, count=len(building.windows)),
     )
 
 
@@ -148,13 +151,26 @@ def _issue_lines(issues: Iterable[Issue], severity: str, audience: Audience) -> 
     lines = [_issue_line(one, audience) for one in kinds[:SHOWN]]
     if len(kinds) > SHOWN:
         count = sum(one.count for one in kinds[SHOWN:])
-        lines.append(f"{count} more of {len(kinds) - SHOWN} other kinds; cfs check lists all")
+        lines.append(
+            Note(
+                "{count} more of {kinds} other kinds; cfs check lists all",
+                count=count,
+                kinds=len(kinds) - SHOWN,
+            )
+        )
     return lines
 
 
 def _issue_line(one: Ranked, audience: Audience) -> str:
-    area = f" ({one.glass:.2f} m2 of glass)" if one.glass else ""
-    return f"{one.text(audience).line}{area}"
+    text = one.text(audience, Note)
+    parts = {"what": text.what, "effect": text.effect}
+    if text.fix:
+        line = Note("{what}: {effect}; {fix}", fix=text.fix, **parts)
+    else:
+        line = Note("{what}: {effect}", **parts)
+    if not one.glass:
+        return line
+    return Note("{line} ({area:.2f} m2 of glass)", line=line, area=one.glass)
 
 
 def model_notes(building: Building) -> tuple[str, ...]:
@@ -162,27 +178,28 @@ def model_notes(building: Building) -> tuple[str, ...]:
     account = building.account
     verdict = account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
     issues = (one for one in building.issues if one.severity == "unused" or one.code in NOTED)
-    return (*verdict, *map(_note, issues))
+    return (*verdict, *map(issue_note, issues))
 
 
 def unused_notes(building: Building) -> tuple[str, ...]:
     """What of a building's file a command with uses, sensors and eyes of its own leaves out."""
-    held = {
-        "uses of rooms": building.uses, "sensor grids": building.grids, "views": building.views,
-    }  # fmt: skip
-    counts = [f"{len(some)} {what}" for what, some in held.items() if some]
-    if not counts or building.file is None:
+    parts = (building.uses, building.grids, building.views)
+    if not any(map(len, parts)) or building.file is None:
         return ()
-    return (f"{building.file.name} holds {', '.join(counts)}: not used here.",)
+    note = Note(
+        "{file} contains {uses} uses of rooms, {grids} sensor grids and {views} views; they are "
+        "not used here.",
+        file=building.file.name,
+        uses=len(building.uses),
+        grids=len(building.grids),
+        views=len(building.views),
+    )
+    return (note,)
 
 
 def tree_notes(building: Building) -> tuple[str, ...]:
     """How much light the trees outdoors let pass."""
-    return tuple(_note(issue) for issue in building.issues if issue.code == TREES)
-
-
-def _note(issue: Issue) -> str:
-    return f"{issue_text(issue, 'command').line}."
+    return tuple(issue_note(issue) for issue in building.issues if issue.code == TREES)
 
 
 def _once(lines: Iterable[str]) -> tuple[str, ...]:
@@ -208,10 +225,13 @@ def _peak_note(system: FenestrationSystem) -> tuple[str, ...]:
     peak = float(through_peak(bsdf.transmission_front, bsdf.basis_in).transmittance[0])
     if peak < LEAST_PEAK:
         return ()
-    return (
-        f"{system.name}: direct sun and view pass straight on by a see-through peak of the Klems "
-        f"patches, transmittance {peak:.2f} at normal incidence.",
+    note = Note(
+        "{system}: direct sun and view out use the specular peak of the Klems patches, "
+        "transmittance {peak:.2f} at normal incidence.",
+        system=system.name,
+        peak=peak,
     )
+    return (note,)
 
 
 def site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
@@ -222,8 +242,14 @@ def site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
     east = (building.longitude_deg - weather.longitude_deg + 180) % 360 - 180
     if max(abs(north), abs(east)) <= FAR_SITE_DEG:
         return ()
-    return (
-        f"The building's site ({building.latitude_deg:.1f} N, {building.longitude_deg:.1f} E) is "
-        f"far from the weather station {weather.site} ({weather.latitude_deg:.1f} N, "
-        f"{weather.longitude_deg:.1f} E): the sun is the weather station's.",
+    note = Note(
+        "The site of the building ({north:.1f} N, {east:.1f} E) is far from the weather station "
+        "{station} ({station_north:.1f} N, {station_east:.1f} E); the solar positions are those of "
+        "the weather station.",
+        north=building.latitude_deg,
+        east=building.longitude_deg,
+        station=weather.site,
+        station_north=weather.latitude_deg,
+        station_east=weather.longitude_deg,
     )
+    return (note,)

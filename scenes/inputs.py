@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from bim.model import Building, Space
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes.chosen_rooms import chosen_spaces, named_spaces
@@ -173,7 +174,11 @@ def _state_notes(
     """A sentence where windows have more states than are used."""
     if operation is not None and operation.systems and options.system is not None:
         name = operation.file.name
-        return (f"--cfs fills the windows: [[system]] of {name} is not used.",)
+        note = Note(
+            "--cfs sets the fenestration of the windows; [[system]] of {file} is not used.",
+            file=name,
+        )
+        return (note,)
     several = [
         states[0].name
         for guid, states in filled.items()
@@ -183,7 +188,10 @@ def _state_notes(
         return ()
     source = building.name if options.building is None else options.building.name
     names = ", ".join(dict.fromkeys(several))
-    return (
-        f"{source} holds several shading states; without --operation the first of "
-        f"each window ({names}) holds all year.",
+    note = Note(
+        "{file} has several shading states; without --operation the first state of each window "
+        "({windows}) is used all year.",
+        file=source,
+        windows=names,
     )
+    return (note,)

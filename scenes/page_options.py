@@ -27,6 +27,7 @@ StudySection = Literal[
     "verdict", "comparison", "model", "problems", "method", "inputs", "glossary"
 ]  # fmt: skip
 DossierSection = Literal["rooms", "problems", "sources"]
+GlareSection = Literal["worst", "seats", "views"]
 
 Section = TypeVar("Section", bound=str)
 Line = Annotated[str, Field(min_length=1, max_length=200)]
@@ -69,28 +70,25 @@ class PageOptions:
 OWN_PAGE = PageOptions()
 
 
-def read_page(path: Path | None, sections: Any, *, translated: bool = False) -> PageOptions:
+def read_page(path: Path | None, sections: Any, language: Language | None = None) -> PageOptions:
     """The options of a page; the page's own where there is no file.
 
     Args:
         sections: literal type of the sections that this page can do without.
-        translated: whether there is a translation of the page.
+        language: of the page; None: that of the file.
 
     Raises: `DataError` that names file and key.
     """
     if path is None:
-        return OWN_PAGE
+        return PageOptions(language=language or "en")
     table: PageTable = validated(PageTable[sections], read_table(path), path)
-    if table.language != "en" and not translated:
-        message = f"{table.language}: this page is there in English alone"
-        raise DataError(message, file=path, field="language")
     logo = None if table.logo is None else path.parent / table.logo
     return PageOptions(
         title=table.title or "",
         author=table.author or "",
         logo="" if logo is None else _logo_uri(logo, path),
         left_out=tuple(name for name, shown in table.sections.items() if not shown),
-        language=table.language,
+        language=language or table.language,
         inputs=(path,) if logo is None else (path, logo),
     )
 

@@ -112,7 +112,13 @@ def test_study_files_in_the_docs_are_read(folder):
 
 
 def test_the_page_of_the_quick_start_is_read(folder):
-    from scenes.page_options import DossierSection, RunSection, StudySection, read_page
+    from scenes.page_options import (
+        DossierSection,
+        GlareSection,
+        RunSection,
+        StudySection,
+        read_page,
+    )
 
     text = (REPOSITORY / "docs" / "quickstart.md").read_text("utf-8")
     (code,) = [c for c in examples(REPOSITORY / "docs" / "quickstart.md", "toml") if "logo" in c]
@@ -123,6 +129,7 @@ def test_the_page_of_the_quick_start_is_read(folder):
         ("run", RunSection),
         ("study", StudySection),
         ("comply", DossierSection),
+        ("dgp", GlareSection),
     ):
         row = text.partition(f"| `cfs {command}` | ")[2].partition(" |")[0]
         assert set(row.replace("; of each room", ",").split(", ")) == set(get_args(sections))

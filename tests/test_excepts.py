@@ -115,8 +115,8 @@ def test_no_except_hides_a_mistake_of_ours(path):
         "with contextlib.suppress(Exception):\n    x()",
         "def ours(): ...\ntry:\n    ours()\nexcept (ValueError, TypeError):\n    pass",
         "from bim.names import named\nwith suppress(KeyError):\n    named(1)",
-        "class A:\n    def f(self):\n        try:\n            self.g()\n"
-        "        except AttributeError:\n            pass",
+        "class A:\n    def f(self):\n        try:\n            self.g()\n        except "
+        "AttributeError:\n            pass",
     ],
 )
 def test_a_hiding_except_is_seen(body):

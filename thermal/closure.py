@@ -25,6 +25,7 @@ from thermal.errors import require, require_range
 from thermal.glazing import Gap, gap_resistance
 from thermal.glazing_unit import GlazingUnit
 from thermal.iso15099 import Iso15099Data, iso15099_data
+from thermal.notes import ThermalNote
 
 U_MODELS = ("constant", "linear", "gap", "surface", "layers")
 # Films that a shade's face realises at 0 and 20 degC [m2 K/W], R_i inside and R_e outside: of a
@@ -122,19 +123,26 @@ class Closure:
             return closed
         return with_realised_films(closed, r_inner_realised=films[0], r_outer_realised=films[1])
 
-    def described(self, place: str) -> str:
+    def described(self, place: str) -> ThermalNote:
         """The closure in words, and the error to expect."""
         words = {
-            "constant": "plain Kuhn, constant resistance",
-            "linear": f"U linear in temperature, {100 * self.slope:.3g} %/K",
-            "gap": "R(T_m, dT) of the gas gap",
-            "surface": "R(T_m, dT) as stated",
-            "layers": "ISO 15099 layer by layer",
+            "constant": ThermalNote("Kuhn's Blackbox model with constant resistance"),
+            "linear": ThermalNote(
+                "U-value linear in temperature, {slope:.3g} %/K", {"slope": 100 * self.slope}
+            ),
+            "gap": ThermalNote("resistance of the gas gap by temperature, R(T_m, dT)"),
+            "surface": ThermalNote("resistance by temperature as stated, R(T_m, dT)"),
+            "layers": ThermalNote("ISO 15099, layer by layer"),
         }[self.u_model]
         shaded = self.unit is not None and place in TYPICAL_FILMS
-        films = ", films that the shade realises" if self.states_films or shaded else ""
+        films = self.states_films or shaded
+        if films:
+            words = ThermalNote("{model}, with films of the shade", {"model": words})
         known = ERRORS.get(place, {}).get(self.u_model + ("+" if films else ""))
         if known is None:
-            return f"{words}{films}; its error is not known"
-        error = f"{known[0]:.2f} K of air, {known[1]:.2f} K of the window"
-        return f"{words}{films}; in 128 cases {error}"
+            return ThermalNote("{model}; error unknown", {"model": words})
+        return ThermalNote(
+            "{model}; RMS error against EnergyPlus over 128 cases: air {air:.2f} K, glass "
+            "{glass:.2f} K",
+            {"model": words, "air": known[0], "glass": known[1]},
+        )

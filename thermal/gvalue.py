@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermal.errors import require, require_range
+from thermal.notes import ThermalNote
 
 # EN 13363-1:2003 as in Kuhn 2006 and the dissertation [W/(m2 K)]: external, internal, integrated
 EXTERNAL_CONDUCTANCES = (6.0, 18.0)
@@ -31,10 +32,10 @@ TYPICAL_SYSTEMS = {
 
 
 _SHADES = {
-    "none": "without a shade",
-    "external": "with an external shade",
-    "internal": "with an internal shade",
-    "integrated": "with a shade between its panes",
+    "none": ThermalNote("without a shade"),
+    "external": ThermalNote("with an external shade"),
+    "internal": ThermalNote("with an internal shade"),
+    "integrated": ThermalNote("with a shade between the panes"),
 }
 
 
@@ -44,7 +45,7 @@ class ThermalData:
 
     u_value: float  # [W/(m2 K)]
     g_value: NDArray[np.float64]  # [...] as the transmittance
-    assumptions: tuple[str, ...]  # one sentence for every value that was not given
+    assumptions: tuple[ThermalNote, ...]  # one for every value that was not given
 
 
 def thermal_data(
@@ -77,14 +78,20 @@ def thermal_data(
     if u_value is None:
         u_value = typical_u
         notes.append(
-            f"U was not given: {u_value:g} W/(m2 K) is taken, "
-            f"as of low-e double glazing {_SHADES[shading_position]}."
+            ThermalNote(
+                "{system}: no U-value given; {u_value:g} W/(m2 K) is assumed, as for low-e double "
+                "glazing {shade}.",
+                {"system": item, "u_value": u_value, "shade": _SHADES[shading_position]},
+            )
         )
     require_range(u_value, 0.1, 7.0, f"{item}: U", "W/(m2 K)")
     if g_normal is None:
         notes.append(
-            f"g was not given: {100 * share:g} % of the absorbed sun is taken to go inwards, "
-            f"as of low-e double glazing {_SHADES[shading_position]}."
+            ThermalNote(
+                "{system}: no g-value given; {percent:g} % of the absorbed solar radiation is "
+                "assumed to be released inwards, as for low-e double glazing {shade}.",
+                {"system": item, "percent": 100 * share, "shade": _SHADES[shading_position]},
+            )
         )
     else:
         share = inward_share(float(tau.flat[normal]), float(rho.flat[normal]), g_normal, item=item)

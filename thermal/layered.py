@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from thermal.glazing_unit import GlazingUnit
 from thermal.gvalue import ThermalData, inward_share
 from thermal.iso15099 import iso15099_data, yearly_g_values
+from thermal.notes import ThermalNote
 
 
 def layered_thermal_data(
@@ -32,10 +33,20 @@ def layered_thermal_data(
     notes = []
     if u_value is None:
         u_value = iso15099_data(unit).u_value
-        notes.append(f"{item}: U {u_value:.3g} W/(m2 K) by ISO 15099 from its layers.")
+        notes.append(
+            ThermalNote(
+                "{system}: U-value {u_value:.3g} W/(m2 K) from its layers (ISO 15099).",
+                {"system": item, "u_value": u_value},
+            )
+        )
     g = yearly_g_values(unit, tau, np.asarray(absorbed, dtype=float))
     if g_normal is None:
-        notes.append(f"{item}: g {g[0]:.3g} at normal incidence by ISO 15099 from its layers.")
+        notes.append(
+            ThermalNote(
+                "{system}: g-value {g:.3g} at normal incidence from its layers (ISO 15099).",
+                {"system": item, "g": float(g[0])},
+            )
+        )
         return ThermalData(u_value, g, tuple(notes))
     rho = np.asarray(reflectance, dtype=float)
     share = inward_share(float(tau[0]), float(rho[0]), g_normal, item=item)

@@ -18,9 +18,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
+from mitsuba_cfs.notes import Note
+
 Severity = Literal["loss", "warning", "unused", "assumption", "info"]
 Audience = Literal["python", "command"]  # whom a fix is for: an argument, or a flag
-Translate = Callable[[str], str]
+Fill = Callable[..., str]  # of a template's text, by name the values of its fields
 SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 CATALOGUE = Path(__file__).parent / "catalogue.toml"
 LISTED = 6  # names that a text lists before it counts the rest
@@ -123,34 +125,41 @@ def phrases() -> Mapping[str, str]:
     return _tables()["phrase"]
 
 
-def issue_text(
-    issue: Issue, audience: Audience = "python", translate: Translate = lambda text: text
-) -> IssueText:
+def issue_text(issue: Issue, audience: Audience = "python", fill: Fill = str.format) -> IssueText:
     """The text of an issue.
 
     Args:
         audience: whom the fix is for.
-        translate: the translation of an English template, which keeps its fields in braces.
+        fill: fills a template, called with its text and by name its values: in another language
+            with its translation.
     """
     template = catalogue()[issue.code]
-    words = {key: _words(value, translate) for key, value in issue.values.items()}
+    words = {key: _words(value, fill) for key, value in issue.values.items()}
     fix = template.fix if audience == "python" else template.fix_command or template.fix
     filled = (
-        translate(text).format(**{"where": issue.where, **words}) if text else ""
+        fill(text, **{"where": issue.where, **words}) if text else ""
         for text in (template.what, template.effect, fix)
     )
     return IssueText(*filled)
 
 
+def issue_note(issue: Issue, audience: Audience = "command") -> Note:
+    """An issue as a sentence that a page can show in another language."""
+    text = issue_text(issue, audience, Note)
+    if text.fix:
+        return Note("{what}: {effect}; {fix}.", **text._asdict())
+    return Note("{what}: {effect}.", what=text.what, effect=text.effect)
+
+
 def issue_rows(
     issues: Iterable[Issue],
     audience: Audience = "python",
-    translate: Translate = lambda text: text,
+    fill: Fill = str.format,
 ) -> list[tuple[str, str, str, str, str]]:
     """Rows of `COLUMNS`; the consequence is the effect with the fix."""
     rows: list[tuple[str, str, str, str, str]] = []
     for issue in issues:
-        what, consequence = issue_text(issue, audience, translate).pair
+        what, consequence = issue_text(issue, audience, fill).pair
         rows.append((issue.where, what, consequence, issue.code, issue.severity))
     return rows
 
@@ -161,16 +170,16 @@ def templates() -> tuple[str, ...]:
     return tuple(dict.fromkeys([*texts, *phrases().values()]))
 
 
-def _words(value: object, translate: Translate) -> object:
+def _words(value: object, fill: Fill) -> object:
     """A value as the templates take it: phrases and lists as text, numbers as they are."""
     if isinstance(value, Phrase):
-        words = {key: _words(one, translate) for key, one in value.values.items()}
-        return translate(phrases()[value.key]).format(**words)
+        words = {key: _words(one, fill) for key, one in value.values.items()}
+        return fill(phrases()[value.key], **words)
     if isinstance(value, tuple):
-        listed = ", ".join(str(_words(one, translate)) for one in value[:LISTED])
+        listed = ", ".join(str(_words(one, fill)) for one in value[:LISTED])
         if len(value) <= LISTED:
             return listed
-        return translate(phrases()["more"]).format(names=listed, count=len(value) - LISTED)
+        return fill(phrases()["more"], names=listed, count=len(value) - LISTED)
     return value
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from bim.report.issue import (
     Audience,
+    Fill,
     Issue,
     IssueText,
     Phrase,
-    Translate,
     catalogue,
     issue_text,
     phrases,
@@ -27,14 +27,12 @@ class Ranked:
     glass: float  # [m2]
     first: Issue
 
-    def text(
-        self, audience: Audience = "python", translate: Translate = lambda text: text
-    ) -> IssueText:
+    def text(self, audience: Audience = "python", fill: Fill = str.format) -> IssueText:
         """The text of the first issue as an example, after the number of issues."""
-        text = issue_text(self.first, audience, translate)
+        text = issue_text(self.first, audience, fill)
         if self.count == 1:
             return text
-        what = translate(phrases()["times"]).format(count=self.count, what=text.what)
+        what = fill(phrases()["times"], count=self.count, what=text.what)
         return text._replace(what=what)
 
 

@@ -16,11 +16,12 @@ from mitsuba_cfs.glare.position_index import position_index, view_angles
 from mitsuba_cfs.glare.sources import Sources, glare_sources, pixel_sources, with_disc
 from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View
+from mitsuba_cfs.notes import Note
 
 BACKGROUNDS = ("indirect", "average", "illuminance")
 GROUPINGS = {  # what a source is
-    "evalglare": "bright pixels near one another, as evalglare groups them",
-    "pixels": "each bright pixel, as raytools sums them",
+    "evalglare": Note("groups of adjacent bright pixels (evalglare)"),
+    "pixels": Note("each bright pixel (raytools)"),
 }
 
 
@@ -70,8 +71,8 @@ class GlareOptions:
     @property
     def rule(self) -> str:
         """Definition of the glare sources as text."""
-        own = "a source of its own" if self.sun == "source" else "part of its pixels"
-        return f"sources: {GROUPINGS[self.grouping]}; the sun's disc: {own}"
+        own = Note("separate source") if self.sun == "source" else Note("part of its pixels")
+        return Note("{grouping}; solar disc: {sun}", grouping=GROUPINGS[self.grouping], sun=own)
 
 
 @dataclass(frozen=True)

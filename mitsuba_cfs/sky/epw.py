@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky import air, weather_table
 from mitsuba_cfs.sky.plausible import checked_sun
 from mitsuba_cfs.sky.weather import Weather
@@ -85,9 +86,14 @@ def _pressure(
     if wrong.any():
         row = int(np.argmax(wrong))
         notes = (
-            f"Weather {site.name}: {np.count_nonzero(wrong)} impossible pressures, the first in "
-            f"line {column.first_line + row}: {standard:.0f} Pa of the standard atmosphere stand "
-            "in.",
+            Note(
+                "Weather {site}: {count} impossible pressures, the first in line {line}; "
+                "{pressure:.0f} Pa (standard atmosphere) is used.",
+                site=site.name,
+                count=np.count_nonzero(wrong),
+                line=column.first_line + row,
+                pressure=standard,
+            ),
         )
     return np.where(np.isnan(pressure), standard, pressure), notes
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.air import relative_humidity, standard_pressure
 from mitsuba_cfs.sky.weather import Weather
 
@@ -104,11 +105,18 @@ def in_city(
 def _notes(
     weather: Weather, maximum: NDArray[np.float64], excess: NDArray[np.float64]
 ) -> list[str]:
-    found = [
-        f"Weather {weather.site}: the air is that of a street, {excess.mean():.1f} K warmer than "
-        f"in the file in the mean of the year and {excess.max():.1f} K at most (heat island by "
-        f"{SOURCE}, daily maxima of {np.median(maximum):.1f} K in the median, by "
-        "hour as stated); sky, wind, ground and the water in the air are the file's."
+    found: list[str] = [
+        Note(
+            "Weather {site}: air of an urban street, on average {mean:.1f} K and at most "
+            "{most:.1f} K warmer than in the file (urban heat island by {source}, median of the "
+            "daily maxima {median:.1f} K); sky, wind, ground and absolute humidity are those of "
+            "the file.",
+            site=weather.site,
+            mean=float(excess.mean()),
+            most=float(excess.max()),
+            source=SOURCE,
+            median=float(np.median(maximum)),
+        )
     ]
     for value, (low, high) in (
         (weather.latitude_deg, NORTH_DEG),
@@ -116,8 +124,11 @@ def _notes(
     ):
         if not low <= value <= high:
             found.append(
-                f"Weather {weather.site}: the heat island's equation is of cities in north-western "
-                "Europe, where this site is not."
+                Note(
+                    "Weather {site}: the heat island equation is for cities in north-western "
+                    "Europe; this site is elsewhere.",
+                    site=weather.site,
+                )
             )
             break
     return found

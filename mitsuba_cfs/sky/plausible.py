@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.sun import SOLAR_CONSTANT, declination_and_time
 from mitsuba_cfs.sky.weather import Weather
 
@@ -82,8 +83,26 @@ def _clock(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]
         text = f": {' or '.join(fits)} would fit" if fits else ""
         field = fits[0].rpartition(" ")[0] if len(fits) == 1 else "time zone"
         raise DataError(what + text, file=file, field=field)
-    causes = [*(f"{text} would fit" for text in fits), "its hours may be labelled otherwise"]
-    return [f"Weather {weather.site}: {what}: {', or '.join(causes)}."]
+    values = {
+        "site": weather.site, "hours": abs(late), "longitude": weather.longitude_deg,
+        "zone": weather.timezone_h, "fits": ", ".join(fits),
+    }  # fmt: skip
+    note = (
+        Note(
+            "Weather {site}: on clear days the radiation is centred {hours:.1f} h before the solar "
+            "noon of longitude {longitude:g} and time zone {zone:g}; values that fit: {fits}; or "
+            "the hours are labelled differently.",
+            **values,
+        )
+        if late < 0
+        else Note(
+            "Weather {site}: on clear days the radiation is centred {hours:.1f} h after the solar "
+            "noon of longitude {longitude:g} and time zone {zone:g}; values that fit: {fits}; or "
+            "the hours are labelled differently.",
+            **values,
+        )
+    )
+    return [note]
 
 
 def _fitting(weather: Weather, late: float) -> dict[str, float]:
@@ -127,10 +146,15 @@ def _far_zone(weather: Weather) -> list[str]:
     apart = _wrapped(weather.timezone_h - weather.longitude_deg / 15)
     if abs(apart) <= FAR_ZONE_H:
         return []
-    return [
-        f"Weather {weather.site}: time zone {weather.timezone_h:g} lies {abs(apart):.1f} h from "
-        f"longitude {weather.longitude_deg:g}, though the radiation agrees with both."
-    ]
+    note = Note(
+        "Weather {site}: time zone {zone:g} differs by {hours:.1f} h from longitude {longitude:g}, "
+        "although the radiation agrees with both.",
+        site=weather.site,
+        zone=weather.timezone_h,
+        hours=abs(apart),
+        longitude=weather.longitude_deg,
+    )
+    return [note]
 
 
 def _seasons(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]:
@@ -148,10 +172,14 @@ def _seasons(weather: Weather, days: Days, file: str | PathLike[str]) -> list[st
         raise DataError(what + "would fit (its sign?)", file=file, field="latitude")
     if LEAST_SLOPE <= slope <= MOST_SLOPE:
         return []
-    return [
-        f"Weather {weather.site}: from winter to summer the days grow {slope:.1f} times as much as "
-        f"they do at latitude {weather.latitude_deg:g}."
-    ]
+    note = Note(
+        "Weather {site}: from winter to summer the length of the days changes {slope:.1f} times as "
+        "much as at latitude {latitude:g}.",
+        site=weather.site,
+        slope=slope,
+        latitude=weather.latitude_deg,
+    )
+    return [note]
 
 
 def _amount(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]:
@@ -170,7 +198,13 @@ def _amount(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str
     )
     if clearness < LEAST_CLEARNESS:
         raise DataError(what, file=file, field="global horizontal irradiance")
-    return [f"Weather {weather.site}: {what}."] if clearness > MOST_CLEARNESS else []
+    note = Note(
+        "Weather {site}: in the clearest hours {percent:.2g} % of the extraterrestrial radiation "
+        "arrives; the unit must be W/m2.",
+        site=weather.site,
+        percent=100 * clearness,
+    )
+    return [note] if clearness > MOST_CLEARNESS else []
 
 
 def _wrapped(hours: float) -> float:

@@ -13,6 +13,7 @@ from scenes.commands.parameters import FILE, check_is_ifc
 from scenes.commands.printed_head import PrintedHead
 from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
+    chosen_language,
     directions_option,
     eye_height_option,
     grid_option,
@@ -81,7 +82,7 @@ def command(
     from scenes.page_options import DossierSection, read_page
     from scenes.result_folder import ResultFolder
 
-    page_options = read_page(page, DossierSection)
+    page_options = read_page(page, DossierSection, chosen_language())
     inputs = (building, options.weather, options.system, options.closed, options.uses)
     inputs += (*options.surroundings, *page_options.inputs)
     folder = ResultFolder(out, "comply", inputs=inputs)

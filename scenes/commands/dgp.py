@@ -10,6 +10,7 @@ from scenes import quick
 from scenes.commands.printed_head import PrintedHead
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
+    chosen_language,
     directions_option,
     eye_height_option,
     grid_option,
@@ -17,6 +18,7 @@ from scenes.commands.room_options import (
     light_options,
     method_option,
     out_folder_option,
+    page_option,
     samples_option,
     size_option,
     subdivide_option,
@@ -57,8 +59,9 @@ _DEFAULT = YearOptions(Path(), Path())
 @click.option("--hdr", is_flag=True, help="These pictures as .hdr too.")
 @subdivide_option
 @light_options
+@page_option
 @quick_option
-def command(out: Path, **chosen) -> None:
+def command(out: Path, page: Path | None, **chosen) -> None:
     """Daylight glare probability of a room's views in every hour with the sun up.
 
     What fills the windows without --cfs: the BSDF attached to them or their types in the IFC, else
@@ -73,19 +76,22 @@ def command(out: Path, **chosen) -> None:
     start, end = chosen["occupied"]
     if start == end or start == 24:
         raise click.UsageError(f"--occupied {start} {end}: expected two different hours, 0 to 24")
+    from scenes.page_options import GlareSection, read_page
     from scenes.result_folder import ResultFolder
     from scenes.year_of_glare.views import read_files
 
     if chosen["quick"]:
         chosen |= quick.picks(quick.VIEWS, given())
+    page_options = read_page(page, GlareSection, chosen_language())
     named = (chosen["building"], chosen["weather"], chosen["system"])
-    files = (*named, *map(Path, chosen["views"]), *chosen["surroundings"])
+    files = (*named, *map(Path, chosen["views"]), *chosen["surroundings"], *page_options.inputs)
     options = YearOptions(**with_demo(chosen))
     folder = ResultFolder(out, "dgp", inputs=files)
     read = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
     from scenes.language.catalogue import ngettext
-    from scenes.year_of_glare import outputs, page
+    from scenes.year_of_glare import outputs
+    from scenes.year_of_glare.page import write_page
     from scenes.year_of_glare.year import rate_views, read_year
 
     if options.quick:
@@ -97,7 +103,7 @@ def command(out: Path, **chosen) -> None:
         with folder.replaced() as place:
             rows = [outputs.write_view(year, rated, place) for rated in views]
             table = outputs.write_summary(year, rows, place)
-            page.write_page(year, table, place / "report.html")
+            write_page(year, table, place / "report.html", page_options)
     worst = table.loc[table["highest_dgp"].idxmax()]
     views = ngettext("{count} view", "{count} views", len(table))
     hours = ngettext("{count} hour", "{count} hours", len(year.sky.lit))

@@ -25,21 +25,31 @@ RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, help="On the loopback address; 0: any."
 )
+@click.option(
+    "--language", type=click.Choice(["en", "de", "fr"]), default="en", show_default=True,
+    help="Language of the page; of several runs, or of --out.",
+)  # fmt: skip
 @click.option("--no-browser", is_flag=True, help="Only say the address.")
-def command(results: Sequence[Path], out: Path | None, port: int, no_browser: bool) -> None:
+def command(
+    results: Sequence[Path], out: Path | None, port: int, language: str, no_browser: bool
+) -> None:
     """Walk through any hour of runs: pictures, glare, plans with patches of sun, temperatures.
 
     RESULTS are folders of `cfs run --explore`.  Those of several runs can be seen side by side.
     The page is served to this machine alone until Ctrl-C; it asks for nothing elsewhere.
     """
     from scenes.explore.folder import explorer_of, join_explorers
+    from scenes.language.catalogue import in_language
     from scenes.result_folder import ResultFolder
 
     folders = [explorer_of(one) for one in results]
     for one in results:
         _print_head(one, several=len(results) > 1)
     if out is not None:
-        with ResultFolder(out, "explore", inputs=results).replaced() as place:
+        with (
+            in_language(language),
+            ResultFolder(out, "explore", inputs=results).replaced() as place,
+        ):
             join_explorers(results, place)
         click.echo(f"explorer: {out / 'index.html'}")
         return
@@ -47,7 +57,8 @@ def command(results: Sequence[Path], out: Path | None, port: int, no_browser: bo
         folder = folders[0]
         if len(results) > 1:
             folder = Path(place)
-            join_explorers(results, folder)
+            with in_language(language):
+                join_explorers(results, folder)
         _serve(folder, port, open_it=not no_browser)
 
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 Study = TypeVar("Study", "StudyFile", "Grid")
 Option = Callable[[Callable], Callable]
 _GRID = SensorGrid()
+LANGUAGE = "cfs.language"  # where `--language` is kept of a call
 
 out_folder_option = click.option(
     "--out", required=True, type=click.Path(path_type=Path), help="Folder of results."
@@ -119,10 +120,30 @@ sky_ground_option = click.option(
 annual_glare_option = click.option(
     "--annual-glare", is_flag=True, help="Rate every hour with daylight."
 )
-page_option = click.option(
-    "--page", type=FILE, metavar="FILE.toml",
-    help="Title, author, logo and sections of the page that is written; see docs/quickstart.md.",
-)  # fmt: skip
+
+
+def _keep_language(context: click.Context, _: click.Parameter, value: str | None) -> None:
+    context.meta[LANGUAGE] = value
+
+
+def chosen_language() -> str | None:
+    """The language of `--language`; None where it is not given."""
+    return click.get_current_context().meta.get(LANGUAGE)
+
+
+def page_option(command: Callable) -> Callable:
+    """`--page` and `--language`; the latter is had by `chosen_language`."""
+    language = click.option(
+        "--language", type=click.Choice(["en", "de", "fr"]), expose_value=False,
+        callback=_keep_language, help="Language of the page; default: of --page, else English.",
+    )  # fmt: skip
+    file = click.option(
+        "--page", type=FILE, metavar="FILE.toml",
+        help="Title, author, logo, language and sections of the page; see docs/quickstart.md.",
+    )  # fmt: skip
+    return file(language(command))
+
+
 set_option = click.option(
     "--set", "settings", multiple=True, metavar="NAME=VALUE",
     help="A choice by its name in `[options]` of study files, such as sensor_samples=4096.",

@@ -13,6 +13,7 @@ from scenes.commands.parameters import FILE
 from scenes.commands.printed_head import PrintedHead
 from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
+    chosen_language,
     explore_option,
     height_option,
     input_options,
@@ -122,7 +123,7 @@ def run_to_folder(
 
     if scheduler is not None:
         check_dask()
-    page_options = read_page(page, RunSection, translated=True)
+    page_options = read_page(page, RunSection, chosen_language())
     inputs = (options.building, options.weather, options.system, options.operation)
     inputs += (*options.surroundings, *page_options.inputs)
     folder = ResultFolder(out, "run", inputs=inputs)
@@ -151,7 +152,7 @@ def run_to_folder(
         )  # fmt: skip
         progress("results", 0.0)
         report = partial(write_report, page=page_options)
-        explorer = write_explorer if options.explore else None
+        explorer = partial(write_explorer, page=page_options) if options.explore else None
         write_results(
             result, folder, report, explorer,
             netcdf=options.netcdf, processes=processes, progress=progress,

@@ -14,6 +14,7 @@ from scenes.commands.parameters import FILE, check_is_ifc
 from scenes.commands.printed_head import PrintedHead
 from scenes.commands.quick_option import quick_option
 from scenes.commands.room_options import (
+    chosen_language,
     explore_option,
     method_option,
     out_folder_option,
@@ -94,7 +95,7 @@ def study_to_folder(
     """Compute a study with a progress bar, say what comes out case by case, write its files."""
     from scenes.page_options import StudySection, read_page
 
-    page_options = read_page(page, StudySection, translated=True)
+    page_options = read_page(page, StudySection, chosen_language())
     files = (file, *parsed.files, *page_options.inputs)
     store = _checked(files, parsed, out, scheduler, write_ifc)
     from scenes.commands.compiling import compiled_beside
@@ -125,7 +126,9 @@ def study_to_folder(
                 progress=progress, on_case=_print_explorer,
             )  # fmt: skip
     report = None if nothing else lambda path: write_study_report(result, path, page_options)
-    page_of_cases = partial(write_study_explorer, result) if result.explored else None
+    page_of_cases = (
+        partial(write_study_explorer, result, page=page_options) if result.explored else None
+    )
     write_study(parsed, result, store, report, page_of_cases)
     _print_outcome(result, out)
     if write_ifc is not None and not nothing:

@@ -11,8 +11,9 @@ from scenes.comply.need import Need
 from scenes.comply.openings import openings_of
 from scenes.comply.rules import NOT_MET, CriterionTable, LevelTable, RuleTable
 from scenes.comply.uses import RoomUse
+from scenes.language.catalogue import N_
 
-NOT_FOR_IT, NOT_COMPUTED = "not for this room", "not computed"
+NOT_FOR_IT, NOT_COMPUTED = N_("not applicable"), N_("not computed")
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.metrics.autonomy import daylight_autonomy
 from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded
 from mitsuba_cfs.metrics.lm83 import sunlit_hours
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from scenes.chosen_rooms import no_window
@@ -36,12 +37,15 @@ from scenes.comply.outdoors import OutdoorMesh, outdoors_of
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLights
 from scenes.comply.solar import solar_sentences
 from scenes.comply.sunlight import SunExposure, sun_day, sun_exposure
+from scenes.comply.tables import USE_WORDS
 from scenes.comply.uses import UNKNOWN, RoomUse
 from scenes.comply.view_out import ViewOut, view_out
 from scenes.fenestration.systems import States
 from scenes.head import Head, unused_notes
 from scenes.input_files import building_of
 from scenes.inputs import first_states, inputs_of
+from scenes.language.catalogue import N_
+from scenes.report.method import METHODS
 from scenes.room.inputs import room_inputs
 from scenes.room.light import room_light
 from scenes.room.options import RoomOptions
@@ -180,7 +184,9 @@ class Check:
         for space in spaces:
             use = self.files.uses.of(space, texts.get(space.guid, ()))
             if use.key == UNKNOWN and not space.windows:
-                use = replace(use, occupied=False, source="no window and no use: not occupied")
+                use = replace(
+                    use, occupied=False, source=Note("no window and no use, not occupied")
+                )
             found[space.guid] = use
         return found
 
@@ -330,9 +336,16 @@ class Check:
         found += dwelling_words(rooms)
         if left:
             names = ", ".join(space.label for space in left)
-            found.append(f"Left out, without a window and not regularly occupied: {names}.")
+            found.append(
+                Note("Not assessed (no window, not regularly occupied): {rooms}.", rooms=names)
+            )
         found += [
-            f"{room.space.label}: {room.use.key}, {room.use.source}."
+            Note(
+                "{room}: {use}; {source}.",
+                room=room.space.label,
+                use=Note(USE_WORDS.get(room.use.key, room.use.key)),
+                source=room.use.source,
+            )
             for room in rooms
             if room.use.assumed
         ]
@@ -343,14 +356,19 @@ class Check:
         files, options = self.files, self.options
         if "sun" in self.parts:
             month, day = options.day
-            yield (
-                f"Sunlight on {day:02d}.{month:02d}., the sun from "
-                f"{files.least_altitude_deg:g}° above the horizon ({files.altitude_source})."
+            yield Note(
+                "Sunlight is assessed on {day:02d}.{month:02d}. for solar altitudes from "
+                "{altitude:g}° ({source}).",
+                day=day,
+                month=month,
+                altitude=files.least_altitude_deg,
+                source=files.altitude_source,
             )
         if "view" in self.parts:
-            yield (
-                f"View out: eyes {options.eye_height:g} m above the floor, 0.5 m apart and off the "
-                "walls, are the utilised area; furniture does not count."
+            yield Note(
+                "View out is assessed at eyes {height:g} m above the floor, spaced 0.5 m and 0.5 m "
+                "from the walls (utilised area), without furniture.",
+                height=options.eye_height,
             )
             yield from self.glass
 
@@ -358,41 +376,59 @@ class Check:
         """What was assumed for light, glare and heat."""
         room = self.options.room
         if "glare" in self.parts and not self.glaring:
-            yield "Glare was not computed: --annual-glare rates every hour with daylight."
+            yield Note("Glare was not computed; --annual-glare rates every hour with daylight.")
         elif self.glaring:
             yield glare_words(self.options, shaded=self.shaded)
         if self.lit:
             yield light_words(room)
         if "heat" in self.parts:
-            blinds = "blinds closed when LM-83 closes some" if self.shaded else "no blinds"
-            yield (
-                f"Temperatures are those without heating and cooling, {blinds}, "
-                f"{room.infiltration_ach:g} air changes an hour, gains of the hours of use."
+            template = (
+                N_(
+                    "Temperatures are without heating and cooling, with blinds closed by the rule "
+                    "of LM-83, {air_changes:g} air changes per hour and gains in the hours of use."
+                )
+                if self.shaded
+                else N_(
+                    "Temperatures are without heating and cooling, without blinds, with "
+                    "{air_changes:g} air changes per hour and gains in the hours of use."
+                )
             )
+            yield Note(template, air_changes=room.infiltration_ach)
         if "open" in self.parts and self.calendar.median_diffuse is None:
-            yield "The weather file has no diffuse illuminance: no daylight factor method."
+            yield Note(
+                "The daylight factor method is not available: the weather file has no diffuse "
+                "illuminance."
+            )
 
 
 def glare_words(options: ComplyOptions, *, shaded: bool) -> str:
     """How glare is rated; `shaded`: with real blinds."""
-    blinds = "blinds closed by LM-83's rule" if shaded else "every window open"
-    seats = "one seat in the middle of each room"
+    blinds = Note("blinds closed by the rule of LM-83") if shaded else Note("all blinds open")
+    seats = Note("one seat in the middle of each room")
     if options.grid is not None:
-        seats = f"seats {options.grid:g} m apart"
+        seats = Note("seats spaced {distance:g} m", distance=options.grid)
     start, end = options.room.occupancy.hours
-    return (
-        f"Glare is rated with {blinds}, at {seats}, {start} to {end} o'clock of every day, in "
-        f"pictures of {options.room.outputs.picture_size} pixels."
+    return Note(
+        "Glare is rated with {blinds}, {seats}, daily from {start} to {end} o'clock, with pictures "
+        "of {pixels} pixels.",
+        blinds=blinds,
+        seats=seats,
+        start=start,
+        end=end,
+        pixels=options.room.outputs.picture_size,
     )
 
 
 def light_words(room: RoomOptions) -> str:
     """How light is computed."""
     sampling = room.sampling
-    return (
-        f"Light by the {room.method} method: {sampling.sensor_samples} paths from a sensor, "
-        f"{sampling.patch_samples} from a direction of a window, {sampling.sun_points} points of "
-        "a window that look for the sun."
+    return Note(
+        "Light is computed with the {method} method: {sensor} paths per sensor, {patch} per window "
+        "direction, {sun} sun sampling points per window.",
+        method=Note(METHODS[room.method]),
+        sensor=sampling.sensor_samples,
+        patch=sampling.patch_samples,
+        sun=sampling.sun_points,
     )
 
 

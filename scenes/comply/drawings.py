@@ -10,15 +10,16 @@ from scenes.comply.results import CheckedRoom, Compliance, GridSummary
 from scenes.figures.chart import Chart, ChartMark, box
 from scenes.figures.plan import FloorPlan, plan, plan_frame
 from scenes.figures.scale import ColourScale, Tick
-from scenes.language.numbers import rounded
+from scenes.language.catalogue import decimal, gettext, ngettext
+from scenes.language.numbers import day_and_month, rounded
 
 FIRST_HOUR, LAST_HOUR = 4, 21  # of the sun's bars
 # plans of the light, and the needs of rules that look at what they show, the nearest first
 LIGHT_PLANS = {
-    "Half of the daylight hours": ("reached_lux",),
-    "Daylight factor": ("reached_factor",),
-    "Daylight autonomy": ("sda", "view_free", "leni", "mean_hours", "worst_hours", "equinox"),
-    "Sunlit hours": ("ase",),
+    "half time": ("reached_lux",),
+    "daylight factor": ("reached_factor",),
+    "daylight autonomy": ("sda", "view_free", "leni", "mean_hours", "worst_hours", "equinox"),
+    "sunlit hours": ("ase",),
 }
 MOST_BARS = 12  # openings with a bar of their own
 MOST_LETTERS = 28  # of the name beside a bar
@@ -35,44 +36,59 @@ def _view_plans(result: Compliance, room: CheckedRoom) -> Iterator[FloorPlan]:
         return
     frame = plan_frame(room.space, room.view.points)
     angle = room.view.sight_angle_deg
-    scale = ColourScale(0, 90, "Horizontal sight angle", "°")
-    text = f"{rounded(float(np.min(angle)), 0)} to {rounded(float(np.max(angle)), 0)}° by place."
-    yield plan(frame, angle, scale, title="Horizontal sight angle", explanation=text)
+    title = gettext("Horizontal sight angle")
+    scale = ColourScale(0, 90, title, "°")
+    text = gettext(
+        "{least} to {most}°.",
+        least=rounded(float(np.min(angle)), 0),
+        most=rounded(float(np.max(angle)), 0),
+    )
+    yield plan(frame, angle, scale, title=title, explanation=text)
     layers = room.view.layer_count
-    scale = ColourScale(0, 3, "Layers", "")
-    text = "Landscape, sky and ground that one opening shows; 0 where the landscape is not seen."
-    yield plan(frame, layers, scale, title="Layers of the view", explanation=text)
+    scale = ColourScale(0, 3, gettext("Layers"), "")
+    text = gettext(
+        "Layers (landscape, sky, ground) visible through one opening; 0 where the landscape is not "
+        "visible."
+    )
+    yield plan(frame, layers, scale, title=gettext("Layers of the view"), explanation=text)
 
 
 def _light_plans(result: Compliance, room: CheckedRoom) -> Iterator[FloorPlan]:
     """One plan of each quantity, on the grid of the first rule that asks for it."""
-    for title, needs in LIGHT_PLANS.items():
+    for kind, needs in LIGHT_PLANS.items():
         found = _asking(result, room, needs)
         if found is None:
             continue
         name, grid = found
         frame = plan_frame(room.space, grid.points)
-        blinds = "blinds open" if grid.closed is None else "blinds operated"
-        height = f"{grid.points[0, 2] - room.space.floor_level:.2f} m high"
-        on = f"on the grid of {name}, {height}"
-        if title == "Daylight factor":
-            factor = 100 * grid.factor
+        height = decimal(f"{grid.points[0, 2] - room.space.floor_level:.2f}")
+        of_grid = gettext("Grid of {rule}, {height} m above the floor.", rule=name, height=height)
+        if kind == "daylight factor":
+            title, factor = gettext("Daylight factor"), 100 * grid.factor
             scale = ColourScale(0, max(float(np.ceil(factor.max())), 1.0), title, "%")
-            text = f"Overcast sky, {on}."
+            text = gettext("Overcast sky.") + " " + of_grid
             yield plan(frame, factor, scale, title=title, explanation=text, digits=1)
-        elif title == "Half of the daylight hours":
+        elif kind == "half time":
+            title = gettext("Illuminance in half of the daylight hours")
             top = float(max(np.ceil(grid.half_time.max() / 250) * 250, 750))
-            scale = ColourScale(0, top, "Illuminance", "lx")
-            text = f"Illuminance reached in half of the daylight hours, blinds open, {on}."
+            scale = ColourScale(0, top, gettext("Illuminance"), "lx")
+            text = gettext("Reached in half of the daylight hours, blinds open.") + " " + of_grid
             yield plan(frame, grid.half_time, scale, title=title, explanation=text)
-        elif title == "Daylight autonomy":
+        elif kind == "daylight autonomy":
+            title = gettext("Daylight autonomy")
             scale = ColourScale(0, 100, title, "%")
-            text = f"300 lx, 8 to 18 o'clock, {blinds}, {on}."
+            text = (
+                gettext("300 lx, 8 to 18 o'clock, blinds open.")
+                if grid.closed is None
+                else gettext("300 lx, 8 to 18 o'clock, blinds operated.")
+            )
+            text += " " + of_grid
             yield plan(frame, 100 * grid.autonomy, scale, title=title, explanation=text)
         elif grid.sunlit_hours.any():
+            title = gettext("Sunlit hours")
             top = float(np.ceil(grid.sunlit_hours.max() / 50) * 50)
-            scale = ColourScale(0, top, "Direct sun", "h")
-            text = f"1000 lx of direct sun, 8 to 18 o'clock, blinds open, {on}."
+            scale = ColourScale(0, top, gettext("Direct sun"), "h")
+            text = gettext("1000 lx of direct sun, 8 to 18 o'clock, blinds open.") + " " + of_grid
             yield plan(frame, grid.sunlit_hours, scale, title=title, explanation=text)
 
 
@@ -97,10 +113,18 @@ def _glare_plans(room: CheckedRoom) -> Iterator[FloorPlan]:
     worst = np.zeros(len(eyes))  # of the directions of each eye
     np.maximum.at(worst, seat.ravel(), glare.not_exceeded())
     frame = plan_frame(room.space, eyes)
-    scale = ColourScale(0.2, 0.6, "Daylight glare probability", "")
-    blinds = "blinds operated" if glare.operated else "blinds open"
-    text = f"Exceeded in 5 % of the hours of use, in each seat's worst direction, {blinds}."
-    yield plan(frame, worst, scale, title="Glare", explanation=text, digits=2)
+    scale = ColourScale(0.2, 0.6, gettext("Daylight glare probability"), "")
+    text = (
+        gettext(
+            "DGP exceeded in 5 % of the hours of use, worst direction of each seat, blinds "
+            "operated."
+        )
+        if glare.operated
+        else gettext(
+            "DGP exceeded in 5 % of the hours of use, worst direction of each seat, blinds open."
+        )
+    )
+    yield plan(frame, worst, scale, title=gettext("Glare"), explanation=text, digits=2)
 
 
 def shortened(name: str) -> str:
@@ -115,7 +139,7 @@ def sun_bars(result: Compliance, room: CheckedRoom) -> Chart | None:
     if room.sun is None or not wanted or not room.sun.openings:
         return None
     openings = room.sun.openings[:MOST_BARS]
-    rows = [("any opening", room.sun.times)]
+    rows = [(gettext("any opening"), room.sun.times)]
     rows += [(shortened(one.name), one.times) for one in openings]
     count = len(rows)
     x_range, y_range = (60.0 * FIRST_HOUR, 60.0 * LAST_HOUR), (0.0, float(count))
@@ -131,12 +155,18 @@ def sun_bars(result: Compliance, room: CheckedRoom) -> Chart | None:
     hours = range(FIRST_HOUR, LAST_HOUR + 1, 2)
     span = LAST_HOUR - FIRST_HOUR
     more = len(room.sun.openings) - len(openings)
+    text = gettext(
+        "{date}, local standard time, cloudless: {hours} h at any opening.",
+        date=day_and_month(result.day.day),
+        hours=rounded(room.sun.hours, 2),
+    )
+    if more:
+        text += " " + ngettext(
+            "{count} more opening in the table.", "{count} more openings in the table.", more
+        )
     return Chart(
-        "Possible sun at the openings",
-        f"{result.day.day.day} {result.day.day:%B}, local standard time, cloudless; "
-        f"{room.sun.hours:.2f} h at any opening"
-        + (f"; {more} more openings in the table." if more else "."),
-        "Hour", "",
+        gettext("Possible sunlight at the openings"), text,
+        gettext("Hour"), "",
         tuple(Tick(100 * (h - FIRST_HOUR) / span, str(h), "") for h in hours),
         tuple(Tick(100 * (count - i - 0.5) / count, name, "", False)
               for i, (name, _) in enumerate(rows)),

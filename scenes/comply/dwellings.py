@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from mitsuba_cfs.notes import Note
 from scenes.comply.assess import NOT_COMPUTED, BuildingVerdict, RoomVerdict, assess_building
 from scenes.comply.results import CheckedRoom
 from scenes.comply.rules import NOT_MET
@@ -59,7 +60,17 @@ def dwelling_words(rooms: Sequence[CheckedRoom]) -> Iterator[str]:
         for room in used:
             homes.setdefault(room.use.dwelling, []).append(room.space.label)
         alone = homes.pop("", [])
-        parts = [f"{name} ({', '.join(labels)})" for name, labels in homes.items()]
+        parts = "; ".join(f"{name} ({', '.join(labels)})" for name, labels in homes.items())
+        if parts:
+            yield Note(
+                "{criterion}: dwellings are {dwellings}; a mapping file (--uses) names dwellings.",
+                criterion=Note(title),
+                dwellings=parts,
+            )
         if alone:
-            parts.append(f"of no named dwelling, so each by itself: {', '.join(alone)}")
-        yield f"{title}: {'; '.join(parts)}. A mapping file (--uses) names dwellings."
+            yield Note(
+                "{criterion}: rooms without a named dwelling are assessed individually: {rooms}; a "
+                "mapping file (--uses) names dwellings.",
+                criterion=Note(title),
+                rooms=", ".join(alone),
+            )

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.options import OTHER_ALTITUDE_DEG, ComplyOptions
 from scenes.comply.rules import RuleTable, read_rule
@@ -56,11 +57,13 @@ def least_altitude(
 ) -> tuple[float, str]:
     """Least altitude of the sun [deg] that counts as sunlight, and where it is from."""
     if options.least_altitude_deg is not None:
-        return options.least_altitude_deg, "given by --sun-altitude"
+        return options.least_altitude_deg, Note("given by --sun-altitude")
     country = weather.site.rpartition(", ")[2]
     for name, rule in rules.items():
         if country in rule.least_altitude_deg:
-            return rule.least_altitude_deg[country], f"of {country}, by the rule file {name}"
-    return OTHER_ALTITUDE_DEG, (
-        f"assumed: no rule file has one for {country or 'the country'}; --sun-altitude gives it"
+            source = Note("for {country}, rule file {rule}", country=country, rule=name)
+            return rule.least_altitude_deg[country], source
+    return OTHER_ALTITUDE_DEG, Note(
+        "assumed: no rule file has a value for {country}; --sun-altitude sets it",
+        country=country or Note("the country"),
     )

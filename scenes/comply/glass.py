@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from bim.model import Window
 from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.notes import Note
 from scenes.fenestration.systems import FenestrationSystem, States
 
 MOST_HAZE = 0.5  # share of the light passed that may be scattered in what counts as a view
@@ -56,17 +57,23 @@ def windows_without_view(
             if id(system) not in known:
                 known[id(system)] = sight_through(system)
             sight = known[id(system)]
-            notes[system.name] = (
-                f"{system.name}: {100 * sight.straight:.0f} % of the light straight on at normal "
-                f"incidence, haze {100 * sight.haze:.0f} %: {_said(sight, closed=number > 0)}."
+            notes[system.name] = Note(
+                "{system}: direct visible transmittance {direct:.0f} % at normal incidence, haze "
+                "{haze:.0f} %; {verdict}.",
+                system=system.name,
+                direct=100 * sight.straight,
+                haze=100 * sight.haze,
+                verdict=_view_words(sight, closed=number > 0),
             )
             if number == 0 and not sight.is_view:
                 hidden.add(window.guid)
     return frozenset(hidden), tuple(notes.values())
 
 
-def _said(sight: SightThrough, *, closed: bool) -> str:
+def _view_words(sight: SightThrough, *, closed: bool) -> Note:
     """What a state, open or closed, means for the view."""
+    if closed and sight.is_view:
+        return Note("the view remains when closed")
     if closed:
-        return "leaves the view free where closed" if sight.is_view else "hides the view"
-    return "counts as a view" if sight.is_view else "does not count as a view"
+        return Note("blocks the view")
+    return Note("counts as a view") if sight.is_view else Note("does not count as a view")

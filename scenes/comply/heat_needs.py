@@ -9,6 +9,7 @@ import numpy as np
 
 from scenes.comply.findings import Findings
 from scenes.comply.need import Need
+from scenes.language.catalogue import gettext
 from thermal.comfort import ADAPTIVE_BANDS, comfort_by_outdoors, degree_hours
 
 
@@ -25,8 +26,10 @@ class DegreeHours(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        when = "of the year" if self.all_hours else "of use"
-        return f"degree hours above {self.above_c:g} °C in the hours {when}"
+        above = f"{self.above_c:g}"
+        if self.all_hours:
+            return gettext("degree hours above {above} °C in all hours of the year", above=above)
+        return gettext("degree hours above {above} °C in the hours of use", above=above)
 
     def value(self, room: Findings) -> float | None:
         """Degree hours [K h]."""
@@ -51,12 +54,19 @@ class ComfortShare(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        found = f"share of the hours of use in the adaptive band {self.band}, where it applies"
         if self.cold_from_c >= ADAPTIVE_BANDS[self.band][-1]:
-            return f"{found}; too cold does not count"
+            return gettext(
+                "share of the hours of use within the adaptive band {band}, upper limit only",
+                band=self.band,
+            )
         if math.isfinite(self.cold_from_c):
-            found += f"; too cold counts from {self.cold_from_c:g} °C of running mean outdoors"
-        return found
+            return gettext(
+                "share of the hours of use within the adaptive band {band}; the lower limit "
+                "applies from an outdoor running mean of {cold_from} °C",
+                band=self.band,
+                cold_from=f"{self.cold_from_c:g}",
+            )
+        return gettext("share of the hours of use within the adaptive band {band}", band=self.band)
 
     def value(self, room: Findings) -> float | None:
         """Share, 0 to 1, of the hours whose running mean outdoors is in the band's range.

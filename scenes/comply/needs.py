@@ -13,6 +13,8 @@ from mitsuba_cfs.metrics.lm83 import annual_sunlight_exposure
 from scenes.comply.findings import Findings
 from scenes.comply.heat_needs import ComfortShare, DegreeHours
 from scenes.comply.need import Need
+from scenes.language.catalogue import decimal, gettext, ngettext
+from scenes.language.numbers import listed
 from scenes.toml_file import Positive, Share
 
 
@@ -29,9 +31,11 @@ class ReachedLux(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return (
-            f"illuminance reached on {100 * self.area:g} % of the reference plane "
-            f"in {100 * self.time:g} % of the daylight hours"
+        return gettext(
+            "illuminance reached on {area} % of the reference plane in {time} % of the daylight "
+            "hours",
+            area=f"{100 * self.area:g}",
+            time=f"{100 * self.time:g}",
         )
 
     def value(self, room: Findings) -> float | None:
@@ -59,9 +63,10 @@ class ReachedFactor(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return (
-            f"daylight factor reached on {100 * self.area:g} % of the reference plane, times the "
-            "site's median diffuse illuminance"
+        return gettext(
+            "daylight factor reached on {area} % of the reference plane, times the median outdoor "
+            "diffuse illuminance of the site",
+            area=f"{100 * self.area:g}",
         )
 
     def value(self, room: Findings) -> float | None:
@@ -88,10 +93,14 @@ class ViewShare(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        layers = "layer, the landscape" if self.layers == 1 else "layers with the landscape"
-        return (
-            f"share of the utilised area with a sight angle of {self.angle_deg:g}°, "
-            f"{self.distance:g} m of distance and {self.layers} {layers}"
+        return ngettext(
+            "share of the utilised area with a horizontal sight angle of {angle}°, an outside "
+            "distance of {distance} m and {count} layer (landscape)",
+            "share of the utilised area with a horizontal sight angle of {angle}°, an outside "
+            "distance of {distance} m and {count} layers (landscape included)",
+            self.layers,
+            angle=f"{self.angle_deg:g}",
+            distance=f"{self.distance:g}",
         )
 
     def value(self, room: Findings) -> float | None:
@@ -113,7 +122,7 @@ class SunHours(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return "hours of possible sun at the reference points of the openings"
+        return gettext("possible sunlight hours at the reference points of the openings")
 
     def value(self, room: Findings) -> float | None:
         """Hours."""
@@ -133,9 +142,9 @@ class DgpExceeded(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return (
-            f"share of the hours of use with a daylight glare probability above {self.limit:.2f}, "
-            "at the worst seat"
+        return gettext(
+            "share of the hours of use with a daylight glare probability above {limit}, worst seat",
+            limit=decimal(f"{self.limit:.2f}"),
         )
 
     def value(self, room: Findings) -> float | None:
@@ -154,7 +163,10 @@ class ViewFree(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return "share of 8 to 18 o'clock in which blinds leave the view through some window free"
+        return gettext(
+            "share of the hours from 8 to 18 o'clock with an unobstructed view through at least "
+            "one window"
+        )
 
     def value(self, room: Findings) -> float | None:
         """Share, 0 to 1."""
@@ -177,7 +189,11 @@ class SpatialAutonomy(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return f"sDA {self.lux:g} lx, {100 * self.time:g} % of 8 to 18 o'clock, blinds operated"
+        return gettext(
+            "sDA: {lux} lx in {time} % of the hours from 8 to 18 o'clock, blinds operated",
+            lux=f"{self.lux:g}",
+            time=f"{100 * self.time:g}",
+        )
 
     def value(self, room: Findings) -> float | None:
         """Share, 0 to 1."""
@@ -201,7 +217,11 @@ class SunlightExposure(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return f"ASE {self.lux:g} lx of direct sun for more than {self.hours:g} h, blinds open"
+        return gettext(
+            "ASE: {lux} lx of direct sun in more than {hours} h, blinds open",
+            lux=f"{self.lux:g}",
+            hours=f"{self.hours:g}",
+        )
 
     def value(self, room: Findings) -> float | None:
         """Share, 0 to 1."""
@@ -228,10 +248,11 @@ class Equinox(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        clocks = " and ".join(map(str, self.clocks))
-        return (
-            f"share of the area with {self.low:g} to {self.high:g} lx at {clocks} o'clock "
-            "of the clear days"
+        return gettext(
+            "share of the area with {low} to {high} lx at {clocks} o'clock of the clear days",
+            low=f"{self.low:g}",
+            high=f"{self.high:g}",
+            clocks=listed([str(clock) for clock in self.clocks]),
         )
 
     def value(self, room: Findings) -> float | None:
@@ -257,7 +278,10 @@ class MeanHours(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return f"hours of the year with {self.lux:g} lx as a mean over the room"
+        return gettext(
+            "hours of the year with a mean illuminance of {lux} lx in the room",
+            lux=f"{self.lux:g}",
+        )
 
     def value(self, room: Findings) -> float | None:
         """Hours."""
@@ -279,7 +303,9 @@ class WorstHours(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return f"hours of the year with {self.lux:g} lx at the worst lit point"
+        return gettext(
+            "hours of the year with {lux} lx at the worst lit point", lux=f"{self.lux:g}"
+        )
 
     def value(self, room: Findings) -> float | None:
         """Hours."""
@@ -302,7 +328,11 @@ class PointHours(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return f"share of the area with {self.lux:g} lx in {self.hours:g} hours of the year"
+        return gettext(
+            "share of the area with {lux} lx in {hours} hours of the year",
+            lux=f"{self.lux:g}",
+            hours=f"{self.hours:g}",
+        )
 
     def value(self, room: Findings) -> float | None:
         """Share, 0 to 1, of the points, each by its own hours."""
@@ -326,9 +356,10 @@ class LightingEnergy(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return (
-            f"energy of lamps of {self.power_w_m2:g} W/m², dimmed to {self.lux:g} lx, "
-            "8 to 18 o'clock"
+        return gettext(
+            "lighting energy with {power} W/m² installed, dimmed to {lux} lx, 8 to 18 o'clock",
+            power=decimal(f"{self.power_w_m2:g}"),
+            lux=f"{self.lux:g}",
         )
 
     def value(self, room: Findings) -> float | None:

@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib import metadata
 
 import numpy as np
 from markupsafe import Markup
 
-from bim.report.issue import issue_rows
 from scenes.comply import tables
 from scenes.comply.drawings import plans, sun_bars
 from scenes.comply.findings import SeatGlare
 from scenes.comply.results import CheckedRoom, Compliance
 from scenes.comply.rules import RuleTable
 from scenes.figures.chart import Chart
-from scenes.language.numbers import rounded
+from scenes.language.catalogue import decimal, gettext, in_language, ngettext, translated
+from scenes.language.numbers import colon, rounded, semicolons
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
+from scenes.report.names import stage_words
 from scenes.report.page import FILES as SHARED
 from scenes.report.page import environment
 from scenes.report.page_files import page_files
 from scenes.report.room import RoomSection, facts
-from scenes.report.tables import Column, Table
+from scenes.report.tables import Table, issues_table
 
 FILES = page_files("scenes.comply")
 # what does not come apart at the end of a line: a sign and its number, a number and what it counts
@@ -55,21 +57,36 @@ class DossierRoom(RoomSection):
 
 def dossier_html(result: Compliance, *, quick: bool = False, page: PageOptions = OWN_PAGE) -> str:
     """The dossier as text: no script, font or picture is fetched from anywhere."""
+    with in_language(page.language):
+        return _filled(result, quick=quick, page=page)
+
+
+def _filled(result: Compliance, *, quick: bool, page: PageOptions) -> str:
     rooms = [dossier_room(result, room, i) for i, room in enumerate(result.rooms, 1)]
     style = (SHARED["style.css"], FILES["dossier.css"])
     return environment(FILES).get_template("dossier.html.j2").render(
         page=page,
-        title=page.title or result.building.name or "Building",
+        title=page.title or result.building.name or gettext("Building"),
         facts=summary(result) + page.facts,
-        notes=[*([NOTE] if quick else []), *result.head.lines, *result.notes],
-        assumptions=result.assumptions,
+        notes=[
+            *([gettext(NOTE)] if quick else []),
+            *map(translated, (*result.head.lines, *result.notes)),
+        ],
+        assumptions=[translated(text) for text in result.assumptions],
         rules=[dossier_rule(result, name) for name in result.rules],
         rooms=rooms,
-        problems=problems_table(result),
+        problems=issues_table(result.issues),
         version=metadata.version("mitsuba-cfs"),
-        seconds=tied(", ".join(f"{name} {value:g} s" for name, value in result.seconds.items())),
+        seconds=tied(_seconds(result.seconds)),
         style=Markup("\n".join(style)),
     )  # fmt: skip
+
+
+def _seconds(stages: Mapping[str, float]) -> str:
+    """The computing time of each stage."""
+    return ", ".join(
+        f"{stage_words(stage)} {decimal(f'{value:g}')} s" for stage, value in stages.items()
+    )
 
 
 def dossier_rule(result: Compliance, name: str) -> DossierRule:
@@ -87,7 +104,7 @@ def dossier_room(result: Compliance, room: CheckedRoom, number: int) -> DossierR
     found = [tied_table(tables.room_table(result, room, name)) for name in result.rules]
     return DossierRoom(
         f"room-{number}",
-        f"Room {room.space.label}",
+        gettext("Room {room}", room=room.space.label),
         room_facts(room),
         plans(result, room),
         tuple(map(tied, tables.missed(room))),
@@ -100,36 +117,56 @@ def dossier_room(result: Compliance, room: CheckedRoom, number: int) -> DossierR
 def room_facts(room: CheckedRoom) -> tuple[tuple[str, str], ...]:
     """Size, use and blinds of a room in words."""
     template = "" if room.light is None else room.light.template
-    rows = [*facts(room.space, template), ("Use", f"{room.use.key}, {room.use.source}")]
+    use = f"{tables.use_words(room.use)}, {translated(room.use.source)}"
+    rows = [*facts(room.space, template), (gettext("Use"), use)]
     if room.use.dwelling:
-        rows.append(("Dwelling", room.use.dwelling))
+        rows.append((gettext("Dwelling"), room.use.dwelling))
     if not room.use.occupied:
-        rows.append(("Occupied", "not regularly: left out of what looks at occupied rooms"))
+        words = gettext("not regularly; criteria for occupied rooms do not apply")
+        rows.append((gettext("Occupied"), words))
     if room.light is not None:
         grids = list(room.light.grids.values())
         shares = {
-            f"{name}: {rounded(100 * share, 0)} %": None
+            colon(name, f"{rounded(100 * share, 0)} %"): None
             for grid in grids
             if grid.closed is not None
             for name, share in zip(room.light.groups, grid.closed.tolist(), strict=True)
         }
         if shares:
-            rows.append(("Blinds closed, of 8 to 18 o'clock", ", ".join(shares)))
+            rows.append((gettext("Blinds closed (8 to 18 o'clock)"), ", ".join(shares)))
         for some, every in {grid.view_free: None for grid in grids if grid.view_free}:
-            words = f"{rounded(100 * some, 0)} %, through all {rounded(100 * every, 0)} %"
-            rows.append(("View free through some window, of 8 to 18 o'clock", words))
+            words = gettext(
+                "{some} %, through all windows {every} %",
+                some=rounded(100 * some, 0),
+                every=rounded(100 * every, 0),
+            )
+            title = gettext("Unobstructed view through at least one window (8 to 18 o'clock)")
+            rows.append((title, words))
         if room.light.glare is not None:
-            rows.append(("Glare", glare_words(room.light.glare)))
+            rows.append((gettext("Glare"), glare_words(room.light.glare)))
     return tuple(rows)
 
 
 def glare_words(glare: SeatGlare) -> str:
-    """At how many seats glare was rated, and the worst of them."""
+    """The number of seats whose glare is rated, and the worst of them."""
     seats = len(np.unique(glare.eyes, axis=0))
-    ways = len(glare.eyes) // seats
-    where = f"{seats} seat{'s' * (seats > 1)}" + (f", {ways} directions each" if ways > 1 else "")
-    return (
-        f"{where}; at the worst DGP is above {glare.not_exceeded().max():.2f} in 5 % of the hours"
+    directions = len(glare.eyes) // seats
+    dgp = rounded(float(glare.not_exceeded().max()), 2)
+    if directions > 1:
+        return ngettext(
+            "{count} seat, {directions} directions; DGP exceeded in 5 % of the hours: {dgp} at the "
+            "worst",
+            "{count} seats, {directions} directions each; DGP exceeded in 5 % of the hours: {dgp} "
+            "at the worst",
+            seats,
+            directions=directions,
+            dgp=dgp,
+        )
+    return ngettext(
+        "{count} seat; DGP exceeded in 5 % of the hours: {dgp}",
+        "{count} seats; DGP exceeded in 5 % of the hours: {dgp} at the worst",
+        seats,
+        dgp=dgp,
     )
 
 
@@ -150,18 +187,14 @@ def summary(result: Compliance) -> tuple[tuple[str, str], ...]:
     file = "" if building.file is None else building.file.name
     median = result.calendar.median_diffuse
     rows = [
-        ("Model", file or building.name),
-        ("Weather", f"{weather.site} ({weather.file.name if weather.file else 'no file'})"),
-        ("Rooms", f"{len(result.rooms)} of {len(building.spaces)}"),
-        ("Rules", "; ".join(rule.edition for rule in result.rules.values())),
+        (gettext("Model"), file or building.name),
+        (gettext("Weather"), weather.site + (f" ({weather.file.name})" if weather.file else "")),
+        (
+            gettext("Rooms"),
+            gettext("{count} of {all}", count=len(result.rooms), all=len(building.spaces)),
+        ),
+        (gettext("Rules"), semicolons([rule.edition for rule in result.rules.values()])),
     ]
     if median is not None:
-        rows.append(("Median diffuse illuminance", f"{rounded(median, 0)} lx"))
+        rows.append((gettext("Median diffuse illuminance"), f"{rounded(median, 0)} lx"))
     return tuple(rows)
-
-
-def problems_table(result: Compliance) -> Table:
-    """What is wrong with the building's file and what was done about it."""
-    columns = tuple(Column(c, numeric=False) for c in ("Where", "What", "Consequence and repair"))
-    rows = tuple(row[:3] for row in issue_rows(result.issues, "command"))
-    return Table("Problems of the model", columns, rows)

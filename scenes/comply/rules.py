@@ -12,10 +12,11 @@ from pydantic import Field, model_validator
 from mitsuba_cfs.errors import DataError
 from scenes.comply.need import Need
 from scenes.comply.needs import AnyNeed
+from scenes.language.catalogue import N_
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 
 FOLDER = files(__package__) / "rules"
-NOT_MET = "not met"
+NOT_MET = N_("not met")
 # What of the rooms is compared over the building; "no building": nothing, and no room misses it
 Over = Literal[
     "room", "area mean", "each room", "area of rooms", "room of each dwelling", "no building"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from mitsuba_cfs.notes import Note
 from scenes.comply.blinds import DEFAULT_NAME
 from scenes.fenestration.ratings import system_ratings
 from scenes.fenestration.systems import FenestrationSystem, States
@@ -25,8 +26,11 @@ def solar_sentences(systems: Mapping[str, States]) -> Iterator[str]:
             continue
         try:
             yield solar_sentence(system)
+            yield from thermal_system(system).notes
         except ThermalInputError as error:
-            yield f"{system.name}: g_tot is not known: {error.message}."
+            yield Note(
+                "{system}: g_tot is unknown: {reason}.", system=system.name, reason=error.message
+            )
 
 
 def solar_sentence(system: FenestrationSystem) -> str:
@@ -38,12 +42,13 @@ def solar_sentence(system: FenestrationSystem) -> str:
     found = {rating.method: rating for rating in system_ratings(system, heat)}
     rating: ThermalRating = found.get(STANDARD) or found["heat balance"]
     limits = ", ".join(f"{limit:.2f}" for limit in CLASSES["g"])
-    source = "as the heat balance takes it" if rating.method == "heat balance" else rating.method
-    return " ".join(
-        (
-            f"{system.name}: g_tot {rating.g_value:.2f} at normal incidence ({source}), "
-            f"class {rating.solar_class('g')} if EN 14501's limits are {limits}, which could not "
-            "be checked.",
-            *heat.notes,
-        )
+    source = Note("as in the heat balance") if rating.method == "heat balance" else rating.method
+    return Note(
+        "{system}: g_tot {g:.2f} at normal incidence ({source}), class {solar_class} for the "
+        "limits {limits} of EN 14501 (not verified).",
+        system=system.name,
+        g=rating.g_value,
+        source=source,
+        solar_class=rating.solar_class("g"),
+        limits=limits,
     )

@@ -9,13 +9,22 @@ import pandas as pd
 from scenes.comply.assess import NOT_COMPUTED, NOT_FOR_IT, RoomVerdict
 from scenes.comply.need import Need
 from scenes.comply.results import CheckedRoom, Compliance
-from scenes.comply.rules import NOT_MET, LevelTable
-from scenes.language.numbers import MISSING, rounded
+from scenes.comply.rules import NOT_MET, CriterionTable, LevelTable
+from scenes.comply.uses import RoomUse
+from scenes.language.catalogue import N_, decimal, gettext
+from scenes.language.numbers import MISSING, cell, colon, rounded, semicolons
 from scenes.report.tables import Column, Table
 
-OVER = "share of the floor area whose rooms meet it"
+USE_WORDS = {  # of the uses that come with the program
+    "sanitary": N_("sanitary room"), "circulation": N_("circulation"),
+    "technical": N_("technical room"), "storage": N_("storage"), "roof": N_("roof or balcony"),
+    "laboratory": N_("laboratory"), "classroom": N_("classroom"), "nursery": N_("nursery"),
+    "meeting": N_("meeting room"), "consulting": N_("consulting room"),
+    "ward": N_("patient room"), "retail": N_("retail"), "kitchen": N_("kitchen"),
+    "bedroom": N_("bedroom"), "living": N_("living room"), "office": N_("office"),
+    "unknown": N_("use unknown"),
+}  # fmt: skip
 MOST_DIGITS = 5  # behind the decimal point of a value beside its limit
-OVER_DWELLINGS = "share of the dwellings of which a room meets it"
 COLUMNS = (
     "room", "guid", "use", "floor_area_m2", "rule", "edition", "clause", "criterion", "level",
     "quantity", "value", "limit", "unit", "met", "asked",
@@ -42,18 +51,24 @@ def limit_of(need: Need) -> str:
     """The limit of a need with its unit."""
     word, value = ("≥", need.at_least) if need.at_least is not None else ("≤", need.at_most)
     factor = 100 if need.unit == "%" else 1
-    return f"{word} {factor * (value or 0):g} {need.unit}".strip()
+    return f"{word} {decimal(f'{factor * (value or 0):g}')} {need.unit}".strip()
 
 
 def yes_or_no(met: bool | None) -> str:
-    """Whether something is met, in a word."""
+    """Whether something is met, in a word of `values.csv`."""
     return MISSING if met is None else ("yes" if met else "no")
+
+
+def use_words(use: RoomUse) -> str:
+    """The use of a room, in the page's language."""
+    return gettext(USE_WORDS.get(use.key, use.key))
 
 
 def building_table(result: Compliance, rule: str) -> Table:
     """The building against the criteria of a rule."""
-    columns = [_text("Criterion"), _text("Clause"), _text("What is compared")]
-    columns += [_text("By level"), _text("Reached"), Column("Rooms")]
+    columns = [_text(gettext("Criterion")), _text(gettext("Clause")), _text(gettext("Quantity"))]
+    columns += [_text(gettext("Value by level (limit)")), _text(gettext("Level reached"))]
+    columns.append(Column(gettext("Rooms")))
     rows = []
     for verdict in result.verdicts:
         if verdict.rule != rule or not verdict.rooms or verdict.criterion.over == "no building":
@@ -62,69 +77,85 @@ def building_table(result: Compliance, rule: str) -> Table:
         compared = [
             _compared(level, value) for level, value in zip(one.level, verdict.values, strict=True)
         ]
-        names = (level.name for level in one.level)
-        levels = "; ".join(f"{n}: {text}" for n, (_, text) in zip(names, compared, strict=True))
+        names = (gettext(level.name) for level in one.level)
+        levels = [colon(n, text) for n, (_, text) in zip(names, compared, strict=True)]
         words = ", ".join(dict.fromkeys(what for what, _ in compared))
-        rows.append((one.title, one.clause, words, levels, verdict.reached, str(verdict.rooms)))
-    return Table("The building", tuple(columns), tuple(rows))
+        rows.append(
+            (gettext(one.title), clause(one), words, semicolons(levels), gettext(verdict.reached),
+             str(verdict.rooms))
+        )  # fmt: skip
+    return Table(gettext("Building"), tuple(columns), tuple(rows))
+
+
+def clause(criterion: CriterionTable) -> str:
+    """The clause of a criterion."""
+    return gettext(criterion.clause)
 
 
 def _compared(level: LevelTable, value: float | None) -> tuple[str, str]:
     """What a level compares over the rooms; its value and its limit."""
     if level.over == "area mean":
         need = level.needs[0]
-        return f"{need.words}; mean over the floor area", f"{shown(need, value)} ({limit_of(need)})"
+        words = gettext("{quantity}; mean over the floor area", quantity=need.words)
+        return words, f"{shown(need, value)} ({limit_of(need)})"
     limit = 100.0 if level.share is None else 100 * level.share
     number = MISSING
     if value is not None:
         number = f"{beside_limit(100 * value, 0, lambda v: v >= limit - 1e-7)} %"
-    words = OVER_DWELLINGS if level.over == "room of each dwelling" else OVER
-    return words, f"{number} (≥ {limit:g} %)"
+    words = (
+        gettext("share of the dwellings with at least one room that meets the level")
+        if level.over == "room of each dwelling"
+        else gettext("share of the floor area in rooms that meet the level")
+    )
+    return words, f"{number} (≥ {decimal(f'{limit:g}')} %)"
 
 
 def without_rooms(result: Compliance, rule: str) -> tuple[str, ...]:
-    """Titles of the criteria of a rule that no room is for."""
+    """Titles of the criteria of a rule that apply to no room."""
     verdicts = (v for v in result.verdicts if v.rule == rule and not v.rooms)
-    return tuple(verdict.criterion.title for verdict in verdicts)
+    return tuple(gettext(verdict.criterion.title) for verdict in verdicts)
 
 
 def rooms_table(result: Compliance, rule: str) -> Table:
     """Every room with the level that it reaches of each criterion that is for some room."""
     numbers = [i for i, v in enumerate(result.verdicts) if v.rule == rule and v.rooms]
-    columns = [_text("Room"), _text("Use"), Column("Area", "m²")]
-    columns += [_text(result.verdicts[i].criterion.title) for i in numbers]
+    columns = [_text(gettext("Room")), _text(gettext("Use")), Column(gettext("Area"), "m²")]
+    columns += [_text(gettext(result.verdicts[i].criterion.title)) for i in numbers]
     rows = [
         (
             room.space.label,
-            room.use.key if room.use.occupied else f"{room.use.key} (not occupied)",
+            use_words(room.use)
+            if room.use.occupied
+            else gettext("{use} (not occupied)", use=use_words(room.use)),
             rounded(room.space.floor_area, 1),
             *(_short(room.verdicts[i].reached) for i in numbers),
         )
         for room in result.rooms
     ]
-    return Table("Room by room", tuple(columns), tuple(rows))
+    return Table(gettext("Levels reached by room"), tuple(columns), tuple(rows))
 
 
 def room_table(result: Compliance, room: CheckedRoom, rule: str) -> Table:
     """A room against the criteria of a rule: every quantity with its limits and its clause."""
-    columns = [_text("Criterion"), _text("Clause"), _text("Quantity"), Column("Value")]
-    columns += [_text("Limits by level"), _text("Reached")]
+    columns = [_text(gettext("Criterion")), _text(gettext("Clause")), _text(gettext("Quantity"))]
+    columns += [Column(gettext("Value")), _text(gettext("Limits by level"))]
+    columns.append(_text(gettext("Level reached")))
     rows = []
     for verdict in room.verdicts:
         if verdict.rule != rule or not verdict.applies:
             continue
         if verdict.reached == NOT_COMPUTED:
-            one = verdict.criterion
-            rows.append((one.title, one.clause, NOT_COMPUTED, MISSING, "", NOT_COMPUTED))
+            one, words = verdict.criterion, gettext(NOT_COMPUTED)
+            rows.append((gettext(one.title), clause(one), words, MISSING, "", words))
             continue
         first = True
         for words, (value, limits) in _quantities(verdict).items():
             one = verdict.criterion
-            head = (one.title, one.clause) if first else ("", "")
-            last = verdict.reached if first else ""
-            rows.append((*head, words, value, "; ".join(limits), last))
+            head = (gettext(one.title), clause(one)) if first else ("", "")
+            last = gettext(verdict.reached) if first else ""
+            rows.append((*head, words, value, semicolons(limits), last))
             first = False
-    return Table(result.rules[rule].title, tuple(columns), tuple(rows))
+    return Table(gettext(result.rules[rule].title), tuple(columns), tuple(rows))
 
 
 def _quantities(verdict: RoomVerdict) -> dict[str, tuple[str, list[str]]]:
@@ -133,7 +164,7 @@ def _quantities(verdict: RoomVerdict) -> dict[str, tuple[str, list[str]]]:
     for level, values in zip(verdict.criterion.level, verdict.values, strict=True):
         for need, value in zip(level.needs, values, strict=True):
             _, limits = found.setdefault(need.words, (shown(need, value), []))
-            limits.append(f"{level.name} {limit_of(need)}")
+            limits.append(f"{gettext(level.name)} {limit_of(need)}")
     return found
 
 
@@ -143,30 +174,38 @@ def missed(room: CheckedRoom) -> Iterator[str]:
         if not (verdict.applies and verdict.asked) or verdict.reached != NOT_MET:
             continue
         one, values = verdict.criterion, verdict.values[0]
-        numbers = "; ".join(
-            f"{need.words}: {shown(need, value)}, {limit_of(need)} for {one.level[0].name}"
+        numbers = [
+            gettext(
+                "{quantity}: {value}, required {limit} for {level}",
+                quantity=need.words,
+                value=shown(need, value),
+                limit=limit_of(need),
+                level=gettext(one.level[0].name),
+            )
             for need, value in zip(one.level[0].needs, values, strict=True)
             if not need.met(value)
-        )
-        yield f"{verdict.rule}, {one.title} ({one.clause}): {numbers}"
+        ]
+        head = f"{verdict.rule}, {gettext(one.title)} ({clause(one)})"
+        yield colon(head, semicolons(numbers))
 
 
 def openings_table(room: CheckedRoom) -> Table | None:
     """The sunlight of each opening of a room."""
     if room.sun is None:
         return None
-    columns = [_text("Opening"), *(Column(axis, "m") for axis in "xyz"), Column("Sun", "h")]
-    columns.append(_text("Times (local standard time)"))
+    columns = [_text(gettext("Opening")), *(Column(axis, "m") for axis in "xyz")]
+    columns += [Column(gettext("Sunlight"), "h"), _text(gettext("Times (local standard time)"))]
     rows = [
-        (one.name, *(f"{v:.2f}" for v in one.point), f"{one.hours:.2f}", spans(one.times))
+        (one.name, *(cell(v, 2) for v in one.point), cell(one.hours, 2), spans(one.times))
         for one in room.sun.openings
     ]
-    return Table("Sunlight at the openings' reference points", tuple(columns), tuple(rows))
+    title = gettext("Sunlight at the reference points of the openings")
+    return Table(title, tuple(columns), tuple(rows))
 
 
 def spans(times: tuple[tuple[float, float], ...]) -> str:
     """Intervals in minutes of the day as clock times."""
-    return ", ".join(f"{_clock(start)}–{_clock(end)}" for start, end in times) or "none"
+    return ", ".join(f"{_clock(start)}–{_clock(end)}" for start, end in times) or gettext("none")
 
 
 def values_frame(result: Compliance) -> pd.DataFrame:
@@ -198,7 +237,7 @@ def _clock(minutes: float) -> str:
 
 
 def _short(reached: str) -> str:
-    return MISSING if reached == NOT_FOR_IT else reached
+    return MISSING if reached == NOT_FOR_IT else gettext(reached)
 
 
 def _text(label: str) -> Column:

@@ -14,6 +14,8 @@ from pathlib import Path
 from pydantic import Field
 
 from bim.model import Space
+from mitsuba_cfs.notes import Note
+from scenes.language.catalogue import N_
 from scenes.toml_file import TomlTable, read_table, validated
 
 UNKNOWN = "unknown"
@@ -82,19 +84,28 @@ class RoomUses:
             for use in self.uses:
                 word = next((word for word in use.words if _holds(text, word)), None)
                 if word is not None:
-                    source = f"{where} {text!r} holds {word!r}"
+                    source = Note(
+                        "{where} '{text}' contains '{word}'",
+                        where=Note(where),
+                        text=text,
+                        word=word,
+                    )
                     return RoomUse(use.key, use.occupied, source, where in ("name", "long name"))
-        return RoomUse(UNKNOWN, True, "nothing says what it is used for: regularly occupied", True)
+        source = Note("no information on its use, taken as regularly occupied")
+        return RoomUse(UNKNOWN, True, source, True)
 
     def _named(self, key: str) -> RoomUse:
         use = next((one for one in self.uses if one.key == key), None)
         occupied = use.occupied if use is not None else True
-        return RoomUse(key, occupied, f"named in {self.file}")
+        return RoomUse(key, occupied, Note("named in {file}", file=self.file))
 
     @staticmethod
     def _texts(space: Space, texts: Sequence[tuple[str, str]]) -> Iterator[tuple[str, str]]:
         yield from texts
-        names = (("type", space.type_name), ("long name", space.long_name), ("name", space.name))
+        names = (
+            (N_("type"), space.type_name), (N_("long name"), space.long_name),
+            (N_("name"), space.name),
+        )  # fmt: skip
         yield from ((where, text) for where, text in names if text)
 
 

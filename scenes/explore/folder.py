@@ -15,22 +15,27 @@ from mitsuba_cfs.files import write_text
 from scenes.explore.packing import read_data, write_data
 from scenes.explore.room_files import write_room
 from scenes.figures.scale import ColourScale
+from scenes.language.catalogue import current_language, gettext, in_language, messages
+from scenes.page_options import OWN_PAGE, PageOptions
+from scenes.report.page import environment
 from scenes.report.page_files import page_files
 from scenes.result_folder import EXPLORER
 from scenes.results import RunResult
 
-CASE = "case.js"
+CASE, PAGE = "case.js", "index.html"
+SCRIPTS = "scenes/explore/templates/"  # where the messages of scripts are from
 FILES = page_files("scenes.explore") | {"style.css": page_files("scenes.report")["style.css"]}
 STEPS = 256  # of the palette
 
 
-def write_explorer(result: RunResult, folder: Path) -> None:
+def write_explorer(result: RunResult, folder: Path, page: PageOptions = OWN_PAGE) -> None:
     """Write the explorer of a run's rooms that were computed for it.
 
     A room that is equal to another has that one's light, and is named with it.
     """
-    write_rooms(result, folder)
-    write_page(folder)
+    with in_language(page.language):
+        write_rooms(result, folder)
+        write_page(folder)
 
 
 def write_rooms(result: RunResult, folder: Path) -> None:
@@ -47,7 +52,7 @@ def write_rooms(result: RunResult, folder: Path) -> None:
     write_data(
         folder / CASE,
         {
-            "title": result.building.name or "Building",
+            "title": result.building.name or gettext("Building"),
             "site": str(result.manifest.get("site", "")),
             "first_day": f"{first:%Y-%m-%d}",
             "hours": len(result.times),
@@ -58,9 +63,23 @@ def write_rooms(result: RunResult, folder: Path) -> None:
 
 
 def write_page(folder: Path) -> None:
-    """Write the page with its style and scripts."""
+    """Write the page with its style and scripts, in the language of the context."""
     for name, text in FILES.items():
+        if name == PAGE:
+            template = environment(FILES).get_template(PAGE)
+            text = template.render(language=current_language(), words=script_words())
         write_text(folder / name, text)
+
+
+def script_words() -> dict[str, str | tuple[str, str]]:
+    """Translations of the scripts' messages, by their English text; of plurals both forms."""
+    if current_language() == "en":
+        return {}
+    words = {}
+    for message in messages(current_language()):
+        if any(path.startswith(SCRIPTS) for path, _ in message.locations):
+            words[message.id[0] if message.pluralizable else message.id] = message.string
+    return words
 
 
 def explorer_of(results: Path) -> Path:

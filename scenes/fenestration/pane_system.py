@@ -9,6 +9,7 @@ import numpy as np
 from mitsuba_cfs.bsdf.angular import ANGLES, AngularTable, specular_matrices, stack_table
 from mitsuba_cfs.bsdf.glazing import Pane
 from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, spectral_glazing
+from mitsuba_cfs.notes import Note
 from scenes.fenestration.layer_tables import GlazingLayerTable, spectral_panes
 from scenes.fenestration.systems import FenestrationSystem
 
@@ -28,7 +29,11 @@ def system_of_panes(layers: Sequence[GlazingLayerTable]) -> FenestrationSystem:
         notes, tables = [], _by_wavelength(panes)
     else:
         notes = [
-            f"{name}: layer {number} states no visible values: the sun's stand in for them."
+            Note(
+                "{system}: layer {number} has no visible values; its solar values are used.",
+                system=name,
+                number=number,
+            )
             for number, layer in enumerate(layers, start=1)
             if layer.pane is None and layer.visible is None
         ]

@@ -19,6 +19,7 @@ from pathlib import Path
 from bim.building_file import held_states, is_ifc
 from bim.model import Window
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.notes import Note
 from scenes.fenestration.systems import FenestrationSystem, States, WindowOverrides
 
 NAMED = 5  # windows that one sentence names
@@ -147,17 +148,24 @@ def window_sources(windows: Iterable[Window], systems: Mapping[str, States]) -> 
 def source_notes(sources: Iterable[dict]) -> tuple[str, ...]:
     """A sentence for each system on what it fills and where it is from."""
     return tuple(
-        f"{windows_named(one['windows'])}: {one['system']}, from {one['source']}."
+        Note(
+            "{windows}: {system}, from {source}.",
+            windows=windows_named(one["windows"]),
+            system=one["system"],
+            source=one["source"],
+        )
         for one in sources
     )
 
 
 def windows_named(names: list[str]) -> str:
     """Windows in words, the first few by name; the noun where their names have it not."""
+    listed = _listed(names)
     if all(name.casefold().startswith("window") for name in names):
-        listed = _listed(names)
-        return listed[:1].upper() + listed[1:]
-    return f"{'Window' if len(names) == 1 else 'Windows'} {_listed(names)}"
+        return listed if isinstance(listed, Note) else listed[:1].upper() + listed[1:]
+    if len(names) == 1:
+        return Note("Window {names}", names=listed)
+    return Note("Windows {names}", names=listed)
 
 
 def _listed(names: list[str]) -> str:
@@ -165,4 +173,5 @@ def _listed(names: list[str]) -> str:
     counts = list(Counter(names).items())
     shown = [name if count == 1 else f"{name} ({count})" for name, count in counts[:NAMED]]
     left = sum(count for _, count in counts[NAMED:])
-    return ", ".join(shown) + (f" and {left} more" if left else "")
+    text = ", ".join(shown)
+    return Note("{names} and {count} more", names=text, count=left) if left else text

@@ -18,8 +18,10 @@ from mitsuba_cfs.bsdf.simple_glazing import (
     visible_reflectances,
 )
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.notes import Note
 from scenes.fenestration.attached import Held, held_thermal, usual_first
 from scenes.fenestration.systems import FenestrationSystem, States, WindowOverrides
+from scenes.language.catalogue import N_
 from thermal.gvalue import TYPICAL_SYSTEMS
 
 PANES = (1, 2, 3)  # that Roos' factor knows
@@ -110,12 +112,26 @@ def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
         front, back = visible_reflectances(values.visible)
         clear = Glazing(name, values.visible, front, back, panes)
         visible, table = specular_klems(clear, KLEMS_FULL), roos_table(clear)
-        notes = [f"{name}: no BSDF, a clear glazing of {panes} pane(s) after Roos et al. 2001."]
+        template = (
+            N_("{system}: no BSDF; modelled as clear single glazing (Roos et al. 2001).")
+            if panes == 1
+            else N_(
+                "{system}: no BSDF; modelled as clear glazing with {panes} panes (Roos et al. "
+                "2001)."
+            )
+        )
+        notes = [Note(template, system=name, panes=panes)]
     else:
         table = values.glass.table
         visible = specular_matrices(table)
         count = len(values.glass.panes)
-        notes = [f"{name}: {count} pane(s) of uncoated glass by Fresnel's equations."]
+        notes = [
+            Note(
+                "{system}: uncoated glass by Fresnel's equations, panes: {count}.",
+                system=name,
+                count=count,
+            )
+        ]
     solar, tau, g = visible, values.solar, values.g_value
     if g is not None:
         tau = solar_transmittance(u, g) if tau is None else tau
@@ -123,13 +139,25 @@ def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
         solar = specular_klems(Glazing(name, tau, rho, rho, panes), KLEMS_FULL)
         if values.solar is None:
             notes.append(
-                f"{name}: solar transmittance {tau:.2f} from U and g (Arasteh et al. 2009)."
+                Note(
+                    "{system}: solar transmittance {tau:.2f} from U and g (Arasteh et al. 2009).",
+                    system=name,
+                    tau=tau,
+                )
             )
     elif values.glass is not None:
-        notes.append(f"{name} has no Solar band: its Visible band stands in for it.")
+        notes.append(
+            Note(
+                "{system} has no {band} band; its {other} band is used instead.",
+                system=name,
+                band="Solar",
+                other="Visible",
+            )
+        )
     return FenestrationSystem(
         name, visible, solar, u_value=values.u_value, g_value=g, shading_position="none",
-        notes=tuple(notes), source=f"the values stated in {file}", angular=table,
+        notes=tuple(notes), source=Note("the values stated in {file}", file=file),
+        angular=table,
     )  # fmt: skip
 
 

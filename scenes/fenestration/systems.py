@@ -18,6 +18,7 @@ from mitsuba_cfs.bsdf.spectral_pane import SpectralPane
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.notes import Note
 from scenes.fenestration.angular_file import check_specular
 from scenes.fenestration.thermal_file import ThermalFile
 from thermal.closure import Closure
@@ -118,7 +119,14 @@ def system_of(
         raise DataError("has neither a Visible nor a Solar band", file=path, field="WavelengthData")
     for band, other in (("Visible", "Solar"), ("Solar", "Visible")):
         if band not in bands:
-            notes.append(f"{name} has no {band} band: its {other} band stands in for it.")
+            notes.append(
+                Note(
+                    "{system} has no {band} band; its {other} band is used instead.",
+                    system=name,
+                    band=band,
+                    other=other,
+                )
+            )
     visible = bands.get("Visible") or bands["Solar"]
     solar = bands.get("Solar") or bands["Visible"]
     klems = _klems(visible, path, "Visible")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.notes import Note
 from scenes.fenestration.layer_sun import sun_in_layers
 from scenes.fenestration.systems import FenestrationSystem
 from thermal.blackbox import (
@@ -21,6 +22,7 @@ from thermal.closure import Closure
 from thermal.errors import ThermalInputError, require
 from thermal.gvalue import thermal_data
 from thermal.layered import layered_thermal_data
+from thermal.notes import ThermalNote
 
 SHADE_SCATTERS = 0.5  # share of the light beyond which a BSDF is that of a shade
 
@@ -42,7 +44,9 @@ class ThermalSystem:
     @property
     def named_model(self) -> str:
         """A sentence for results: the window model of the system."""
-        return f"{self.fenestration.name}: window model: {self.model}."
+        return Note(
+            "{system}: window model {model}.", system=self.fenestration.name, model=self.model
+        )
 
 
 def thermal_system(system: FenestrationSystem) -> ThermalSystem:
@@ -73,9 +77,18 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
         g_value,
         back_rho,
         max(1.0 - back_rho - back_tau, 0.0),
-        (*data.assumptions, *_unplaced(system, closure)),
-        closure.described(place),
+        (*map(_note, data.assumptions), *_unplaced(system, closure)),
+        _note(closure.described(place)),
     )
+
+
+def _note(of_model: ThermalNote) -> Note:
+    """A note of the thermal model as one that a page can translate."""
+    values = {
+        key: _note(value) if isinstance(value, ThermalNote) else value
+        for key, value in of_model.values.items()
+    }
+    return Note(of_model.template, **values)
 
 
 def _place(system: FenestrationSystem) -> str:
@@ -89,7 +102,7 @@ def _place(system: FenestrationSystem) -> str:
     return stated or of_layers or "none"
 
 
-def _unplaced(system: FenestrationSystem, closure: Closure) -> list[str]:
+def _unplaced(system: FenestrationSystem, closure: Closure) -> list[Note]:
     """A sentence where what may be a shade is taken for panes, for want of its place and data."""
     placed = system.shading_position is not None or closure.unit is not None
     by_patch = system.g_by_patch is not None
@@ -97,9 +110,12 @@ def _unplaced(system: FenestrationSystem, closure: Closure) -> list[str]:
     if placed or known or scattered_share(system.solar) < SHADE_SCATTERS:
         return []
     return [
-        f"{system.name}: scatters light as a shade does, but where the shade is was not stated: "
-        "its U and g are those of panes without one; state shading_position (external, internal, "
-        "integrated or none)."
+        Note(
+            "{system}: scatters light like a shade, but its position is not stated; its U-value "
+            "and g-value are those of glazing without a shade. State shading_position (external, "
+            "internal, integrated or none).",
+            system=system.name,
+        )
     ]
 
 

@@ -13,6 +13,7 @@ from pydantic import Field
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky import air
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
@@ -74,10 +75,12 @@ def read_measured(path: Path, table: MeasuredTable) -> Weather:
     values["relative_humidity"] = values["relative_humidity"] / 100.0
     if "pressure_pa" not in values:
         values["pressure_pa"] = np.full(whole, air.standard_pressure(table.elevation_m))
-        notes.append(f"{path.name}: no pressure; the standard one of its height is taken.")
+        notes.append(
+            Note("{file}: no pressure; that of the standard atmosphere is used.", file=path.name)
+        )
     if "wind_direction_deg" not in values:
         values["wind_direction_deg"] = np.zeros(whole)
-        notes.append(f"{path.name}: no wind direction; north is taken.")
+        notes.append(Note("{file}: no wind direction; north is used.", file=path.name))
     given = {key: v for key, v in values.items() if key != "global_horizontal"}
     weather = Weather(
         path.stem, table.latitude_deg, table.longitude_deg, table.timezone_h, table.elevation_m,

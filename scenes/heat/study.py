@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bim.model import Building
-from bim.report.issue import issue_text
+from bim.report.issue import issue_note
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -110,7 +110,7 @@ def run_study(
         )  # fmt: skip
         if space.windows:
             leaks = leak_issues(space, visible_scene(room), seed=options.sampling.seed, cache=cache)
-            notes |= dict.fromkeys(issue_text(one, "command").line for one in leaks)
+            notes |= dict.fromkeys(map(issue_note, leaks))
         zone, radiant = operated_zone(room, progress=steps), None
         if trace.view_factors:
             radiant = radiant_room(

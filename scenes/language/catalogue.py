@@ -18,6 +18,8 @@ from gettext import GNUTranslations, NullTranslations
 from importlib.resources import files
 from typing import TYPE_CHECKING, Literal
 
+from mitsuba_cfs.notes import Note
+
 if TYPE_CHECKING:
     from babel.messages import Catalog
 
@@ -42,7 +44,7 @@ def current_language() -> str:
     return _language.get()
 
 
-def gettext(message: str, **values: object) -> str:
+def gettext(message: str, /, **values: object) -> str:
     """A message in the page's language, its fields in braces filled.
 
     Numbers have the decimal mark of the language; what is not in the catalogue stays English.
@@ -55,6 +57,11 @@ def ngettext(singular: str, plural: str, count: int, **values: object) -> str:
     """A message on a counted thing in the page's language; `{count}` is the number."""
     text = translations(_language.get()).ngettext(singular, plural, count)
     return FORMATTER.format(text, count=f"{count:,}".replace(",", NARROW_SPACE), **values)
+
+
+def translated(text: str) -> str:
+    """A note in the page's language; other text as it is."""
+    return gettext(text.template, **text.values) if isinstance(text, Note) else text
 
 
 def N_(message: str) -> str:
@@ -71,6 +78,8 @@ class _Formatter(string.Formatter):
     """`str.format` whose numbers have the decimal mark of the page's language."""
 
     def format_field(self, value: object, format_spec: str) -> str:
+        if isinstance(value, Note):
+            value = translated(value)
         text = super().format_field(value, format_spec)
         return decimal(text) if isinstance(value, float) else text
 

@@ -20,8 +20,10 @@ from babel.messages.pofile import read_po, write_po
 
 from scenes.language.catalogue import TRANSLATED
 
-ARGUMENTS = {"gettext": 1, "N_": 1, "ngettext": 2}  # that are messages
-PACKAGE = Path(__file__).parents[1]
+ARGUMENTS = {"gettext": 1, "N_": 1, "Note": 1, "ThermalNote": 1, "ngettext": 2}  # that are messages
+PACKAGES = [
+    Path(__file__).parents[2] / name for name in ("scenes", "bim", "mitsuba_cfs", "thermal")
+]
 HEADER = """\
 # Text of the pages of mitsuba-cfs in {language}, by the English text in the code.
 # `make catalogues` adds what is new in the code; translations are written by hand.
@@ -80,10 +82,13 @@ def extracted() -> Catalog:
     with config.open(encoding="utf-8") as file:
         methods, options = parse_mapping_cfg(file, str(config))
     catalog = Catalog()
-    found = extract_from_dir(PACKAGE, methods, options, keywords={**DEFAULT_KEYWORDS})
-    for path, _, message, comments, context in found:
-        place = f"{PACKAGE.name}/{Path(path).as_posix()}"
-        catalog.add(message, None, [(place, None)], auto_comments=comments, context=context)
+    keywords = {**DEFAULT_KEYWORDS, "Note": None, "ThermalNote": None}
+    for package in PACKAGES:
+        for path, _, message, comments, context in extract_from_dir(
+            package, methods, options, keywords=keywords
+        ):
+            place = f"{package.name}/{Path(path).as_posix()}"
+            catalog.add(message, None, [(place, None)], auto_comments=comments, context=context)
     return catalog
 
 

@@ -69,6 +69,13 @@ def semicolons(parts: list[str] | tuple[str, ...]) -> str:
     return gettext("; ").join(parts)
 
 
+def listed(names: list[str]) -> str:
+    """Names with "and" before the last."""
+    if len(names) == 1:
+        return names[0]
+    return gettext("{names} and {last}", names=", ".join(names[:-1]), last=names[-1])
+
+
 def month_name(month: int) -> str:
     """The name of a month, 1 to 12, as it stands by itself."""
     return _months("wide")[month]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenes.language.catalogue import N_, gettext
+from scenes.language.catalogue import N_, gettext, translated
 from scenes.language.numbers import rounded, share
 from scenes.results import RunResult
 
@@ -30,9 +30,8 @@ LIGHT = {  # sentences
         MATRICES,
         N_(
             "Its direct sun is replaced by the true solar disc of 0.53°, traced through the BSDF "
-            "of "
-            "the window with the specular beam kept separate: V T D s - V_d T D_d s_d + "
-            "C_ds s_sun."
+            "of the window with the specular beam kept separate: V T D s - V_d T D_d s_d + C_ds "
+            "s_sun."
         ),
         SKIES,
     ),
@@ -67,8 +66,7 @@ HEAT = (
     N_(
         "The daylight matrix in the solar band gives the solar radiation that the window transmits "
         "and absorbs; the two layers of the window model exchange heat according to its U-value "
-        "and "
-        "g-value (Kuhn's Blackbox model)."
+        "and g-value (Kuhn's Blackbox model)."
     ),
     N_(
         "The sky for heat has the three components of Perez's model for tilted planes: isotropic, "
@@ -121,8 +119,7 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
     if any("ase1000_250" in room.daylight.room_metrics for room in rooms):
         sun = gettext(
             "Annual sunlight exposure counts direct sun through the window, scattered by it or "
-            "not, "
-            "without interreflections in the room."
+            "not, without interreflections in the room."
         )
         if _moved(result):
             sun += " " + gettext("It is for the most open shading state.")
@@ -180,7 +177,7 @@ def _sources(result: RunResult) -> str:
     """Where each system comes from; empty where that is not known."""
     tables = [values for room in result.spaces for values in room.heat.fenestration]
     sources = {
-        gettext("{system}: from {source}.", system=t["system"], source=t["source"])
+        gettext("{system}: from {source}.", system=t["system"], source=translated(t["source"]))
         for t in tables
         if t.get("source")
     }
@@ -196,12 +193,11 @@ def _glare(result: RunResult) -> str:
     text = gettext(PICTURES[result.method])
     rule = next((room.glare.rule for room in result.spaces if room.glare.rule), "")
     if rule:
-        text += " " + gettext("Glare sources: {rule}.", rule=rule)
+        text += " " + gettext("Glare sources: {rule}.", rule=translated(rule))
     if any(room.annual_glare is not None for room in result.spaces):
         text += " " + gettext(
             "All hours with the sun up are rated in the same way; EN 17037 requires that DGP "
-            "exceeds "
-            "its limit in at most 5 % of the hours of use."
+            "exceeds its limit in at most 5 % of the hours of use."
         )
     return text
 

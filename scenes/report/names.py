@@ -7,7 +7,8 @@ import tomllib
 from dataclasses import dataclass
 from importlib.resources import files
 
-from scenes.language.catalogue import gettext, ngettext
+from scenes.language.catalogue import N_, gettext, ngettext
+from scenes.language.numbers import colon
 
 PERCENT = "%"
 WITHIN = re.compile(r"^within_(.+)$")
@@ -43,6 +44,37 @@ def glossary() -> tuple[tuple[str, str], ...]:
     return tuple(sorted(found, key=lambda item: item[0].lower()))
 
 
+STAGES = {  # whose seconds are noted
+    "view matrix": N_("view matrix"),
+    "view matrices": N_("view matrices"),
+    "daylight matrix": N_("daylight matrix"),
+    "direct sun": N_("direct sun"),
+    "annual product": N_("annual product"),
+    "daylight": N_("daylight"),
+    "holes": N_("check for leaks"),
+    "annual glare": N_("annual glare"),
+    "glare": N_("glare"),
+    "pictures": N_("pictures"),
+    "colour": N_("colour picture"),
+    "explorer": N_("explorer"),
+    "thermal": N_("heat balance"),
+    "leaks": N_("check for leaks"),
+    "reading": N_("reading of files"),
+    "view and sunlight": N_("view out and sunlight"),
+    "V and D": N_("matrices V and D"),
+    "light and blinds of every hour": N_("light and blinds of every hour"),
+    "glare by pictures": N_("glare by pictures"),
+    "temperatures": N_("temperatures"),
+    "what else light takes": N_("other steps of the light"),
+}
+
+
+def stage_words(stage: str) -> str:
+    """A stage of the computation in words."""
+    name = stage.replace("_", " ")
+    return gettext(STAGES.get(name, name))
+
+
 def rooms_counted(count: int) -> str:
     """A number of rooms."""
     return ngettext("{count} room", "{count} rooms", count)
@@ -71,6 +103,9 @@ def quantity(key: str) -> Quantity:
         return _useful_illuminance(*match.groups())
     if match := WITHIN.match(key):
         return _within(match.group(1))
+    if key.endswith("_s"):
+        stage = colon(gettext("Computing time"), stage_words(key.removesuffix("_s")))
+        return Quantity(stage, "s", 1)
     ending = next((e for e in ENDINGS if key.endswith(e)), "")
     text = key.removesuffix(ending).replace("_", " ").strip()
     return Quantity(text[:1].upper() + text[1:], ENDINGS.get(ending, ""), 1 if ending else 3)

@@ -13,15 +13,14 @@ import jinja2
 from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
-from scenes.language.catalogue import N_, gettext, in_language, ngettext
-from scenes.language.heard import heard, heard_list
+from scenes.language.catalogue import gettext, in_language, ngettext, translated
 from scenes.language.numbers import cell, day_and_month, rounded, semicolons
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import tables
 from scenes.report.method import method_words
 from scenes.report.model3d import model3d
-from scenes.report.names import glossary, option_words
+from scenes.report.names import glossary, option_words, stage_words
 from scenes.report.page_files import page_files
 from scenes.report.room import room_page
 from scenes.report.storeys import RoomMetric, room_metrics, storey_plans
@@ -175,13 +174,12 @@ def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
     rows.append((gettext("Rooms"), rooms))
     account = building.account
     read = () if account is None else account.facts
-    return (*rows, *((gettext(title), prose(heard_list(text, ", "))) for title, text in read))
+    return (*rows, *((translated(title), prose(translated(text))) for title, text in read))
 
 
-def notes(result: RunResult) -> tuple[tuple[str, bool], ...]:
-    """What is to be known first, and whether it is there in English alone."""
-    found = [(note, gettext(note) if note == NOTE else heard(note)) for note in result.notes]
-    return tuple((text, text == note) for note, text in found)
+def notes(result: RunResult) -> tuple[str, ...]:
+    """Assumptions and limits of the run, in the page's language."""
+    return tuple(gettext(NOTE) if note == NOTE else translated(note) for note in result.notes)
 
 
 def comparison(result: RunResult, rooms) -> tables.Table | None:
@@ -256,29 +254,6 @@ def timings_table(result: RunResult) -> tables.Table:
     if isinstance(total, int | float):
         rows.append((gettext("entire run"), gettext("all"), cell(total, 1)))
     return tables.Table(gettext("Computing time"), columns, tuple(rows))
-
-
-STAGES = {  # whose seconds are noted
-    "view matrix": N_("view matrix"),
-    "view matrices": N_("view matrices"),
-    "daylight matrix": N_("daylight matrix"),
-    "direct sun": N_("direct sun"),
-    "annual product": N_("annual product"),
-    "daylight": N_("daylight"),
-    "holes": N_("check for leaks"),
-    "annual glare": N_("annual glare"),
-    "glare": N_("glare"),
-    "pictures": N_("pictures"),
-    "colour": N_("colour picture"),
-    "explorer": N_("explorer"),
-    "thermal": N_("heat balance"),
-}
-
-
-def stage_words(stage: str) -> str:
-    """A stage of the computation in words."""
-    name = stage.replace("_", " ")
-    return gettext(STAGES.get(name, name))
 
 
 def remaining(manifest: Mapping) -> dict:

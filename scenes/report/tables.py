@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from bim.report.issue import Issue, IssueText, issue_text
 from bim.report.ranking import ranked
 from scenes.language.catalogue import N_, gettext
-from scenes.language.numbers import cell
+from scenes.language.numbers import cell, semicolons
 from scenes.report.names import Quantity, quantity
 from scenes.results import LuminancePicture, RoomYear, RunResult
 
@@ -160,10 +161,27 @@ def problems_table(result: RunResult) -> Table:
         Column(gettext("Treatment in the model"), numeric=False),
     )
     rows = tuple(
-        (cell(one.glass, 2) if one.glass else "–", one.first.where, *one.text("command").pair)
+        (
+            cell(one.glass, 2) if one.glass else "–",
+            one.first.where,
+            *issue_cells(one.text("command", gettext)),
+        )
         for one in ranked(result.issues)
     )
     return Table(gettext("Problems by element"), columns, rows)
+
+
+def issues_table(issues: Iterable[Issue]) -> Table:
+    """The issues of a building's file, one a row."""
+    titles = (gettext("Element"), gettext("Problem"), gettext("Treatment in the model"))
+    rows = [(one.where, *issue_cells(issue_text(one, "command", gettext))) for one in issues]
+    columns = tuple(Column(title, numeric=False) for title in titles)
+    return Table(gettext("Problems by element"), columns, tuple(rows))
+
+
+def issue_cells(text: IssueText) -> tuple[str, str]:
+    """An issue, and its effect with the fix."""
+    return text.what, semicolons([part for part in (text.effect, text.fix) if part])
 
 
 def nested_table(caption: str, content: Mapping) -> Table:

@@ -13,6 +13,7 @@ from bim.model import Space
 from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.annual import AnnualGlare
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.stored_arrays import StoredArrays
@@ -291,17 +292,19 @@ def _coupling_note(rooms: Sequence[RoomZone]) -> str:
                 among += surface.area
             elif guid is not None and surface.outside == "twin":
                 other += surface.area
-    text = (
-        f"The heat of the {len(rooms)} rooms is balanced together: it flows between them through "
-        f"{through:.1f} m2 of walls, floors and doors."
+    values = {"count": len(rooms), "area": through}
+    if max(among, other) < 0.05:
+        return Note(
+            "The heat of the {count} rooms is balanced together: it flows through {area:.1f} m2 of "
+            "walls, floors and doors between them.",
+            **values,
+        )
+    return Note(
+        "The heat of the {count} rooms is balanced together: it flows through {area:.1f} m2 of "
+        "walls, floors and doors between them. Surfaces without a computed neighbour ({among:.1f} "
+        "m2 between these rooms, {other:.1f} m2 towards other rooms) are taken as adjacent to a "
+        "room of the same temperature.",
+        among=among,
+        other=other,
+        **values,
     )
-    uncoupled = {
-        "towards each other where no face of the other was found": among,
-        "towards rooms that are not computed": other,
-    }
-    behind = " and ".join(
-        f"{area:.1f} m2 {what}" for what, area in uncoupled.items() if area >= 0.05
-    )
-    if behind:
-        text += f" Behind these sides a room of the same temperature is taken to lie: {behind}."
-    return text

@@ -27,6 +27,7 @@ from mitsuba_cfs.methods.light import SeasonalLight, group_shares
 from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics, SystemOptics
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.scattering import AngularScattering
 from scenes.fenestration.stated import StatedValues, glazing_system
@@ -156,17 +157,16 @@ def borrowed_share(
         return ""
     first, sums = len(light.scene.outdoor_groups), group_shares(light)
     share = float(sums[first:].sum() / max(sums.sum(), 1e-9))
-    return (
-        f"Room {space.label} borrows {100 * share:.0f} % of its daylight through "
-        f"{_through(inner)} from {', '.join(dict.fromkeys(inner.names))}; the sun comes through "
-        "it by sky patches, blinds there are in their first state, the heat balance has none of it."
+    return Note(
+        "Room {room} receives {share:.0f} % of its daylight through {glass:.1f} m2 of inner glass "
+        "and {open:.1f} m2 of open doorways from {rooms}; their sun is averaged over sky patches, "
+        "their blinds are in the first state, and the heat balance omits it.",
+        room=space.label,
+        share=100 * share,
+        glass=inner.area,
+        open=inner.open_area,
+        rooms=", ".join(dict.fromkeys(inner.names)),
     )
-
-
-def _through(inner: InnerGlass) -> str:
-    """Areas of glass and doorways, in words."""
-    parts = ((inner.area, "glass"), (inner.open_area, "open doorways"))
-    return " and ".join(f"{area:.1f} m2 of {what}" for area, what in parts if area > 0)
 
 
 def _panes_to_windows(building: Building) -> dict[str, int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bim.model import Space
-from bim.report.issue import Issue, Phrase, issue_text
+from bim.report.issue import Issue, Phrase, issue_note
 from bim.sensors import sensor_grid, view_point
 from bim.to_tracer import furnished_surfaces, window_groups
 from mitsuba_cfs.errors import RoomError
@@ -58,7 +58,7 @@ def leak_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None)
         fisheye(*view_point(space), EYE_PIXELS),
     )
     issues = leak_issues(space, scene, seed=seed, cache=cache)
-    return [issue_text(issue).line for issue in issues]
+    return [issue_note(issue, "python") for issue in issues]
 
 
 def _issue(space: Space, points: np.ndarray, escape: Escape) -> Issue:

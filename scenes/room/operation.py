@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from bim.model import Building, Space
 from bim.use import ScheduledValue, StatedUse, YearSchedule
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.pane_system import system_of_panes
 from scenes.fenestration.systems import FenestrationSystem, read_system
@@ -164,11 +165,19 @@ def stated_note(building: Building, before: str = "") -> tuple[str, ...]:
     count = sum(space.guid in building.uses for space in building.spaces)
     if not count or building.file is None:
         return ()
-    first = f"; what {before} says goes before" if before else ""
-    return (
-        f"Gains, air and set points of {count} of {len(building.spaces)} room(s) are those that "
-        f"{building.file.name} states{first}.",
+    values = {"count": count, "all": len(building.spaces), "file": building.file.name}
+    if not before:
+        note = Note(
+            "Gains, outdoor air and set points of {count} of {all} rooms are from {file}.", **values
+        )
+        return (note,)
+    note = Note(
+        "Gains, outdoor air and set points of {count} of {all} rooms are from {file}; values of "
+        "{operation} take precedence.",
+        operation=before,
+        **values,
     )
+    return (note,)
 
 
 def _entry(

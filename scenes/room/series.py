@@ -21,9 +21,11 @@ from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, phase_matrices, with_outdoors
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, Stage, item, silent
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.fenestration.systems import States
+from scenes.language.catalogue import N_
 from scenes.results import RoomYear
 from scenes.room.heat import DaylitRoom
 from scenes.room.leaks import moved_issue
@@ -146,7 +148,7 @@ class RoomSeries(Generic[R]):
     file: Path | None = None  # named in messages
     alike: Callable[[Space, Space], bool] = lambda one, other: True  # besides shape and light
     on_room: Callable[[R], None] = lambda result: None  # called with each result, in order
-    shared: str = "results are"  # subject of the note on an equal room
+    shared: str = N_("results")  # that the note on an equal room names
     parallel: Parallel[R] | None = None  # computes several rooms at a time, in place of `compute`
     stored: Callable[[R], R] = lambda result: result  # puts a result on disk
 
@@ -165,7 +167,9 @@ class RoomSeries(Generic[R]):
         ahead: Iterator[tuple[str, R | BaseException]],
         progress: Progress,
     ) -> tuple[list[R], list[Issue], list[str]]:
-        results, issues, notes = [], [], []
+        results: list[R] = []
+        issues: list[Issue] = []
+        notes: list[str] = []
         computed: dict[str, R | BaseException] = {}
         for number, space in enumerate(self.spaces, 1):
             steps = item(progress, "room", number, len(self.spaces), space.label)
@@ -184,8 +188,13 @@ class RoomSeries(Generic[R]):
                 if twin is not None:
                     result = self.move(result, space)
                     notes.append(
-                        f"Room {space.label} is like {twin.label} in shape, orientation, "
-                        f"materials, windows and in what shades it: its {self.shared} those."
+                        Note(
+                            "Room {room} is equal to {template} in shape, orientation, materials, "
+                            "windows and surroundings; it has the same {shared}.",
+                            room=space.label,
+                            template=twin.label,
+                            shared=Note(self.shared),
+                        )
                     )
             except RoomError as error:
                 templates.drop(space)

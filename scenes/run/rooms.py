@@ -22,6 +22,7 @@ from mitsuba_cfs.source_code import code_version
 from mitsuba_cfs.stored_arrays import PassedArrays, StoredArrays
 from scenes.input_files import sha256
 from scenes.inputs import Inputs, read_inputs
+from scenes.language.catalogue import N_
 from scenes.results import RoomYear
 from scenes.room.heat import DaylitRoom, coupled_years
 from scenes.room.inner_glass import source_rooms
@@ -72,7 +73,7 @@ def computed_rooms(
         options.building,
         partial(_interchangeable, inputs, options),
         on_room=(on_light if coupled else on_room) or _ignore,
-        shared="daylight, glare and sun are" if coupled else "results are",
+        shared=N_("daylight, glare and solar gains") if coupled else N_("results"),
         parallel=None if workers is None else partial(work.parallel, workers=workers),
         stored=_unchanged if store is None else store.stored,
     )

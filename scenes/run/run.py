@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from importlib import metadata
 from pathlib import Path
 
-from bim.report.issue import issue_text
+from bim.report.issue import issue_note
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, silent
@@ -95,7 +95,7 @@ def run_inputs(
         *head.notes,
         *notes,
         *(result.borrowed for result in results if result.borrowed),
-        *(f"{issue_text(leak, 'command').line}." for leak in leaks),
+        *map(issue_note, leaks),
     ]
     return RunResult(
         building,

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from scenes.explore.folder import moved_entry, write_joined
+from scenes.language.catalogue import in_language
+from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.result_folder import EXPLORER
 from scenes.study.case import Case
 from scenes.study.explored import PHASED
@@ -35,7 +37,7 @@ def explorer_link(study: StudyResult, number: int) -> str:
     return f"{EXPLORER}/index.html#case-{number}" if number in study.explored else ""
 
 
-def write_study_explorer(study: StudyResult, folder: Path) -> None:
+def write_study_explorer(study: StudyResult, folder: Path, page: PageOptions = OWN_PAGE) -> None:
     """Write the page of the explored cases, whose data lie in folders of it."""
     folder.mkdir(parents=True, exist_ok=True)
     entries, first = [], next(iter(study.explored.values())).shown
@@ -46,4 +48,5 @@ def write_study_explorer(study: StudyResult, folder: Path) -> None:
         for entry in explored.shown["rooms"]:
             entries.append(moved_entry(entry, explored.key, name) | about)
     title = study.title or first["title"]
-    write_joined(first | {"title": title, "rooms": entries}, folder)
+    with in_language(page.language):
+        write_joined(first | {"title": title, "rooms": entries}, folder)

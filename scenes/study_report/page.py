@@ -8,7 +8,6 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from bim.report.issue import issue_rows
 from mitsuba_cfs.files import write_text
 from scenes.language.catalogue import decimal, gettext, in_language, ngettext
 from scenes.language.numbers import rounded, share
@@ -87,7 +86,7 @@ def _filled(
         left_out=len(done) - len(pages),
         model=study_model(study),
         has_outdoors=any(b.elements for b, _ in study.plan.rooms.values()),
-        problems=problems_table(study),
+        problems=tables.issues_table(study.issues),
         inputs=inputs_table(study),
         mean_error=share(sum(errors) / len(errors) / 100),
         worst_error=share(worst / 100),
@@ -134,17 +133,6 @@ def _seconds(study: StudyResult) -> str:
         "{seconds} s, {count} cases from an earlier run",
         study.reused,
         seconds=seconds,
-    )
-
-
-def problems_table(study: StudyResult) -> tables.Table:
-    """What is wrong with the building files and what was done about it."""
-    titles = (gettext("Element"), gettext("Problem"), gettext("Treatment in the model"))
-    columns = tuple(tables.Column(title, numeric=False) for title in titles)
-    return tables.Table(
-        gettext("Problems by element"),
-        columns,
-        tuple(row[:3] for row in issue_rows(study.issues, "command")),
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from mitsuba_cfs.glare.classes import CLASSES
 from scenes.language.catalogue import gettext, ngettext
-from scenes.language.numbers import percent, rounded
+from scenes.language.numbers import listed, percent, rounded
 from scenes.report.headline import WARM_C, Card, cards, protection_card
 from scenes.report.limits import LimitTables, limits
 from scenes.report.names import rooms_counted, systems_counted
@@ -28,7 +28,7 @@ def study_verdict(study: StudyResult) -> Verdict:
 
     def named(values: list[str], counted: Callable[[int], str]) -> str:
         values = list(dict.fromkeys(values))
-        return _and(values) if len(values) <= 3 else counted(len(values))
+        return listed(values) if len(values) <= 3 else counted(len(values))
 
     question = ngettext(
         "Daylight, glare and temperatures of {count} case; rooms: {rooms}; weather: {climates}; "
@@ -49,12 +49,6 @@ def study_verdict(study: StudyResult) -> Verdict:
     )
     sentences = tuple((heading, sentence(study)) for heading, sentence in found)
     return Verdict(question, sentences, _limits(study))
-
-
-def _and(names: list[str]) -> str:
-    if len(names) == 1:
-        return names[0]
-    return gettext("{names} and {last}", names=", ".join(names[:-1]), last=names[-1])
 
 
 def _extremes(

@@ -14,8 +14,12 @@ from mitsuba_cfs.files import write_text
 from mitsuba_cfs.glare.classes import LEVELS, LIMITS
 from scenes.figures.plan import PlanFrame, plan_frame, sensor_cells
 from scenes.figures.rose import RoseWedge, roses
-from scenes.language.numbers import percent, rounded, spoken
+from scenes.language.catalogue import gettext, in_language, ngettext, translated
+from scenes.language.numbers import day_and_month, percent, rounded, spoken
+from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
+from scenes.report.headline import LEVEL_WORDS
+from scenes.report.method import METHODS
 from scenes.report.page import FILES as SHARED
 from scenes.report.page import environment
 from scenes.report.page_files import page_files
@@ -27,42 +31,68 @@ ALONE = 1.5  # [m] between eyes where there is one
 NEAR = 0.01  # [m] eyes nearer than this are one
 
 
-def write_page(year: GlareYear, table: pd.DataFrame, path: Path) -> None:
+def write_page(
+    year: GlareYear, table: pd.DataFrame, path: Path, page: PageOptions = OWN_PAGE
+) -> None:
     """Write the page (HTML, needs nothing else but its pictures' files beside it).
 
     Args: table: a row for each view, as in `views.csv`.
     """
-    text = (
-        environment(FILES)
-        .get_template("glare_year.html.j2")
-        .render(
-            year=year,
-            facts=_facts(year, table),
-            notes=(*year.head.lines, *year.notes),
-            plan=_plan(year, table),
-            limits=[f"{limit:.2f}" for limit in LIMITS],
-            worst=_worst(year, table),
-            seats=_seats(table),
-            views=_views(table),
-            style=Markup(SHARED["style.css"]),
-            scripts=Markup(SHARED["tables.js"]),
+    with in_language(page.language):
+        text = (
+            environment(FILES)
+            .get_template("glare_year.html.j2")
+            .render(
+                year=year,
+                page=page,
+                title=page.title or year.room,
+                notes=[translated(note) for note in (*year.head.lines, *year.notes)],
+                facts=(*_facts(year, table), *page.facts),
+                plan=_plan(year, table),
+                limits=[rounded(limit, 2) for limit in LIMITS],
+                worst=_worst(year, table),
+                seats=_seats(table),
+                views=_views(table),
+                style=Markup(SHARED["style.css"]),
+                scripts=Markup(SHARED["tables.js"]),
+            )
         )
-    )
     write_text(path, text)
 
 
 def _facts(year: GlareYear, table: pd.DataFrame) -> list[tuple[str, str]]:
     options = year.options
     start, end = options.occupied
-    rows = [("Run", NOTE)] if options.quick else []
+    rows = [(gettext("Run"), gettext(NOTE))] if options.quick else []
+    systems = ", ".join(dict.fromkeys(str(f["system"]) for f in year.fenestration))
     return [
         *rows,
-        ("Room", year.room),
-        ("Weather", year.weather.site),
-        ("Fenestration", ", ".join(dict.fromkeys(str(f["system"]) for f in year.fenestration))),
-        ("Views", f"{len(table)}, of {len(_eyes(table)[1])} eyes"),
-        ("Hours of use", f"{start} to {end} o'clock, {table['hours_of_use'].iloc[0]} hours"),
-        ("Rating", f"{options.metric}, {options.method}; {rating_of(options).rule}"),
+        (gettext("Room"), year.room),
+        (gettext("Weather"), year.weather.site),
+        (gettext("Fenestration"), systems),
+        (
+            gettext("Views"),
+            ngettext(
+                "{views}, {count} view point",
+                "{views}, {count} view points",
+                len(_eyes(table)[1]),
+                views=len(table),
+            ),
+        ),
+        (
+            gettext("Hours of use"),
+            gettext(
+                "{start} to {end} o'clock, {hours} hours",
+                start=start,
+                end=end,
+                hours=rounded(int(table["hours_of_use"].iloc[0]), 0),
+            ),
+        ),
+        (
+            gettext("Glare metric"),
+            f"{options.metric}, {gettext(METHODS.get(options.method, options.method))}",
+        ),
+        (gettext("Glare sources"), translated(rating_of(options).rule)),
     ]
 
 
@@ -113,10 +143,19 @@ def _renamed(table: pd.DataFrame) -> pd.DataFrame:
 
 def _words(row: Any) -> str:
     shares = ", ".join(
-        f"{percent(100 * getattr(row, _column(limit)))} % above {limit:.2f}" for limit in LIMITS
+        gettext(
+            "{share} % above {limit}",
+            share=percent(100 * getattr(row, _column(limit))),
+            limit=rounded(limit, 2),
+        )
+        for limit in LIMITS
     )
-    return (
-        f"{row.view}: {shares}; highest {row.highest_dgp:.2f}, protection {row.protection_en17037}"
+    return gettext(
+        "{view}: {shares}; maximum {highest}, protection: {level}",
+        view=row.view,
+        shares=shares,
+        highest=rounded(row.highest_dgp, 2),
+        level=gettext(LEVEL_WORDS[row.protection_en17037]),
     )
 
 
@@ -128,10 +167,19 @@ def _worst(year: GlareYear, table: pd.DataFrame) -> dict[str, str]:
     picture = f"{highest['view']}_{moment:%m-%d_%Hh}"
     shown = year.options.worst > 0 and year.options.metric != "sDGP"
     return {
-        "often": f"{most['view']}: {percent(100 * most[f'share_above_{LIMITS[-1]:.2f}'])} % of the "
-        f"hours of use above {LIMITS[-1]:.2f}",
-        "highest": f"{highest['view']}: {year.options.metric} {highest['highest_dgp']:.2f}, "
-        f"{spoken(moment)}",
+        "often": gettext(
+            "{view}: {share} % of the hours of use above {limit}",
+            view=most["view"],
+            share=percent(100 * most[f"share_above_{LIMITS[-1]:.2f}"]),
+            limit=rounded(LIMITS[-1], 2),
+        ),
+        "highest": gettext(
+            "{view}: {metric} {value}, {hour}",
+            view=highest["view"],
+            metric=year.options.metric,
+            value=rounded(highest["highest_dgp"], 2),
+            hour=spoken(moment),
+        ),
         "picture": f"{picture}.png" if shown else "",
         "sources": f"{picture}_sources.png" if shown else "",
     }
@@ -150,26 +198,29 @@ def _seats(table: pd.DataFrame) -> Table:
                 str(number + 1),
                 rounded(x, 2),
                 rounded(y, 2),
-                LEVELS[int(ranks.max())],
-                LEVELS[int(ranks.min())],
+                gettext(LEVEL_WORDS[LEVELS[int(ranks.max())]]),
+                gettext(LEVEL_WORDS[LEVELS[int(ranks.min())]]),
                 percent(100 * float(share.max())),
                 rounded(float(own["highest_dgp"].max()), 2),
             )
         )
+    limit = rounded(LIMITS[-1], 2)
     columns = (
-        Column("Seat"), Column("x", "m"), Column("y", "m"),
-        Column("Protection, worst direction", numeric=False),
-        Column("Protection, best direction", numeric=False),
-        Column(f"Above {LIMITS[-1]:.2f} in the worst direction", "%"), Column("Highest"),
+        Column(gettext("Seat")), Column("x", "m"), Column("y", "m"),
+        Column(gettext("Protection, worst direction"), numeric=False),
+        Column(gettext("Protection, best direction"), numeric=False),
+        Column(gettext("Above {limit} in the worst direction", limit=limit), "%"),
+        Column(gettext("Maximum")),
     )  # fmt: skip
-    return Table("Protection from glare by seat (EN 17037)", columns, tuple(rows))
+    return Table(gettext("Protection from glare by seat (EN 17037)"), columns, tuple(rows))
 
 
 def _views(table: pd.DataFrame) -> Table:
     columns = (
-        Column("View", numeric=False), *(Column(f"Above {limit:.2f}", "%") for limit in LIMITS),
-        Column("Not exceeded in 95 %"), Column("Highest"), Column("Worst hour", numeric=False),
-        Column("Protection", numeric=False),
+        Column(gettext("View"), numeric=False),
+        *(Column(gettext("Above {limit}", limit=rounded(limit, 2)), "%") for limit in LIMITS),
+        Column(gettext("Exceeded in 5 %")), Column(gettext("Maximum")),
+        Column(gettext("Worst hour"), numeric=False), Column(gettext("Protection"), numeric=False),
     )  # fmt: skip
     rows = [
         (
@@ -177,9 +228,10 @@ def _views(table: pd.DataFrame) -> Table:
             *(percent(100 * row[f"share_above_{limit:.2f}"]) for limit in LIMITS),
             rounded(row["dgp_exceeded_in_5_percent"], 2),
             rounded(row["highest_dgp"], 2),
-            f"{pd.Timestamp(row['worst_hour']):%d %b %H:%M}",
-            str(row["protection_en17037"]),
+            f"{day_and_month(pd.Timestamp(row['worst_hour']), short=True)} "
+            f"{pd.Timestamp(row['worst_hour']):%H:%M}",
+            gettext(LEVEL_WORDS[str(row["protection_en17037"])]),
         )
         for _, row in table.iterrows()
     ]
-    return Table("All views", columns, tuple(rows))
+    return Table(gettext("All views"), columns, tuple(rows))

@@ -48,14 +48,14 @@ def account(**changed) -> Account:
     [
         ({}, USABLE, ""),
         ({"used": 19.6}, USABLE, ""),
-        ({"used": 19.5}, CARE, "98 % of the glass that looks out is used"),
-        ({"used": 9.9}, NOT_USABLE, "only 50 % of the glass that looks out is used"),
+        ({"used": 19.5}, CARE, "98 % of the exterior glass is used"),
+        ({"used": 9.9}, NOT_USABLE, "only 50 % of the exterior glass is used"),
         ({"glass_assumed": 2.1}, CARE, "2.1 m2 of glass assumed"),
         ({"phantom": 0.3}, CARE, "0.3 m2 transparent but no glass"),
-        ({"closed": 0.3}, CARE, "0.3 m2 openings without a window closed"),
-        ({"shut_in": 0.3}, CARE, "0.3 m2 of glass with no sky or ground in sight"),
-        ({"overlapping": ("A and B",)}, CARE, "1 pairs of spaces overlap"),
-        ({"leaking": ("A",)}, CARE, "1 rooms with open edges"),
+        ({"closed": 0.3}, CARE, "0.3 m2 of openings without a window closed"),
+        ({"shut_in": 0.3}, CARE, "0.3 m2 of glass without sky or ground in view"),
+        ({"overlapping": ("A and B",)}, CARE, "pairs of overlapping spaces: 1"),
+        ({"leaking": ("A",)}, CARE, "rooms with open edges: 1"),
         ({"found": True}, CARE, "rooms found from geometry"),
         ({"cut_off": True}, NOT_USABLE, "THE FILE IS CUT OFF"),
     ],
@@ -77,7 +77,7 @@ def test_sound_room_is_usable_and_all_its_glass_used(tmp_path):
 def test_a_file_without_rooms_claims_no_share_of_glass():
     account = Account((), 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
     assert account.lines[1].startswith("Rooms read: none: the file has no spaces")
-    assert account.lines[2] == "Glass: none looks out of a room"
+    assert account.lines[2] == "Glass: no exterior glass in a room"
 
 
 # phantom glass -------------------------------------------------------------------------------
@@ -252,7 +252,7 @@ def test_storey_without_spaces_and_window_above_a_low_room_are_named(tmp_path):
     building = read(tmp_path, small)
     assert building.account.share_used == pytest.approx(0.5, rel=1e-3)
     assert building.account.glass_missing == pytest.approx(GLASS_AREA, rel=1e-3)
-    assert "storey attic has no rooms and 3.6 m2 of glass unused" in building.account.lines[2]
+    assert "storey attic has no rooms and 3.6 m2 of unused glass" in building.account.lines[2]
 
 
 @pytest.mark.parametrize("suffix", ["ifc", "ifczip"])

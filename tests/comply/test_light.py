@@ -156,7 +156,7 @@ def test_a_closed_state_says_what_it_leaves_of_the_view():
     space = shoebox(4.0, 6.0).spaces[0]
     (window,) = space.windows
     clear, dark = glazing(0.7), replace(glazing(0.2), name="dark")
-    for closed, said in ((dark, "leaves the view free where closed"), (None, "hides the view")):
+    for closed, said in ((dark, "the view remains when closed"), (None, "blocks the view")):
         states = open_and_closed({window.guid: (clear,)}, closed)
         hidden, notes = windows_without_view([window], states)
         assert not hidden and len(notes) == 2

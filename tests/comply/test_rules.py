@@ -158,7 +158,7 @@ def test_a_sentence_names_what_is_missed_alone():
     criterion = read_rule("en17037").criterion[0]
     verdict = RoomVerdict("en17037", criterion, True, ((310.0, 50.0),) * 3)
     (text,) = missed(SimpleNamespace(verdicts=(verdict,)))
-    assert "95 % of the reference plane" in text and "50 lx, ≥ 100 lx for minimum" in text
+    assert "95 % of the reference plane" in text and "50 lx, required ≥ 100 lx for minimum" in text
     assert "310 lx" not in text
 
 
@@ -223,7 +223,7 @@ def test_the_building_is_a_mean_over_the_floor_area(calendar):
     assert mean.values == pytest.approx([0.25] * 3) and mean.reached == NOT_MET
     assert all_rooms.values == pytest.approx([0.25]) and all_rooms.reached == NOT_MET
     mean, all_rooms = assess_building([room(1.0), room(0.55)], [10.0, 30.0])
-    assert mean.reached == "2 points" and all_rooms.reached.startswith("1 more point")
+    assert mean.reached == "2 points" and all_rooms.reached.startswith("1 additional point")
     mean, _ = assess_building([room(1.0), room(None)], [10.0, 30.0])
     assert mean.reached == NOT_COMPUTED
 

@@ -13,6 +13,7 @@ import pytest
 from scenes.figures.plan import plan_frame
 from scenes.figures.rose import RoseWedge, roses
 from scenes.head import NO_HEAD
+from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.page import write_page
 from tests.devtools import Page, chromium
@@ -41,7 +42,7 @@ def table() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def write_glare_page(path: Path) -> None:
+def write_glare_page(path: Path, page: PageOptions = OWN_PAGE) -> None:
     """The page of these views."""
     options = YearOptions("office.ifc", "city.epw", grid=2.0, directions=DIRECTIONS)
     year = SimpleNamespace(
@@ -49,7 +50,7 @@ def write_glare_page(path: Path) -> None:
         weather=SimpleNamespace(site="Lyon"), notes=("A note & more.",), head=NO_HEAD,
         fenestration=({"system": "Blind at 45", "source": "blind.xml", "windows": ["W"]},),
     )  # fmt: skip
-    write_page(year, table(), path)
+    write_page(year, table(), path, page)
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +63,7 @@ def page(tmp_path_factory):
 def test_every_view_is_a_wedge_with_its_figures(page) -> None:
     text = page.read_text()
     assert text.count('class="wedge"') == 4 * DIRECTIONS
-    assert "eye002_1: 51 % above 0.35, 31 % above 0.40, 15 % above 0.45; highest 0.81" in text
+    assert "eye002_1: 51 % above 0.35, 31 % above 0.40, 15 % above 0.45; maximum 0.81" in text
     assert "101 &lt;Open&gt; office" in text and "A note &amp; more." in text
     assert "eye002_1: DGP 0.81, 21 December" in text
     assert 'src="eye002_1_12-21_12h.png"' in text

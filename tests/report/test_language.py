@@ -14,14 +14,11 @@ from bim.account import Account, StoreyAccount
 from mitsuba_cfs.errors import DataError
 from scenes.language import catalogue
 from scenes.language.catalogue import TRANSLATED, in_language
-from scenes.language.heard import heard
-from scenes.page_options import DossierSection, PageOptions, RunSection, read_page
+from scenes.page_options import PageOptions, RunSection, read_page
 from scenes.report.page import report_html, summary
-from scenes.study_report.page import study_report_html
 from tests.report.browser import chromium, inspect
 from tests.report.building_page import building
 from tests.report.synthetic import run_result
-from tests.report.test_study_report import study
 
 LANGUAGES = TRANSLATED
 EVERYTHING = Account(  # that can be said of a model which is usable with care
@@ -136,21 +133,17 @@ def test_english_is_as_it_was(result) -> None:
     assert report_html(result, PageOptions()) == report_html(result)
 
 
-@pytest.mark.parametrize(
-    ("text", "sections", "translated", "words"),
-    [
-        ("language = 'it'", RunSection, True, "language: expected 'en', 'de' or 'fr', got 'it'"),
-        ("language = 'de'", DossierSection, False, "language: de: this page is there in English"),
-    ],
-)
-def test_another_language_is_one_line(tmp_path, text, sections, translated, words) -> None:
+def test_another_language_is_one_line(tmp_path) -> None:
     path = tmp_path / "page.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text("language = 'it'", encoding="utf-8")
     with pytest.raises(DataError) as error:
-        read_page(path, sections, translated=translated)
+        read_page(path, RunSection)
+    words = "language: expected 'en', 'de' or 'fr', got 'it'"
     assert str(error.value).startswith(f"{path}: {words}")
     path.write_text("language = 'de'", encoding="utf-8")
-    assert read_page(path, RunSection, translated=True).language == "de"
+    assert read_page(path, RunSection).language == "de"
+    assert read_page(path, RunSection, "fr").language == "fr"
+    assert read_page(None, RunSection, "fr").language == "fr"
 
 
 @pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
@@ -179,35 +172,3 @@ def test_the_account_of_the_model_is_in_the_pages_language(result, language, acc
     for text in shown:
         assert not ENGLISH.search(text), text
     assert dict(summary(run))["Rooms read"] == dict(account.facts)["Rooms read"]
-
-
-def test_notes_are_translated_or_named_english(result) -> None:
-    note = "Windows A, B: Blind 45, from --cfs blind.xml."
-    run = replace(result, notes=(note, "Nobody has translated this."))
-    page = report_html(run, PageOptions(language="de"))
-    assert "<li>Fenster A, B: Blind 45, aus --cfs blind.xml.</li>" in page
-    assert '<li lang="en">Nobody has translated this.</li>' in page
-    assert heard(note) == note
-
-
-STUDY_NAMES = (  # of the made-up study, its rooms and the stages whose seconds are noted
-    r"Blinds & shades|broken\.xml: has <no> band|Open-plan office south|Meeting room west & archive"
-    r"|(?:View|Daylight) matrix s|Annual product s|Pictures s"
-)
-ENGLISH_STUDY = re.compile(
-    r"\b(the|of|with|hours?|daylight|glare|and|above|computed|rooms|every|which|year)\b",
-    re.I,
-)
-
-
-@pytest.mark.parametrize("language", LANGUAGES)
-def test_a_study_is_in_the_pages_language(language) -> None:
-    """What a reader sees of a study has no English word, but for names and problems."""
-    asked = study()
-    page = study_report_html(asked, PageOptions(language=language))
-    page = re.sub(r'<section id="problems">.*?</section>', "", page, flags=re.DOTALL)
-    assert f'<html lang="{language}">' in page
-    for text in shown(page):
-        found = ENGLISH_STUDY.search(re.sub(STUDY_NAMES, "", text))
-        assert not found, text
-    assert study_report_html(asked) == study_report_html(asked, PageOptions())

@@ -105,8 +105,8 @@ def test_account_stands_in_the_head_and_alike_issues_once(result) -> None:
     lost = Issue("window-without-room", "W1", {"element": "window W1"}, Effect("window", 11.0))
     page = report_html(replace(result, building=building, issues=(*dull, lost)))
     head, _, rest = page.replace("\u00a0", " ").partition("</header>")
-    assert "9.0 of 20.0 m² that looks out used" in head
-    assert "not usable: only 45 % of the glass that looks out is used" in head
+    assert "9.0 of 20.0 m² of exterior glass used" in head
+    assert "not usable: only 45 % of the exterior glass is used" in head
     assert "3 of 4 spaces" in head and "A gym" in head
     assert "19 times: wall 0: its body is no closed solid" in rest and "wall 7: its" not in rest
     assert rest.index("no room behind it") < rest.index("19 times")

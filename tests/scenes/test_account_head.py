@@ -17,7 +17,7 @@ def test_a_head_begins_with_the_account_of_a_model_that_will_not_do(tmp_path, ca
     PrintedHead()(head)
     printed = capsys.readouterr().out
     # the glass reaches from 1.0 to 2.3 m, the room to 1.2 m
-    verdict = "Model: not usable: only 15 % of the glass that looks out is used"
+    verdict = "Model: not usable: only 15 % of the exterior glass is used"
     assert printed.splitlines()[0].startswith(verdict)
     assert "Rooms read: 1 of 1 spaces" in printed and "Glass: " in printed
     assert head.notes[0].startswith(verdict)

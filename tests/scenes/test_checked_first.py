@@ -299,12 +299,9 @@ def test_the_planted_building_is_seen_when_it_is_read(place, capsys) -> None:
 def _loaded(words: list[str], folder: Path) -> set[str]:
     """Modules in memory when `cfs` has ended, in a process of its own."""
     code = (
-        "import json, sys\n"
-        "from scenes import cli\n"
-        "try:\n"
+        "import json, sys\nfrom scenes import cli\ntry:\n"
         f"    cli.run({words!r})\n"
-        "finally:\n"
-        "    print('\\n' + json.dumps(sorted(sys.modules)))\n"
+        "finally:\n    print('\\n' + json.dumps(sorted(sys.modules)))\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=folder

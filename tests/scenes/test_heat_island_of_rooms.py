@@ -26,7 +26,7 @@ from .study_files import study_file
 
 NIGHT = [1.0] * 6 + [0.0] * 13 + [0.5] * 5  # shares of the maximum from midnight on
 ISLAND = f"[heat_island]\nsky_view = 0.5\nvegetation = 0.1\nhourly_shares = {NIGHT}\n"
-STREET = "the air is that of a street"
+STREET = "air of an urban street"
 
 
 @pytest.fixture

@@ -197,4 +197,7 @@ def test_run_computes_a_room_without_windows_and_says_what_it_borrows(
     assert without.exit_code != 0 and "has no window" in str(without.exception)
     result = CliRunner().invoke(cfs, [*call, "--inner-glass", "--out", str(tmp_path / "open")])
     assert result.exit_code == 0, result.exception or result.output
-    assert "borrows 100 % of its daylight through 5.6 m2 of glass from lit" in result.output
+    assert (
+        "receives 100 % of its daylight through 5.6 m2 of inner glass and 0.0 m2 of open doorways "
+        "from lit" in result.output
+    )

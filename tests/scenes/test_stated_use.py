@@ -163,13 +163,18 @@ def test_cfs_thermal_has_the_files_set_points(tmp_path):
     years, notes = run_study(read_study(study), lambda *_: None)
     office, hall = (year.hours["air_c"] for year in years)
     assert hall.min() < 15 < office.min()
-    assert any(note.startswith("Gains, air and set points of 2 of 2 room(s)") for note in notes)
+    assert any(
+        note.startswith("Gains, outdoor air and set points of 2 of 2 rooms are from ")
+        for note in notes
+    )
     assert any(note.startswith("The file states set points (rooms: Hall)") for note in notes)
 
 
 def test_commands_with_rules_of_their_own_say_what_they_leave_out(used):
     """`cfs comply` has the uses, sensors and eyes of its rules."""
     said = unused_notes(replace(used, grids=(ModelGrid("g", np.zeros((1, 3)), np.eye(3)[2:]),)))
-    assert said[-1] == "used.hbjson holds 2 uses of rooms, 1 sensor grids: not used here."
+    assert said[-1] == (
+        "used.hbjson contains 2 uses of rooms, 1 sensor grids and 0 views; they are not used here."
+    )
     assert "set points (Hall): not used: the room has no system." in said
     assert not unused_notes(read_honeybee(TWO_ROOMS))

@@ -67,7 +67,7 @@ def test_layers_give_u_g_films_and_resistance_by_default():
         heat.fenestration.layer_resistance.coefficients, data.resistance.coefficients, rtol=1e-9
     )
     assert heat.transmittance[0] < heat.g_value[0] < 0.9
-    assert "ISO 15099 layer by layer, films that the shade realises" in heat.model
+    assert "ISO 15099, layer by layer, with films of the shade" in heat.model
     assert len(heat.notes) == 2  # U and g are from the layers
     known = thermal_system(
         grey_system(closure=Closure("layers", unit=INTERNAL), u_value=1.0, g_value=0.4)
@@ -125,7 +125,7 @@ def test_place_of_a_shade_gives_its_typical_films_unless_stated():
         inner, outer = TYPICAL_FILMS[place]
         heat = thermal_system(grey_system(u_value=1.1, g_value=0.4, shading_position=place))
         assert heat.fenestration.r_inner == (inner or R_INNER)
-        assert "films that the shade realises" in heat.model
+        assert "films of the shade" in heat.model
         # shades that stand 1 to 10 cm open at their edges realise about these
         found = [
             iso15099_data(
@@ -148,7 +148,7 @@ def test_place_of_a_shade_gives_its_typical_films_unless_stated():
 
 def test_a_shade_is_not_taken_for_a_pane_by_silence():
     said = thermal_system(grey_system()).notes
-    assert "state shading_position" in said[-1]
+    assert "State shading_position" in said[-1]
     for known in ({"shading_position": "none"}, {"u_value": 1.1, "g_value": 0.4}):
         assert not any("shading_position" in n for n in thermal_system(grey_system(**known)).notes)
     wrong = grey_system(closure=Closure("layers", unit=INTERNAL), shading_position="external")

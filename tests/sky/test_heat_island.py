@@ -121,7 +121,7 @@ def test_a_study_has_the_air_of_a_street() -> None:
     excess = (weather.dry_bulb_c - plain.dry_bulb_c).reshape(-1, 24)
     assert 1.0 < excess[:, 2].mean() < 6.0
     np.testing.assert_allclose(excess[:, 12], 0.0, atol=1e-9)
-    assert "the air is that of a street" in " ".join(weather.notes)
+    assert "air of an urban street" in " ".join(weather.notes)
 
 
 def test_a_study_out_of_range_is_one_line() -> None:

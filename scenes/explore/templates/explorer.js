@@ -1,6 +1,7 @@
 // The page: one hour for all that is shown, one or two variants, and their difference.
 (() => {
   "use strict";
+  const { gettext, fixed } = cfs;
   const byId = (id) => document.getElementById(id);
   const PLAY = 200; // [ms] an hour at least
   const explorer = { rooms: [], variants: [], panels: [], playing: false };
@@ -16,8 +17,8 @@
     for (const entry of data.rooms) {
       let promise;
       const room = () => (promise ||= cfs.Room.load(entry));
-      const several = data.rooms.length > 1, which = several ? entry.name : "", group = which || "Shading";
-      if (entry.states.length > 1) explorer.variants.push({ group, which, label: "as operated", state: -1, room, entry });
+      const several = data.rooms.length > 1, which = several ? entry.name : "", group = which || gettext("Shading");
+      if (entry.states.length > 1) explorer.variants.push({ group, which, label: gettext("as operated"), state: -1, room, entry });
       entry.states.forEach((label, state) => explorer.variants.push({ group, which, label, state, room, entry }));
     }
     const count = explorer.variants.length, first = namedVariant(), second = secondVariant(first);
@@ -92,7 +93,7 @@
     const both = byId("compare").checked;
     document.body.classList.toggle("both", both);
     byId("date-now").textContent = explorer.calendar.words(day);
-    byId("hour-now").textContent = `${clock}:00 to ${clock + 1}:00`;
+    byId("hour-now").textContent = gettext("{start}:00 to {end}:00", { start: clock, end: clock + 1 });
     byId("hour").setAttribute("aria-valuetext", byId("hour-now").textContent);
     byId("date").setAttribute("aria-valuetext", byId("date-now").textContent);
     const shown = explorer.panels.slice(0, both ? 2 : 1), found = [];
@@ -119,23 +120,28 @@
     canvas.height = view.height;
     canvas.getContext("2d").putImageData(cfs.difference(view, found[0].room.arrays.pixels, found[0].values, found[1].values), 0, 0);
     const d = found[1].glare.dgp - found[0].glare.dgp, median = (f) => Array.from(f.lux).sort((a, b) => a - b)[f.lux.length >> 1];
-    const sign = (v, digits) => (v < 0 ? "−" : "+") + Math.abs(v).toFixed(digits);
-    byId("changes").textContent = `The second has DGP ${sign(d, 3)}, ${sign(found[1].glare.Ev - found[0].glare.Ev, 0)} lx at the eye, `
-      + `${sign(median(found[1]) - median(found[0]), 0)} lx in the median of the work plane.`;
+    const sign = (v, digits) => (v < 0 ? "−" : "+") + fixed(Math.abs(v), digits);
+    byId("changes").textContent = gettext("Second minus first: DGP {dgp}, {eye} lx at the eye, {median} lx median of the work plane.", {
+      dgp: sign(d, 3), eye: sign(found[1].glare.Ev - found[0].glare.Ev, 0), median: sign(median(found[1]) - median(found[0]), 0),
+    });
   }
 
   function sayHour(found, sun, lit) {
     const degrees = (v) => Math.round(v * 180 / Math.PI), altitude = degrees(Math.asin(Math.max(-1, Math.min(1, sun[2]))));
-    let text = "Sun below the horizon.";
+    let text = gettext("Sun below the horizon.");
     if (altitude > 0) {
       const azimuth = (degrees(Math.atan2(sun[0], sun[1])) + (found.room.entry.turned || 0) + 360) % 360;
-      text = `Sun ${altitude}° high, ${azimuth}° from north by east`;
-      text += found.l === undefined ? "." : `, ${cfs.number(found.room.arrays.sun_lux[found.l], 2)} lx normal to its beam.`;
+      text = found.l === undefined
+        ? gettext("Solar altitude {altitude}°, azimuth {azimuth}°.", { altitude, azimuth })
+        : gettext("Solar altitude {altitude}°, azimuth {azimuth}°, direct normal illuminance {lux} lx.", {
+          altitude, azimuth, lux: cfs.number(found.room.arrays.sun_lux[found.l], 2),
+        });
     }
     byId("sun").textContent = text;
-    byId("time").textContent = lit ? `Picture ${lit.milliseconds.toFixed(0)} ms, glare ${lit.glareMilliseconds.toFixed(0)} ms, with unpacking ${lit.wholeMilliseconds.toFixed(0)} ms.` : "";
+    byId("time").textContent = lit ? gettext("Computing time: picture {picture} ms, glare {glare} ms, with decompression {whole} ms.", { picture: fixed(lit.milliseconds, 0), glare: fixed(lit.glareMilliseconds, 0), whole: fixed(lit.wholeMilliseconds, 0) }) : "";
     const check = found.room.facts.checks[found.state];
-    byId("error").textContent = check ? `In ${check.hours.length} hours drawn at random the DGP shown differs from that of the uncompressed pictures by ${check.largest.toFixed(4)} at most, ${check.mean < 0.0001 ? "less than 0.0001" : check.mean.toFixed(4)} in the mean.` : "";
+    const mean = check && (check.mean < 0.0001 ? `< ${fixed(0.0001, 4)}` : fixed(check.mean, 4));
+    byId("error").textContent = check ? gettext("In {count} random hours the DGP shown differs from that of the uncompressed pictures by at most {most}, on average {mean}.", { count: check.hours.length, most: fixed(check.largest, 4), mean }) : "";
   }
 
   function paintCarpet(found, day, clock) {
@@ -157,7 +163,7 @@
 
   async function play() {
     explorer.playing = true;
-    byId("play").textContent = "Pause";
+    byId("play").textContent = gettext("Pause");
     const date = byId("date"), hour = byId("hour");
     while (explorer.playing) {
       const begun = performance.now();
@@ -171,8 +177,8 @@
   }
   function stop() {
     explorer.playing = false;
-    byId("play").textContent = "Play";
+    byId("play").textContent = gettext("Play");
   }
   cfs.explorer = explorer;
-  start().catch((error) => { byId("fault").hidden = false; byId("fault").textContent = `This page cannot be shown: ${error.message}`; throw error; });
+  start().catch((error) => { byId("fault").hidden = false; byId("fault").textContent = gettext("This page cannot be shown: {reason}", { reason: error.message }); throw error; });
 })();

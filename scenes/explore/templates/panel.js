@@ -1,7 +1,8 @@
 // One variant on the page: its picture, its figures, its plan.
 (() => {
   "use strict";
-  const TEMPERATURES = [["operative", "operative", "--operative"], ["air", "air", "--air"], ["outdoor", "outdoors", "--outdoor"]];
+  const { gettext, ngettext, fixed } = cfs;
+  const TEMPERATURES = [["operative", gettext("operative"), "--operative"], ["air", gettext("air"), "--air"], ["outdoor", gettext("outdoors"), "--outdoor"]];
 
   class Panel {
     // root: its element; variants: [{label, which room where there are several, room (a promise), state}]
@@ -59,29 +60,36 @@
     say(found) {
       const { glare, room, state, variant } = found, set = (name, text) => { this.at(name).textContent = text; };
       set("state", [variant.which, room.facts.states[state]].filter(Boolean).join(" \u00b7 "));
-      set("up", room.entry.turned ? `as modelled, before it is turned by ${room.entry.turned}°` : "north up");
+      set("up", room.entry.turned ? gettext("as modelled, before rotation by {degrees}°", { degrees: room.entry.turned }) : gettext("north up"));
       const dgp = this.at("dgp");
       dgp.className = "dgp";
       if (!glare) {
-        set("dgp", "the sun is down");
+        set("dgp", gettext("sun below the horizon"));
         set("figures", "\u00a0");
         return;
       }
       dgp.classList.add(cfs.glareClass(glare.dgp));
-      set("dgp", `DGP ${glare.dgp.toFixed(3)} ${cfs.glareClass(glare.dgp)}`);
-      const n = glare.sources.length, sources = n ? `${n} glare source${n > 1 ? "s" : ""}` : "no glare source";
-      const seen = glare.sources.some((s) => s.sun) ? ", the sun's disc in view" : "";
-      set("figures", `${cfs.number(glare.Ev)} lx at the eye, ${sources}${seen}, up to ${cfs.number(glare.largest, 2)} cd/m²`);
+      set("dgp", `DGP ${fixed(glare.dgp, 3)} ${cfs.glareWords(glare.dgp)}`);
+      const n = glare.sources.length;
+      const facts = [
+        gettext("{lux} lx at the eye", { lux: cfs.number(glare.Ev) }),
+        n ? ngettext("{count} glare source", "{count} glare sources", n) : gettext("no glare source"),
+      ];
+      if (glare.sources.some((s) => s.sun)) facts.push(gettext("solar disc in view"));
+      facts.push(gettext("up to {value} cd/m²", { value: cfs.number(glare.largest, 2) }));
+      set("figures", facts.join(", "));
     }
 
     sayLight(found, beams, sun) {
       const { lux, room } = found;
       if (!lux) { this.at("light").textContent = "\u00a0"; return; }
       const sorted = Array.from(lux).sort((a, b) => a - b), middle = sorted[sorted.length >> 1];
-      let text = `Work plane: median ${cfs.number(middle)} lx, ${cfs.number(sorted[0])} to ${cfs.number(sorted.at(-1))} lx.`;
+      let text = gettext("Work plane: median {median} lx, {least} to {most} lx.", {
+        median: cfs.number(middle), least: cfs.number(sorted[0]), most: cfs.number(sorted.at(-1)),
+      });
       const most = Math.max(0, ...beams.map((b) => b.through)), direct = room.arrays.sun_lux[found.l] * Math.max(sun[2], 0) * most;
-      if (direct >= 1) text += ` Sun patches bring up to ${cfs.number(direct, 2)} lx.`;
-      else if (beams.length) text += " No sun passes straight.";
+      if (direct >= 1) text += " " + gettext("Sun patches reach {lux} lx.", { lux: cfs.number(direct, 2) });
+      else if (beams.length) text += " " + gettext("No direct sun is transmitted.");
       this.at("light").textContent = text;
     }
 
@@ -92,11 +100,11 @@
       }));
       this.at("heat").hidden = !lines.length;
       if (!lines.length) return;
-      const loads = [["heating", "heating"], ["cooling", "cooling"], ["lighting", "lamps"]]
+      const loads = [["heating", gettext("heating")], ["cooling", gettext("cooling")], ["lighting", gettext("lighting")]]
         .filter(([name]) => room.arrays[name] && room.arrays[name][hour] >= 1)
         .map(([name, label]) => `${label} ${cfs.number(room.arrays[name][hour], 2)} W`);
-      const operated = room.facts.states.length > 1 ? " (of the year as operated)" : "";
-      this.at("temperatures").textContent = lines.map((l) => `${l.label} ${l.now.toFixed(1).replace("-", "−")} °C`).concat(loads).join(", ") + operated;
+      const operated = room.facts.states.length > 1 ? " " + gettext("(as operated in the year)") : "";
+      this.at("temperatures").textContent = lines.map((l) => `${l.label} ${fixed(l.now, 1)} °C`).concat(loads).join(", ") + operated;
       cfs.paintDay(this.at("day"), lines, hour % 24);
     }
 
@@ -108,7 +116,7 @@
       this.lookup ||= new Map();
       if (!this.lookup.has(found.room)) this.lookup.set(found.room, new Map(Array.from(found.room.arrays.pixels, (p, i) => [p, i])));
       const i = this.lookup.get(found.room).get(y * view.width + x);
-      this.at("under").textContent = i === undefined ? "\u00a0" : `${cfs.number(found.values[i])} cd/m² under the pointer`;
+      this.at("under").textContent = i === undefined ? "\u00a0" : gettext("{value} cd/m² at the pointer", { value: cfs.number(found.values[i]) });
     }
   }
   cfs.Panel = Panel;

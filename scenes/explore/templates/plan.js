@@ -86,7 +86,7 @@
         const distance = Math.max(Math.abs(x - (cell[0][0] + cell[2][0]) / 2), Math.abs(y - (cell[0][1] + cell[2][1]) / 2));
         if (distance < least) { least = distance; best = s; }
       });
-      return best < 0 || !this.lux ? "" : `${cfs.number(this.lux[best], 3)} lx at x ${x.toFixed(1)} m, y ${y.toFixed(1)} m`;
+      return best < 0 || !this.lux ? "" : cfs.gettext("{lux} lx at x {x} m, y {y} m", { lux: cfs.number(this.lux[best], 3), x: cfs.fixed(x, 1), y: cfs.fixed(y, 1) });
     }
   }
   // A number with so many significant digits, thousands set apart
@@ -95,7 +95,7 @@
     const power = value ? Math.floor(Math.log10(Math.abs(value))) : 0, step = 10 ** Math.max(power - digits + 1, -digits);
     const digitsAfter = Math.max(0, digits - 1 - Math.max(power, 0)), text = (Math.round(value / step) * step).toFixed(digitsAfter);
     const [whole, ...rest] = text.split(".");
-    return [whole.replace(/\B(?=(\d{3})+$)/g, "\u202f"), ...rest].join(".");
+    return [whole.replace(/\B(?=(\d{3})+$)/g, "\u202f"), ...rest].join(document.documentElement.lang === "en" ? "." : ",");
   };
   Object.assign(cfs, { Plan, LUX: [LOW, HIGH] });
 })();

@@ -10,14 +10,19 @@
       this.days = Math.ceil(hours / DAY);
     }
     date(day) { return new Date(this.first + day * 864e5); }
-    words(day) { return this.date(day).toLocaleDateString("en-GB", { day: "numeric", month: "long", timeZone: "UTC" }); }
+    words(day) { return cfs.day(this.date(day), "long"); }
     months() {
       const found = [];
-      for (let d = 0; d < this.days; d++) if (this.date(d).getUTCDate() === 1) found.push([d, this.date(d).toLocaleDateString("en-GB", { month: "short", timeZone: "UTC" })]);
+      for (let d = 0; d < this.days; d++) if (this.date(d).getUTCDate() === 1) found.push([d, cfs.month(this.date(d))]);
       return found;
     }
   }
 
+  const WORDS = {
+    imperceptible: cfs.gettext("imperceptible"), perceptible: cfs.gettext("perceptible"),
+    disturbing: cfs.gettext("disturbing"), intolerable: cfs.gettext("intolerable"),
+  };
+  const glareWords = (dgp) => WORDS[glareClass(dgp)];
   const glareClass = (dgp) => CLASSES.find(([limit]) => dgp <= limit)[1];
 
   // Paint values [H] (NaN: empty) as days across and hours up, with a frame round the chosen hour
@@ -68,5 +73,5 @@
     }
     pen.setLineDash([]);
   }
-  Object.assign(cfs, { Calendar, glareClass, paintCarpet, paintDay });
+  Object.assign(cfs, { Calendar, glareClass, glareWords, paintCarpet, paintDay });
 })();
