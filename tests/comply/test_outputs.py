@@ -195,7 +195,8 @@ def test_each_quantity_of_the_light_has_one_plan(result):
     light = RoomLights(room.space, dict(zip(names, grids, strict=True)), {})
     found = {one.title: one for one in plans(lit, replace(room, view=None, light=light))}
     assert list(found) == [
-        "Illuminance in half of the daylight hours", "Daylight factor", "Daylight autonomy", "Sunlit hours",
+        "Illuminance in half of the daylight hours", "Daylight factor", "Daylight autonomy",
+        "Sunlit hours",
     ]  # fmt: skip
     assert (
         "grid of en17037, 0.85 m" in found["Illuminance in half of the daylight hours"].explanation
