@@ -195,10 +195,13 @@ def test_each_quantity_of_the_light_has_one_plan(result):
     light = RoomLights(room.space, dict(zip(names, grids, strict=True)), {})
     found = {one.title: one for one in plans(lit, replace(room, view=None, light=light))}
     assert list(found) == [
-        "Half of the daylight hours", "Daylight factor", "Daylight autonomy", "Sunlit hours",
+        "Illuminance in half of the daylight hours", "Daylight factor", "Daylight autonomy",
+        "Sunlit hours",
     ]  # fmt: skip
-    assert "grid of en17037, 0.85 m" in found["Half of the daylight hours"].explanation
-    assert "222" in found["Half of the daylight hours"].body
+    assert (
+        "grid of en17037, 0.85 m" in found["Illuminance in half of the daylight hours"].explanation
+    )
+    assert "222" in found["Illuminance in half of the daylight hours"].body
     autonomy = found["Daylight autonomy"].explanation  # of sDA before BREEAM's hours
     assert "grid of lm83" in autonomy and "blinds operated" in autonomy
     assert "grid of lm83" in found["Sunlit hours"].explanation
