@@ -181,7 +181,7 @@ def test_a_room_says_how_glare_was_rated(result):
 
 
 def test_each_quantity_of_the_light_has_one_plan(result):
-    """On the grid of the rule that asks for it, not on that of every rule."""
+    """On the Grid of the rule that asks for it, not on that of every rule."""
     room = result.rooms[0]
 
     def grid(height: float, lux: float, closed=None) -> GridSummary:
@@ -199,12 +199,12 @@ def test_each_quantity_of_the_light_has_one_plan(result):
         "Sunlit hours",
     ]  # fmt: skip
     assert (
-        "grid of en17037, 0.85 m" in found["Illuminance in half of the daylight hours"].explanation
+        "Grid of en17037, 0.85 m" in found["Illuminance in half of the daylight hours"].explanation
     )
     assert "222" in found["Illuminance in half of the daylight hours"].body
     autonomy = found["Daylight autonomy"].explanation  # of sDA before BREEAM's hours
-    assert "grid of lm83" in autonomy and "blinds operated" in autonomy
-    assert "grid of lm83" in found["Sunlit hours"].explanation
+    assert "Grid of lm83" in autonomy and "blinds operated" in autonomy
+    assert "Grid of lm83" in found["Sunlit hours"].explanation
 
 
 def test_values_have_a_row_for_each_need(result, tmp_path):
