@@ -290,7 +290,7 @@ def test_a_failing_room_is_found_again_from_its_topic(tmp_path):
     found = found_again(tmp_path / "out" / "issues.bcf", OFFICE)
     assert set(found) == failing
     for guid, (text, direction) in found.items():
-        assert f"{table.loc[guid].value:.2f} h, ≥ 6 h" in text
+        assert f"{table.loc[guid].value:.2f} h, required ≥ 6 h" in text
         assert np.abs(direction).max() == pytest.approx(1.0, abs=1e-6)  # windows amid their walls
 
 
