@@ -76,7 +76,6 @@ NOT_CLEAN: set[str] = {
     "scenes/comply",
     "scenes/fenestration",
     "scenes/heat",
-    "scenes/language",
     "scenes/photovoltaics",
     "scenes/report",
     "scenes/room",

@@ -24,6 +24,7 @@ from mitsuba_cfs.methods.phase_matrices import (
     INDOOR_DEPTH,
     OUTDOOR_DEPTH,
     PhaseMatrices,
+    has_sharp_beam,
 )
 from mitsuba_cfs.methods.window_reflection import (
     by_way_of_outdoors,
@@ -78,7 +79,7 @@ def group_coefficients(
 
 
 def _of_group(matrices: PhaseMatrices, optics: SystemOptics, g: int) -> GroupCoefficients:
-    view, _ = sensor_matrices(matrices)
+    view = sensor_matrix(matrices)
     daylight, beam = matrices.daylight.values, direct_transmittance(matrices, optics, g)
     straight = _straight_view(matrices, optics, g, beam)
     whole = np.zeros((len(view.values), daylight.shape[-1]))
@@ -97,7 +98,7 @@ def _by_sun(matrices: PhaseMatrices, group: GroupCoefficients, g: int) -> Array:
 
     V_d T D_d + (V - V_d) T_b D_d + B_d - V_d diag(tau) D_d
     """
-    view, direct_view = sensor_matrices(matrices)
+    view, direct_view = sensor_matrix(matrices), direct_sensor_matrix(matrices)
     daylight = direct_daylight(matrices)
     lost, beams = group.optics.transmission, beam_matrix(group.optics)
     if group.straight is not None:
@@ -116,11 +117,10 @@ def without_straight(matrices: PhaseMatrices, group: GroupCoefficients, q: int) 
 
     V T - V_d diag(tau)
     """
-    view, direct_view = sensor_matrices(matrices)
-    shares: Array = view.values[:, q] @ group.optics.transmission
+    shares: Array = sensor_matrix(matrices).values[:, q] @ group.optics.transmission
     if group.straight is None:
         return shares
-    return shares - direct_view[:, q] * group.beam
+    return shares - direct_sensor_matrix(matrices)[:, q] * group.beam
 
 
 def direct_transmittance(matrices: PhaseMatrices, optics: SystemOptics, g: int) -> Array:
@@ -162,8 +162,7 @@ def _straight_view(
             scenes=matrices.scenes,
         )  # fmt: skip
         return StraightView(values, np.zeros_like(values.values) if matrices.five_phase else None)
-    sharp = matrices.five_phase or len(matrices.parts.of(g)) > 1 or bool(scene.exterior.glossy)
-    if not sharp:
+    if not has_sharp_beam(matrices, g):
         return None
     scattering = [optics.scattering if i == g else None for i in range(len(scene.groups))]
 
@@ -192,7 +191,7 @@ def reflection_shares(
 
     Args: optics: of the window parts [Q].
     """
-    view, _ = sensor_matrices(matrices)
+    view = sensor_matrix(matrices)
     matrices = with_exchange_of(matrices, optics)
     shares: NDArray[np.floating] | None = None
     outwards = None
@@ -213,11 +212,18 @@ def coefficients_of(matrices: PhaseMatrices, shares: NDArray[np.floating]) -> Ar
     return coefficients
 
 
-def sensor_matrices(matrices: PhaseMatrices) -> tuple[Estimate, Array]:
-    """V and V_d [S, Q, K]; `ValueError` where they have not been traced."""
-    if matrices.sensors is None or matrices.direct_sensors is None:
+def sensor_matrix(matrices: PhaseMatrices) -> Estimate:
+    """V [S, Q, K]; `ValueError` where it has not been traced."""
+    if matrices.sensors is None:
         raise ValueError("the matrices have none of the sensors: with_sensors(matrices)")
-    return matrices.sensors, matrices.direct_sensors
+    return matrices.sensors
+
+
+def direct_sensor_matrix(matrices: PhaseMatrices) -> Array:
+    """V_d [S, Q, K]; `ValueError` where it has not been traced."""
+    if matrices.direct_sensors is None:
+        raise ValueError("the matrices have no V_d of the sensors: with_sensors(matrices)")
+    return matrices.direct_sensors
 
 
 def direct_daylight(matrices: PhaseMatrices) -> Array:

@@ -28,9 +28,10 @@ from mitsuba_cfs.methods.coefficients import (
     beam_matrix,
     coefficients_of,
     direct_daylight,
+    direct_sensor_matrix,
     group_coefficients,
     reflection_shares,
-    sensor_matrices,
+    sensor_matrix,
 )
 from mitsuba_cfs.methods.optics import (
     States,
@@ -398,7 +399,7 @@ def _sensor_light(
 
 def _beam_in_room(light: PhaseLight, one: GroupCoefficients, g: int) -> Array:
     """The sun's beam that a room with mirrors reflects, at the sun's own angle [S, L] [lx]."""
-    view, direct_view = sensor_matrices(light.matrices)
+    view, direct_view = sensor_matrix(light.matrices), direct_sensor_matrix(light.matrices)
     indirect, total = view.values - direct_view, np.zeros((len(direct_view), len(light.sky.lit)))
     for q in light.matrices.parts.of(g):
         beams = sun_beams(light.matrices, q, one.optics, light.sky)

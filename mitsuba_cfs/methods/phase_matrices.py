@@ -171,13 +171,23 @@ def with_direct_daylight(matrices: PhaseMatrices, *, progress: Progress = silent
     return replace(matrices, direct_daylight=direct, straight_daylight=straight)
 
 
+def has_sharp_beam(matrices: PhaseMatrices, g: int) -> bool:
+    """Whether what passes a window group straight on is traced apart from V T D."""
+    scene = matrices.scene
+    if matrices.five_phase or g >= len(scene.outdoor_groups) or scene.exterior.glossy:
+        return True
+    return len(matrices.parts.of(g)) > 1
+
+
 def with_sensors(matrices: PhaseMatrices, *, progress: Progress = silent) -> PhaseMatrices:
-    """The matrices with V and V_d of the scene's sensors."""
+    """The matrices with V of the scene's sensors, and V_d where the straight beam is apart."""
     if matrices.sensors is not None:
         return matrices
     sensors = _sensors(matrices, INDOOR_DEPTH, part(progress, 0.3, 0.9, "daylight"))
-    # V_d is a part of V entry by entry: the same seed and samples
-    direct = _sensors(matrices, 1, part(progress, 0.9, 1.0, "daylight")).values
+    direct = None
+    if any(has_sharp_beam(matrices, g) for g in range(len(matrices.scene.groups))):
+        # V_d is a part of V entry by entry: the same seed and samples
+        direct = _sensors(matrices, 1, part(progress, 0.9, 1.0, "daylight")).values
     return replace(matrices, sensors=sensors, direct_sensors=direct)
 
 

@@ -11,7 +11,7 @@ from mitsuba_cfs.methods.coefficients import (
     GroupCoefficients,
     beam_matrix,
     direct_daylight,
-    sensor_matrices,
+    sensor_matrix,
     without_straight,
 )
 from mitsuba_cfs.methods.optics import SystemOptics, combinations
@@ -96,7 +96,7 @@ def _exchange_variance(
         hours: which; the light of the others is taken as 0.
     """
     matrices, sky = with_exchange_of(light.matrices, optics), light.sky
-    view, _ = sensor_matrices(matrices)
+    view = sensor_matrix(matrices)
     variance = np.zeros(len(view.values))
     inwards, outwards = reflects(optics), reflects_outdoors(matrices, optics)
     if not inwards and not outwards:
@@ -130,7 +130,7 @@ def _part_variance(
             to the window patches, less that in D [Q, K].
     """
     matrices, T = light.matrices, group.optics.transmission
-    view, _ = sensor_matrices(matrices)
+    view = sensor_matrix(matrices)
     before = matrices.daylight.values[q] @ sky
     if sun is not None:
         on_patches, replaced = sun

@@ -143,7 +143,7 @@ def test_windows_without_view_are_no_view_openings():
     systems = {first.guid: (glazing(),), second.guid: (with_default_shade(glazing()),)}
     hidden, notes = windows_without_view(space.windows, systems)
     assert hidden == {second.guid} and len(notes) == 2
-    assert "haze 100 %: does not count" in notes[1]
+    assert "haze 100 %; does not count" in notes[1]
     found = view_out(space, outdoors_of(building), hidden=hidden)
     x, y = found.points[:, 0], found.points[:, 1]
     wanted = np.degrees(np.arctan2(1.75 - x, y) - np.arctan2(0.25 - x, y))

@@ -146,7 +146,7 @@ def test_the_state_of_shading_switches(page, run) -> None:
     page.until("document.querySelector('#one .state').textContent === 'blind <down>'")
     assert _picture(page) != before
     assert _text(page, "#one .dgp") != open_dgp
-    assert "No sun passes straight" in _text(page, "#one .light")
+    assert "No direct sun is transmitted" in _text(page, "#one .light")
 
 
 def test_two_side_by_side_and_their_difference(page, run) -> None:

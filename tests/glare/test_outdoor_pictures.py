@@ -181,9 +181,8 @@ def test_the_matrices_of_a_view_are_found_again_with_their_elements(tmp_path):
     cache = cfs.MatrixCache(tmp_path)
     first, again = (cfs.phase_matrices(scene, needs=["DGP"], cache=cache).view for _ in range(2))
     assert first is not again and len(list(tmp_path.rglob("view-*.npz"))) == 2
-    light = np.random.default_rng(0).random((first.elements.mean.places.size, 3))
-    np.testing.assert_array_equal(first.elements.mean.rows(light), again.elements.mean.rows(light))
-    np.testing.assert_array_equal(
-        first.elements.mean.places.point, again.elements.mean.places.point
-    )
+    random, shares = np.random.default_rng(0), first.sunlit.mean
+    light = [random.random((part.shape[1], 3), np.float32) for part in (shares.share, shares.near)]
+    np.testing.assert_array_equal(shares.rows(*light), again.sunlit.mean.rows(*light))
+    np.testing.assert_array_equal(first.sunlit.mean.places.point, again.sunlit.mean.places.point)
     np.testing.assert_array_equal(first.indirect.rows, again.indirect.rows)

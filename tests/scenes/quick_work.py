@@ -117,7 +117,7 @@ def _room_picture(_options, *_others):
     view = fisheye([0, 0, 1], [0, 1, 0], 64)
     luminance = np.full((64, 64), 500.0, np.float32)
     rated = evaluate(luminance, view)
-    return RoomPicture(luminance, view, "A", pd.Timestamp("2000-06-21 12:30"), (), rated)
+    return RoomPicture(luminance, view, "A", pd.Timestamp("2000-06-21 12:30"), glare=rated)
 
 
 def _calibrated(size, **_options):

@@ -164,7 +164,7 @@ def test_a_run_has_the_temperatures_of_a_coupled_study(variant, weather, blind, 
     )  # fmt: skip
     names = [space.name for space in building.spaces]
     assert heard == [f"light of {name}" for name in names] + names and not issues
-    assert "flows between them through 18.0 m2" in notes[-1]
+    assert "it flows through 18.0 m2" in notes[-1]
     for year, theirs in zip(found, expected, strict=True):
         np.testing.assert_allclose(year.heat.air_c, theirs.hours["air_c"], atol=1e-3)
         own = year.operation.summary["heating_kwh"]

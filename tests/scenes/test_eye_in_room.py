@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from scenes import cli
-from scenes.demo import WEATHER
+from scenes.demo import VENETIAN_BLIND, WEATHER
 from tests.bim.small_ifc import box_room
 
 # the room spans x 0 to 4, y 0 to 6, z 0 to 3 m; its walls are 0.3 m thick, its window to the south
@@ -31,7 +31,7 @@ def room(tmp_path):
     return folder / "room.ifc"
 
 
-YEAR = ["dgp", "--weather", str(WEATHER)]
+YEAR = ["dgp", "--weather", str(WEATHER), "--cfs", str(VENETIAN_BLIND)]
 
 
 def picture(room, view: str, out) -> int:
@@ -46,6 +46,8 @@ def picture(room, view: str, out) -> int:
         "16",
         "--samples",
         "1",
+        "--cfs",
+        str(VENETIAN_BLIND),
     ]
     return cli.run([*call, "--view", view, "--out", str(out)])
 

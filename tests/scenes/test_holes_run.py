@@ -47,4 +47,4 @@ def test_a_run_says_that_a_room_is_open(tmp_path, holed, capsys):
 def test_other_commands_that_trace_say_so_too(tmp_path, holed, capsys, command):
     out = tmp_path / ("out.png" if command[0] == "picture" else "out")
     assert main([command[0], *holed, *command[1:], "--out", str(out)]) == 0
-    assert "note: room A South office is open: up to" in capsys.readouterr().out
+    assert "Room A South office is open: up to" in capsys.readouterr().out

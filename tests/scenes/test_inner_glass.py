@@ -110,7 +110,7 @@ def test_light_goes_through_a_dark_room_to_the_one_behind_it(three_rooms: Buildi
     systems = in_all_windows(lit, read_system(VENETIAN_BLIND))
     found = inner_glass(three_rooms, last, systems)
     (beyond,) = found.beyond
-    (before,) = beyond.scene.beyond
+    (before,) = beyond.scene.adjacent
     assert len(beyond.scene.groups) == 1 and len(beyond.transmission) == 1
     np.testing.assert_allclose(beyond.transmission[0], found.optics[0][0].transmission)
     (blind,) = room_windows(lit, systems).optics()[0]

@@ -147,7 +147,7 @@ def test_cut_off_ratings_are_made_again_with_a_note(tmp_path, caplog, damage):
     assert finished_glare(keep, 9) is None
     assert "rated again" in caplog.text and str(keep) in caplog.text
     keep.write_text("a letter")
-    with pytest.raises(DataError, match="no file of ratings"):
+    with pytest.raises(DataError, match="is not a file of glare ratings"):
         finished_glare(keep, 9)
     assert keep.read_text() == "a letter"
 

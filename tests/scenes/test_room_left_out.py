@@ -12,7 +12,7 @@ from scenes import cli
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from tests.bim.small_ifc import box_room, empty_project
 
-WHY = "R1 Room: is marked as external (left out)"
+WHY = "Space R1 Room is marked as external ("
 
 
 @pytest.fixture
@@ -67,7 +67,7 @@ def test_a_room_asked_for_by_name_that_was_left_out(tmp_path, capsys):
     call = ["export", str(tmp_path / "m.ifc"), "--gltf", str(tmp_path / "a.glb")]
     assert cli.run([*call, "--space", "shaft"]) == 1
     said = capsys.readouterr().err.strip().splitlines()[-1]
-    assert "space 'shaft' was left out: space 7 Shaft: holds 0.030 m3 only" in said
+    assert "space 'shaft' was left out: Space 7 Shaft has a volume of only 0.030 m3" in said
     assert cli.run([*call, "--space", "Hal"]) == 1
     assert "no space 'Hal'; there are: 1 Hall" in capsys.readouterr().err
     assert cli.run([*call, "--space", "1 hall"]) == 0
@@ -88,7 +88,7 @@ def test_the_tables_of_check_are_whole_when_piped(tmp_path, capsys):
     assert "…" not in said and space.LongName in said
     for row in csv.reader(io.StringIO(table.read_text())):
         if row[0] != "where":
-            assert all(cell in said for cell in row)
+            assert all(cell in said for cell in row[:3])  # not code and severity
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,7 @@ g_value = 0.3
 """
 WRONG = {
     "no system": ("", BOX + CLIMATE, "system: is missing"),
-    "unknown key": ("colour = 1\n", BOX + SYSTEM + CLIMATE, "colour: no such key; there are title"),
+    "unknown key": ("colour = 1\n", BOX + SYSTEM + CLIMATE, "colour: no such key; there are "),
     "unknown method": (
         'methods = ["six-phase"]\n', BOX + SYSTEM + CLIMATE, "methods.0: expected 'three-phase', ",
     ),

@@ -19,7 +19,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods.light import direct_sun
 from scenes import cli
 from scenes.demo import WEATHER
-from scenes.head import model_notes, unused_notes
+from scenes.head import head_of, model_notes
 from scenes.room.control import shading_state
 from scenes.room.daylight import room_daylight
 from scenes.room.glare import annual_glare, room_glare
@@ -168,7 +168,7 @@ def test_the_sun_through_a_crown_by_month_is_that_of_beers_law(variant, weather,
 
 
 def test_what_trees_let_pass_is_said_at_the_head(behind):
-    for notes in (model_notes(behind), unused_notes(behind)):
+    for notes in (model_notes(behind), head_of(behind).lines):
         (said,) = (note for note in notes if "tree" in note)
         assert "3 % from May to October, 46 % from November to April" in said
 

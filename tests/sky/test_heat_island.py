@@ -90,7 +90,7 @@ def test_the_water_in_the_air_stays_and_the_head_says_it() -> None:
     assert "Theeuwes et al. 2017" in found.notes[0]
     assert len(found.notes) == 1
     far = in_city(_weather(latitude_deg=1.3, longitude_deg=103.8), 0.5, 0.2, NIGHT)
-    assert "where this site is not" in far.notes[1]
+    assert "this site is elsewhere" in far.notes[1]
 
 
 def test_a_calm_day_counts_with_half_a_metre_a_second() -> None:

@@ -150,12 +150,12 @@ def test_stretches_of_a_year_are_the_year_in_one(sun_by_step, monkeypatch):
         light.append(replace(shone, state=rng.integers(0, 2, (hours, 1))))
     weather = climate(hours, outdoor=10 + 8 * rng.random(hours))
 
-    def years(**kept):
-        return simulate_zones(rooms, weather, light, air_links=[[0, 0.05], [0.05, 0]], **kept)
+    def years(**storage):
+        return simulate_zones(rooms, weather, light, air_links=[[0, 0.05], [0.05, 0]], **storage)
 
     whole, seen = years(), []
     monkeypatch.setattr(balance, "STRETCH", 50)
-    for found in (years(), years(kept=lambda result: seen.append(result) or result)):
+    for found in (years(), years(storage=lambda result: seen.append(result) or result)):
         for one, other in zip(whole, found, strict=True):
             assert len(other.air_c) == hours and one.warm_up_days == other.warm_up_days
             for field in fields(one):

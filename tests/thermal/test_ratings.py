@@ -91,7 +91,7 @@ def test_command_rates_a_state_and_writes_what_the_balance_takes(tmp_path, shade
     command = ["bsdf", "thermal", str(shade)]
     assert cli.run([*command, "--out", str(out[0]), "--toml", str(out[2])]) == 0
     said = capsys.readouterr().out
-    assert "ISO 52022-3, summer" in said and "ISO 15099 layer by layer" in said
+    assert "ISO 52022-3, summer" in said and "ISO 15099, layer by layer" in said
     table = pd.read_csv(out[0])
     assert list(table["method"]) == [
         "heat balance", "NFRC", "ISO 52022-3, reference", "ISO 52022-3, summer",
