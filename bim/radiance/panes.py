@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bim.planes import merged_polygons, plane_through
 from bim.radiance.daylight import LAYERS, pane_sides
 from bim.radiance.scene import RadianceObject, RadianceScene
-from bim.rays import hemisphere, ray_mesh
+from bim.rays import RayMesh, hemisphere, ray_mesh
 from bim.report.issue import Effect, Issue
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.surfaces import WindowSurface, triangle_areas
@@ -61,6 +61,7 @@ def panes_of(
     dark = {id(thing) for thing in scene.of_modifiers(facades)} if facades else set()
     things = [thing for thing in scene.of_modifiers(apertures) if id(thing) not in dark]
     sides = pane_sides(scene)
+    whole = ray_mesh(np.concatenate([np.empty((0, 3, 3)), *(o.triangles for o in scene.objects)]))
     chosen: list[tuple[RadianceObject, WindowSurface]] = []
     for thing in things:
         try:
@@ -69,7 +70,7 @@ def panes_of(
             if named:
                 raise
             continue  # the sky on either side: no room
-        if named or not _is_free_standing(scene, surface):
+        if named or not _is_free_standing(whole, surface):
             chosen.append((thing, surface))
     layers, beyond, issues = _in_front(chosen)
     windows = [
@@ -119,13 +120,12 @@ def _in_front(
     return layers, beyond, issues
 
 
-def _is_free_standing(scene: RadianceScene, surface: WindowSurface) -> bool:
+def _is_free_standing(scene: RayMesh, surface: WindowSurface) -> bool:
     """Whether most rays from the inner side of a pane meet nothing: it has no room behind it."""
-    mesh = ray_mesh(np.concatenate([np.empty((0, 3, 3)), *(o.triangles for o in scene.objects)]))
     triangles, inwards = surface.triangles, -_normal(surface.triangles)
     rays = np.tile(hemisphere(inwards, RAYS), (len(triangles), 1))
     starts = np.repeat(triangles.mean(axis=1) + BEFORE * inwards, RAYS, axis=0)
-    return bool(np.mean(mesh.first_hits(starts, rays)[1] < 0) > OPEN)
+    return bool(np.mean(scene.first_hits(starts, rays)[1] < 0) > OPEN)
 
 
 def _left_out(thing: RadianceObject) -> Issue:
