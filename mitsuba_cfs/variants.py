@@ -213,7 +213,9 @@ def _checked(variant: str) -> str:
         fault = llvm_fault()
     if fault is None:
         return variant
-    hint = llvm.INSTALL_HINT if variant.startswith("llvm") else f"use the LLVM variant ({DEVICE}=cpu)"
+    hint = f"use the LLVM variant ({DEVICE}=cpu)"
+    if variant.startswith("llvm"):
+        hint = llvm.INSTALL_HINT
     raise VariantError(f"{variant}: {fault}; {hint}")
 
 

@@ -69,10 +69,7 @@ def test_unknown_variant_is_named() -> None:
 
 
 def test_scalar_is_the_last_resort_with_a_warning() -> None:
-    code = (
-        "from mitsuba_cfs import variants\n"
-        "print(variants.activate(vectorised=False))"
-    )
+    code = "from mitsuba_cfs import variants\nprint(variants.activate(vectorised=False))"
     done = _python(code, **{llvm.VARIABLE: "/nowhere/libLLVM.so.19"})
     assert done.stdout.strip() == "scalar_rgb"
     assert "apt-get install libllvm19" in done.stderr
@@ -117,7 +114,7 @@ def test_a_gpu_is_used_only_where_it_is_asked_for() -> None:
 
 
 def test_a_device_that_loses_the_second_scene_of_a_launch_is_named() -> None:
-    """What Dr.Jit 1.5 says it does on OptiX: the ray tracing of the second scene is switched off."""
+    """On OptiX Dr.Jit 1.5 switches off the ray tracing of a second scene, with a warning."""
     code = (
         "import mitsuba as mi\n"
         "from mitsuba_cfs import variants\n"
