@@ -35,7 +35,7 @@ from scenes.room.operation import stated_note, with_stated_uses
 from scenes.room.operation_hours import OperationHours, check_schedules
 from scenes.room.room import operated_zone
 from scenes.room.skies import skies_for
-from scenes.room.zone import RoomZone, balances, coupled
+from scenes.room.zone import RoomZone, balances, coupled, step_issues
 from thermal.balance import ZoneResult
 from thermal.moisture import Humidity
 from thermal.ventilation import AirTransfer
@@ -158,7 +158,8 @@ def _balanced(
     in_windows: Mapping[str, States],
 ) -> BalancedRooms:
     """The rooms' years: together where the study couples them, else one by one."""
-    step_s, notes = study.options.heat_step_s, ()
+    step_s = study.options.heat_step_s
+    notes: tuple[str, ...] = ()
     progress("heat balance", 0.0)
     groups: list[tuple[Sequence[RoomZone], dict]] = [([room], {}) for room in rooms]
     if study.couple:
@@ -170,6 +171,8 @@ def _balanced(
         place = {"terrain": study.terrain}
         found = balances(together, weather, step_s, progress=progress, **air, **place)
         results += found
+        for issues in step_issues(together, found, weather, step_s, **air, **place):
+            notes += tuple(map(issue_note, issues))
         moist += room_humidity(together, found, weather, **air)
         if study.design is not None:
             cold = study.design.outdoor_c

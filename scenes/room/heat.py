@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pandas as pd
@@ -26,7 +26,7 @@ from scenes.results import (
     ThermalResult,
 )
 from scenes.room.operation_tables import ComfortTable, OperationTables
-from scenes.room.zone import RoomZone, balances, coupled
+from scenes.room.zone import RoomZone, balances, coupled, step_issues
 from thermal.balance import ZoneResult
 from thermal.comfort import comfort_by_outdoors, pmv_ppd, standard_effective_temperature, summarise
 from thermal.moisture import Humidity, MoistZone, humidity_ratio, zone_humidity
@@ -205,10 +205,11 @@ class DaylitRoom:
     def with_heat(self, heat: Heat) -> RoomYear:
         """The room's year, with temperatures and operation."""
         thermal, operation = heat
-        names = (field.name for field in fields(self) if field.name != "zone")
+        names = (field.name for field in fields(self) if field.name not in {"zone", "issues"})
         return RoomYear(
-            heat=thermal, operation=operation, **{name: getattr(self, name) for name in names}
-        )
+            heat=thermal, operation=operation, issues=self.issues + thermal.issues,
+            **{name: getattr(self, name) for name in names},
+        )  # fmt: skip
 
 
 def heat_of(
@@ -233,11 +234,17 @@ def heat_of(
         store=store,
     )  # fmt: skip
     passed = iter if store is None else store.each
+    issues = step_issues(
+        rooms, passed(results), weather, step_s, air_links=air_links, terrain=terrain, store=store
+    )
     humidities = room_humidity(rooms, passed(results), weather, air_links=air_links)
     heats: list[Heat] = []
-    for room, balance, humidity in zip(rooms, passed(results), humidities, strict=True):
+    for room, balance, humidity, found in zip(
+        rooms, passed(results), humidities, issues, strict=True
+    ):
         comfort = (room.operation or OperationTables()).comfort
-        thermal = thermal_result(room, balance, weather, felt_by(comfort, balance, humidity))
+        felt = felt_by(comfort, balance, humidity)
+        thermal = replace(thermal_result(room, balance, weather, felt), issues=found)
         operation = None if room.operation is None else operated_year(room, balance, weather)
         heat = thermal, operation
         heats.append(heat if store is None else store.stored(heat))

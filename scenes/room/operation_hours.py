@@ -162,6 +162,7 @@ class OperationHours:
             least_difference=table.least_difference,
             greatest_wind=table.greatest_wind,
             least_outdoor_c=table.least_outdoor_c,
+            heating_while_open=table.heating_while_open,
         )
 
     def states(self, count: int) -> NDArray[np.int64]:
