@@ -1,10 +1,10 @@
 """Outdoor air, opened windows, supplied air and the slab's power in a time step, compiled.
 
 Leaks and the flow through opened windows follow the air of the last iterate.  Windows open where
-the air of the step would rise above their upper limit and close where it would fall below the lower
-one.  Where both would happen within one step, they open and close during it: then they let in
-the air that keeps the zone midway between its limits, as on the mean of many short steps.  Supply
-air and slab follow the air at the start of the step.
+the air of the step would rise above their upper limit, and close where shut it would not exceed the
+lower one.  Where fully open it would fall below the lower limit, they are open in part and hold it.
+So no on and off of windows is left that the time step would have to resolve.  Supply air and
+slab follow the air at the start of the step.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ def set_air_flows(
     """Set the outdoor air of every zone, and the air through its windows when open."""
     for z in range(work.flow.size):
         work.flow[z] = drive.airflow[hour, z] + _leaks(net, state, weather, drive, t, hour, z)
-        work.airing[z, 3] = 0.0
+        work.airing[z, 2] = 0.0
         if drive.airing[hour, z] > 0.0:
-            work.airing[z, 3] = _airing(net, state, work, weather, drive, t, hour, z)
+            work.airing[z, 2] = _airing(net, state, work, weather, drive, t, hour, z)
 
 
 @inlined
@@ -69,13 +69,13 @@ def _set_limits(
     net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
     t: int, z: int,
 ) -> None:  # fmt: skip
-    """Air temperatures at which the windows close and open, and the mean of both."""
+    """Air temperatures at which the windows close and open."""
     above, below, difference = net.paths.opens[z, 0], net.paths.opens[z, 1], net.paths.opens[z, 2]
     lower = max(below, weather.outdoor[t] + difference)
     if net.paths.opens[z, 5] == 0.0:
         lower = max(lower, drive.heating_c[t, z])
     upper = max(above, lower)
-    work.airing[z, 0], work.airing[z, 1], work.airing[z, 2] = lower, upper, 0.5 * (lower + upper)
+    work.airing[z, 0], work.airing[z, 1] = lower, upper
     work.windows[z] = OPEN if state.opened[z] else SHUT
 
 
@@ -87,12 +87,13 @@ def _airing(
     """Air through the windows when open [m3/s]; 0 where they must stay shut."""
     greatest, least_out = net.paths.opens[z, 3], net.paths.opens[z, 4]
     v, out = weather.speed[t] * net.paths.site, weather.outdoor[t]
-    if v > greatest or out < least_out or work.airing[z, 2] > drive.cooling_c[t, z]:
+    if v > greatest or out < least_out or work.airing[z, 0] > drive.cooling_c[t, z]:
         return 0.0
-    w, s, both = net.paths.airing[z]
+    w, s, both, flow = net.paths.airing[z]
     wind, stack = w * v * v, s * abs(state.air[z] - out)
     squared = wind + stack if both > 0.0 else max(wind, stack)
-    return drive.airing[hour, z] * REFERENCE_DENSITY / weather.density[t] * np.sqrt(squared)
+    flow += REFERENCE_DENSITY / weather.density[t] * np.sqrt(squared)
+    return drive.airing[hour, z] * flow
 
 
 @inlined

@@ -22,7 +22,7 @@ class AirPaths(NamedTuple):
 
     leak: NDArray[np.float64]  # [Z, 8] a, b, c, d, s, m, w, n of `Leakage`
     wind: NDArray[np.float64]  # [Z] of the weather's, at the zone's height
-    airing: NDArray[np.float64]  # [Z, 3] w, s, 1 where both are added
+    airing: NDArray[np.float64]  # [Z, 4] w, s, 1 where both are added, constant flow
     # [Z, 6] opened above, closed below [degC], least difference [K], greatest wind, least outdoor,
     # 1 where the zone may be heated while they are open
     opens: NDArray[np.float64]
@@ -57,7 +57,7 @@ def air_paths(zones: Sequence[Zone], transfers: Sequence[AirTransfer], terrain: 
             [(*x.factors, x.stack, x.stack_exponent, x.wind, x.wind_exponent) for x in leaks]
         ),
         wind=np.array([local_wind_factor(_height(zone), terrain) for zone in zones]),
-        airing=np.array([(x.wind, x.stack, float(x.both)) for x in airings]),
+        airing=np.array([(x.wind, x.stack, float(x.both), x.flow) for x in airings]),
         opens=np.array(
             [(x.open_above_c, x.close_below_c, x.least_difference, x.greatest_wind,
               x.least_outdoor_c, float(x.heating_while_open)) for x in airings]

@@ -264,7 +264,7 @@ def _work(net: Network, state: records.State) -> records.Workspace:
         air=np.zeros((zones, 2)),
         plant=np.zeros(zones, dtype=np.int64),
         windows=np.zeros(zones, dtype=np.int64),
-        airing=np.zeros((zones, 4)),
+        airing=np.zeros((zones, 3)),
         radiant=np.zeros(zones),
         radiant_seen=np.tile([0.0, 0.0, 0.3], (zones, 1)),
         flow=np.zeros(zones),

@@ -1,7 +1,7 @@
 """Ideal plants and opened windows in the linear system of a step; compiled.
 
-A plant is free, holds a set point, or is at its limit; windows are shut, open, or open for a part
-of the step (`air_flow`).
+A plant is free, holds a set point, or is at its limit; windows are shut, fully open, or partly open
+to hold a temperature (`air_flow`).
 
 What they do is guessed, and changed until temperatures and loads agree with it: the system
 is an M-matrix with bounds, for which that ends.  Source: Hintermueller, Ito and Kunisch 2002,
@@ -15,7 +15,7 @@ from thermal.network import Network
 from thermal.records import AIR_HEAT, Drive, OutdoorConditions, State, Workspace, inlined
 
 FREE, HEATS, HEATS_FULLY, COOLS, COOLS_FULLY = range(5)  # what the plant of a zone does
-VENTS = 5  # windows, open for a part of the step, hold the air
+VENTS = 5  # windows, partly open, hold the air at their lower limit
 ROUNDING = 1e-10  # of temperatures [K]
 RADIANT_PART = 1e-4  # that the shares of a load may be off, of it
 LEAST_REPLY = 0.01  # of the load's other part, less by each watt that is radiant
@@ -32,7 +32,7 @@ def set_point(work: Workspace, drive: Drive, t: int, z: int) -> float:
     """The air temperature that plant or windows hold [degC]."""
     plant = work.plant[z]
     if plant == VENTS:
-        return work.airing[z, 2]
+        return work.airing[z, 0]
     return drive.heating_c[t, z] if plant == HEATS else drive.cooling_c[t, z]
 
 
@@ -114,7 +114,7 @@ def plants_agree(
 @inlined
 def _windows_agree(work: Workspace, z: int, air: float) -> bool:
     """Whether the windows do what this air temperature asks, else they change."""
-    lower, upper, _, full = work.airing[z]
+    lower, upper, full = work.airing[z]
     windows = work.windows[z]
     if work.plant[z] == VENTS:
         if 0.0 <= work.aired[z] <= full:
@@ -129,7 +129,8 @@ def _windows_agree(work: Workspace, z: int, air: float) -> bool:
         else:
             work.windows[z] = SHUT | TOO_COLD_OPEN
         return False
-    if full == 0.0 or air <= upper + ROUNDING:
+    limit = lower if windows & TOO_COLD_OPEN else upper
+    if full == 0.0 or air <= limit + ROUNDING:
         return True
     if windows & TOO_COLD_OPEN:
         work.plant[z] = VENTS

@@ -88,7 +88,7 @@ class Workspace(NamedTuple):
     air: NDArray[np.float64]  # [Z, 2] conductance to all around [W/K], what flows in from it [W]
     plant: NDArray[np.int64]  # [Z] what the plant does: FREE ... VENTS
     windows: NDArray[np.int64]  # [Z] SHUT, OPEN; with what was tried in the step
-    # [Z, 4] air in which windows close, open, are partly open [degC]; flow when open [m3/s]
+    # [Z, 3] air in which windows close or are partly open, in which they open [degC]; flow [m3/s]
     airing: NDArray[np.float64]
     radiant: NDArray[np.float64]  # [Z] radiant part of its load [W]
     # [Z, 3] of that part: its load's other part, itself, both when last solved; less by its watt

@@ -260,7 +260,7 @@ def _assemble_air(
     heat = weather.density[t] * AIR_HEAT
     for z in range(work.plant.size):
         through = work.windows[z] & OPEN and work.plant[z] != VENTS
-        work.aired[z] = work.airing[z, 3] if through else 0.0
+        work.aired[z] = work.airing[z, 2] if through else 0.0
         outdoor = heat * (work.flow[z] + work.aired[z]) + net.paths.bridges[z]
         store = heat * net.air_capacity[z] / method.step_s
         work.air[z, 0] = store + outdoor + work.supply[z, 0]

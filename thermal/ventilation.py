@@ -87,8 +87,8 @@ class SupplyAir:
 class WindowAiring:
     """Windows that are opened: sqrt of the greater of w v^2 and s dT, or of their sum [m3/s].
 
-    They cool: unless `heating_while_open`, they are shut before the zone's air falls below its
-    heating set point.  See `air_flow` for their control within a time step.
+    They cool: opened above `open_above_c`, they are opened in part where the air would fall below
+    `close_below_c`, or below the zone's heating set point unless `heating_while_open`.
     """
 
     wind: float  # w [(m3/s)^2/(m/s)^2]
@@ -101,6 +101,7 @@ class WindowAiring:
     greatest_wind: float = np.inf  # on the site [m/s]
     least_outdoor_c: float = -np.inf
     heating_while_open: bool = False
+    flow: float = 0.0  # besides wind and stack, of open windows [m3/s]
 
     def __post_init__(self) -> None:
         require(self.wind >= 0 and self.stack >= 0, "opened windows", "negative flow")

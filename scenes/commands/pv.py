@@ -10,13 +10,13 @@ import click
 
 from bim.report.issue import COLUMNS, issue_rows
 from scenes import quick as quick_run
-from scenes.commands.parameters import FILE
-from scenes.commands.printed_head import PrintedHead
-from scenes.commands.quick_option import quick_option
 from scenes.commands.room_options import (
+    FILE,
+    PrintedHead,
     input_options,
     no_cache_option,
     out_folder_option,
+    quick_option,
     seed_option,
 )
 from scenes.input_options import InputOptions
@@ -39,6 +39,7 @@ def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
     are found by material, type, name or GUID; shade and reflections by everything in the
     model are traced, the sun as its exact disc.
     """
+    from mitsuba_cfs.sky.albedo import with_albedo
     from mitsuba_cfs.sky.epw import read_epw
     from scenes.photovoltaics.study_file import read_pv_study
     from scenes.result_folder import ResultFolder
@@ -46,7 +47,7 @@ def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
     study = read_pv_study(study_file)
     options = InputOptions(**chosen)
     building, weather, quick = options.building, options.weather, options.quick
-    climate = read_epw(weather)
+    climate = with_albedo(read_epw(weather), options.albedo)
     folder = ResultFolder(out, "pv", inputs=(building, weather, study_file))
     # all that is small is read: what is heavy is loaded now
     from mitsuba_cfs import variants

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.bsdf.glazing import Pane
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
+from mitsuba_cfs.bsdf.pane_stack import absorbed_by_layers
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.notes import Note
-from scenes.fenestration.layer_sun import sun_in_layers
 from scenes.fenestration.systems import FenestrationSystem
 from thermal.blackbox import (
     Fenestration,
@@ -20,9 +21,39 @@ from thermal.blackbox import (
 )
 from thermal.closure import Closure
 from thermal.errors import ThermalInputError, require
-from thermal.gvalue import thermal_data
+from thermal.glazing_unit import GlazingUnit
+from thermal.gvalue import inward_share, position_of_share, thermal_data
 from thermal.layered import layered_thermal_data
 from thermal.notes import ThermalNote
+
+
+def sun_in_layers(
+    unit: GlazingUnit, transmittance: ArrayLike, reflectance: ArrayLike, incidence: ArrayLike
+) -> NDArray[np.float64]:
+    """Solar absorptance of every layer [K, N], see `pane_stack.absorbed_by_layers`.
+
+    A pane is coated where its sides differ.
+
+    Args:
+        transmittance, reflectance: [K] of the whole system, direction to hemisphere, solar.
+        incidence: [K] [rad].
+
+    Raises: `ThermalInputError` where a pane's solar values are missing or two layers are shades.
+    """
+    shades = sum(layer.openings is not None for layer in unit.layers)
+    require(shades <= 1, "layers", "expected at most one shade")
+    panes: list[Pane | None] = []
+    for number, layer in enumerate(unit.layers, start=1):
+        item = f"layers: layer {number}"
+        if layer.openings is not None:
+            panes.append(None)
+            continue
+        message = "its solar transmittance and reflectances are missing"
+        require(layer.solar is not None, item, message)
+        tau, front, back = layer.solar
+        panes.append(Pane(item, tau, front, back, coated=front != back))
+    return absorbed_by_layers(panes, transmittance, reflectance, incidence)
+
 
 SHADE_SCATTERS = 0.5  # share of the light beyond which a BSDF is that of a shade
 
@@ -56,10 +87,14 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     rho = solar.direct_hemispherical(solar.reflection_front)
     rho = np.minimum(rho, 1.0 - tau)
     place = _place(system)
+    guess = None if system.shading_position is not None else _guessed_place(system, tau, rho)
+    place = guess or place
     closure = (system.closure or Closure()).for_place(place)
     known = {"u_value": system.u_value, "g_normal": system.g_value, "item": system.name}
     if closure.unit is None:
-        data = thermal_data(tau, rho, shading_position=place, **known)
+        data = thermal_data(
+            tau, rho, shading_position=place, incidence=solar.basis_in.centres()[0], **known
+        )
     else:
         absorbed = sun_in_layers(closure.unit, tau, rho, solar.basis_in.centres()[0])
         data = layered_thermal_data(closure.unit, tau, rho, absorbed, **known)
@@ -77,7 +112,7 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
         g_value,
         back_rho,
         max(1.0 - back_rho - back_tau, 0.0),
-        (*map(_note, data.assumptions), *_unplaced(system, closure)),
+        (*map(_note, data.assumptions), *_unplaced(system, closure), *_guess_note(system, guess)),
         _note(closure.described(place)),
     )
 
@@ -100,6 +135,30 @@ def _place(system: FenestrationSystem) -> str:
     message = f"{stated!r}, but the layers have their shade {of_layers!r}"
     require(fits, f"{system.name}: shading_position", message)
     return stated or of_layers or "none"
+
+
+def _guessed_place(
+    system: FenestrationSystem, tau: NDArray[np.float64], rho: NDArray[np.float64]
+) -> str | None:
+    """Position of a shade whose U and g are known, from its inward share; None: not guessed."""
+    layered = system.closure is not None and system.closure.unit is not None
+    unknown = system.u_value is None or system.g_value is None
+    if layered or unknown or scattered_share(system.solar) < SHADE_SCATTERS:
+        return None
+    share = inward_share(float(tau[0]), float(rho[0]), system.g_value, item=system.name)
+    return position_of_share(share)
+
+
+def _guess_note(system: FenestrationSystem, guess: str | None) -> list[Note]:
+    if guess is None:
+        return []
+    return [
+        Note(
+            "{system}: scatters light like a shade, but its position is not stated; from g at "
+            "normal incidence it is taken as {position}. State shading_position.",
+            system=system.name, position=guess,
+        )
+    ]  # fmt: skip
 
 
 def _unplaced(system: FenestrationSystem, closure: Closure) -> list[Note]:

@@ -14,7 +14,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.heat_island import in_city
 from mitsuba_cfs.sky.weather import Weather
 from scenes import plausible
-from scenes.fenestration.tables import StateTable
+from scenes.fenestration.thermal_file import StateTable
 from scenes.room.schedules import (
     CLOCK,
     CalendarTable,
@@ -103,6 +103,8 @@ class OpenedTable(TomlTable):
     least_difference: Annotated[float, Field(ge=-20, le=20)] = 0.0  # above outdoors [K]
     greatest_wind: Annotated[Positive, plausible.WIND] = 60.0  # [m/s]
     least_outdoor_c: Annotated[float, plausible.OUTDOOR] = 10.0
+    # air change of open windows where a standard states it, instead of EN 16798-7's flow
+    ach: Annotated[Positive, plausible.AIR_CHANGE] | None = None
     heating_while_open: bool = False  # else they close before the air needs heating
 
     @model_validator(mode="after")
