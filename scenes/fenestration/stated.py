@@ -157,7 +157,7 @@ def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
     return FenestrationSystem(
         name, visible, solar, u_value=values.u_value, g_value=g, shading_position="none",
         notes=tuple(notes), source=Note("the values stated in {file}", file=file),
-        angular=table,
+        angular=table, from_values=True,
     )  # fmt: skip
 
 
