@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,13 +11,13 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bim.model import Face, Window
+from bim.model import Face, MaterialLayer, Window
 from bim.planes import merged_polygons, newell_normal, plane_through, triangulated
 from mitsuba_cfs.errors import DataError
 from thermal.zone import Layer
 
 VERSION = "25.2"
-MOST_LAYERS = 10  # of a construction in EnergyPlus
+MOST_LAYERS = 10  # of a construction in EnergyPlus and in honeybee
 LEAST_SURFACE = 1e-3  # [m2]
 NEAR = 0.015  # EnergyPlus takes corners within a centimetre for one [m]
 Model = dict[str, dict[str, Any]]  # objects by class and name
@@ -92,6 +94,25 @@ def opaque_construction(
     found = f"C{len(model['Construction'])}"
     model["Construction"][found] = entry
     return found
+
+
+def at_most_layers(layers: Sequence[MaterialLayer]) -> tuple[MaterialLayer, ...]:
+    """At most ten layers: the thinnest neighbours are merged, with their resistance and mass."""
+    result = list(layers)
+    while len(result) > MOST_LAYERS:
+        widths = [a.thickness + b.thickness for a, b in itertools.pairwise(result)]
+        at = widths.index(min(widths))
+        pair = result[at : at + 2]
+        width, mass = widths[at], sum(one.thickness * one.density for one in pair)
+        heat = sum(one.thickness * one.density * one.heat_capacity for one in pair)
+        result[at : at + 2] = [
+            MaterialLayer(
+                " + ".join(one.name for one in pair), width,
+                width / sum(one.thickness / one.conductivity for one in pair), mass / width,
+                heat / mass if mass else pair[0].heat_capacity,
+            )
+        ]  # fmt: skip
+    return tuple(result)
 
 
 def _material(model: Model, layer: Layer, finish: FaceFinish) -> str:

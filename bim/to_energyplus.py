@@ -7,17 +7,17 @@ which stands for the frame.  Faces towards other rooms are adiabatic: a room can
 
 from __future__ import annotations
 
-import itertools
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike
 
 from bim.defaults import WINDOW_FRAME
 from bim.energyplus_parts import (
-    MOST_LAYERS,
     NEAR,
     FaceFinish,
     Model,
+    at_most_layers,
     is_drawable,
     model_frame,
     object_name,
@@ -31,7 +31,7 @@ from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of
 from bim.model import Building, Construction, Face, Space
 from bim.to_thermal import layers_of
 from mitsuba_cfs.files import write_text
-from thermal.zone import OUTSIDE_ABSORPTANCE, Layer
+from thermal.zone import OUTSIDE_ABSORPTANCE
 
 BOUNDARY = {"outside": "Outdoors", "ground": "Ground"}  # all others: adiabatic
 SURFACE_TYPE = {"floor": "Floor", "ceiling": "Ceiling", "roof": "Roof"}
@@ -139,22 +139,6 @@ class _Windows:
 def _construction(model: Model, construction: Construction, face: Face | None) -> str:
     """Name of the construction with the face's absorptance inside, the usual one outside."""
     absorptance = 0.5 if face is None else 1 - face.total_reflectance("solar")
-    return opaque_construction(
-        model, _at_most(MOST_LAYERS, layers_of(construction)), FaceFinish(OUTSIDE_ABSORPTANCE),
-        FaceFinish(absorptance), construction.name,
-    )  # fmt: skip
-
-
-def _at_most(most: int, layers: Sequence[Layer]) -> list[Layer]:
-    """Layers of which the thinnest neighbours are merged, with their resistance and mass."""
-    layers = list(layers)
-    while len(layers) > most:
-        pairs = [a.thickness + b.thickness for a, b in itertools.pairwise(layers)]
-        at = pairs.index(min(pairs))
-        a, b = layers[at : at + 2]
-        resistance = a.thickness / a.conductivity + b.thickness / b.conductivity
-        mass = a.thickness * a.density + b.thickness * b.density
-        heat = sum(one.thickness * one.density * one.heat_capacity for one in (a, b))
-        capacity = heat / mass if mass else a.heat_capacity
-        layers[at : at + 2] = [Layer(pairs[at], pairs[at] / resistance, mass / pairs[at], capacity)]
-    return layers
+    layers = layers_of(replace(construction, layers=at_most_layers(construction.layers)))
+    finishes = FaceFinish(OUTSIDE_ABSORPTANCE), FaceFinish(absorptance)
+    return opaque_construction(model, list(layers), *finishes, construction.name)

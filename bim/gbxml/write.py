@@ -13,9 +13,10 @@ import shapely
 
 from bim.defaults import WINDOW_FRAME
 from bim.doorways import Key, touching
+from bim.energyplus_parts import at_most_layers
 from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of
 from bim.hosted_windows import HostedPolygon, hosted_polygons
-from bim.model import Building, Construction, Element, Face, MaterialLayer, Space, Window
+from bim.model import Building, Element, Face, MaterialLayer, Space, Window
 from bim.planes import Plane, planar_facets, rings_of, without_holes
 from mitsuba_cfs.files import write_text
 
@@ -212,10 +213,9 @@ def _finish(face: Face | None) -> _Finish:
     """Finish of a face; a frame's where the face only carries a window."""
     if face is None:
         return _Finish(WINDOW_FRAME.name, WINDOW_FRAME.layers)
-    construction: Construction = face.construction
-    return _Finish(
-        construction.name, construction.layers, face.reflectance_visible, face.reflectance_solar
-    )
+    layers = at_most_layers(face.construction.layers)
+    reflectances = face.reflectance_visible, face.reflectance_solar
+    return _Finish(face.construction.name, layers, *reflectances)
 
 
 def _share(owner: ElementTree.Element, tag: str, value: float, kind: str) -> None:

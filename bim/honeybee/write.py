@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 
 from bim.doorways import Key, touching
+from bim.energyplus_parts import at_most_layers
 from bim.exported_glazing import Glazings, glazing_of
 from bim.hosted_windows import HostedPolygon, hosted_polygons
 from bim.model import Building, Construction, Element, Face, Space, Window
@@ -89,13 +90,14 @@ class _Library:
 
     def construction(self, one: Construction, solar: float, visible: float) -> str:
         """Name of layers whose room side reflects so much."""
-        content = (one.layers, solar, visible)
+        layers = at_most_layers(one.layers)
+        content = (layers, solar, visible)
         known = content in self._keys
         key = self._keys.setdefault(content, f"{identifier(one.name)[:50]}_{len(self._keys)}")
         if not known:
             names = []
-            for number, layer in enumerate(one.layers):
-                inner = number == len(one.layers) - 1
+            for number, layer in enumerate(layers):
+                inner = number == len(layers) - 1
                 absorbed = (1 - solar, 1 - visible) if inner else (0.7, 0.7)
                 name = f"{key}_{number}"
                 names.append(name)
