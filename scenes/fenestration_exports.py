@@ -15,10 +15,10 @@ from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from scenes.fenestration.resolver import (
     held_systems,
     source_notes,
+    stated_values,
     window_sources,
     windows_named,
 )
-from scenes.fenestration.stated import stated_values
 from scenes.fenestration.systems import FenestrationSystem, WindowOverrides
 from scenes.fenestration.thermal_system import ThermalSystem, checked_system, window_optics
 from scenes.room.windows import room_windows
