@@ -27,13 +27,13 @@ from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import comfort_summary, hourly_table, year_summary
 from scenes.inputs import Inputs, every_state, inputs_of
-from scenes.room.heat import felt_by, room_humidity
+from scenes.room.heat import felt_by, room_humidity, step_issues
 from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.leaks import leak_issues
 from scenes.room.light import visible_scene
 from scenes.room.operation import OperationHours, check_schedules, stated_note, with_stated_uses
 from scenes.room.room import operated_zone
-from scenes.room.zone import RoomZone, balances, coupled, step_issues
+from scenes.room.zone import RoomZone, balances, coupled
 from thermal.balance import ZoneResult
 from thermal.moisture import Humidity
 from thermal.ventilation import AirTransfer
