@@ -25,12 +25,12 @@ FILE = click.Path(path_type=Path)
 @click.argument("files", nargs=-1, required=True, type=FILE, metavar="MEASURED.txt ...")
 @click.option(
     "--normal", type=click.Choice(["room", "outside"]), default="room", show_default=True,
-    help="Where the sample's normal points to.",
+    help="Side to which the sample's normal points.",
 )  # fmt: skip
 @basis_option
 @tensor_tree_option
 @cull_option
-@click.option("--name", default="", help="Name to write into the file; the sample's without.")
+@click.option("--name", default="", help="Name to write into the file; default: the sample's.")
 @click.option("--out", type=FILE, required=True, help="XML file to write.")
 def interpolate(
     files: tuple[Path, ...],
@@ -42,10 +42,10 @@ def interpolate(
     name: str,
     out: Path,
 ) -> None:
-    """Make a BSDF of goniophotometer files (pgII text), one or more an incident direction.
+    """Convert goniophotometer files (pgII text, one or more per incident direction) to a BSDF.
 
-    Prints for each incident direction the share of light that is scattered, with the standard
-    error that the noise of the values gives it, and what was taken for symmetry.
+    Prints the scattered fraction of each incident direction with its standard error, and the
+    symmetry that was assumed.
     """
     from mitsuba_cfs.bsdf.measured_file import read_measurement
     from mitsuba_cfs.bsdf.xml import write_bsdf_xml

@@ -22,9 +22,11 @@ basis_option = click.option(
     help="Klems basis.",
 )  # fmt: skip
 tensor_tree_option = click.option(
-    "--tensor-tree", type=click.IntRange(1, 6), help="4^N cells a hemisphere instead."
+    "--tensor-tree",
+    type=click.IntRange(1, 6),
+    help="Write a tensor tree of 4^N cells per hemisphere instead.",
 )
 cull_option = click.option(
     "--cull", type=Number(0, 1, max_open=True), default=0.9,
-    help="Share of a tree's cells to merge away.",
+    help="Fraction of the tensor tree's cells to merge.",
 )  # fmt: skip

@@ -16,18 +16,20 @@ FILE = click.Path(path_type=Path)
 
 @click.command("thermal")
 @click.argument("states", nargs=-1, required=True, type=FILE, metavar="STATE.xml ...")
-@click.option("--place", type=click.Choice(PLACES), help="The files are shades; where they stand.")
 @click.option(
-    "--glazing", type=click.Choice(["A", "B", "C", "D"]), help="Of EN 14501, with --place."
+    "--place", type=click.Choice(PLACES), help="The files are shades alone, at this position."
+)
+@click.option(
+    "--glazing",
+    type=click.Choice(["A", "B", "C", "D"]),
+    help="Reference glazing of EN 14501, with --place.",
 )
 @click.option(
     "--kappa", type=click.FloatRange(0, 1), default=0.4, show_default=True,
-    help="Of Kuhn's formula for interior shades.",
+    help="Parameter of Kuhn's formula for interior shades.",
 )  # fmt: skip
-@click.option(
-    "--out", type=FILE, help="The rows as CSV; as JSON, g by patch with it, by its suffix."
-)
-@click.option("--toml", type=FILE, help="Write what the heat balance takes, of one state.")
+@click.option("--out", type=FILE, help="Write the table as .csv, or as .json with g by patch.")
+@click.option("--toml", type=FILE, help="Write the thermal data of one state for the heat balance.")
 def thermal(
     states: tuple[Path, ...],
     place: str | None,
@@ -36,11 +38,11 @@ def thermal(
     out: Path | None,
     toml: Path | None,
 ) -> None:
-    """U, g_tot, tau_e, secondary heat and EN 14501 classes of each STATE of a system.
+    """Print U, g_tot, tau_e, secondary heat and EN 14501 classes of each STATE of a system.
 
-    A state is a BSDF file; the .toml beside it says what else is known: U and g, or its layers,
-    which are rated by ISO 15099 (NFRC), ISO 52022-3, EN 673 and EN 410.  With --place and --glazing
-    the files are shades alone, rated by EN 13363-1 and Kuhn.
+    A state is a BSDF file with a .toml file beside it that gives U and g, or the layers, which are
+    rated by ISO 15099 (NFRC), ISO 52022-3, EN 673 and EN 410.  With --place and --glazing the
+    files are shades alone, rated by EN 13363-1 and Kuhn.
     """
     from scenes.fenestration.ratings import printed, rated_state, thermal_toml
 

@@ -21,9 +21,14 @@ UNCUT = 100_000  # columns of a table that nobody sees
 
 @click.command()
 @input_options("all", weather="", system=False)
-@click.option("--csv", "issues", type=click.Path(path_type=Path), help="Also write the problems.")
+@click.option(
+    "--csv",
+    "issues",
+    type=click.Path(path_type=Path),
+    help="Also write the problems to a CSV file.",
+)
 def command(issues: Path | None, **chosen) -> None:
-    """Rooms, windows and problems of a building's file, as the simulation will see them.
+    """List rooms, windows and problems of a building model as the simulation reads them.
 
     BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
     """

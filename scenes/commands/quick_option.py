@@ -6,7 +6,7 @@ import click
 from click.core import ParameterSource
 
 quick_option = click.option(
-    "--quick", is_flag=True, help="A first look: few rays, small pictures, one hour."
+    "--quick", is_flag=True, help="Fast preview: few rays, coarse sensor grid, one small picture."
 )
 
 
