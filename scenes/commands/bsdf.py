@@ -42,11 +42,13 @@ basis_option = click.option(
     help="Klems basis.",
 )  # fmt: skip
 tensor_tree_option = click.option(
-    "--tensor-tree", type=click.IntRange(1, 6), help="4^N cells a hemisphere instead."
+    "--tensor-tree",
+    type=click.IntRange(1, 6),
+    help="Write a tensor tree of 4^N cells per hemisphere instead.",
 )
 cull_option = click.option(
     "--cull", type=Number(0, 1, max_open=True), default=0.9,
-    help="Share of a tree's cells to merge away.",
+    help="Fraction of the tensor tree's cells to merge.",
 )  # fmt: skip
 
 
@@ -327,12 +329,12 @@ def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, out:
 @click.argument("files", nargs=-1, required=True, type=FILE, metavar="MEASURED.txt ...")
 @click.option(
     "--normal", type=click.Choice(["room", "outside"]), default="room", show_default=True,
-    help="Where the sample's normal points to.",
+    help="Side to which the sample's normal points.",
 )  # fmt: skip
 @basis_option
 @tensor_tree_option
 @cull_option
-@click.option("--name", default="", help="Name to write into the file; the sample's without.")
+@click.option("--name", default="", help="Name to write into the file; default: the sample's.")
 @click.option("--out", type=FILE, required=True, help="XML file to write.")
 def interpolate(
     files: tuple[Path, ...],
@@ -344,10 +346,10 @@ def interpolate(
     name: str,
     out: Path,
 ) -> None:
-    """Make a BSDF of goniophotometer files (pgII text), one or more an incident direction.
+    """Convert goniophotometer files (pgII text, one or more per incident direction) to a BSDF.
 
-    Prints for each incident direction the share of light that is scattered, with the standard
-    error that the noise of the values gives it, and what was taken for symmetry.
+    Prints the scattered fraction of each incident direction with its standard error, and the
+    symmetry that was assumed.
     """
     from mitsuba_cfs.bsdf.measured_file import read_measurement
     from mitsuba_cfs.bsdf.xml import write_bsdf_xml
@@ -430,18 +432,20 @@ def _print_shares(patterns: Sequence[Pattern], band: int) -> None:
 
 @command.command("thermal")
 @click.argument("states", nargs=-1, required=True, type=FILE, metavar="STATE.xml ...")
-@click.option("--place", type=click.Choice(PLACES), help="The files are shades; where they stand.")
 @click.option(
-    "--glazing", type=click.Choice(["A", "B", "C", "D"]), help="Of EN 14501, with --place."
+    "--place", type=click.Choice(PLACES), help="The files are shades alone, at this position."
+)
+@click.option(
+    "--glazing",
+    type=click.Choice(["A", "B", "C", "D"]),
+    help="Reference glazing of EN 14501, with --place.",
 )
 @click.option(
     "--kappa", type=click.FloatRange(0, 1), default=0.4, show_default=True,
-    help="Of Kuhn's formula for interior shades.",
+    help="Parameter of Kuhn's formula for interior shades.",
 )  # fmt: skip
-@click.option(
-    "--out", type=FILE, help="The rows as CSV; as JSON, g by patch with it, by its suffix."
-)
-@click.option("--toml", type=FILE, help="Write what the heat balance takes, of one state.")
+@click.option("--out", type=FILE, help="Write the table as .csv, or as .json with g by patch.")
+@click.option("--toml", type=FILE, help="Write the thermal data of one state for the heat balance.")
 def thermal(
     states: tuple[Path, ...],
     place: str | None,
@@ -450,11 +454,11 @@ def thermal(
     out: Path | None,
     toml: Path | None,
 ) -> None:
-    """U, g_tot, tau_e, secondary heat and EN 14501 classes of each STATE of a system.
+    """Print U, g_tot, tau_e, secondary heat and EN 14501 classes of each STATE of a system.
 
-    A state is a BSDF file; the .toml beside it says what else is known: U and g, or its layers,
-    which are rated by ISO 15099 (NFRC), ISO 52022-3, EN 673 and EN 410.  With --place and --glazing
-    the files are shades alone, rated by EN 13363-1 and Kuhn.
+    A state is a BSDF file with a .toml file beside it that gives U and g, or the layers, which are
+    rated by ISO 15099 (NFRC), ISO 52022-3, EN 673 and EN 410.  With --place and --glazing the
+    files are shades alone, rated by EN 13363-1 and Kuhn.
     """
     from scenes.fenestration.ratings import printed, rated_state, thermal_toml
 

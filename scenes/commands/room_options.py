@@ -71,7 +71,7 @@ IFC_FILE = IfcFile(exists=True, dir_okay=False, readable=True, path_type=Path)
 
 
 quick_option = click.option(
-    "--quick", is_flag=True, help="A first look: few rays, small pictures, one hour."
+    "--quick", is_flag=True, help="Fast preview: few rays, coarse sensor grid, one small picture."
 )
 
 
