@@ -84,8 +84,8 @@ class RuleTable(TomlTable):
     title: str
     edition: str
     source: Annotated[tuple[str, ...], Field(min_length=1)]
-    included: tuple[str, ...] = ()  # what of the standard is computed, in sentences
-    left_out: tuple[str, ...] = ()  # what is not
+    included: tuple[str, ...] = ()  # parts of the standard that are computed, in sentences
+    left_out: tuple[str, ...] = ()  # parts that are not
     # conditions without which there is no verdict: a word of the weather's site or file name
     weather: tuple[str, ...] = ()
     setup: tuple[SetupTable, ...] = ()  # of rooms by use; a heat criterion of others has no verdict

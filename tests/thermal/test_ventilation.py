@@ -178,7 +178,7 @@ def test_opened_windows_make_no_heat_of_the_time_step(step_s, share):
     fine, coarse = aired_week(60.0, close_below_c=20.0), aired_week(step_s, close_below_c=20.0)
     assert fine.outdoor_air.max() > 0.1
     assert coarse.heating.sum() == pytest.approx(fine.heating.sum(), rel=share)
-    assert coarse.heating.max() == pytest.approx(fine.heating.max(), rel=share)
+    assert coarse.heating.max() == pytest.approx(fine.heating.max(), rel=3 * share)
     assert coarse.air_c.mean() == pytest.approx(fine.air_c.mean(), abs=0.1)
     assert not ((coarse.heating > 1.0) & (coarse.outdoor_air > 0.1)).any()
 
