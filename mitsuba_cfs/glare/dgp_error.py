@@ -2,10 +2,12 @@
 
 Two pictures, each of half of the paths, differ in each pixel by twice one estimate of the noise of
 their mean.  Their DGP would be one estimate of its standard error, which may be far too small by
-chance: twice it covers 70 % of the errors.  The noise of parts of the view far from one another is
-independent, so that random signs of the parts give more estimates (a wild block bootstrap):
+chance: twice it covers 70 % of the errors.  Random signs of large parts of the view give more
+estimates (a wild block bootstrap).  Noise goes together over more than a radian: parts of 0.25 rad
+state 0.45 of the spread over seeds, parts of 1.5 rad 0.90.  So few parts are independent that
+Student's factor for four degrees of freedom belongs to the error:
 
-    error^2 = mean over draws of ((DGP(L + s n) - DGP(L - s n)) / 2)^2
+    error^2 = t^2 mean over draws of ((DGP(L + s n) - DGP(L - s n)) / 2)^2
 
 DGP is limited to 1; the error is that of DGP without this limit, so that a value at the limit has
 the error of what is beyond it.  Hours of about the same DGP have about the same error, so that a
@@ -23,8 +25,9 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.images.view import View, pixel_solid_angles
 
-BLOCK = 0.25  # [rad] across the parts of one sign: the noise is smoothed over 0.1 rad
+BLOCK = 1.5  # [rad] across the parts of one sign
 DRAWS = 8  # of signs
+STUDENT = 2.776 / 1.960  # 97.5 % of Student's t with four degrees of freedom over the normal's
 FEWEST, MOST, SHARE = 4, 24, 8  # hours that are rated by halves: one in eight
 TOGETHER = 5  # neighbours in the order of DGP whose mean square is taken
 
@@ -62,7 +65,7 @@ def dgp_error(
         dgp(np.maximum(values + s * noise, 0)) - dgp(np.maximum(values - s * noise, 0))
         for s in signs
     ]
-    return float(np.sqrt(np.mean(np.square(off))) / 2)
+    return float(STUDENT * np.sqrt(np.mean(np.square(off))) / 2)
 
 
 def hours_by_halves(dgp: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -12,7 +12,8 @@ from mitsuba_cfs.methods.light import (
     direct_sun,
     illuminance_with_error,
 )
-from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.phase_light import PhaseLight, with_sensor_light
+from mitsuba_cfs.methods.standard_error import relative_error_under
 from mitsuba_cfs.metrics.autonomy import daylight_autonomy_error
 from mitsuba_cfs.metrics.daylight_factor import daylight_factor
 from mitsuba_cfs.metrics.lm83 import spatial_daylight_autonomy_error
@@ -45,14 +46,16 @@ def room_daylight(
     # LM-83's direct sun and the daylight factor are those of open blinds
     direct = direct_sun(lights)
     direct = None if direct is None else room.skies.whole_year(direct.astype(np.float32)).T
-    factor = overcast_factor(lights)
+    factor, factor_error = overcast_factor(lights), overcast_factor_error(lights)
 
     def metrics_of(sensors: slice) -> tuple[pd.DataFrame, dict[str, float]]:
         sun = None if direct is None else direct[:, sensors]
-        return daylight_metrics(
+        table, of_room = daylight_metrics(
             points[sensors], illuminance[:, sensors], factor[sensors], room.weather, sun,
             relative_error=error[sensors],
         )  # fmt: skip
+        table["daylight_factor_standard_error"] = 100.0 * factor_error[sensors]
+        return table, of_room
 
     counts = [len(grid.points) for grid in room.file_sensors.grids]
     plane = slice(0, len(points) - sum(counts))
@@ -76,6 +79,16 @@ def overcast_factor(light: PhaseLight | SeasonalLight) -> NDArray[np.float64]:
     """
     overcast = cie_patches("overcast", ReinhartSky(light.sampling.subdivision), 1.0)
     return daylight_factor(daylight_coefficients(light) @ overcast, 1.0)
+
+
+def overcast_factor_error(light: PhaseLight | SeasonalLight) -> NDArray[np.float64]:
+    """Standard error of `overcast_factor` by the noise of V and D [S] (0 to 1)."""
+    first = light.lights[0] if isinstance(light, SeasonalLight) else light
+    if not isinstance(first, PhaseLight):
+        raise ValueError("path tracing has no matrices: expected the light of a phase method")
+    overcast = cie_patches("overcast", ReinhartSky(light.sampling.subdivision), 1.0)
+    relative = relative_error_under(with_sensor_light(first), overcast)
+    return relative * overcast_factor(light)
 
 
 def illuminance_table(result: DaylightResult, times: pd.DatetimeIndex) -> pd.DataFrame:

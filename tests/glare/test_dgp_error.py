@@ -11,7 +11,7 @@ from scipy.stats import f
 from mitsuba_cfs.glare import annual
 from mitsuba_cfs.glare.annual import annual_glare
 from mitsuba_cfs.glare.dgp_error import (
-    BLOCK,
+    STUDENT,
     dgp_error,
     dgp_errors,
     hours_by_halves,
@@ -98,7 +98,7 @@ def test_the_error_of_a_year_is_half_of_what_its_half_pictures_differ(monkeypatc
     one_sign(monkeypatch)
     found = annual_glare(Rated(), threads=1)
     assert found.dgp[0] == pytest.approx(dgp_of(1.0), rel=1e-6)
-    expected = abs(dgp_of(1 + SHARE) - dgp_of(1 - SHARE)) / 2
+    expected = STUDENT * abs(dgp_of(1 + SHARE) - dgp_of(1 - SHARE)) / 2
     assert expected > 0.01
     assert found.dgp_standard_error[0] == pytest.approx(expected, rel=1e-5)
 
@@ -113,7 +113,7 @@ def test_the_error_of_a_shown_picture_is_that_of_its_halves(monkeypatch) -> None
     ((shown, rated),) = rated_pictures(light, np.array([0]))
     assert shown[0, 0] == LUMINANCE[0] + DISC  # which a source's rating takes apart
     np.testing.assert_array_equal(shown.ravel()[1:], LUMINANCE[1:])
-    expected = abs(dgp_of(1 + SHARE) - dgp_of(1 - SHARE)) / 2
+    expected = STUDENT * abs(dgp_of(1 + SHARE) - dgp_of(1 - SHARE)) / 2
     assert rated.dgp_standard_error == pytest.approx(expected, rel=1e-5)
 
 
@@ -121,7 +121,7 @@ def test_the_stated_error_covers_95_percent_at_twice() -> None:
     """Noise that is independent from part to part, estimated once in each pixel."""
     random, size = np.random.default_rng(5), 96
     view = fisheye((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), size)
-    patch = round(BLOCK / 4 * size / np.pi)  # pixels of one noise, as smoothing leaves it
+    patch = round(0.06 * size / np.pi)  # pixels of one noise, as smoothing leaves it
     row, column = np.divmod(np.arange(size * size), size)
     part = (row // patch) * size + column // patch
     truth = np.where(column < size / 2, 500.0, 4_000.0)
@@ -137,8 +137,8 @@ def test_the_stated_error_covers_95_percent_at_twice() -> None:
     for _ in range(200):
         values = (truth + noise()).astype(np.float32)
         off.append(abs(dgp(values) - right) / dgp_error(dgp, values, noise(), signs))
-    # two standard errors; of 200 trials 93 to 97 % are 95 %, and eight draws have longer tails
-    assert 0.90 <= np.mean(np.array(off) < 2) <= 0.98
+    # 1.5 % of noise by 200 trials; one estimate without signs covers 70 %
+    assert 0.92 <= np.mean(np.array(off) < 2) < 1.0
 
 
 def test_a_dgp_at_its_limit_has_the_error_of_what_is_beyond_it() -> None:
@@ -189,7 +189,7 @@ def test_the_stated_error_is_the_spread_over_seeds(five_phase: bool) -> None:
         rated.append(glare.dgp)
         stated.append(glare.dgp_standard_error)
     variance = np.var(rated, axis=0, ddof=1).mean()
-    ratio = np.mean(np.square(stated)) / variance
+    ratio = np.mean(np.square(stated)) / STUDENT**2 / variance
     # the hours share their matrices: no more degrees of freedom than one hour has, 8 and 7
     low, high = f.ppf([0.005, 0.995], SEEDS, SEEDS - 1)
     assert variance > 0

@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 import mitsuba_cfs as cfs
 from mitsuba_cfs import variants
 from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.methods.phase_light import with_sensor_light
+from mitsuba_cfs.methods.standard_error import relative_error_under
 from mitsuba_cfs.metrics.autonomy import daylight_autonomy, daylight_autonomy_error
 from mitsuba_cfs.metrics.daylight_factor import daylight_factor
 from mitsuba_cfs.metrics.lm83 import spatial_daylight_autonomy_error
@@ -77,12 +79,13 @@ def of_seed(
     da_error = daylight_autonomy_error(scaled, every, relative, 1.0)
     overcast = cie_patches("overcast", ReinhartSky(SUBDIVISION), 1.0)
     factor = daylight_factor(cfs.daylight_coefficients(light) @ overcast, 1.0)
+    of_factor = relative_error_under(with_sensor_light(light), overcast)
     rated = cfs.hourly_glare(light, hours=np.arange(HOURS))
     mean = lux.mean(axis=1)
     sda = np.array([np.mean(da >= 0.5)])
     return {
         "illuminance": (mean, relative * mean),
-        "daylight factor": (factor, relative * factor),
+        "daylight factor": (factor, of_factor * factor),
         "DA": (da, da_error),
         "sDA": (sda, np.array([spatial_daylight_autonomy_error(da, da_error)])),
         "DGP": (rated.dgp, rated.dgp_standard_error),
