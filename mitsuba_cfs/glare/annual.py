@@ -244,6 +244,9 @@ def annual_glare(
         known = options if own is None else replace(options, illuminance=float(own[hour]))
         return evaluate(picture, geometry, options=known, discs=discs)
 
+    def row(values: NDArray[np.float32], discs: tuple[SunDisc, ...], hour: int) -> list[float]:
+        return figures(rated(values, discs, hour))
+
     def made(batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
         if options.sun == "source":
             return pictures.without_disc(batch)
@@ -252,14 +255,20 @@ def annual_glare(
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         for start in range(0, len(left), size):
             batch = left[start : start + size]
-            table[batch] = [figures(one) for one in pool.map(rated, *made(batch), batch)]
+            table[batch] = list(pool.map(row, *made(batch), batch))
             _save(checkpoint, table)
             progress("glare", (len(table) - len(left) + start + len(batch)) / len(table))
-        dgp, errors = table[:, 0], []
+        dgp = table[:, 0]
+        errors: list[float] = []
         by_halves = hours_by_halves(dgp)
         signs = random_signs(pictures.view, pictures.pixels)
 
-        def error(values: NDArray, noise: NDArray, discs: tuple[SunDisc, ...], hour: int) -> float:
+        def error(
+            values: NDArray[np.float32],
+            noise: NDArray[np.float32],
+            discs: tuple[SunDisc, ...],
+            hour: int,
+        ) -> float:
             return dgp_error(
                 lambda some: rated(some, discs, hour).unlimited_dgp, values, noise, signs
             )

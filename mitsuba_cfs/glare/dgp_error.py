@@ -42,7 +42,7 @@ def random_signs(view: View, pixels: NDArray[np.int64]) -> NDArray[np.float32]:
         down, right = random.integers(0, across, 2)
         y, x = (row + down) // across, (column + right) // across
         of_block = random.choice(
-            np.float32([-1, 1]), size=(y.max(initial=0) + 1, x.max(initial=0) + 1)
+            np.array([-1, 1], dtype=np.float32), size=(y.max(initial=0) + 1, x.max(initial=0) + 1)
         )
         signs.append(of_block[y, x])
     return np.stack(signs)
