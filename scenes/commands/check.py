@@ -20,7 +20,7 @@ UNCUT = 100_000  # columns of a table that nobody sees
 
 
 @click.command()
-@input_options("all", weather="", system=False)
+@input_options("all", weather="", system=False, glazing=False)
 @click.option("--csv", "issues", type=click.Path(path_type=Path), help="Also write the problems.")
 def command(issues: Path | None, **chosen) -> None:
     """Rooms, windows and problems of a building's file, as the simulation will see them.
