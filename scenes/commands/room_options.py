@@ -129,7 +129,7 @@ system_option = click.option(
 )  # fmt: skip
 glazing_option = click.option(
     "--glazing", type=click.Choice(list(GENERIC_GLAZINGS)),
-    help="Generic glazing of windows whose file states no glazing data.",
+    help="Reference glazing by name; of windows whose file states no glazing data.",
 )  # fmt: skip
 tau_option = click.option(
     "--tau", "visible_transmittance", type=click.FloatRange(0, 1, min_open=True),
