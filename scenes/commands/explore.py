@@ -77,7 +77,7 @@ def _print_head(results: Path, *, several: bool) -> None:
 
 
 def _serve(folder: Path, port: int, *, open_it: bool) -> None:
-    from scenes.explore.serve import server
+    from scenes.explore.folder import server
 
     try:
         running = server(folder, port)

@@ -15,7 +15,7 @@ from mitsuba_cfs.bsdf.angular import glass_table
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.trace.paths.scene import without_peaks
-from scenes.fenestration.stated import glazing_system, stated_values
+from scenes.fenestration.resolver import glazing_system, stated_values
 from scenes.fenestration.systems import WindowOverrides
 
 OFFICE = Path(__file__).parents[2] / "docs/tutorials/office.rad"
