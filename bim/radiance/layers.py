@@ -44,7 +44,7 @@ APART = 0.02  # spread over azimuths from which a function depends on them, of i
 
 
 @dataclass(frozen=True, slots=True)
-class Layer:
+class WindowLayer:
     """A layer's shares of light by angle of incidence, front outdoors."""
 
     specular: PaneOptics  # [2, N] by polarisation at `ANGLES`
@@ -97,12 +97,12 @@ def layered_window(things: Sequence[RadianceObject], outwards: Sequence[bool]) -
     if any(ups[0] @ other < 0.9999 for other in ups[1:]):
         raise things[-1].primitive.fault("two BSDF in series have different up vectors")
     angular = None
-    plain = [layer for layer in layers if isinstance(layer, Layer)]
+    plain = [layer for layer in layers if isinstance(layer, WindowLayer)]
     if len(plain) == len(layers):
         whole = stack([layer.specular for layer in plain])
         values = (whole.tau, whole.rho_front, whole.rho_back)
         angular = AngularTable(ANGLES, *(np.clip(one.mean(axis=0), 0, 1) for one in values))
-    klems = [layer.klems if isinstance(layer, Layer) else layer for layer in layers]
+    klems = [layer.klems if isinstance(layer, WindowLayer) else layer for layer in layers]
     system = klems[0] if len(klems) == 1 else combine_layers(klems).bsdf
     state = ShadingState(bands={"Visible": system}, angular=angular)
     return LayeredWindow(state, ups[0] if ups else None, tuple(issues))
@@ -157,7 +157,7 @@ def _bsdf_layer(thing: RadianceObject) -> KlemsBsdf:
     return klems_of(file.bands.get("Visible") or file.bands["Solar"]).filled()
 
 
-def _layer(thing: RadianceObject, outward: bool, issues: list[Issue]) -> Layer:
+def _layer(thing: RadianceObject, outward: bool, issues: list[Issue]) -> WindowLayer:
     material, zero = thing.material, np.zeros(len(ANGLES))
     patterns = thing.definitions[:-1]
     for one in patterns:
@@ -178,7 +178,7 @@ def _layer(thing: RadianceObject, outward: bool, issues: list[Issue]) -> Layer:
         passed = np.clip(material.transmissivity * scale, 0.0, 1.0)
         tau, rho = polarised_shares(np.cos(ANGLES)[:, None], material.index, passed)
         tau, rho = tau.mean(axis=2), rho.mean(axis=2)
-        return Layer(PaneOptics(tau, rho, rho), zero, zero, zero)
+        return WindowLayer(PaneOptics(tau, rho, rho), zero, zero, zero)
     colour = np.minimum(scale, 1.0).mean(axis=1)
     if material.kind.startswith("trans"):
         return _trans_layer(thing, colour)
@@ -187,7 +187,7 @@ def _layer(thing: RadianceObject, outward: bool, issues: list[Issue]) -> Layer:
     raise thing.primitive.fault(f"{material.kind} is not computed as a layer of a window")
 
 
-def _trans_layer(thing: RadianceObject, colour: NDArray[np.float64]) -> Layer:
+def _trans_layer(thing: RadianceObject, colour: NDArray[np.float64]) -> WindowLayer:
     """A smooth `trans`: diffuse and straight transmission."""
     numbers = thing.definitions[-1].primitive.numbers
     specular, roughness, passed, straight = numbers[3], numbers[4], *numbers[-2:]
@@ -200,10 +200,12 @@ def _trans_layer(thing: RadianceObject, colour: NDArray[np.float64]) -> Layer:
     beam, mirror = (np.stack([v, v]) for v in (rest * passed * straight, mirrored))
     diffuse = rest * (1 - passed)
     scattered = rest * passed * (1 - straight)
-    return Layer(PaneOptics(beam, mirror, mirror), scattered, diffuse, diffuse)
+    return WindowLayer(PaneOptics(beam, mirror, mirror), scattered, diffuse, diffuse)
 
 
-def _function_layer(thing: RadianceObject, outward: bool, colour: NDArray[np.float64]) -> Layer:
+def _function_layer(
+    thing: RadianceObject, outward: bool, colour: NDArray[np.float64]
+) -> WindowLayer:
     """A `BRTDfunc` with specular functions of the angle of incidence and diffuse shares."""
     definition = thing.definitions[-1]
     primitive = definition.primitive
@@ -238,7 +240,7 @@ def _function_layer(thing: RadianceObject, outward: bool, colour: NDArray[np.flo
         shares, front, back = shares[::-1], back, front
     tau = np.stack([shares[0][1]] * 2)
     rho_front, rho_back = (np.stack([one[0]] * 2) for one in shares)
-    return Layer(
+    return WindowLayer(
         PaneOptics(tau * colour, rho_front * colour, rho_back * colour),
         passed * colour, front * colour, back * colour,
     )  # fmt: skip
