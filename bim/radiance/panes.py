@@ -143,7 +143,7 @@ class _Space:
                 if n not in near:
                     others.setdefault(n, []).append(away)
             seen.update(near)
-            if end > LAYERS or near:
+            if end > LAYERS:  # else a frame or wall is there
                 names = tuple(_optics(self._objects[n]) for n in near)
                 stacks[names] += 1
                 examples.setdefault(names, tuple(near))

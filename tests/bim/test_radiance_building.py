@@ -282,3 +282,17 @@ def test_a_translucent_panel_is_a_window(tmp_path):
     block = state.bands["Visible"].transmission_front
     assert block[0, 100] == pytest.approx(0.8 * 0.6 * 0.8 / np.pi, rel=1e-6)
     assert not issue_of(building, "trans-as-opaque")
+
+
+def test_a_fabric_before_panes_in_a_frame_has_both_as_layers(tmp_path):
+    bar = (
+        "\nplaster polygon bar\n0\n0\n12  1.8 0.02 0.9  2.2 0.02 0.9  2.2 0.02 2.5  1.8 0.02 2.5\n"
+    )
+    coat = "\nvoid glass coat\n0\n0\n4 1 1 1 1.05\n"
+    cloth = "\n" + CLOTH.format(tau="0.1", file=".")
+    layers = pane("coat", 0.08, material="coat") + pane("blind", 0.1, material="cloth")
+    building = read(tmp_path, bar + coat + cloth + layers)
+    (window,) = building.windows
+    straight = glass_table([(0.87, 1.52), (1.0, 1.05)]).transmittance[0] * 0.1
+    assert window.states[0].angular.transmittance[0] == pytest.approx(straight, rel=2e-3)
+    assert not issue_of(building, "pane-before-window")
