@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import logging
 import os
 import signal
@@ -11,27 +13,70 @@ from importlib import import_module, metadata
 
 import click
 
-from scenes.streams import open_streams
+
+class _Stream(io.FileIO):
+    """A standard stream that says nothing more once nobody reads it or nothing more fits."""
+
+    def __init__(self, handle: int, name: str) -> None:
+        super().__init__(handle, "w", closefd=False)
+        self._told = name
+
+    def write(self, data) -> int:  # type: ignore[override]
+        """Write; `OSError` names the stream, but where its reader has gone the work goes on."""
+        try:
+            return super().write(data)
+        except OSError as error:
+            if error.errno == errno.EAGAIN:
+                raise
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self.fileno())
+            os.close(nowhere)
+            if error.errno == errno.EPIPE:
+                return len(memoryview(data).cast("B"))
+            raise OSError(error.errno, error.strerror, self._told) from None
+
+
+def open_streams() -> None:
+    """Give the program its three standard streams, whatever the shell left of them.
+
+    A closed one becomes the null device: else the next file that is opened takes its number.
+    """
+    for handle in range(3):
+        try:
+            os.fstat(handle)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest number that is free
+    for handle, name, told in ((1, "stdout", "standard output"), (2, "stderr", "standard error")):
+        old = getattr(sys, name)
+        text = io.TextIOWrapper(
+            io.BufferedWriter(_Stream(handle, told)),
+            encoding=getattr(old, "encoding", None) or "utf-8",
+            errors=getattr(old, "errors", None) or "backslashreplace",
+            line_buffering=handle == 2 or getattr(old, "line_buffering", False),
+            write_through=getattr(old, "write_through", False),
+        )
+        setattr(sys, name, text)
+
 
 # name: help in one line. The module scenes.commands.<name> defines `command`.
 COMMANDS = {
-    "run": "IFC, weather and fenestration to daylight, glare, heat and comfort.",
-    "comply": "Rooms against EN 17037, LM-83, LEED, BREEAM: a dossier that prints.",
-    "demo": "An office with its blind up, down and controlled, compared.",
-    "explore": "Any hour of a run's results in a browser: pictures, plans, temperatures.",
-    "doctor": "Versions, the variant that traces the rays, and a self-test.",
-    "check": "Rooms, windows and problems of a building's file.",
-    "export": "The rooms for Radiance, Mitsuba, EnergyPlus, honeybee, gbXML, or for viewing.",
+    "run": "Compute daylight, glare, heat and comfort of the rooms of a building.",
+    "comply": "Check rooms against EN 17037, LM-83, LEED, BREEAM; write a printable dossier.",
+    "demo": "Compare an office with its blind up, down and controlled.",
+    "explore": "Show any hour of a run in a browser: pictures, plans, temperatures.",
+    "doctor": "Print versions and the Mitsuba variant, and run a self-test.",
+    "check": "List rooms, windows and problems of a building model.",
+    "export": "Write rooms for Radiance, Mitsuba, EnergyPlus, Honeybee, gbXML or glTF viewers.",
     "ifc": "Attach data to IFC files, query and survey them.",
     "bsdf": "Read, check, plot and make BSDF files.",
-    "sky": "Sun positions and sky matrices of a weather file.",
-    "glare": "Glare indices of a fisheye luminance image.",
-    "picture": "Luminance picture of a room under the sky of an hour.",
-    "dgp": "Glare of a room's views in every hour of a year.",
-    "thermal": "Gains, temperatures and comfort of a room, hour by hour.",
-    "study": "Many variants from one study file.",
-    "pv": "Yield of the photovoltaic modules of a building.",
-    "calibrate": "What each method costs on this machine.",
+    "sky": "Write sun positions and sky matrices of a weather file.",
+    "glare": "Compute glare indices of fisheye luminance pictures, as evalglare does.",
+    "picture": "Render a luminance picture of a room for one hour.",
+    "dgp": "Compute the glare of views in a room for every hour of the year.",
+    "thermal": "Compute hourly gains, temperatures, loads and comfort of rooms (heat only).",
+    "study": "Compare rooms, systems, orientations and climates of a study file.",
+    "pv": "Compute the yield of the photovoltaic modules of a building.",
+    "calibrate": "Measure the computing time of each method on this machine.",
 }
 USAGE, FAILED, INTERRUPTED = 2, 1, 130
 SIGNALLED = 128  # and the signal's number
@@ -85,7 +130,7 @@ def _print_version(ctx: click.Context, _parameter: click.Parameter, wanted: bool
     cls=LazyGroup,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
-@click.option("-v", "--verbose", count=True, help="Say more: -v what is done, -vv everything.")
+@click.option("-v", "--verbose", count=True, help="Log progress (-v) or all details (-vv).")
 @click.option(
     "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version,
     help="Print the version.",

@@ -10,16 +10,17 @@ import click
 
 from bim.report.issue import issue_text
 from scenes import quick as quick_run
-from scenes.commands.parameters import FILE, check_is_ifc
-from scenes.commands.printed_head import PrintedHead
-from scenes.commands.quick_option import quick_option
 from scenes.commands.room_options import (
+    FILE,
+    PrintedHead,
+    check_is_ifc,
     chosen_language,
     explore_option,
     method_option,
     out_folder_option,
     page_option,
     processes_option,
+    quick_option,
     scheduler_option,
     surroundings_offset_option,
     surroundings_option,
@@ -28,9 +29,8 @@ from scenes.commands.room_options import (
 )
 
 if TYPE_CHECKING:
-    from scenes.study.case import Case
     from scenes.study.explored import ExploredCase
-    from scenes.study.plan import StudyPlan
+    from scenes.study.plan import Case, StudyPlan
     from scenes.study.store import Store
     from scenes.study.study import StudyResult
     from scenes.study.study_file import Study
@@ -41,11 +41,17 @@ if TYPE_CHECKING:
 @out_folder_option
 @processes_option
 @scheduler_option
-@method_option(["auto"], "auto: by cost and error, in place of the file's")
-@click.option("--time-budget", metavar="TIME", help="Of the whole study for auto: 90s, 20min, 2h.")
-@click.option("--dgp-error", metavar="PERCENT", help="Relative error of DGP for auto: 10%.")
-@explore_option("of 12 cases at most, which the report's marks then open")
-@write_ifc_option("one for each case of a study of one file")
+@method_option(["auto"], "auto: chosen by cost and error, instead of the file's")
+@click.option(
+    "--time-budget",
+    metavar="TIME",
+    help="Time limit of the whole study for --method auto: 90s, 20min, 2h.",
+)
+@click.option(
+    "--dgp-error", metavar="PERCENT", help="Relative error limit of DGP for --method auto: 10%."
+)
+@explore_option("for at most 12 cases, which open from the marks of the report")
+@write_ifc_option("one property set for each case; for studies of a single IFC file")
 @surroundings_option
 @surroundings_offset_option
 @quick_option
@@ -66,11 +72,11 @@ def command(
     quick: bool,
     page: Path | None,
 ) -> None:
-    """Every room of a study with every system, orientation, climate and method.
+    """Compute every room of a study with every system, orientation, climate and method.
 
-    docs/studies.md lists what the file may hold.  Finished cases are kept in the folder of
-    results: the same command goes on after an interruption, and a longer grid computes only what
-    is new.
+    docs/studies.md describes the file.  Finished cases are stored in the folder of results: after
+    an interruption the same command continues, and after additions to the file it computes only
+    the new cases.
     """
     from scenes.study.study_file import read_study
 
@@ -98,14 +104,13 @@ def study_to_folder(
     page_options = read_page(page, StudySection, chosen_language())
     files = (file, *parsed.files, *page_options.inputs)
     store = _checked(files, parsed, out, scheduler, write_ifc)
-    from scenes.commands.compiling import compiled_beside
-    from scenes.commands.progress_bar import ProgressBar
+    from scenes.commands.progress_bar import ProgressBar, compiled_beside
     from scenes.study.automatic import settled
     from scenes.study.plan import plan_of
     from scenes.study.study import run_study, with_explorers, write_study
     from scenes.study.write_ifc import write_study_ifc
     from scenes.study_report import write_study_report
-    from scenes.study_report.explorer import explorable, write_study_explorer
+    from scenes.study_report.page import explorable, write_study_explorer
 
     if parsed.quick:
         click.echo(quick_run.NOTE)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenes.commands.parameters import FILE
+from scenes.commands.room_options import FILE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from scenes.heat.study_file import StudyFile
     from scenes.result_folder import ResultFolder
 from scenes import quick as quick_run
-from scenes.commands.printed_head import PrintedHead
-from scenes.commands.quick_option import quick_option
 from scenes.commands.room_options import (
+    PrintedHead,
     out_folder_option,
+    quick_option,
     surroundings_offset_option,
     surroundings_option,
     with_flags,
@@ -31,10 +31,10 @@ from scenes.commands.room_options import (
 @click.command()
 @click.argument("study", type=FILE, metavar="STUDY.toml")
 @out_folder_option
-@click.option("--figures", is_flag=True, help="A figure of each room's year as SVG.")
+@click.option("--figures", is_flag=True, help="Write a figure of each room's year as SVG.")
 @click.option(
     "--energyplus", is_flag=True,
-    help="The same rooms as an input of EnergyPlus too (model.epJSON, schedules.csv).",
+    help="Also write the rooms as EnergyPlus input (model.epJSON, schedules.csv).",
 )  # fmt: skip
 @surroundings_option
 @surroundings_offset_option
@@ -49,7 +49,7 @@ def command(
     surroundings_offset: tuple[float, float, float] | None,
     quick: bool,
 ) -> None:
-    """Gains, temperatures, loads and comfort of rooms, hour by hour.
+    """Compute hourly gains, temperatures, loads and comfort of rooms.
 
     The study file names the weather, the rooms (an IFC file or a box), the shading states (BSDF
     files) and their control, gains, outdoor air and set points; docs/thermal.md lists every field.
@@ -69,8 +69,7 @@ def command(
     )
     folder = ResultFolder(out, "thermal", inputs=inputs)
     files = read_files(parsed, study)  # before anything heavy is loaded
-    from scenes.commands.compiling import compiled_beside
-    from scenes.commands.progress_bar import ProgressBar
+    from scenes.commands.progress_bar import ProgressBar, compiled_beside
     from scenes.heat.study import run_study
 
     if quick:

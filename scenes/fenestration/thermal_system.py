@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from bim.energyplus_windows import WindowOptics
+from mitsuba_cfs.bsdf.glazing import Pane
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
+from mitsuba_cfs.bsdf.pane_stack import absorbed_by_layers
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.notes import Note
-from scenes.fenestration.layer_sun import sun_in_layers
 from scenes.fenestration.systems import FenestrationSystem
 from thermal.blackbox import (
     Fenestration,
@@ -20,9 +22,39 @@ from thermal.blackbox import (
 )
 from thermal.closure import Closure
 from thermal.errors import ThermalInputError, require
+from thermal.glazing_unit import GlazingUnit
 from thermal.gvalue import thermal_data
 from thermal.layered import layered_thermal_data
 from thermal.notes import ThermalNote
+
+
+def sun_in_layers(
+    unit: GlazingUnit, transmittance: ArrayLike, reflectance: ArrayLike, incidence: ArrayLike
+) -> NDArray[np.float64]:
+    """Solar absorptance of every layer [K, N], see `pane_stack.absorbed_by_layers`.
+
+    A pane is coated where its sides differ.
+
+    Args:
+        transmittance, reflectance: [K] of the whole system, direction to hemisphere, solar.
+        incidence: [K] [rad].
+
+    Raises: `ThermalInputError` where a pane's solar values are missing or two layers are shades.
+    """
+    shades = sum(layer.openings is not None for layer in unit.layers)
+    require(shades <= 1, "layers", "expected at most one shade")
+    panes: list[Pane | None] = []
+    for number, layer in enumerate(unit.layers, start=1):
+        item = f"layers: layer {number}"
+        if layer.openings is not None:
+            panes.append(None)
+            continue
+        message = "its solar transmittance and reflectances are missing"
+        require(layer.solar is not None, item, message)
+        tau, front, back = layer.solar
+        panes.append(Pane(item, tau, front, back, coated=front != back))
+    return absorbed_by_layers(panes, transmittance, reflectance, incidence)
+
 
 SHADE_SCATTERS = 0.5  # share of the light beyond which a BSDF is that of a shade
 
@@ -130,6 +162,18 @@ def _diffuse(solar: KlemsBsdf, block: NDArray[np.float64]) -> float:
     """Hemispherical value for diffuse light."""
     weight = solar.basis_in.projected_solid_angles()
     return float(weight @ solar.direct_hemispherical(block) / weight.sum())
+
+
+def window_optics(system: FenestrationSystem, heat: ThermalSystem) -> WindowOptics:
+    """Matrices and layers of a system for EnergyPlus.
+
+    Args: heat: of `thermal_system`.
+    """
+    closure, stated = system.closure, system.u_value is not None  # a stated U is not its panes'
+    return WindowOptics(
+        system.solar, system.visible, heat.fenestration, heat.absorptances, heat.back_absorptance,
+        None if closure is None or stated else closure.unit,
+    )  # fmt: skip
 
 
 def checked_system(system: FenestrationSystem, path: Path | None) -> ThermalSystem:

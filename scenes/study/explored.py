@@ -18,12 +18,11 @@ from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.source_code import code_version
-from scenes.explore.folder import CASE, write_rooms
-from scenes.explore.packing import read_data
+from scenes.explore.folder import CASE, read_data, write_rooms
 from scenes.results import RunResult
-from scenes.study.case import Case
 from scenes.study.one_case import ALONE, case_inputs, case_year
-from scenes.study.schedule import said
+from scenes.study.plan import Case
+from scenes.study.store import said
 from scenes.workers import Tasks
 
 PHASED = ("three-phase", "five-phase")  # a path tracer has no matrices to compute an hour from
@@ -72,7 +71,7 @@ def explorers(
 ) -> Generator[tuple[Case, ExploredCase]]:
     """The explorer of each case, once for each key: kept in the folder, or computed and kept.
 
-    Args: processes, scheduler, progress: as of `scenes.study.schedule.computed`.
+    Args: processes, scheduler, progress: as of `scenes.study.store.computed`.
     """
     once = {explorer_key(case): case for case in cases}
     left = []

@@ -16,9 +16,14 @@ from click.testing import CliRunner
 from bim.model import Element
 from mitsuba_cfs.errors import DataError
 from scenes.cli import cfs
-from scenes.explore.folder import explorer_of, join_explorers, write_explorer
-from scenes.explore.packing import packed, read_data
-from scenes.explore.serve import server
+from scenes.explore.folder import (
+    explorer_of,
+    join_explorers,
+    packed,
+    read_data,
+    server,
+    write_explorer,
+)
 from scenes.report import write_report
 from scenes.result_folder import ResultFolder
 from scenes.run.outputs import write_results

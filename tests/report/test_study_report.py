@@ -13,9 +13,8 @@ import pytest
 from bim.report.issue import Issue
 from scenes.language.numbers import percent
 from scenes.report.daylight_figures import plans
-from scenes.study.case import Case, InputFile
 from scenes.study.one_case import glare_figures, room_figures
-from scenes.study.plan import StudyPlan
+from scenes.study.plan import Case, InputFile, StudyPlan
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
 from scenes.study_report.comparison import finished, glare_share, pareto_front
@@ -125,7 +124,7 @@ def test_all_that_a_reader_asks_for_is_there(page):
     for words in (
         "Daylight and glare", "Glare classes of the occupied hours", "Glare through the year",
         "Adaptive comfort", "Temperature duration", "Relative standard error", "five-phase, DGP",
-        "broken.xml: has &lt;no&gt; band", "2 faces have no construction", "UDI 300",
+        "broken.xml: has &lt;no&gt; band", "faces without construction: 2", "UDI 300",
     ):  # fmt: skip
         assert words in page, words
     assert page.count('<section class="case"') == 4 and len(page) < 5e6

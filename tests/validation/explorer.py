@@ -20,8 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.explore.folder import CASE, explorer_of
-from scenes.explore.packing import read_data
+from scenes.explore.folder import CASE, explorer_of, read_data
 from tests.devtools import Page
 
 WALK = """(async () => {
