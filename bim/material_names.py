@@ -13,10 +13,11 @@ come before the table's.
 
 from __future__ import annotations
 
+import fnmatch
 import math
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
@@ -84,6 +85,18 @@ class NamedMaterial:
             return replace(self.layer, thickness=thickness)
         resistance = next(r for limit, r in AIR_RESISTANCE if thickness <= limit)
         return replace(self.layer, thickness=thickness, conductivity=thickness / resistance)
+
+
+@dataclass(frozen=True, slots=True)
+class MaterialCorrection:
+    """Thermal properties of the materials that a pattern names, in place of the file's."""
+
+    name: str  # a pattern of names: * stands for any text
+    values: Mapping[str, float]  # by name, `u` among them
+
+    def matches(self, name: str) -> bool:
+        """Whether a material is meant; capitals do not count."""
+        return fnmatch.fnmatchcase(name.casefold(), self.name.casefold())
 
 
 @cache

@@ -32,15 +32,15 @@ ours: 'IfcWall, layer="A-WALL"'.
 
 from __future__ import annotations
 
-import fnmatch
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bim.material_names import MaterialCorrection
 from mitsuba_cfs.errors import DataError, no_such_key
 from mitsuba_cfs.files import reason
 from mitsuba_cfs.gloss import ROUGHEST, Gloss, lacquer
@@ -67,18 +67,6 @@ class Paint:
     visible: float
     solar: float
     gloss: Gloss | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class MaterialCorrection:
-    """Thermal properties of the materials that a pattern names, in place of the file's."""
-
-    name: str  # a pattern of names: * stands for any text
-    values: Mapping[str, float]  # of MATERIAL_KEYS
-
-    def matches(self, name: str) -> bool:
-        """Whether a material is meant; capitals do not count."""
-        return fnmatch.fnmatchcase(name.casefold(), self.name.casefold())
 
 
 @dataclass(frozen=True, slots=True)

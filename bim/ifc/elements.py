@@ -18,11 +18,11 @@ from bim.defaults import (
     LOWEST_REFLECTANCE,
     SITE_REFLECTANCE,
 )
-from bim.ifc.corrections import MaterialCorrection
 from bim.ifc.damage import Damage, entities
 from bim.ifc.materials import MaterialReader, materials_of
 from bim.ifc.project import storey_of
 from bim.ifc.shapes import Shape
+from bim.material_names import MaterialCorrection
 from bim.model import Element
 from bim.report.issue import Issue
 from mitsuba_cfs.gloss import Gloss

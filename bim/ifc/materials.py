@@ -10,10 +10,9 @@ import ifcopenshell
 import ifcopenshell.util.element
 import numpy as np
 
-from bim.ifc.corrections import MaterialCorrection
 from bim.ifc.damage import Damage, entities, instances, placement_of
 from bim.ifc.project import length_scale
-from bim.material_names import NamedMaterial, material_named
+from bim.material_names import MaterialCorrection, NamedMaterial, material_named
 from bim.model import MaterialLayer
 from bim.report.issue import Issue, Phrase
 
