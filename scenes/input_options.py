@@ -28,6 +28,8 @@ class InputOptions:
     facade_panes: tuple[str, ...] = ()  # materials of a Radiance scene's panes before dark rooms
     u_value: float | None = None  # of every window, instead of the file's [W/(m2 K)]
     g_value: float | None = None  # of every window at normal incidence
+    glazing: str | None = None  # generic glazing for windows whose file states no data
+    visible_transmittance: float | None = None  # of windows without a BSDF, before the file's
     operation: Path | None = None  # shading control, gains, set points
 
     @property

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@input_options("", system=False)
+@input_options("", system=False, glazing=False)
 @click.option(
     "--study",
     "study_file",

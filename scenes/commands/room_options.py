@@ -16,6 +16,7 @@ import click
 
 from mitsuba_cfs.sky.options import GROUNDS, SUBDIVISIONS, SUN_MODELS
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
 from scenes.room.options import GLARE_SOURCES, GLARE_SUN, SensorGrid
 
 if TYPE_CHECKING:
@@ -125,6 +126,14 @@ weather_option = click.option(
 system_option = click.option(
     "--cfs", "system", type=FILE,
     help="BSDF XML file (Klems full or tensor tree) for all windows; default: those in BUILDING.",
+)  # fmt: skip
+glazing_option = click.option(
+    "--glazing", type=click.Choice(list(GENERIC_GLAZINGS)),
+    help="Reference glazing by name; of windows whose file states no glazing data.",
+)  # fmt: skip
+tau_option = click.option(
+    "--tau", "visible_transmittance", type=click.FloatRange(0, 1, min_open=True),
+    help="Visible transmittance of windows without a BSDF.",
 )  # fmt: skip
 u_option = click.option(
     "--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value of the windows [W/(m2 K)]."
@@ -260,14 +269,19 @@ def size_option(name: str, default: int, why: str) -> Option:
 
 
 def input_options(
-    spaces: str, *, several: bool = True, weather: str = "needed", system: bool = True
+    spaces: str,
+    *,
+    several: bool = True,
+    weather: str = "needed",
+    system: bool = True,
+    glazing: bool = True,
 ) -> Option:
     """The argument and the options of every command, named as in `InputOptions`.
 
     Args:
         spaces: what `--space` chooses by default, "" without rooms; several: may be repeated.
         weather: "needed", "demo" (with the demo's building where there is none) or "" (none).
-        system: whether `--cfs` is one of them.
+        system: whether `--cfs` is one of them; glazing: whether `--glazing` and `--tau` are.
     """
     demo = weather == "demo"
     weathers = {"needed": [needed_weather_option], "demo": [weather_option], "": []}
@@ -278,6 +292,7 @@ def input_options(
         ),
         *weathers[weather],
         *([system_option] if system else []),
+        *([glazing_option, tau_option] if glazing else []),
         *([] if not spaces else [
             space_option("spaces", f"default: {spaces}", several=several), join_option,
             furniture_option, surroundings_option, surroundings_offset_option,
