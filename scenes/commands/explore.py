@@ -27,7 +27,7 @@ RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 )
 @click.option(
     "--language", type=click.Choice(["en", "de", "fr"]), default="en", show_default=True,
-    help="Language of the page; of several runs, or of --out.",
+    help="Language of the page.",
 )  # fmt: skip
 @click.option("--no-browser", is_flag=True, help="Only say the address.")
 def command(
@@ -38,7 +38,7 @@ def command(
     RESULTS are folders of `cfs run --explore`.  Those of several runs can be seen side by side.
     The page is served to this machine alone until Ctrl-C; it asks for nothing elsewhere.
     """
-    from scenes.explore.folder import explorer_of, join_explorers
+    from scenes.explore.folder import copy_explorer, explorer_of, join_explorers
     from scenes.language.catalogue import in_language
     from scenes.result_folder import ResultFolder
 
@@ -54,12 +54,12 @@ def command(
         click.echo(f"explorer: {out / 'index.html'}")
         return
     with tempfile.TemporaryDirectory() as place:
-        folder = folders[0]
-        if len(results) > 1:
-            folder = Path(place)
-            with in_language(language):
-                join_explorers(results, folder)
-        _serve(folder, port, open_it=not no_browser)
+        with in_language(language):
+            if len(results) > 1:
+                join_explorers(results, Path(place))
+            else:
+                copy_explorer(folders[0], Path(place))
+        _serve(Path(place), port, open_it=not no_browser)
 
 
 def _print_head(results: Path, *, several: bool) -> None:

@@ -41,6 +41,8 @@ def read_data(path: Path) -> Any:
     """
     try:
         text = path.read_text(encoding="utf-8")
+        if not (text.startswith(BEFORE) and text.endswith(AFTER)):
+            raise ValueError("is empty" if not text else "another text than one call of cfs.give")
         return json.loads(text.removeprefix(BEFORE).removesuffix(AFTER))
-    except (OSError, UnicodeDecodeError, ValueError) as error:
+    except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
         raise DataError(f"is no data of an explorer: {reason(error)}", file=path) from None
