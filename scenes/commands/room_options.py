@@ -270,7 +270,7 @@ def named_settings(settings: Sequence[str], but: Collection[str] = ()) -> dict[s
             raise click.UsageError(f"--set {text!r}: {reason}")
         try:
             table[name] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
+        except (tomllib.TOMLDecodeError, RecursionError):
             table[name] = value  # a word needs no quotes
     found = validated(OptionsTable, table, Path("--set"))
     return {name: getattr(found, name) for name in table}

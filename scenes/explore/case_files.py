@@ -1,4 +1,4 @@
-"""The case of an explorer's folder and the files that it names, checked: results may be a stranger's.
+"""The checked case of an explorer's folder and the files that it names: results may be foreign.
 
 A case names its data files. Only plain names under a folder `data` are followed, and only to data:
 the page loads each of them as a script.

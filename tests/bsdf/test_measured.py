@@ -250,6 +250,7 @@ def test_the_command_writes_a_tree_and_colours(tmp_path, capsys):
         assert isinstance(tree, TensorTreeBsdf)
         np.testing.assert_allclose(tree.transmission_back.values, value, rtol=1e-4)
 
+
 def test_a_bsdf_of_more_light_than_it_receives_is_refused(tmp_path, capsys):
     """A measurement in another unit gave a file that scatters 120 %, without a word."""
     out, texts = tmp_path / "out.xml", {}

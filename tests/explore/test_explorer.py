@@ -197,7 +197,12 @@ def _link(file: Path) -> None:
     file.symlink_to(outside)
 
 
-DAMAGES = {Path.unlink: "No such file", _emptied: "is empty", _script: "is no data of an explorer", _link: "link"}
+DAMAGES = {
+    Path.unlink: "No such file",
+    _emptied: "is empty",
+    _script: "is no data of an explorer",
+    _link: "link",
+}
 
 
 @pytest.mark.parametrize(("damage", "words"), DAMAGES.items())
