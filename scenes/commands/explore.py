@@ -65,15 +65,22 @@ def command(
 def _print_head(results: Path, *, several: bool) -> None:
     """What was left out and assumed of the inputs of a run."""
     from scenes.head import record_lines
+    from scenes.user_errors import one_line
 
     try:
         record = json.loads((results / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):  # an explorer that was copied without its run
+    except FileNotFoundError:  # an explorer that was copied without its run
         return
+    except (OSError, ValueError, RecursionError) as error:
+        raise DataError(f"cannot be read: {reason(error)}", file=results / "run.json") from None
     if several:
         click.echo(f"{results}:")
-    for line in record_lines(record["head"]) if "head" in record else ():
-        click.echo(line)
+    try:
+        lines = record_lines(record["head"]) if "head" in record else ()
+    except (KeyError, TypeError):
+        raise DataError("is no head of results", file=results / "run.json", field="head") from None
+    for line in lines:
+        click.echo(one_line(line))
 
 
 def _serve(folder: Path, port: int, *, open_it: bool) -> None:

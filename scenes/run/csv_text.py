@@ -11,11 +11,14 @@ from itertools import chain
 
 import pandas as pd
 
+from mitsuba_cfs.files import without_formulas
+
 DIGITS = "%.6g"
 
 
 def csv_text(table: pd.DataFrame, *, index: bool = True) -> str:
-    """What `table.to_csv(float_format="%.6g")` gives, byte for byte."""
+    """What `table.to_csv(float_format="%.6g")` gives of a table `without_formulas`."""
+    table = without_formulas(table)
     columns = [_entries(table.iloc[:, k]) for k in range(table.shape[1])]
     names = list(map(str, table.columns))
     if index:

@@ -39,7 +39,10 @@ class CaseResult:
         with opened_arrays(path) as data:
             arrays = {name: data[name] for name in data.files}
         record = json.loads(arrays.pop("record").tobytes())
-        return cls(record["key"], record["figures"], arrays)
+        key, figures = record["key"], record["figures"]
+        if not all(isinstance(value, float | int | str) for value in figures.values()):
+            raise ValueError("figures: expected numbers and texts")
+        return cls(key, figures, arrays)
 
 
 class Store:
@@ -61,7 +64,7 @@ class Store:
         """The finished case of that key; None where there is none, or none that can be read."""
         try:
             result = CaseResult.read(self._place(key))
-        except UNREADABLE:
+        except (*UNREADABLE, AttributeError):  # of a record that is no table
             return None
         return result if result.key == key else None
 
