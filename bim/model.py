@@ -157,7 +157,7 @@ class Window:
         return centroid(self.triangles)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Space:
     """A room: its air, what bounds it and its windows to the outside."""
 
@@ -206,6 +206,10 @@ class Space:
             return float(self.shell[..., 2].min())
         return float(max(floors, key=lambda face: face.area).triangles[..., 2].mean())
 
+    def __repr__(self) -> str:
+        size = f"{self.floor_area:.1f} m2, {self.volume:.1f} m3, {len(self.windows)} windows"
+        return f"<Space {self.label!r}: {size}, {len(self.faces)} faces>"
+
 
 @dataclass(frozen=True, slots=True)
 class Element:
@@ -230,7 +234,7 @@ class Element:
         return _in_band(self, band)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Building:
     """Rooms, what stands around them, and the faults found on the way."""
 
@@ -267,6 +271,10 @@ class Building:
             return Room(self, self.space(name_or_guid))
         except (UnknownName, AmbiguousName) as error:
             raise DataError(str(error.args[0]), file=self.file, field="space") from None
+
+    def __repr__(self) -> str:
+        sizes = f"{len(self.spaces)} spaces, {len(self.windows)} windows"
+        return f"<Building {self.name!r}: {sizes}, {len(self.issues)} issues>"
 
 
 @dataclass(frozen=True, slots=True)

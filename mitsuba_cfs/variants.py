@@ -1,4 +1,7 @@
-"""Choose and activate the Mitsuba variant: CUDA where there is a GPU, else LLVM, else scalar.
+"""Choose and activate the Mitsuba variant: LLVM, or CUDA where the user asks for it, else scalar.
+
+The validation tables were made with LLVM; none of them has been repeated on a GPU, so that CUDA
+is never chosen without being asked for (`CFS_DEVICE=cuda`, `cfs --device cuda`).
 
 Mitsuba and Dr.Jit are imported inside the functions, after the LLVM library has been chosen.
 """
@@ -21,6 +24,8 @@ from mitsuba_cfs import llvm
 from mitsuba_cfs.errors import VariantError
 
 BLAS_THREADS = "OPENBLAS_NUM_THREADS"  # environment variable
+DEVICE = "CFS_DEVICE"  # environment variable: one of DEVICES; worker processes inherit it
+DEVICES = ("cpu", "cuda")
 CUDA, LLVM, SCALAR = "cuda_ad_mono", "llvm_ad_mono", "scalar_rgb"
 
 log = logging.getLogger(__name__)
@@ -37,13 +42,13 @@ class Choice:
 def activate(preferred: str | None = None, *, vectorised: bool = True) -> str:
     """Activate the Mitsuba variant and return its name; repeated calls are fast.
 
-    Without a preference the variant that is active already stays; else CUDA where a GPU is
-    usable, else LLVM.
+    Without a preference the variant that is active already stays; else the one of `choose`. CUDA
+    is refused where it loses rays of a launch that traces two scenes, as several kernels do.
 
     Args:
         preferred: a Mitsuba variant that must be used, such as `llvm_ad_rgb`.
         vectorised: whether Dr.Jit arrays are needed (every matrix is). If not, the scalar
-            variant is taken, with a warning, where there is neither a GPU nor an LLVM library.
+            variant is taken, with a warning, where there is no LLVM library.
 
     Raises:
         VariantError: no usable variant; the message says what to install.
@@ -54,12 +59,34 @@ def activate(preferred: str | None = None, *, vectorised: bool = True) -> str:
         return current
     variant = _checked(preferred) if preferred else choose(vectorised=vectorised).variant
     if _is_scalar(variant):
-        log.warning("tracing without LLVM or CUDA (%s) is slow: %s", variant, llvm.INSTALL_HINT)
+        log.warning("tracing without LLVM (%s) is slow: %s", variant, llvm.INSTALL_HINT)
     try:
         mi.set_variant(variant)
     except ImportError as error:
         raise VariantError(f"{variant}: {error}; {llvm.INSTALL_HINT}") from error
+    if variant.startswith("cuda") and (fault := two_scenes_fault()):
+        raise VariantError(f"{variant}: {fault}; use the LLVM variant ({DEVICE}=cpu)")
     return variant
+
+
+def two_scenes_fault() -> str | None:
+    """Whether the active variant loses rays where one launch traces two scenes; None if not.
+
+    Dr.Jit 1.5 allows one OptiX shader binding table in a kernel: with more it warns and switches
+    the ray tracing off, so that panes or neighbouring rooms would vanish.
+    """
+    mi, dr = _tracer("mitsuba"), _tracer("drjit")
+    scenes = []
+    for distance in (1.0, 2.0):  # a square that faces the rays, so many metres away
+        to_world = mi.ScalarTransform4f().translate([0, 0, distance])
+        square = {"type": "rectangle", "to_world": to_world}
+        scenes.append(mi.load_dict({"type": "scene", "square": square}, parallel=False))
+    ray = mi.Ray3f(dr.zeros(mi.Point3f, 4), mi.Vector3f(0.0, 0.0, 1.0))
+    distances = [scene.ray_intersect_preliminary(ray).t for scene in scenes]
+    dr.eval(*distances)  # one launch
+    if all(bool(dr.allclose(t, d)) for t, d in zip(distances, (1.0, 2.0), strict=True)):
+        return None
+    return "a launch that traces two scenes loses rays"
 
 
 def share_cores(processes: int) -> None:
@@ -88,16 +115,21 @@ def return_memory() -> None:
 
 
 def choose(*, vectorised: bool = True) -> Choice:
-    """The variant for this machine, with the reason; activates nothing."""
-    gpu_fault = cuda_fault()
-    if gpu_fault is None:
-        return Choice(CUDA, "a GPU is usable")
+    """The variant for this machine, with the reason; activates nothing.
+
+    Raises: `VariantError` where the device of `CFS_DEVICE` is unknown or cannot be used.
+    """
+    device = os.environ.get(DEVICE) or "cpu"
+    if device not in DEVICES:
+        raise VariantError(f"{DEVICE}={device}: choose one of {', '.join(DEVICES)}")
+    if device == "cuda":
+        return Choice(_checked(CUDA), f"{DEVICE}=cuda")
     library_fault = llvm_fault()
     if library_fault is None:
-        return Choice(LLVM, f"{gpu_fault}; LLVM at {llvm.select_library()}")
+        return Choice(LLVM, f"LLVM at {llvm.select_library()}")
     if vectorised:
-        raise VariantError(f"{gpu_fault} and {library_fault}: {llvm.INSTALL_HINT}")
-    return Choice(SCALAR, f"{gpu_fault} and {library_fault}")
+        raise VariantError(f"{library_fault}: {llvm.INSTALL_HINT}")
+    return Choice(SCALAR, library_fault)
 
 
 def register(callback: Callable[[str], None]) -> None:
@@ -181,7 +213,9 @@ def _checked(variant: str) -> str:
         fault = llvm_fault()
     if fault is None:
         return variant
-    hint = llvm.INSTALL_HINT if variant.startswith("llvm") else "use the LLVM variant instead"
+    hint = f"use the LLVM variant ({DEVICE}=cpu)"
+    if variant.startswith("llvm"):
+        hint = llvm.INSTALL_HINT
     raise VariantError(f"{variant}: {fault}; {hint}")
 
 

@@ -90,8 +90,13 @@ def _print_version(ctx: click.Context, _parameter: click.Parameter, wanted: bool
     "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version,
     help="Print the version.",
 )  # fmt: skip
-def cfs(verbose: int) -> None:
+@click.option(
+    "--device", type=click.Choice(["cpu", "cuda"]), envvar="CFS_DEVICE", default="cpu",
+    show_default=True, help="Where rays are traced. No result has been verified on a GPU yet.",
+)  # fmt: skip
+def cfs(verbose: int, device: str) -> None:
     """Daylight, glare, temperatures and comfort behind complex fenestration systems."""
+    os.environ["CFS_DEVICE"] = device  # worker processes inherit it
     level = (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
     logging.basicConfig(level=level, format="%(message)s", handlers=[_StderrHandler()], force=True)
     for noisy in ("matplotlib", "numba", "h5py", "PIL"):

@@ -146,7 +146,7 @@ class ExploredRoom:
     windows: tuple[NDArray[np.float64], ...]  # [G] triangles [T, 3, 3] of each group [m]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class RoomYear:
     """The year of one room: its daylight, glare, heat and operation."""
 
@@ -179,8 +179,18 @@ class RoomYear:
             tables.append(self.annual_glare)
         return pd.concat(tables, axis=1).rename_axis("time")
 
+    def __repr__(self) -> str:
+        operative = self.heat.operative_c
+        figures = [
+            f"DA {self.daylight.da:.0f} %",
+            f"operative {operative.min():.1f} to {operative.max():.1f} degC",
+        ]
+        if self.glare.pictures:
+            figures.insert(1, f"worst DGP {self.glare.worst:.2f}")
+        return f"<{type(self).__name__} {self.space.label!r}: {', '.join(figures)}>"
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, repr=False)
 class RunResult:
     """A run: the building, the years of its rooms, notes and manifest."""
 
@@ -192,3 +202,6 @@ class RunResult:
     manifest: dict  # of run.json: inputs with hashes, options, versions, seed, timings
     notes: tuple[str, ...] = field(default=())  # sentences for the head of the results
     method: str = "three-phase"  # one of mitsuba_cfs.methods.METHODS
+
+    def __repr__(self) -> str:
+        return f"<RunResult {self.building.name!r}: {len(self.spaces)} rooms, {self.method}>"

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class SimulatedYear(RoomYear):
     """A room's year that can write its files and show itself."""
 

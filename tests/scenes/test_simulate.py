@@ -97,6 +97,15 @@ def test_the_hours_are_one_frame(year) -> None:
     assert {"operative_c", "transmitted_w", "within_80"} <= set(hours)
 
 
+def test_a_prompt_shows_one_line(year) -> None:
+    """A year, its run, building and space hold thousands of triangles that no prompt needs."""
+    for shown in (year, year.run, year.run.building, year.space):
+        text = repr(shown)
+        assert len(text) < 150, text[:300]
+        assert type(shown).__name__ in text
+    assert f"DA {year.daylight.da:.0f} %, worst DGP {year.glare.worst:.2f}" in repr(year)
+
+
 def test_a_notebook_shows_the_headline_figures(year) -> None:
     text = year._repr_html_()
     assert "South office" in text and f"{year.daylight.sda:.0f} %" in text

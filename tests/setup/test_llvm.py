@@ -128,7 +128,6 @@ def test_the_users_own_setting_wins(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_nothing_found_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(variants.llvm, "select_library", lambda: None)
     monkeypatch.setattr(variants.llvm, "candidates", list)
-    monkeypatch.setattr(variants, "cuda_fault", lambda: "no usable NVIDIA GPU")
     with pytest.raises(VariantError, match="apt-get install libllvm19") as caught:
         variants.choose()
     assert "\n" not in str(caught.value)

@@ -69,11 +69,7 @@ def test_unknown_variant_is_named() -> None:
 
 
 def test_scalar_is_the_last_resort_with_a_warning() -> None:
-    code = (
-        "from mitsuba_cfs import variants\n"
-        "variants.cuda_fault = lambda: 'no GPU'\n"
-        "print(variants.activate(vectorised=False))"
-    )
+    code = "from mitsuba_cfs import variants\nprint(variants.activate(vectorised=False))"
     done = _python(code, **{llvm.VARIABLE: "/nowhere/libLLVM.so.19"})
     assert done.stdout.strip() == "scalar_rgb"
     assert "apt-get install libllvm19" in done.stderr
@@ -98,3 +94,40 @@ def test_missing_system_library_is_named() -> None:
     done = _python(code)
     assert "libatomic.so.1" in done.stdout, done.stderr
     assert "apt-get install libatomic1" in done.stdout
+
+
+def test_a_gpu_is_used_only_where_it_is_asked_for() -> None:
+    code = (
+        "from mitsuba_cfs import errors, variants\n"
+        "variants.cuda_fault = lambda: {fault}\n"
+        "try:\n"
+        "    print(variants.choose().variant)\n"
+        "except errors.VariantError as error:\n"
+        "    print(error)\n"
+    )
+    usable, missing = code.format(fault="None"), code.format(fault="'no NVIDIA GPU'")
+    assert _python(usable).stdout.strip() == "llvm_ad_mono"
+    assert _python(usable, CFS_DEVICE="cuda").stdout.strip() == "cuda_ad_mono"
+    refused = _python(missing, CFS_DEVICE="cuda").stdout.strip()
+    assert refused == "cuda_ad_mono: no NVIDIA GPU; use the LLVM variant (CFS_DEVICE=cpu)"
+    assert "CFS_DEVICE=tpu: choose one of cpu, cuda" in _python(usable, CFS_DEVICE="tpu").stdout
+
+
+def test_a_device_that_loses_the_second_scene_of_a_launch_is_named() -> None:
+    """On OptiX Dr.Jit 1.5 switches off the ray tracing of a second scene, with a warning."""
+    code = (
+        "import mitsuba as mi\n"
+        "from mitsuba_cfs import variants\n"
+        "variants.activate('llvm_ad_mono')\n"
+        "print(variants.two_scenes_fault())\n"
+        "traced, scenes = mi.Scene.ray_intersect_preliminary, []\n"
+        "def first_scene_only(scene, ray):\n"
+        "    scenes.append(scene)\n"
+        "    return traced(scene, ray, active=len(scenes) == 1)\n"
+        "mi.Scene.ray_intersect_preliminary = first_scene_only\n"
+        "print(variants.two_scenes_fault())\n"
+    )
+    done = _python(code)
+    assert done.stdout.splitlines() == [
+        "None", "a launch that traces two scenes loses rays"
+    ], done.stderr  # fmt: skip

@@ -28,36 +28,44 @@
     return area < 0 ? flat.reverse() : flat;
   }
 
-  // A path of the shadows of all triangles [n * 9], `to` takes metres to the canvas
-  function shadows(triangles, sun, z, to) {
+  // A path of the shadows of all triangles [n * 9] that fall on the canvas; `to` takes metres to its
+  // pixels. Each ends with a line to its first point: the time of closePath grows in Chromium with
+  // the length of the path, and 20,000 triangles of a house would take seconds.
+  function shadows(triangles, sun, z, to, canvas) {
     const path = new Path2D();
     for (let at = 0; at < triangles.length; at += 9) {
-      const polygon = shadow(triangles, at, sun, z);
-      if (!polygon) continue;
-      polygon.forEach(([x, y], i) => (i ? path.lineTo(...to(x, y)) : path.moveTo(...to(x, y))));
-      path.closePath();
+      const polygon = shadow(triangles, at, sun, z)?.map(([x, y]) => to(x, y));
+      if (!polygon || outside(polygon, canvas)) continue;
+      path.moveTo(...polygon[0]);
+      for (let i = 1; i < polygon.length; i++) path.lineTo(...polygon[i]);
+      path.lineTo(...polygon[0]);
     }
     return path;
+  }
+
+  // Whether all points of a polygon lie beyond one and the same edge of the canvas
+  function outside(polygon, { width, height }) {
+    return polygon.every(([u]) => u < 0) || polygon.every(([u]) => u > width)
+      || polygon.every(([, v]) => v < 0) || polygon.every(([, v]) => v > height);
   }
 
   // Paint what the sun reaches of the room's outline on the plane z; groups: [{triangles, through}]
   function sunPatch(canvas, room, sun, z, to, colour) {
     const pen = canvas.getContext("2d");
     pen.clearRect(0, 0, canvas.width, canvas.height);
-    if (sun[2] <= 0.01) return;
-    const blocked = shadows(room.blockers, sun, z, to);
-    for (const group of room.groups) {
-      if (!(group.through > 0)) continue;
+    const sunlit = room.groups.filter((group) => group.through > 0);
+    if (sun[2] <= 0.01 || !sunlit.length) return;
+    for (const group of sunlit) {
       pen.save();
       pen.globalCompositeOperation = "source-over";
       pen.clip(room.outlinePath(to), "evenodd");
       pen.fillStyle = colour;
-      pen.fill(shadows(group.triangles, sun, z, to), "nonzero");
+      pen.fill(shadows(group.triangles, sun, z, to, canvas), "nonzero");
       pen.restore();
     }
     pen.globalCompositeOperation = "destination-out";
     pen.fillStyle = "#000";
-    pen.fill(blocked, "nonzero");
+    pen.fill(shadows(room.blockers, sun, z, to, canvas), "nonzero");
     pen.globalCompositeOperation = "source-over";
   }
   Object.assign(cfs, { sunPatch, shadow });
