@@ -153,11 +153,15 @@ def write_table(table: pd.DataFrame, path: str | PathLike[str], **options: objec
 
 def without_formulas(table: pd.DataFrame) -> pd.DataFrame:
     """The table with its texts, names of columns and rows as `plain_cell`."""
+    import pandas as pd
+
     texts = [k for k, kind in enumerate(table.dtypes) if kind.kind not in "biufcmM"]
     if texts:
         table = table.copy(deep=False)
         for k in texts:
-            table.isetitem(k, table.iloc[:, k].map(plain_cell))
+            column = table.iloc[:, k]
+            cells = [plain_cell(value) for value in column]
+            table.isetitem(k, pd.Series(cells, table.index, dtype=object))
     index = table.index if table.index.dtype.kind in "biufcmM" else table.index.map(plain_cell)
     return table.set_axis(table.columns.map(plain_cell), axis=1).set_axis(index, axis=0)
 

@@ -71,7 +71,7 @@ def room_values(results: str, quantity: str) -> dict[str, float]:
         places = json.loads((folder / "run.json").read_text(encoding="utf-8"))["folders"]
         found = {}
         for guid, place in places.items():
-            if Path(place).name != place or place == "..":
+            if Path(place).is_absolute() or ".." in Path(place).parts:
                 raise ValueError(f"{place[:60]!r} is no name of a room's folder")
             with open(folder / place / wanted.file, encoding="utf-8", newline="") as file:
                 cells = [row[wanted.column] for row in csv.DictReader(file)]
@@ -174,8 +174,9 @@ def add_on_classes(bpy: Any) -> Sequence[type]:
             out = bpy.path.abspath(settings.results) or tempfile.mkdtemp(prefix="cfs-")
             try:
                 words = run_command(
-                    preferences.program, _ifc().get_path() or "", bpy.path.abspath(settings.weather),
-                    out, quick=settings.quick, system=bpy.path.abspath(settings.system),
+                    preferences.program, _ifc().get_path() or "",
+                    bpy.path.abspath(settings.weather), out, quick=settings.quick,
+                    system=bpy.path.abspath(settings.system),
                 )  # fmt: skip
                 self.log = tempfile.TemporaryFile("w+", encoding="utf-8")
                 self.job = subprocess.Popen(words, stdout=self.log, stderr=subprocess.STDOUT)

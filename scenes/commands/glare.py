@@ -266,12 +266,16 @@ def _write_pictures(path: Path, picture: Picture, result: GlareResult, request, 
         pixels = check_radiance(result, uniform, show_task=blue)
         view, about = result.geometry.view, (VERSION,)
         if several or check.is_dir():
-            with ResultFolder(check, "glare", adding=True, among=True, field="-c").replaced() as place:
+            with ResultFolder(
+                check, "glare", adding=True, among=True, field="-c"
+            ).replaced() as place:
                 write_hdr(place / f"{path.stem}_check.hdr", pixels, view, comments=about)
         else:
             write_hdr(check, pixels, view, comments=about)
     if (folder := request.value("--png")) is not None:
-        with ResultFolder(folder, "glare", adding=True, among=True, field="--png").replaced() as place:
+        with ResultFolder(
+            folder, "glare", adding=True, among=True, field="--png"
+        ).replaced() as place:
             _write_png(place, path.stem, picture, result, request.given.get("--scale"))
 
 

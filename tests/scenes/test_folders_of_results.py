@@ -26,7 +26,7 @@ from tests.scenes.writing_jobs import (
 pytestmark = [pytest.mark.early, pytest.mark.usefixtures("own_cache")]
 
 
-@pytest.mark.parametrize("name", heavy_ones_slow(OWN))
+@pytest.mark.parametrize("name", heavy_ones_slow(FOLDERS))
 def test_a_folder_is_ours_by_its_mark_alone(name, place, capsys):
     """A `run.json` of somebody else's, and a mark that another program wrote."""
     here = place(name)
