@@ -20,8 +20,13 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system
 from scenes.fenestration.thermal_system import checked_system
 from scenes.input_options import InputOptions
-from scenes.room.operation import Operation, check_states, check_systems, read_operation
-from scenes.room.operation_hours import check_schedules
+from scenes.room.operation import (
+    Operation,
+    check_schedules,
+    check_states,
+    check_systems,
+    read_operation,
+)
 
 
 @dataclass(frozen=True, slots=True)

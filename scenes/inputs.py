@@ -24,8 +24,13 @@ from scenes.head import Head, head_of
 from scenes.input_files import InputFiles, building_of, read_files
 from scenes.input_options import NO_OPTIONS, InputOptions
 from scenes.room.inner_glass import opened, source_rooms
-from scenes.room.operation import Operation, check_states, stated_note, used_operation
-from scenes.room.operation_hours import check_schedules
+from scenes.room.operation import (
+    Operation,
+    check_schedules,
+    check_states,
+    stated_note,
+    used_operation,
+)
 from scenes.room.windows import traced_building
 
 Systems = Mapping[str, States]  # by window GUID

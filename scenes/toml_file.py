@@ -160,3 +160,30 @@ def _alternatives(annotation: object) -> Iterator[object]:
             yield from _alternatives(one)
     else:
         yield annotation
+
+
+class ReadTable(TomlTable):
+    """How a building's file is read, see `bim.building_file.ReadOptions`."""
+
+    join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
+    furniture: bool = False  # whether furniture is in the light and the views of its room
+    apertures: tuple[str, ...] = ()  # materials of a Radiance scene's windows
+    facade_panes: tuple[str, ...] = ()  # materials of a Radiance scene's panes before dark rooms
+
+
+class OutdoorTable(TomlTable):
+    """Files of what stands around a building."""
+
+    surroundings: tuple[Path, ...] = ()  # of buildings, terrain, trees and horizons outdoors
+    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
+
+
+def read_options(*tables: TomlTable) -> dict[str, object]:
+    """The keys of these tables as options of `InputOptions`."""
+    names = (*ReadTable.model_fields, *OutdoorTable.model_fields)
+    return {
+        name: getattr(table, name)
+        for table in tables
+        for name in names
+        if name in type(table).model_fields
+    }

@@ -27,10 +27,10 @@ RANKS = {
     "mitsuba_cfs.trace": ({"kernels"}, {"matrices"}, {"sun"}, {"paths"}, {"pictures"}),
     "scenes": (
         {"language"},
-        {"demo", "figures", "plausible", "quick", "result_folder", "results", "streams",
+        {"demo", "figures", "plausible", "quick", "result_folder", "results",
          "toml_file", "user_errors", "pictures", "room_views",
-         "bsdf_combination", "bsdf_generation", "bsdf_plots"},
-        {"page_options", "provision_levels", "read_table", "workers"},
+         "bsdf_generation"},
+        {"page_options", "provision_levels", "workers"},
         {"fenestration", "cost", "report", "plots"},
         {"head", "chosen_rooms", "input_options"},
         {"room"},
@@ -186,7 +186,7 @@ def test_no_function_takes_many_positional_parameters() -> None:
         ),
         ("scenes/results.py", "if TYPE_CHECKING:\n    from scenes.report.page import write_report"),
         ("scenes/heat/x.py", "from importlib import import_module\nimport_module('scenes.study')"),
-        ("scenes/study/x.py", "from scenes.commands.parameters import seed_option"),
+        ("scenes/study/x.py", "from scenes.commands.room_options import seed_option"),
         ("scenes/commands/x.py", "from scenes.cli import run"),
     ],
 )

@@ -18,9 +18,9 @@ from scenes.cost.reference import reference_costs
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system
 from scenes.input_files import read_weather
+from scenes.room.inputs import skies_for
 from scenes.room.options import RoomOptions
 from scenes.room.room import compute_room
-from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 
 PHASES = ("three-phase", "five-phase")

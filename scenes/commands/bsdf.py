@@ -2,23 +2,53 @@
 
 from __future__ import annotations
 
+import json
 import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
-from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
+from mitsuba_cfs.bsdf.bsdf_file import Bsdf, BsdfFile
 from mitsuba_cfs.bsdf.checks import check_bsdf
 from mitsuba_cfs.bsdf.evaluate import bsdf_values, direct_hemispherical
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import check_file, replacing, write_table
-from scenes.commands.bsdf_interpolation import interpolate
-from scenes.commands.bsdf_options import Number, basis_option, cull_option, tensor_tree_option
-from scenes.commands.bsdf_thermal import thermal
+from mitsuba_cfs.files import check_file, replacing, write_table, write_text
 from scenes.commands.room_options import seed_option
+
+if TYPE_CHECKING:
+    from mitsuba_cfs.bsdf.measured import Pattern, ScatteringInterpolant
+    from mitsuba_cfs.bsdf.measured_file import Measurement
+
+
+class Number(click.FloatRange):
+    """A finite number within bounds."""
+
+    def convert(self, value, param, ctx) -> float:
+        """The number; a usage error where it is none."""
+        number = super().convert(value, param, ctx)
+        if not np.isfinite(number):
+            self.fail(f"{value!r} is not a finite number.", param, ctx)
+        return number
+
+
+basis_option = click.option(
+    "--basis", type=click.Choice(["full", "half", "quarter"]), default="full", show_default=True,
+    help="Klems basis.",
+)  # fmt: skip
+tensor_tree_option = click.option(
+    "--tensor-tree", type=click.IntRange(1, 6), help="4^N cells a hemisphere instead."
+)
+cull_option = click.option(
+    "--cull", type=Number(0, 1, max_open=True), default=0.9,
+    help="Share of a tree's cells to merge away.",
+)  # fmt: skip
+
 
 INFO_ANGLES_DEG = (0, 10, 20, 30, 40, 50, 60, 70, 80)
 INFO_SIDES = {"sky": 90.0, "right": 0.0, "ground": -90.0, "left": 180.0}  # where the light is
@@ -34,6 +64,7 @@ SHAPES = (
     "product",
 )
 FILE = click.Path(path_type=Path)
+PLACES = ("external", "internal", "integrated")
 
 ANGLES = (Number(), Number())
 LENGTH, SHARE = Number(min=0, min_open=True), Number(0, 1)
@@ -46,10 +77,6 @@ BAND_OPTION = click.option(
 @click.group("bsdf")
 def command() -> None:
     """Read, check, plot and make BSDF files."""
-
-
-command.add_command(thermal)
-command.add_command(interpolate)
 
 
 @command.command()
@@ -197,7 +224,7 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
         raise DataError(f"has no {band} band", file=file)
     direction = _from_radiance(np.array([[*incident, 0.0, 0.0]]))[0][0]
     title = f"{file.name}, {band}, light from theta {incident[0]:g}°, phi {incident[1]:g}°"
-    from scenes.bsdf_plots import plot_hemispheres
+    from scenes.plots import plot_hemispheres
 
     figure = plot_hemispheres(data.bands[band], direction, title)
     with replacing(out) as part:
@@ -259,7 +286,7 @@ def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, out:
 
     Inter-reflections are all counted; gaps between the files are taken to be empty.
     """
-    from scenes.bsdf_combination import combined_file
+    from scenes.bsdf_generation import combined_file
 
     for option, path in (("--out", out), ("--absorptances", absorptances)):
         if path is not None:
@@ -271,3 +298,173 @@ def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, out:
     for band in file.bands:
         tau = direct_hemispherical(file.band(band), "transmission_front", [0.0, 0.0, 1.0])[0]
         click.echo(f"{out}: {band}: transmittance at normal incidence {tau:.4f}")
+
+
+@command.command("interpolate")
+@click.argument("files", nargs=-1, required=True, type=FILE, metavar="MEASURED.txt ...")
+@click.option(
+    "--normal", type=click.Choice(["room", "outside"]), default="room", show_default=True,
+    help="Where the sample's normal points to.",
+)  # fmt: skip
+@basis_option
+@tensor_tree_option
+@cull_option
+@click.option("--name", default="", help="Name to write into the file; the sample's without.")
+@click.option("--out", type=FILE, required=True, help="XML file to write.")
+def interpolate(
+    files: tuple[Path, ...],
+    *,
+    normal: str,
+    basis: str,
+    tensor_tree: int | None,
+    cull: float,
+    name: str,
+    out: Path,
+) -> None:
+    """Make a BSDF of goniophotometer files (pgII text), one or more an incident direction.
+
+    Prints for each incident direction the share of light that is scattered, with the standard
+    error that the noise of the values gives it, and what was taken for symmetry.  Measurements
+    whose BSDF scatters more light than it receives are refused, as `cfs bsdf check` refuses it.
+    """
+    from mitsuba_cfs.bsdf.energy import ENERGY_LIMIT, check_energy
+    from mitsuba_cfs.bsdf.measured_file import read_measurement
+    from mitsuba_cfs.bsdf.xml import write_bsdf_xml
+
+    check_file(out, inputs=files)
+    measured = [read_measurement(path, normal=normal) for path in files]
+    grazing = sum(one.grazing for one in measured)
+    if grazing:
+        click.echo(f"{grazing} values along the sample's plane are left out")
+    means = _klems(basis) if tensor_tree is None else _trees(tensor_tree, cull)
+    file = BsdfFile(_interpolated(measured, means))
+    others = f" and {len(files) - 1} more" * (len(files) > 1)
+    for band, bsdf in file.bands.items():
+        for note in check_energy(bsdf, ENERGY_LIMIT, file=f"{files[0]}{others}", band=band):
+            click.echo(f"note: {note}", err=True)
+    write_bsdf_xml(replace(file, name=name or measured[0].name), out)
+    click.echo(f"{out}: {', '.join(file.bands)}")
+
+
+def _interpolated(measured: Sequence[Measurement], means: _Means) -> dict[str, Bsdf]:
+    """The BSDF of each band, of the blocks that were measured."""
+    from mitsuba_cfs.bsdf.measured import ScatteringInterpolant, patterns_of
+    from mitsuba_cfs.bsdf.resample import BLOCKS
+
+    bands = measured[0].bands
+    for one in measured:
+        if one.bands != bands:
+            raise DataError(
+                f"has {', '.join(one.bands)}, {measured[0].path} {', '.join(bands)}",
+                file=one.path,
+                field="colorimetry",
+            )
+    blocks: dict[str, dict[str, Any]] = {band: {} for band in bands}
+    for block in BLOCKS:
+        patterns = patterns_of(measured, block)
+        if not patterns:
+            continue
+        interpolant = ScatteringInterpolant(patterns)
+        click.echo(f"{block.replace('_', ' ')}: {interpolant.symmetry}")
+        _print_shares(patterns, bands.index("Visible"))
+        for band, values in zip(bands, means.of(interpolant), strict=True):
+            blocks[band][block] = values
+    return {band: means.bsdf(found) for band, found in blocks.items()}
+
+
+@dataclass(frozen=True)
+class _Means:
+    """What an interpolant is averaged over: its values in each band, and the BSDF they make."""
+
+    of: Callable[[ScatteringInterpolant], list[Any]]
+    bsdf: Callable[[dict[str, Any]], Bsdf]
+
+
+def _klems(basis: str) -> _Means:
+    from mitsuba_cfs.bsdf.klems import KlemsBsdf
+    from scenes.bsdf_generation import BASES
+
+    patches = BASES[basis]
+    return _Means(
+        of=lambda interpolant: list(interpolant.matrix(patches)),
+        bsdf=lambda blocks: KlemsBsdf(patches, patches, **blocks),
+    )
+
+
+def _trees(levels: int, cull: float) -> _Means:
+    from mitsuba_cfs.bsdf.tensor_merge import culled_tree
+    from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
+
+    return _Means(
+        of=lambda interpolant: [culled_tree(grid, cull)[0] for grid in interpolant.grid(levels)],
+        bsdf=lambda blocks: TensorTreeBsdf(**blocks),
+    )
+
+
+def _print_shares(patterns: Sequence[Pattern], band: int) -> None:
+    import numpy as np
+
+    click.echo("theta   share  std error  noise of a value")
+    for pattern in sorted(patterns, key=lambda pattern: float(np.hypot(*pattern.incident))):
+        theta = np.degrees(np.arcsin(min(1.0, float(np.hypot(*pattern.incident)))))
+        relative, error = pattern.noise()
+        click.echo(f"{theta:5.1f} {pattern.share[band]:7.4f} {error:10.4f} {100 * relative:8.1f} %")
+
+
+@command.command("thermal")
+@click.argument("states", nargs=-1, required=True, type=FILE, metavar="STATE.xml ...")
+@click.option("--place", type=click.Choice(PLACES), help="The files are shades; where they stand.")
+@click.option(
+    "--glazing", type=click.Choice(["A", "B", "C", "D"]), help="Of EN 14501, with --place."
+)
+@click.option(
+    "--kappa", type=click.FloatRange(0, 1), default=0.4, show_default=True,
+    help="Of Kuhn's formula for interior shades.",
+)  # fmt: skip
+@click.option(
+    "--out", type=FILE, help="The rows as CSV; as JSON, g by patch with it, by its suffix."
+)
+@click.option("--toml", type=FILE, help="Write what the heat balance takes, of one state.")
+def thermal(
+    states: tuple[Path, ...],
+    place: str | None,
+    glazing: str | None,
+    kappa: float,
+    out: Path | None,
+    toml: Path | None,
+) -> None:
+    """U, g_tot, tau_e, secondary heat and EN 14501 classes of each STATE of a system.
+
+    A state is a BSDF file; the .toml beside it says what else is known: U and g, or its layers,
+    which are rated by ISO 15099 (NFRC), ISO 52022-3, EN 673 and EN 410.  With --place and --glazing
+    the files are shades alone, rated by EN 13363-1 and Kuhn.
+    """
+    from scenes.fenestration.ratings import printed, rated_state, thermal_toml
+
+    if (place is None) != (glazing is None):
+        raise click.UsageError("--place and --glazing belong together")
+    if toml is not None and (len(states) != 1 or place is not None):
+        raise click.UsageError("--toml writes the data of one state, not of a shade alone")
+    for option, path in (("--out", out), ("--toml", toml)):
+        if path is not None:
+            check_file(path, field=option, inputs=states)
+    missing = [path for path in states if not path.is_file()]
+    if missing:
+        raise DataError("no such file", file=missing[0])
+    found = [rated_state(path, place=place, glazing=glazing, kappa=kappa) for path in states]
+    rows = [row for state in found for row in state.rows()]
+    for line in printed(rows):
+        click.echo(line)
+    for note in dict.fromkeys(n for s in found for n in s.notes):
+        if place is None:
+            click.echo(f"note: {note}")
+    if out is not None and out.suffix == ".json":
+        by_patch = {s.path.stem: [round(float(g), 5) for g in s.heat.g_value] for s in found}
+        record = {"rows": rows} if place else {"rows": rows, "g by patch": by_patch}
+        write_text(out, json.dumps(record, indent=2) + "\n")
+    elif out is not None:
+        import pandas as pd
+
+        write_table(pd.DataFrame(rows), out, index=False, float_format="%.4f")
+    if toml is not None:
+        write_text(toml, thermal_toml(found[0]))

@@ -9,13 +9,14 @@ import click
 
 from bim.report.issue import issue_text
 from scenes import quick as quick_run
-from scenes.commands.parameters import FILE, check_is_ifc
-from scenes.commands.printed_head import PrintedHead
-from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
+    FILE,
+    PrintedHead,
+    check_is_ifc,
     chosen_language,
     directions_option,
     eye_height_option,
+    given,
     grid_option,
     input_options,
     named_settings,
@@ -90,8 +91,7 @@ def command(
         check_is_ifc(building, "--write-ifc")
         check_file(write_ifc, field="--write-ifc", inputs=(building,))
     files = read_files(options)  # before anything heavy is loaded
-    from scenes.commands.compiling import compiled_beside
-    from scenes.commands.progress_bar import ProgressBar
+    from scenes.commands.progress_bar import ProgressBar, compiled_beside
     from scenes.comply.comply import check_building
     from scenes.comply.outputs import write_compliance, write_into_ifc
 

@@ -7,18 +7,19 @@ from pathlib import Path
 import click
 
 from scenes import quick
-from scenes.commands.printed_head import PrintedHead
-from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
+    PrintedHead,
     chosen_language,
     directions_option,
     eye_height_option,
+    given,
     grid_option,
     input_options,
     light_options,
     method_option,
     out_folder_option,
     page_option,
+    quick_option,
     samples_option,
     size_option,
     subdivide_option,

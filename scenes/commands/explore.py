@@ -75,16 +75,14 @@ def _print_head(results: Path, *, several: bool) -> None:
         raise DataError(f"cannot be read: {reason(error)}", file=results / "run.json") from None
     if several:
         click.echo(f"{results}:")
-    try:
-        lines = record_lines(record["head"]) if "head" in record else ()
-    except (KeyError, TypeError):
-        raise DataError("is no head of results", file=results / "run.json", field="head") from None
-    for line in lines:
+    if not isinstance(record, dict):
+        raise DataError("is no record of a run", file=results / "run.json")
+    for line in record_lines(record["head"], results / "run.json") if "head" in record else ():
         click.echo(one_line(line))
 
 
 def _serve(folder: Path, port: int, *, open_it: bool) -> None:
-    from scenes.explore.serve import server
+    from scenes.explore.folder import server
 
     try:
         running = server(folder, port)

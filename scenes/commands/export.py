@@ -13,8 +13,8 @@ import click
 
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import check_file
-from scenes.commands.printed_head import PrintedHead
 from scenes.commands.room_options import (
+    PrintedHead,
     height_option,
     input_options,
     spacing_option,

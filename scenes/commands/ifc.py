@@ -9,11 +9,11 @@ import click
 
 from mitsuba_cfs.files import check_file, write_text
 from mitsuba_cfs.progress import Stage
-from scenes.commands.bonsai import bonsai
 from scenes.commands.check import command as check
 from scenes.commands.export import command as export
-from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.commands.room_options import (
+    FILE,
+    IFC_FILE,
     out_folder_option,
     space_option,
     u_option,
@@ -22,6 +22,21 @@ from scenes.result_folder import ResultFolder
 
 if TYPE_CHECKING:
     pass
+
+
+@click.command()
+@click.option(
+    "--out", required=True, type=click.Path(path_type=Path, dir_okay=False), metavar="ADDON.zip",
+    help="The add-on, for Blender's Preferences, Add-ons, Install from Disk.",
+)  # fmt: skip
+def bonsai(out: Path) -> None:
+    """Write the Bonsai panel: cfs run on the open IFC file, rooms coloured by result."""
+    check_file(out, field="--out")
+    from bim.bonsai.package import write_add_on
+
+    write_add_on(out)
+    click.echo(out)
+
 
 BANDS = ("Visible", "Solar")
 UNCUT = 100_000  # columns of a table that nobody sees

@@ -8,8 +8,8 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.files import check_file
-from scenes.commands.printed_head import PrintedHead
 from scenes.commands.room_options import (
+    PrintedHead,
     eye_height_option,
     input_options,
     light_options,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import TracebackType
 
@@ -20,6 +22,7 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
+from mitsuba_cfs.interpreter import own_paths, own_python
 from mitsuba_cfs.progress import Stage, TimeLeft, spoken_left
 
 NEXT_ITEM_S = 10.0  # of a log: items that are shorter do not get a line each
@@ -195,3 +198,46 @@ class ProgressBar:
     def _write(self, line: str) -> None:
         self._told = self._clock()
         click.echo(line, err=True)
+
+
+COMPILE = "from scenes.commands.progress_bar import compile_now; compile_now()"
+
+
+@contextmanager
+def compiled_beside() -> Iterator[None]:
+    """Where the heat balance has to be compiled yet, let another process do so in the meantime.
+
+    It keeps what it compiles where this process looks for it; too late or failed, this one compiles
+    for itself.
+    """
+    from mitsuba_cfs.compiled import must_compile
+    from thermal.kernel import advance
+
+    if not must_compile(advance) or advance.stats.cache_path is None:
+        yield
+        return
+    nowhere = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL}
+    with subprocess.Popen(
+        own_python("-c", COMPILE), env=own_paths(), stderr=subprocess.DEVNULL, **nowhere
+    ) as process:
+        try:
+            yield
+        finally:
+            process.terminate()
+
+
+def compile_now() -> None:
+    """Compile the heat balance and the glare of a picture by computing the smallest of each."""
+    import numpy as np
+
+    from mitsuba_cfs.glare.evaluation import evaluate
+    from mitsuba_cfs.images.view import fisheye
+    from thermal.balance import simulate
+    from thermal.climate import Climate, no_sun
+    from thermal.zone import Layer, OpaqueSurface, Zone
+
+    day, up = np.zeros(24), np.array([0.0, 0.0, 1.0])
+    roof = OpaqueSurface("roof", 10.0, (Layer(0.1, 1.0, 1000.0, 1000.0),), up)
+    climate = Climate(day, day, day, day, day, day + 101325.0)
+    simulate(Zone("room", 30.0, (roof,)), climate, no_sun(24, 1, 0))
+    evaluate(np.ones((64, 64), dtype=np.float32), fisheye((0, 0, 0), (0, 1, 0), 64))

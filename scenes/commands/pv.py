@@ -10,13 +10,13 @@ import click
 
 from bim.report.issue import COLUMNS, issue_rows
 from scenes import quick as quick_run
-from scenes.commands.parameters import FILE
-from scenes.commands.printed_head import PrintedHead
-from scenes.commands.quick_option import quick_option
 from scenes.commands.room_options import (
+    FILE,
+    PrintedHead,
     input_options,
     no_cache_option,
     out_folder_option,
+    quick_option,
     seed_option,
 )
 from scenes.input_options import InputOptions

@@ -15,14 +15,75 @@ from typing import TYPE_CHECKING, TypeVar
 import click
 
 from mitsuba_cfs.sky.options import GROUNDS, SUBDIVISIONS, SUN_MODELS
-from scenes.commands.parameters import BUILDING_FILE, FILE
-from scenes.commands.quick_option import quick_option
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.room.options import GLARE_SOURCES, GLARE_SUN, SensorGrid
 
 if TYPE_CHECKING:
     from scenes.heat.study_file import StudyFile
     from scenes.study.study_file import Study as Grid
+
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from click.core import ParameterSource
+
+if TYPE_CHECKING:
+    from scenes.head import Head
+
+
+class IfcFile(click.Path):
+    """An IFC file whose head and corrections file are sound; nothing heavy is loaded for that."""
+
+    def convert(self, value, param, ctx) -> Path:
+        """The path; `DataError` where the file is none of ours."""
+        from bim.building_file import check_ifc
+
+        path = super().convert(value, param, ctx)
+        check_ifc(path)
+        return path
+
+
+class BuildingFile(click.Path):
+    """A file of any format that a building is read from, sound as far as it can be seen at once."""
+
+    def convert(self, value, param, ctx) -> Path:
+        """The path; `DataError` where the file is none of ours."""
+        from bim.building_file import check_building_file
+
+        path = super().convert(value, param, ctx)
+        check_building_file(path)
+        return path
+
+
+def check_is_ifc(path: Path, field: str) -> None:
+    """Raise `DataError` for what only an IFC file can do, asked of another format."""
+    from bim.building_file import is_ifc
+    from mitsuba_cfs.errors import DataError
+
+    if not is_ifc(path):
+        raise DataError(f"needs an IFC file, got {path.name}", field=field)
+
+
+FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+BUILDING_FILE = BuildingFile(exists=True, dir_okay=False, readable=True, path_type=Path)
+IFC_FILE = IfcFile(exists=True, dir_okay=False, readable=True, path_type=Path)
+
+
+quick_option = click.option(
+    "--quick", is_flag=True, help="A first look: few rays, small pictures, one hour."
+)
+
+
+def given() -> set[str]:
+    """Names of the parameters of the command under way that do not have their default."""
+    context = click.get_current_context()
+    return {
+        name
+        for name in context.params
+        if context.get_parameter_source(name) not in (ParameterSource.DEFAULT, None)
+    }
+
 
 Study = TypeVar("Study", "StudyFile", "Grid")
 Option = Callable[[Callable], Callable]
@@ -333,3 +394,26 @@ def with_demo(chosen: dict) -> dict:
     click.echo(f"no BUILDING given: the demo's {', '.join(demo)}")
     files = (OFFICE, weather or WEATHER, system or VENETIAN_BLIND)
     return chosen | dict(zip(names, files, strict=True))
+
+
+class PrintedHead:
+    """Prints a head once it is known, and afterwards only notes that it does not have."""
+
+    def __init__(self) -> None:
+        """Nothing is printed yet."""
+        self._lines: dict[str, None] = {}
+        self.record: dict[str, list] = {}  # of the head
+
+    def __call__(self, head: Head) -> None:
+        """Print the lines of a head that were not printed yet."""
+        for line in head.lines:
+            if line not in self._lines:
+                click.echo(line)
+        self.record = head.record
+        self._lines |= dict.fromkeys((*head.lines, *head.notes))
+
+    def notes(self, notes: Iterable[str]) -> None:
+        """Print the notes of a result that are not in the head."""
+        for note in notes:
+            if note not in self._lines:
+                click.echo(f"note: {note}")

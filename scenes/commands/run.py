@@ -9,12 +9,12 @@ import click
 
 from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
-from scenes.commands.parameters import FILE
-from scenes.commands.printed_head import PrintedHead
-from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
+    FILE,
+    PrintedHead,
     chosen_language,
     explore_option,
+    given,
     height_option,
     input_options,
     method_option,
@@ -130,15 +130,13 @@ def run_to_folder(
     if options.cache:
         default_folder()  # or one line that it cannot be one
     files = read_files(options)  # before anything heavy is loaded
-    from scenes.commands.compiling import compiled_beside
-    from scenes.commands.progress_bar import ProgressBar
+    from scenes.commands.progress_bar import ProgressBar, compiled_beside
     from scenes.explore.folder import write_explorer
     from scenes.language.catalogue import ngettext
     from scenes.report import write_report
     from scenes.result_folder import EXPLORER
     from scenes.run.outputs import write_results
-    from scenes.run.rooms import Workers
-    from scenes.run.run import run_job
+    from scenes.run.run import Workers, run_job
 
     beside = processes > 1 or scheduler is not None
     if options.quick:

@@ -10,16 +10,17 @@ import click
 
 from bim.report.issue import issue_text
 from scenes import quick as quick_run
-from scenes.commands.parameters import FILE, check_is_ifc
-from scenes.commands.printed_head import PrintedHead
-from scenes.commands.quick_option import quick_option
 from scenes.commands.room_options import (
+    FILE,
+    PrintedHead,
+    check_is_ifc,
     chosen_language,
     explore_option,
     method_option,
     out_folder_option,
     page_option,
     processes_option,
+    quick_option,
     scheduler_option,
     surroundings_offset_option,
     surroundings_option,
@@ -28,9 +29,8 @@ from scenes.commands.room_options import (
 )
 
 if TYPE_CHECKING:
-    from scenes.study.case import Case
     from scenes.study.explored import ExploredCase
-    from scenes.study.plan import StudyPlan
+    from scenes.study.plan import Case, StudyPlan
     from scenes.study.store import Store
     from scenes.study.study import StudyResult
     from scenes.study.study_file import Study
@@ -98,14 +98,13 @@ def study_to_folder(
     page_options = read_page(page, StudySection, chosen_language())
     files = (file, *parsed.files, *page_options.inputs)
     store = _checked(files, parsed, out, scheduler, write_ifc)
-    from scenes.commands.compiling import compiled_beside
-    from scenes.commands.progress_bar import ProgressBar
+    from scenes.commands.progress_bar import ProgressBar, compiled_beside
     from scenes.study.automatic import settled
     from scenes.study.plan import plan_of
     from scenes.study.study import run_study, with_explorers, write_study
     from scenes.study.write_ifc import write_study_ifc
     from scenes.study_report import write_study_report
-    from scenes.study_report.explorer import explorable, write_study_explorer
+    from scenes.study_report.page import explorable, write_study_explorer
 
     if parsed.quick:
         click.echo(quick_run.NOTE)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenes.commands.parameters import FILE
+from scenes.commands.room_options import FILE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from scenes.heat.study_file import StudyFile
     from scenes.result_folder import ResultFolder
 from scenes import quick as quick_run
-from scenes.commands.printed_head import PrintedHead
-from scenes.commands.quick_option import quick_option
 from scenes.commands.room_options import (
+    PrintedHead,
     out_folder_option,
+    quick_option,
     surroundings_offset_option,
     surroundings_option,
     with_flags,
@@ -69,8 +69,7 @@ def command(
     )
     folder = ResultFolder(out, "thermal", inputs=inputs)
     files = read_files(parsed, study)  # before anything heavy is loaded
-    from scenes.commands.compiling import compiled_beside
-    from scenes.commands.progress_bar import ProgressBar
+    from scenes.commands.progress_bar import ProgressBar, compiled_beside
     from scenes.heat.study import run_study
 
     if quick:

@@ -46,12 +46,11 @@ from scenes.input_files import building_of
 from scenes.inputs import first_states, inputs_of
 from scenes.language.catalogue import N_
 from scenes.report.method import METHODS
-from scenes.room.inputs import room_inputs
+from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.light import room_light
 from scenes.room.options import RoomOptions
 from scenes.room.room import StageTimes
 from scenes.room.series import RoomSeries, corner
-from scenes.room.skies import skies_for
 
 # the parts of a room's light, as the dossier's last line names their seconds
 PARTS = TRACING, SUMS, GLARE, HEAT = (

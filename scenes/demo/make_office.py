@@ -22,14 +22,315 @@ from pathlib import Path
 import ifcopenshell
 import ifcopenshell.api.aggregate
 import ifcopenshell.api.context
+import ifcopenshell.api.feature
+import ifcopenshell.api.geometry
 import ifcopenshell.api.georeference
+import ifcopenshell.api.material
 import ifcopenshell.api.project
+import ifcopenshell.api.pset
 import ifcopenshell.api.root
+import ifcopenshell.api.spatial
+import ifcopenshell.api.style
 import ifcopenshell.api.unit
 import numpy as np
+from numpy.typing import NDArray
 
-from scenes.demo.office_materials import thickness
-from scenes.demo.office_parts import Office
+from scenes.demo.office_materials import (
+    GLASS,
+    GLAZING,
+    TIMBER,
+    WINDOW_U,
+    Palette,
+    thickness,
+    u_value,
+)
+
+Entity = ifcopenshell.entity_instance
+Point = tuple[float, float]
+
+FRAME_WIDTH, FRAME_DEPTH = 0.07, 0.08  # of a window's frame, seen and through the wall [m]
+PANE = 0.024  # double glazing 4/16/4 [m]
+REVEAL = 0.20  # from the wall's inner face to the frame: in the insulation's plane [m]
+
+
+class Office:
+    """One storey being furnished with building elements; all lengths in metres."""
+
+    def __init__(
+        self, model: ifcopenshell.file, storey: Entity, body: Entity, axis: Entity,
+        *, palette: Palette | None = None,
+    ) -> None:  # fmt: skip
+        """Add to this storey, with bodies and axes in these contexts; heights from its elevation.
+
+        Args: palette: of a storey made before, where there is one.
+        """
+        self._model, self._storey, self._body, self._axis = model, storey, body, axis
+        self.palette = Palette(model) if palette is None else palette
+        self._walls: dict[str, tuple[Entity, NDArray[np.float64], float]] = {}
+
+    def slab(self, name: str, layers: str, outline: tuple[Point, ...], z: float, style: str):
+        """A slab over the outline, its bottom at z: the ground floor or the roof."""
+        kind = "ROOF" if layers == "Roof" else "BASESLAB"
+        slab = self._element("IfcSlab", name, kind)
+        solid = self._extruded(outline, thickness(layers))
+        self._show(slab, [(solid, style)])
+        self._place(slab, _frame((0.0, 0.0, z), (1.0, 0.0)))
+        self._layered(slab, layers, "AXIS3")
+        self._pset(
+            slab, "Pset_SlabCommon",
+            {"IsExternal": True, "LoadBearing": True, "ThermalTransmittance": u_value(layers)},
+        )  # fmt: skip
+
+    def wall(
+        self, name: str, layers: str, start: Point, end: Point, height: float, style: str
+    ) -> None:
+        """A wall whose reference line runs from start to end; its layers lie to the left."""
+        run = np.subtract(end, start)
+        length = float(np.hypot(*run))
+        wall = self._element("IfcWall", name, "SOLIDWALL" if "wall" in name else "PARTITIONING")
+        depth = thickness(layers)
+        solid = self._extruded(_rectangle(0.0, 0.0, length, depth), height)
+        self._show(wall, [(solid, style)])
+        line = ifcopenshell.api.geometry.add_axis_representation(
+            self._model, context=self._axis, axis=[(0.0, 0.0), (length, 0.0)]
+        )
+        ifcopenshell.api.geometry.assign_representation(
+            self._model, product=wall, representation=line
+        )
+        frame = _frame((*start, 0.0), tuple(run / length))
+        self._place(wall, frame)
+        self._layered(wall, layers, "AXIS2")
+        external = layers == "Outer wall"
+        self._pset(
+            wall, "Pset_WallCommon",
+            {"IsExternal": external, "LoadBearing": external,
+             "ThermalTransmittance": u_value(layers)},
+        )  # fmt: skip
+        self._walls[name] = (wall, frame, depth)
+
+    def window(
+        self, name: str, wall: str, along: float, sill: float, width: float, height: float
+    ) -> None:
+        """A window in a wall: frame all round and one pane, behind an inner reveal."""
+        opening, frame = self._opening(f"Opening of {name}", wall, along, sill, width, height)
+        window = self._element("IfcWindow", name, "WINDOW")
+        window.OverallWidth, window.OverallHeight = width, height
+        window.PartitioningType = "SINGLE_PANEL"
+        lining = self._ring(width, height, FRAME_WIDTH, FRAME_DEPTH)
+        clear_width, clear_height = width - 2 * FRAME_WIDTH, height - 2 * FRAME_WIDTH
+        middle = (FRAME_DEPTH - PANE) / 2
+        pane = self._upright(FRAME_WIDTH, FRAME_WIDTH, clear_width, clear_height, middle, PANE)
+        self._show(window, [(lining, "White frame"), (pane, "Clear glass")])
+        self._place(window, frame @ _shift(0.0, REVEAL, 0.0))
+        ifcopenshell.api.feature.add_filling(self._model, opening=opening, element=window)
+        self._constituents(window, {"Lining": TIMBER, "Glazing": GLASS})
+        area_fraction = clear_width * clear_height / (width * height)
+        self._pset(
+            window, "Pset_WindowCommon",
+            {"IsExternal": True, "ThermalTransmittance": WINDOW_U,
+             "GlazingAreaFraction": area_fraction},
+        )  # fmt: skip
+        self._pset(
+            window, "Pset_DoorWindowGlazingType",
+            {"GlassLayers": 2, "GlassThickness1": 0.004, "GlassThickness2": 0.004,
+             "FillGas": "Argon", "IsTempered": False, "IsLaminated": False, "IsCoated": True,
+             "VisibleLightTransmittance": GLAZING["visible"],
+             "SolarTransmittance": GLAZING["solar"],
+             "SolarHeatGainTransmittance": GLAZING["g"],
+             "ThermalTransmittanceSummer": GLAZING["u"],
+             "ThermalTransmittanceWinter": GLAZING["u"]},
+        )  # fmt: skip
+        self._quantities(
+            window, "Qto_WindowBaseQuantities",
+            {"Width": width, "Height": height, "Area": width * height},
+        )  # fmt: skip
+
+    def door(self, name: str, wall: str, along: float, width: float, height: float) -> None:
+        """A single-leaf inner door in a wall, its leaf in the middle of the wall."""
+        opening, frame = self._opening(f"Opening of {name}", wall, along, 0.0, width, height)
+        door = self._element("IfcDoor", name, "DOOR")
+        door.OverallWidth, door.OverallHeight = width, height
+        door.OperationType = "SINGLE_SWING_LEFT"
+        leaf = 0.04
+        self._show(door, [(self._upright(0.0, 0.0, width, height, 0.0, leaf), "Beech door")])
+        middle = (self._walls[wall][2] - leaf) / 2
+        self._place(door, frame @ _shift(0.0, middle, 0.0))
+        ifcopenshell.api.feature.add_filling(self._model, opening=opening, element=door)
+        self._constituents(door, {"Leaf": TIMBER})
+        self._pset(door, "Pset_DoorCommon", {"IsExternal": False, "ThermalTransmittance": 2.0})
+
+    def space(self, name: str, long_name: str, low: Point, high: Point, height: float) -> Entity:
+        """A rectangular room from the inner faces of its walls, floor and ceiling."""
+        width, depth = np.subtract(high, low)
+        space = ifcopenshell.api.root.create_entity(
+            self._model, ifc_class="IfcSpace", name=name, predefined_type="INTERNAL"
+        )
+        space.LongName = long_name
+        ifcopenshell.api.aggregate.assign_object(
+            self._model, products=[space], relating_object=self._storey
+        )
+        self._show(space, [(self._extruded(_rectangle(0, 0, width, depth), height), None)])
+        self._place(space, _frame((*low, 0.0), (1.0, 0.0)))
+        area = float(width * depth)
+        self._pset(space, "Pset_SpaceCommon", {"Reference": "office", "IsExternal": False})
+        self._pset(space, "Pset_SpaceOccupancyRequirements", {"OccupancyNumber": 2})
+        self._quantities(
+            space, "Qto_SpaceBaseQuantities",
+            {"Height": height, "NetFloorArea": area, "GrossFloorArea": area,
+             "NetVolume": area * height, "NetPerimeter": float(2 * (width + depth))},
+        )  # fmt: skip
+        return space
+
+    def desk(self, name: str, space: Entity, corner: NDArray[np.float64]) -> None:
+        """A desk 1.6 x 0.8 x 0.74 m: a top and two side panels."""
+        desk = ifcopenshell.api.root.create_entity(
+            self._model, ifc_class="IfcFurniture", name=name, predefined_type="DESK"
+        )
+        ifcopenshell.api.spatial.assign_container(
+            self._model, products=[desk], relating_structure=space
+        )
+        top = self._extruded(_rectangle(0.0, 0.0, 1.6, 0.8), 0.03, z=0.71)
+        sides = [self._extruded(_rectangle(x, 0.05, 0.03, 0.7), 0.71) for x in (0.05, 1.52)]
+        self._show(desk, [(solid, "Beech desk") for solid in (top, *sides)])
+        self._place(desk, _frame(tuple(corner), (1.0, 0.0)))
+
+    def _opening(
+        self, name: str, wall: str, along: float, sill: float, width: float, height: float
+    ) -> tuple[Entity, NDArray[np.float64]]:
+        """The opening through a wall, and the frame of its lower corner on the reference line."""
+        host, wall_frame, depth = self._walls[wall]
+        frame = wall_frame @ _shift(along, 0.0, sill)
+        opening = ifcopenshell.api.root.create_entity(
+            self._model, ifc_class="IfcOpeningElement", name=name, predefined_type="OPENING"
+        )
+        self._show(opening, [(self._upright(0.0, 0.0, width, height, 0.0, depth), None)])
+        self._place(opening, frame)
+        ifcopenshell.api.feature.add_feature(self._model, feature=opening, element=host)
+        return opening, frame
+
+    def _element(self, ifc_class: str, name: str, kind: str) -> Entity:
+        made = ifcopenshell.api.root.create_entity(
+            self._model, ifc_class=ifc_class, name=name, predefined_type=kind
+        )
+        ifcopenshell.api.spatial.assign_container(
+            self._model, products=[made], relating_structure=self._storey
+        )
+        return made
+
+    def _place(self, product: Entity, frame: NDArray[np.float64]) -> None:
+        placed = _shift(0.0, 0.0, self._storey.Elevation or 0.0) @ frame
+        ifcopenshell.api.geometry.edit_object_placement(self._model, product=product, matrix=placed)
+
+    def _layered(self, product: Entity, layers: str, direction: str) -> None:
+        """The layer set, from the reference line in the positive direction."""
+        ifcopenshell.api.material.assign_material(
+            self._model, products=[product], type="IfcMaterialLayerSetUsage",
+            material=self.palette.layer_set(layers),
+        )  # fmt: skip
+        usage = product.HasAssociations[0].RelatingMaterial
+        usage.LayerSetDirection, usage.DirectionSense = direction, "POSITIVE"
+        usage.OffsetFromReferenceLine = 0.0
+
+    def _constituents(self, product: Entity, parts: dict[str, object]) -> None:
+        constituents = ifcopenshell.api.material.add_material_set(
+            self._model, name=product.Name, set_type="IfcMaterialConstituentSet"
+        )
+        for name, substance in parts.items():
+            ifcopenshell.api.material.add_constituent(
+                self._model, constituent_set=constituents, name=name,
+                material=self.palette.material(substance),
+            )  # fmt: skip
+        ifcopenshell.api.material.assign_material(
+            self._model, products=[product], type="IfcMaterialConstituentSet",
+            material=constituents,
+        )  # fmt: skip
+
+    def _pset(self, product: Entity, name: str, properties: dict[str, object]) -> None:
+        pset = ifcopenshell.api.pset.add_pset(self._model, product=product, name=name)
+        ifcopenshell.api.pset.edit_pset(self._model, pset=pset, properties=properties)
+
+    def _quantities(self, product: Entity, name: str, quantities: dict[str, float]) -> None:
+        qto = ifcopenshell.api.pset.add_qto(self._model, product=product, name=name)
+        ifcopenshell.api.pset.edit_qto(self._model, qto=qto, properties=quantities)
+
+    def _show(self, product: Entity, solids: list[tuple[Entity, str | None]]) -> None:
+        """Give a product its body, each solid with its surface style."""
+        model = self._model
+        body = model.create_entity(
+            "IfcShapeRepresentation", self._body, "Body", "SweptSolid", [s for s, _ in solids]
+        )
+        ifcopenshell.api.geometry.assign_representation(model, product=product, representation=body)
+        for solid, style in solids:
+            if style is not None:
+                ifcopenshell.api.style.assign_item_style(
+                    model, item=solid, style=self.palette.style(style)
+                )
+
+    def _extruded(self, outline: tuple[Point, ...], height: float, z: float = 0.0) -> Entity:
+        """The prism over a horizontal outline, from z upwards."""
+        return self._solid(
+            self._profile(self._polyline(outline)), height, (0.0, 0.0, z), upright=False
+        )
+
+    def _upright(
+        self, x: float, z: float, width: float, height: float, y: float, depth: float
+    ) -> Entity:
+        """The box over an upright rectangle of the x-z plane, from y in the direction of +y."""
+        profile = self._profile(self._polyline(_rectangle(x, z, width, height)))
+        return self._solid(profile, depth, (0.0, y, 0.0), upright=True)
+
+    def _ring(self, width: float, height: float, border: float, depth: float) -> Entity:
+        """A frame of the x-z plane, from y = 0 in the direction of +y."""
+        inner = _rectangle(border, border, width - 2 * border, height - 2 * border)
+        profile = self._model.create_entity(
+            "IfcArbitraryProfileDefWithVoids", "AREA", None,
+            self._polyline(_rectangle(0.0, 0.0, width, height)), [self._polyline(inner)],
+        )  # fmt: skip
+        return self._solid(profile, depth, (0.0, 0.0, 0.0), upright=True)
+
+    def _solid(
+        self, profile: Entity, depth: float, origin: tuple[float, ...], *, upright: bool
+    ) -> Entity:
+        """The profile swept along +z, or, put upright (its y up), along +y."""
+        make = self._model.create_entity
+        axis = (0.0, -1.0, 0.0) if upright else (0.0, 0.0, 1.0)
+        position = make(
+            "IfcAxis2Placement3D",
+            make("IfcCartesianPoint", [float(value) for value in origin]),
+            make("IfcDirection", axis),
+            make("IfcDirection", (1.0, 0.0, 0.0)),
+        )
+        sweep = (0.0, 0.0, -1.0) if upright else (0.0, 0.0, 1.0)
+        return make("IfcExtrudedAreaSolid", profile, position, make("IfcDirection", sweep), depth)
+
+    def _profile(self, curve: Entity) -> Entity:
+        return self._model.create_entity("IfcArbitraryClosedProfileDef", "AREA", None, curve)
+
+    def _polyline(self, outline: tuple[Point, ...]) -> Entity:
+        points = [
+            self._model.create_entity("IfcCartesianPoint", [float(x), float(y)]) for x, y in outline
+        ]
+        return self._model.create_entity("IfcPolyline", [*points, points[0]])
+
+
+def _rectangle(x: float, y: float, width: float, height: float) -> tuple[Point, ...]:
+    return ((x, y), (x + width, y), (x + width, y + height), (x, y + height))
+
+
+def _frame(origin: tuple[float, ...], along: tuple[float, ...]) -> NDArray[np.float64]:
+    """[4, 4] placement with local x along a horizontal direction and z up."""
+    matrix = np.eye(4)
+    matrix[:2, 0] = along
+    matrix[:2, 1] = -along[1], along[0]
+    matrix[:3, 3] = origin
+    return matrix
+
+
+def _shift(x: float, y: float, z: float) -> NDArray[np.float64]:
+    matrix = np.eye(4)
+    matrix[:3, 3] = x, y, z
+    return matrix
+
 
 HEIGHT = 3.0
 DEPTH = 6.0

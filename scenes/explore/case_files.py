@@ -6,6 +6,7 @@ the page loads each of them as a script.
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from collections.abc import Iterator
@@ -13,12 +14,27 @@ from pathlib import Path
 from typing import Any
 
 from mitsuba_cfs.errors import DataError
-from scenes.explore.packing import read_data
+from mitsuba_cfs.files import reason
 
 CASE = "case.js"
+BEFORE, AFTER = "cfs.give(", ");\n"  # of the JSON in a data file, a script
 NAME = re.compile(r"(?:[\w-]+/)*data/[\w-]+", re.ASCII)
 TEXTS, LISTS = ("name", "file"), ("states", "models", "lux")  # of the entry of a room
 PACKED = {"kind", "length", "data"}
+
+
+def read_data(path: Path) -> Any:
+    """The data of a script that calls `cfs.give` (`scenes.explore.folder.write_data`).
+
+    Raises: `DataError` for a file that is none.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        if not (text.startswith(BEFORE) and text.endswith(AFTER)):
+            raise ValueError("is empty" if not text else "another text than one call of cfs.give")
+        return json.loads(text.removeprefix(BEFORE).removesuffix(AFTER))
+    except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
+        raise DataError(f"is no data of an explorer: {reason(error)}", file=path) from None
 
 
 def read_case(folder: Path) -> dict[str, Any]:

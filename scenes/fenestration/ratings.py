@@ -10,9 +10,8 @@ import numpy as np
 
 from mitsuba_cfs.bsdf.spectral_pane import SpectralRating, spectral_rating
 from mitsuba_cfs.errors import DataError
-from scenes.fenestration.layer_sun import sun_in_layers
 from scenes.fenestration.systems import FenestrationSystem, read_system
-from scenes.fenestration.thermal_system import ThermalSystem, checked_system
+from scenes.fenestration.thermal_system import ThermalSystem, checked_system, sun_in_layers
 from thermal.errors import ThermalInputError
 from thermal.ratings import (
     CLASSES,

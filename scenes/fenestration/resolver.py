@@ -13,14 +13,125 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bim.building_file import held_states, is_ifc
+from bim.fenestration import AngularGValue, PlainGlass, ShadingState
 from bim.model import Window
+from mitsuba_cfs.bsdf.angular import roos_table, specular_matrices
+from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.simple_glazing import (
+    HIGH_U,
+    solar_reflectance,
+    solar_transmittance,
+    visible_reflectances,
+)
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.notes import Note
-from scenes.fenestration.systems import FenestrationSystem, States, WindowOverrides
+from scenes.fenestration.systems import FenestrationSystem, States, WindowOverrides, system_of
+from scenes.fenestration.thermal_file import ThermalFile
+from scenes.language.catalogue import N_
+from thermal.gvalue import TYPICAL_SYSTEMS
+
+Held = Mapping[str, tuple[ShadingState, ...]]  # by window, as `read_fenestration` gives them
+
+
+def attached_systems(held: Held, windows: Iterable[Window], path: Path) -> dict[str, States]:
+    """The systems by state of each window that has a BSDF attached, by its GUID.
+
+    The state without a name is the usual one and comes first; the others follow in the file's
+    order.  Windows whose data are the same share their systems.
+
+    Args: path: of the IFC file.
+    """
+    equal: dict[str, list[Window]] = {}
+    for window in windows:
+        states = usual_first(held.get(window.guid, ()))
+        if any(state.bands for state in states):
+            equal.setdefault(digest(*(_content(state) for state in states)), []).append(window)
+    found = {}
+    for group in equal.values():
+        states = usual_first(held[group[0].guid])
+        source = _source([usual_first(held[window.guid])[0] for window in group], path)
+        systems = tuple(_system(state, group[0], path, source) for state in states)
+        found |= {window.guid: systems for window in group}
+    return found
+
+
+def usual_first(states: Iterable[ShadingState]) -> list[ShadingState]:
+    """The states, the one without a name first."""
+    return sorted(states, key=lambda state: state.name != "")
+
+
+def _content(state: ShadingState) -> list:
+    bands = [[name, bsdf] for name, bsdf in sorted(state.bands.items())]
+    thermal = [state.g_value, state.u_value, state.g_normal, state.g_by_patch]
+    beside = None if state.file is None else str(state.file)
+    held = [*thermal, state.closure, state.shading_position, state.angular]
+    return [state.name, bands, *held, beside]
+
+
+def _system(state: ShadingState, window: Window, path: Path, source: str) -> FenestrationSystem:
+    name = state.name or window.type_name or window.name or window.guid
+    if not state.bands:
+        label = f"state {state.name!r} has no BSDF" if state.name else "has no BSDF"
+        raise DataError(label, file=path, element=f"window {window.name or window.guid}")
+    named = "" if state.file is None else f" as {state.file.name}"
+    thermal = held_thermal(state)
+    return system_of(state.bands, name, path=path, source=f"{source}{named}", **thermal)
+
+
+def _source(states: Iterable[ShadingState], path: Path) -> str:
+    """What holds the data of some windows, one state of each."""
+    types = dict.fromkeys(state.of_type for state in states)
+    names = [name or "without a name" for name in types if name is not None]
+    holders = [f"window type {', '.join(names)}"] if names else []
+    holders += ["the window itself"] if None in types else []
+    return f"what is attached to {' and '.join(holders)} in {path.name}"
+
+
+def held_thermal(state: ShadingState) -> dict:
+    """U, g, closure and place of the shade: of the model, else of the file beside the BSDF's."""
+    beside = ThermalFile()
+    if state.file is not None:
+        beside = ThermalFile.read(state.file.with_suffix(".toml"))
+    g_normal, by_patch = state.g_normal, state.g_by_patch
+    if state.g_value is not None:
+        by_patch = g_by_patch(state.g_value)
+    elif g_normal is None and by_patch is None:
+        g_normal, by_patch = beside.g_value, beside.g_value_by_patch
+    return {
+        "u_value": beside.u_value if state.u_value is None else state.u_value,
+        "g_value": g_normal,
+        "g_by_patch": by_patch,
+        "closure": state.closure or beside.closure,
+        "shading_position": state.shading_position or beside.shading_position,
+        "angular": state.angular or beside.angular,
+    }
+
+
+def g_by_patch(table: AngularGValue) -> NDArray[np.float64]:
+    """g [K] at the middles of the Klems full basis' incident patches, linear between the angles.
+
+    Azimuths are those of the basis; outside the polar angles the nearest value holds.
+    """
+    theta, phi = KLEMS_FULL.centres()
+    by_azimuth = np.stack([np.interp(theta, table.polar, column) for column in table.values.T])
+    if len(table.azimuth) == 1:
+        return by_azimuth[0]
+    return np.array(
+        [
+            np.interp(p, table.azimuth, column, period=2 * np.pi)
+            for p, column in zip(phi, by_azimuth.T, strict=True)
+        ]
+    )
+
 
 NAMED = 5  # windows that one sentence names
 
@@ -62,8 +173,6 @@ def held_systems(
         element = f"window {_listed([window.name for window in windows])}" if own else None
         message = f"a box holds no fenestration data: give {overrides.ask}"
         raise DataError(message, element=element, field="box")
-    from scenes.fenestration.attached import attached_systems
-    from scenes.fenestration.stated import stated_systems, stated_values
 
     held = held_states(windows, file)
     found = _with_overrides(attached_systems(held, windows, file), overrides)
@@ -104,8 +213,6 @@ def stated_u_and_g(
     windows: Iterable[Window], file: Path
 ) -> dict[str, tuple[float | None, float | None]]:
     """U and g of each window by GUID as they are attached or stated; None where neither is."""
-    from scenes.fenestration.stated import stated_values
-
     windows = list(windows)
     held = held_states(windows, file)
     values = {w.guid: stated_values(held, w, file, WindowOverrides()) for w in windows}
@@ -175,3 +282,147 @@ def _listed(names: list[str]) -> str:
     left = sum(count for _, count in counts[NAMED:])
     text = ", ".join(shown)
     return Note("{names} and {count} more", names=text, count=left) if left else text
+
+
+PANES = (1, 2, 3)  # that Roos' factor knows
+NO_SHADE = (None, "none")
+
+
+@dataclass(frozen=True, slots=True)
+class StatedValues:
+    """What is known of a glazing at normal incidence."""
+
+    visible: float | None
+    solar: float | None
+    g_value: float | None
+    u_value: float | None  # [W/(m2 K)]
+    panes: int | None
+    shade: bool = False  # there is one, of which no BSDF is known
+    glass: PlainGlass | None = None  # a single pane, whose law of the angle is known
+
+    def missing(self, light_only: bool) -> str:
+        """What is needed and not stated, in words; empty where nothing is missing."""
+        needed = {"no visible transmittance": self.visible is None}
+        known = light_only or self.g_value is not None or self.glass is not None
+        needed["no g"] = not known
+        needed = [name for name, is_missing in needed.items() if is_missing]
+        if self.shade:
+            return "for its shade"
+        return f"and its property sets state {' and '.join(needed)}" if needed else ""
+
+
+def stated_systems(
+    held: Held, windows: Iterable[Window], path: Path, overrides: WindowOverrides
+) -> dict[str, States]:
+    """The glazing of each window of which enough is attached or stated, the same ones shared."""
+    found: dict[str, States] = {}
+    known: dict[StatedValues, States] = {}
+    for window in windows:
+        values = stated_values(held, window, path, overrides)
+        if values.missing(overrides.light_only):
+            continue
+        if values not in known:
+            known[values] = (glazing_system(values, path.name),)
+        found[window.guid] = known[values]
+    return found
+
+
+def stated_values(
+    held: Held, window: Window, path: Path, overrides: WindowOverrides
+) -> StatedValues:
+    """What the user gives goes before what is attached, and that before what is stated."""
+    states = usual_first(held.get(window.guid, ()))
+    thermal = held_thermal(states[0]) if states else {}
+    by_patch = thermal.get("g_by_patch")
+    attached_g = thermal.get("g_value") if by_patch is None else float(by_patch[0])
+    values = StatedValues(
+        window.visible_transmittance,
+        window.solar_transmittance,
+        _first(overrides.g_value, attached_g, window.g_value),
+        _first(overrides.u_value, thermal.get("u_value"), window.u_value),
+        window.panes if window.panes in PANES else None,
+        any(state.shading_position not in NO_SHADE for state in states),
+        window.glass,
+    )
+    for name in ("visible", "solar", "g_value"):
+        value = getattr(values, name)
+        is_black = name == "visible" and value == 0 and values.glass is not None
+        if value is not None and not (0 < value <= 1 or is_black):
+            what = name if name == "g_value" else f"{name} transmittance"
+            message = f"states {value:g} as its {what}: expected more than 0, at most 1"
+            raise DataError(message, file=path, element=f"window {window.name or window.guid}")
+    return values
+
+
+def _first(*values: float | None) -> float | None:
+    return next((value for value in values if value is not None), None)
+
+
+def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
+    """A glazing of known values at normal incidence.
+
+    Light: a single pane whose transmissivity and index are known follows Fresnel's equations, any
+    other glazing falls with the angle after Roos et al. 2001. Sun: what is not stated follows from
+    U and g by the simple window model (`mitsuba_cfs.bsdf.simple_glazing`).
+    """
+    u = TYPICAL_SYSTEMS["none"][0] if values.u_value is None else values.u_value
+    panes = values.panes or (1 if u > HIGH_U else 2)
+    name = "glazing, " + _in_words(values)
+    if values.glass is None:
+        front, back = visible_reflectances(values.visible)
+        clear = Glazing(name, values.visible, front, back, panes)
+        visible, table = specular_klems(clear, KLEMS_FULL), roos_table(clear)
+        template = (
+            N_("{system}: no BSDF; modelled as clear single glazing (Roos et al. 2001).")
+            if panes == 1
+            else N_(
+                "{system}: no BSDF; modelled as clear glazing with {panes} panes (Roos et al. "
+                "2001)."
+            )
+        )
+        notes = [Note(template, system=name, panes=panes)]
+    else:
+        table = values.glass.table
+        visible = specular_matrices(table)
+        count = len(values.glass.panes)
+        notes = [
+            Note(
+                "{system}: uncoated glass by Fresnel's equations, panes: {count}.",
+                system=name,
+                count=count,
+            )
+        ]
+    solar, tau, g = visible, values.solar, values.g_value
+    if g is not None:
+        tau = solar_transmittance(u, g) if tau is None else tau
+        rho = solar_reflectance(u, g, tau)
+        solar = specular_klems(Glazing(name, tau, rho, rho, panes), KLEMS_FULL)
+        if values.solar is None:
+            notes.append(
+                Note(
+                    "{system}: solar transmittance {tau:.2f} from U and g (Arasteh et al. 2009).",
+                    system=name,
+                    tau=tau,
+                )
+            )
+    elif values.glass is not None:
+        notes.append(
+            Note(
+                "{system} has no {band} band; its {other} band is used instead.",
+                system=name,
+                band="Solar",
+                other="Visible",
+            )
+        )
+    return FenestrationSystem(
+        name, visible, solar, u_value=values.u_value, g_value=g, shading_position="none",
+        notes=tuple(notes), source=Note("the values stated in {file}", file=file),
+        angular=table,
+    )  # fmt: skip
+
+
+def _in_words(values: StatedValues) -> str:
+    parts = {"U": values.u_value, "g": values.g_value, "visible transmittance": values.visible}
+    if values.solar is not None:
+        parts["solar transmittance"] = values.solar
+    return ", ".join(f"{name} {value:g}" for name, value in parts.items() if value is not None)

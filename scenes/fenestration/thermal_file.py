@@ -1,22 +1,437 @@
-"""What is known of a fenestration system besides its BSDF, from the `.toml` file beside it."""
+"""Thermal and angular data of a fenestration system, from the `.toml` file beside its BSDF.
+
+    [angular]                    # exact angular transmittance of a specular system
+    table = "glass.csv"          # columns theta_deg, transmittance (, reflectance_front, _back)
+
+    [angular.roos]               # or a whole glazing unit after Roos et al. 2001
+    transmittance = 0.70
+    reflectance_front = 0.12
+    reflectance_back = 0.13
+    panes = 2
+    category = 4
+
+    [[angular.pane]]             # or its panes, the outer one first
+    product = "coated.json"      # of the IGSDB; or transmittance, reflectance_front, _back, coated
+    flipped = true
+
+    [angular]
+    glazing = "system.json"      # or a glazing system with its `layers`
+
+Paths are relative to the TOML file.  The angular function is for the visible band.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
-from mitsuba_cfs.bsdf.angular import AngularTable
-from mitsuba_cfs.bsdf.spectral_pane import SpectralPane
+from mitsuba_cfs.bsdf.angular import AngularTable, roos_table, stack_table
+from mitsuba_cfs.bsdf.glazing import Glazing, Pane
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.bsdf.pane_file import read_glazing_layers, read_pane_file
+from mitsuba_cfs.bsdf.spectral_pane import (
+    SpectralPane,
+    read_spectral_pane,
+    spectral_glazing,
+)
 from mitsuba_cfs.errors import DataError
-from scenes.fenestration.angular_file import AngularData
-from scenes.fenestration.layer_tables import spectral_panes
-from scenes.fenestration.tables import ByPatch, WindowHeatTable
-from scenes.toml_file import Share, read_table, validated
-from thermal.closure import Closure
+from mitsuba_cfs.files import reason
+from scenes import plausible
+from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
+from thermal.closure import U_MODELS, Closure
 from thermal.errors import ThermalInputError
+from thermal.gases import GAS_NAMES
+from thermal.glazing import GASES, Gap
+from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
+from thermal.gvalue import TYPICAL_SYSTEMS
+from thermal.shade_layers import perforated_layer, sheet_layer, venetian_layer, woven_layer
+
+ANGULAR_COLUMNS = ("theta_deg", "transmittance")
+ANGULAR_OPTIONAL = ("reflectance_front", "reflectance_back")
+SCATTERED_LIMIT = 0.05  # share of what a specular system passes that may be scattered
+DIFFUSE_TOLERANCE = 0.05  # that function and BSDF may pass more or less of diffuse light
+Film = Annotated[Positive, plausible.RESISTANCE]  # [m2 K/W]
+PATCHES = KLEMS_FULL.size
+ByPatch = Annotated[tuple[float, ...], Field(min_length=PATCHES, max_length=PATCHES)]
+Table = TypeVar("Table", bound="ClosureTable")
+# the model of U that a key belongs to
+OF_MODEL = {"gap": "gap", "surface": "surface", "layers": "layers", "u_slope": "linear"}
+SHADES = ("slats", "threads", "holes", "openness")  # what makes a layer a shade
+
+
+class PaneTable(TomlTable):
+    """A pane: a product of the IGSDB, or its values at normal incidence."""
+
+    product: Path | None = None
+    flipped: bool = False  # the product's front is towards the room
+    transmittance: Share | None = None
+    reflectance_front: Share | None = None
+    reflectance_back: Share | None = None
+    coated: bool = False
+
+    @model_validator(mode="after")
+    def _has_values(self) -> PaneTable:
+        if (self.product is None) == (self.transmittance is None):
+            raise ValueError("expected either product or transmittance")
+        if self.product is None and self.reflectance_front is None:
+            raise ValueError("transmittance needs reflectance_front")
+        return self
+
+    def pane(self, folder: Path) -> Pane:
+        """The pane as the formulas take it; `ValueError` where its values cannot be."""
+        if self.product is not None:
+            return replace(
+                read_pane_file(folder / self.product), turned=self.flipped
+            ).visible_pane()
+        front, back = self.reflectance_front, self.reflectance_back
+        back = front if back is None else back
+        sides = (back, front) if self.flipped else (front, back)
+        return Pane("pane", self.transmittance, *sides, self.coated or front != back)
+
+
+class RoosTable(TomlTable):
+    """A glazing unit by its values at normal incidence, after Roos."""
+
+    transmittance: Share
+    reflectance_front: Share
+    reflectance_back: Share
+    panes: Annotated[int, Field(ge=1, le=3)] = 2
+    category: Annotated[float, Field(ge=1, le=10)] = 4.0
+
+
+class AngularData(TomlTable):
+    """What is known of a specular system at every angle; one of the four."""
+
+    table: Path | None = None
+    roos: RoosTable | None = None
+    pane: tuple[PaneTable, ...] = ()
+    glazing: Path | None = None
+
+    @model_validator(mode="after")
+    def _is_one(self) -> AngularData:
+        if len(self.model_fields_set) != 1 or not any(
+            (self.table, self.roos, self.pane, self.glazing)
+        ):
+            raise ValueError("expected one of table, roos, pane and glazing")
+        return self
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that it names, as they stand there."""
+        named = (self.table, self.glazing, *(one.product for one in self.pane))
+        return tuple(file for file in named if file is not None)
+
+    def read(self, path: Path) -> AngularTable:
+        """The function of the file `path`; `DataError` where it cannot be."""
+        folder = path.parent
+        if self.table is not None:
+            return read_angular_table(folder / self.table)
+        try:
+            if self.roos is not None:
+                return roos_table(Glazing("glazing", **self.roos.model_dump()))
+            if self.glazing is not None:
+                layers = read_glazing_layers(folder / self.glazing)
+                return stack_table([layer.visible_pane() for layer in layers])
+            return stack_table([one.pane(folder) for one in self.pane])
+        except DataError:
+            raise
+        except ValueError as error:
+            raise DataError(str(error), file=path, field="angular") from error
+
+
+def read_angular_table(path: Path) -> AngularTable:
+    """A CSV file of `ANGULAR_COLUMNS`, and of `ANGULAR_OPTIONAL` those that are known."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            rows = list(csv.DictReader(line for line in stream if line.strip()))
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
+    if not rows or not set(ANGULAR_COLUMNS) <= set(rows[0]):
+        raise DataError(f"expected the columns {', '.join(ANGULAR_COLUMNS)}", file=path)
+    names = [*ANGULAR_COLUMNS, *(name for name in ANGULAR_OPTIONAL if name in rows[0])]
+    values: dict[str, list[float]] = {name: [] for name in names}
+    for number, row in enumerate(rows, start=2):
+        for name in names:
+            try:
+                values[name].append(float(row[name]))
+            except (TypeError, ValueError):
+                message = f"{row[name]!r} is not a number"
+                raise DataError(message, file=path, element=f"line {number}", field=name) from None
+    columns = {name: np.array(column) for name, column in values.items()}
+    try:
+        return AngularTable(np.radians(columns.pop("theta_deg")), **columns)
+    except ValueError as error:
+        raise DataError(str(error), file=path) from error
+
+
+def check_specular(klems: KlemsBsdf, angular: AngularTable | None, path: Path) -> None:
+    """`DataError` where the BSDF is not that of a specular system with this function."""
+    if angular is None:
+        return
+    omega = klems.basis_in.projected_solid_angles()
+    peak = through_peak(klems.filled().transmission_front, klems.basis_in)
+    beam, rest = omega @ peak.transmittance / np.pi, omega @ peak.scattered @ omega / np.pi
+    if rest > SCATTERED_LIMIT * (beam + rest):
+        share = 100 * rest / (beam + rest)
+        message = f"the BSDF scatters {share:.0f} % of what it passes: no function of an angle"
+        raise DataError(message, file=path, field="angular")
+    means = float(omega @ angular.patch_means(klems.basis_in) / np.pi)
+    if abs(means - beam) > DIFFUSE_TOLERANCE:
+        message = f"passes {means:.2f} of diffuse light, the BSDF {beam:.2f}: not the same system"
+        raise DataError(message, file=path, field="angular")
+
+
+Length = Annotated[Positive, plausible.LAYER]
+Both = tuple[Share, Share]  # front (outdoors) and back
+
+
+class LayerGapTable(TomlTable):
+    """The space behind a layer, towards the room."""
+
+    width: Annotated[Positive, plausible.GAP]  # [m]
+    gas: dict[Literal[GAS_NAMES], Share] = Field({"air": 1.0})  # volume fractions
+
+
+class SlatTable(TomlTable):
+    """The slats of a venetian blind."""
+
+    width: Length
+    spacing: Length
+    tilt_deg: Annotated[float, Field(ge=-90, le=90)] = 0.0  # positive lowers the outer edge
+    thickness: Length = 0.0005
+
+
+class CellTable(TomlTable):
+    """Threads of a fabric or round holes of a screen: their diameter and spacing."""
+
+    diameter: Length
+    spacing: Length
+
+
+class GlazingLayerTable(TomlTable):
+    """A pane, from a file by wavelength or by its values; or a shade."""
+
+    pane: Path | None = None  # Optics or IGSDB file
+    turned: bool = False  # the pane's back is outdoors
+    thickness: Length | None = None  # [m]
+    conductivity: Annotated[float, plausible.CONDUCTIVITY] | None = None  # [W/(m K)]
+    emissivity: Both | None = None  # of a shade: of its material
+    infrared_transmittance: Share | None = None
+    solar: tuple[Share, Share, Share] | None = None  # transmittance, reflectance front and back
+    visible: tuple[Share, Share, Share] | None = None  # the same; without: as the sun's
+    slats: SlatTable | None = None
+    threads: CellTable | None = None
+    holes: CellTable | None = None
+    openness: Share | None = None  # open share of a shade of no known cell
+    edges: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)  # [m] top, bottom, left, right
+    gap: LayerGapTable | None = None  # none behind the innermost layer
+
+    @model_validator(mode="after")
+    def _is_one_kind(self) -> GlazingLayerTable:
+        kinds = [name for name in ("pane", *SHADES) if getattr(self, name) is not None]
+        if len(kinds) > 1:
+            raise ValueError(f"{kinds[0]} and {kinds[1]} exclude each other")
+        shade = self.is_shade
+        if not kinds and self.thickness is None:
+            raise ValueError("expected a pane (a file, or its thickness) or one of " + _listed())
+        for key in ("solar", "visible") if shade else ():
+            if getattr(self, key) is not None:
+                raise ValueError(f"{key}: is of panes; what a shade absorbs follows from the BSDF")
+        if not shade and any(self.edges):
+            raise ValueError("edges: are of shades: " + _listed())
+        return self
+
+    @property
+    def is_shade(self) -> bool:
+        """Whether the layer is no pane."""
+        return any(getattr(self, name) is not None for name in SHADES)
+
+    def layer(self) -> GlazingLayer:
+        """The layer; `DataError` for a pane's file that cannot be read."""
+        stated = {"conductivity": self.conductivity, "emissivity": self.emissivity}
+        given = {name: value for name, value in stated.items() if value is not None}
+        if self.slats is not None:
+            s = self.slats
+            return venetian_layer(
+                s.width, s.spacing, s.tilt_deg,
+                slat_thickness=s.thickness, edges=self.edges, **given,
+            )  # fmt: skip
+        if self.thickness is not None:
+            given["thickness"] = self.thickness
+        if self.pane is not None:
+            return self._of_file()
+        if self.infrared_transmittance is not None and self.openness is None:
+            given["infrared_transmittance"] = self.infrared_transmittance
+        if self.threads is not None:
+            return woven_layer(
+                self.threads.diameter, self.threads.spacing, edges=self.edges, **given
+            )
+        if self.holes is not None:
+            return perforated_layer(
+                self.holes.diameter, self.holes.spacing, edges=self.edges, **given
+            )
+        if self.openness is not None:
+            passed = self.infrared_transmittance
+            return sheet_layer(
+                self.openness, edges=self.edges, infrared_transmittance=passed, **given
+            )
+        return GlazingLayer(solar=self.solar, **given)
+
+    def spectral(self) -> SpectralPane:
+        """The pane of the file, as it is turned."""
+        pane = read_spectral_pane(self.pane, thickness=self.thickness)
+        return pane.turned() if self.turned else pane
+
+    def _of_file(self) -> GlazingLayer:
+        pane = self.spectral()
+        sun = spectral_glazing([pane])["Solar"]
+        values = (sun.transmittance, sun.reflectance_front, sun.reflectance_back)
+        return GlazingLayer(
+            self.thickness or pane.thickness,
+            self.conductivity or pane.conductivity,
+            self.emissivity or pane.emissivity,
+            pane.infrared_transmittance,
+            solar=self.solar or tuple(float(v[0]) for v in values),
+        )
+
+
+def spectral_panes(layers: Sequence[GlazingLayerTable]) -> tuple[SpectralPane, ...]:
+    """The panes of layers that all come from files of spectra; none where one does not."""
+    if any(layer.pane is None for layer in layers):
+        return ()
+    return tuple(layer.spectral() for layer in layers)
+
+
+def _listed() -> str:
+    return ", ".join(SHADES)
+
+
+def glazing_unit(
+    layers: tuple[GlazingLayerTable, ...], height: float, tilt_deg: float
+) -> GlazingUnit:
+    """The unit of layers from outside to inside; `ThermalInputError` where they are none."""
+    gaps = tuple(
+        GasGap(one.gap.width, tuple(one.gap.gas.items())) for one in layers if one.gap is not None
+    )
+    return GlazingUnit(tuple(one.layer() for one in layers), gaps, height, 1.0, tilt_deg)
+
+
+class GapTable(TomlTable):
+    """The gas gap of a double glazing, for `u_model = "gap"`."""
+
+    width: Annotated[Positive, plausible.GAP]  # [m]
+    gas: dict[Literal[tuple(GASES)], Share] = Field({"argon": 0.9, "air": 0.1})
+    emissivity: tuple[Share, Share] = (0.837, 0.03)  # of the two faces that bound it
+
+
+class ClosureTable(TomlTable):
+    """How a system's thermal model is closed: in a study, and beside a BSDF file."""
+
+    u_model: Literal[U_MODELS] | None = None  # None: what the other keys are of, else "constant"
+    gap: GapTable | None = None
+    u_slope: Annotated[float, Field(ge=-0.05, le=0.05)] | None = None  # of U for "linear" [1/K]
+    # 1/R = c0 + c1 x + c2 d + c3 d2 + c4 x d + c5 x2, see thermal.blackbox.LayerResistance
+    surface: Annotated[tuple[float, ...], Field(min_length=6, max_length=6)] | None = None
+    layers: tuple[GlazingLayerTable, ...] = ()  # outermost first: ISO 15099
+    glazing_height: Annotated[Positive, plausible.LENGTH] = 1.5  # [m] of the layers
+    glazing_tilt_deg: Annotated[float, Field(ge=0, le=180)] = 90.0  # from horizontal
+    realised_inner_resistance: Film | None = None  # [m2 K/W], see thermal.blackbox
+    realised_outer_resistance: Film | None = None
+
+    @model_validator(mode="after")
+    def _fits_its_model(self) -> ClosureTable:
+        stated = [key for key in OF_MODEL if getattr(self, key)]
+        models = {OF_MODEL[key] for key in stated}
+        if len(models) > 1:
+            raise ValueError(f"{stated[0]} and {stated[1]} exclude each other")
+        model = self.u_model
+        if model in ("gap", "surface", "layers") and model not in models:
+            raise ValueError(f'u_model "{model}" and {model} belong together')
+        if model is not None and models and models != {model}:
+            raise ValueError(f'{stated[0]}: belongs to u_model "{OF_MODEL[stated[0]]}"')
+        films = (self.realised_inner_resistance, self.realised_outer_resistance)
+        if "layers" in models and films != (None, None):
+            raise ValueError("layers: give the realised films, which are not to be stated too")
+        return self
+
+    def placed(self: Table, folder: Path) -> Table:
+        """The table with the files of its panes in a folder."""
+        layers = tuple(
+            one if one.pane is None else one.model_copy(update={"pane": folder / one.pane})
+            for one in self.layers
+        )
+        return self.model_copy(update={"layers": layers})
+
+    def closure(self) -> Closure | None:
+        """What the table states; None where it states nothing."""
+        if not self.model_fields_set & set(ClosureTable.model_fields):
+            return None
+        gap, unit = self.gap, None
+        if gap is not None:
+            gap = Gap(gap.width, tuple(gap.gas.items()), gap.emissivity)
+        if self.layers:
+            unit = glazing_unit(self.layers, self.glazing_height, self.glazing_tilt_deg)
+        stated = [OF_MODEL[key] for key in OF_MODEL if getattr(self, key)]
+        more = {} if self.u_slope is None else {"slope": self.u_slope}
+        return Closure(
+            self.u_model or (stated or ["constant"])[0], gap, self.realised_inner_resistance,
+            self.realised_outer_resistance, surface=self.surface, unit=unit, **more,
+        )  # fmt: skip
+
+
+class WindowHeatTable(ClosureTable):
+    """What else is known of a system: in a study, and beside a BSDF file."""
+
+    u_value: Annotated[float, Field(ge=0.1, le=7)] | None = None  # [W/(m2 K)]
+    g_value: Share | None = None  # at normal incidence
+    g_value_by_angle: tuple[tuple[float, Share], ...] = ()  # angle of incidence [degrees] and g
+    g_value_by_patch: ByPatch | None = None  # for each incident patch of the Klems full basis
+    shading_position: Literal[tuple(TYPICAL_SYSTEMS)] | None = None  # of the shade
+
+    @model_validator(mode="after")
+    def _has_one_g(self) -> WindowHeatTable:
+        keys = ("g_value_by_angle", "g_value_by_patch")
+        if all(getattr(self, key) for key in keys):
+            raise ValueError(f"{keys[0]} and {keys[1]} exclude each other")
+        angles = [angle for angle, _ in self.g_value_by_angle]
+        if angles and (angles != sorted(set(angles)) or angles[0] < 0 or angles[-1] > 90):
+            raise ValueError("g_value_by_angle: expected rising angles from 0 to 90 degrees")
+        return self
+
+    def g_by_patch(self) -> NDArray[np.float64] | None:
+        """g [K] of the Klems full patches where it is stated by patch or by angle."""
+        if self.g_value_by_patch is not None:
+            return np.array(self.g_value_by_patch)
+        if not self.g_value_by_angle:
+            return None
+        angles, values = np.array(self.g_value_by_angle, dtype=float).T
+        return np.interp(KLEMS_FULL.centres()[0], np.radians(angles), values)
+
+
+class StateTable(WindowHeatTable):
+    """One shading state: a BSDF file, or `layers` of panes alone, and what else was measured."""
+
+    bsdf: Path | None = None
+
+    @model_validator(mode="after")
+    def _has_optics(self) -> StateTable:
+        if self.bsdf is None and not self.layers:
+            raise ValueError("bsdf: is missing; only panes, as `layers`, go without one")
+        for number, layer in enumerate(self.layers if self.bsdf is None else ()):
+            if layer.is_shade:
+                raise ValueError(f"layers.{number}: a shade's light needs a `bsdf` of the system")
+            if layer.pane is None and layer.solar is None:
+                message = "its transmittance and reflectances are missing, and there is no `bsdf`"
+                raise ValueError(f"layers.{number}.solar: {message}")
+        return self
 
 
 class ThermalTable(WindowHeatTable):

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.bsdf.glazing import Pane
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
+from mitsuba_cfs.bsdf.pane_stack import absorbed_by_layers
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.notes import Note
-from scenes.fenestration.layer_sun import sun_in_layers
 from scenes.fenestration.systems import FenestrationSystem
 from thermal.blackbox import (
     Fenestration,
@@ -20,9 +21,39 @@ from thermal.blackbox import (
 )
 from thermal.closure import Closure
 from thermal.errors import ThermalInputError, require
+from thermal.glazing_unit import GlazingUnit
 from thermal.gvalue import thermal_data
 from thermal.layered import layered_thermal_data
 from thermal.notes import ThermalNote
+
+
+def sun_in_layers(
+    unit: GlazingUnit, transmittance: ArrayLike, reflectance: ArrayLike, incidence: ArrayLike
+) -> NDArray[np.float64]:
+    """Solar absorptance of every layer [K, N], see `pane_stack.absorbed_by_layers`.
+
+    A pane is coated where its sides differ.
+
+    Args:
+        transmittance, reflectance: [K] of the whole system, direction to hemisphere, solar.
+        incidence: [K] [rad].
+
+    Raises: `ThermalInputError` where a pane's solar values are missing or two layers are shades.
+    """
+    shades = sum(layer.openings is not None for layer in unit.layers)
+    require(shades <= 1, "layers", "expected at most one shade")
+    panes: list[Pane | None] = []
+    for number, layer in enumerate(unit.layers, start=1):
+        item = f"layers: layer {number}"
+        if layer.openings is not None:
+            panes.append(None)
+            continue
+        message = "its solar transmittance and reflectances are missing"
+        require(layer.solar is not None, item, message)
+        tau, front, back = layer.solar
+        panes.append(Pane(item, tau, front, back, coated=front != back))
+    return absorbed_by_layers(panes, transmittance, reflectance, incidence)
+
 
 SHADE_SCATTERS = 0.5  # share of the light beyond which a BSDF is that of a shade
 

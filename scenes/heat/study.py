@@ -28,13 +28,11 @@ from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import comfort_summary, hourly_table, year_summary
 from scenes.inputs import Inputs, every_state, inputs_of
 from scenes.room.heat import felt_by, room_humidity
-from scenes.room.inputs import room_inputs
+from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.leaks import leak_issues
 from scenes.room.light import visible_scene
-from scenes.room.operation import stated_note, with_stated_uses
-from scenes.room.operation_hours import OperationHours, check_schedules
+from scenes.room.operation import OperationHours, check_schedules, stated_note, with_stated_uses
 from scenes.room.room import operated_zone
-from scenes.room.skies import skies_for
 from scenes.room.zone import RoomZone, balances, coupled
 from thermal.balance import ZoneResult
 from thermal.moisture import Humidity

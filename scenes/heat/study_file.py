@@ -14,16 +14,24 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import ROUGHEST
 from mitsuba_cfs.methods import METHODS
 from scenes import plausible
-from scenes.fenestration.tables import StateTable
+from scenes.fenestration.thermal_file import StateTable
 from scenes.heat.measured_weather import MeasuredTable
 from scenes.input_options import InputOptions
 from scenes.quick import HEAT, picks
-from scenes.read_table import OutdoorTable, ReadTable, read_options
 from scenes.room.operation import schedules_there
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.schedules import OrSchedule, unknown_name
-from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
+from scenes.toml_file import (
+    OutdoorTable,
+    Positive,
+    ReadTable,
+    Share,
+    TomlTable,
+    read_options,
+    read_table,
+    validated,
+)
 
 Part = Literal[BOX_PARTS]  # a side of the box, or all its faces of a kind
 Length = Annotated[Positive, plausible.LENGTH]  # [m]

@@ -11,9 +11,9 @@ from scenes.figures.scale import ColourScale, round_limits
 from scenes.language.catalogue import N_, gettext
 from scenes.language.numbers import percent, rounded
 from scenes.report.headline import occupied
-from scenes.report.month_chart import month_chart
 from scenes.report.names import quantity
 from scenes.report.tables import monthly_gains
+from scenes.report.thermal_figures import month_chart
 from scenes.results import RoomYear, RunResult
 
 STATE_COLOURS = ("#f0e7c8", "#c9b458", "#8f9d3d", "#4f7f4f", "#2c5f66", "#23395b")

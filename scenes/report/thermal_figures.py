@@ -11,9 +11,8 @@ from scenes.figures.carpet import carpet, class_carpet
 from scenes.figures.chart import Chart, ChartMark, Readout, box, line
 from scenes.figures.scale import ColourScale, Tick, axis_ticks, round_limits
 from scenes.language.catalogue import gettext
-from scenes.language.numbers import day_and_month, percent, rounded, short_month
+from scenes.language.numbers import day_and_month, month_name, percent, rounded, short_month
 from scenes.report.headline import WARM_C, applicable, comfort_columns, heated, occupied
-from scenes.report.month_chart import month_chart
 from scenes.report.names import quantity
 from scenes.report.tables import step_hours
 from scenes.results import RoomYear, RunResult
@@ -221,4 +220,36 @@ def gains_chart(monthly: pd.DataFrame) -> Chart | None:
             "Solar radiation incident on the glass, transmitted into the room, and absorbed in the "
             "window (a part of it reaches the room as heat)."
         ),
+    )
+
+
+def month_chart(
+    monthly: pd.DataFrame,
+    names: Sequence[str],
+    marks: Sequence[ChartMark],
+    top: float,
+    *,
+    title: str,
+    explanation: str,
+) -> Chart:
+    """Marks over months, from 0 to a top [kWh].
+
+    Args: names: columns of `monthly` [kWh] that are told under the pointer.
+    """
+    ticks = tuple(
+        Tick(100 * (i + 0.5) / len(monthly), name[0], name[1:], False)
+        for i, name in enumerate(short_month(m.month) for m in monthly.index)
+    )
+    rows = tuple(
+        (quantity(n).label, tuple(f"{rounded(v, 0)} kWh" for v in monthly[n])) for n in names
+    )
+    return Chart(
+        title,
+        explanation,
+        gettext("Month"),
+        gettext("Energy [kWh]"),
+        ticks,
+        axis_ticks(0.0, top),
+        tuple(marks),
+        readout=Readout(tuple(month_name(m.month) for m in monthly.index), rows),
     )

@@ -30,7 +30,7 @@ from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.scattering import AngularScattering
-from scenes.fenestration.stated import StatedValues, glazing_system
+from scenes.fenestration.resolver import StatedValues, glazing_system
 from scenes.fenestration.systems import States
 from scenes.room.windows import room_windows
 

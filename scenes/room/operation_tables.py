@@ -14,7 +14,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.heat_island import in_city
 from mitsuba_cfs.sky.weather import Weather
 from scenes import plausible
-from scenes.fenestration.tables import StateTable
+from scenes.fenestration.thermal_file import StateTable
 from scenes.room.schedules import (
     CLOCK,
     CalendarTable,

@@ -30,27 +30,41 @@ from numpy.typing import NDArray
 
 from bim.model import Building, Space
 from mitsuba_cfs import variants
+from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.methods.light import eye_illuminance, illuminance, with_pictures, with_view
+from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
+from mitsuba_cfs.picture_year.year import picture_year
+from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.trace.kernels.scattering import through_beams
 from scenes.fenestration.systems import States
-from scenes.results import GlareResults, RoomYear
-from scenes.room.control import control_signal, shading_state
+from scenes.results import ExploredRoom, GlareResults, RoomYear
 from scenes.room.daylight import room_daylight
-from scenes.room.explorer import explored_room
-from scenes.room.glare import annual_glare, coloured, rated_hours, rating_of, room_glare
+from scenes.room.glare import (
+    annual_glare,
+    coloured,
+    glare_by_state,
+    rated_hours,
+    rating_of,
+    room_glare,
+)
 from scenes.room.heat import DaylitRoom, heat_alone
 from scenes.room.inner_glass import borrowed_share
 from scenes.room.inputs import FileSensors, RoomInputs, room_inputs
 from scenes.room.leaks import leak_issues
-from scenes.room.light import room_light
-from scenes.room.operation import Operation
+from scenes.room.light import RoomLight, room_light
+from scenes.room.operation import Operation, OperationHours
+from scenes.room.operation_tables import ControlTable, OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
-from scenes.room.solar import seasonal_outdoors
+from scenes.room.solar import SeasonalOutdoors, seasonal_outdoors, window_irradiance
 from scenes.room.zone import RoomZone, reads_work_plane, room_zone, zone_surfaces
+from thermal.control import always, by_cut_off, by_glare, by_irradiance
 
 
 class RoomChoices(TypedDict, total=False):
@@ -221,3 +235,137 @@ def operated_zone(room: RoomInputs, *, progress: Progress = silent) -> RoomZone:
     if light is not None:
         daylight = room_daylight(room, light, state, progress=progress)
     return room_zone(room, surfaces, outdoors, state, daylight, progress=progress)
+
+
+FloatArray = NDArray[np.float64]
+
+
+def control_signal(room: RoomInputs) -> str:
+    """The computed quantity that the shading rule of a room reads; "": none.
+
+    "irradiance" of the windows, "eye": illuminance at the eye, "dgp" of every hour.
+    """
+    if room.operation is None or not room.space.windows:
+        return ""
+    return signal_of(room.operation.control)
+
+
+def signal_of(control: ControlTable) -> str:
+    """The computed quantity that a rule reads; "": none."""
+    if control.rule == "irradiance":
+        return "irradiance"
+    if control.rule == "glare":
+        return "eye" if control.limit_dgp is None else "dgp"
+    return ""
+
+
+def shading_state(
+    room: RoomInputs,
+    light: RoomLight | None = None,
+    outdoors: SeasonalOutdoors | None = None,
+    *,
+    progress: Progress = silent,
+) -> NDArray[np.int64]:
+    """The shading state of every hour [H], the same in all windows of the room.
+
+    Args: light: for the signals "eye" and "dgp"; outdoors: for the signal "irradiance".
+    """
+    if room.operation is None or not room.space.windows:
+        return np.zeros(room.skies.hours, dtype=np.int64)
+    signal, values = control_signal(room), None
+    if signal == "irradiance":
+        values = window_irradiance(outdoors, room.skies)
+    elif signal == "eye":
+        values = room.skies.whole_year(light.eye())
+    elif signal == "dgp":
+        values = glare_by_state(light.light, rating_of(room.options.outputs), progress)
+    return states_by_rule(room.operation, room.space, room.weather, room.windows.states, values)
+
+
+def states_by_rule(
+    operation: OperationTables,
+    space: Space,
+    weather: Weather,
+    states: int,
+    signal: FloatArray | None = None,
+) -> NDArray[np.int64]:
+    """The state of every hour [H] by the rule of an operation.
+
+    Args:
+        states: number of states, from open to closed.
+        signal: `signal_of` the rule: irradiance of the window groups [H, G] [W/m2] (the brightest
+            counts), illuminance at the eye [J, H] [lx] or DGP [J, H] in each state.
+    """
+    control = operation.control
+    if control.rule == "schedule":
+        return OperationHours(operation, weather).states(states)
+    if control.rule == "irradiance":
+        closed = control.state or states - 1
+        brightest = signal.max(axis=1)
+        return by_irradiance(brightest, control.close_above, control.open_below, closed=closed)
+    if control.rule == "glare":
+        limit = control.limit_lx if control.limit_dgp is None else control.limit_dgp
+        return by_glare(signal, limit)
+    if control.rule == "cut-off":
+        local = sun_directions(weather) @ window_frame(space.windows[0].normal).T
+        beam = weather.direct_normal * np.maximum(local[:, 2], 0.0)
+        tilts = np.radians(control.slat_tilts_deg)
+        return by_cut_off(local, beam, tilts, control.slat_width, control.slat_spacing)
+    return always(control.state, len(weather.times))
+
+
+LARGEST = 400  # pixels of a side of its pictures
+
+
+def explored_room(
+    room: RoomInputs,
+    room_light: RoomLight,
+    state: NDArray[np.int64],
+    *,
+    sensors: int,
+    progress: Progress = silent,
+) -> ExploredRoom:
+    """Pictures, illuminances and the sun's beam of all lit hours in all states.
+
+    The outdoors must be the same all year.
+
+    Args:
+        state: [H] of the shading in each hour.
+        sensors: number of sensors of the work plane, the first of the scene's.
+    """
+    light, scene, sky = room_light.light, room_light.scene, room.skies
+    progress = part(progress, 0.0, 1.0, "explorer")
+    names = [system.name for system in max(room.windows.systems, key=len)]
+    L, J = len(sky.lit), light.states
+    small, pictures, through = _small(light, progress), [], []
+    hours, ones = np.arange(L), np.ones(L, dtype=np.int64)
+    for j in range(J):
+        of_groups = [min(j, len(states) - 1) for states in light.systems]
+        steps = part(progress, j / J, (j + 1) / J)
+        made = pictures_in_state(small, hours, of_groups)
+        pictures.append(picture_year(made, seed=light.sampling.seed, progress=steps))
+        optics = [states[k] for states, k in zip(light.systems, of_groups, strict=True)]
+        scattering = [one.scattering for one in optics]
+        through.append(through_beams(scene.groups, scattering, sky.direction))
+    triangles = [np.concatenate([w.triangles for w in g.windows]) for g in scene.groups]
+    return ExploredRoom(
+        tuple(names[:J]),
+        state,
+        sky.lit,
+        tuple(pictures),
+        tuple(illuminance(light, j * ones)[:sensors].astype(np.float32) for j in range(J)),
+        np.stack([eye_illuminance(light, j * ones) for j in range(J)]).astype(np.float32),
+        np.stack(through).astype(np.float32),
+        np.maximum(sky.illuminance, 0).astype(np.float32),
+        tuple(triangles),
+    )
+
+
+def _small(light: PhaseLight, progress: Progress) -> PhaseLight:
+    """The light of the same hours for pictures of at most `LARGEST` pixels a side."""
+    view = light.scene.eye
+    if max(view.width, view.height) <= LARGEST:
+        return with_pictures(light, progress=progress)
+    share = LARGEST / max(view.width, view.height)
+    size = {"width": round(view.width * share), "height": round(view.height * share)}
+    return with_pictures(with_view(light, replace(view, **size)), progress=progress)

@@ -2,25 +2,246 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from functools import lru_cache, partial
 from importlib import metadata
 from pathlib import Path
 
-from bim.report.issue import issue_note
+from bim.model import Space
+from bim.report.issue import Issue, issue_note
+from bim.sensors import model_grids
+from bim.templates import same_hues
+from bim.to_thermal import same_surfaces, shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
+from mitsuba_cfs.source_code import code_version
+from mitsuba_cfs.stored_arrays import PassedArrays, StoredArrays
 from scenes.head import Head
 from scenes.input_files import InputFiles, sha256
 from scenes.inputs import Inputs, read_inputs
+from scenes.language.catalogue import N_
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
-from scenes.room.skies import skies_for
+from scenes.room.heat import DaylitRoom, coupled_years
+from scenes.room.inner_glass import source_rooms
+from scenes.room.inputs import skies_for
+from scenes.room.operation_tables import OperationTables
+from scenes.room.room import RoomChoices, compute_room, lit_room
+from scenes.room.series import RoomSeries, moved_light, moved_result
 from scenes.run.options import JobOptions
-from scenes.run.rooms import OnLight, OnRoom, Workers, computed_rooms
+from scenes.workers import Tasks
+
+OnLight = Callable[[DaylitRoom], None]  # called with the light of each room, before its heat
+OnRoom = Callable[[RoomYear], None]  # called with each room as soon as it is computed
+
+
+@dataclass(frozen=True, slots=True)
+class Workers:
+    """Processes or cluster that compute the rooms of a run in parallel."""
+
+    processes: int = 1  # on this machine, a room each
+    scheduler: str | None = None  # address of a Dask scheduler; its workers replace the processes
+
+
+def computed_rooms(
+    inputs: Inputs,
+    skies: AnnualSky,
+    options: JobOptions,
+    progress: Progress,
+    *,
+    on_room: OnRoom | None = None,
+    on_light: OnLight | None = None,
+    workers: Workers | None = None,
+) -> tuple[Sequence[RoomYear], list[Issue], list[str]]:
+    """The years of the rooms in their order, issues of rooms left out, notes.
+
+    Rooms that exchange heat are balanced together, after the light of all of them.
+    """
+    coupled = balanced_together(inputs, options)
+    work = RoomWork(inputs, run_spaces(inputs, options), skies, options, with_heat=not coupled)
+    store = StoredArrays() if len(work.spaces) > 1 else None
+    series = RoomSeries(
+        inputs.building,
+        work.spaces,
+        inputs.systems,
+        options.room.sampling,
+        MatrixCache.of_user() if options.cache else None,
+        work,
+        moved_light if coupled else moved_result,
+        options.building,
+        partial(_interchangeable, inputs, options),
+        on_room=(on_light if coupled else on_room) or _ignore,
+        shared=N_("daylight, glare and solar gains") if coupled else N_("results"),
+        parallel=None if workers is None else partial(work.parallel, workers=workers),
+        stored=_unchanged if store is None else store.stored,
+    )
+    results, issues, notes = series.results(progress)
+    if not coupled:
+        return _read_back(results, store), issues, notes
+    years: list[RoomYear] = []
+    if results:
+        tables = OperationTables() if inputs.operation is None else inputs.operation.tables
+        years, note = coupled_years(
+            results, inputs.weather, options.room.heat_step_s, tables, progress, store=store
+        )
+        variants.return_memory()
+        notes += [note] if len(years) > 1 else []
+    rooms = _read_back(years, store)
+    for room in rooms if on_room is not None else ():
+        on_room(room)
+    return rooms, issues, notes
+
+
+def balanced_together(inputs: Inputs, options: JobOptions) -> bool:
+    """Whether heat flows between the rooms of a run."""
+    return options.coupled_heat and len(inputs.spaces) > 1
+
+
+def run_spaces(inputs: Inputs, options: JobOptions) -> Sequence[Space]:
+    """The rooms of a run; in coupled rooms both sides of a wall have the same construction."""
+    if not balanced_together(inputs, options):
+        return inputs.spaces
+    return list(shared_constructions(inputs.spaces))
+
+
+def _interchangeable(inputs: Inputs, options: JobOptions, one: Space, other: Space) -> bool:
+    """Whether the results of one of two rooms of equal shape and light are those of the other."""
+    building, operation = inputs.building, inputs.operation
+    rooms = (one, other)
+    if options.inner_glass and any(source_rooms(building, room) for room in rooms):
+        return False  # their light depends on their neighbours
+    if any(model_grids(building, room) for room in rooms):
+        return False
+    if operation is not None:
+        tables = operation.tables
+        if tables.of_room(building, one) != tables.of_room(building, other):
+            return False
+    if options.colour and not same_hues(one, other):
+        return False
+    return not balanced_together(inputs, options) or same_surfaces(one, other)
+
+
+def _read_back(rooms: list[RoomYear], store: StoredArrays | None) -> Sequence[RoomYear]:
+    """The rooms, each read from disk and released again where they are stored there."""
+    return tuple(rooms) if store is None else PassedArrays(store, rooms)
+
+
+def _ignore(room: object) -> None:
+    """No reaction to a room."""
+
+
+def _unchanged(room: RoomYear | DaylitRoom) -> RoomYear | DaylitRoom:
+    """A result in memory."""
+    return room
+
+
+@dataclass(frozen=True, slots=True)
+class RoomWork:
+    """The computation of each room of a run."""
+
+    inputs: Inputs
+    spaces: Sequence[Space]  # `run_spaces`
+    skies: AnnualSky
+    options: JobOptions
+    with_heat: bool  # False: light alone, the heat of all rooms is balanced together
+
+    def __call__(self, space: Space, progress: Progress = silent) -> RoomYear | DaylitRoom:
+        """The result of a room."""
+        inputs, options = self.inputs, self.options
+        choices: RoomChoices = {
+            "operation": inputs.operation,
+            "skies": self.skies,
+            "cache": MatrixCache.of_user() if options.cache else None,
+            "explore": options.explore,
+            "colour": options.colour,
+            "inner": options.inner_glass,
+            "progress": progress,
+        }
+        room = inputs.building, space, inputs.systems, inputs.weather, options.room
+        if self.with_heat:
+            return compute_room(*room, **choices)
+        light = lit_room(*room, **choices)
+        progress("heat", 1.0)
+        return light
+
+    def parallel(
+        self, spaces: Sequence[Space], *, workers: Workers
+    ) -> Generator[tuple[Space, RoomYear | DaylitRoom | BaseException]]:
+        """Each room with its result or its error, in any order."""
+        rooms = {space.guid: space for space in spaces}
+        here = workers.scheduler is None
+        run = "" if here else _identity(self.options, self.inputs)
+        compute = _Here(self) if here else _FromFiles(self.with_heat, self.options, run)
+        tasks = Tasks(
+            list(rooms), compute, _failed, key=lambda guid: f"{run}{guid}", scene=lambda guid: guid
+        )
+        with closing(tasks.results(**asdict(workers))) as results:
+            for guid, result in results:
+                yield rooms[guid], result
+
+    def of(self, guid: str) -> RoomYear | DaylitRoom:
+        """The result of the room with a GUID."""
+        return self(next(space for space in self.spaces if space.guid == guid))
+
+
+@dataclass(frozen=True, slots=True)
+class _Here:
+    """Computes a room by its GUID, from inputs in memory."""
+
+    work: RoomWork
+
+    def __call__(self, guid: str) -> tuple[str, RoomYear | DaylitRoom]:
+        variants.activate()
+        return guid, self.work.of(guid)
+
+
+@dataclass(frozen=True, slots=True)
+class _FromFiles:
+    """Computes a room by its GUID, from files read on the worker, once in each process.
+
+    Raises: `DataError` for a worker with other files or another version of the program.
+    """
+
+    with_heat: bool
+    options: JobOptions
+    run: str  # `_identity` of the run
+
+    def __call__(self, guid: str) -> tuple[str, RoomYear | DaylitRoom]:
+        variants.activate()
+        inputs, spaces, skies = _read(self.options, self.run)
+        work = RoomWork(inputs, spaces, skies, self.options, with_heat=self.with_heat)
+        return guid, work.of(guid)
+
+
+@lru_cache(maxsize=1)
+def _read(options: JobOptions, run: str) -> tuple[Inputs, Sequence[Space], AnnualSky]:
+    inputs, room = read_inputs(options, inner=options.inner_glass), options.room
+    if _identity(options, inputs) != run:
+        message = "a worker has other input files or another version of the program"
+        raise DataError(message, field="--scheduler")
+    skies = skies_for(inputs.weather, room.method, room.sampling, **room.sky)
+    return inputs, run_spaces(inputs, options), skies
+
+
+def _failed(guid: str, error: BaseException) -> tuple[str, BaseException]:
+    return guid, error
+
+
+def _identity(options: JobOptions, inputs: Inputs) -> str:
+    """Hash of options, program and contents of the files, before the keys of a run's rooms."""
+    parts = [repr(options), code_version(__name__)]
+    parts += map(sha256, inputs.files.values())
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16] + "-"
+
 
 OnHead = Callable[[Head], None]  # called as soon as all inputs are read
 

@@ -13,14 +13,19 @@ from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from scenes.calibration.choice import Demand, MethodChoice, choose
 from scenes.calibration.costs import Calibration, Workload
-from scenes.calibration.errors import MeasuredErrors, measured_errors
+from scenes.calibration.errors import (
+    MeasuredErrors,
+    Traits,
+    hidden_sky,
+    measured_errors,
+    sun_in_view,
+    system_traits,
+)
 from scenes.calibration.shipped import this_machines_costs
-from scenes.calibration.traits import Traits, hidden_sky, sun_in_view, system_traits
 from scenes.fenestration.systems import read_system
 from scenes.input_files import read_weather
-from scenes.study.case import AUTO, Case, with_method
 from scenes.study.one_case import case_inputs
-from scenes.study.plan import StudyPlan
+from scenes.study.plan import AUTO, Case, StudyPlan, with_method
 from scenes.study.study_file import Study
 
 SHINING = 50.0  # [W/m2] normal to the sun, from which it counts as shining

@@ -21,9 +21,9 @@ from mitsuba_cfs.source_code import code_version
 from scenes.explore.case_files import CASE, read_case
 from scenes.explore.folder import write_rooms
 from scenes.results import RunResult
-from scenes.study.case import Case
 from scenes.study.one_case import ALONE, case_inputs, case_year
-from scenes.study.schedule import said
+from scenes.study.plan import Case
+from scenes.study.store import said
 from scenes.workers import Tasks
 
 PHASED = ("three-phase", "five-phase")  # a path tracer has no matrices to compute an hour from
@@ -72,7 +72,7 @@ def explorers(
 ) -> Generator[tuple[Case, ExploredCase]]:
     """The explorer of each case, once for each key: kept in the folder, or computed and kept.
 
-    Args: processes, scheduler, progress: as of `scenes.study.schedule.computed`.
+    Args: processes, scheduler, progress: as of `scenes.study.store.computed`.
     """
     once = {explorer_key(case): case for case in cases}
     left = []

@@ -11,8 +11,13 @@ from scenes.fenestration.systems import read_system
 from scenes.fenestration.thermal_system import checked_system
 from scenes.heat.box import box_building
 from scenes.input_files import check_names, read_weather
-from scenes.room.operation import Operation, check_states, check_systems, read_operation
-from scenes.room.operation_hours import check_schedules
+from scenes.room.operation import (
+    Operation,
+    check_schedules,
+    check_states,
+    check_systems,
+    read_operation,
+)
 from scenes.study.study_file import Study, SystemTable
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Unpack
@@ -12,8 +13,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Building
+from bim.model import Building, Window
 from mitsuba_cfs import variants
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, protection_level
@@ -25,7 +28,7 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import source_notes
-from scenes.fenestration.systems import States, WindowOverrides, read_system
+from scenes.fenestration.systems import FenestrationSystem, States, WindowOverrides, read_system
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.head import Head, joined, model_lines, tree_notes
 from scenes.heat.box import building_or_box
@@ -33,14 +36,12 @@ from scenes.input_files import InputFiles, building_of, read_weather
 from scenes.input_options import InputOptions
 from scenes.inputs import Inputs, inputs_of
 from scenes.results import RoomYear
+from scenes.room.inputs import skies_for
 from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
 from scenes.room.room import RoomChoices, compute_room
-from scenes.room.skies import skies_for
-from scenes.study.case import Case, InputFile, program_version
-from scenes.study.plan import StudyPlan
+from scenes.study.plan import Case, InputFile, StudyPlan, program_version
 from scenes.study.store import CaseResult
-from scenes.study.straight_view import straight_view
 
 WARM_C = 26.0  # operative temperature above which hours are counted
 KEPT_TEMPERATURES = ("outdoor_c", "air_c", "operative_c")
@@ -265,3 +266,37 @@ def heat_figures(temperatures: pd.DataFrame, comfort: pd.DataFrame) -> dict[str,
     for band in ("within_90", "within_80"):
         found[f"comfortable_{band[-2:]}_h"] = float(comfort.loc[used, band].sum())
     return found
+
+
+def straight_view(
+    windows: Sequence[Window], systems: Mapping[str, States], state: NDArray[np.int64]
+) -> float:
+    """Visible transmittance straight on at normal incidence [%], mean of windows and hours.
+
+    The normal-normal transmittance by which EN 14501 classes the view out; what a system scatters,
+    or sends on in another direction, shows nothing of the outdoors.
+
+    Args:
+        systems: by state of each window, by its GUID; the last state stands for those beyond.
+        state: [h] the room's shading state in the hours that count.
+    """
+    beams: dict[int, float] = {}
+    hours = np.bincount(state)
+    seen = area = 0.0
+    for window in windows:
+        states = systems[window.guid]
+        for number, count in enumerate(hours):
+            system = states[min(number, len(states) - 1)]
+            if id(system) not in beams:
+                beams[id(system)] = _normal_beam(system)
+            seen += window.area * count * beams[id(system)]
+        area += window.area
+    return 100.0 * seen / (area * len(state)) if len(state) else 0.0
+
+
+def _normal_beam(system: FenestrationSystem) -> float:
+    """The beam through the patch at normal incidence."""
+    block = system.visible.transmission_front
+    if block is None:
+        raise ValueError(f"{system.name} has no transmission")
+    return float(through_peak(block, KLEMS_FULL).transmittance[0])

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from operator import attrgetter
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.files import opened_arrays, write_bytes, write_table, write_text
 from mitsuba_cfs.matrices.cache import UNREADABLE
+from mitsuba_cfs.progress import Progress, silent
 from scenes.result_folder import EXPLORER, ResultFolder
+from scenes.study.plan import Case
+from scenes.user_errors import one_line, user_message
+from scenes.workers import Tasks
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +46,7 @@ class CaseResult:
         with opened_arrays(path) as data:
             arrays = {name: data[name] for name in data.files}
         record = json.loads(arrays.pop("record").tobytes())
-        key, figures = record["key"], record["figures"]
+        key, figures = record["key"], dict(record["figures"])
         if not all(isinstance(value, float | int | str) for value in figures.values()):
             raise ValueError("figures: expected numbers and texts")
         return cls(key, figures, arrays)
@@ -64,7 +71,7 @@ class Store:
         """The finished case of that key; None where there is none, or none that can be read."""
         try:
             result = CaseResult.read(self._place(key))
-        except (*UNREADABLE, AttributeError):  # of a record that is no table
+        except UNREADABLE:
             return None
         return result if result.key == key else None
 
@@ -104,3 +111,47 @@ class Store:
 
     def _place(self, key: str) -> Path:
         return self.folder / "cases" / f"{key}.npz"
+
+
+class Compute(Protocol):
+    """A function of a module that computes a case."""
+
+    def __call__(self, case: Case, /, *, progress: Progress = ...) -> CaseResult:
+        """The result of a case."""
+        ...
+
+
+def computed(
+    cases: Sequence[Case],
+    compute: Compute,
+    *,
+    processes: int = 1,
+    scheduler: str | None = None,
+    progress: Progress = silent,
+) -> Generator[CaseResult]:
+    """The result of each case, once for each key, in the order in which they are ready.
+
+    A case that fails gives a result with its error.  Closing the generator ends the work.
+
+    Args:
+        processes: how many cases at a time on this machine.
+        scheduler: address of a Dask scheduler, whose workers then do the work.  They read the
+            input files under the same paths.
+        progress: of the case under way, where this process computes the cases itself.
+    """
+    once = list({case.key: case for case in cases}.values())
+    here = processes == 1 and scheduler is None
+    of_case = partial(compute, progress=progress) if here else compute
+    tasks = Tasks(once, of_case, _failed, key=attrgetter("key"), scene=attrgetter("scene"))
+    return tasks.results(processes=processes, scheduler=scheduler)
+
+
+def _failed(case: Case, error: BaseException) -> CaseResult:
+    return CaseResult(case.key, error=said(error))
+
+
+def said(error: BaseException) -> str:
+    """A failure in one line: the message of an expected one, what is known of another."""
+    message = user_message(error)
+    fault = f"fault of the program: {one_line(repr(error))}; cfs -vv tells where"
+    return message or fault

@@ -19,12 +19,10 @@ from scenes.calibration.durations import spoken_time
 from scenes.head import Head
 from scenes.report.glare_figures import compass
 from scenes.study.automatic import settled
-from scenes.study.case import Case
 from scenes.study.explored import ExploredCase, explorer_key, explorers
 from scenes.study.one_case import compute_case, plan_head
-from scenes.study.plan import AS_HELD, StudyPlan, plan_of
-from scenes.study.schedule import Compute, computed
-from scenes.study.store import CaseResult, Store
+from scenes.study.plan import AS_HELD, Case, StudyPlan, plan_of
+from scenes.study.store import CaseResult, Compute, Store, computed
 from scenes.study.study_file import Study
 
 
@@ -113,7 +111,7 @@ def run_study(
     Args:
         store: the folder of the finished cases.
         plan: of the study, with the methods that `auto` chose; made here by default.
-        processes, scheduler: see `scenes.study.schedule.computed`.
+        processes, scheduler: see `scenes.study.store.computed`.
         on_case: called with each case that is ready, how many are, and of how many.
     """
     start = time.monotonic()

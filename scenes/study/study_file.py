@@ -13,11 +13,10 @@ from scenes import plausible
 from scenes.calibration.durations import seconds_of, share_of
 from scenes.heat.study_file import BoxTable
 from scenes.quick import ROOM, picks
-from scenes.read_table import OutdoorTable, ReadTable
 from scenes.room.operation import read_operation
 from scenes.room.options import CHOICES, RoomOptions, named_types
 from scenes.room.schedules import Hours
-from scenes.toml_file import TomlTable, read_table, validated
+from scenes.toml_file import OutdoorTable, ReadTable, TomlTable, read_table, validated
 
 OF_THE_GRID = ("method", "annual_glare")
 # Options that mean what a key of an operation file means

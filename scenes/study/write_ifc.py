@@ -9,8 +9,8 @@ from bim.ifc.results_write import SET_NAME, write_results
 from bim.model import Space
 from bim.report.issue import Issue
 from mitsuba_cfs.files import replacing
-from scenes.study.case import Case, InputFile
 from scenes.study.files import one_building
+from scenes.study.plan import Case, InputFile
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
 

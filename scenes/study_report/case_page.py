@@ -19,7 +19,7 @@ from scenes.report.method import METHODS
 from scenes.report.names import quantity
 from scenes.report.room import error_words
 from scenes.results import DaylightResult, GlareResults, RoomYear, RunResult, ThermalResult
-from scenes.study.case import Case
+from scenes.study.plan import Case
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult, facing
 

@@ -14,7 +14,7 @@ from scenes.report.headline import LEVEL_WORDS
 from scenes.report.method import METHODS
 from scenes.report.names import quantity
 from scenes.report.tables import CLASS_WORDS
-from scenes.study.case import Case
+from scenes.study.plan import Case
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
 from scenes.study_report.case_page import case_label, label_of

@@ -2,38 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 
+import numpy as np
 from markupsafe import Markup
 
+from bim.model import Building, Space
 from mitsuba_cfs.files import write_text
-from scenes.language.catalogue import decimal, gettext, in_language, ngettext
-from scenes.language.numbers import rounded, share
+from scenes.explore.folder import moved_entry, write_joined
+from scenes.figures.scale import ColourScale, Tick, axis_ticks, round_limits
+from scenes.language.catalogue import N_, decimal, gettext, in_language, ngettext
+from scenes.language.numbers import colon, rounded, share
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import page as run_page
 from scenes.report import tables
 from scenes.report.method import METHODS
-from scenes.report.names import glossary
+from scenes.report.model3d import ColourLayer, Model3D, colour_bytes, model3d
+from scenes.report.names import glossary, quantity
 from scenes.report.page_files import page_files
-from scenes.study.case import Case
+from scenes.result_folder import EXPLORER
+from scenes.results import RoomYear, RunResult
+from scenes.study.explored import PHASED
+from scenes.study.plan import Case
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
-from scenes.study_report.case_page import case_page, room_of
+from scenes.study_report.case_page import case_label, case_page, room_of
 from scenes.study_report.comparison import (
     bars,
     clock_table,
     comparison_table,
     failures_table,
     finished,
+    glare_share,
+    pareto_front,
     scatter,
+    system_looks,
 )
-from scenes.study_report.explorer import explorer_link
-from scenes.study_report.model import study_model
-from scenes.study_report.parallel import parallel
-from scenes.study_report.verdict import study_verdict
+from scenes.study_report.verdict import ENERGIES, study_verdict
 
 FILES = page_files("scenes.study_report")
 SCRIPTS = ("study.js", "parallel.js")
@@ -152,3 +161,253 @@ def inputs_table(study: StudyResult) -> tables.Table:
     columns = tuple(tables.Column(title, numeric=False) for title in run_page.input_titles())
     rows = tuple((kind, path.name, digest) for (kind, path), digest in found.items())
     return tables.Table(gettext("Input files"), columns, rows)
+
+
+SHOWN = ("da300", "udi_300_3000")
+MOST_LAYERS = 60
+APART = 3.0  # between buildings [m]
+
+
+def study_model(study: StudyResult) -> Model3D:
+    """All rooms that have a result, buildings side by side, before they are turned."""
+    first: dict[str, tuple[Case, CaseResult]] = {}
+    for case, result in zip(study.plan.cases, study.results, strict=True):
+        if not result.error:
+            first.setdefault(case.scene, (case, result))
+    places = _places(study, list(first))
+    rooms, elements = [], []
+    seen: set[int] = set()
+    for scene, (case, result) in first.items():
+        building, _ = study.plan.rooms[scene]
+        offset = places[scene]
+        rooms.append(_moved_room(room_of(study, case, result), offset))
+        if id(building) not in seen:
+            seen.add(id(building))
+            elements += [_moved(e, offset) for e in building.elements]
+    name = next(iter(study.plan.rooms.values()))[0].name
+    whole = Building(name, tuple(room.space for room in rooms), tuple(elements))
+    times = rooms[0].heat.temperatures.index
+    model = model3d(RunResult(whole, times, np.empty((0, 3)), tuple(rooms), (), {}))
+    return replace(model, layers=_layers(study, list(first)))
+
+
+def _places(study: StudyResult, scenes: list[str]) -> dict[str, np.ndarray]:
+    """How far each room's building is moved along x so that none stands in another."""
+    places, moved, edge = {}, {}, 0.0
+    for scene in scenes:
+        building, _ = study.plan.rooms[scene]
+        if id(building) not in moved:
+            points = np.concatenate([space.shell.reshape(-1, 3) for space in building.spaces])
+            shift = edge - points[:, 0].min() if moved else 0.0
+            edge = points[:, 0].max() + shift + APART
+            moved[id(building)] = np.array([shift, 0.0, 0.0])
+        places[scene] = moved[id(building)]
+    return places
+
+
+def _moved(part, offset: np.ndarray):
+    """A face, window or element somewhere else."""
+    return replace(part, triangles=part.triangles + offset)
+
+
+def _moved_room(room: RoomYear, offset: np.ndarray) -> RoomYear:
+    space: Space = room.space
+    space = replace(
+        space,
+        faces=tuple(_moved(face, offset) for face in space.faces),
+        windows=tuple(_moved(window, offset) for window in space.windows),
+    )
+    daylight = replace(room.daylight, points=room.daylight.points + offset)
+    return replace(room, space=space, daylight=daylight)
+
+
+def _layers(study: StudyResult, scenes: list[str]) -> tuple[ColourLayer, ...]:
+    """A colouring for each case but its room, with the values of every room that has that case."""
+    groups: dict[tuple, dict[str, tuple[Case, CaseResult]]] = {}
+    for case, result in zip(study.plan.cases, study.results, strict=True):
+        if not result.error:
+            key = (case.system, case.climate, case.orientation_deg, case.options.method)
+            groups.setdefault(key, {})[case.scene] = case, result
+    found = []
+    for members in groups.values():
+        if set(members) != set(scenes):
+            continue
+        label = case_label(study, next(iter(members.values()))[0])
+        for column in SHOWN:
+            q = quantity(column)
+            values = np.concatenate([members[s][1].arrays[f"sensor/{column}"] for s in scenes])
+            scale = ColourScale(0.0, 100.0, f"{q.label}: {label}", "%")
+            found.append(ColourLayer(column, scale, colour_bytes(scale, values), 0))
+    return tuple(found[:MOST_LAYERS])
+
+
+TICKS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class ParallelAxis:
+    """One upright axis; the better end is above."""
+
+    name: str
+    words: str  # the quantity, without its unit
+    unit: str
+    digits: int
+    low: float  # at the lower end
+    high: float  # at the upper end; below `low` where less is better
+    x: float  # [%] of the width
+    ticks: tuple[Tick, ...]
+
+    def at(self, value: float) -> float:
+        """Height of a value [%]."""
+        return 100.0 * (value - self.low) / (self.high - self.low)
+
+
+@dataclass(frozen=True, slots=True)
+class CaseLine:
+    """One case: its height on each axis [%], NaN where it has no value there."""
+
+    number: int
+    colour: str
+    at: tuple[float, ...]
+    words: str
+
+    def path(self, axes: tuple[ParallelAxis, ...]) -> str:
+        """SVG path on a square of 1000; broken where there is no value."""
+        found, pen = [], "M"
+        for axis, height in zip(axes, self.at, strict=True):
+            if np.isnan(height):
+                pen = "M"
+                continue
+            found.append(f"{pen}{10 * axis.x:.1f} {1000 - 10 * height:.1f}")
+            pen = "L"
+        return "".join(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Parallel:
+    """All cases with a result over the axes that at least one of them has."""
+
+    axes: tuple[ParallelAxis, ...]
+    lines: tuple[CaseLine, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """A figure that may be an axis."""
+
+    name: str
+    words: str
+    unit: str
+    digits: int
+    more_is_better: bool
+    value: Callable[[CaseResult, Space], float]  # NaN where the case has none
+
+    def axis(self, values: list[float], x: float) -> ParallelAxis:
+        """The axis that holds the values, at a place [%] of the width."""
+        whole = [0.0, 100.0] if self.unit == "%" and self.more_is_better else [0.0]
+        low, high = round_limits([*values, *whole], TICKS)
+        ticks = axis_ticks(low, high, TICKS)
+        if not self.more_is_better:
+            low, high = high, low
+            ticks = tuple(replace(tick, at=100.0 - tick.at) for tick in ticks)
+        name, words = gettext(self.name), gettext(self.words)
+        return ParallelAxis(name, words, self.unit, self.digits, low, high, x, ticks)
+
+
+def parallel(study: StudyResult) -> Parallel:
+    """Every finished case of a study as a line."""
+    cases = finished(study)
+    spaces = [study.plan.rooms[case.scene][1] for _, case, _ in cases]
+    columns = []
+    for axis in CANDIDATES:
+        values = [axis.value(r, space) for (_, _, r), space in zip(cases, spaces, strict=True)]
+        if not np.isnan(values).all():
+            columns.append((axis, values))
+    axes = tuple(
+        candidate.axis(values, 100.0 * (i + 0.5) / len(columns))
+        for i, (candidate, values) in enumerate(columns)
+    )
+    looks = system_looks(cases)
+    lines = []
+    for i, (number, case, _) in enumerate(cases):
+        own = [(axis, values[i]) for axis, (_, values) in zip(axes, columns, strict=True)]
+        figures = (
+            f"{axis.name.lower()} {rounded(value, axis.digits)} {axis.unit}"
+            for axis, value in own
+            if not np.isnan(value)
+        )
+        words = colon(f"{number}, {case_label(study, case)}", ", ".join(figures))
+        at = tuple(axis.at(value) for axis, value in own)
+        lines.append(CaseLine(number, looks[case.system][0], at, words))
+    return Parallel(axes, tuple(lines))
+
+
+def _figure(result: CaseResult, name: str) -> float:
+    return float(result.figures.get(name, np.nan))
+
+
+def _glare(result: CaseResult) -> float:
+    rated = "glare_disturbing_h" in result.figures
+    return glare_share(result) if rated else np.nan
+
+
+def _comfort(result: CaseResult) -> float:
+    """Occupied hours within the band that 80 % of people accept [%]."""
+    used = max(int(result.arrays["comfort/occupied"].sum()), 1)
+    return 100.0 * _figure(result, "comfortable_80_h") / used
+
+
+def _energy(result: CaseResult, space: Space) -> float:
+    return sum(_figure(result, name) for name in ENERGIES) / space.floor_area
+
+
+CANDIDATES = (
+    _Candidate(N_("Daylight"), N_("daylight autonomy 300 lx"), "%", 0, True,
+           lambda result, _: _figure(result, "da300")),
+    _Candidate(N_("Glare"), N_("occupied hours with DGP above 0.40"), "%", 1, False,
+           lambda result, _: _glare(result)),
+    _Candidate(N_("Comfort"), N_("occupied hours within the 80 % limits"), "%", 0, True,
+           lambda result, _: _comfort(result)),
+    _Candidate(N_("Energy"), N_("heating, cooling and light per floor area"), "kWh/m²", 0, False,
+           _energy),
+    _Candidate(N_("View"), N_("direct visible transmittance"), "%", 0, True,
+           lambda result, _: _figure(result, "straight_view_percent")),
+)  # fmt: skip
+
+
+MOST_EXPLORED = 12  # cases in an explorer: some 5 to 15 MB each
+
+
+def explorable(study: StudyResult) -> dict[int, Case]:
+    """The cases that get an explorer, by number from 1: those of the front, then the first others.
+
+    Cases by paths have none; all have a year of as many hours.
+    """
+    dots = scatter(study).dots
+    front = set(pareto_front([(dot.x, dot.y) for dot in dots]))
+    best = {dot.number for dot in dots if (dot.x, dot.y) in front}
+    phased = [(n, c, r) for n, c, r in finished(study) if c.options.method in PHASED]
+    ordered = sorted(phased, key=lambda one: one[0] not in best)
+    hours = {len(result.arrays["times"]) for _, _, result in ordered[:1]}
+    alike = [(n, case) for n, case, r in ordered if len(r.arrays["times"]) in hours]
+    return dict(sorted(alike[:MOST_EXPLORED]))
+
+
+def explorer_link(study: StudyResult, number: int) -> str:
+    """The address of a case's explorer from the report; empty where it has none."""
+    return f"{EXPLORER}/index.html#case-{number}" if number in study.explored else ""
+
+
+def write_study_explorer(study: StudyResult, folder: Path, page: PageOptions = OWN_PAGE) -> None:
+    """Write the page of the explored cases, whose data lie in folders of it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    entries, first = [], next(iter(study.explored.values())).shown
+    for number, explored in study.explored.items():
+        case = study.plan.cases[number - 1]
+        name = f"{number}: {case_label(study, case)}"
+        about = {"id": f"case-{number}", "turned": case.orientation_deg % 360.0}
+        for entry in explored.shown["rooms"]:
+            entries.append(moved_entry(entry, explored.key, name) | about)
+    title = study.title or first["title"]
+    with in_language(page.language):
+        write_joined(first | {"title": title, "rooms": entries}, folder)

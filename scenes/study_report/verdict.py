@@ -10,9 +10,8 @@ from mitsuba_cfs.glare.classes import CLASSES
 from scenes.language.catalogue import gettext, ngettext
 from scenes.language.numbers import listed, percent, rounded
 from scenes.report.headline import WARM_C, Card, cards, protection_card
-from scenes.report.limits import LimitTables, limits
 from scenes.report.names import rooms_counted, systems_counted
-from scenes.report.verdict import Verdict
+from scenes.report.verdict import LimitTables, Verdict, limits
 from scenes.results import RunResult
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult

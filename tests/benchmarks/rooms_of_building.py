@@ -19,9 +19,9 @@ import numpy as np
 from mitsuba_cfs import variants
 from scenes.inputs import read_inputs
 from scenes.quick import ROOM
+from scenes.room.inputs import skies_for
 from scenes.room.options import RoomOptions
 from scenes.room.room import compute_room
-from scenes.room.skies import skies_for
 from scenes.run.options import JobOptions
 
 

@@ -11,7 +11,7 @@ from bim.building_file import ReadOptions, check_building_file, held_states, rea
 from bim.sensors import sensor_grid, view_point
 from bim.shell import enclosed_volume
 from mitsuba_cfs.errors import DataError
-from scenes.fenestration.stated import glazing_system, stated_values
+from scenes.fenestration.resolver import glazing_system, stated_values
 from scenes.fenestration.systems import WindowOverrides
 
 OFFICE = Path(__file__).parents[2] / "docs/tutorials/office.rad"

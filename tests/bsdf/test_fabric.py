@@ -16,7 +16,7 @@ from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from scenes.commands.bsdf import command
-from scenes.fenestration.layer_tables import GlazingLayerTable
+from scenes.fenestration.thermal_file import GlazingLayerTable
 from tests.bim.bim_fuzz import mutations
 from thermal.ratings import REFERENCE_GLAZINGS
 

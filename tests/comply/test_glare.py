@@ -16,12 +16,11 @@ from scenes.comply.glare import seat_glare
 from scenes.comply.needs import DgpExceeded
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
-from scenes.room.control import shading_state
 from scenes.room.glare import annual_glare
-from scenes.room.inputs import room_inputs
+from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.light import room_light
 from scenes.room.options import RoomOptions
-from scenes.room.skies import skies_for
+from scenes.room.room import shading_state
 from scenes.room_views import eyes_of
 
 EVERY = 211  # hour with the sun up

@@ -21,10 +21,9 @@ from scenes.comply.rules import GridTable, read_rule
 from scenes.comply.view_out import view_out
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
-from scenes.room.inputs import room_inputs
+from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.light import room_light
 from scenes.room.options import RoomOptions, SensorGrid
-from scenes.room.skies import skies_for
 
 EVERY = 23  # hour with the sun up: all hours of the day and all seasons come
 # Sums over a window's directions in float32, added up in another order with other hours beside:

@@ -17,9 +17,16 @@ from click.testing import CliRunner
 from bim.model import Element
 from mitsuba_cfs.errors import DataError
 from scenes.cli import cfs
-from scenes.explore.folder import copy_explorer, explorer_of, join_explorers, write_explorer
-from scenes.explore.packing import packed, read_data, write_data
-from scenes.explore.serve import server
+from scenes.explore.case_files import read_data
+from scenes.explore.folder import (
+    copy_explorer,
+    explorer_of,
+    join_explorers,
+    packed,
+    server,
+    write_data,
+    write_explorer,
+)
 from scenes.report import write_report
 from scenes.result_folder import ResultFolder
 from scenes.run.outputs import write_results
@@ -224,3 +231,11 @@ def test_the_page_that_is_served_is_the_programs(results, tmp_path) -> None:
     copy_explorer(folder, tmp_path / "served")
     assert "Explorer" in (tmp_path / "served" / "index.html").read_text()
     assert not (tmp_path / "served" / "extra.js").exists()
+
+
+@pytest.mark.parametrize("text", ["[", "[1]", '{"head": 3}', '{"head": {"model": [1]}}'])
+def test_a_record_of_a_run_that_is_none_is_one_line(text, results, tmp_path) -> None:
+    folder = shutil.copytree(results, tmp_path / "damaged")
+    (folder / "run.json").write_text(text)
+    done = CliRunner().invoke(cfs, ["explore", str(folder), "--out", str(tmp_path / "one")])
+    assert isinstance(done.exception, DataError) and "run.json" in str(done.exception)

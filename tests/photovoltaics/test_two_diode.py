@@ -9,7 +9,7 @@ import pvlib
 import pytest
 
 from scenes.photovoltaics.diode import cell_voltage
-from scenes.photovoltaics.strings import string_power, string_voltage
+from scenes.photovoltaics.energy import string_power, string_voltage
 from scenes.photovoltaics.two_diode import (
     BOLTZMANN,
     ICE,

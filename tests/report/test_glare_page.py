@@ -11,11 +11,10 @@ import pandas as pd
 import pytest
 
 from scenes.figures.plan import plan_frame
-from scenes.figures.rose import RoseWedge, roses
 from scenes.head import NO_HEAD
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.year_of_glare.options import YearOptions
-from scenes.year_of_glare.page import write_page
+from scenes.year_of_glare.page import RoseWedge, roses, write_page
 from tests.devtools import Page, chromium
 from tests.report.synthetic import two_rooms
 

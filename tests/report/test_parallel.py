@@ -11,9 +11,8 @@ import pytest
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from scenes.fenestration.systems import FenestrationSystem
-from scenes.study.straight_view import straight_view
-from scenes.study_report.page import study_report_html
-from scenes.study_report.parallel import parallel
+from scenes.study.one_case import straight_view
+from scenes.study_report.page import parallel, study_report_html
 from tests.devtools import Page, chromium
 from tests.report.test_study_report import study
 

@@ -13,9 +13,8 @@ import pytest
 from bim.report.issue import Issue
 from scenes.language.numbers import percent
 from scenes.report.daylight_figures import plans
-from scenes.study.case import Case, InputFile
 from scenes.study.one_case import glare_figures, room_figures
-from scenes.study.plan import StudyPlan
+from scenes.study.plan import Case, InputFile, StudyPlan
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
 from scenes.study_report.comparison import finished, glare_share, pareto_front

@@ -55,6 +55,6 @@ def small_disk(tmp_path) -> Iterator[Path]:
 @pytest.fixture
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Stubs of rooms' results have no arrays that a run could hold on disk."""
-    from scenes.run import rooms
+    from scenes.run import run as rooms
 
     monkeypatch.setattr(rooms.StoredArrays, "stored", lambda self, room: room)

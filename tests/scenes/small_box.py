@@ -15,8 +15,8 @@ from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import FenestrationSystem, read_system
+from scenes.room.inputs import skies_for
 from scenes.room.options import RoomOptions
-from scenes.room.skies import skies_for
 
 HOURS = (2122, 4092, 4096, 8460)  # March 30 10 h, June 20 12 h and 16 h, December 19 12 h
 SMALL = RoomOptions.of(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, silent
-from scenes.study.case import Case
+from scenes.study.plan import Case
 from scenes.study.store import CaseResult
 
 SECONDS = 0.25  # of a case of these tests

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bim.ifc.building import read_ifc
-from scenes.commands.printed_head import PrintedHead
+from scenes.commands.room_options import PrintedHead
 from scenes.head import head_of
 from tests.bim.small_ifc import DEPTH, WIDTH, box_model
 

@@ -18,13 +18,12 @@ from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
 from scenes.room.heat import DaylitRoom, coupled_years, heat_alone
-from scenes.room.inputs import room_inputs
+from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.operation import read_operation
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import operated_zone
-from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
-from scenes.run import rooms
+from scenes.run import run as rooms
 from scenes.run.options import JobOptions
 from tests.scenes.small_box import SMALL
 

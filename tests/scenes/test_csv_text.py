@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from mitsuba_cfs.files import write_table
-from scenes.run.csv_text import csv_text
+from scenes.run.outputs import csv_text
 
 TIMES = pd.date_range("2021-01-01 00:30", periods=6, freq="h", name="time")
 VALUES = [0.0, -1234567.0, 1.5e-7, np.nan, np.inf, 20.12345678]

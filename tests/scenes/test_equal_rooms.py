@@ -64,7 +64,7 @@ def test_an_equal_room_has_the_results_of_its_template(
 
 
 def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeypatch) -> None:
-    from scenes.run import rooms as run
+    from scenes.run import run
 
     twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
     other = shoebox(2.5, 4.0, 2.8, windows=(WindowRectangle(0.5, 0.9, 1.5, 1.5),), name="other")
@@ -96,7 +96,7 @@ def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeyp
 def test_equal_rooms_that_are_operated_otherwise_are_computed_each(
     variant, tmp_path, weather, skies, glass, monkeypatch, no_pictures
 ) -> None:
-    from scenes.run import rooms as run
+    from scenes.run import run
 
     twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
     building = replace(BOX, spaces=(ROOM, twin))

@@ -17,10 +17,9 @@ from mitsuba_cfs.sky.epw import read_epw
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.room.glare import rated_hours
-from scenes.room.inputs import room_inputs
+from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.light import room_light
 from scenes.room.options import RoomOptions
-from scenes.room.skies import skies_for
 
 EVERY = 211  # hour with the sun up
 OPTIONS = RoomOptions.of(

@@ -12,7 +12,7 @@ import scenes.demo
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.sun import sun_directions
-from scenes.room import skies as module
+from scenes.room import inputs as module
 
 EPW = Path(scenes.demo.__file__).with_name("USA_IL_Chicago-OHare.Intl.AP.725300_TMY3.epw")
 

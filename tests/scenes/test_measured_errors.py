@@ -14,9 +14,12 @@ from scenes.calibration.errors import (
     FILE,
     MeasuredCase,
     MeasuredErrors,
+    Traits,
+    hidden_sky,
     measured_errors,
+    sun_in_view,
+    system_traits,
 )
-from scenes.calibration.traits import Traits, hidden_sky, sun_in_view, system_traits
 from scenes.cost import room
 
 CLEAR = Glazing("clear", 0.78, 0.14, 0.14)

@@ -11,7 +11,7 @@ from rich.console import Console
 from bim.building_file import STAGES
 from bim.ifc.building import read_ifc
 from mitsuba_cfs.progress import Stage, TimeLeft, in_shares, item, part, spoken_left, summed
-from scenes.commands import compiling
+from scenes.commands import progress_bar as compiling
 from scenes.commands.progress_bar import ProgressBar
 from scenes.demo import OFFICE
 

@@ -19,7 +19,7 @@ from scenes.heat import study_file as heat_file
 from scenes.room import series as rooms_of_a_run
 from scenes.room.glare import default_hours
 from scenes.room.options import RoomOptions
-from scenes.run import rooms
+from scenes.run import run as rooms
 from scenes.run.options import JobOptions
 from scenes.study.study_file import read_study
 from scenes.year_of_glare.options import YearOptions

@@ -15,15 +15,14 @@ from mitsuba_cfs.progress import silent
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system
-from scenes.room.inputs import room_inputs
+from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.options import RoomOptions
 from scenes.room.room import compute_room
-from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 from scenes.room.zone import zone_surfaces
-from scenes.run import rooms as job
+from scenes.run import run as job
 from scenes.run.options import JobOptions
-from scenes.study import schedule
+from scenes.study import store as schedule
 
 OPTIONS = JobOptions(
     OFFICE, WEATHER, cache=False, room=RoomOptions.of(sky_subdivision=1), coupled_heat=False

@@ -24,10 +24,10 @@ from scenes.inputs import Inputs, read_inputs
 from scenes.room import series
 from scenes.room.options import RoomOptions
 from scenes.room.series import RoomSeries
-from scenes.run import outputs, rooms
+from scenes.run import outputs
+from scenes.run import run as rooms
 from scenes.run.options import JobOptions
-from scenes.run.rooms import Workers
-from scenes.run.run import run_inputs, run_job
+from scenes.run.run import Workers, run_inputs, run_job
 from scenes.workers import Tasks
 from tests.conftest import REPOSITORY
 from tests.scenes.small_box import BOX, ROOM, SMALL

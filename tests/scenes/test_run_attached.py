@@ -17,7 +17,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.matrices.cache import digest
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.fenestration.attached import g_by_patch
+from scenes.fenestration.resolver import g_by_patch
 from scenes.fenestration.systems import read_system
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.inputs import read_inputs

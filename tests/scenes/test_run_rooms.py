@@ -16,10 +16,9 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from scenes.demo import VENETIAN_BLIND
 from scenes.fenestration.systems import FenestrationSystem, read_system
-from scenes.room.control import signal_of, states_by_rule
 from scenes.room.glare import worst_hours
 from scenes.room.operation import check_states, read_operation
-from scenes.room.room import compute_room
+from scenes.room.room import compute_room, signal_of, states_by_rule
 from scenes.room.windows import in_all_windows, room_windows
 from tests.scenes.small_box import BOX, HOURS, ROOM, SMALL, clear
 

@@ -16,8 +16,7 @@ from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
 from scenes.chosen_rooms import chosen_spaces
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.room.operation import read_operation
-from scenes.room.operation_hours import OperationHours, check_schedules
+from scenes.room.operation import OperationHours, check_schedules, read_operation
 from scenes.room.operation_tables import OperationTables
 from scenes.run.files import read_files
 from scenes.run.options import JobOptions

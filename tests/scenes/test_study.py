@@ -18,8 +18,7 @@ from mitsuba_cfs.errors import DataError, RoomError
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.study.plan import plan_of
-from scenes.study.schedule import computed
-from scenes.study.store import CaseResult, Store
+from scenes.study.store import CaseResult, Store, computed
 from scenes.study.study import run_study
 from scenes.study.study_file import read_study
 from tests.conftest import REPOSITORY, default_signals
@@ -270,13 +269,13 @@ def test_failed_cases_end_with_exit_1_and_their_number(tmp_path, capsys, monkeyp
     ],
 )
 def test_a_case_that_fails_says_why_without_a_class(error, words):
-    from scenes.study.schedule import said
+    from scenes.study.store import said
 
     assert said(error) == words
 
 
 def test_a_fault_of_the_program_is_called_so():
-    from scenes.study.schedule import said
+    from scenes.study.store import said
 
     assert said(KeyError("D")).startswith("fault of the program: KeyError('D')")
 

@@ -12,8 +12,7 @@ from tests.scenes.study_files import BOX, study_file
 def test_auto_chooses_for_the_study_and_says_why(tmp_path):
     """Made-up costs and errors: a year of steps leads to the phases, a mirror to paths."""
     from scenes.calibration.costs import HEAT, Calibration
-    from scenes.calibration.errors import MeasuredCase, MeasuredErrors
-    from scenes.calibration.traits import Traits
+    from scenes.calibration.errors import MeasuredCase, MeasuredErrors, Traits
     from scenes.cost.measure import Cost
     from scenes.study.automatic import settled
 

@@ -14,9 +14,8 @@ from pathlib import Path
 import pytest
 
 from mitsuba_cfs.errors import DataError
-from scenes.study.case import Case
-from scenes.study.plan import plan_of
-from scenes.study.schedule import computed
+from scenes.study.plan import Case, plan_of
+from scenes.study.store import computed
 from scenes.study.study_file import read_study
 from tests.conftest import REPOSITORY
 from tests.scenes.study_files import study_file

@@ -12,8 +12,8 @@ import pytest
 
 from mitsuba_cfs.errors import DataError
 from scenes.cli import run as main
-from scenes.fenestration.layer_tables import GlazingLayerTable
-from scenes.fenestration.pane_system import system_of_panes
+from scenes.fenestration.systems import system_of_panes
+from scenes.fenestration.thermal_file import GlazingLayerTable
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.heat.study_file import StudyFile, read_study
 from scenes.room.operation import read_state

@@ -20,13 +20,11 @@ from mitsuba_cfs.methods.light import direct_sun
 from scenes import cli
 from scenes.demo import WEATHER
 from scenes.head import head_of, model_notes
-from scenes.room.control import shading_state
 from scenes.room.daylight import room_daylight
 from scenes.room.glare import annual_glare, room_glare
-from scenes.room.inputs import RoomInputs, room_inputs
+from scenes.room.inputs import RoomInputs, room_inputs, skies_for
 from scenes.room.light import room_light
-from scenes.room.room import lit_room, operated_zone
-from scenes.room.skies import skies_for
+from scenes.room.room import lit_room, operated_zone, shading_state
 from scenes.room.solar import facade_irradiance, seasonal_outdoors, window_irradiance
 from scenes.room.windows import in_all_windows
 from scenes.room.zone import zone_surfaces

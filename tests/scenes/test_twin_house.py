@@ -9,7 +9,7 @@ import pytest
 
 from scenes.heat.files import read_files
 from scenes.heat.study_file import read_study
-from scenes.room.operation_hours import OperationHours
+from scenes.room.operation import OperationHours
 from tests.validation import twin_house
 
 

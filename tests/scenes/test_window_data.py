@@ -14,10 +14,9 @@ from bim.ifc.fenestration_read import read_fenestration
 from bim.ifc.targets import Targets
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
-from scenes.fenestration.layer_sun import sun_in_layers
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.fenestration.thermal_file import ThermalFile
-from scenes.fenestration.thermal_system import thermal_system
+from scenes.fenestration.thermal_system import sun_in_layers, thermal_system
 from scenes.room.operation import read_operation
 from tests.scenes.fenestration_models import grey, room
 from thermal.blackbox import R_INNER

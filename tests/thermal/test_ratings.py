@@ -10,8 +10,8 @@ import pytest
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from scenes import cli
-from scenes.fenestration.layer_sun import sun_in_layers
 from scenes.fenestration.thermal_file import ThermalFile
+from scenes.fenestration.thermal_system import sun_in_layers
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
 from thermal.ratings import REFERENCE_GLAZINGS, ThermalRating, layered_ratings, shade_ratings
 from thermal.shade_layers import sheet_layer

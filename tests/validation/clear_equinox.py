@@ -36,10 +36,9 @@ from scenes.comply.light import lights_of
 from scenes.comply.needs import Equinox, SunlightExposure
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
-from scenes.room.inputs import room_inputs
+from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.light import room_light
 from scenes.room.options import RoomOptions, SensorGrid
-from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 from tests.benchmarks import radiance
 from tests.validation.rendered_scene import RenderedScene

@@ -14,7 +14,7 @@ import pandas as pd
 
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.demo import WEATHER
-from scenes.room.operation_hours import OperationHours
+from scenes.room.operation import OperationHours
 from scenes.room.operation_tables import OperationTables
 from tests.validation.differences import rmse_and_bias
 from tests.validation.energyplus_cases import clear_double_year

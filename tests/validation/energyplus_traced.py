@@ -30,9 +30,8 @@ from scenes.fenestration.systems import FenestrationSystem
 from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
 from scenes.heat.box import box_building
 from scenes.heat.study_file import StudyFile, read_study
-from scenes.room.inputs import room_inputs
+from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.room import operated_zone
-from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 from scenes.room.zone import RoomZone, balances
 from tests.validation.energyplus_cases import (

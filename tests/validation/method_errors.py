@@ -41,8 +41,16 @@ from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import SkySeries, sky_series
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.calibration.costs import GLARE
-from scenes.calibration.errors import FILE, LEAST, MeasuredCase, MeasuredErrors
-from scenes.calibration.traits import Traits, hidden_sky, sun_in_view, system_traits
+from scenes.calibration.errors import (
+    FILE,
+    LEAST,
+    MeasuredCase,
+    MeasuredErrors,
+    Traits,
+    hidden_sky,
+    sun_in_view,
+    system_traits,
+)
 from scenes.cost import room as box
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from tests.validation.blind_room import blind_layer

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.pane_stack import hemispherical_mean
 from mitsuba_cfs.directions import incident_azimuth
-from scenes.fenestration.layer_sun import sun_in_layers
+from scenes.fenestration.thermal_system import sun_in_layers
 from tests.validation.ashrae140_sun import ANGLES, glass
 from thermal.blackbox import (
     R_INNER,
