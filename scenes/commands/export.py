@@ -38,19 +38,19 @@ PATTERNS = {  # of the files that an export writes
 @input_options("all", weather="", system=False)
 @click.option(
     "--radiance", type=click.Path(file_okay=False, path_type=Path),
-    help="Folder of Radiance scenes; one folder inside for each room.",
+    help="Folder for Radiance scenes, with a subfolder for each room.",
 )  # fmt: skip
 @click.option(
     "--mitsuba", type=click.Path(file_okay=False, path_type=Path),
-    help="Folder of Mitsuba scenes; one folder inside for each room with a window.",
+    help="Folder for Mitsuba scenes, with a subfolder for each room with a window.",
 )  # fmt: skip
 @click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
-@click.option("--honeybee", type=click.Path(path_type=Path), help="honeybee model (.hbjson).")
+@click.option("--honeybee", type=click.Path(path_type=Path), help="Honeybee model (.hbjson).")
 @click.option("--gbxml", type=click.Path(path_type=Path), help="gbXML file (.gbxml).")
 @click.option(
     "--band", type=click.Choice(BANDS, case_sensitive=False), default="Visible", show_default=True,
-    help="Visible or Solar; of the Radiance and Mitsuba scenes.",
+    help="Spectral band of the BSDF: Visible or Solar; of the Radiance and Mitsuba scenes.",
 )  # fmt: skip
 @spacing_option
 @height_option
@@ -69,12 +69,12 @@ def command(
     subdivision: str,
     **chosen,
 ) -> None:
-    """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing.
+    """Write the rooms for Radiance, Mitsuba, EnergyPlus, Honeybee, gbXML or glTF viewers.
 
     BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
 
-    Windows go with the BSDF, U and g that the file holds or states for them; where they come from,
-    and what is not known, is said.
+    Windows are exported with the BSDF, U and g in the file; the output states their source and
+    what is missing.
     """
     options = InputOptions(**chosen, weather=None)
     building = options.building
@@ -173,11 +173,11 @@ def export_files(
     if not any(files.values()):
         return ()
     writers = {"honeybee": write_honeybee, "gbxml": write_gbxml, "epjson": write_epjson}
-    u_and_g, assumed = known.u_and_g()
+    glazing, assumed = known.glazings()
     for name, write in writers.items():
         path = files[name]
         if path is not None:
-            write(building, path, known=u_and_g)
+            write(building, path, glazing=glazing)
             click.echo(path)
     return assumed
 

@@ -42,17 +42,19 @@ _DEFAULT = RoomOptions()
 @room_options
 @method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
 @u_option
-@click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
+@click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g-value at normal incidence.")
 @click.option(
     "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH[:MM]'",
-    help="Hour to show and rate for glare; default: nine hours and the brightest.",
+    help="Hour to render and rate, may be repeated; default: nine hours and the brightest.",
 )  # fmt: skip
-@size_option("picture_size", _DEFAULT.outputs.picture_size, "of up to ten in each room's report")
+@size_option(
+    "picture_size", _DEFAULT.outputs.picture_size, "up to ten pictures in each room's report"
+)
 @spacing_option
 @height_option
 @click.option(
     "--ach", "infiltration_ach", type=click.FloatRange(0, 50), default=_DEFAULT.infiltration_ach,
-    show_default=True, help="Outdoor air changes [1/h].",
+    show_default=True, help="Outdoor air change rate [1/h].",
 )  # fmt: skip
 @click.option(
     "--operation", type=FILE,
@@ -65,18 +67,18 @@ _DEFAULT = RoomOptions()
 )  # fmt: skip
 @click.option(
     "--no-coupled-heat", "coupled_heat", is_flag=True, flag_value=False, default=True,
-    help="Balance each room's heat alone, as if rooms of its own temperature lay around it.",
+    help="Simulate each room alone, with adjacent rooms at its own temperature.",
 )  # fmt: skip
 @click.option(
     "--no-colour", is_flag=True,
-    help="Leave each room's picture in colour out; --quick does as well.",
+    help="Omit the colour picture of each room; implied by --quick.",
 )  # fmt: skip
 @explore_option()
 @processes_option
 @scheduler_option
 @click.option(
     "--netcdf", is_flag=True,
-    help="Write all numbers of all rooms as results.nc besides, for xarray; see docs/formats.md.",
+    help="Also write all results to results.nc, for xarray; see docs/formats.md.",
 )  # fmt: skip
 def command(
     out: Path,
@@ -86,7 +88,7 @@ def command(
     scheduler: str | None,
     **chosen,
 ) -> None:
-    """Daylight, glare, temperatures and comfort of a building's rooms.
+    """Compute daylight, glare, temperatures and comfort of a building's rooms.
 
     BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
     """
