@@ -117,6 +117,30 @@ surroundings_offset_option = click.option(
     "--surroundings-offset", type=float, nargs=3, metavar="X Y Z",
     help="Offset added to the surroundings' coordinates [m], instead of georeferences.",
 )  # fmt: skip
+
+
+class Albedo(click.ParamType):
+    """A number, twelve by month, `file` or `snow`."""
+
+    name = "albedo"
+
+    def convert(self, value, param, ctx) -> float | tuple[float, ...] | str:
+        """The albedo as of `with_albedo`."""
+        if value in ("file", "snow") or not isinstance(value, str):
+            return value
+        try:
+            numbers = tuple(float(part) for part in value.split(","))
+        except ValueError:
+            numbers = ()
+        if len(numbers) not in (1, 12) or not all(0 <= number <= 1 for number in numbers):
+            self.fail(f"expected a number from 0 to 1, twelve, 'file' or 'snow'; got {value!r}")
+        return numbers[0] if len(numbers) == 1 else numbers
+
+
+albedo_option = click.option(
+    "--albedo", type=Albedo(), metavar="A",
+    help="Ground reflectance: a number, 12 by month, 'file' or 'snow' (EPW); default: 0.2.",
+)  # fmt: skip
 needed_weather_option = click.option(
     "--weather", required=True, type=FILE, help="Hourly weather file (EPW)."
 )
@@ -291,6 +315,7 @@ def input_options(
             metavar="[BUILDING]" if demo else "BUILDING",
         ),
         *weathers[weather],
+        *([albedo_option] if weather else []),
         *([system_option] if system else []),
         *([glazing_option, tau_option] if glazing else []),
         *([] if not spaces else [

@@ -88,7 +88,9 @@ def _system(state: ShadingState, window: Window, path: Path, source: str) -> Fen
         raise DataError(label, file=path, element=f"window {window.name or window.guid}")
     named = "" if state.file is None else f" as {state.file.name}"
     thermal = held_thermal(state)
-    return system_of(state.bands, name, path=path, source=f"{source}{named}", **thermal)
+    angular = thermal.pop("angular") if state.angular is not None else None
+    system = system_of(state.bands, name, path=path, source=f"{source}{named}", **thermal)
+    return system if angular is None else replace(system, angular=angular)
 
 
 def _source(states: Iterable[ShadingState], path: Path) -> str:
