@@ -45,11 +45,15 @@ PHRASES = {  # a regular expression, and what to write
         "say which side: outside, on the room side of",
     r"(a|an|each|every|one) (row|ray|path|column|line|picture) an? "
     r"(hour|pixel|sensor|case|room|patch)": "... per ...",
-    r"mend(s|ed|ing)?\b": "fix",
+    r"\bmend(s|ed|ing)?\b": "fix",
     r"does without|do without": "omits",
     r"(walks|walk) of light": "random walks",
     r"for itself\b": "separately",
     r"neither .{1,40} nor .{1,40} hold": "say it with a verb",
+    r"each for itself|all by itself": "separately",
+    r"so far apart": "spacing",
+    r"asks? for nothing": "needs no, loads nothing",
+    r"to be had\b": "available",
 }  # fmt: skip
 NAMES = {  # names of public functions, classes, parameters and fields
     "found": "result", "said": "message", "heard": "callbacks", "given": "overrides",
@@ -62,26 +66,18 @@ ALLOWED = {"given_sky"}  # public names that stay until the next breaking versio
 # Parts of the code that still have such phrases or names: the list shrinks, and none enters it
 NOT_CLEAN: set[str] = {
     "bim",
-    "bim/bonsai",
-    "bim/gbxml",
-    "bim/honeybee",
     "bim/ifc",
     "bim/radiance",
-    "bim/surroundings",
     "mitsuba_cfs/methods",
     "mitsuba_cfs/trace",
     "scenes",
     "scenes/calibration",
     "scenes/commands",
     "scenes/comply",
-    "scenes/fenestration",
     "scenes/heat",
     "scenes/photovoltaics",
     "scenes/report",
-    "scenes/room",
-    "scenes/run",
     "scenes/study",
-    "scenes/study_report",
     "scenes/year_of_glare",
 }
 

@@ -72,6 +72,8 @@ def read_epw(path: str | PathLike[str]) -> Weather:
         wind_speed=wind,
         wind_direction_deg=column.whole("wind direction"),
         horizontal_infrared=infrared,
+        stated_albedo=column.unchecked("albedo"),
+        snow_depth_cm=column.unchecked("snow depth"),
         ground_depth_m=depth,
         ground_temperature_c=ground,
         first_weekday=weather_table.epw_first_weekday(head),

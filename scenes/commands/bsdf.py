@@ -246,7 +246,10 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
 
 
 @command.command()
-@click.option("--shape", type=click.Choice(SHAPES), default="venetian", show_default=True)
+@click.option(
+    "--shape", type=click.Choice(SHAPES), default="venetian", show_default=True,
+    help="Geometry to trace, or the data sheet of a fabric or product.",
+)  # fmt: skip
 @click.option("--depth-mm", type=LENGTH, help="Chord width of a slat, or depth of a pleat.")
 @click.option("--spacing-mm", type=LENGTH, help="Distance between slats, holes, threads or pleats.")
 @click.option("--openness", type=SHARE, help="Open area fraction of a perforated or woven sheet.")
@@ -259,7 +262,9 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
     help="Slat tilt; positive lowers the exterior edge.",
 )
 @click.option("--radius-mm", type=LENGTH, help="Radius of curvature; default: flat.")
-@click.option("--thickness-mm", type=Number(min=0), default=0.0)
+@click.option(
+    "--thickness-mm", type=Number(min=0), default=0.0, help="Thickness of a slat or sheet."
+)
 @click.option(
     "--index",
     type=Number(min=1),
@@ -272,8 +277,15 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
 @click.option("--fabric", help="Name and colour of a fabric, if the file has several.")
 @click.option("--visible", type=SHARE, help="Visible reflectance (Radiance plastic).")
 @click.option("--solar", type=SHARE, help="Solar reflectance; default: the visible one.")
-@click.option("--specular", type=SHARE, default=0.0)
-@click.option("--roughness", type=Number(min=0), default=0.0)
+@click.option(
+    "--specular", type=SHARE, default=0.0, help="Specular reflectance (Radiance plastic)."
+)
+@click.option(
+    "--roughness",
+    type=Number(min=0),
+    default=0.0,
+    help="Roughness of the specular part (Radiance plastic).",
+)
 @basis_option
 @tensor_tree_option
 @click.option("--isotropic", is_flag=True, help="Tensor tree of rank 3: mean over azimuths.")
@@ -444,7 +456,7 @@ def _print_shares(patterns: Sequence[Pattern], band: int) -> None:
 @click.option(
     "--glazing",
     type=click.Choice(["A", "B", "C", "D"]),
-    help="Reference glazing of EN 14501, with --place.",
+    help="Reference glazing by name; of EN 14501, with --place.",
 )
 @click.option(
     "--kappa", type=click.FloatRange(0, 1), default=0.4, show_default=True,

@@ -27,7 +27,7 @@ def irradiation_picture(result: PvResult, towards: NDArray[np.float64]) -> NDArr
     """An orthographic picture [HEIGHT, WIDTH, 3], seen from the direction `towards` [3].
 
     Modules carry the annual irradiation of their groups of cells, everything else is grey; they
-    shine through what stands before them.
+    are drawn over whatever obstructs them.
     """
     elements = result.standing.elements
     triangles = np.concatenate([element.triangles for element in elements])

@@ -114,7 +114,7 @@ class ScheduleTable(DaysTable):
     peak: float = 1.0  # multiplies all values
     holidays: tuple[Date, ...] | None = None  # in place of the calendar's
     season: tuple[SeasonTable, ...] = ()  # the first that applies replaces the days above
-    csv: Path | None = None  # a row an hour, with a header
+    csv: Path | None = None  # one row per hour, with a header
     column: str = ""
     _year: YearSchedule | None = PrivateAttr(None)  # of a building's file, in place of the profiles
 

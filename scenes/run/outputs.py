@@ -159,7 +159,7 @@ def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
 
 
 def _write_grids(grids: Sequence[GridDaylight], place: Path) -> None:
-    """Tables of the sensor grids of the building's file: one row a grid, one row a sensor."""
+    """Tables of the sensor grids of the building's file: one row per grid, one row per sensor."""
     if not grids:
         return
     rows = [{"grid": g.name, "sensors": len(g.sensor_metrics)} | g.metrics for g in grids]

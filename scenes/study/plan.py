@@ -66,8 +66,9 @@ class Case:
     glare: str  # DGP, eDGP, sDGP or none
     chosen: str = ""  # why this method, where `auto` chose it
     referenced: tuple[InputFile, ...] = ()  # BSDF files that the building's names, and those beside
-    surroundings: tuple[InputFile, ...] = ()  # of what stands around the building
+    surroundings: tuple[InputFile, ...] = ()  # around the building
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
+    albedo: float | tuple[float, ...] | str | None = None  # of the ground, as of `InputOptions`
     join: tuple[str, ...] = ()  # these four as of `InputOptions`
     furniture: bool = False
     apertures: tuple[str, ...] = ()
@@ -87,6 +88,7 @@ class Case:
             _plain(self.options.named()),
             self.glare,
             [source.sha256 for source in self.referenced],
+            self.albedo,
         )[:32]
 
     @property
@@ -124,6 +126,7 @@ class Case:
             facade_panes=self.facade_panes,
             surroundings=tuple(file.path for file in self.surroundings),
             surroundings_offset=self.surroundings_offset,
+            albedo=self.albedo,
         )
 
 
@@ -195,7 +198,7 @@ def _check_turning(study: Study) -> None:
 
 
 def _of_system(study: Study, system: SystemTable) -> dict:
-    """What a case is told of its system, and of the operation with it."""
+    """The system of a case, with its operation."""
     beside = None if system.bsdf is None else system.bsdf.with_suffix(".toml")
     operation = system.operation or study.operation
     referenced = () if system.bsdf is None else files_beside(system.bsdf)[1:]
@@ -231,6 +234,7 @@ def _of_space(
                         options=RoomOptions.of(**options),
                         program=program_version(),
                         glare=study.glare,
+                        albedo=study.albedo,
                         chosen=AUTO if method == AUTO else "",
                     )
 

@@ -173,7 +173,7 @@ def warm_share(result: CaseResult) -> float:
 
 
 def comparison_table(study: StudyResult) -> tables.Table:
-    """One row a case with its main figures."""
+    """One row per case with its main figures."""
     present = {name for result in study.results for name in result.figures}
     columns = [c for c in COLUMNS if c in present]
     headings = (
