@@ -46,38 +46,38 @@ class KnownFenestration:
         heat = {id(s): checked_system(s, self.file) for s in self.systems.values()}
         notes = list(dict.fromkeys(note for one in heat.values() for note in one.notes))
         left = [window for window in self.windows if window.guid not in self.systems]
-        found = stated_u_and_g(left, self.file)
+        result = stated_u_and_g(left, self.file)
         for guid, system in self.systems.items():
             thermal = heat[id(system)]
-            found[guid] = thermal.fenestration.u_value, float(thermal.g_value[0])
+            result[guid] = thermal.fenestration.u_value, float(thermal.g_value[0])
         for number, (name, value) in enumerate((("U", DEFAULT_U), ("g", DEFAULT_G))):
-            names = [w.name or w.guid for w in left if found[w.guid][number] is None]
+            names = [w.name or w.guid for w in left if result[w.guid][number] is None]
             if names:
                 notes.append(f"{windows_named(names)}: no {name} is known, {value:g} is written.")
-        return found, tuple(notes)
+        return result, tuple(notes)
 
     def groups(self, space: Space) -> list[FilledGroup]:
         """The window groups of a room by orientation and system, with their matrices."""
         nothing = FenestrationSystem("unknown", None, None)
         systems = {w.guid: (self.systems.get(w.guid, nothing),) for w in space.windows}
         windows = room_windows(space, systems)
-        found = []
+        result = []
         for group, (system,) in zip(windows.groups, windows.systems, strict=True):
             if system is nothing:
-                found.append(FilledGroup(group))
+                result.append(FilledGroup(group))
                 continue
             klems = BsdfFile({"Visible": system.visible, "Solar": system.solar}, system.name)
             tree = None if system.tree is None else BsdfFile({"Visible": system.tree}, system.name)
-            found.append(FilledGroup(group, klems, tree))
-        return found
+            result.append(FilledGroup(group, klems, tree))
+        return result
 
     def bsdfs(self, band: str = "visible") -> dict[str, BsdfFile]:
         """The band of each window, the visible one as finely as it is known, by GUID.
 
         Either stands as the visible one, which is what the scenes' plugins read.
         """
-        found = {g: s.fine if band == "visible" else s.solar for g, s in self.systems.items()}
-        return {g: BsdfFile({"Visible": bsdf}, self.systems[g].name) for g, bsdf in found.items()}
+        result = {g: s.fine if band == "visible" else s.solar for g, s in self.systems.items()}
+        return {g: BsdfFile({"Visible": bsdf}, self.systems[g].name) for g, bsdf in result.items()}
 
 
 def known_fenestration(spaces: Iterable[Space], file: Path) -> KnownFenestration:

@@ -133,7 +133,7 @@ def read_building(
         join: rooms to make one, as "Hall + Living".
         furniture: whether furniture is in the light and the views of its room.
         apertures: materials of a Radiance scene's surfaces that are windows.
-        surroundings: files of what stands around, see `bim.with_surroundings`.
+        surroundings: files of the surroundings, see `bim.with_surroundings`.
         surroundings_offset: added to their coordinates [m] in place of any georeference.
         facade_panes: materials of a Radiance scene's panes before dark rooms; they mirror.
 

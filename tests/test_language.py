@@ -68,21 +68,7 @@ NOT_CLEAN: set[str] = {
     "bim/ifc",
     "bim/radiance",
     "bim/surroundings",
-    "mitsuba_cfs/methods",
     "mitsuba_cfs/trace",
-    "scenes",
-    "scenes/calibration",
-    "scenes/commands",
-    "scenes/comply",
-    "scenes/fenestration",
-    "scenes/heat",
-    "scenes/photovoltaics",
-    "scenes/report",
-    "scenes/room",
-    "scenes/run",
-    "scenes/study",
-    "scenes/study_report",
-    "scenes/year_of_glare",
 }
 
 PHRASE = re.compile("|".join(f"(?:{pattern})" for pattern in PHRASES), re.IGNORECASE)

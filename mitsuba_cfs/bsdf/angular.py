@@ -124,7 +124,7 @@ def _table_of(panes: Sequence[PaneOptics]) -> AngularTable:
     """The mean of both polarisations of panes [2, N] behind each other."""
     whole = stack(panes)
     values = (whole.tau, whole.rho_front, whole.rho_back)
-    tau, front, back = (np.clip(one.mean(axis=0), 0, 1) for one in values)
+    tau, front, back = (np.clip(value.mean(axis=0), 0, 1) for value in values)
     return AngularTable(ANGLES, tau, front, back)
 
 

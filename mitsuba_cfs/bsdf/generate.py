@@ -106,12 +106,12 @@ def generate_tensor_tree(
     systems, bounds = [], []
     for total in sums:
         values = total[0] * np.float32(width**2 / np.pi / per_row)
-        found = {
+        result = {
             name: culled_tree(grid, cull, noise=noise)
             for name, grid in _dense_grids(values, rank, width).items()
         }
-        systems.append(TensorTreeBsdf(**{name: tree for name, (tree, _) in found.items()}))
-        bounds += [bound for _, bound in found.values()]
+        systems.append(TensorTreeBsdf(**{name: tree for name, (tree, _) in result.items()}))
+        bounds += [bound for _, bound in result.values()]
     return tuple(systems), max(bounds)
 
 

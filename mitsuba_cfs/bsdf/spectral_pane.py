@@ -101,12 +101,12 @@ def spectral_glazing(
     angles = np.atleast_1d(np.asarray(theta, dtype=float))
     nm, whole = _whole(panes, angles)
     stacked = (whole.tau, whole.rho_front, whole.rho_back, whole.absorptance)
-    found = {}
+    result = {}
     for band in ("Solar", "Visible"):
         average = visible_average if band == "Visible" else solar_average(spectrum)
         tau, front, back, absorbed = (_averaged(nm, values, average) for values in stacked)
-        found[band] = BandValues(tau, front, back, absorbed)
-    return found
+        result[band] = BandValues(tau, front, back, absorbed)
+    return result
 
 
 @dataclass(frozen=True, slots=True)

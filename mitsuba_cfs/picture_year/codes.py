@@ -68,11 +68,11 @@ def unpacked(data: bytes, sizes: tuple[int, ...]) -> list[Codes]:
         return [Codes(empty, np.zeros(size, dtype=np.uint8)) for size in sizes]
     raw = zlib.decompress(data, DEFLATED)
     counts = np.frombuffer(raw, "<u2", len(sizes))
-    at, levels, found = 2 * len(sizes), [], []
+    at, levels, result = 2 * len(sizes), [], []
     for count in counts.tolist():
         levels.append(np.frombuffer(raw, "<f4", count, at))
         at += 4 * count
     for level, size in zip(levels, sizes, strict=True):
-        found.append(Codes(level, np.frombuffer(raw, np.uint8, size, at)))
+        result.append(Codes(level, np.frombuffer(raw, np.uint8, size, at)))
         at += size
-    return found
+    return result

@@ -71,13 +71,13 @@ class PictureYear:
     def values(self, hour: int) -> NDArray[np.float32]:
         """Luminance [n] of the pixels in an hour, without the sun's disc."""
         beam, ratio = unpacked(self.codes[hour], (len(self.pixels), len(self.window)))
-        found = self._part(0, hour)[self.row] * self.share + beam.values(0.0)
+        result = self._part(0, hour)[self.row] * self.share + beam.values(0.0)
         shown = self._part(1, hour)
         if ratio.code.any():
             known = np.maximum(shown, self.floor[hour])
             shown = np.where(ratio.code > 0, known * ratio.values(1.0), shown)
-        found[self.window] += shown
-        return found
+        result[self.window] += shown
+        return result
 
     def _part(self, which: int, hour: int) -> NDArray[np.float32]:
         patterns = (self.rows, self.windows)[which]
@@ -106,8 +106,8 @@ def picture_year(pictures: Pictures, *, seed: int = 0, progress: Progress = sile
         progress("explorer", done / max(pictures.hours, 1))
     year = work.year()
     hours = np.array(sorted(rated), dtype=np.int64)
-    kept = [work.dgp(year.values(h), year.discs[h]) for h in hours.tolist()]
-    check = DgpCheck(hours, np.array([rated[h] for h in hours.tolist()]), np.array(kept))
+    dgps = [work.dgp(year.values(h), year.discs[h]) for h in hours.tolist()]
+    check = DgpCheck(hours, np.array([rated[h] for h in hours.tolist()]), np.array(dgps))
     return work.year(check)
 
 

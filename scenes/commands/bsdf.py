@@ -38,16 +38,21 @@ class Number(click.FloatRange):
 
 
 basis_option = click.option(
-    "--basis", type=click.Choice(["full", "half", "quarter"]), default="full", show_default=True,
+    "--basis",
+    type=click.Choice(["full", "half", "quarter"]),
+    default="full",
+    show_default=True,
     help="Klems basis.",
-)  # fmt: skip
+)
 tensor_tree_option = click.option(
     "--tensor-tree", type=click.IntRange(1, 6), help="4^N cells a hemisphere instead."
 )
 cull_option = click.option(
-    "--cull", type=Number(0, 1, max_open=True), default=0.9,
+    "--cull",
+    type=Number(0, 1, max_open=True),
+    default=0.9,
     help="Share of a tree's cells to merge away.",
-)  # fmt: skip
+)
 
 
 INFO_ANGLES_DEG = (0, 10, 20, 30, 40, 50, 60, 70, 80)
@@ -151,9 +156,11 @@ def _description(data: BsdfFile) -> list[str]:
 @click.argument("file", type=FILE)
 @click.argument("pairs", required=False, type=click.Choice(["-"]))
 @click.option(
-    "--incident", type=ANGLES, metavar="THETA PHI",
+    "--incident",
+    type=ANGLES,
+    metavar="THETA PHI",
     help="To the light [degrees]; together with --outgoing.",
-)  # fmt: skip
+)
 @click.option("--outgoing", type=ANGLES, metavar="THETA PHI", help="It leaves to [degrees].")
 @BAND_OPTION
 def evaluate(file: Path, pairs: str | None, incident, outgoing, band: str) -> None:
@@ -303,9 +310,12 @@ def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, out:
 @command.command("interpolate")
 @click.argument("files", nargs=-1, required=True, type=FILE, metavar="MEASURED.txt ...")
 @click.option(
-    "--normal", type=click.Choice(["room", "outside"]), default="room", show_default=True,
+    "--normal",
+    type=click.Choice(["room", "outside"]),
+    default="room",
+    show_default=True,
     help="Where the sample's normal points to.",
-)  # fmt: skip
+)
 @basis_option
 @tensor_tree_option
 @cull_option
@@ -363,7 +373,7 @@ def _interpolated(measured: Sequence[Measurement], means: _Means) -> dict[str, B
         _print_shares(patterns, bands.index("Visible"))
         for band, values in zip(bands, means.of(interpolant), strict=True):
             blocks[band][block] = values
-    return {band: means.bsdf(found) for band, found in blocks.items()}
+    return {band: means.bsdf(result) for band, result in blocks.items()}
 
 
 @dataclass(frozen=True)
@@ -412,9 +422,12 @@ def _print_shares(patterns: Sequence[Pattern], band: int) -> None:
     "--glazing", type=click.Choice(["A", "B", "C", "D"]), help="Of EN 14501, with --place."
 )
 @click.option(
-    "--kappa", type=click.FloatRange(0, 1), default=0.4, show_default=True,
+    "--kappa",
+    type=click.FloatRange(0, 1),
+    default=0.4,
+    show_default=True,
     help="Of Kuhn's formula for interior shades.",
-)  # fmt: skip
+)
 @click.option(
     "--out", type=FILE, help="The rows as CSV; as JSON, g by patch with it, by its suffix."
 )
@@ -445,15 +458,15 @@ def thermal(
     missing = [path for path in states if not path.is_file()]
     if missing:
         raise DataError("no such file", file=missing[0])
-    found = [rated_state(path, place=place, glazing=glazing, kappa=kappa) for path in states]
-    rows = [row for state in found for row in state.rows()]
+    rated_states = [rated_state(path, place=place, glazing=glazing, kappa=kappa) for path in states]
+    rows = [row for state in rated_states for row in state.rows()]
     for line in printed(rows):
         click.echo(line)
-    for note in dict.fromkeys(n for s in found for n in s.notes):
+    for note in dict.fromkeys(n for s in rated_states for n in s.notes):
         if place is None:
             click.echo(f"note: {note}")
     if out is not None and out.suffix == ".json":
-        by_patch = {s.path.stem: [round(float(g), 5) for g in s.heat.g_value] for s in found}
+        by_patch = {s.path.stem: [round(float(g), 5) for g in s.heat.g_value] for s in rated_states}
         record = {"rows": rows} if place else {"rows": rows, "g by patch": by_patch}
         write_text(out, json.dumps(record, indent=2) + "\n")
     elif out is not None:
@@ -461,4 +474,4 @@ def thermal(
 
         write_table(pd.DataFrame(rows), out, index=False, float_format="%.4f")
     if toml is not None:
-        write_text(toml, thermal_toml(found[0]))
+        write_text(toml, thermal_toml(rated_states[0]))

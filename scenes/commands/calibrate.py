@@ -12,9 +12,10 @@ from scenes.commands.room_options import size_option
 @click.command()
 @size_option("size", 300, "costs are scaled to those of a study")
 @click.option(
-    "--out", type=click.Path(path_type=Path, dir_okay=False),
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
     help="Where to keep it; default: where `cfs study` looks.",
-)  # fmt: skip
+)
 def command(size: int, out: Path | None) -> None:
     """Time every method and glare metric on this machine.
 
@@ -31,13 +32,15 @@ def command(size: int, out: Path | None) -> None:
     from scenes.commands.progress_bar import ProgressBar
 
     with ProgressBar() as progress:
-        found = calibrated(size, progress=progress)
-    click.echo(f"{found.machine}; pictures of {found.picture_size} x {found.picture_size} pixels")
+        result = calibrated(size, progress=progress)
+    click.echo(
+        f"{result.machine}; pictures of {result.picture_size} x {result.picture_size} pixels"
+    )
     click.echo(f"{'method':14} {'metric':12} {'scene [s]':>10} {'system [s]':>11} {'step [s]':>10}")
-    for c in found.costs:
+    for c in result.costs:
         click.echo(
             f"{c.method:14} {c.metric:12} {c.per_scene:10.2f} {c.per_system:11.2f} "
             f"{c.per_step:10.4f}"
         )
-    found.write(target)
+    result.write(target)
     click.echo(f"kept: {target}")

@@ -16,11 +16,11 @@ from scenes.commands.room_options import (
     chosen_language,
     directions_option,
     eye_height_option,
-    given,
     grid_option,
     input_options,
     named_settings,
     room_options,
+    stated_options,
     taken,
     write_ifc_option,
 )
@@ -41,19 +41,25 @@ DAYS = ((2, 1), (3, 21))  # between which EN 17037 has the day of the sunlight c
     help="Rules to check: en17037, leed-v4.1, any other of docs/comply.md, or a file of your own.",
 )  # fmt: skip
 @click.option(
-    "--closed", type=FILE,
+    "--closed",
+    type=FILE,
     help="BSDF XML file of every window with its blinds closed; default: the last state that the "
     "IFC holds, else LM-83's shade.",
-)  # fmt: skip
+)
 @click.option("--uses", type=FILE, help="TOML file of room uses; see docs/comply.md.")
 @click.option(
-    "--day", default="03-21", show_default=True, metavar="MM-DD",
+    "--day",
+    default="03-21",
+    show_default=True,
+    metavar="MM-DD",
     help="Of the exposure to sunlight, 02-01 to 03-21.",
-)  # fmt: skip
+)
 @click.option(
-    "--sun-altitude", "least_altitude_deg", type=click.FloatRange(0, 45),
+    "--sun-altitude",
+    "least_altitude_deg",
+    type=click.FloatRange(0, 45),
     help="Least altitude of the sun that counts [deg]; default: the rule's for the country.",
-)  # fmt: skip
+)
 @eye_height_option
 @grid_option
 @directions_option
@@ -73,7 +79,7 @@ def command(
     """
     named = named_settings(settings, OF_RULES)
     if chosen["quick"]:
-        chosen |= quick_run.picks(quick_run.ROOM, given())
+        chosen |= quick_run.picks(quick_run.ROOM, stated_options())
     chosen |= named
     own = taken(ComplyOptions, chosen)
     options = ComplyOptions(**own, day=day_of(day), room=RoomOptions.of(**chosen))
@@ -115,8 +121,8 @@ def command(
 
 def day_of(text: str) -> tuple[int, int]:
     """Month and day of "MM-DD", between those of EN 17037."""
-    found = re.fullmatch(r"(\d{1,2})-(\d{1,2})", text)
-    day = (int(found[1]), int(found[2])) if found else (0, 0)
+    match = re.fullmatch(r"(\d{1,2})-(\d{1,2})", text)
+    day = (int(match[1]), int(match[2])) if match else (0, 0)
     if not DAYS[0] <= day <= DAYS[1] or day[1] > (29 if day[0] == 2 else 31) or day[1] < 1:
         raise click.UsageError(f"--day {text!r}: expected a day from 02-01 to 03-21, as 03-21")
     return day

@@ -12,7 +12,6 @@ from scenes.commands.room_options import (
     chosen_language,
     directions_option,
     eye_height_option,
-    given,
     grid_option,
     input_options,
     light_options,
@@ -22,6 +21,7 @@ from scenes.commands.room_options import (
     quick_option,
     samples_option,
     size_option,
+    stated_options,
     subdivide_option,
     view_option,
     with_demo,
@@ -40,9 +40,12 @@ _DEFAULT = YearOptions(Path(), Path())
 @eye_height_option
 @method_option(METHODS, "by paths there are single pictures, cfs picture", default=_DEFAULT.method)
 @click.option(
-    "--metric", type=click.Choice(METRICS), default=_DEFAULT.metric, show_default=True,
+    "--metric",
+    type=click.Choice(METRICS),
+    default=_DEFAULT.metric,
+    show_default=True,
     help="DGP; enhanced simplified (sources of direct light); simplified (illuminance alone).",
-)  # fmt: skip
+)
 @size_option("size", _DEFAULT.size, "as evalglare wants them")
 @samples_option(_DEFAULT.samples, "for all hours together")
 @click.option(
@@ -54,9 +57,12 @@ _DEFAULT = YearOptions(Path(), Path())
     show_default=True, help="Clock hours of use, every day; over midnight too: 18 8.",
 )  # fmt: skip
 @click.option(
-    "--worst", type=click.IntRange(0, 100), default=_DEFAULT.worst, show_default=True,
+    "--worst",
+    type=click.IntRange(0, 100),
+    default=_DEFAULT.worst,
+    show_default=True,
     help="Pictures of each view's worst hours.",
-)  # fmt: skip
+)
 @click.option("--hdr", is_flag=True, help="These pictures as .hdr too.")
 @subdivide_option
 @light_options
@@ -82,7 +88,7 @@ def command(out: Path, page: Path | None, **chosen) -> None:
     from scenes.year_of_glare.views import read_files
 
     if chosen["quick"]:
-        chosen |= quick.picks(quick.VIEWS, given())
+        chosen |= quick.picks(quick.VIEWS, stated_options())
     page_options = read_page(page, GlareSection, chosen_language())
     named = (chosen["building"], chosen["weather"], chosen["system"])
     files = (*named, *map(Path, chosen["views"]), *chosen["surroundings"], *page_options.inputs)
@@ -100,7 +106,7 @@ def command(out: Path, page: Path | None, **chosen) -> None:
     head = PrintedHead()
     with ProgressBar() as progress:
         year = read_year(options, progress, read, head)
-        views = rate_views(year, folder.kept(outputs.KEPT), progress)
+        views = rate_views(year, folder.checkpoints(outputs.KEPT), progress)
         with folder.replaced() as place:
             rows = [outputs.write_view(year, rated, place) for rated in views]
             table = outputs.write_summary(year, rows, place)

@@ -19,16 +19,18 @@ RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 @click.command()
 @click.argument("results", type=RESULTS, nargs=-1, required=True, metavar="RESULTS...")
 @click.option(
-    "--out", type=click.Path(path_type=Path),
-    help="Write one folder that opens as a file, and end.",
-)  # fmt: skip
+    "--out", type=click.Path(path_type=Path), help="Write one folder that opens as a file, and end."
+)
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, help="On the loopback address; 0: any."
 )
 @click.option(
-    "--language", type=click.Choice(["en", "de", "fr"]), default="en", show_default=True,
+    "--language",
+    type=click.Choice(["en", "de", "fr"]),
+    default="en",
+    show_default=True,
     help="Language of the page; of several runs, or of --out.",
-)  # fmt: skip
+)
 @click.option("--no-browser", is_flag=True, help="Only say the address.")
 def command(
     results: Sequence[Path], out: Path | None, port: int, language: str, no_browser: bool
@@ -42,7 +44,7 @@ def command(
     from scenes.language.catalogue import in_language
     from scenes.result_folder import ResultFolder
 
-    folders = [explorer_of(one) for one in results]
+    folders = [explorer_of(result) for result in results]
     for one in results:
         _print_head(one, several=len(results) > 1)
     if out is not None:

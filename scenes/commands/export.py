@@ -37,21 +37,26 @@ PATTERNS = {  # of the files that an export writes
 @click.command()
 @input_options("all", weather="", system=False)
 @click.option(
-    "--radiance", type=click.Path(file_okay=False, path_type=Path),
+    "--radiance",
+    type=click.Path(file_okay=False, path_type=Path),
     help="Folder of Radiance scenes; one folder inside for each room.",
-)  # fmt: skip
+)
 @click.option(
-    "--mitsuba", type=click.Path(file_okay=False, path_type=Path),
+    "--mitsuba",
+    type=click.Path(file_okay=False, path_type=Path),
     help="Folder of Mitsuba scenes; one folder inside for each room with a window.",
-)  # fmt: skip
+)
 @click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
 @click.option("--honeybee", type=click.Path(path_type=Path), help="honeybee model (.hbjson).")
 @click.option("--gbxml", type=click.Path(path_type=Path), help="gbXML file (.gbxml).")
 @click.option(
-    "--band", type=click.Choice(BANDS, case_sensitive=False), default="Visible", show_default=True,
+    "--band",
+    type=click.Choice(BANDS, case_sensitive=False),
+    default="Visible",
+    show_default=True,
     help="Visible or Solar; of the Radiance and Mitsuba scenes.",
-)  # fmt: skip
+)
 @spacing_option
 @height_option
 @subdivision_option
@@ -73,8 +78,8 @@ def command(
 
     BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
 
-    Windows go with the BSDF, U and g that the file holds or states for them; where they come from,
-    and what is not known, is said.
+    Windows are written with the BSDF, U and g of the file; their sources, and values that are not
+    known, are printed.
     """
     options = InputOptions(**chosen, weather=None)
     building = options.building
@@ -100,9 +105,12 @@ def command(
     head = PrintedHead()
     head(head_of(read, light_only=True).with_assumptions(known.notes()))
     writers = room_writers(
-        known, band.lower(), spacing=sensor_spacing, height=sensor_height,
+        known,
+        band.lower(),
+        spacing=sensor_spacing,
+        height=sensor_height,
         sky_division=int(subdivision),
-    )  # fmt: skip
+    )
     export_folders(read, spaces, writers, folders)
     exported = replace(read, spaces=tuple(spaces))
     assumed = export_files(exported, known, epjson=epjson, honeybee=honeybee, gbxml=gbxml)

@@ -26,9 +26,12 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option(
-    "--out", required=True, type=click.Path(path_type=Path, dir_okay=False), metavar="ADDON.zip",
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="ADDON.zip",
     help="The add-on, for Blender's Preferences, Add-ons, Install from Disk.",
-)  # fmt: skip
+)
 def bonsai(out: Path) -> None:
     """Write the Bonsai panel: cfs run on the open IFC file, rooms coloured by result."""
     check_file(out, field="--out")
@@ -55,9 +58,12 @@ def _renamed(name: str, current: click.Command) -> click.Command:
         return current.callback(**chosen) if current.callback is not None else None
 
     return click.Command(
-        name, params=current.params, callback=callback, help=current.help,
+        name,
+        params=current.params,
+        callback=callback,
+        help=current.help,
         short_help=f"Now `cfs {name}`.",
-    )  # fmt: skip
+    )
 
 
 for _name, _current in (("check", check), ("export", export)):
@@ -71,28 +77,39 @@ for _name, _current in (("check", check), ("export", export)):
 @space_option("rooms", "its windows")
 @click.option("--storey", "storeys", multiple=True, metavar="NAME", help="Windows of a storey.")
 @click.option(
-    "--facade", "facades", multiple=True, metavar="N|E|S|W|FROM-TO",
+    "--facade",
+    "facades",
+    multiple=True,
+    metavar="N|E|S|W|FROM-TO",
     help="Windows that face there: also NE ..., roof, or azimuths such as 150-210.",
-)  # fmt: skip
+)
 @click.option(
-    "--all", "every_window", is_flag=True,
+    "--all",
+    "every_window",
+    is_flag=True,
     help="Every IfcWindow; glazed doors and panels only by GUID, room, storey or facade.",
-)  # fmt: skip
+)
 @click.option(
-    "--bsdf", type=FILE,
-    help="BSDF XML file: Klems or tensor tree; U, g and more of the .toml beside it come along.",
-)  # fmt: skip
+    "--bsdf",
+    type=FILE,
+    help="BSDF XML file: Klems or tensor tree; the .toml beside it is attached too.",
+)
 @click.option(
-    "--g", "g_value", metavar="NUMBER|FILE.csv",
+    "--g",
+    "g_value",
+    metavar="NUMBER|FILE.csv",
     help="g at normal incidence; or a CSV: polar_deg, g and maybe azimuth_deg.",
-)  # fmt: skip
+)
 @u_option
 @click.option("--state", default="", help="Name of the shading state; default: the usual one.")
 @click.option("--reference", is_flag=True, help="Name the BSDF file instead of copying it.")
 @click.option(
-    "-o", "--out", required=True, type=click.Path(dir_okay=False, path_type=Path),
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
     help="IFC file to write.",
-)  # fmt: skip
+)
 def attach(
     building: Path,
     *,
@@ -185,14 +202,14 @@ def query(building: Path, selector: str) -> None:
 
     from bim.ifc.query import query as chosen_elements
 
-    found = chosen_elements(building, selector)
+    elements = chosen_elements(building, selector)
     table = Table()
     for head in ("class", "name", "type", "storey", "material", "layer", "GUID"):
         table.add_column(head, overflow="fold")
-    for one in found:
+    for one in elements:
         row = (one.ifc_class, one.name, one.type_name, one.storey, one.material, one.layer)
         table.add_row(*map(escape, row), one.guid)
     console = Console(width=None if Console().is_terminal else UNCUT)
-    if found:
+    if elements:
         console.print(table)
-    console.print(f"{len(found)} elements")
+    console.print(f"{len(elements)} elements")

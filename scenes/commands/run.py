@@ -14,7 +14,6 @@ from scenes.commands.room_options import (
     PrintedHead,
     chosen_language,
     explore_option,
-    given,
     height_option,
     input_options,
     method_option,
@@ -24,6 +23,7 @@ from scenes.commands.room_options import (
     scheduler_option,
     size_option,
     spacing_option,
+    stated_options,
     taken,
     u_option,
 )
@@ -32,8 +32,10 @@ from scenes.run.options import JobOptions
 
 LOADS = ("heating", "cooling", "lighting")
 NEED_PHASES = {
-    "annual_glare": "--annual-glare", "explore": "--explore", "inner_glass": "--inner-glass",
-}  # fmt: skip
+    "annual_glare": "--annual-glare",
+    "explore": "--explore",
+    "inner_glass": "--inner-glass",
+}
 _DEFAULT = RoomOptions()
 
 
@@ -44,9 +46,12 @@ _DEFAULT = RoomOptions()
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
 @click.option(
-    "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH[:MM]'",
+    "--picture",
+    "picture_hours",
+    multiple=True,
+    metavar="'MM-DD HH[:MM]'",
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
-)  # fmt: skip
+)
 @size_option("picture_size", _DEFAULT.outputs.picture_size, "of up to ten in each room's report")
 @spacing_option
 @height_option
@@ -55,29 +60,33 @@ _DEFAULT = RoomOptions()
     show_default=True, help="Outdoor air changes [1/h].",
 )  # fmt: skip
 @click.option(
-    "--operation", type=FILE,
+    "--operation",
+    type=FILE,
     help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
-)  # fmt: skip
+)
 @click.option(
-    "--inner-glass", is_flag=True,
+    "--inner-glass",
+    is_flag=True,
     help="Let daylight through glass and open doorways between rooms; rooms lit by that alone are "
     "computed too, and those open to each other by more than a door are one room.",
-)  # fmt: skip
+)
 @click.option(
     "--no-coupled-heat", "coupled_heat", is_flag=True, flag_value=False, default=True,
     help="Balance each room's heat alone, as if rooms of its own temperature lay around it.",
 )  # fmt: skip
 @click.option(
-    "--no-colour", is_flag=True,
+    "--no-colour",
+    is_flag=True,
     help="Leave each room's picture in colour out; --quick does as well.",
-)  # fmt: skip
+)
 @explore_option()
 @processes_option
 @scheduler_option
 @click.option(
-    "--netcdf", is_flag=True,
+    "--netcdf",
+    is_flag=True,
     help="Write all numbers of all rooms as results.nc besides, for xarray; see docs/formats.md.",
-)  # fmt: skip
+)
 def command(
     out: Path,
     page: Path | None,
@@ -98,7 +107,7 @@ def command(
         raise click.UsageError("--inner-glass and --explore exclude each other")
     named = named_settings(settings)
     if chosen["quick"]:
-        chosen |= quick_run.picks(quick_run.ROOM, given())
+        chosen |= quick_run.picks(quick_run.ROOM, stated_options())
     chosen |= named
     colour = not (chosen.pop("no_colour") or chosen["quick"])
     own = taken(JobOptions, chosen)
@@ -178,10 +187,12 @@ class _RoomLines:
         _print_grids(room)
 
     def year(self, room) -> None:
-        """Print those of its heat, and of its light where that was not said."""
-        said = room.space.guid in self._lit
-        click.echo(f"{room.space.label}: {_heat_figures(room)}" if said else summary_line(room))
-        if not said:
+        """Print the figures of its heat, and those of its light if not printed yet."""
+        light_printed = room.space.guid in self._lit
+        click.echo(
+            f"{room.space.label}: {_heat_figures(room)}" if light_printed else summary_line(room)
+        )
+        if not light_printed:
             _print_grids(room)
 
 

@@ -33,9 +33,10 @@ from scenes.commands.room_options import (
 @out_folder_option
 @click.option("--figures", is_flag=True, help="A figure of each room's year as SVG.")
 @click.option(
-    "--energyplus", is_flag=True,
+    "--energyplus",
+    is_flag=True,
     help="The same rooms as an input of EnergyPlus too (model.epJSON, schedules.csv).",
-)  # fmt: skip
+)
 @surroundings_option
 @surroundings_offset_option
 @quick_option

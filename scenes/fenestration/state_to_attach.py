@@ -37,7 +37,7 @@ def state_to_attach(
     g = _given_g(g_value)
     table = g if isinstance(g, AngularGValue) else None
     number = g if isinstance(g, float) else None
-    one = ShadingState(
+    shading_state = ShadingState(
         name,
         file.bands if file is not None and copy_bsdf else {},
         table,
@@ -47,8 +47,8 @@ def state_to_attach(
         beside.closure,
         beside.shading_position,
     )
-    notes += _origins(one, beside, source.name, u_value=u_value, g_value=g_value)
-    return one, tuple(notes)
+    notes += _origins(shading_state, beside, source.name, u_value=u_value, g_value=g_value)
+    return shading_state, tuple(notes)
 
 
 def _given_g(text: str | None) -> AngularGValue | float | None:
@@ -75,10 +75,10 @@ def _origins(
     u_value: float | None,
     g_value: str | None,
 ) -> list[str]:
-    """Where U, g, closure and position are from, and what of the file beside is not used."""
+    """Sources of U, g, closure and position, and unused values of the file beside."""
     notes = []
     if state.u_value is None:
-        notes.append("no U: a typical one will be taken, and said")
+        notes.append("no U: a typical value will be used and reported")
     else:
         notes.append(f"U {state.u_value:g} W/(m2 K) from {file if u_value is None else '--u'}")
     if u_value is not None and beside.u_value is not None:
@@ -92,7 +92,7 @@ def _origins(
         patches = "" if state.g_by_patch is None else f" for {len(state.g_by_patch)} directions"
         notes.append(f"g{' and'.join(part for part in (normal, patches) if part)} from {file}")
     else:
-        notes.append("no g: a typical one will be taken, and said")
+        notes.append("no g: a typical value will be used and reported")
     if state.closure is not None:
         notes.append(f"closure of the thermal model ({state.closure.u_model} U) from {file}")
     if state.shading_position is not None:

@@ -191,7 +191,7 @@ def system_of_panes(layers: Sequence[GlazingLayerTable]) -> FenestrationSystem:
 
 
 def _by_wavelength(panes: Sequence[SpectralPane]) -> dict[str, AngularTable]:
-    found = spectral_glazing(panes, ANGLES)
+    result = spectral_glazing(panes, ANGLES)
     return {
         band: AngularTable(
             ANGLES,
@@ -200,7 +200,7 @@ def _by_wavelength(panes: Sequence[SpectralPane]) -> dict[str, AngularTable]:
                 for values in (one.transmittance, one.reflectance_front, one.reflectance_back)
             ),
         )
-        for band, one in found.items()
+        for band, one in result.items()
     }
 
 

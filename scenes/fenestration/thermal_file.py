@@ -365,8 +365,8 @@ class ClosureTable(TomlTable):
     def placed(self: Table, folder: Path) -> Table:
         """The table with the files of its panes in a folder."""
         layers = tuple(
-            one if one.pane is None else one.model_copy(update={"pane": folder / one.pane})
-            for one in self.layers
+            layer if layer.pane is None else layer.model_copy(update={"pane": folder / layer.pane})
+            for layer in self.layers
         )
         return self.model_copy(update={"layers": layers})
 
@@ -435,7 +435,7 @@ class StateTable(WindowHeatTable):
 
 
 class ThermalTable(WindowHeatTable):
-    """The file beside a BSDF: the same as a study's [[system]], and what g was worked out from."""
+    """The file beside a BSDF: keys as of a study's [[system]], and the source of g."""
 
     angular: AngularData | None = None  # of a specular system, visible
     # layer by layer; for readers, the balance takes g

@@ -50,7 +50,7 @@ def box_building(box: BoxTable) -> Building:
 def building_or_box(
     box: BoxTable | None, options: InputOptions, progress: Progress = silent
 ) -> Building:
-    """The building of the options' file, or a box with what stands around it."""
+    """The building of the options' file, or a box with its surroundings."""
     if box is None:
         return building_of(options, progress)
     read = options.read

@@ -13,9 +13,9 @@ from bim.model import Element
 from bim.planes import area_vectors, planar_facets
 from bim.rays import RayMesh, hemisphere, ray_mesh
 
-OFF_THE_FACE = 0.005  # sensors stand so far before the glass [m]
-NEARLY_AS_BIG = 0.8  # share of the biggest face's area that the other side of a module has
-RAYS = 64  # that tell the free side from the side towards the wall
+OFF_THE_FACE = 0.005  # distance of the sensors from the glass [m]
+NEARLY_AS_BIG = 0.8  # least area of a module's other side, as a share of its biggest face
+RAYS = 64  # to distinguish the free side from the side towards the wall
 TOUCHING = 0.5  # what stops a ray so near covers that side [m]
 
 
@@ -63,7 +63,7 @@ def pv_modules(
         if element.guid in guids:
             parts.setdefault(element.guid, []).append(element)
     mesh = ray_mesh(np.concatenate([e.triangles for e in elements] or [np.empty((0, 3, 3))]))
-    return [_module(own, mesh, substrings, along) for own in parts.values()]
+    return [_module(part, mesh, substrings, along) for part in parts.values()]
 
 
 def _module(parts: Sequence[Element], mesh: RayMesh, substrings: int, along: int) -> PvModule:

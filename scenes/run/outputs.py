@@ -100,9 +100,12 @@ def _write_rooms(
     """The files of each room in its folder."""
     rooms = list(zip(result.spaces, places, strict=True))
     tasks = Tasks(
-        rooms, _Files(result.times), _fault,
-        key=lambda item: item[0].space.guid, scene=lambda item: item[0].space.guid,
-    )  # fmt: skip
+        rooms,
+        _Files(result.times),
+        _fault,
+        key=lambda item: item[0].space.guid,
+        scene=lambda item: item[0].space.guid,
+    )
     # a process takes as long to begin as it does to write some rooms
     processes = min(processes, len(rooms) // ROOMS_A_PROCESS)
     with closing(tasks.results(processes=processes)) as written:
@@ -159,7 +162,7 @@ def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
 
 
 def _write_grids(grids: Sequence[GridDaylight], place: Path) -> None:
-    """Tables of the sensor grids of the building's file: one row a grid, one row a sensor."""
+    """Tables of the sensor grids of the building's file: one row per grid, one row per sensor."""
     if not grids:
         return
     rows = [{"grid": g.name, "sensors": len(g.sensor_metrics)} | g.metrics for g in grids]

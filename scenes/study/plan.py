@@ -66,7 +66,7 @@ class Case:
     glare: str  # DGP, eDGP, sDGP or none
     chosen: str = ""  # why this method, where `auto` chose it
     referenced: tuple[InputFile, ...] = ()  # BSDF files that the building's names, and those beside
-    surroundings: tuple[InputFile, ...] = ()  # of what stands around the building
+    surroundings: tuple[InputFile, ...] = ()  # of the surroundings
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     join: tuple[str, ...] = ()  # these four as of `InputOptions`
     furniture: bool = False
@@ -161,7 +161,7 @@ def plan_of(study: Study) -> StudyPlan:
     held = SystemTable.model_construct(name=AS_HELD)
     systems = [_of_system(study, system) for system in study.system or (held,)]
     climates = [{"climate": c.name, "weather": InputFile.of(c.weather)} for c in study.climate]
-    found: list[Case] = []
+    cases: list[Case] = []
     rooms = {}
     _check_turning(study)
     around = tuple(map(InputFile.of, study.surroundings))
@@ -183,8 +183,8 @@ def plan_of(study: Study) -> StudyPlan:
             mine = [one | {"referenced": (*held_files, *one["referenced"])} for one in systems]
             of_space = list(_of_space(study, about, mine, climates))
             rooms[of_space[0].scene] = building, space
-            found += of_space
-    return StudyPlan(tuple(found), rooms)
+            cases += of_space
+    return StudyPlan(tuple(cases), rooms)
 
 
 def _check_turning(study: Study) -> None:
@@ -195,7 +195,7 @@ def _check_turning(study: Study) -> None:
 
 
 def _of_system(study: Study, system: SystemTable) -> dict:
-    """What a case is told of its system, and of the operation with it."""
+    """Fields of a case that describe its system and its operation."""
     beside = None if system.bsdf is None else system.bsdf.with_suffix(".toml")
     operation = system.operation or study.operation
     referenced = () if system.bsdf is None else files_beside(system.bsdf)[1:]
