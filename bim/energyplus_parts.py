@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,14 +11,14 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bim.model import Face, Window
-from bim.planes import merged_polygons, plane_through, triangulated
+from bim.model import Face, MaterialLayer, Window
+from bim.planes import merged_polygons, newell_normal, plane_through, triangulated
 from mitsuba_cfs.errors import DataError
 from thermal.zone import Layer
 
 VERSION = "25.2"
-MOST_LAYERS = 10  # of a construction in EnergyPlus
-THINNEST = 0.003  # thinner layers have no mass worth a conduction transfer function [m]
+MOST_LAYERS = 10  # of a construction in EnergyPlus and in honeybee
+LEAST_SURFACE = 1e-3  # [m2]
 NEAR = 0.015  # EnergyPlus takes corners within a centimetre for one [m]
 Model = dict[str, dict[str, Any]]  # objects by class and name
 Ring = NDArray[np.float64]  # [N, 2] or [N, 3] corners, counter-clockwise
@@ -94,6 +96,25 @@ def opaque_construction(
     return found
 
 
+def at_most_layers(layers: Sequence[MaterialLayer]) -> tuple[MaterialLayer, ...]:
+    """At most ten layers: the thinnest neighbours are merged, with their resistance and mass."""
+    result = list(layers)
+    while len(result) > MOST_LAYERS:
+        widths = [a.thickness + b.thickness for a, b in itertools.pairwise(result)]
+        at = widths.index(min(widths))
+        pair = result[at : at + 2]
+        width, mass = widths[at], sum(one.thickness * one.density for one in pair)
+        heat = sum(one.thickness * one.density * one.heat_capacity for one in pair)
+        result[at : at + 2] = [
+            MaterialLayer(
+                " + ".join(one.name for one in pair), width,
+                width / sum(one.thickness / one.conductivity for one in pair), mass / width,
+                heat / mass if mass else pair[0].heat_capacity,
+            )
+        ]  # fmt: skip
+    return tuple(result)
+
+
 def _material(model: Model, layer: Layer, finish: FaceFinish) -> str:
     """Name of a layer's material, written once."""
     optical = {
@@ -102,7 +123,7 @@ def _material(model: Model, layer: Layer, finish: FaceFinish) -> str:
         "solar_absorptance": float(finish.absorptance),
         "visible_absorptance": float(finish.absorptance),
     }
-    if layer.thickness < THINNEST or not layer.density:
+    if not layer.density:
         kind = "Material:NoMass"
         resistance = layer.thickness / layer.conductivity
         entry = {"thermal_resistance": max(resistance, 0.001), **optical}
@@ -144,6 +165,13 @@ def flat_outlines(polygon: shapely.Polygon, gap: float, *, convex: bool) -> list
     if simple.interiors or bent:
         return list(triangulated(simple))
     return [np.asarray(shapely.orient_polygons(simple).exterior.coords)[:-1]]
+
+
+def is_drawable(ring: Ring) -> bool:
+    """Whether EnergyPlus, which merges corners within a centimetre, keeps a polygon [N, 3]."""
+    edges = np.linalg.norm(ring - np.roll(ring, 1, axis=0), axis=1)
+    area = float(np.linalg.norm(newell_normal(ring)))
+    return area > LEAST_SURFACE and area > NEAR * edges.max()
 
 
 def rectangle(

@@ -25,6 +25,7 @@ from bim.energyplus_operation import (
     outdoor_air,
 )
 from bim.energyplus_parts import (
+    LEAST_SURFACE,
     NEAR,
     FaceFinish,
     Model,
@@ -53,7 +54,6 @@ from thermal.ventilation import AirTransfer
 from thermal.zone import OpaqueSurface, Zone
 
 LEAST_SHADE = 0.05  # [m2] smaller plane parts of what stands outdoors shade nothing
-LEAST_SURFACE = 1e-3  # [m2]
 LOOKOUTS = 8  # of so many places before an outer wall one is looked from
 RAYS = 400  # from each point, to what may shade it
 TERRAINS = {"suburbs": "Suburbs", "country": "Country", "city": "City"}

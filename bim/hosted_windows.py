@@ -18,6 +18,7 @@ from bim.planes import Plane, merged_polygons, plane_through, polygons_of
 
 SAME_PLANE = 2e-3  # glass this near the plane of a face lies in it [m]
 WIDER = 1.001  # of a face that is made for a window, in size
+SLIVER = 1.5e-3  # narrower polygons are left out [m]
 INSIDE = 0.01  # share of the glass' border that a face it lies in has to share
 
 
@@ -32,8 +33,16 @@ class HostedPolygon:
 
 
 def hosted_polygons(space: Space) -> list[HostedPolygon]:
-    """The polygons of a room's faces, in their order, and of glass that lies in none of them."""
-    parts = [(face, plane, p) for face in space.faces for plane, p in _polygons(face.triangles)]
+    """The polygons of a room's faces, in their order, and of glass that lies in none of them.
+
+    Slivers, which other programs refuse, are left out.
+    """
+    parts = [
+        (face, plane, polygon)
+        for face in space.faces
+        for plane, polygon in _polygons(face.triangles)
+        if not polygon.buffer(-SLIVER / 2).is_empty
+    ]
     panes: list[list[tuple[Window, shapely.Polygon]]] = [[] for _ in parts]
     extra = []
     for window in space.windows:

@@ -128,6 +128,19 @@ def rings_of(polygon: shapely.Polygon) -> list[NDArray[np.float64]]:
     return [np.asarray(ring.coords)[:-1] for ring in rings]
 
 
+def without_holes(polygon: shapely.Polygon) -> list[shapely.Polygon]:
+    """Polygons without holes that cover one with holes: cut upright through each hole."""
+    if not polygon.interiors:
+        return [polygon]
+    (x, _), (left, low, right, high) = polygon.interiors[0].centroid.coords[0], polygon.bounds
+    halves = (
+        shapely.box(left - 1, low - 1, x, high + 1),
+        shapely.box(x, low - 1, right + 1, high + 1),
+    )
+    cut = shapely.intersection([polygon, polygon], halves, grid_size=GRID)
+    return [part for half in cut for piece in polygons_of(half) for part in without_holes(piece)]
+
+
 def triangulated(polygon: shapely.Polygon) -> NDArray[np.float64]:
     """Counter-clockwise triangles [T, 3, 2] that use every vertex of the polygon and no other."""
     parts = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))

@@ -1,21 +1,24 @@
-"""Rooms as an EnergyPlus input (epJSON): one zone each, walls by layer, windows by U and g.
+"""Rooms as an EnergyPlus input (epJSON): one zone each, walls by layer, windows by BSDF or U and g.
 
 Each window becomes a rectangle of its glass area in a parent surface of the size of its opening,
 which stands for the frame.  Faces towards other rooms are adiabatic: a room can be run alone.
-`bim.energyplus_twin` writes the whole model of a study: schedules, coupling, BSDF, ground.
+`bim.energyplus_twin` writes the whole model of a study: schedules, coupling, gains, ground.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike
 
 from bim.defaults import WINDOW_FRAME
 from bim.energyplus_parts import (
-    MOST_LAYERS,
+    NEAR,
     FaceFinish,
     Model,
+    at_most_layers,
+    is_drawable,
     model_frame,
     object_name,
     opaque_construction,
@@ -23,14 +26,20 @@ from bim.energyplus_parts import (
     outlines,
     write_window,
 )
-from bim.model import Building, Construction, Face, Space, Window
+from bim.energyplus_windows import complex_state
+from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of
+from bim.model import Building, Construction, Face, Space
+from bim.to_thermal import layers_of
 from mitsuba_cfs.files import write_text
-from thermal.zone import OUTSIDE_ABSORPTANCE, Layer
+from thermal.zone import OUTSIDE_ABSORPTANCE
 
 BOUNDARY = {"outside": "Outdoors", "ground": "Ground"}  # all others: adiabatic
 SURFACE_TYPE = {"floor": "Floor", "ceiling": "Ceiling", "roof": "Roof"}
 DEFAULT_U, DEFAULT_G = 1.3, 0.6  # double glazing with low emissivity [W/(m2 K)], [-]
-UAndG = tuple[float | None, float | None]  # of a window; None: not known
+MONTHS = (
+    "january", "february", "march", "april", "may", "june",
+    "july", "august", "september", "october", "november", "december",
+)  # fmt: skip
 
 
 def write_epjson(
@@ -40,32 +49,36 @@ def write_epjson(
     spaces: Sequence[Space] | None = None,
     u_value: float | None = None,
     g_value: float | None = None,
-    known: Mapping[str, UAndG] | None = None,
+    glazing: Glazings | None = None,
+    ground_c: Sequence[float] | None = None,
     air_changes: float = 0.5,
 ) -> None:
     """Write the rooms (by default all) as free-floating zones with hourly air temperatures.
 
     Args:
         u_value, g_value: of every window; by default those that are known or the file states.
-        known: U and g of windows, by GUID, before what the file states.
+        glazing: of windows by GUID, in place of what the file states; a window with `optics` is
+            written as `Construction:ComplexFenestrationState` unless u_value or g_value is given.
+        ground_c: [12] monthly temperature below floors and outside walls in the ground [degC];
+            without it EnergyPlus takes 18 degC.
     """
-    model = model_frame(building.name) | {"WindowMaterial:SimpleGlazingSystem": {}}
-    given = (u_value, g_value)
+    model = model_frame(building.name)
+    if ground_c is not None:
+        if len(ground_c) != len(MONTHS):
+            raise ValueError(f"ground_c: expected 12 monthly values, got {len(ground_c)}")
+        model["Site:GroundTemperature:BuildingSurface"] = {
+            "ground": {
+                f"{month}_ground_temperature": float(value)
+                for month, value in zip(MONTHS, ground_c, strict=True)
+            }
+        }
+    windows = _Windows(model, (u_value, g_value), glazing or {})
     for number, space in enumerate(building.spaces if spaces is None else spaces):
-        _zone(
-            model, f"Z{number} {object_name(space.label)}", space, given, known or {}, air_changes
-        )
+        _zone(model, f"Z{number} {object_name(space.label)}", space, windows, air_changes)
     write_text(path, json.dumps(model, indent=1))
 
 
-def _zone(
-    model: Model,
-    zone: str,
-    space: Space,
-    given: UAndG,
-    known: Mapping[str, UAndG],
-    air_changes: float,
-) -> None:
+def _zone(model: Model, zone: str, space: Space, windows: _Windows, air_changes: float) -> None:
     model["Zone"][zone] = {"volume": space.volume, "floor_area": max(space.floor_area, 0.01)}
     model["ZoneInfiltration:DesignFlowRate"][f"{zone} air"] = {
         "zone_or_zonelist_or_space_or_spacelist_name": zone,
@@ -76,7 +89,8 @@ def _zone(
     for index, face in enumerate(space.faces):
         if face.kind == "window frame":
             continue
-        for part, ring in enumerate(outlines(face)):
+        rings = [ring for ring in outlines(face, gap=NEAR, convex=True) if is_drawable(ring)]
+        for part, ring in enumerate(rings):
             kind = SURFACE_TYPE.get(face.kind, "Wall")
             outside = BOUNDARY.get(face.adjacency, "Adiabatic")
             if kind == "Ceiling" and outside == "Outdoors":
@@ -85,33 +99,46 @@ def _zone(
                 kind, _construction(model, face.construction, face), zone, outside, ring
             )
     for index, window in enumerate(space.windows):
-        u, g = known.get(window.guid, (None, None))
-        _window(
-            model, f"{zone} W{index}", zone, window,
-            given[0] or u or window.u_value or DEFAULT_U,
-            given[1] or g or window.g_value or DEFAULT_G,
-        )  # fmt: skip
+        frame = _construction(model, WINDOW_FRAME, None)
+        construction = windows.construction(glazing_of(window, windows.glazing))
+        write_window(model, f"{zone} W{index}", zone, window, frame=frame, glazing=construction)
 
 
-def _window(model: Model, name: str, zone: str, window: Window, u: float, g: float) -> None:
-    """A rectangle of glass in a parent of the size of the opening."""
-    frame = _construction(model, WINDOW_FRAME, None)
-    system = f"Glazing U {u:.3f} g {g:.3f}"
-    model["WindowMaterial:SimpleGlazingSystem"][system] = {
-        "u_factor": u,
-        "solar_heat_gain_coefficient": g,
-    }
-    model["Construction"][system] = {"outside_layer": system}
-    write_window(model, name, zone, window, frame=frame, glazing=system)
+class _Windows:
+    """The constructions of glazings, each written once."""
+
+    def __init__(
+        self, model: Model, overrides: tuple[float | None, float | None], glazing: Glazings
+    ) -> None:
+        self._model, self._overrides, self.glazing = model, overrides, glazing
+        self._complex: dict[int, str] = {}  # by the id of the optics
+
+    def construction(self, known: ExportedGlazing) -> str:
+        """Name of the construction: by its BSDF, else a simple glazing."""
+        if known.optics is None or any(value is not None for value in self._overrides):
+            return self._simple(known)
+        key = id(known.optics)
+        if key not in self._complex:
+            self._complex[key] = f"System {len(self._complex)}"
+            complex_state(self._model, self._complex[key], known.optics, panes=True)
+        return self._complex[key]
+
+    def _simple(self, known: ExportedGlazing) -> str:
+        u = self._overrides[0] or known.u_value or DEFAULT_U
+        g = self._overrides[1] or known.g_value or DEFAULT_G
+        name = f"Glazing U {u:.3f} g {g:.3f}"
+        fields: dict[str, float] = {"u_factor": u, "solar_heat_gain_coefficient": g}
+        if known.visible_transmittance:
+            name += f" tau {known.visible_transmittance:.3f}"
+            fields["visible_transmittance"] = known.visible_transmittance
+        self._model.setdefault("WindowMaterial:SimpleGlazingSystem", {})[name] = fields
+        self._model["Construction"][name] = {"outside_layer": name}
+        return name
 
 
 def _construction(model: Model, construction: Construction, face: Face | None) -> str:
     """Name of the construction with the face's absorptance inside, the usual one outside."""
     absorptance = 0.5 if face is None else 1 - face.total_reflectance("solar")
-    layers = [
-        Layer(one.thickness, one.conductivity, one.density, one.heat_capacity)
-        for one in construction.layers[:MOST_LAYERS]
-    ]
-    return opaque_construction(
-        model, layers, FaceFinish(OUTSIDE_ABSORPTANCE), FaceFinish(absorptance), construction.name
-    )
+    layers = layers_of(replace(construction, layers=at_most_layers(construction.layers)))
+    finishes = FaceFinish(OUTSIDE_ABSORPTANCE), FaceFinish(absorptance)
+    return opaque_construction(model, list(layers), *finishes, construction.name)

@@ -213,11 +213,12 @@ def _other_side(
 
 
 def layers_of(construction: Construction) -> tuple[Layer, ...]:
-    """The layers that count for heat, outermost first."""
+    """The layers that count for heat, outermost first; the thickest where none does."""
+    thick = [layer for layer in construction.layers if layer.thickness >= THINNEST]
+    thick = thick or [max(construction.layers, key=lambda layer: layer.thickness)]
     return tuple(
         Layer(layer.thickness, layer.conductivity, layer.density, layer.heat_capacity)
-        for layer in construction.layers
-        if layer.thickness >= THINNEST
+        for layer in thick
     )
 
 

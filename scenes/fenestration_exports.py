@@ -6,20 +6,24 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from bim.building_file import held_states
+from bim.exported_glazing import ExportedGlazing, normal_transmittance
 from bim.model import Space, Window
-from bim.to_energyplus import DEFAULT_G, DEFAULT_U, UAndG
+from bim.to_energyplus import DEFAULT_G, DEFAULT_U
 from bim.to_radiance import FilledGroup
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from scenes.fenestration.resolver import (
     held_systems,
     source_notes,
-    stated_u_and_g,
+    stated_values,
     window_sources,
     windows_named,
 )
 from scenes.fenestration.systems import FenestrationSystem, WindowOverrides
-from scenes.fenestration.thermal_system import checked_system
+from scenes.fenestration.thermal_system import ThermalSystem, checked_system, window_optics
 from scenes.room.windows import room_windows
+
+LIGHT_ONLY = WindowOverrides(light_only=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +34,7 @@ class KnownFenestration:
     windows: tuple[Window, ...]
     systems: dict[str, FenestrationSystem]  # by window GUID
     unfilled: dict[str, list[str]]  # names of the other windows, by what is missing of them
+    overrides: WindowOverrides = LIGHT_ONLY
 
     def notes(self, without: str = "written without") -> tuple[str, ...]:
         """Where each window's optics come from, and which windows have none, as `without` says."""
@@ -41,20 +46,49 @@ class KnownFenestration:
         )
         return (*source_notes(window_sources(filled, states)), *none)
 
-    def u_and_g(self) -> tuple[dict[str, UAndG], tuple[str, ...]]:
-        """U and g of each window as a run takes them, and a sentence on what is not known."""
+    def glazings(self) -> tuple[dict[str, ExportedGlazing], tuple[str, ...]]:
+        """Data of each window by GUID as a run uses them, and a sentence on each assumption.
+
+        A window with a BSDF goes with it. A window of which only U, g or a transmittance is known
+        gets usual values for the others; one of which nothing is known has no entry.
+        """
         heat = {id(s): checked_system(s, self.file) for s in self.systems.values()}
-        notes = list(dict.fromkeys(note for one in heat.values() for note in one.notes))
-        left = [window for window in self.windows if window.guid not in self.systems]
-        result = stated_u_and_g(left, self.file)
-        for guid, system in self.systems.items():
-            thermal = heat[id(system)]
-            result[guid] = thermal.fenestration.u_value, float(thermal.g_value[0])
-        for number, (name, value) in enumerate((("U", DEFAULT_U), ("g", DEFAULT_G))):
-            names = [w.name or w.guid for w in left if result[w.guid][number] is None]
+        notes = [note for one in heat.values() for note in one.notes]
+        notes += [note for s in self.systems.values() for note in s.notes]
+        exported = {
+            key: self._exported(system, heat[key])
+            for key, system in {id(s): s for s in self.systems.values()}.items()
+        }
+        result = {guid: exported[id(system)] for guid, system in self.systems.items()}
+        held = held_states(self.windows, self.file)
+        unknown: dict[str, list[str]] = {"U": [], "g": []}
+        for window in self.windows:
+            if window.guid in self.systems:
+                continue
+            values = stated_values(held, window, self.file, self.overrides)
+            known = values.u_value, values.g_value
+            label = window.name or window.guid
+            for name, value in zip(unknown, known, strict=True):
+                if value is None:
+                    unknown[name].append(label)
+            if any(value is not None for value in (*known, values.visible, values.solar)):
+                result[window.guid] = ExportedGlazing(
+                    DEFAULT_U if known[0] is None else known[0],
+                    DEFAULT_G if known[1] is None else known[1],
+                    values.visible, values.solar,
+                )  # fmt: skip
+        for (name, names), value in zip(unknown.items(), (DEFAULT_U, DEFAULT_G), strict=True):
             if names:
                 notes.append(f"{windows_named(names)}: no {name} is known, {value:g} is written.")
-        return result, tuple(notes)
+        return result, tuple(dict.fromkeys(notes))
+
+    def _exported(self, system: FenestrationSystem, heat: ThermalSystem) -> ExportedGlazing:
+        visible, solar = normal_transmittance(system.visible), normal_transmittance(system.solar)
+        values = heat.fenestration.u_value, float(heat.g_value[0]), visible, solar
+        if system.from_values:
+            return ExportedGlazing(*values)
+        bsdf = BsdfFile({"Visible": system.fine, "Solar": system.solar}, system.name)
+        return ExportedGlazing(*values, bsdf, window_optics(system, heat))
 
     def groups(self, space: Space) -> list[FilledGroup]:
         """The window groups of a room by orientation and system, with their matrices."""
@@ -80,9 +114,14 @@ class KnownFenestration:
         return {g: BsdfFile({"Visible": bsdf}, self.systems[g].name) for g, bsdf in result.items()}
 
 
-def known_fenestration(spaces: Iterable[Space], file: Path) -> KnownFenestration:
-    """What an IFC file holds for the windows of some rooms."""
+def known_fenestration(
+    spaces: Iterable[Space], file: Path, overrides: WindowOverrides = LIGHT_ONLY
+) -> KnownFenestration:
+    """What a building's file holds for the windows of some rooms.
+
+    Args: overrides: of the user, in place of the file's data.
+    """
     windows = tuple(window for space in spaces for window in space.windows)
-    systems, unfilled = held_systems(windows, WindowOverrides(light_only=True), file)
+    systems, unfilled = held_systems(windows, overrides, file)
     first = {guid: states[0] for guid, states in systems.items()}
-    return KnownFenestration(file, windows, first, unfilled)
+    return KnownFenestration(file, windows, first, unfilled, overrides)

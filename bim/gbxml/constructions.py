@@ -38,17 +38,16 @@ class Constructions:
         layers = tuple(self._layers(one))
         name = _name(one)
         construction = Construction(name, layers, self.document.file.name) if layers else None
-        inner = {band: self._share(one, "Reflectance", f"Int{band}") for band in ("Vis", "Solar")}
-        outer = self._share(one, "Reflectance", "ExtVis")
+        visible, solar = (
+            self._share(one, "Reflectance", kind) for kind in ("IntVisible", "IntSolar")
+        )
+        outer = self._share(one, "Reflectance", "ExtVisible")
         absorbed = self._share(one, "Absorptance", "IntSolar")
-        solar = inner["Solar"]
         if solar is None and absorbed is not None:
             solar = 1.0 - absorbed
         emissivity = self._share(one, "Emittance", "IntIR")
-        found = SurfaceFinish(construction, inner["Vis"], solar, outer=outer)
-        return found if emissivity is None else SurfaceFinish(
-            construction, inner["Vis"], solar, emissivity, outer=outer
-        )  # fmt: skip
+        found = SurfaceFinish(construction, visible, solar, outer=outer)
+        return found if emissivity is None else replace(found, emissivity=emissivity)
 
     def _layers(self, one: ElementTree.Element) -> list[MaterialLayer]:
         """The layers of a construction, outermost first, as gbXML orders them."""
@@ -120,8 +119,9 @@ class Constructions:
         return self.document.optional(lambda: self._stated(owner, what, kind), self.issues)
 
     def _stated(self, owner: ElementTree.Element, what: str, kind: str) -> float | None:
+        kinds = (kind, kind.replace("Visible", "Vis"))  # the schema's word, and earlier exports'
         for one in owner.iterfind(what):
-            if one.get("type") == kind and one.get("incidentAngle", "0") in ("0", "0.0", ""):
+            if one.get("type") in kinds and one.get("incidentAngle", "0") in ("0", "0.0", ""):
                 value = self.document.number(one, least=0.0, most=100.0)
                 value = value / 100.0 if one.get("unit") == "Percent" else value
                 if value > 1:

@@ -17,27 +17,32 @@ import numpy as np
 import shapely
 
 from bim.doorways import Key, touching
+from bim.energyplus_parts import at_most_layers
+from bim.exported_glazing import Glazings, glazing_of
 from bim.hosted_windows import HostedPolygon, hosted_polygons
 from bim.model import Building, Construction, Element, Face, Space, Window
 from bim.planes import Plane, rings_of
 from bim.to_radiance import identifier
+from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
+from mitsuba_cfs.bsdf.xml import bsdf_xml
 from mitsuba_cfs.files import write_text
 
 TYPES = {"floor": "Floor", "ceiling": "RoofCeiling", "roof": "RoofCeiling"}
-Known = Mapping[str, tuple[float | None, float | None]]  # U and g by a window's GUID
+LEAST_CAPACITY = 100.0  # [J/(kg K)] that honeybee takes
 
 
 def write_honeybee(
-    building: Building, path: str | PathLike[str], *, known: Known | None = None
+    building: Building, path: str | PathLike[str], *, glazing: Glazings | None = None
 ) -> None:
-    """Write rooms, windows, constructions, reflectances and what stands outdoors as HBJSON.
+    """Write rooms, windows, constructions, reflectances and obstructions as HBJSON.
 
-    What is lost: BSDF data and shading states, gloss, furniture; a glazing without U, g or visible
-    transmittance has no construction.
+    A window with U and g gets a construction (its visible transmittance is that of the BSDF where
+    none is stated), a window with a BSDF that as its modifier. Not written: further shading states,
+    gloss, furniture. A window without U or g gets no construction, so honeybee's default.
 
-    Args: known: U and g of windows in place of those that the building states.
+    Args: glazing: of windows by GUID, in place of what the building states.
     """
-    library = _Library(known or {})
+    library = _Library(glazing or {})
     names = _Names()
     guids = {space.guid: names.of(space.label) for space in building.spaces}
     building, sides = touching(building)
@@ -75,29 +80,32 @@ class _Names:
 class _Library:
     """Constructions and modifiers that have been asked for."""
 
-    def __init__(self, known: Known) -> None:
-        self._known = known
+    def __init__(self, glazing: Glazings) -> None:
+        self._glazing = glazing
         self._keys: dict[tuple, str] = {}
         self._materials: dict[str, dict] = {}
         self._constructions: dict[str, dict] = {}
         self._modifiers: dict[str, dict] = {}
+        self._bsdfs: dict[int, str] = {}  # modifier of each BSDF
 
     def construction(self, one: Construction, solar: float, visible: float) -> str:
         """Name of layers whose room side reflects so much."""
-        content = (one.layers, solar, visible)
+        layers = at_most_layers(one.layers)
+        content = (layers, solar, visible)
         known = content in self._keys
         key = self._keys.setdefault(content, f"{identifier(one.name)[:50]}_{len(self._keys)}")
         if not known:
             names = []
-            for number, layer in enumerate(one.layers):
-                inner = number == len(one.layers) - 1
+            for number, layer in enumerate(layers):
+                inner = number == len(layers) - 1
                 absorbed = (1 - solar, 1 - visible) if inner else (0.7, 0.7)
                 name = f"{key}_{number}"
                 names.append(name)
                 self._materials[name] = {
                     "type": "EnergyMaterial", "identifier": name, "display_name": layer.name,
                     "thickness": layer.thickness, "conductivity": layer.conductivity,
-                    "density": layer.density, "specific_heat": max(layer.heat_capacity, 100.0),
+                    "density": layer.density,
+                    "specific_heat": max(layer.heat_capacity, LEAST_CAPACITY),
                     "roughness": "MediumRough", "thermal_absorptance": 0.9,
                     "solar_absorptance": absorbed[0], "visible_absorptance": absorbed[1],
                 }  # fmt: skip
@@ -108,13 +116,18 @@ class _Library:
         return key
 
     def glazing(self, window: Window) -> str | None:
-        """Name of a simple glazing with the window's U, g and transmittance; None without them."""
-        u_value, g_value = self._known.get(window.guid, (window.u_value, window.g_value))
-        if u_value is None or g_value is None or not window.visible_transmittance:
+        """Name of a simple glazing with the window's U, g and transmittance; None without U or g.
+
+        A visible transmittance that is not known is left to honeybee's default.
+        """
+        known = glazing_of(window, self._glazing)
+        if known.u_value is None or known.g_value is None:
             return None
-        values = (u_value, g_value, window.visible_transmittance)
-        key = "glazing_" + "_".join(f"{value:.4g}" for value in values)
-        fields = dict(zip(("u_factor", "shgc", "vt"), values, strict=True))
+        values = {"u_factor": known.u_value, "shgc": known.g_value}
+        if known.visible_transmittance:
+            values["vt"] = known.visible_transmittance
+        fields = {name: round(float(value), 6) for name, value in values.items()}
+        key = "glazing_" + "_".join(f"{value:.6g}" for value in fields.values())
         material = f"{key}_system"
         self._materials[material] = {
             "type": "EnergyWindowMaterialSimpleGlazSys",
@@ -127,6 +140,23 @@ class _Library:
             "materials": [material],
         }
         return key
+
+    def bsdf(self, window: Window) -> str | None:
+        """Name of the modifier with the window's visible BSDF; None without one."""
+        file = glazing_of(window, self._glazing).bsdf
+        visible = None if file is None else file.bands.get("Visible") or file.bands.get("Solar")
+        if file is None or visible is None:
+            return None
+        if id(visible) not in self._bsdfs:
+            name = f"bsdf_{len(self._bsdfs)}_{identifier(file.name)[:50]}"
+            self._bsdfs[id(visible)] = name
+            self._modifiers[name] = {
+                "type": "BSDF", "identifier": name, "display_name": file.name or name,
+                "modifier": None, "dependencies": [], "up_orientation": [0.0, 0.01, 1.0],
+                "thickness": 0.0, "function_file": ".", "transform": None,
+                "bsdf_data": bsdf_xml(BsdfFile({"Visible": visible}, file.name)),
+            }  # fmt: skip
+        return self._bsdfs[id(visible)]
 
     def modifier(self, reflectance: float) -> str:
         """Name of a grey diffuse plastic."""
@@ -231,7 +261,9 @@ def _aperture(
         "type": "Aperture", "identifier": names.of(window.name or window.guid),
         "display_name": window.name or window.guid, "geometry": _geometry(plane, pane),
         "is_operable": False, "boundary_condition": {"type": "Outdoors"},
-        "properties": _properties("Aperture", library.glazing(window)),
+        "properties": _properties(
+            "Aperture", library.glazing(window), library.bsdf(window)
+        ),
     }  # fmt: skip
 
 

@@ -337,6 +337,11 @@ def write_bsdf_xml(bsdf: BsdfFile, path: str | PathLike[str], *, digits: int = 7
         file.writelines(_lines(bsdf, digits))
 
 
+def bsdf_xml(bsdf: BsdfFile, *, digits: int = 7) -> str:
+    """The text of `write_bsdf_xml`."""
+    return "".join(_lines(bsdf, digits))
+
+
 def _lines(bsdf: BsdfFile, digits: int) -> Iterator[str]:
     yield HEADER
     yield from _material_lines(bsdf)

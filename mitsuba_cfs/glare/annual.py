@@ -120,11 +120,11 @@ class Pictures(Protocol):
 
     def without_disc(
         self, batch: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
-        """The same without the sun's disc, and the visible part of the disc [h]."""
+    ) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
+        """The same without the sun's disc and its images in mirrors, and these [h]."""
 
     def add_disc(self, values: NDArray[np.float32], batch: NDArray[np.int64]) -> None:
-        """Add the sun's disc to the luminances [h, n] of `without_disc`, which gives `values`."""
+        """Add the discs to the luminances [h, n] of `without_disc`, which gives `values`."""
 
     @property
     def shared(self) -> PictureMatrix:
@@ -136,8 +136,8 @@ class Pictures(Protocol):
         A pixel's luminance is that of its row times its share, plus its own part.
         """
 
-    def discs(self, batch: NDArray[np.int64]) -> list[SunDisc | None]:
-        """The visible part of the sun's disc [h]."""
+    def discs(self, batch: NDArray[np.int64]) -> list[tuple[SunDisc, ...]]:
+        """The visible parts of the sun's disc and of its images in mirrors [h]."""
 
     def noise(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """Half the difference of pictures [h, n] by two halves of the paths [cd/m2]."""
@@ -186,16 +186,16 @@ class ThreePhasePictures:
 
     def without_disc(
         self, batch: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
+    ) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
         """See `Pictures`; the patches include the sun."""
         return self.values(batch), self.discs(batch)
 
     def add_disc(self, values: NDArray[np.float32], batch: NDArray[np.int64]) -> None:
         """See `Pictures`; adds nothing, because the patches include the sun."""
 
-    def discs(self, batch: NDArray[np.int64]) -> list[SunDisc | None]:
+    def discs(self, batch: NDArray[np.int64]) -> list[tuple[SunDisc, ...]]:
         """See `Pictures`; none, because the patches include the sun."""
-        return [None] * len(batch)
+        return [()] * len(batch)
 
     def noise(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """See `Pictures`; 0 where the halves are unknown."""
@@ -239,15 +239,15 @@ def annual_glare(
     left = np.flatnonzero(np.isnan(table[:, 0]))
     size = max(1, BATCH_BYTES // (4 * max(1, len(pictures.pixels))))
 
-    def rated(values: NDArray[np.float32], disc: SunDisc | None, hour: int) -> list[float]:
+    def rated(values: NDArray[np.float32], discs: tuple[SunDisc, ...], hour: int) -> list[float]:
         picture = full_picture(values, pictures.pixels, pictures.view)
         known = options if own is None else replace(options, illuminance=float(own[hour]))
-        return figures(evaluate(picture, geometry, options=known, disc=disc))
+        return figures(evaluate(picture, geometry, options=known, discs=discs))
 
-    def made(batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
+    def made(batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
         if options.sun == "source":
             return pictures.without_disc(batch)
-        return pictures.values(batch), [None] * len(batch)
+        return pictures.values(batch), [()] * len(batch)
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         for start in range(0, len(left), size):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -103,7 +104,7 @@ class GlareResult:
     cgi: float
     dgr: float
     contrast: float = field(repr=False, default=0.0)  # sum L^2 omega/P^2
-    disc: SunDisc | None = None  # that is a source of its own, the last
+    discs: tuple[SunDisc, ...] = ()  # that are sources of their own, the last
     dgp_standard_error: float = np.nan  # from the noise of the picture; NaN: not known
 
     @cached_property
@@ -134,7 +135,7 @@ def evaluate(
     view: View | GlareView,
     *,
     options: GlareOptions | None = None,
-    disc: SunDisc | None = None,
+    discs: Sequence[SunDisc] = (),
     **changes: Any,
 ) -> GlareResult:
     """Glare of a picture.
@@ -143,7 +144,7 @@ def evaluate(
         luminance: [ny, nx] row 0 at the top [cd/m2].
         view: the picture's view, or its `GlareView`, computed once for many pictures.
         options: how glare is rated; `changes` are single options by name.
-        disc: the sun, where the picture's pixels are without it.
+        discs: the sun and its images in mirrors, where the picture's pixels are without them.
 
     Raises:
         ValueError: negative or NaN pixels, another size than the view's, a parallel view.
@@ -156,14 +157,12 @@ def evaluate(
         picture = np.where(seen(geometry, options.field_of_view), picture, 0.0)
     task = mean if options.task is None else task_luminance(picture, geometry, options.task)
     threshold = _threshold(options, task)
-    lux = 0.0
-    if disc is not None:
-        lux = disc.luminance * disc.solid_angle * float(disc.direction @ geometry.forward)
-        Ev, mean = Ev + lux, mean + disc.luminance * disc.solid_angle / geometry.total_solid_angle
+    for disc in discs:
+        flux = disc.luminance * disc.solid_angle
+        Ev, mean = Ev + _disc_illuminance(disc, geometry), mean + flux / geometry.total_solid_angle
         largest = max(largest, disc.luminance)
-        if disc.luminance <= threshold or not _in_field(disc, geometry, options):
-            disc = None
-    sources, zones, direction, position = _placed(picture, geometry, threshold, options, disc, lux)
+    discs = tuple(d for d in discs if d.luminance > threshold and _in_field(d, geometry, options))
+    sources, zones, direction, position = _placed(picture, geometry, threshold, options, discs)
     sigma = view_angles(direction, geometry.view)[0]
     direct = float(sources.illuminance.sum())
     background = _background(options, geometry, sources, Ev, direct, mean)
@@ -195,7 +194,7 @@ def evaluate(
         cgi=indices.cie_glare_index(contrast, Ev, direct),
         dgr=rating,
         contrast=contrast,
-        disc=disc,
+        discs=discs,
     )
 
 
@@ -204,24 +203,25 @@ def _placed(
     geometry: GlareView,
     threshold: float,
     options: GlareOptions,
-    disc: SunDisc | None,
-    lux: float,
+    discs: tuple[SunDisc, ...],
 ) -> tuple[Sources, NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Sources, and zone, direction and position index of each [n]; the disc of lux [lx] is last."""
+    """Sources, and zone, direction and position index of each [n]; the discs are last."""
     sources, zones = _sources(picture, geometry, threshold, options)
     # evalglare rounds to four bytes before it cuts off: a whole number stays one
     pixel = sources.x.astype(np.float32).astype(int), sources.y.astype(np.float32).astype(int)
     direction = geometry.directions[pixel]
     position = _positions(options, geometry, pixel, direction)
-    if disc is None:
-        return sources, zones, direction, position
-    own = position_index(disc.direction[None], geometry.view, model=options.position_model)
-    return (
-        with_disc(sources, disc, lux, geometry),
-        np.append(zones, 0),
-        np.vstack([direction, disc.direction]),
-        np.append(position, own),
-    )
+    for disc in discs:
+        sources = with_disc(sources, disc, _disc_illuminance(disc, geometry), geometry)
+        own = position_index(disc.direction[None], geometry.view, model=options.position_model)
+        zones, position = np.append(zones, 0), np.append(position, own)
+        direction = np.vstack([direction, disc.direction])
+    return sources, zones, direction, position
+
+
+def _disc_illuminance(disc: SunDisc, geometry: GlareView) -> float:
+    """Illuminance at the eye by a disc [lx]."""
+    return disc.luminance * disc.solid_angle * float(disc.direction @ geometry.forward)
 
 
 def _sources(

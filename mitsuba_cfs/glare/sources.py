@@ -88,7 +88,7 @@ def pixel_sources(luminance: NDArray[np.float64], geometry: GlareView, threshold
 
 
 def with_disc(sources: Sources, disc: SunDisc, illuminance: float, geometry: GlareView) -> Sources:
-    """The sources and the sun's disc as the last; it covers none of the pixels.
+    """The sources and a disc as the last; it covers none of the pixels.
 
     Args: illuminance: of the disc at the eye [lx].
     """

@@ -1,4 +1,8 @@
-"""The sun's disc as an eye sees it: a glare source with its own luminance, whatever the pixels."""
+"""The sun's disc as an eye sees it: a glare source with its own luminance, whatever the pixels.
+
+A smooth mirror shows the disc once more, at the mirrored direction and with the luminance times the
+reflectance: a source of the same solid angle.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,7 @@ from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 
 @dataclass(frozen=True, slots=True)
 class SunDisc:
-    """Visible part of the sun's disc, attenuated by the glazing."""
+    """Visible part of the sun's disc or of an image of it, attenuated by glazing and mirrors."""
 
     direction: NDArray[np.float64]  # [3] unit vector to the centre of the visible part
     luminance: float  # [cd/m2]

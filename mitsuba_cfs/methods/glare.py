@@ -42,7 +42,7 @@ from mitsuba_cfs.methods.phase_pictures import (
 )
 from mitsuba_cfs.methods.point_in_time import (
     PathLight,
-    disc_of_room,
+    discs_of_room,
     path_eye_illuminance,
     picture_of_room,
     picture_with_disc,
@@ -171,7 +171,7 @@ def rated_pictures(
     else:
         made = _phase_pictures(light, hours, rows)
     for one in made:
-        how: dict[str, Any] = {"options": options, "disc": one.disc if apart else None}
+        how: dict[str, Any] = {"options": options, "discs": one.discs if apart else ()}
         rated = evaluate(one.bare if apart else one.shown, geometry, **how)
         if one.halves:
             add = 0 if apart else one.shown - one.bare
@@ -187,10 +187,10 @@ class _Made:
     """One of several pictures, before it is rated."""
 
     number: int  # among them
-    bare: Picture  # without the sun's disc
-    disc: SunDisc | None
-    shown: Picture  # with the disc
-    halves: Sequence[Picture]  # of the paths, without the disc; none: not known
+    bare: Picture  # without the sun's disc and its images
+    discs: tuple[SunDisc, ...]
+    shown: Picture  # with the discs
+    halves: Sequence[Picture]  # of the paths, without the discs; none: not known
 
 
 def _path_pictures(
@@ -201,7 +201,7 @@ def _path_pictures(
     for i, (hour, now) in enumerate(zip(hours.tolist(), rows.T, strict=True)):
         steps = part(progress, i / len(hours), (i + 1) / len(hours), "pictures")
         one = picture_with_disc(light, rooms[tuple(now.tolist())], hour, progress=steps)
-        yield _Made(i, one.bare, one.disc, one.shown, ())
+        yield _Made(i, one.bare, one.discs, one.shown, ())
 
 
 def _phase_pictures(
@@ -308,8 +308,8 @@ def _by_path_tracing(
             [eye] = path_eye_illuminance(light, hours[i : i + 1], state)
             known, depth = replace(options, illuminance=float(eye)), {"max_depth": DIRECT_DEPTH}
         picture = picture_of_room(light, room, hour, disc=not apart, **depth, **seed)
-        disc = disc_of_room(light, room, hour) if apart else None
-        return figures(evaluate(picture, geometry, options=known, disc=disc))
+        discs = discs_of_room(light, room, hour) if apart else ()
+        return figures(evaluate(picture, geometry, options=known, discs=discs))
 
     values = []
     for i in range(len(hours)):

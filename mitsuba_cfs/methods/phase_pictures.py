@@ -293,7 +293,7 @@ class AdjacentRoomPictures:
 
     def without_disc(
         self, batch: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
+    ) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
         values, discs = self.pictures.without_disc(batch)
         return self._with_rooms(values, batch), discs
@@ -307,7 +307,7 @@ class AdjacentRoomPictures:
         rows, values = self.pictures.by_rows(batch)
         return rows, self._with_rooms(values, batch)
 
-    def discs(self, batch: NDArray[np.int64]) -> list[SunDisc | None]:
+    def discs(self, batch: NDArray[np.int64]) -> list[tuple[SunDisc, ...]]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
         return self.pictures.discs(batch)
 

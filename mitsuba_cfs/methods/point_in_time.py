@@ -16,7 +16,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
-from mitsuba_cfs.trace.paths.disc import disc_seen, with_disc
+from mitsuba_cfs.trace.paths.disc import discs_seen, with_discs
 from mitsuba_cfs.trace.paths.point_in_time import point_in_time
 from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
@@ -55,11 +55,11 @@ class PathLight:
 
 @dataclass(frozen=True)
 class PathPicture:
-    """A luminance picture of one hour, and the sun's disc, which is not in it."""
+    """A luminance picture of one hour, and the sun's disc and its images, apart from it."""
 
-    bare: NDArray[np.float32]  # [ny, nx] [cd/m2] without the disc
-    disc: SunDisc | None
-    shown: NDArray[np.float32]  # [ny, nx] [cd/m2] with the disc in its pixels
+    bare: NDArray[np.float32]  # [ny, nx] [cd/m2] without the disc and its images in mirrors
+    discs: tuple[SunDisc, ...]
+    shown: NDArray[np.float32]  # [ny, nx] [cd/m2] with the discs in their pixels
 
 
 def path_tracing_room(
@@ -137,18 +137,18 @@ def picture_of_room(
     return point_in_time_picture(room, path_sky(light, hour), light.scene.eye, **options)
 
 
-def disc_of_room(light: PathLight, room: PathTracingScene, hour: int) -> SunDisc | None:
-    """The sun's disc in the view in one hour."""
-    return disc_seen(room, path_sky(light, hour), light.scene.eye)
+def discs_of_room(light: PathLight, room: PathTracingScene, hour: int) -> tuple[SunDisc, ...]:
+    """The sun's disc and its images in mirrors in the view in one hour."""
+    return discs_seen(room, path_sky(light, hour), light.scene.eye)
 
 
 def picture_with_disc(
     light: PathLight, room: PathTracingScene, hour: int, **options: Any
 ) -> PathPicture:
-    """The picture of one hour, the sun's disc apart and in its pixels."""
+    """The picture of one hour, the sun's discs apart and in their pixels."""
     bare = picture_of_room(light, room, hour, disc=False, **options)
-    shown = with_disc(bare, room, path_sky(light, hour), light.scene.eye)
-    return PathPicture(bare, disc_of_room(light, room, hour), shown)
+    shown = with_discs(bare, room, path_sky(light, hour), light.scene.eye)
+    return PathPicture(bare, discs_of_room(light, room, hour), shown)
 
 
 def path_sky(light: PathLight, hour: int) -> Sky:

@@ -196,7 +196,7 @@ class PictureYear:
     amount_step: tuple[NDArray[np.float32], NDArray[np.float32]]  # [r]
     floor: NDArray[np.float32]  # [H] luminance below which no window pixel is corrected
     codes: tuple[bytes, ...]  # [H] beam [n] and ratio [w], see `codes.packed`
-    discs: tuple[SunDisc | None, ...]  # [H]
+    discs: tuple[tuple[SunDisc, ...], ...]  # [H]
     check: DgpCheck | None = None
 
     def values(self, hour: int) -> NDArray[np.float32]:
@@ -275,7 +275,7 @@ class _Work:
         self._amounts = [np.zeros((H, p.rank)) for p in self.patterns]
         self.floor = np.zeros(H, dtype=np.float32)
         self.codes: list[bytes] = [b""] * H
-        self.discs: list[SunDisc | None] = [None] * H
+        self.discs: list[tuple[SunDisc, ...]] = [()] * H
 
     def _sampled(self, hours: NDArray[np.int64]) -> tuple[NDArray, NDArray]:
         parts = [self._pictures.by_rows(hours[i : i + 50]) for i in range(0, len(hours), 50)]
@@ -293,8 +293,8 @@ class _Work:
             ratio = np.maximum(shown[i], floor) / np.maximum(known[1][i], floor)
             wrong = coded(ratio, np.abs(np.log(ratio)) > UNLIKE)
             self.codes[hour] = packed(beam, wrong)
-        for hour, disc in zip(batch.tolist(), self._pictures.discs(batch), strict=True):
-            self.discs[hour] = disc
+        for hour, discs in zip(batch.tolist(), self._pictures.discs(batch), strict=True):
+            self.discs[hour] = discs
 
     def _fitted(self, which: int, batch: NDArray[np.int64], values: NDArray) -> NDArray:
         """The hours [h, ..] by the patterns, with the original illuminance at the eye."""
@@ -307,10 +307,10 @@ class _Work:
         self._amounts[which][batch] = amounts
         return known * factor[:, None]
 
-    def dgp(self, values: NDArray, disc: SunDisc | None) -> float:
-        """DGP of pixels' luminance [n] and a disc."""
+    def dgp(self, values: NDArray, discs: tuple[SunDisc, ...]) -> float:
+        """DGP of pixels' luminance [n], and of the sun's disc and its images."""
         picture = full_picture(values, self._pictures.pixels, self._pictures.view)
-        return evaluate(picture, self._geometry, disc=disc).dgp
+        return evaluate(picture, self._geometry, discs=discs).dgp
 
     def year(self, check: DgpCheck | None = None) -> PictureYear:
         """The compressed pictures."""

@@ -181,11 +181,11 @@ def export_files(
     if not any(files.values()):
         return ()
     writers = {"honeybee": write_honeybee, "gbxml": write_gbxml, "epjson": write_epjson}
-    u_and_g, assumed = known.u_and_g()
+    glazing, assumed = known.glazings()
     for name, write in writers.items():
         path = files[name]
         if path is not None:
-            write(building, path, known=u_and_g)
+            write(building, path, glazing=glazing)
             click.echo(path)
     return assumed
 

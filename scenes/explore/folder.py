@@ -201,9 +201,8 @@ def write_pictures(folder: Path, name: str, year: PictureYear) -> None:
 
 
 def _model_arrays(year: PictureYear) -> dict[str, Any]:
-    lit = [hour for hour, disc in enumerate(year.discs) if disc is not None]
-    discs = [d for d in year.discs if d is not None]
-    rows = [[*d.direction, d.luminance, d.solid_angle] for d in discs]
+    lit = [hour for hour, discs in enumerate(year.discs) for _ in discs]
+    rows = [[*d.direction, d.luminance, d.solid_angle] for discs in year.discs for d in discs]
     arrays = {
         "window": packed(year.window, "i4"),
         "floor": packed(year.floor, "f4"),

@@ -209,16 +209,6 @@ def _by_name(
     return result
 
 
-def stated_u_and_g(
-    windows: Iterable[Window], file: Path
-) -> dict[str, tuple[float | None, float | None]]:
-    """U and g of each window by GUID as they are attached or stated; None where neither is."""
-    windows = list(windows)
-    held = held_states(windows, file)
-    values = {w.guid: stated_values(held, w, file, WindowOverrides()) for w in windows}
-    return {guid: (value.u_value, value.g_value) for guid, value in values.items()}
-
-
 def _with_overrides(systems: Mapping[str, States], overrides: WindowOverrides) -> dict[str, States]:
     """The systems with the user's U and g; the same ones stay the same."""
     if overrides.u_value is None and overrides.g_value is None:
@@ -417,7 +407,7 @@ def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
     return FenestrationSystem(
         name, visible, solar, u_value=values.u_value, g_value=g, shading_position="none",
         notes=tuple(notes), source=Note("the values stated in {file}", file=file),
-        angular=table,
+        angular=table, from_values=True,
     )  # fmt: skip
 
 

@@ -49,6 +49,7 @@ class FenestrationSystem:
     source: str = ""  # where the system comes from, in words
     angular: AngularTable | None = None  # visible, of a specular system: exact at every angle
     panes: Panes = ()  # all its layers, where each is known by wavelength
+    from_values: bool = False  # modelled from U, g and transmittances, without a BSDF
 
     @property
     def fine(self) -> Bsdf:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bim.energyplus_windows import WindowOptics
 from mitsuba_cfs.bsdf.glazing import Pane
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.pane_stack import absorbed_by_layers
@@ -161,6 +162,18 @@ def _diffuse(solar: KlemsBsdf, block: NDArray[np.float64]) -> float:
     """Hemispherical value for diffuse light."""
     weight = solar.basis_in.projected_solid_angles()
     return float(weight @ solar.direct_hemispherical(block) / weight.sum())
+
+
+def window_optics(system: FenestrationSystem, heat: ThermalSystem) -> WindowOptics:
+    """Matrices and layers of a system for EnergyPlus.
+
+    Args: heat: of `thermal_system`.
+    """
+    closure, stated = system.closure, system.u_value is not None  # a stated U is not its panes'
+    return WindowOptics(
+        system.solar, system.visible, heat.fenestration, heat.absorptances, heat.back_absorptance,
+        None if closure is None or stated else closure.unit,
+    )  # fmt: skip
 
 
 def checked_system(system: FenestrationSystem, path: Path | None) -> ThermalSystem:

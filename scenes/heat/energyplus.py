@@ -5,8 +5,7 @@ from __future__ import annotations
 from bim.energyplus_twin import EnergyPlusTwin, TwinAir, TwinRoom
 from bim.energyplus_windows import WindowOptics
 from mitsuba_cfs.errors import DataError
-from scenes.fenestration.systems import FenestrationSystem
-from scenes.fenestration.thermal_system import thermal_system
+from scenes.fenestration.thermal_system import thermal_system, window_optics
 from scenes.heat.study import BalancedRooms
 from scenes.heat.study_file import StudyFile
 from scenes.room.zone import climate
@@ -31,7 +30,7 @@ def energyplus_twin(study: StudyFile, balanced: BalancedRooms) -> EnergyPlusTwin
     for room in balanced.rooms:
         windows = {w.guid: balanced.in_windows[w.guid] for w in room.space.windows}
         for system in (one for states in windows.values() for one in states):
-            optics.setdefault(id(system), _optics(system))
+            optics.setdefault(id(system), window_optics(system, thermal_system(system)))
         of_window = {
             guid: [optics[id(system)] for system in states] for guid, states in windows.items()
         }
@@ -44,12 +43,3 @@ def energyplus_twin(study: StudyFile, balanced: BalancedRooms) -> EnergyPlusTwin
         terrain=study.terrain,
         steps=60 // study.step_minutes,
     )
-
-
-def _optics(system: FenestrationSystem) -> WindowOptics:
-    heat = thermal_system(system)
-    closure, stated = system.closure, system.u_value is not None  # a stated U is not its panes'
-    return WindowOptics(
-        system.solar, system.visible, heat.fenestration, heat.absorptances, heat.back_absorptance,
-        None if closure is None or stated else closure.unit,
-    )  # fmt: skip

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from bim.exported_glazing import ExportedGlazing
 from bim.gbxml.building import read_gbxml
 from bim.gbxml.write import write_gbxml
 from bim.shell import open_edges
@@ -22,7 +23,9 @@ def test_a_room_comes_back(tmp_path, recess, frame):
     (room,) = box.spaces
     glass = tuple(replace(w, visible_transmittance=0.7) for w in room.windows)
     box = replace(box, spaces=(replace(room, windows=glass),))
-    write_gbxml(box, tmp_path / "box.gbxml", known={glass[0].guid: (1.1, 0.5)})
+    write_gbxml(
+        box, tmp_path / "box.gbxml", glazing={glass[0].guid: ExportedGlazing(1.1, 0.5, 0.7)}
+    )
     found = read_gbxml(tmp_path / "box.gbxml")
     (space,), (own,) = found.spaces, box.spaces
     assert (found.latitude_deg, found.longitude_deg) == (50.0, 8.0)

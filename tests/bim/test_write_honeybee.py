@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bim.exported_glazing import ExportedGlazing
 from bim.honeybee.building import read_honeybee
 from bim.honeybee.write import write_honeybee
 from bim.model import Element
@@ -23,7 +24,9 @@ def test_a_room_comes_back(tmp_path, recess, frame):
     box = shoebox(
         4, 5, 3, windows=windows, recess=recess, elements=(wall,), reflectance_solar={"floor": 0.35}
     )
-    write_honeybee(box, tmp_path / "box.hbjson", known={"room-window-0": (1.1, 0.5)})
+    write_honeybee(
+        box, tmp_path / "box.hbjson", glazing={"room-window-0": ExportedGlazing(1.1, 0.5)}
+    )
     (space,), (own,) = read_honeybee(tmp_path / "box.hbjson").spaces, box.spaces
     assert space.volume == pytest.approx(own.volume, rel=1e-5)
     assert space.floor_area == pytest.approx(own.floor_area, rel=1e-5)

@@ -58,7 +58,7 @@ class MadeUpPictures:
         seen = self._suns[batch] @ np.asarray(self.view.direction) > 0.93
         light = 1e9 * self._through
         found = zip(self._suns[batch], seen, strict=True)
-        return [SunDisc(sun, light, 6.8e-5) if shown else None for sun, shown in found]
+        return [(SunDisc(sun, light, 6.8e-5),) if shown else () for sun, shown in found]
 
 
 def explored_run(*, step: int = STEP, size: int = SIZE) -> RunResult:

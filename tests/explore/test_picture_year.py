@@ -45,7 +45,7 @@ def test_pictures_come_back(pictures, year) -> None:
 
 def test_pictures_whose_patches_hold_the_sun_have_no_disc() -> None:
     year = picture_year(made_up())
-    assert year.discs == (None,) * 9
+    assert year.discs == ((),) * 9
     assert year.check is not None and year.check.compressed_dgp == pytest.approx(
         year.check.dgp, abs=0.002
     )
@@ -69,8 +69,8 @@ def test_the_glare_is_that_of_the_pictures(pictures, year) -> None:
         hour = int(year.check.hours[i])
         picture = np.zeros(VIEW.width * VIEW.height)
         picture[pictures.pixels] = _whole(pictures, hour)
-        disc = pictures.discs([hour])[0]
-        rated = evaluate(picture.reshape(VIEW.height, VIEW.width), geometry, disc=disc)
+        discs = pictures.discs([hour])[0]
+        rated = evaluate(picture.reshape(VIEW.height, VIEW.width), geometry, discs=discs)
         assert year.check.dgp[i] == pytest.approx(rated.dgp, abs=1e-9)
 
 

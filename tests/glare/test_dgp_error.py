@@ -65,7 +65,7 @@ class Rated:
 
     @staticmethod
     def without_disc(batch):
-        return Rated.values(batch), [None] * len(batch)
+        return Rated.values(batch), [()] * len(batch)
 
     @staticmethod
     def add_disc(values, batch):
@@ -108,7 +108,7 @@ def test_the_error_by_paths_is_that_of_another_seed(monkeypatch) -> None:
         return ((1 + SHARE * seed) * LUMINANCE).reshape(48, 48)
 
     monkeypatch.setattr(method_glare, "picture_of_room", picture)
-    monkeypatch.setattr(method_glare, "disc_of_room", lambda *_: None)
+    monkeypatch.setattr(method_glare, "discs_of_room", lambda *_: ())
     monkeypatch.setattr(method_glare, "rooms_by_state", lambda *_: {(0,): None})
     light = SimpleNamespace(scene=SimpleNamespace(eye=VIEW), sampling=SimpleNamespace(seed=0))
     state = np.zeros((1, 1), dtype=np.int64)

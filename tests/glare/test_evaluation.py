@@ -159,11 +159,11 @@ def test_the_disc_counts_where_it_is_seen_and_bright():
     picture = np.full((220, 220), 100.0)
     dim, bright = (SunDisc(towards, L, 6e-5) for L in (1500.0, 1e6))
     bare = evaluate(picture, AHEAD)
-    rated = evaluate(picture, AHEAD, disc=dim)
-    assert rated.count == 0 and rated.disc is None
+    rated = evaluate(picture, AHEAD, discs=(dim,))
+    assert rated.count == 0 and rated.discs == ()
     assert rated.Ev - bare.Ev == pytest.approx(1500 * 6e-5 * towards[1], rel=1e-6)
     for grouping in ("evalglare", "pixels"):
-        rated = evaluate(picture, AHEAD, disc=bright, grouping=grouping)
+        rated = evaluate(picture, AHEAD, discs=(bright,), grouping=grouping)
         assert rated.count == 1 and rated.largest_luminance == 1e6
         assert rated.Ev_direct == pytest.approx(1e6 * 6e-5 * towards[1], rel=1e-9)
         assert rated.background_luminance == pytest.approx(bare.background_luminance, rel=1e-9)
@@ -171,8 +171,8 @@ def test_the_disc_counts_where_it_is_seen_and_bright():
         assert row < 110 < column
     # 80 degrees to the side: outside the 51 that both eyes see
     aside = SunDisc(np.array([np.sin(1.4), np.cos(1.4), 0]), 1e6, 6e-5)
-    assert evaluate(picture, AHEAD, disc=aside, field_of_view="both eyes").count == 0
-    assert evaluate(picture, AHEAD, disc=aside).count == 1
+    assert evaluate(picture, AHEAD, discs=(aside,), field_of_view="both eyes").count == 0
+    assert evaluate(picture, AHEAD, discs=(aside,)).count == 1
 
 
 def test_rules_that_are_none_are_refused():

@@ -84,7 +84,8 @@ def source(system, *, exterior=rooms.NOTHING, size=200):
 
     room, groups = rooms.test_room(0.0)
     view = fisheye(EYE, (0.0, -1.0, 0.0), size)
-    return PictureSun(room, exterior, groups, [system], view).discs(SUN[None], LUX)[0]
+    discs = PictureSun(room, exterior, groups, [system], view).discs(SUN[None], LUX)[0]
+    return discs[0] if discs else None
 
 
 @pytest.mark.parametrize("size", [90, 200, 800])
@@ -93,10 +94,10 @@ def test_the_disc_is_a_source_with_its_own_luminance_whatever_the_pixel(size):
     disc = source(clear(), size=size)
     assert disc.luminance == pytest.approx(0.8 * LUX[0] / SUN_SOLID_ANGLE, rel=1e-5)
     assert disc.solid_angle == pytest.approx(SUN_SOLID_ANGLE, rel=1e-5)
-    rated = evaluate(np.full((size, size), 100.0), view, disc=disc)
+    rated = evaluate(np.full((size, size), 100.0), view, discs=(disc,))
     assert np.degrees(np.linalg.norm(disc.direction - SUN)) < 1e-3
     P = position_index(disc.direction[None], view)[0]
-    assert rated.count == 1 and rated.disc is disc
+    assert rated.count == 1 and rated.discs == (disc,)
     assert rated.Ev == pytest.approx(100 * np.pi - 0.8 * LUX[0] * SUN[1], rel=2e-3)  # the rim
     contrast = disc.luminance**2 * SUN_SOLID_ANGLE / P**2
     assert rated.contrast == pytest.approx(contrast, rel=1e-5)
@@ -132,14 +133,14 @@ def test_the_disc_ends_where_the_eye_does(beyond, share):
     turn = np.radians(90 + beyond)
     across = np.cross(SUN, [0, 0, 1.0]) / np.linalg.norm(np.cross(SUN, [0, 0, 1.0]))
     view = fisheye(EYE, np.cos(turn) * SUN + np.sin(turn) * across, 200)
-    disc = PictureSun(room, rooms.NOTHING, groups, [clear()], view).discs(SUN[None], LUX)[0]
-    seen = 0.0 if disc is None else disc.solid_angle / SUN_SOLID_ANGLE
+    discs = PictureSun(room, rooms.NOTHING, groups, [clear()], view).discs(SUN[None], LUX)[0]
+    seen = sum(disc.solid_angle for disc in discs) / SUN_SOLID_ANGLE
     assert seen == pytest.approx(share, abs=0.01)
 
 
 def test_paths_see_the_same_disc():
     from mitsuba_cfs.trace.kernels.scattering import AngularBeam
-    from mitsuba_cfs.trace.paths.disc import disc_seen, with_disc
+    from mitsuba_cfs.trace.paths.disc import discs_seen, with_discs
     from mitsuba_cfs.trace.paths.scene import PathOptics, PathTracingScene, Sky
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
@@ -148,14 +149,14 @@ def test_paths_see_the_same_disc():
         room, rooms.NOTHING, groups, [PathOptics(None, AngularBeam(np.full(16, 0.8)))]
     )
     sky = Sky(np.full(146, 1000.0), SUN, LUX[0] / SUN_SOLID_ANGLE)
-    disc = disc_seen(lit, sky, VIEW)
+    (disc,) = discs_seen(lit, sky, VIEW)
     assert disc.luminance == pytest.approx(source(clear()).luminance, rel=1e-5)
     assert disc.solid_angle == pytest.approx(source(clear()).solid_angle, rel=1e-5)
     view = fisheye(EYE, (0.0, -1.0, 0.0), 100)
     bare, whole = (
         point_in_time_picture(lit, sky, view, samples=2, disc=disc) for disc in (False, True)
     )
-    np.testing.assert_allclose(with_disc(bare, lit, sky, view), whole, rtol=1e-6)
+    np.testing.assert_allclose(with_discs(bare, lit, sky, view), whole, rtol=1e-6)
     assert whole.max() > 100 * bare.max()
 
 

@@ -151,7 +151,7 @@ def test_the_beam_that_the_room_reflects_has_the_suns_own_angle():
     # the beam lies on ten to fifty of the elements, four places on each: 3 %
     assert cfs.hourly_glare(light).Ev == pytest.approx(truth, rel=0.05)
     pictures = pictures_in_state(light, np.arange(4), [0])
-    assert pictures.without_disc(np.arange(4))[1] == [None] * 4
+    assert pictures.without_disc(np.arange(4))[1] == [()] * 4
 
 
 def test_smoothing_keeps_what_is_even_and_what_there_is():

@@ -52,13 +52,14 @@ def _compliance(options, *_others):
     from scenes.comply.findings import calendar_of
     from scenes.comply.results import Compliance
     from scenes.comply.sunlight import sun_day
+    from scenes.head import NO_HEAD
     from scenes.input_files import read_building, read_weather
 
     weather, building = read_weather(options.weather), read_building(options.building)
     rooms = tuple(_checked(space) for space in building.spaces)
     return Compliance(
         building, {}, rooms, (), calendar_of(weather), weather, sun_day(weather, 3, 21, 11.0),
-        (), (), (), {},
+        (), NO_HEAD, (), (), {},
     )  # fmt: skip
 
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.gloss import mirror
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+from mitsuba_cfs.surfaces import Surfaces
 from tests.trace.gloss_scenes import (
     EYE,
     IMAGE,
@@ -64,7 +66,6 @@ def test_a_mirror_behind_the_windows_sends_them_no_sun():
 def test_five_phases_have_the_sun_of_a_mirror_facade():
     """E in a room behind clear glass by five phases against paths, an even sky and the sun."""
     import mitsuba_cfs as cfs
-    from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 
     room, groups = rooms.test_room()
     outdoors = facade(mirror(0.8))
@@ -83,7 +84,6 @@ def test_five_phases_have_the_sun_of_a_mirror_facade():
 
 def test_a_picture_by_paths_shows_the_suns_disc_in_a_mirror():
     from mitsuba_cfs.images.view import fisheye
-    from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
     from mitsuba_cfs.trace.paths.scene import PathTracingScene
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
@@ -91,7 +91,7 @@ def test_a_picture_by_paths_shows_the_suns_disc_in_a_mirror():
     view = fisheye(EYE, (0.0, -1.0, 0.0), 32)
     for outdoors, expected in ((facade(mirror(0.8)), IMAGE), (hidden_sun(mirror(0.8)), 0.0)):
         lit = PathTracingScene(black_room(None)[0], outdoors, rooms.test_room()[1], [clear()])
-        picture = point_in_time_picture(lit, sky, view, samples=4, disc=False)
+        picture = point_in_time_picture(lit, sky, view, samples=4)
         assert normal_illuminance(picture, view) == pytest.approx(expected, rel=0.01)
 
 
@@ -113,7 +113,13 @@ def test_a_five_phase_picture_shows_the_suns_disc_in_a_mirror(indoors):
     view = fisheye(eye, direction, 64)
     shown = PictureSun(*around, [beam], view)
     values = np.zeros((1, len(shown.pixels)))
-    shown.add_to(values, sun[None], np.array([50_000.0]))
+    lux = np.array([50_000.0])
+    shown.add_to(values, sun[None], lux)
+    assert not values.any()  # in the picture without discs
+    (disc,) = shown.discs(sun[None], lux)[0]
+    assert disc.luminance * disc.solid_angle == pytest.approx(IMAGE, rel=1e-4)
+    assert disc.solid_angle == pytest.approx(SUN_SOLID_ANGLE, rel=1e-4)
+    shown.add_disc(values, sun[None], lux)
     picture = np.zeros(view.height * view.width)
     picture[shown.pixels] = values[0]
     found = normal_illuminance(picture.reshape(view.height, view.width), view)
@@ -149,7 +155,6 @@ def test_the_sun_on_a_rough_facade_is_seen_through_the_window():
 def test_window_patches_have_the_sun_of_a_rough_facade_in_its_lobe(alpha):
     """Irradiance of the window by the patches' light, against the lobe's integral."""
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-    from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
     from mitsuba_cfs.trace.kernels.scene import TracedScene
     from mitsuba_cfs.trace.sun.reflected import outdoor_light, window_shares
 
@@ -190,3 +195,60 @@ def test_a_mirror_floor_absorbs_what_it_does_not_mirror():
     np.testing.assert_allclose(mirrored[:, 0], 0.6 * dull[:, 0], rtol=1e-5)
     np.testing.assert_allclose(mirrored.sum(axis=1), 1.0, rtol=1e-5)
     assert mirrored[:, 1].sum() > dull[:, 1].sum()  # the ceiling has it
+
+
+def street(own: float, opposite: float) -> tuple[Surfaces, np.ndarray]:
+    """Mirrors above the window and opposite, and a sun that reaches the window by both alone."""
+    wall = rooms.quad((-400, 0.01, 3.1), (400, 0.01, 3.1), (400, 0.01, 60), (-400, 0.01, 60))
+    across = rooms.quad((-400, -10, -50), (400, -10, -50), (400, -10, 15), (-400, -10, 15))
+    glosses = (mirror(own), mirror(opposite))
+    numbers = np.array([0, 0, 1, 1])
+    both = Surfaces(np.concatenate([wall, across]), np.zeros(4), numbers, (), glosses)
+    return both, np.array([0.1, -1.0, 1.0]) / np.linalg.norm([0.1, -1.0, 1.0])
+
+
+@pytest.mark.parametrize(("own", "opposite"), [(0.8, 0.8), (0.8, 0.5)], ids=["alike", "unlike"])
+def test_the_sun_by_two_mirrors_lights_sensors(own, opposite):
+    """The direct-sun matrix and paths: both reflectances times the sun without the street."""
+    from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
+    from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
+
+    room, groups = black_room(None)[0], rooms.test_room()[1]
+    outdoors, sun = street(own, opposite)
+    beam = [KlemsScattering(KLEMS_FULL, np.full((145, 145), 0.1), np.full(145, 0.5))]
+
+    def matrix(outdoors):
+        return direct_sun_matrix(room, outdoors, groups, beam, POINTS, UP, suns=sun[None]).values
+
+    alone = matrix(rooms.NOTHING)
+    assert alone.min() > 0
+    np.testing.assert_allclose(matrix(outdoors), own * opposite * alone, rtol=4e-3)
+    sky = lit_by(np.zeros(146), sun, 50_000.0 / SUN_SOLID_ANGLE)
+    some = POINTS[1:2], UP[1:2]  # in the patch of sun
+    bare, found = (
+        traced(o, sky, interior=room, samples=4096, points=some[0], normals=some[1]).values
+        for o in (rooms.NOTHING, outdoors)
+    )
+    assert bare[0] > 1_000
+    np.testing.assert_allclose(found, own * opposite * bare, rtol=0.02)
+
+
+def test_a_picture_shows_the_sun_by_two_mirrors():
+    from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+    from mitsuba_cfs.images.view import fisheye
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
+    from mitsuba_cfs.trace.paths.disc import discs_seen
+    from mitsuba_cfs.trace.paths.scene import PathTracingScene
+    from mitsuba_cfs.trace.sun.picture_sun import PictureSun
+
+    outdoors, sun = street(0.8, 0.5)
+    room, groups = black_room(None)[0], rooms.test_room()[1]
+    view = fisheye((1.8, 0.6, 1.4), (0.0, -1.0, 0.0), 64)
+    beam = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.ones(145))
+    by_phases = PictureSun(room, outdoors, groups, [beam], view).discs(sun[None], np.ones(1))[0]
+    sky = lit_by(np.zeros(146), sun, 1 / SUN_SOLID_ANGLE)
+    by_paths = discs_seen(PathTracingScene(room, outdoors, groups, [clear()]), sky, view)
+    for (disc,) in (by_phases, by_paths):
+        assert disc.luminance * SUN_SOLID_ANGLE == pytest.approx(0.4, rel=1e-3)
+        np.testing.assert_allclose(disc.direction, sun, atol=1e-3)

@@ -64,7 +64,7 @@ def test_rays_that_pass_the_box_of_a_mirror_are_all_that_meet_it(monkeypatch):
     suns = directions(64) * [1, -1, 1]
     some = sunlight(outside, places, suns)
     monkeypatch.setattr(
-        SpecularPath, "_may_meet", lambda self, ray: dr.full(type(ray.o.x > 0), True)
+        SpecularPath, "_may_meet", lambda self, ray, plane: dr.full(type(ray.o.x > 0), True)
     )
     np.testing.assert_array_equal(some, sunlight(outside, places, suns))
     assert 0.02 < np.mean(some > 0) < 0.5

@@ -87,7 +87,7 @@ def measured(
         for hour in range(len(case.sky.lit)):
             picture = picture_with_disc(light, room, hour, seed=SEED)
             if case.sun == "source":
-                found = evaluate(picture.bare, geometry, disc=picture.disc)
+                found = evaluate(picture.bare, geometry, discs=picture.discs)
             else:
                 found = evaluate(picture.shown, geometry)
             row.append((found.dgp, found.Ev))

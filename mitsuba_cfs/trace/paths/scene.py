@@ -24,6 +24,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import SkyBins
 from mitsuba_cfs.trace.kernels.scattering import AngularBeam, PatchBeam, TreeBeam, loaded
 from mitsuba_cfs.trace.kernels.scene import TracedScene
+from mitsuba_cfs.trace.sun.specular_paths import SpecularPath, mirror_sequences
 
 
 class PathOptics:
@@ -109,6 +110,8 @@ class PathTracingScene:
         self.outside = TracedScene(exterior, groups)
         self.systems = tuple(systems)
         self.glossy = self.inside.gloss is not None or self.outside.gloss is not None
+        sequences = mirror_sequences(self.outside)
+        self.mirror_paths = [SpecularPath(self.outside, planes) for planes in sequences]
 
 
 def path_optics(bsdf: Bsdf, angular: AngularTable | None = None) -> PathOptics:

@@ -21,6 +21,7 @@ from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.gloss import TracedGloss, facet_density, facets
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.paths.scene import PatchSky, PathTracingScene, Sky
+from mitsuba_cfs.trace.sun.specular_paths import SpecularPath
 
 MOST_IMAGES = 8  # mirror planes asked at a vertex; of more, so many are drawn
 
@@ -131,6 +132,27 @@ def sun_images(
             if not rough:
                 image = image._replace(strength=dr.select(image.sharp, image.strength, 0.0))
             yield image
+    for path in () if isinstance(sky, PatchSky) else room.mirror_paths:
+        u = mi.Point2f(generator.next_float32(), generator.next_float32())
+        yield _image_by_mirrors(room, sky, path, vertex, u, active)
+
+
+def _image_by_mirrors(
+    room: PathTracingScene,
+    sky: Sky,
+    path: SpecularPath,
+    vertex: Vertex,
+    u: mi.Point2f,
+    active: mi.Bool,
+) -> SunImage:
+    """The image of the sun by several smooth mirrors outdoors."""
+    towards = path.apparent_rays(on_disc(sky, u))
+    active = active & (dr.dot(vertex.normal, towards) > 0) & (sky.sun_radiance > 0)
+    beam, start = through_window(room, vertex.position, towards, vertex.outdoors, active)
+    active &= beam > 0
+    shown = beam * path.transmittance(mi.Ray3f(start, towards), active)
+    strength = shown * sky.sun_radiance * float(SUN_SOLID_ANGLE)
+    return SunImage(towards, dr.select(active, strength, 0.0), mi.Bool(True))
 
 
 def _image(
@@ -180,23 +202,37 @@ def by_plane(
     active: mi.Bool,
 ) -> mi.Float:
     """Transmittance by a mirror plane to the sky, with its reflectance."""
-    gloss, outside = tracer.gloss, tracer is room.outside
+    outside = tracer is room.outside
     active, tau, origin = mi.Bool(active), mi.Float(1), position
     if outside:
         tau, origin = through_window(room, origin, towards, outdoors, active)
         active &= tau > 0
     else:
         active &= ~outdoors
-    ray = mi.Ray3f(origin, towards)
+    rho, position, _ = by_mirror(tracer, number, origin, towards, active)
+    beyond = straight_to_sky(room, position, onwards, mi.Bool(outside), active & (rho > 0))
+    return dr.select(beyond > 0, rho * tau * beyond, 0.0)
+
+
+def by_mirror(
+    tracer: TracedScene,
+    number: mi.Int32,
+    position: mi.Point3f,
+    towards: mi.Vector3f,
+    active: mi.Bool,
+) -> tuple[mi.Float, mi.Point3f, mi.Vector3f]:
+    """Reflectance of a mirror plane that rays meet first, else 0; where they continue, and how."""
+    gloss = tracer.gloss
+    ray = mi.Ray3f(position, towards)
     hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-    active &= hit.is_valid()
+    active = active & hit.is_valid()
     active &= gloss.plane_of(hit.prim_index, active) == number
     normal, _ = gloss.plane(mi.UInt32(number))
     normal = dr.mulsign(normal, -dr.dot(normal, towards))
-    rho = gloss.specular(hit.prim_index, -dr.dot(normal, towards), active)
-    place = mi.Point3f(origin + towards * hit.t + normal * tracer.epsilon)
-    beyond = straight_to_sky(room, place, onwards, mi.Bool(outside), active)
-    return dr.select(beyond > 0, rho * tau * beyond, 0.0)
+    cosine = -dr.dot(normal, towards)
+    rho = gloss.specular(hit.prim_index, cosine, active)
+    start = mi.Point3f(position + towards * hit.t + normal * tracer.epsilon)
+    return dr.select(active, rho, 0.0), start, mi.Vector3f(towards + normal * (2 * cosine))
 
 
 def _drawn(gloss: TracedGloss) -> float:

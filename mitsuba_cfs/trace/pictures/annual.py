@@ -292,7 +292,7 @@ class FivePhasePictures:
 
     def without_disc(
         self, batch: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
+    ) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
         return self._values(batch), self.discs(batch)
 
@@ -300,7 +300,7 @@ class FivePhasePictures:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
         self._sun.add_disc(values, self._directions[batch], self._illuminance[batch])
 
-    def discs(self, batch: NDArray[np.int64]) -> list[SunDisc | None]:
+    def discs(self, batch: NDArray[np.int64]) -> list[tuple[SunDisc, ...]]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
         return self._sun.discs(self._directions[batch], self._illuminance[batch])
 

@@ -33,7 +33,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     vectors,
 )
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene
-from mitsuba_cfs.trace.paths.disc import add_disc, add_mirrored_discs, eye_of
+from mitsuba_cfs.trace.paths.disc import add_discs, eye_of
 from mitsuba_cfs.trace.paths.point_in_time import add_paths, leave, window_parts, window_sun
 from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
 from mitsuba_cfs.trace.paths.sun import Vertex, on_disc, surface_sun
@@ -103,7 +103,8 @@ def point_in_time_picture(
             (2 pixels at least); 1: every pixel for itself, without smoothing, for a picture free
             of any assumption.
         pixels: [n] row * width + column of those to trace, by default all that show something.
-        disc: the sun's disc too; without it, it is to be rated apart (`path_disc.disc_seen`).
+        disc: the sun's disc and its images in mirrors too; without them, they are to be rated apart
+            (`mitsuba_cfs.trace.paths.disc.discs_seen`).
     """
     tile = tile_size(view) if tile is None else tile
     shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1)) if pixels is None else pixels
@@ -124,9 +125,8 @@ def point_in_time_picture(
             rows.append(light.by_tile(block, samples, tiles))
         progress("picture", (start + len(block)) / len(shown))
     _add_shared(picture, tiles, pairs, rows, numbers.windows)
-    add_mirrored_discs(picture, room, sky, view)
     if disc:
-        add_disc(picture, room, sky, view)
+        add_discs(picture, room, sky, view)
     return picture.astype(np.float32).reshape(view.height, view.width)
 
 

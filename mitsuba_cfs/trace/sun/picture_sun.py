@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 
 import drjit as dr
 import mitsuba as mi
@@ -39,6 +41,16 @@ CELL_POINTS = 4096  # on all windows, that the sun is followed from to the cells
 LEAST_POINTS = 256  # on each window group
 WINDOW_POINTS = 64  # on each group, for its sunlit share
 PATCH_POINTS = 16  # directions in each window patch, for its mean of scattered sun
+
+
+@dataclass(frozen=True, slots=True)
+class _DiscImage:
+    """The sun's disc of some hours as the eye may see it, straight or in mirrors."""
+
+    suns: NDArray[np.float64]  # [h, 3] apparent directions to its centre
+    illuminance: NDArray[np.float64]  # [h] normal to it, before glazing and mirrors [lx]
+    hours: NDArray[np.int64]  # those in which it may be visible
+    transmittance: Callable[[mi.Vector3f], mi.Float]  # from the eye, of directions on the disc
 
 
 class PictureSun:
@@ -120,18 +132,13 @@ class PictureSun:
     def add_to(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
         """Add the sun's light on surfaces and windows [cd/m2] to the pixels' values [h, n].
 
-        Without its disc: see `add_disc` and `discs`.
+        Without its disc and the images of it: see `add_disc` and `discs`.
 
         Args: suns: [h, 3] directions to the disc; illuminance: [h] normal to it [lx].
         """
         for mirror in self._mirrors:
             mirror.add_to(values, suns, illuminance)
-            mirror.add_disc(values, suns, illuminance)
         suns, illuminance = self._turned(suns, illuminance)
-        for plane in [] if self._inside.gloss is None else self._inside.gloss.mirrors:
-            normal = self._inside.gloss.normals[plane]
-            shown = suns - 2 * (suns @ normal)[:, None] * normal
-            self._add_disc(values, shown, illuminance, int(plane))
         lit = self._shining(suns, illuminance)
         if not len(lit):
             return
@@ -209,21 +216,38 @@ class PictureSun:
         facing = np.any([suns @ g.frame[2] > 0 for g in self._inside.groups], axis=0)
         return np.flatnonzero(facing & (illuminance > 0))
 
-    def discs(self, suns: NDArray, illuminance: NDArray) -> list[SunDisc | None]:
-        """The sun's disc [h] as the eye sees it through the straight beam, None where hidden."""
-        found: list[SunDisc | None] = [None] * len(suns)
-        suns, illuminance = self._turned(suns, illuminance)
-        lit = self._shining(suns, illuminance)
-        lit = lit[self._tree.query(suns[lit])[0] < self._size] if len(lit) else lit
-        if not len(lit):
-            return found
-        ways = np.stack([disc_parts(suns[hour]) for hour in lit])
-        towards = vectors(ways.reshape(-1, 3))
-        tau = self._straight(mi.Point3f(self._eye), towards, mi.Bool(True)).numpy()
-        tau = np.broadcast_to(tau, ways.shape[0] * ways.shape[1]).reshape(ways.shape[:2])
-        for hour, way, part in zip(lit, ways, tau * before_eye(self.view, ways), strict=True):
-            found[hour] = seen_disc(way, part * (illuminance[hour] / SUN_SOLID_ANGLE))
-        return found
+    def discs(self, suns: NDArray, illuminance: NDArray) -> list[tuple[SunDisc, ...]]:
+        """The sun's disc and its images in mirrors [h], as far as the eye sees them.
+
+        Args: suns, illuminance: as of `add_to`.
+        """
+        discs: list[tuple[SunDisc, ...]] = [()] * len(suns)
+        for image in self._images(suns, illuminance):
+            lit = image.hours
+            lit = lit[self._tree.query(image.suns[lit])[0] < self._size] if len(lit) else lit
+            if not len(lit):
+                continue
+            ways = np.stack([disc_parts(image.suns[hour]) for hour in lit])
+            tau = image.transmittance(vectors(ways.reshape(-1, 3))).numpy()
+            tau = np.broadcast_to(tau, ways.shape[0] * ways.shape[1]).reshape(ways.shape[:2])
+            for hour, way, part in zip(lit, ways, tau * before_eye(self.view, ways), strict=True):
+                disc = seen_disc(way, part * (image.illuminance[hour] / SUN_SOLID_ANGLE))
+                discs[hour] += () if disc is None else (disc,)
+        return discs
+
+    def _images(self, suns: NDArray, illuminance: NDArray) -> Iterator[_DiscImage]:
+        """The disc, its image in each mirror of the room, and those of each mirror outdoors."""
+        gloss, eye = self._inside.gloss, mi.Point3f(self._eye)
+        shown, strength = self._turned(suns, illuminance)
+        hours = self._shining(shown, strength)
+        straight = partial(self._straight, eye, active=mi.Bool(True))
+        yield _DiscImage(shown, strength, hours, straight)
+        for plane in [] if gloss is None else gloss.mirrors:
+            mirrored = shown - 2 * (shown @ gloss.normals[plane])[:, None] * gloss.normals[plane]
+            by_mirror = partial(self._by_mirror, plane=int(plane))
+            yield _DiscImage(mirrored, strength, np.flatnonzero(strength), by_mirror)
+        for mirror in self._mirrors:
+            yield from mirror._images(suns, illuminance)
 
     def _add(self, values, lit, columns, suns, strength, kernel, *options, edges=False) -> None:
         """Add the values of a kernel for pairs of hours and pixels, some hours at a time.
@@ -387,15 +411,15 @@ class PictureSun:
         return seen.numpy().reshape(-1, WINDOW_POINTS).mean(axis=1)
 
     def add_disc(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
-        """Add the visible disc to the pixels by its share of each; arguments as of `add_to`."""
-        self._add_disc(values, *self._turned(suns, illuminance), None)
+        """Add the disc and its images to the pixels by their shares; arguments as of `add_to`."""
+        for image in self._images(suns, illuminance):
+            self._add_image(values, image)
 
-    def _add_disc(
-        self, values: NDArray, suns: NDArray, illuminance: NDArray, mirror: int | None
-    ) -> None:
-        """Add the disc at directions `suns`, or its image in a mirror plane of the room."""
-        lit = self._shining(suns, illuminance) if mirror is None else np.flatnonzero(illuminance)
-        suns, strength = suns[lit], illuminance[lit]
+    def _add_image(self, values: NDArray, image: _DiscImage) -> None:
+        lit = image.hours
+        if not len(lit):
+            return
+        suns, strength = image.suns[lit], image.illuminance[lit]
         reach = 2 * np.sin(disc_reach(self._size) / 2)
         near = self._tree.query_ball_point(suns, reach)
         hour = np.repeat(np.arange(len(lit)), [len(found) for found in near])
@@ -405,11 +429,7 @@ class PictureSun:
         pair, way, share = disc_rays(self.view, self.pixels[pixel], suns[hour], self._size)
         if not len(pair):
             return
-        towards = vectors(way)
-        if mirror is None:
-            tau = self._straight(mi.Point3f(self._eye), towards, mi.Bool(True)).numpy()
-        else:
-            tau = self._by_mirror(towards, mirror).numpy()
+        tau = image.transmittance(vectors(way)).numpy()
         seen = np.bincount(pair, tau, minlength=len(hour)) * share
         np.add.at(values, (lit[hour], pixel), seen * strength[hour] / SUN_SOLID_ANGLE)
 

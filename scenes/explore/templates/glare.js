@@ -220,8 +220,8 @@
       return found;
     }
 
-    // Glare of the pixels' luminance and of the sun's disc beside them
-    rate(values, disc) {
+    // Glare of the pixels' luminance and of the discs beside them: the sun and its images in mirrors
+    rate(values, discs) {
       const { eye, luminance } = this;
       let Ev = 0, largest = 0;
       luminance.fill(0);
@@ -234,7 +234,7 @@
         if (value > largest) largest = value;
       }
       const sources = this.sources();
-      if (disc) {
+      for (const disc of discs) {
         Ev += disc.luminance * disc.solidAngle * cfs.dot(disc.direction, eye.frame.forward);
         largest = Math.max(largest, disc.luminance);
         if (disc.luminance > THRESHOLD) {

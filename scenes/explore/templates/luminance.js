@@ -78,17 +78,20 @@
       return values;
     }
 
-    disc(hour) {
-      const at = this.model.disc_hour.indexOf(hour);
-      if (at < 0) return null;
-      const d = this.model.disc.subarray(5 * at, 5 * at + 5);
-      return { direction: [d[0], d[1], d[2]], luminance: d[3], solidAngle: d[4] };
+    // The sun's disc and its images in mirrors
+    discs(hour) {
+      const { disc, disc_hour } = this.model, discs = [];
+      for (let at = disc_hour.indexOf(hour); at >= 0 && disc_hour[at] === hour; at++) {
+        const d = disc.subarray(5 * at, 5 * at + 5);
+        discs.push({ direction: [d[0], d[1], d[2]], luminance: d[3], solidAngle: d[4] });
+      }
+      return discs;
     }
 
     async picture(hour) {
       const codes = await this.codes(hour), start = performance.now();
       const values = this.compute(hour, codes);
-      return { values, disc: this.disc(hour), milliseconds: performance.now() - start };
+      return { values, discs: this.discs(hour), milliseconds: performance.now() - start };
     }
   }
   cfs.PictureYear = PictureYear;

@@ -56,7 +56,7 @@
     async rated(state, l) {
       const pictures = await this.pictures(state), begun = performance.now();
       const picture = await pictures.picture(l), start = performance.now();
-      const glare = this.scan.rate(picture.values, picture.disc);
+      const glare = this.scan.rate(picture.values, picture.discs);
       const end = performance.now();
       return { ...picture, glare, glareMilliseconds: end - start, wholeMilliseconds: end - begun };
     }

@@ -1,0 +1,48 @@
+"""Fenestration data of a window as an export writes them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from bim.energyplus_windows import WindowOptics
+from bim.model import Window
+from mitsuba_cfs.bsdf.bsdf_file import Bsdf, BsdfFile
+from mitsuba_cfs.bsdf.resample import klems_of
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedGlazing:
+    """Fenestration data of a window in its first shading state, None where not known."""
+
+    u_value: float | None = None  # [W/(m2 K)]
+    g_value: float | None = None  # at normal incidence
+    visible_transmittance: float | None = None  # at normal incidence, to the hemisphere
+    solar_transmittance: float | None = None
+    bsdf: BsdfFile | None = None  # by band; a tensor tree where the data are one
+    optics: WindowOptics | None = None  # matrices and layers for EnergyPlus
+
+
+Glazings = Mapping[str, ExportedGlazing]  # by window GUID
+
+
+def glazing_of(window: Window, glazings: Glazings) -> ExportedGlazing:
+    """Data of a window: those given by GUID, else those that its file states or holds."""
+    if window.guid in glazings:
+        return glazings[window.guid]
+    state = next(iter(window.states), None)
+    bands = {} if state is None else state.bands
+    visible, solar = window.visible_transmittance, window.solar_transmittance
+    if "Visible" in bands:
+        visible = normal_transmittance(bands["Visible"]) if visible is None else visible
+    if "Solar" in bands:
+        solar = normal_transmittance(bands["Solar"]) if solar is None else solar
+    return ExportedGlazing(
+        window.u_value, window.g_value, visible, solar, BsdfFile(bands) if bands else None
+    )
+
+
+def normal_transmittance(bsdf: Bsdf) -> float:
+    """Direct-hemispherical transmittance from outdoors at normal incidence."""
+    klems = klems_of(bsdf)
+    return min(float(klems.direct_hemispherical(klems.transmission_front)[0]), 1.0)
