@@ -67,9 +67,9 @@ def check_building(options: InputOptions) -> None:
 
     Raises: `DataError` for a file of no format that is read, or an empty name.
     """
+    check_names(options.spaces)
     if options.building is not None:
         check_building_file(options.building)
-    check_names(options.spaces)
 
 
 def check_names(names: Sequence[str], field: str = "--space") -> None:
@@ -149,8 +149,8 @@ def read_building(
 
 def building_of(options: InputOptions, progress: Progress = silent) -> Building:
     """The building of a command's options; raises as `read_building`."""
-    steps = summed(progress, "inputs", STAGES)
-    return read_building_file(options.building, options.read, steps)
+    read = options.read
+    return read_building_file(options.building, read, summed(progress, "inputs", STAGES))
 
 
 def sha256(path: Path) -> str:

@@ -79,7 +79,7 @@ def optical_data_of(document: dict[str, Any], path: Path) -> OpticalData:
     own = _table(_table(data, "serverSpecific", path), "igsdb", path)
     rows = [[nm, *table.triple(nm)] for nm in table.wavelengths]
     visible = table.triple("visible") if table.has("visible") else None
-    side = own.get("coatedSide")
+    coated_side = own.get("coatedSide")
     name = component.get("name") or own.get("marketingName")
     return OpticalData(
         name=name if isinstance(name, str) else None,
@@ -89,7 +89,9 @@ def optical_data_of(document: dict[str, Any], path: Path) -> OpticalData:
         infrared_transmittance=passed,
         thickness_mm=_stated(_table(own, "physicalProperties", path), "thickness", path),
         conductivity=_stated(_table(own, "materialBulkProperties", path), "conductivity", path),
-        coated=_differs(rows, visible, infrared) if side is None else side not in ("NEITHER", "NA"),
+        coated=_differs(rows, visible, infrared)
+        if coated_side is None
+        else coated_side not in ("NEITHER", "NA"),
     )
 
 

@@ -66,8 +66,10 @@ def read_spectral_pane(
     if not thickness:
         raise DataError("states no thickness", file=file.path)
     front, back = (EMISSIVITY if e is None else e for e in file.emissivity)
+    wavelength_nm, tau, rho_front, rho_back = file.spectrum.T
     return SpectralPane(
-        file.name, *file.spectrum.T, thickness, file.conductivity or 1.0, (front, back),
+        file.name, wavelength_nm, tau, rho_front, rho_back, thickness,
+        file.conductivity or 1.0, (front, back),
         file.infrared_transmittance or 0.0, file.coated,
     )  # fmt: skip
 
