@@ -60,23 +60,23 @@ def open_streams() -> None:
 
 # name: help in one line. The module scenes.commands.<name> defines `command`.
 COMMANDS = {
-    "run": "IFC, weather and fenestration to daylight, glare, heat and comfort.",
-    "comply": "Rooms against EN 17037, LM-83, LEED, BREEAM: a dossier that prints.",
-    "demo": "An office with its blind up, down and controlled, compared.",
-    "explore": "Any hour of a run's results in a browser: pictures, plans, temperatures.",
-    "doctor": "Versions, the variant that traces the rays, and a self-test.",
-    "check": "Rooms, windows and problems of a building's file.",
-    "export": "The rooms for Radiance, Mitsuba, EnergyPlus, honeybee, gbXML, or for viewing.",
+    "run": "Compute daylight, glare, heat and comfort of the rooms of a building.",
+    "comply": "Check rooms against EN 17037, LM-83, LEED, BREEAM; write a printable dossier.",
+    "demo": "Compare an office with its blind up, down and controlled.",
+    "explore": "Show any hour of a run in a browser: pictures, plans, temperatures.",
+    "doctor": "Print versions and the Mitsuba variant, and run a self-test.",
+    "check": "List rooms, windows and problems of a building model.",
+    "export": "Write rooms for Radiance, Mitsuba, EnergyPlus, Honeybee, gbXML or glTF viewers.",
     "ifc": "Attach data to IFC files, query and survey them.",
     "bsdf": "Read, check, plot and make BSDF files.",
-    "sky": "Sun positions and sky matrices of a weather file.",
-    "glare": "Glare indices of a fisheye luminance image.",
-    "picture": "Luminance picture of a room under the sky of an hour.",
-    "dgp": "Glare of a room's views in every hour of a year.",
-    "thermal": "Gains, temperatures and comfort of a room, hour by hour.",
-    "study": "Many variants from one study file.",
-    "pv": "Yield of the photovoltaic modules of a building.",
-    "calibrate": "What each method costs on this machine.",
+    "sky": "Write sun positions and sky matrices of a weather file.",
+    "glare": "Compute glare indices of fisheye luminance pictures, as evalglare does.",
+    "picture": "Render a luminance picture of a room for one hour.",
+    "dgp": "Compute the glare of views in a room for every hour of the year.",
+    "thermal": "Compute hourly gains, temperatures, loads and comfort of rooms (heat only).",
+    "study": "Compare rooms, systems, orientations and climates of a study file.",
+    "pv": "Compute the yield of the photovoltaic modules of a building.",
+    "calibrate": "Measure the computing time of each method on this machine.",
 }
 USAGE, FAILED, INTERRUPTED = 2, 1, 130
 SIGNALLED = 128  # and the signal's number
@@ -130,7 +130,7 @@ def _print_version(ctx: click.Context, _parameter: click.Parameter, wanted: bool
     cls=LazyGroup,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
-@click.option("-v", "--verbose", count=True, help="Say more: -v what is done, -vv everything.")
+@click.option("-v", "--verbose", count=True, help="Log progress (-v) or all details (-vv).")
 @click.option(
     "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version,
     help="Print the version.",

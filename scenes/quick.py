@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from scenes.language.catalogue import N_
 
 NOTE = N_(
-    "Quick run: few rays, small pictures, one hour. This is a preview; run without --quick for "
+    "Quick run: few rays, few sensors, small pictures. This is a preview; run without --quick for "
     "reliable results."
 )
 

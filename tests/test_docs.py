@@ -111,6 +111,21 @@ def test_study_files_in_the_docs_are_read(folder):
     assert found
 
 
+def test_the_system_and_operation_files_of_the_quick_start_are_read(folder):
+    from scenes.fenestration.thermal_file import ThermalFile
+    from scenes.room.operation_tables import OperationTables
+    from scenes.toml_file import read_table, validated
+
+    system, operation, _page = examples(REPOSITORY / "docs" / "quickstart.md", "toml")
+    path = folder / "system.toml"
+    path.write_text(system)
+    values = ThermalFile.read(path)
+    assert (values.u_value, values.g_value, values.shading_position) == (1.1, 0.25, "external")
+    path = folder / "office.toml"
+    path.write_text(operation)
+    assert validated(OperationTables, read_table(path), path).control.rule == "irradiance"
+
+
 def test_the_page_of_the_quick_start_is_read(folder):
     from scenes.page_options import (
         DossierSection,

@@ -38,21 +38,18 @@ class Number(click.FloatRange):
 
 
 basis_option = click.option(
-    "--basis",
-    type=click.Choice(["full", "half", "quarter"]),
-    default="full",
-    show_default=True,
+    "--basis", type=click.Choice(["full", "half", "quarter"]), default="full", show_default=True,
     help="Klems basis.",
-)
+)  # fmt: skip
 tensor_tree_option = click.option(
-    "--tensor-tree", type=click.IntRange(1, 6), help="4^N cells a hemisphere instead."
+    "--tensor-tree",
+    type=click.IntRange(1, 6),
+    help="Write a tensor tree of 4^N cells per hemisphere instead.",
 )
 cull_option = click.option(
-    "--cull",
-    type=Number(0, 1, max_open=True),
-    default=0.9,
-    help="Share of a tree's cells to merge away.",
-)
+    "--cull", type=Number(0, 1, max_open=True), default=0.9,
+    help="Fraction of the tensor tree's cells to merge.",
+)  # fmt: skip
 
 
 INFO_ANGLES_DEG = (0, 10, 20, 30, 40, 50, 60, 70, 80)
@@ -75,7 +72,10 @@ ANGLES = (Number(), Number())
 LENGTH, SHARE = Number(min=0, min_open=True), Number(0, 1)
 PERIOD = (LENGTH, LENGTH)
 BAND_OPTION = click.option(
-    "--band", default="Visible", show_default=True, help="Visible or Solar; of the file."
+    "--band",
+    default="Visible",
+    show_default=True,
+    help="Spectral band of the BSDF: Visible or Solar; of the file.",
 )
 
 
@@ -87,7 +87,7 @@ def command() -> None:
 @command.command()
 @click.argument("file", type=FILE)
 def check(file: Path) -> None:
-    """List what is wrong with FILE, or worth knowing, each with its consequence.
+    """List errors and remarks on FILE, each with its consequence.
 
     Exits with an error where the file should not be used.
     """
@@ -156,12 +156,15 @@ def _description(data: BsdfFile) -> list[str]:
 @click.argument("file", type=FILE)
 @click.argument("pairs", required=False, type=click.Choice(["-"]))
 @click.option(
-    "--incident",
+    "--incident", type=ANGLES, metavar="THETA PHI",
+    help="Direction to the light [degrees]; together with --outgoing.",
+)  # fmt: skip
+@click.option(
+    "--outgoing",
     type=ANGLES,
     metavar="THETA PHI",
-    help="To the light [degrees]; together with --outgoing.",
+    help="Direction in which light leaves [degrees].",
 )
-@click.option("--outgoing", type=ANGLES, metavar="THETA PHI", help="It leaves to [degrees].")
 @BAND_OPTION
 def evaluate(file: Path, pairs: str | None, incident, outgoing, band: str) -> None:
     """Print the BSDF [1/sr] of FILE, angles in Radiance's frame.
@@ -215,7 +218,11 @@ def _from_radiance(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 @command.command()
 @click.argument("file", type=FILE)
 @click.option(
-    "--incident", type=ANGLES, required=True, metavar="THETA PHI", help="To the light [degrees]."
+    "--incident",
+    type=ANGLES,
+    required=True,
+    metavar="THETA PHI",
+    help="Direction to the light [degrees].",
 )
 @BAND_OPTION
 @click.option("--out", type=FILE, required=True, help="PNG, PDF or SVG to write.")
@@ -239,31 +246,52 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
 
 
 @command.command()
-@click.option("--shape", type=click.Choice(SHAPES), default="venetian", show_default=True)
-@click.option("--depth-mm", type=LENGTH, help="Width of a slat along its chord; of a pleat.")
-@click.option("--spacing-mm", type=LENGTH, help="From one slat, hole, thread or pleat to the next.")
-@click.option("--openness", type=SHARE, help="Share of a perforated or woven sheet that is hole.")
+@click.option(
+    "--shape", type=click.Choice(SHAPES), default="venetian", show_default=True,
+    help="Geometry to trace, or the data sheet of a fabric or product.",
+)  # fmt: skip
+@click.option("--depth-mm", type=LENGTH, help="Chord width of a slat, or depth of a pleat.")
+@click.option("--spacing-mm", type=LENGTH, help="Distance between slats, holes, threads or pleats.")
+@click.option("--openness", type=SHARE, help="Open area fraction of a perforated or woven sheet.")
 @click.option("--geometry", type=FILE, help="Radiance scene of one cell, in genBSDF's frame.")
 @click.option("--period-mm", type=PERIOD, metavar="WIDTH HEIGHT", help="Size of that cell.")
-@click.option("--tilt-deg", type=Number(-90, 90), default=0.0, help="Lowers the exterior edge.")
-@click.option("--radius-mm", type=LENGTH, help="Radius of curvature; flat without.")
-@click.option("--thickness-mm", type=Number(min=0), default=0.0)
 @click.option(
-    "--index", type=Number(min=1), help="Refractive index of a prism panel; --tilt-deg its angle."
+    "--tilt-deg",
+    type=Number(-90, 90),
+    default=0.0,
+    help="Slat tilt; positive lowers the exterior edge.",
 )
-@click.option("--product", type=FILE, help="IGSDB's JSON of a shade, for --shape product.")
-@click.option("--fabrics", type=FILE, help="CSV of fabrics by EN 14501, for --shape fabric.")
-@click.option("--fabric", help="Name and colour of one of them, where it has several.")
-@click.option("--visible", type=SHARE, help="Colour (Radiance plastic), visible.")
-@click.option("--solar", type=SHARE, help="Colour, solar; the visible's without.")
-@click.option("--specular", type=SHARE, default=0.0)
-@click.option("--roughness", type=Number(min=0), default=0.0)
+@click.option("--radius-mm", type=LENGTH, help="Radius of curvature; default: flat.")
+@click.option(
+    "--thickness-mm", type=Number(min=0), default=0.0, help="Thickness of a slat or sheet."
+)
+@click.option(
+    "--index",
+    type=Number(min=1),
+    help="Refractive index of a prism panel, whose angle is --tilt-deg.",
+)
+@click.option(
+    "--product", type=FILE, help="JSON file of a shade from the IGSDB, for --shape product."
+)
+@click.option("--fabrics", type=FILE, help="CSV file of fabrics by EN 14501, for --shape fabric.")
+@click.option("--fabric", help="Name and colour of a fabric, if the file has several.")
+@click.option("--visible", type=SHARE, help="Visible reflectance (Radiance plastic).")
+@click.option("--solar", type=SHARE, help="Solar reflectance; default: the visible one.")
+@click.option(
+    "--specular", type=SHARE, default=0.0, help="Specular reflectance (Radiance plastic)."
+)
+@click.option(
+    "--roughness",
+    type=Number(min=0),
+    default=0.0,
+    help="Roughness of the specular part (Radiance plastic).",
+)
 @basis_option
 @tensor_tree_option
-@click.option("--isotropic", is_flag=True, help="Tensor tree of rank 3: the mean over azimuths.")
+@click.option("--isotropic", is_flag=True, help="Tensor tree of rank 3: mean over azimuths.")
 @cull_option
 @click.option(
-    "--paths", type=click.IntRange(min=1), default=32_768, help="For each direction and side."
+    "--paths", type=click.IntRange(min=1), default=32_768, help="Paths for each direction and side."
 )
 @seed_option
 @click.option("--name", default="", help="Name to write into the file.")
@@ -286,12 +314,14 @@ def generate(out: Path, **options) -> None:
 @command.command()
 @click.argument("layers", nargs=-1, required=True, type=FILE, metavar="OUTER.xml ... INNER.xml")
 @click.option("--name", default="", help="Name to write into the file.")
-@click.option("--absorptances", type=FILE, help="CSV file: what each layer absorbs, by patch.")
+@click.option(
+    "--absorptances", type=FILE, help="CSV file of the absorptance of each layer by patch."
+)
 @click.option("--out", type=FILE, required=True, help="XML file to write.")
 def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, out: Path) -> None:
     """Combine layers, the exterior one first, by Klems matrix algebra.
 
-    Inter-reflections are all counted; gaps between the files are taken to be empty.
+    All inter-reflections are included; the gaps between the layers are empty.
     """
     from scenes.bsdf_generation import combined_file
 
@@ -310,16 +340,13 @@ def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, out:
 @command.command("interpolate")
 @click.argument("files", nargs=-1, required=True, type=FILE, metavar="MEASURED.txt ...")
 @click.option(
-    "--normal",
-    type=click.Choice(["room", "outside"]),
-    default="room",
-    show_default=True,
-    help="Where the sample's normal points to.",
-)
+    "--normal", type=click.Choice(["room", "outside"]), default="room", show_default=True,
+    help="Side to which the sample's normal points.",
+)  # fmt: skip
 @basis_option
 @tensor_tree_option
 @cull_option
-@click.option("--name", default="", help="Name to write into the file; the sample's without.")
+@click.option("--name", default="", help="Name to write into the file; default: the sample's.")
 @click.option("--out", type=FILE, required=True, help="XML file to write.")
 def interpolate(
     files: tuple[Path, ...],
@@ -331,10 +358,10 @@ def interpolate(
     name: str,
     out: Path,
 ) -> None:
-    """Make a BSDF of goniophotometer files (pgII text), one or more an incident direction.
+    """Convert goniophotometer files (pgII text, one or more per incident direction) to a BSDF.
 
-    Prints for each incident direction the share of light that is scattered, with the standard
-    error that the noise of the values gives it, and what was taken for symmetry.
+    Prints the scattered fraction of each incident direction with its standard error, and the
+    symmetry that was assumed.
     """
     from mitsuba_cfs.bsdf.measured_file import read_measurement
     from mitsuba_cfs.bsdf.xml import write_bsdf_xml
@@ -417,21 +444,20 @@ def _print_shares(patterns: Sequence[Pattern], band: int) -> None:
 
 @command.command("thermal")
 @click.argument("states", nargs=-1, required=True, type=FILE, metavar="STATE.xml ...")
-@click.option("--place", type=click.Choice(PLACES), help="The files are shades; where they stand.")
 @click.option(
-    "--glazing", type=click.Choice(["A", "B", "C", "D"]), help="Of EN 14501, with --place."
+    "--place", type=click.Choice(PLACES), help="The files are shades alone, at this position."
 )
 @click.option(
-    "--kappa",
-    type=click.FloatRange(0, 1),
-    default=0.4,
-    show_default=True,
-    help="Of Kuhn's formula for interior shades.",
+    "--glazing",
+    type=click.Choice(["A", "B", "C", "D"]),
+    help="Reference glazing of EN 14501, with --place.",
 )
 @click.option(
-    "--out", type=FILE, help="The rows as CSV; as JSON, g by patch with it, by its suffix."
-)
-@click.option("--toml", type=FILE, help="Write what the heat balance takes, of one state.")
+    "--kappa", type=click.FloatRange(0, 1), default=0.4, show_default=True,
+    help="Parameter of Kuhn's formula for interior shades.",
+)  # fmt: skip
+@click.option("--out", type=FILE, help="Write the table as .csv, or as .json with g by patch.")
+@click.option("--toml", type=FILE, help="Write the thermal data of one state for the heat balance.")
 def thermal(
     states: tuple[Path, ...],
     place: str | None,
@@ -440,11 +466,11 @@ def thermal(
     out: Path | None,
     toml: Path | None,
 ) -> None:
-    """U, g_tot, tau_e, secondary heat and EN 14501 classes of each STATE of a system.
+    """Print U, g_tot, tau_e, secondary heat and EN 14501 classes of each STATE of a system.
 
-    A state is a BSDF file; the .toml beside it says what else is known: U and g, or its layers,
-    which are rated by ISO 15099 (NFRC), ISO 52022-3, EN 673 and EN 410.  With --place and --glazing
-    the files are shades alone, rated by EN 13363-1 and Kuhn.
+    A state is a BSDF file with a .toml file beside it that gives U and g, or the layers, which are
+    rated by ISO 15099 (NFRC), ISO 52022-3, EN 673 and EN 410.  With --place and --glazing the
+    files are shades alone, rated by EN 13363-1 and Kuhn.
     """
     from scenes.fenestration.ratings import printed, rated_state, thermal_toml
 

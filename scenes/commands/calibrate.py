@@ -12,15 +12,14 @@ from scenes.commands.room_options import size_option
 @click.command()
 @size_option("size", 300, "costs are scaled to those of a study")
 @click.option(
-    "--out",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="Where to keep it; default: where `cfs study` looks.",
-)
+    "--out", type=click.Path(path_type=Path, dir_okay=False),
+    help="File to write; default: the one that `cfs study` reads.",
+)  # fmt: skip
 def command(size: int, out: Path | None) -> None:
     """Time every method and glare metric on this machine.
 
-    A room of 3.65 x 4.60 x 3.00 m behind the demo's blind: seconds for each scene, each system in
-    it and each time step.  Let nothing else run meanwhile.
+    Seconds for each scene, system and time step of a room of 3.65 x 4.60 x 3.00 m with the demo's
+    blind.  Run nothing else on the machine meanwhile.
     """
     from mitsuba_cfs.files import check_file
     from scenes.calibration.costs import calibration_file

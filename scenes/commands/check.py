@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,9 +22,14 @@ UNCUT = 100_000  # columns of a table that nobody sees
 
 @click.command()
 @input_options("all", weather="", system=False)
-@click.option("--csv", "issues", type=click.Path(path_type=Path), help="Also write the problems.")
+@click.option(
+    "--csv",
+    "issues",
+    type=click.Path(path_type=Path),
+    help="Also write the problems to a CSV file.",
+)
 def command(issues: Path | None, **chosen) -> None:
-    """Rooms, windows and problems of a building's file, as the simulation will see them.
+    """List rooms, windows and problems of a building model as the simulation reads them.
 
     BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
     """
@@ -47,7 +53,10 @@ def command(issues: Path | None, **chosen) -> None:
     for line in (*head.model, *(f"assumed: {text}" for text in head.assumed)):
         console.print(line, markup=False, highlight=False)
     console.print(_rooms(read))
-    console.print(_issues(read))
+    if read.issues:
+        console.print("Problems, by the glass that they concern; a repeated one with an example:")
+    for line in _issues(read):
+        console.print(line, markup=False, highlight=False)
     console.print(
         f"{len(read.spaces)} rooms, {sum(bool(s.windows) for s in read.spaces)} with windows, "
         f"{len(read.windows)} windows, {sum(w.area for w in read.windows):.1f} m2 of glass, "
@@ -84,17 +93,10 @@ def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.2f}"
 
 
-def _issues(building: Building) -> Table:
-    """The problems by their weight, alike ones counted once."""
-    from rich.table import Table
-
+def _issues(building: Building) -> Iterator[str]:
+    """One line for each kind of problem, the weightiest first."""
     from bim.report.ranking import ranked
 
-    table = Table(title="Problems", title_justify="left")
-    table.add_column("glass m2", justify="right")
-    for head in ("where", "what", "consequence or repair"):
-        table.add_column(head, overflow="fold")
-    for one in ranked(building.issues):
-        glass = f"{one.glass:.2f}" if one.glass else ""
-        table.add_row(glass, one.first.where, *one.text("command").pair)
-    return table
+    for kind in ranked(building.issues):
+        glass = f", {kind.glass:.2f} m2 of glass" if kind.glass else ""
+        yield f"- {kind.text('command').line} ({kind.first.where}{glass})"

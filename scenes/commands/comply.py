@@ -38,32 +38,26 @@ DAYS = ((2, 1), (3, 21))  # between which EN 17037 has the day of the sunlight c
 @room_options
 @click.option(
     "--standard", "standards", multiple=True, required=True, metavar="NAME|FILE.toml",
-    help="Rules to check: en17037, leed-v4.1, any other of docs/comply.md, or a file of your own.",
+    help="Rule set: en17037, leed-v4.1, another of docs/comply.md, or a file; may be repeated.",
 )  # fmt: skip
 @click.option(
-    "--closed",
-    type=FILE,
+    "--closed", type=FILE,
     help="BSDF XML file of every window with its blinds closed; default: the last state that the "
     "IFC holds, else LM-83's shade.",
-)
+)  # fmt: skip
 @click.option("--uses", type=FILE, help="TOML file of room uses; see docs/comply.md.")
 @click.option(
-    "--day",
-    default="03-21",
-    show_default=True,
-    metavar="MM-DD",
-    help="Of the exposure to sunlight, 02-01 to 03-21.",
-)
+    "--day", default="03-21", show_default=True, metavar="MM-DD",
+    help="Date for exposure to sunlight, 02-01 to 03-21.",
+)  # fmt: skip
 @click.option(
-    "--sun-altitude",
-    "least_altitude_deg",
-    type=click.FloatRange(0, 45),
-    help="Least altitude of the sun that counts [deg]; default: the rule's for the country.",
-)
+    "--sun-altitude", "least_altitude_deg", type=click.FloatRange(0, 45),
+    help="Minimum solar altitude [deg]; default: the rule's value for the country.",
+)  # fmt: skip
 @eye_height_option
 @grid_option
 @directions_option
-@write_ifc_option("a level for each criterion of each room")
+@write_ifc_option("a level for each criterion and room")
 def command(
     *,
     out: Path,
@@ -73,7 +67,7 @@ def command(
     settings: tuple[str, ...],
     **chosen,
 ) -> None:
-    """The rooms of a building against daylight rules: a dossier and a table of all values.
+    """Check the rooms of a building against daylight rules; write a dossier and a table of values.
 
     BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
     """

@@ -34,49 +34,45 @@ _DEFAULT = YearOptions(Path(), Path())
 @click.command()
 @input_options("the first with a window", several=False, weather="demo")
 @out_folder_option
-@view_option("views", "or a file of them", several=True)
+@view_option("views", "or a file of views", several=True)
 @grid_option
 @directions_option
 @eye_height_option
-@method_option(METHODS, "by paths there are single pictures, cfs picture", default=_DEFAULT.method)
-@click.option(
-    "--metric",
-    type=click.Choice(METRICS),
-    default=_DEFAULT.metric,
-    show_default=True,
-    help="DGP; enhanced simplified (sources of direct light); simplified (illuminance alone).",
+@method_option(
+    METHODS, "path tracing computes single pictures, see cfs picture", default=_DEFAULT.method
 )
-@size_option("size", _DEFAULT.size, "as evalglare wants them")
-@samples_option(_DEFAULT.samples, "for all hours together")
+@click.option(
+    "--metric", type=click.Choice(METRICS), default=_DEFAULT.metric, show_default=True,
+    help="DGP; eDGP: sources of direct light only; sDGP: illuminance at the eye only.",
+)  # fmt: skip
+@size_option("size", _DEFAULT.size, "as evalglare recomcorrects")
+@samples_option(_DEFAULT.samples, "shared by all hours")
 @click.option(
     "--memory", "memory_gb", type=click.FloatRange(0.01, 1024), default=_DEFAULT.memory_gb,
-    show_default=True, help="Of a view's matrices [GiB]; above it they lie on disk.",
+    show_default=True, help="Memory for the matrices of a view [GiB]; larger ones go to disk.",
 )  # fmt: skip
 @click.option(
     "--occupied", type=click.IntRange(0, 24), nargs=2, default=_DEFAULT.occupied,
-    show_default=True, help="Clock hours of use, every day; over midnight too: 18 8.",
+    show_default=True, help="First and last clock hour of use, every day; past midnight too: 18 8.",
 )  # fmt: skip
 @click.option(
-    "--worst",
-    type=click.IntRange(0, 100),
-    default=_DEFAULT.worst,
-    show_default=True,
-    help="Pictures of each view's worst hours.",
-)
-@click.option("--hdr", is_flag=True, help="These pictures as .hdr too.")
+    "--worst", type=click.IntRange(0, 100), default=_DEFAULT.worst, show_default=True,
+    help="Number of pictures of each view's worst hours.",
+)  # fmt: skip
+@click.option("--hdr", is_flag=True, help="Also write these pictures as .hdr.")
 @subdivide_option
 @light_options
 @page_option
 @quick_option
 def command(out: Path, page: Path | None, **chosen) -> None:
-    """Daylight glare probability of a room's views in every hour with the sun up.
+    """Compute the daylight glare probability of a room's views in every hour with the sun up.
 
-    What fills the windows without --cfs: the BSDF attached to them or their types in the IFC, else
-    the transmittance that it states.  Without BUILDING the demo's office.
+    Without --cfs each window uses the BSDF attached to it or its type in the IFC, else the
+    transmittance stated there.  Without BUILDING the demo's office is used.
 
-    Writes a table of the views with their classes and EN 17037's protection, each view's hours, a
-    heat map and its worst hours.  A run that was stopped goes on where it was when it is called
-    again.
+    Writes a table of the views with their glare class and level of protection (EN 17037), and for
+    each view its hours, a heat map and its worst hours.  After an interruption the same command
+    continues.
     """
     if chosen["views"] and (chosen["grid"] is not None or chosen["directions"] > 1):
         raise click.UsageError("--view gives the views: not with --grid or --directions")

@@ -26,9 +26,9 @@ TIME_LIMIT = 120  # seconds for the self-test; it takes two
 
 @click.command()
 def command() -> None:
-    """Print versions, the variant chosen and why, LLVM libraries, peers, and run a self-test.
+    """Print versions, LLVM libraries, the chosen Mitsuba variant, peer programs; run a self-test.
 
-    Where something is wrong the last line says what, and what to do; the exit code is then 1.
+    If something is wrong, the last line says what and what to do, and the exit code is 1.
     """
     fault = _print_versions()
     _print_llvm()

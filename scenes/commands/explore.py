@@ -19,26 +19,27 @@ RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 @click.command()
 @click.argument("results", type=RESULTS, nargs=-1, required=True, metavar="RESULTS...")
 @click.option(
-    "--out", type=click.Path(path_type=Path), help="Write one folder that opens as a file, and end."
+    "--out", type=click.Path(path_type=Path),
+    help="Write one folder that opens as a file, and exit.",
+)  # fmt: skip
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    help="Port on the loopback address; 0: any free port.",
 )
 @click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, help="On the loopback address; 0: any."
-)
-@click.option(
-    "--language",
-    type=click.Choice(["en", "de", "fr"]),
-    default="en",
-    show_default=True,
+    "--language", type=click.Choice(["en", "de", "fr"]), default="en", show_default=True,
     help="Language of the page; of several runs, or of --out.",
-)
-@click.option("--no-browser", is_flag=True, help="Only say the address.")
+)  # fmt: skip
+@click.option("--no-browser", is_flag=True, help="Print the address only.")
 def command(
     results: Sequence[Path], out: Path | None, port: int, language: str, no_browser: bool
 ) -> None:
-    """Walk through any hour of runs: pictures, glare, plans with patches of sun, temperatures.
+    """Show any hour of a run: pictures, glare, plans with sunlit areas, temperatures.
 
-    RESULTS are folders of `cfs run --explore`.  Those of several runs can be seen side by side.
-    The page is served to this machine alone until Ctrl-C; it asks for nothing elsewhere.
+    RESULTS are folders of `cfs run --explore`; several are shown side by side.  The page is served
+    to this machine only, until Ctrl-C, and loads nothing from the network.
     """
     from scenes.explore.folder import explorer_of, join_explorers
     from scenes.language.catalogue import in_language

@@ -37,26 +37,21 @@ PATTERNS = {  # of the files that an export writes
 @click.command()
 @input_options("all", weather="", system=False)
 @click.option(
-    "--radiance",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder of Radiance scenes; one folder inside for each room.",
-)
+    "--radiance", type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for Radiance scenes, with a subfolder for each room.",
+)  # fmt: skip
 @click.option(
-    "--mitsuba",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder of Mitsuba scenes; one folder inside for each room with a window.",
-)
+    "--mitsuba", type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for Mitsuba scenes, with a subfolder for each room with a window.",
+)  # fmt: skip
 @click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
-@click.option("--honeybee", type=click.Path(path_type=Path), help="honeybee model (.hbjson).")
+@click.option("--honeybee", type=click.Path(path_type=Path), help="Honeybee model (.hbjson).")
 @click.option("--gbxml", type=click.Path(path_type=Path), help="gbXML file (.gbxml).")
 @click.option(
-    "--band",
-    type=click.Choice(BANDS, case_sensitive=False),
-    default="Visible",
-    show_default=True,
-    help="Visible or Solar; of the Radiance and Mitsuba scenes.",
-)
+    "--band", type=click.Choice(BANDS, case_sensitive=False), default="Visible", show_default=True,
+    help="Spectral band of the BSDF: Visible or Solar; of the Radiance and Mitsuba scenes.",
+)  # fmt: skip
 @spacing_option
 @height_option
 @subdivision_option
@@ -74,12 +69,12 @@ def command(
     subdivision: str,
     **chosen,
 ) -> None:
-    """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing.
+    """Write the rooms for Radiance, Mitsuba, EnergyPlus, Honeybee, gbXML or glTF viewers.
 
     BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
 
-    Windows are written with the BSDF, U and g of the file; their sources, and values that are not
-    known, are printed.
+    Windows are exported with the BSDF, U and g in the file; the output states their source and
+    what is missing.
     """
     options = InputOptions(**chosen, weather=None)
     building = options.building
@@ -105,12 +100,9 @@ def command(
     head = PrintedHead()
     head(head_of(read, light_only=True).with_assumptions(known.notes()))
     writers = room_writers(
-        known,
-        band.lower(),
-        spacing=sensor_spacing,
-        height=sensor_height,
+        known, band.lower(), spacing=sensor_spacing, height=sensor_height,
         sky_division=int(subdivision),
-    )
+    )  # fmt: skip
     export_folders(read, spaces, writers, folders)
     exported = replace(read, spaces=tuple(spaces))
     assumed = export_files(exported, known, epjson=epjson, honeybee=honeybee, gbxml=gbxml)

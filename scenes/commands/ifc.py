@@ -26,12 +26,9 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option(
-    "--out",
-    required=True,
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="ADDON.zip",
+    "--out", required=True, type=click.Path(path_type=Path, dir_okay=False), metavar="ADDON.zip",
     help="The add-on, for Blender's Preferences, Add-ons, Install from Disk.",
-)
+)  # fmt: skip
 def bonsai(out: Path) -> None:
     """Write the Bonsai panel: cfs run on the open IFC file, rooms coloured by result."""
     check_file(out, field="--out")
@@ -58,12 +55,9 @@ def _renamed(name: str, current: click.Command) -> click.Command:
         return current.callback(**chosen) if current.callback is not None else None
 
     return click.Command(
-        name,
-        params=current.params,
-        callback=callback,
-        help=current.help,
-        short_help=f"Now `cfs {name}`.",
-    )
+        name, params=current.params, callback=callback, help=current.help,
+        short_help=f"Renamed to `cfs {name}`.",
+    )  # fmt: skip
 
 
 for _name, _current in (("check", check), ("export", export)):
@@ -72,44 +66,37 @@ for _name, _current in (("check", check), ("export", export)):
 
 @command.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@click.option("--window", "windows", multiple=True, metavar="GUID", help="A window or door.")
+@click.option(
+    "--window", "windows", multiple=True, metavar="GUID", help="GUID of a window or door."
+)
 @click.option("--type", "types", multiple=True, metavar="NAME", help="Windows of a type.")
 @space_option("rooms", "its windows")
 @click.option("--storey", "storeys", multiple=True, metavar="NAME", help="Windows of a storey.")
 @click.option(
-    "--facade",
-    "facades",
-    multiple=True,
-    metavar="N|E|S|W|FROM-TO",
-    help="Windows that face there: also NE ..., roof, or azimuths such as 150-210.",
-)
+    "--facade", "facades", multiple=True, metavar="N|E|S|W|FROM-TO",
+    help="Windows of this orientation: also NE ..., roof, or azimuths such as 150-210.",
+)  # fmt: skip
 @click.option(
-    "--all",
-    "every_window",
-    is_flag=True,
-    help="Every IfcWindow; glazed doors and panels only by GUID, room, storey or facade.",
-)
+    "--all", "every_window", is_flag=True,
+    help="Every IfcWindow; choose glazed doors and panels by GUID, room, storey or facade.",
+)  # fmt: skip
 @click.option(
-    "--bsdf",
-    type=FILE,
-    help="BSDF XML file: Klems or tensor tree; the .toml beside it is attached too.",
-)
+    "--bsdf", type=FILE,
+    help="BSDF XML file: Klems or tensor tree; U, g and more come from the .toml beside it.",
+)  # fmt: skip
 @click.option(
-    "--g",
-    "g_value",
-    metavar="NUMBER|FILE.csv",
-    help="g at normal incidence; or a CSV: polar_deg, g and maybe azimuth_deg.",
-)
+    "--g", "g_value", metavar="NUMBER|FILE.csv",
+    help="g-value at normal incidence; or a CSV file: polar_deg, g and, optionally, azimuth_deg.",
+)  # fmt: skip
 @u_option
 @click.option("--state", default="", help="Name of the shading state; default: the usual one.")
-@click.option("--reference", is_flag=True, help="Name the BSDF file instead of copying it.")
 @click.option(
-    "-o",
-    "--out",
-    required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="IFC file to write.",
+    "--reference", is_flag=True, help="Store a reference to the BSDF file instead of its contents."
 )
+@click.option(
+    "-o", "--out", required=True, type=click.Path(dir_okay=False, path_type=Path),
+    help="IFC file to write.",
+)  # fmt: skip
 def attach(
     building: Path,
     *,
@@ -121,9 +108,9 @@ def attach(
     out: Path,
     **chosen,
 ) -> None:
-    """Write BSDF, U, g, thermal closure and the place of the shade into an IFC file's windows.
+    """Write BSDF, U, g, thermal model and shade position into the windows of an IFC file.
 
-    --space, --storey, --facade and --type narrow each other; one of them given twice widens.
+    --space, --storey, --facade and --type restrict each other; repeat one of them to select more.
     """
     if bsdf is None and g_value is None and u_value is None:
         raise click.UsageError("nothing to attach: give --bsdf, --g or --u")
@@ -148,7 +135,7 @@ def attach(
 @command.command()
 @out_folder_option
 def templates(out: Path) -> None:
-    """Write the property set that windows hold as definitions for other programs.
+    """Write the definition of the windows' property set for other programs.
 
     An IFC library with its IfcPropertySetTemplate, buildingSMART's PSD XML, and an IDS that checks
     models for it.
@@ -168,7 +155,7 @@ def templates(out: Path) -> None:
 @click.argument("files", type=FILE, nargs=-1, required=True, metavar="BUILDING.ifc...")
 @click.option("--markdown", "table", type=click.Path(path_type=Path), help="Also write the table.")
 def survey(files: tuple[Path, ...], table: Path | None) -> None:
-    """Check and convert many IFC files: rooms, windows, quantities, seconds and memory of each."""
+    """Check and convert many IFC files: rooms, windows, quantities, time and memory of each."""
     if table is not None:
         check_file(table, field="--markdown", inputs=files)
     from bim.ifc.survey import markdown
@@ -191,7 +178,7 @@ def survey(files: tuple[Path, ...], table: Path | None) -> None:
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.argument("selector")
 def query(building: Path, selector: str) -> None:
-    """The elements that a SELECTOR of the corrections chooses, such as 'IfcWall, layer="A-WALL"'.
+    """List the elements that a SELECTOR matches, such as 'IfcWall, layer="A-WALL"'.
 
     By GUID, class, Name, type, material, location (storey), property (Pset_WallCommon.IsExternal),
     each with = or a regular expression (Name=/Louvre.*/), and by CAD layer; + joins groups.

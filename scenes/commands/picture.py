@@ -24,15 +24,20 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 @click.command()
 @input_options("the first with a window", several=False, weather="demo")
 @click.option(
-    "--at", required=True, metavar="'MM-DD HH[:MM]'", help="The hour of the weather that holds it."
+    "--at",
+    required=True,
+    metavar="'MM-DD HH[:MM]'",
+    help="Date and time; the hour of the weather file that contains it is used.",
 )
-@view_option("view", "not parallel", several=False)
+@view_option("view", "perspective or fisheye", several=False)
 @eye_height_option
-@size_option("size", 800, "as evalglare wants them")
-@samples_option(16, "for the one hour")
-@click.option("--tone", is_flag=True, help="PNG tone-mapped for the eye, not in falsecolour.")
+@size_option("size", 800, "as evalglare recomcorrects")
+@samples_option(16, "for a single hour")
+@click.option("--tone", is_flag=True, help="Tone-map the PNG instead of writing falsecolour.")
 @click.option(
-    "--colour", is_flag=True, help="By the surfaces' colours, white-balanced; PNG tone-mapped."
+    "--colour",
+    is_flag=True,
+    help="Use the colours of the surfaces, white-balanced; the PNG is tone-mapped.",
 )
 @light_options
 @click.option(
@@ -43,10 +48,10 @@ from scenes.picture_options import SUFFIXES, PictureOptions
     help=f"File to write ({', '.join(SUFFIXES)}); may be repeated.",
 )
 def command(out: tuple[Path, ...], tone: bool, **chosen) -> None:
-    """Luminance picture of a room under the sun and sky of an hour, path-traced.
+    """Render a luminance picture of a room under sun and sky of one hour by path tracing.
 
-    What fills the windows without --cfs: the BSDF attached to them or their types in the IFC, else
-    the transmittance that it states.  Without BUILDING the demo's office.
+    Without --cfs each window uses the BSDF attached to it or its type in the IFC, else
+    the transmittance stated there.  Without BUILDING the demo's office is used.
     """
     for file in out:
         if file.suffix not in SUFFIXES:

@@ -27,7 +27,13 @@ if TYPE_CHECKING:
 
 @click.command()
 @input_options("", system=False)
-@click.option("--study", "study_file", required=True, type=FILE, help="TOML file, docs/pv.md.")
+@click.option(
+    "--study",
+    "study_file",
+    required=True,
+    type=FILE,
+    help="TOML file of the system; see docs/pv.md.",
+)
 @out_folder_option
 @seed_option
 @no_cache_option
@@ -36,8 +42,8 @@ def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
     """Irradiance and yield of the photovoltaic modules of a building.
 
     BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).  Modules
-    are found by material, type, name or GUID; shade and reflections by everything in the
-    model are traced, the sun as its exact disc.
+    are selected by material, type, name or GUID.  Shading and reflections by all surfaces of the
+    model are traced, with the true disc of the sun.
     """
     from mitsuba_cfs.sky.epw import read_epw
     from scenes.photovoltaics.study_file import read_pv_study

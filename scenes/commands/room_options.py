@@ -71,7 +71,7 @@ IFC_FILE = IfcFile(exists=True, dir_okay=False, readable=True, path_type=Path)
 
 
 quick_option = click.option(
-    "--quick", is_flag=True, help="A first look: few rays, small pictures, one hour."
+    "--quick", is_flag=True, help="Fast preview: few rays, coarse sensor grid, one small picture."
 )
 
 
@@ -94,85 +94,68 @@ out_folder_option = click.option(
     "--out", required=True, type=click.Path(path_type=Path), help="Folder of results."
 )
 join_option = click.option(
-    "--join",
-    multiple=True,
-    metavar="'ROOM + ROOM'",
-    help="Rooms open to each other that are to be one; 'open' (IFC): all by more than a door.",
-)
+    "--join", multiple=True, metavar="'ROOM + ROOM'",
+    help="Merge rooms that are open to each other; 'open' (IFC): wherever the opening is no door.",
+)  # fmt: skip
 furniture_option = click.option(
     "--furniture", is_flag=True, help="Include the furniture of the model in light and views."
 )
 facade_pane_option = click.option(
-    "--facade-pane",
-    "facade_panes",
-    multiple=True,
-    metavar="MATERIAL",
-    help="Material of panes before dark rooms in a Radiance scene (.rad): they mirror.",
-)
+    "--facade-pane", "facade_panes", multiple=True, metavar="MATERIAL",
+    help="Material of panes with no room behind them in a Radiance scene (.rad); they mirror.",
+)  # fmt: skip
 aperture_option = click.option(
-    "--aperture",
-    "apertures",
-    multiple=True,
-    metavar="MATERIAL",
-    help="Material of the windows of a Radiance scene (.rad); default: all glass and BSDF.",
-)
+    "--aperture", "apertures", multiple=True, metavar="MATERIAL",
+    help="Window material of a Radiance scene (.rad); default: all glass and BSDF materials.",
+)  # fmt: skip
 surroundings_option = click.option(
-    "--surroundings",
-    multiple=True,
-    type=FILE,
-    help="Surroundings: OBJ, STL, PLY, glTF, CityJSON, CityGML, GeoJSON; PVGIS's horizon.",
-)
+    "--surroundings", multiple=True, type=FILE,
+    help="Surroundings: OBJ, STL, PLY, glTF, CityJSON, CityGML, GeoJSON or PVGIS horizon.",
+)  # fmt: skip
 surroundings_offset_option = click.option(
-    "--surroundings-offset",
-    type=float,
-    nargs=3,
-    metavar="X Y Z",
-    help="Added to their coordinates [m] in place of any georeference.",
-)
+    "--surroundings-offset", type=float, nargs=3, metavar="X Y Z",
+    help="Offset added to the surroundings' coordinates [m], instead of georeferences.",
+)  # fmt: skip
 needed_weather_option = click.option(
-    "--weather", required=True, type=FILE, help="EPW file, hourly."
+    "--weather", required=True, type=FILE, help="Hourly weather file (EPW)."
 )
 weather_option = click.option(
-    "--weather", type=FILE, help="EPW file, hourly; needed with a building of your own."
+    "--weather", type=FILE, help="Hourly weather file (EPW); required with BUILDING."
 )
 system_option = click.option(
-    "--cfs",
-    "system",
-    type=FILE,
-    help="BSDF XML file of every window, Klems full or tensor tree; default: the building's own.",
+    "--cfs", "system", type=FILE,
+    help="BSDF XML file (Klems full or tensor tree) for all windows; default: those in BUILDING.",
+)  # fmt: skip
+u_option = click.option(
+    "--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value of the windows [W/(m2 K)]."
 )
-u_option = click.option("--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value [W/(m2 K)].")
 eye_height_option = click.option(
-    "--eye-height",
-    type=click.FloatRange(0.3, 3),
-    default=1.2,
-    show_default=True,
-    help="Of the eye above the floor [m].",
-)
+    "--eye-height", type=click.FloatRange(0.3, 3), default=1.2, show_default=True,
+    help="Height of the eye above the floor [m].",
+)  # fmt: skip
 grid_option = click.option(
-    "--grid", type=click.FloatRange(0.1, 20), help="Eyes all over the room, so far apart [m]."
+    "--grid",
+    type=click.FloatRange(0.1, 20),
+    help="Spacing of a grid of eye positions [m]; default: one position.",
 )
 directions_option = click.option(
-    "--directions",
-    type=click.IntRange(1, 64),
-    default=1,
-    show_default=True,
-    help="Directions of every eye, the first to the biggest window.",
-)
+    "--directions", type=click.IntRange(1, 64), default=1, show_default=True,
+    help="View directions per eye position; the first faces the largest window.",
+)  # fmt: skip
 seed_option = click.option(
     "--seed",
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help="Of the random numbers.",
-)
+    help="Seed of the random numbers.",
+)  # fmt: skip
 spacing_option = click.option(
     "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_GRID.spacing,
     show_default=True, help="Sensor spacing [m].",
 )  # fmt: skip
 height_option = click.option(
     "--height", "sensor_height", type=click.FloatRange(0, 5), default=_GRID.height,
-    show_default=True, help="Work plane above the floor [m].",
+    show_default=True, help="Height of the work plane above the floor [m].",
 )  # fmt: skip
 subdivision_option = click.option(
     "-m", "--subdivision", type=click.Choice([str(mf) for mf in SUBDIVISIONS]), default="1",
@@ -183,35 +166,24 @@ subdivide_option = click.option(
     help="Subgroups of each window group; 0: choose from the surroundings.",
 )  # fmt: skip
 glare_sources_option = click.option(
-    "--glare-sources",
-    type=click.Choice(GLARE_SOURCES),
-    default=GLARE_SOURCES[0],
+    "--glare-sources", type=click.Choice(GLARE_SOURCES), default=GLARE_SOURCES[0],
     show_default=True,
-    help="Bright pixels grouped as in evalglare, or each as a source.",
-)
+    help="Group bright pixels into glare sources as evalglare does, or rate each pixel.",
+)  # fmt: skip
 glare_sun_option = click.option(
-    "--glare-sun",
-    type=click.Choice(GLARE_SUN),
-    default=GLARE_SUN[0],
-    show_default=True,
-    help="The sun's disc: a glare source of its own, or part of its pixels.",
-)
+    "--glare-sun", type=click.Choice(GLARE_SUN), default=GLARE_SUN[0], show_default=True,
+    help="Treat the sun's disc as a separate glare source, or spread it over its pixels.",
+)  # fmt: skip
 sun_option = click.option(
-    "--sun-model",
-    type=click.Choice(SUN_MODELS),
-    default=SUN_MODELS[0],
-    show_default=True,
-    help="Sun position: NREL's SPA, or Radiance's formula as gendaymtx has it.",
-)
+    "--sun-model", type=click.Choice(SUN_MODELS), default=SUN_MODELS[0], show_default=True,
+    help="Sun position by NREL's SPA, or by Radiance's formula (gendaymtx).",
+)  # fmt: skip
 sky_ground_option = click.option(
-    "--sky-ground",
-    type=click.Choice(GROUNDS),
-    default=GROUNDS[0],
-    show_default=True,
-    help="Luminance of the ground to the horizon: of a plain that reflects, or gendaylit's.",
-)
+    "--sky-ground", type=click.Choice(GROUNDS), default=GROUNDS[0], show_default=True,
+    help="Ground luminance: of a diffusely reflecting plane, or as in gendaylit.",
+)  # fmt: skip
 annual_glare_option = click.option(
-    "--annual-glare", is_flag=True, help="Rate every hour with daylight."
+    "--annual-glare", is_flag=True, help="Compute DGP for every daylight hour."
 )
 
 
@@ -227,31 +199,23 @@ def chosen_language() -> str | None:
 def page_option(command: Callable) -> Callable:
     """`--page` and `--language`; the latter is had by `chosen_language`."""
     language = click.option(
-        "--language",
-        type=click.Choice(["en", "de", "fr"]),
-        expose_value=False,
-        callback=_keep_language,
-        help="Language of the page; default: of --page, else English.",
-    )
+        "--language", type=click.Choice(["en", "de", "fr"]), expose_value=False,
+        callback=_keep_language, help="Language of the page; default: of --page, else English.",
+    )  # fmt: skip
     file = click.option(
-        "--page",
-        type=FILE,
-        metavar="FILE.toml",
+        "--page", type=FILE, metavar="FILE.toml",
         help="Title, author, logo, language and sections of the page; see docs/quickstart.md.",
-    )
+    )  # fmt: skip
     return file(language(command))
 
 
 set_option = click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="A choice by its name in `[options]` of study files, such as sensor_samples=4096.",
-)
+    "--set", "settings", multiple=True, metavar="NAME=VALUE",
+    help="Set an option of the `[options]` table of study files, such as sensor_samples=4096.",
+)  # fmt: skip
 no_cache_option = click.option(
     "--no-cache", "cache", is_flag=True, flag_value=False, default=True,
-    help="Trace everything anew; keep nothing.",
+    help="Neither read nor write the cache of traced matrices.",
 )  # fmt: skip
 
 
@@ -282,12 +246,9 @@ def _only(_context: click.Context, _option: click.Parameter, value: str | None) 
 def method_option(methods: Sequence[str], what: str, *, default: str | None = None) -> Option:
     """`--method`, of the methods that the command has."""
     return click.option(
-        "--method",
-        type=click.Choice(methods),
-        default=default,
-        show_default=default is not None,
-        help=f"How light is computed; {what}.",
-    )
+        "--method", type=click.Choice(methods), default=default, show_default=default is not None,
+        help=f"Daylight method; {what}.",
+    )  # fmt: skip
 
 
 def size_option(name: str, default: int, why: str) -> Option:
@@ -381,60 +342,47 @@ def named_settings(settings: Sequence[str], but: Collection[str] = ()) -> dict[s
 
 
 processes_option = click.option(
-    "--processes",
-    type=click.IntRange(1, 64),
-    default=1,
-    show_default=True,
-    help="Rooms or cases at a time on this machine; one already uses most of its cores.",
-)
+    "--processes", type=click.IntRange(1, 64), default=1, show_default=True,
+    help="Rooms or cases computed in parallel; a single one already uses most cores.",
+)  # fmt: skip
 scheduler_option = click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Dask scheduler whose workers compute them, such as tcp://host:8786.",
-)
+    "--scheduler", metavar="ADDRESS",
+    help="Dask scheduler, such as tcp://host:8786, whose workers compute the rooms or cases.",
+)  # fmt: skip
 
 
 def samples_option(default: int, why: str) -> Option:
     """`--samples` of pictures; `why` they are that many by default."""
     return click.option(
-        "--samples",
-        type=click.IntRange(1, 4096),
-        default=default,
-        show_default=True,
-        help=f"Paths of a pixel; {why}.",
-    )
+        "--samples", type=click.IntRange(1, 4096), default=default, show_default=True,
+        help=f"Paths per pixel; {why}.",
+    )  # fmt: skip
 
 
 def explore_option(rest: str = "") -> Option:
     """`--explore`; the `rest`: what this command's explorer holds."""
     return click.option(
-        "--explore",
-        is_flag=True,
-        help="Write the explorer: any hour's picture, plan and temperatures in a browser"
+        "--explore", is_flag=True,
+        help="Write the explorer: picture, plan and temperatures of any hour, in a browser"
         + (f"; {rest}." if rest else "."),
-    )
+    )  # fmt: skip
 
 
 def write_ifc_option(sets: str) -> Option:
     """`--write-ifc`; which `sets` there are."""
     return click.option(
-        "--write-ifc",
-        type=click.Path(path_type=Path, dir_okay=False),
-        metavar="OUT.ifc",
-        help=f"The building with the results in property sets; {sets}.",
-    )
+        "--write-ifc", type=click.Path(path_type=Path, dir_okay=False), metavar="OUT.ifc",
+        help=f"Write a copy of the building with results in property sets; {sets}.",
+    )  # fmt: skip
 
 
 def view_option(name: str, what: str, *, several: bool) -> Option:
     """`--view` into the parameter `name`."""
     return click.option(
-        "--view",
-        name,
-        multiple=several,
-        metavar="'-vta ...'|FILE.vf",
-        help=f"View in Radiance's syntax; {what}, default: the room's in an HBJSON file, else "
-        "its middle, to its window.",
-    )
+        "--view", name, multiple=several, metavar="'-vta ...'|FILE.vf",
+        help=f"View in Radiance's syntax; {what}, default: the view in an HBJSON file, else from "
+        "the room's middle to its window.",
+    )  # fmt: skip
 
 
 def with_demo(chosen: dict) -> dict:
@@ -443,7 +391,9 @@ def with_demo(chosen: dict) -> dict:
     building, weather, system = (chosen[name] for name in names)
     if building is not None:
         if weather is None:
-            raise click.UsageError("--weather: give the EPW file of the building's place")
+            raise click.UsageError(
+                "--weather is required with BUILDING: give the EPW file of its location"
+            )
         return chosen
     demo = ["office"]
     demo += ["weather"] * (weather is None) + ["venetian blind"] * (system is None)

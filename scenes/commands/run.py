@@ -32,10 +32,8 @@ from scenes.run.options import JobOptions
 
 LOADS = ("heating", "cooling", "lighting")
 NEED_PHASES = {
-    "annual_glare": "--annual-glare",
-    "explore": "--explore",
-    "inner_glass": "--inner-glass",
-}
+    "annual_glare": "--annual-glare", "explore": "--explore", "inner_glass": "--inner-glass",
+}  # fmt: skip
 _DEFAULT = RoomOptions()
 
 
@@ -44,49 +42,44 @@ _DEFAULT = RoomOptions()
 @room_options
 @method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
 @u_option
-@click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
+@click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g-value at normal incidence.")
 @click.option(
-    "--picture",
-    "picture_hours",
-    multiple=True,
-    metavar="'MM-DD HH[:MM]'",
-    help="Hour to show and rate for glare; default: nine hours and the brightest.",
+    "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH[:MM]'",
+    help="Hour to render and rate, may be repeated; default: nine hours and the brightest.",
+)  # fmt: skip
+@size_option(
+    "picture_size", _DEFAULT.outputs.picture_size, "up to ten pictures in each room's report"
 )
-@size_option("picture_size", _DEFAULT.outputs.picture_size, "of up to ten in each room's report")
 @spacing_option
 @height_option
 @click.option(
     "--ach", "infiltration_ach", type=click.FloatRange(0, 50), default=_DEFAULT.infiltration_ach,
-    show_default=True, help="Outdoor air changes [1/h].",
+    show_default=True, help="Outdoor air change rate [1/h].",
 )  # fmt: skip
 @click.option(
-    "--operation",
-    type=FILE,
+    "--operation", type=FILE,
     help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
-)
+)  # fmt: skip
 @click.option(
-    "--inner-glass",
-    is_flag=True,
+    "--inner-glass", is_flag=True,
     help="Let daylight through glass and open doorways between rooms; rooms lit by that alone are "
     "computed too, and those open to each other by more than a door are one room.",
-)
-@click.option(
-    "--no-coupled-heat", "coupled_heat", is_flag=True, flag_value=False, default=True,
-    help="Balance each room's heat alone, as if rooms of its own temperature lay around it.",
 )  # fmt: skip
 @click.option(
-    "--no-colour",
-    is_flag=True,
-    help="Leave each room's picture in colour out; --quick does as well.",
-)
+    "--no-coupled-heat", "coupled_heat", is_flag=True, flag_value=False, default=True,
+    help="Simulate each room alone, with adjacent rooms at its own temperature.",
+)  # fmt: skip
+@click.option(
+    "--no-colour", is_flag=True,
+    help="Omit the colour picture of each room; implied by --quick.",
+)  # fmt: skip
 @explore_option()
 @processes_option
 @scheduler_option
 @click.option(
-    "--netcdf",
-    is_flag=True,
-    help="Write all numbers of all rooms as results.nc besides, for xarray; see docs/formats.md.",
-)
+    "--netcdf", is_flag=True,
+    help="Also write all results to results.nc, for xarray; see docs/formats.md.",
+)  # fmt: skip
 def command(
     out: Path,
     page: Path | None,
@@ -95,7 +88,7 @@ def command(
     scheduler: str | None,
     **chosen,
 ) -> None:
-    """Daylight, glare, temperatures and comfort of a building's rooms.
+    """Compute daylight, glare, temperatures and comfort of a building's rooms.
 
     BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
     """
@@ -187,7 +180,7 @@ class _RoomLines:
         _print_grids(room)
 
     def year(self, room) -> None:
-        """Print the figures of its heat, and those of its light if not printed yet."""
+        """Print those of its heat, and of its light where that was not said."""
         light_printed = room.space.guid in self._lit
         click.echo(
             f"{room.space.label}: {_heat_figures(room)}" if light_printed else summary_line(room)

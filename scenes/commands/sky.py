@@ -26,15 +26,12 @@ weather_argument = click.argument("weather", type=click.Path(path_type=Path))
 out_argument = click.argument("out", type=click.Path(path_type=Path, dir_okay=False))
 format_option = click.option(
     "-f", "--format", "kind", type=click.Choice(list(FORMATS)), default="float",
-    show_default=True, help="How the numbers are written.",
+    show_default=True, help="Number format of the matrix.",
 )  # fmt: skip
 ground_option = click.option(
-    "-g",
-    "--ground",
-    type=click.FloatRange(0, 1),
-    default=None,
+    "-g", "--ground", type=click.FloatRange(0, 1), default=None,
     help="Ground reflectance; default: the weather's albedo, 0.2.",
-)
+)  # fmt: skip
 
 
 @click.group()
@@ -50,15 +47,15 @@ def command() -> None:
     "-O", "--output", type=click.Choice(list(OUTPUTS)), default="0", show_default=True,
     help="0: visible (radiance times 179 is luminance), 1: solar, both [W/m2/sr].",
 )  # fmt: skip
-@click.option("-d", "--sun-only", "part", flag_value="sun", help="The direct sun alone.")
+@click.option("-d", "--sun-only", "part", flag_value="sun", help="Direct sun only.")
 @click.option("-s", "--sky-only", "part", flag_value="sky", help="The sky without the sun.")
 @click.option(
     "--part", "part", type=click.Choice(PARTS), default="all", show_default=True,
-    help="The same as -d and -s.",
+    help="Parts of the sky; the same as -d and -s.",
 )  # fmt: skip
 @click.option(
     "-r", "--rotate", type=float, default=0.0, show_default=True,
-    help="Turn sun and sky by degrees, counter-clockwise from above.",
+    help="Rotate sun and sky [degrees], counter-clockwise seen from above.",
 )  # fmt: skip
 @click.option(
     "-u",
@@ -68,23 +65,22 @@ def command() -> None:
     help="Only time steps with the sun above the horizon.",
 )
 @click.option(
-    "-5",
-    "--five-phase",
-    is_flag=True,
+    "-5", "--five-phase", is_flag=True,
     help="The sun of each time step as one 0.533 degree disc at the nearest patch (with -m 6).",
-)
-@click.option(
-    "-c", "--color", type=float, nargs=3, default=(1.0, 1.0, 1.0), show_default=True,
-    help="Red, green and blue of the sky; gendaymtx has .96 1.004 1.118.",
 )  # fmt: skip
 @click.option(
-    "--sun-patches",
-    type=click.IntRange(1, 8),
-    default=SUN_PATCHES,
-    show_default=True,
-    help="How many nearest patches share the sun.",
+    "-c", "--color", type=float, nargs=3, default=(1.0, 1.0, 1.0), show_default=True,
+    help="Red, green and blue of the sky; gendaymtx uses .96 1.004 1.118.",
+)  # fmt: skip
+@click.option(
+    "--sun-patches", type=click.IntRange(1, 8), default=SUN_PATCHES, show_default=True,
+    help="Number of nearest patches that share the sun.",
+)  # fmt: skip
+@click.option(
+    "--measured",
+    is_flag=True,
+    help="Use the illuminances in the file instead of Perez's luminous efficacy.",
 )
-@click.option("--measured", is_flag=True, help="Use the file's illuminances, not Perez's efficacy.")
 @ground_option
 @sun_option
 @format_option
@@ -189,24 +185,36 @@ def wea(weather: Path, out: Path) -> None:
 @command.command()
 @click.argument("table", type=click.Path(path_type=Path))
 @out_argument
-@click.option("--latitude", type=click.FloatRange(-90, 90), required=True, help="North positive.")
-@click.option("--longitude", type=click.FloatRange(-180, 180), required=True, help="East positive.")
-@click.option("--timezone", type=click.FloatRange(-14, 14), required=True, help="Hours from UTC.")
-@click.option("--elevation", type=float, default=0.0, show_default=True, help="Metres.")
 @click.option(
-    "--label",
-    type=click.Choice(list(LABELS)),
-    default="middle",
-    show_default=True,
-    help="Which moment of its interval a time is.",
+    "--latitude",
+    type=click.FloatRange(-90, 90),
+    required=True,
+    help="Latitude, north positive [degrees].",
 )
 @click.option(
-    "--least-altitude",
-    type=click.FloatRange(0, 20),
-    default=LEAST_ALTITUDE_DEG,
-    show_default=True,
+    "--longitude",
+    type=click.FloatRange(-180, 180),
+    required=True,
+    help="Longitude, east positive [degrees].",
+)
+@click.option(
+    "--timezone",
+    type=click.FloatRange(-14, 14),
+    required=True,
+    help="Time zone, hours ahead of UTC.",
+)
+@click.option(
+    "--elevation", type=float, default=0.0, show_default=True, help="Elevation above sea level [m]."
+)
+@click.option(
+    "--label", type=click.Choice(list(LABELS)), default="middle", show_default=True,
+    help="Moment of the interval that a time stamp denotes.",
+)  # fmt: skip
+@click.option(
+    "--least-altitude", type=click.FloatRange(0, 20),
+    default=LEAST_ALTITUDE_DEG, show_default=True,
     help="No direct sun below this altitude [degrees].",
-)
+)  # fmt: skip
 def measured(
     table: Path, out: Path, *, latitude: float, longitude: float, timezone: float,
     elevation: float, label: str, least_altitude: float,
@@ -241,9 +249,9 @@ def measured(
 @click.option("--horizontal", type=click.FloatRange(min=0), default=10_000.0, show_default=True,
               help="Diffuse horizontal illuminance [lx].")  # fmt: skip
 @click.option("--altitude", type=click.FloatRange(0, 90), default=45.0, show_default=True,
-              help="Of the sun [degrees].")  # fmt: skip
+              help="Solar altitude [degrees].")  # fmt: skip
 @click.option("--azimuth", type=float, default=180.0, show_default=True,
-              help="Of the sun, clockwise from north [degrees].")  # fmt: skip
+              help="Solar azimuth, clockwise from north [degrees].")  # fmt: skip
 @click.option("-g", "--ground", type=click.FloatRange(0, 1), default=0.2, show_default=True,
               help="Ground reflectance; of the whole ground.")  # fmt: skip
 @format_option

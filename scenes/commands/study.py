@@ -41,11 +41,17 @@ if TYPE_CHECKING:
 @out_folder_option
 @processes_option
 @scheduler_option
-@method_option(["auto"], "auto: by cost and error, in place of the file's")
-@click.option("--time-budget", metavar="TIME", help="Of the whole study for auto: 90s, 20min, 2h.")
-@click.option("--dgp-error", metavar="PERCENT", help="Relative error of DGP for auto: 10%.")
-@explore_option("of 12 cases at most, which the report's marks then open")
-@write_ifc_option("one for each case of a study of one file")
+@method_option(["auto"], "auto: chosen by cost and error, instead of the file's")
+@click.option(
+    "--time-budget",
+    metavar="TIME",
+    help="Time limit of the whole study for --method auto: 90s, 20min, 2h.",
+)
+@click.option(
+    "--dgp-error", metavar="PERCENT", help="Relative error limit of DGP for --method auto: 10%."
+)
+@explore_option("for at most 12 cases, which open from the marks of the report")
+@write_ifc_option("one property set for each case; for studies of a single IFC file")
 @surroundings_option
 @surroundings_offset_option
 @quick_option
@@ -66,11 +72,11 @@ def command(
     quick: bool,
     page: Path | None,
 ) -> None:
-    """Every room of a study with every system, orientation, climate and method.
+    """Compute every room of a study with every system, orientation, climate and method.
 
-    docs/studies.md lists what the file may hold.  Finished cases are kept in the folder of
-    results: the same command goes on after an interruption, and a longer grid computes only what
-    is new.
+    docs/studies.md describes the file.  Finished cases are stored in the folder of results: after
+    an interruption the same command continues, and after additions to the file it computes only
+    the new cases.
     """
     from scenes.study.study_file import read_study
 

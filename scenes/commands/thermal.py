@@ -31,12 +31,11 @@ from scenes.commands.room_options import (
 @click.command()
 @click.argument("study", type=FILE, metavar="STUDY.toml")
 @out_folder_option
-@click.option("--figures", is_flag=True, help="A figure of each room's year as SVG.")
+@click.option("--figures", is_flag=True, help="Write a figure of each room's year as SVG.")
 @click.option(
-    "--energyplus",
-    is_flag=True,
-    help="The same rooms as an input of EnergyPlus too (model.epJSON, schedules.csv).",
-)
+    "--energyplus", is_flag=True,
+    help="Also write the rooms as EnergyPlus input (model.epJSON, schedules.csv).",
+)  # fmt: skip
 @surroundings_option
 @surroundings_offset_option
 @quick_option
@@ -50,7 +49,7 @@ def command(
     surroundings_offset: tuple[float, float, float] | None,
     quick: bool,
 ) -> None:
-    """Gains, temperatures, loads and comfort of rooms, hour by hour.
+    """Compute hourly gains, temperatures, loads and comfort of rooms.
 
     The study file names the weather, the rooms (an IFC file or a box), the shading states (BSDF
     files) and their control, gains, outdoor air and set points; docs/thermal.md lists every field.

@@ -300,7 +300,7 @@ def _comfort(room: RoomYear) -> Card | None:
         return None
     widest = columns[-1]
     value = 100 * float(comfort.loc[used, widest].mean())
-    words = gettext("of the occupied hours: adaptive comfort, {band}", band=quantity(widest).label)
+    words = gettext("of the occupied hours: adaptive comfort “{band}”", band=quantity(widest).label)
     outside = 100 * float((~applicable(comfort))[used].mean())
     if outside > 0.5:
         outdoors = gettext(

@@ -105,3 +105,17 @@ def test_no_two_spellings_say_the_same() -> None:
 def test_the_kinds_that_differ_still_do() -> None:
     for spelling in KINDS_DIFFER:
         assert len({kind(option) for option in SHARED[spelling].values()}) > 1
+
+
+STARTS_WITHOUT_SUBJECT = ("Of ", "To ", "From ", "By ", "At ", "On ", "In ", "What ", "How ", "As ")
+
+
+def test_every_help_names_what_the_option_gives() -> None:
+    """A noun or a verb first, no preposition that refers to the option's name."""
+    riddles = [
+        f"{name} {spelling}: {option.help}"
+        for spelling, name, option in options()
+        if (option.help or "").startswith(STARTS_WITHOUT_SUBJECT)
+    ]
+    assert not riddles
+    assert not {s for s, _, option in options() if not option.help and not option.hidden}
