@@ -45,7 +45,7 @@ PHRASES = {  # a regular expression, and what to write
         "say which side: outside, on the room side of",
     r"(a|an|each|every|one) (row|ray|path|column|line|picture) an? "
     r"(hour|pixel|sensor|case|room|patch)": "... per ...",
-    r"mend(s|ed|ing)?\b": "fix",
+    r"\bmend(s|ed|ing)?\b": "fix",
     r"does without|do without": "omits",
     r"(walks|walk) of light": "random walks",
     r"for itself\b": "separately",

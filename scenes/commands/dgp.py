@@ -45,7 +45,7 @@ _DEFAULT = YearOptions(Path(), Path())
     "--metric", type=click.Choice(METRICS), default=_DEFAULT.metric, show_default=True,
     help="DGP; eDGP: sources of direct light only; sDGP: illuminance at the eye only.",
 )  # fmt: skip
-@size_option("size", _DEFAULT.size, "as evalglare recomcorrects")
+@size_option("size", _DEFAULT.size, "as evalglare recommends")
 @samples_option(_DEFAULT.samples, "shared by all hours")
 @click.option(
     "--memory", "memory_gb", type=click.FloatRange(0.01, 1024), default=_DEFAULT.memory_gb,

@@ -31,7 +31,7 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 )
 @view_option("view", "perspective or fisheye", several=False)
 @eye_height_option
-@size_option("size", 800, "as evalglare recomcorrects")
+@size_option("size", 800, "as evalglare recommends")
 @samples_option(16, "for a single hour")
 @click.option("--tone", is_flag=True, help="Tone-map the PNG instead of writing falsecolour.")
 @click.option(
