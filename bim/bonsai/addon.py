@@ -108,7 +108,7 @@ def legend(values: Mapping[str, float], quantity: str) -> list[str]:
 
 
 def last_line(text: str) -> str:
-    """What a command said last, for the status bar."""
+    """Last line of a command's output, for the status bar."""
     return next((line for line in reversed(text.splitlines()) if line.strip()), "cfs: no answer")
 
 

@@ -132,7 +132,7 @@ class Document:
             raise self.fault(error.message, owner, name) from None
 
     def optional(self, read: Callable[[], T], issues: list[Issue]) -> T | None:
-        """A value that the simulation can do without; None where it cannot be read.
+        """An optional value; None where it cannot be read.
 
         Args: issues: of the model, to which the fault is added once.
         """

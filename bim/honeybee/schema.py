@@ -112,7 +112,7 @@ class HoneybeeAperture(Shaded):
 
 
 class HoneybeeDoor(HoneybeeAperture):
-    """A door, opaque unless it is said to be of glass."""
+    """A door, opaque unless `is_glass` is set."""
 
     is_glass: bool = False
 

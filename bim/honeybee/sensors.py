@@ -1,4 +1,4 @@
-"""Sensor grids and views of a honeybee model, and what of its shades holds no result."""
+"""Sensor grids and views of a Honeybee model, and the shades that no result uses."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class UseLibrary:
 
     @property
     def issues(self) -> tuple[Issue, ...]:
-        """What of the uses is not used, each once with its rooms."""
+        """Uses that are ignored, each once with its rooms."""
         return tuple(
             replace(issue, values=issue.values | {"rooms": tuple(rooms)})
             for issue, rooms in self._rooms.items()
@@ -243,6 +243,6 @@ def _mean_activity(activity: YearSchedule | None, share: YearSchedule) -> float:
 
 
 def _exterior_area(space: Space) -> float:
-    """What of a room's boundary is exposed to the air outdoors [m2]."""
+    """Area of a room's boundary that is exposed to the outdoor air [m2]."""
     faces = sum(face.area for face in space.faces if face.adjacency == "outside")
     return faces + sum(window.area for window in space.windows)

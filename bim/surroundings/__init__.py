@@ -1,1 +1,1 @@
-"""What stands around a building, from files of its own."""
+"""Surroundings of a building, from separate files."""

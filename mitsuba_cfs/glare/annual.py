@@ -19,7 +19,7 @@ from scipy import sparse
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import replacing
-from mitsuba_cfs.glare.dgp_error import dgp_errors, hours_by_halves
+from mitsuba_cfs.glare.dgp_error import dgp_error, dgp_errors, hours_by_halves, random_signs
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.glare.sun_disc import SunDisc
@@ -239,10 +239,13 @@ def annual_glare(
     left = np.flatnonzero(np.isnan(table[:, 0]))
     size = max(1, BATCH_BYTES // (4 * max(1, len(pictures.pixels))))
 
-    def rated(values: NDArray[np.float32], discs: tuple[SunDisc, ...], hour: int) -> list[float]:
+    def rated(values: NDArray[np.float32], discs: tuple[SunDisc, ...], hour: int) -> GlareResult:
         picture = full_picture(values, pictures.pixels, pictures.view)
         known = options if own is None else replace(options, illuminance=float(own[hour]))
-        return figures(evaluate(picture, geometry, options=known, discs=discs))
+        return evaluate(picture, geometry, options=known, discs=discs)
+
+    def row(values: NDArray[np.float32], discs: tuple[SunDisc, ...], hour: int) -> list[float]:
+        return figures(rated(values, discs, hour))
 
     def made(batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
         if options.sun == "source":
@@ -252,17 +255,28 @@ def annual_glare(
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         for start in range(0, len(left), size):
             batch = left[start : start + size]
-            table[batch] = list(pool.map(rated, *made(batch), batch))
+            table[batch] = list(pool.map(row, *made(batch), batch))
             _save(checkpoint, table)
             progress("glare", (len(table) - len(left) + start + len(batch)) / len(table))
-        dgp, errors = table[:, 0], []
+        dgp = table[:, 0]
+        errors: list[float] = []
         by_halves = hours_by_halves(dgp)
+        signs = random_signs(pictures.view, pictures.pixels)
+
+        def error(
+            values: NDArray[np.float32],
+            noise: NDArray[np.float32],
+            discs: tuple[SunDisc, ...],
+            hour: int,
+        ) -> float:
+            return dgp_error(
+                lambda some: rated(some, discs, hour).unlimited_dgp, values, noise, signs
+            )
+
         for start in range(0, len(by_halves), size):
             batch = by_halves[start : start + size]
             (values, discs), noise = made(batch), pictures.noise(batch)
-            halves = (np.maximum(values + noise, 0), np.maximum(values - noise, 0))
-            one, other = (np.array(list(pool.map(rated, h, discs, batch)))[:, 0] for h in halves)
-            errors.extend(np.abs(one - other) / 2)
+            errors.extend(pool.map(error, values, noise, discs, batch))
     table[:, FIGURES.index("dgp_standard_error")] = dgp_errors(dgp, by_halves, np.array(errors))
     _save(checkpoint, table)
     return AnnualGlare(**dict(zip(FIGURES, table.T, strict=True)), rule=options.rule)

@@ -108,6 +108,11 @@ class GlareResult:
     dgp_standard_error: float = np.nan  # from the noise of the picture; NaN: not known
 
     @cached_property
+    def unlimited_dgp(self) -> float:
+        """DGP without its limit of 1, of which the standard error is stated."""
+        return _dgp(self.options, self.Ev, self.contrast, most=np.inf)
+
+    @cached_property
     def sdgp(self) -> float:
         """Simplified DGP, from the illuminance alone."""
         return indices.simplified_dgp(self.Ev)
@@ -311,10 +316,10 @@ def _background(options, geometry, sources: Sources, Ev, direct, mean) -> float:
     return (total * mean - lit) / (total - omega)
 
 
-def _dgp(options: GlareOptions, Ev: float, contrast: float) -> float:
+def _dgp(options: GlareOptions, Ev: float, contrast: float, most: float = 1.0) -> float:
     """DGP with the corrections asked for."""
     illuminance = Ev if options.illuminance is None else options.illuminance
-    dgp = indices.daylight_glare_probability(illuminance, contrast)
+    dgp = indices.daylight_glare_probability(illuminance, contrast, most=most)
     if options.low_light:
         dgp *= indices.low_light_factor(illuminance)
     if options.age is not None:

@@ -21,8 +21,8 @@ def contrast_term(luminance: ArrayLike, omega: ArrayLike, position: ArrayLike) -
     return float(np.sum(L * L * w / (P * P)))
 
 
-def daylight_glare_probability(illuminance: float, contrast: float) -> float:
-    """DGP = 5.87e-5 E_v + 0.092 log10(1 + sum L^2 omega/(P^2 E_v^1.87)) + 0.159, at most 1.
+def daylight_glare_probability(illuminance: float, contrast: float, *, most: float = 1.0) -> float:
+    """DGP = 5.87e-5 E_v + 0.092 log10(1 + sum L^2 omega/(P^2 E_v^1.87)) + 0.159, at most `most`.
 
     Source: Wienold and Christoffersen (2006); the paper prints 9.18e-2 and 0.16, evalglare computes
     with the constants here.
@@ -30,7 +30,7 @@ def daylight_glare_probability(illuminance: float, contrast: float) -> float:
     if illuminance <= 0:
         return 0.159
     glare = 0.092 * math.log10(1 + contrast / illuminance**1.87)
-    return min(5.87e-5 * illuminance + glare + 0.159, 1.0)
+    return min(5.87e-5 * illuminance + glare + 0.159, most)
 
 
 def simplified_dgp(illuminance: float) -> float:

@@ -10,7 +10,7 @@ whose equation (20) has the sun twice if its s_d holds it: here s_sky is the sky
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.glare import indices
 from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, annual_glare, figures, full_picture
-from mitsuba_cfs.glare.dgp_error import dgp_errors, hours_by_halves
+from mitsuba_cfs.glare.dgp_error import dgp_error, dgp_errors, hours_by_halves, random_signs
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.glare.sun_disc import SunDisc
@@ -173,13 +173,24 @@ def rated_pictures(
     for one in made:
         how: dict[str, Any] = {"options": options, "discs": one.discs if apart else ()}
         rated = evaluate(one.bare if apart else one.shown, geometry, **how)
-        if one.halves:
-            add = 0 if apart else one.shown - one.bare
-            first, second = (evaluate(half + add, geometry, **how).dgp for half in one.halves)
-            rated = replace(rated, dgp_standard_error=abs(first - second) / 2)
+        if one.noise is not None:
+            error = _picture_error(one.bare if apart else one.shown, one.noise, geometry, how)
+            rated = replace(rated, dgp_standard_error=error)
         results[one.number] = one.shown, rated
         progress("pictures", len(results) / len(hours))
     return [results[i] for i in range(len(hours))]
+
+
+def _picture_error(
+    picture: Picture, noise: Picture, geometry: GlareView, how: dict[str, Any]
+) -> float:
+    """Standard error of the DGP of a picture; `how`: options of `evaluate`."""
+
+    def dgp(values: NDArray[np.float32]) -> float:
+        return evaluate(values.reshape(picture.shape), geometry, **how).unlimited_dgp
+
+    signs = random_signs(geometry.view, np.arange(picture.size))
+    return dgp_error(dgp, picture.ravel(), noise.ravel(), signs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +201,7 @@ class _Made:
     bare: Picture  # without the sun's disc and its images
     discs: tuple[SunDisc, ...]
     shown: Picture  # with the discs
-    halves: Sequence[Picture]  # of the paths, without the discs; none: not known
+    noise: Picture | None  # half the difference of two halves of the paths; None: not known
 
 
 def _path_pictures(
@@ -201,7 +212,7 @@ def _path_pictures(
     for i, (hour, now) in enumerate(zip(hours.tolist(), rows.T, strict=True)):
         steps = part(progress, i / len(hours), (i + 1) / len(hours), "pictures")
         one = picture_with_disc(light, rooms[tuple(now.tolist())], hour, progress=steps)
-        yield _Made(i, one.bare, one.discs, one.shown, ())
+        yield _Made(i, one.bare, one.discs, one.shown, None)
 
 
 def _phase_pictures(
@@ -213,10 +224,9 @@ def _phase_pictures(
         for i, number in enumerate(numbers.tolist()):
             only = np.array([i])
             values, discs = of_kind.without_disc(only)
-            noise, bare = of_kind.noise(only)[0], whole(values[0])
-            halves = [whole(np.maximum(values[0] + side * noise, 0)) for side in (1, -1)]
+            noise, bare = whole(of_kind.noise(only)[0]), whole(values[0])
             of_kind.add_disc(values, only)
-            yield _Made(number, bare, discs[0], whole(values[0]), halves)
+            yield _Made(number, bare, discs[0], whole(values[0]), noise)
 
 
 def _of_seasons(

@@ -18,6 +18,7 @@ from mitsuba_cfs.methods.optics import SystemOptics, combinations
 from mitsuba_cfs.methods.phase_light import (
     PhaseLight,
     State,
+    coefficients_in_state,
     sensor_light,
     states_of,
 )
@@ -54,6 +55,26 @@ def relative_standard_error(light: PhaseLight, state: State | None, illuminance:
         variance = variance + _exchange_variance(light, light.optics(kind), hours)
     mean = illuminance.mean(axis=1)
     return np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
+
+
+def relative_error_under(light: PhaseLight, sky: Array, state: int = 0) -> Array:
+    """Relative standard error of the sensors under one sky without the sun [S], such as that of DF.
+
+    That of V and D; a group with fewer states is in its last.
+
+    Args: sky: [P] luminance of the patches.
+    """
+    matrices, sensors = light.matrices, sensor_light(light)
+    count = len(light.scene.points)
+    variance = np.zeros(count)
+    for g, states in enumerate(sensors):
+        group = states[min(state, len(states) - 1)].coefficients
+        for q in matrices.parts.of(g):
+            variance += _part_variance(light, group, q, sky, None)[:count]
+        if group.straight is not None:
+            variance += group.straight.values.error_of(sky)[:count] ** 2
+    total = coefficients_in_state(light, state)[:count] @ sky
+    return np.divide(np.sqrt(variance), total, out=np.zeros_like(total), where=total > 0)
 
 
 def _matrix_variance(light: PhaseLight, rows: State) -> Array:

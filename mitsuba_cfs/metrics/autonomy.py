@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 
 THRESHOLD = 300.0  # [lx] daylight autonomy
+ERROR_STEP = 3.0  # standard errors by which hours are moved to count those near the threshold
 UDI_LIMITS = (100.0, 300.0, 3000.0)  # [lx] Mardaljevic et al. 2012: fell short, supplementary,
 # autonomous, exceeded
 UDI_LIMITS_2005 = (100.0, 300.0, 2000.0)  # [lx] upper limit of Nabil and Mardaljevic 2005
@@ -25,6 +26,29 @@ def daylight_autonomy(
     Source: Reinhart and Walkenhorst 2001, Energy and Buildings 33:683.
     """
     return np.mean(scheduled(illuminance, hours) >= threshold, axis=0)
+
+
+def daylight_autonomy_error(
+    illuminance: ArrayLike,
+    hours: ArrayLike,
+    relative_error: ArrayLike,
+    threshold: float = THRESHOLD,
+) -> FloatArray:
+    """Standard error of DA [S] (0 to 1) by the noise of the illuminance.
+
+        (DA(E (1 + k e)) - DA(E (1 - k e))) / 2 k
+
+    A sensor's noise is that of its matrices, about the same share of the illuminance in all hours.
+    Few hours are close to the threshold: k = 3 counts enough of them.
+
+    Args:
+        illuminance: [H, S] [lx].
+        hours: [H] mask of the scheduled time steps.
+        relative_error: [S] relative standard error of the illuminance.
+    """
+    values, error = scheduled(illuminance, hours), ERROR_STEP * np.asarray(relative_error)
+    above, below = (np.mean(values * (1 + s * error) >= threshold, axis=0) for s in (1, -1))
+    return np.asarray((above - below) / (2 * ERROR_STEP))
 
 
 def continuous_daylight_autonomy(

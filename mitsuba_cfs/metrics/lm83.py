@@ -7,6 +7,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr
 
 from mitsuba_cfs.metrics.autonomy import (
     area_share,
@@ -109,3 +110,24 @@ def blinds_operated(
         left = (~states @ direct[through, hour] >= threshold) @ weights
         closed[through, hour] = states[np.argmax(np.where(left > most, -1.0, left))]
     return closed
+
+
+def spatial_daylight_autonomy_error(
+    autonomy: ArrayLike,
+    error: ArrayLike,
+    *,
+    areas: ArrayLike | None = None,
+    time: float = SDA_TIME,
+) -> float:
+    """Standard error of sDA (0 to 1) from the noise of DA.
+
+        error = sqrt(sum w_i^2 p_i (1 - p_i)), p_i = Phi((DA_i - time) / error_i)
+
+    The noise of sensors is taken as independent.
+
+    Args: autonomy, error: [S] DA and its standard error (0 to 1).
+    """
+    distance, error = np.asarray(autonomy, dtype=float) - time, np.asarray(error, dtype=float)
+    share = ndtr(np.divide(distance, error, out=np.full(len(error), np.inf), where=error > 0))
+    weights = sensor_weights(areas, len(error))
+    return float(np.sqrt(np.sum(weights**2 * share * (1 - share))))

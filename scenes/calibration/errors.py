@@ -57,7 +57,7 @@ class Traits:
     dark: float  # decades that the transmittance of diffuse light lies below 1
     tree: float  # 1: a tensor tree is known; 0: Klems matrices alone
     sun: float  # share of the rated hours whose sun shines in a window of the field of view
-    obstruction: float  # share of the sky that obstructions hide from the windows
+    obstruction: float  # share of the sky in front of the windows that is hidden
 
     def place(self) -> NDArray[np.float64]:
         """The traits over their scales [6]: methods err alike where these lie near."""
@@ -91,7 +91,7 @@ def sun_in_view(
     suns: NDArray[np.float64],
     shining: NDArray[np.bool_],
 ) -> float:
-    """Share of the hours in which the sun shines through a window in the eye's field of view.
+    """Share of the hours whose sun is visible through a window from the eye.
 
     Obstructions outdoors are left to `hidden_sky`.
 

@@ -75,10 +75,10 @@ def _origins(
     u_value: float | None,
     g_value: str | None,
 ) -> list[str]:
-    """Sources of U, g, closure and position, and unused values of the file beside."""
+    """Sources of U, g, closure and position, and the unused values of the file beside the BSDF."""
     notes = []
     if state.u_value is None:
-        notes.append("no U: a typical value will be used and reported")
+        notes.append("no U: a typical one will be assumed and reported")
     else:
         notes.append(f"U {state.u_value:g} W/(m2 K) from {file if u_value is None else '--u'}")
     if u_value is not None and beside.u_value is not None:
@@ -92,7 +92,7 @@ def _origins(
         patches = "" if state.g_by_patch is None else f" for {len(state.g_by_patch)} directions"
         notes.append(f"g{' and'.join(part for part in (normal, patches) if part)} from {file}")
     else:
-        notes.append("no g: a typical value will be used and reported")
+        notes.append("no g: a typical one will be assumed and reported")
     if state.closure is not None:
         notes.append(f"closure of the thermal model ({state.closure.u_model} U) from {file}")
     if state.shading_position is not None:

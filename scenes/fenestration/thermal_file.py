@@ -415,7 +415,7 @@ class StateTable(WindowHeatTable):
 
 
 class ThermalTable(WindowHeatTable):
-    """The file beside a BSDF: keys as of a study's [[system]], and the source of g."""
+    """The file beside a BSDF: the same as a study's [[system]], and the source of its g."""
 
     angular: AngularData | None = None  # of a specular system, visible
     # layer by layer; for readers, the balance takes g

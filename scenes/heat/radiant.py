@@ -39,7 +39,7 @@ def radiant_room(
 ) -> RadiantRoom | None:
     """Traced view factors of a room, or None where its surfaces do not close it.
 
-    Args: cache: of view factors.
+    Args: cache: of traced view factors.
     """
     among, person = _view_factors(enclosure(space, room), *view_point(space), samples, seed, cache)
     if min(among.sum(axis=1).min(), person.sum()) < 1.0 - MOST_LOST:

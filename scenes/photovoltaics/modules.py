@@ -14,8 +14,8 @@ from bim.planes import area_vectors, planar_facets
 from bim.rays import RayMesh, hemisphere, ray_mesh
 
 OFF_THE_FACE = 0.005  # distance of the sensors from the glass [m]
-NEARLY_AS_BIG = 0.8  # least area of a module's other side, as a share of its biggest face
-RAYS = 64  # to distinguish the free side from the side towards the wall
+NEARLY_AS_BIG = 0.8  # share of the biggest face's area that the other side of a module has
+RAYS = 64  # that tell the free side from the side towards the wall
 TOUCHING = 0.5  # what stops a ray so near covers that side [m]
 
 

@@ -27,7 +27,7 @@ def irradiation_picture(result: PvResult, towards: NDArray[np.float64]) -> NDArr
     """An orthographic picture [HEIGHT, WIDTH, 3], seen from the direction `towards` [3].
 
     Modules carry the annual irradiation of their groups of cells, everything else is grey; they
-    are drawn through obstructions.
+    are drawn over whatever obstructs them.
     """
     elements = result.outdoors.elements
     triangles = np.concatenate([element.triangles for element in elements])

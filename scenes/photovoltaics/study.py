@@ -43,7 +43,7 @@ class PvResult:
     head: Head = NO_HEAD  # what was left out, what was assumed
 
     def module_table(self) -> pd.DataFrame:
-        """Annual irradiation of each module, in its plane and in its cells [kWh/m2]."""
+        """Annual irradiation of each module, in the plane and below its glass [kWh/m2]."""
         step = self.weather.step_h / 1000
         owner = {m: subsystem.name for subsystem in self.subsystems for m in subsystem.modules}
         rows = []

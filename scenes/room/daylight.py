@@ -12,9 +12,13 @@ from mitsuba_cfs.methods.light import (
     direct_sun,
     illuminance_with_error,
 )
-from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.phase_light import PhaseLight, with_sensor_light
+from mitsuba_cfs.methods.standard_error import relative_error_under
+from mitsuba_cfs.metrics.autonomy import daylight_autonomy_error
 from mitsuba_cfs.metrics.daylight_factor import daylight_factor
+from mitsuba_cfs.metrics.lm83 import spatial_daylight_autonomy_error
 from mitsuba_cfs.metrics.room import room_metrics
+from mitsuba_cfs.metrics.schedules import lm83_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -42,13 +46,16 @@ def room_daylight(
     # LM-83's direct sun and the daylight factor are those of open blinds
     direct = direct_sun(lights)
     direct = None if direct is None else room.skies.whole_year(direct.astype(np.float32)).T
-    factor = overcast_factor(lights)
+    factor, factor_error = overcast_factor(lights), overcast_factor_error(lights)
 
     def metrics_of(sensors: slice) -> tuple[pd.DataFrame, dict[str, float]]:
         sun = None if direct is None else direct[:, sensors]
-        return daylight_metrics(
-            points[sensors], illuminance[:, sensors], factor[sensors], room.weather, sun
-        )
+        table, of_room = daylight_metrics(
+            points[sensors], illuminance[:, sensors], factor[sensors], room.weather, sun,
+            relative_error=error[sensors],
+        )  # fmt: skip
+        table["daylight_factor_standard_error"] = 100.0 * factor_error[sensors]
+        return table, of_room
 
     counts = [len(grid.points) for grid in room.file_sensors.grids]
     plane = slice(0, len(points) - sum(counts))
@@ -72,6 +79,16 @@ def overcast_factor(light: PhaseLight | SeasonalLight) -> NDArray[np.float64]:
     """
     overcast = cie_patches("overcast", ReinhartSky(light.sampling.subdivision), 1.0)
     return daylight_factor(daylight_coefficients(light) @ overcast, 1.0)
+
+
+def overcast_factor_error(light: PhaseLight | SeasonalLight) -> NDArray[np.float64]:
+    """Standard error of `overcast_factor` by the noise of V and D [S] (0 to 1)."""
+    first = light.lights[0] if isinstance(light, SeasonalLight) else light
+    if not isinstance(first, PhaseLight):
+        raise ValueError("path tracing has no matrices: expected the light of a phase method")
+    overcast = cie_patches("overcast", ReinhartSky(light.sampling.subdivision), 1.0)
+    relative = relative_error_under(with_sensor_light(first), overcast)
+    return relative * overcast_factor(light)
 
 
 def illuminance_table(result: DaylightResult, times: pd.DatetimeIndex) -> pd.DataFrame:
@@ -104,23 +121,31 @@ def daylight_metrics(
     daylight_factor: NDArray[np.float64],
     weather: Weather,
     direct: NDArray[np.float32] | None = None,
+    *,
+    relative_error: NDArray[np.float64],
 ) -> tuple[pd.DataFrame, dict[str, float]]:
     """Metrics by sensor (a table with the positions) and of the room, shares in per cent.
 
     Args:
         points: [S, 3]; illuminance: [H, S] [lx]; daylight_factor: [S] 0 to 1.
         direct: [H, S] [lx] straight from the sun, for annual sunlight exposure.
+        relative_error: [S] relative standard error of the illuminance, for those of DA and sDA.
     """
     metrics = room_metrics(illuminance, weather, direct_illuminance=direct)
     by_sensor = metrics.by_sensor()
     table = pd.DataFrame(points, columns=["x", "y", "z"]).rename_axis("sensor")
     for column, (source, factor) in SENSOR_COLUMNS.items():
         table[column] = factor * by_sensor[source].to_numpy()
+    autonomy_error = daylight_autonomy_error(illuminance, lm83_hours(weather), relative_error)
+    table["da300_standard_error"] = 100.0 * autonomy_error
     if metrics.sunlit_hours is not None:
         table["sunlit_hours"] = metrics.sunlit_hours
     table["daylight_factor"] = 100.0 * daylight_factor
     of_room = metrics.of_room()
     room = {column: factor * of_room[source] for column, (source, factor) in ROOM_COLUMNS.items()}
+    room["sda300_50_standard_error"] = 100.0 * spatial_daylight_autonomy_error(
+        metrics.daylight_autonomy, autonomy_error, areas=metrics.areas
+    )
     if metrics.annual_sunlight_exposure is not None:
         room["ase1000_250"] = 100.0 * metrics.annual_sunlight_exposure
     room["daylight_factor"] = 100.0 * float(np.mean(daylight_factor))

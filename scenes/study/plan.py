@@ -66,7 +66,7 @@ class Case:
     glare: str  # DGP, eDGP, sDGP or none
     chosen: str = ""  # why this method, where `auto` chose it
     referenced: tuple[InputFile, ...] = ()  # BSDF files that the building's names, and those beside
-    surroundings: tuple[InputFile, ...] = ()  # of the surroundings
+    surroundings: tuple[InputFile, ...] = ()  # around the building
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     join: tuple[str, ...] = ()  # these four as of `InputOptions`
     furniture: bool = False
@@ -195,7 +195,7 @@ def _check_turning(study: Study) -> None:
 
 
 def _of_system(study: Study, system: SystemTable) -> dict:
-    """Fields of a case that describe its system and its operation."""
+    """The system of a case, with its operation."""
     beside = None if system.bsdf is None else system.bsdf.with_suffix(".toml")
     operation = system.operation or study.operation
     referenced = () if system.bsdf is None else files_beside(system.bsdf)[1:]

@@ -74,7 +74,7 @@ class StudyResult:
 
     @property
     def table(self) -> pd.DataFrame:
-        """One row per case, see `rows`."""
+        """One row per case, as `rows`."""
         return pd.DataFrame(self.rows())
 
     def _repr_html_(self) -> str:
@@ -82,7 +82,7 @@ class StudyResult:
         return self.table._repr_html_()
 
     def rows(self) -> list[dict]:
-        """One row per case: its description, its status and all figures."""
+        """One row per case: its inputs, its status and every result."""
         columns = dict.fromkeys(name for r in self.results for name in r.figures)
         rows = []
         for case, result in zip(self.plan.cases, self.results, strict=True):

@@ -221,20 +221,24 @@ def test_grazing_sun_lights_a_picture_by_its_flux() -> None:
     assert noise.max() < 0.03
 
 
+@pytest.mark.parametrize("turn_deg", [0.0, 30.0, 45.0])
 @pytest.mark.parametrize("gap", [0.03, 0.1])
-def test_a_skin_behind_a_wall_takes_no_area_from_its_cells(gap: float) -> None:
+def test_a_skin_behind_a_wall_takes_no_area_from_its_cells(gap: float, turn_deg: float) -> None:
     """The scene of the Geneva office has such skins; they took 5 % of the light at the eye."""
+    c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
+    turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])  # rows times this
     wall = rooms.quad((0, 0, 0), (4, 0, 0), (4, 0, 3), (0, 0, 3))
     skin = wall - np.array([0.0, gap, 0.0])
     far = wall + np.array([0.0, 6.0, 0.0])
-    interior = rooms.surfaces([(wall, 0.5), (skin, 0.5), (far, 0.5)])
+    interior = rooms.surfaces([(one @ turned, 0.5) for one in (wall, skin, far)])
     cells = surface_cells(TracedScene(interior, box.window_groups()), interior).cells
     for chosen in (cells, cells.joined()[0]):
         inside = TracedScene(interior, box.window_groups())
         x, z = np.meshgrid(np.linspace(1e-3, 3.999, 801), np.linspace(1e-3, 2.999, 601))
         for y in (0.0, -gap):
-            at = np.stack([x.ravel(), np.full(x.size, y), z.ravel()], axis=1) - inside.centre
-            normal = np.tile(np.float32([0, 1, 0]), (len(at), 1))
+            at = np.stack([x.ravel(), np.full(x.size, y), z.ravel()], axis=1) @ turned
+            at -= inside.centre
+            normal = np.tile((np.array([0, 1, 0]) @ turned).astype(np.float32), (len(at), 1))
             cell = chosen.numbers(SurfacePoints(at.astype(np.float32) + 1e-4 * normal, normal))
             of_plane = np.unique(cell)
             assert (of_plane >= 0).all()

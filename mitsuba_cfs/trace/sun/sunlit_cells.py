@@ -43,9 +43,10 @@ POINTS = 1024  # on each window group that the sun is followed from
 EDGE_SHARE = 4  # one in so many of them for hours whose sun reaches all
 SEARCHED = 4  # of the search for a cell: kernels differ by so many halvings of the table
 FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
-# Parallel faces in one cube (a skin behind a wall, which no light reaches) are separate cells:
-# along the axis that a normal points in, cubes are this much thinner
-THIN, ALONG = 16, 0.999
+# Parallel faces in one cube (a skin behind a wall, which no light reaches) are separate cells: the
+# distance along the normal replaces the coordinate of the normal's main axis, in steps this much
+# smaller.  The weights decide between axes that a slanted normal has equal parts of
+THIN, MAIN = 16, (1.0, 1.01, 1.02)
 SHIFT = 5.5 / THIN  # of the first cube before the surfaces, which lie in the middle of a thin one
 RAYS = 2**21  # at once
 
@@ -79,7 +80,16 @@ class RoomCells:
     def of(self, point: mi.Point3f, normal: mi.Vector3f, active: mi.Bool) -> mi.Int32:
         """The cell of points on surfaces, inside a kernel; -1 where there is none."""
         place = (mi.Vector3f(point) - opaque_vector(self.low)) / opaque(self.edge)
-        place *= dr.select(dr.abs(normal) > ALONG, mi.Vector3f(THIN), mi.Vector3f(1.0))
+        size = dr.abs(normal) * mi.Vector3f(*MAIN)
+        x_main = (size.x >= size.y) & (size.x >= size.z)
+        y_main = ~x_main & (size.y >= size.z)
+        main = dr.select(x_main, normal.x, dr.select(y_main, normal.y, normal.z))
+        along = dr.mulsign(dr.dot(place, normal) * THIN, main)
+        place = mi.Vector3f(
+            dr.select(x_main, along, place.x),
+            dr.select(y_main, along, place.y),
+            dr.select(x_main | y_main, place.z, along),
+        )
         cube = (mi.Vector3i(dr.floor(place)) & 0xFFFF) >> self.halvings
         side = mi.Vector3i(dr.round(FACING * normal)) + 1
         key = mi.UInt64(cube.x) << 37 | mi.UInt64(cube.y) << 21 | mi.UInt64(cube.z) << 5
@@ -119,8 +129,11 @@ def surface_cells(inside: TracedScene, interior: Surfaces) -> CellPoints:
     edge = float(np.sqrt(max(area, 1e-6) / CELLS))
     low = (interior.triangles.min(axis=(0, 1)) - inside.centre) - SHIFT * edge
     points, side = _points_on(interior, inside)
-    thin = np.where(np.abs(points.normal) > ALONG, THIN, 1.0)
-    cube = np.floor((points.point - low) / edge * thin).astype(np.int64) & 0xFFFF
+    place, every = (points.point - low) / edge, np.arange(points.size)
+    main = np.argmax(np.abs(points.normal) * np.array(MAIN), axis=1)
+    along = (place * points.normal).sum(axis=1) * THIN
+    place[every, main] = np.copysign(1, points.normal[every, main]) * along
+    cube = np.floor(place).astype(np.int64) & 0xFFFF
     keys = ((cube[:, 0] << 37) | (cube[:, 1] << 21) | (cube[:, 2] << 5)) + side
     order = np.argsort(keys, kind="stable")
     found, first = np.unique(keys[order], return_index=True)

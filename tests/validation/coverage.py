@@ -1,0 +1,133 @@
+r"""How often twice the stated standard error covers the error, over many seeds.
+
+    python -m tests.validation coverage [--seeds 100] [--json FILE]
+
+A shoebox behind clear glass, four sensors, an eye beside them, six sunny hours and six overcast
+ones, by few paths, so that the noise is large.  Each seed traces all matrices again.  The truth is
+the mean over the other seeds; its own error is a tenth of that of one seed and is included.
+Illuminance: mean over the hours at each sensor; DF: overcast sky; DA: share of the hours above the
+median illuminance of a sensor; sDA: share of sensors with that in half of the hours; DGP: of each
+sunny hour.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+
+import mitsuba_cfs as cfs
+from mitsuba_cfs import variants
+from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.methods.phase_light import with_sensor_light
+from mitsuba_cfs.methods.standard_error import relative_error_under
+from mitsuba_cfs.metrics.autonomy import daylight_autonomy, daylight_autonomy_error
+from mitsuba_cfs.metrics.daylight_factor import daylight_factor
+from mitsuba_cfs.metrics.lm83 import spatial_daylight_autonomy_error
+from mitsuba_cfs.sky.cie import cie_patches
+from mitsuba_cfs.sky.patches import ReinhartSky
+from scenes.cost import room as box
+
+SUBDIVISION = 1
+POINTS = np.array([[1.8, y, 0.8] for y in (0.5, 1.5, 2.5, 3.5)])
+UP = np.tile([0.0, 0.0, 1.0], (len(POINTS), 1))
+SIZE = 48  # [px]
+HOURS = 6
+PATHS = {
+    "sensor_samples": 1_024, "patch_samples": 1_024, "sun_points": 256, "view_samples": 2,
+    "outdoor_samples": 2,
+}  # fmt: skip
+
+
+def sky() -> cfs.AnnualSky:
+    """Hours of a clear sky with the sun, then overcast ones of less and less light."""
+    sphere = ReinhartSky(SUBDIVISION)
+    azimuth = np.radians(np.linspace(150, 230, HOURS))
+    height = np.radians(np.linspace(25, 55, HOURS))
+    sun = np.stack(
+        [np.sin(azimuth) * np.cos(height), np.cos(azimuth) * np.cos(height), np.sin(height)], axis=1
+    )
+    clear = np.stack([cie_patches("clear", sphere, 12_000.0, sun=one) for one in sun], axis=1)
+    overcast = cie_patches("overcast", sphere, 1.0)[:, None] * np.linspace(6e3, 3e4, HOURS)
+    alone = np.zeros((sphere.size, 2 * HOURS))
+    patch = sphere.index(sun)
+    alone[patch, np.arange(HOURS)] = 60_000.0 / sphere.solid_angles[patch]
+    lux = np.repeat([60_000.0, 0.0], HOURS)
+    hours = np.arange(2 * HOURS)
+    whole = np.concatenate([clear, overcast], axis=1) + alone
+    return cfs.AnnualSky(whole, np.concatenate([sun, sun]), lux, hours, 8760, sun=alone)
+
+
+def of_seed(
+    seed: int, under: cfs.AnnualSky, limits: NDArray[np.float64] | None
+) -> tuple[dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]], NDArray[np.float64]]:
+    """Values and stated standard errors of each quantity, and the thresholds of DA [S] [lx]."""
+    interior, groups = box.room(), box.window_groups()
+    view = fisheye((1.8, 2.5, 1.2), (0.5, -1.0, 0.0), SIZE)
+    scene = cfs.DaylightScene(interior, box.NOTHING, groups, POINTS, UP, view=view)
+    glass = cfs.AngularOptics([0.0, 0.4, 0.4, 0.4, 0.4])
+    sampling = cfs.Sampling(**PATHS, subdivision=SUBDIVISION, seed=seed)
+    light = cfs.daylight(scene, [[glass]], under, sampling=sampling)
+    lux, relative = cfs.illuminance_with_error(light)
+    limits = np.median(lux, axis=1) if limits is None else limits
+    every = np.ones(lux.shape[1], dtype=bool)
+    scaled = lux.T / limits
+    da = daylight_autonomy(scaled, every, 1.0)
+    da_error = daylight_autonomy_error(scaled, every, relative, 1.0)
+    overcast = cie_patches("overcast", ReinhartSky(SUBDIVISION), 1.0)
+    factor = daylight_factor(cfs.daylight_coefficients(light) @ overcast, 1.0)
+    of_factor = relative_error_under(with_sensor_light(light), overcast)
+    rated = cfs.hourly_glare(light, hours=np.arange(HOURS))
+    mean = lux.mean(axis=1)
+    sda = np.array([np.mean(da >= 0.5)])
+    return {
+        "illuminance": (mean, relative * mean),
+        "daylight factor": (factor, of_factor * factor),
+        "DA": (da, da_error),
+        "sDA": (sda, np.array([spatial_daylight_autonomy_error(da, da_error)])),
+        "DGP": (rated.dgp, rated.dgp_standard_error),
+    }, limits  # fmt: skip
+
+
+def coverage(values: NDArray[np.float64], errors: NDArray[np.float64]) -> dict[str, float]:
+    """Shares of errors within twice the stated one, and the ratio of stated to found spread.
+
+    Args: values, errors: [seeds, n].
+    """
+    count = len(values)
+    others = (values.sum(axis=0) - values) / (count - 1)
+    spread = values.std(axis=0, ddof=1)
+    stated = np.sqrt(errors**2 + spread**2 / (count - 1))
+    # half a step: shares of few hours are whole numbers of them
+    within = np.abs(values - others) <= 2 * stated + 1e-12
+    root = np.sqrt(np.mean(spread**2))
+    ratio = float(np.sqrt(np.mean(errors**2)) / root) if root > 0 else np.nan
+    return {"covered": float(within.mean()), "spread": float(root), "stated_to_spread": ratio}
+
+
+def main(
+    *,
+    seeds: Annotated[int, "how often everything is traced"] = 100,
+    json_: Annotated[Path | None, "file for the figures"] = None,
+) -> str:
+    """Print the table of coverage."""
+    variants.activate("llvm_ad_mono")
+    under, limits, runs = sky(), None, []
+    for seed in range(seeds):
+        run, limits = of_seed(seed, under, limits)
+        runs.append(run)
+    found = {
+        name: coverage(*(np.stack([run[name][k] for run in runs]) for k in (0, 1)))
+        for name in runs[0]
+    }
+    if json_ is not None:
+        json_.write_text(json.dumps({"seeds": seeds, **found}, indent=1), "utf-8")
+    head = f"{'quantity':16}{'covered by 2 SE':>16}{'spread':>10}{'stated / spread':>17}"
+    lines = [
+        f"{name:16}{row['covered']:16.0%}{row['spread']:10.3g}{row['stated_to_spread']:17.2f}"
+        for name, row in found.items()
+    ]
+    return "\n".join([head, *lines])
