@@ -47,6 +47,7 @@ class Account:
     cut_off: bool = False  # the file has lost its end
     raised: tuple[str, ...] = ()  # rooms that end at the roof in place of the top of their space
     shut_in: float = 0.0  # of the used glass: what stands before it leaves nothing open [m2]
+    inner_only: tuple[str, ...] = ()  # rooms whose glass is all between them and other rooms
 
     @property
     def glass_out(self) -> float:
@@ -94,6 +95,7 @@ class Account:
             (Note("Rooms raised to what covers them"), self.raised),
             (Note("Spaces that are no rooms"), self.missing),
             (Note("Rooms with open edges"), self.leaking),
+            (Note("Rooms with inner glass only"), self.inner_only),
         )
         model = Note(self.verdict)
         if self.reasons:
@@ -150,6 +152,9 @@ class Account:
             found.append(Note("{count} of {all} spaces are no rooms", count=lost, all=self.spaces))
         if self.overlapping:
             found.append(Note("pairs of overlapping spaces: {count}", count=len(self.overlapping)))
+        if self.inner_only:
+            names = _listed(self.inner_only)
+            found.append(Note("only inner glass, to other rooms: {names}", names=names))
         if self.leaking:
             found.append(Note("rooms with open edges: {count}", count=len(self.leaking)))
         return found

@@ -58,6 +58,7 @@ def read_building_file(
     """
     options = options or ReadOptions()
     path = Path(path)
+    refuse_unread_format(path)
     kind = _format(path)
     for field in FLAGS:
         if getattr(options, field) and field not in kind.has:
@@ -131,9 +132,21 @@ def surrounded(
 def check_building_file(path: str | PathLike[str]) -> None:
     """What can be said at once of a building's file, and of the corrections beside it.
 
-    Raises: `DataError` for a file that is none of its format.
+    Raises: `DataError` for a file that is none of its format, or of a format that is not read.
     """
+    refuse_unread_format(Path(path))
     _format(Path(path)).check(Path(path))
+
+
+def refuse_unread_format(path: Path) -> None:
+    """Raise `DataError` for a known format that is not read; it says which file to give instead."""
+    reason = UNREAD.get(path.suffix.lower())
+    if reason is None and path.is_file() and path.suffix.lower() not in IFC.suffixes[1:]:
+        with path.open("rb") as stream:
+            start = stream.read(4096)
+        reason = next((UNREAD[kind] for mark, kind in MARKS if mark in start), None)
+    if reason is not None:
+        raise DataError(reason, file=path)
 
 
 def is_ifc(path: str | PathLike[str]) -> bool:
@@ -215,6 +228,19 @@ def _read_gbxml(path: Path, options: ReadOptions, progress: Progress) -> Buildin
 
 
 FLAGS = {"join": "join", "apertures": "aperture", "facade_panes": "facade-pane"}
+UNREAD = {  # by suffix: what it is, and the file to give instead
+    ".oct": "is a Radiance octree; give the scene files (.rad) that it was made of",
+    ".ifcxml": "is ifcXML; export the model as IFC (.ifc), or convert it with IfcConvert",
+    ".dfjson": "is a dragonfly model; write honeybee's HBJSON of it (Model.to_honeybee)",
+    ".idf": "is an EnergyPlus input; give the building as gbXML or HBJSON",
+    ".osm": "is an OpenStudio model; export it as gbXML",
+    ".rvt": "is a Revit model; export it as IFC or gbXML",
+    ".skp": "is a SketchUp model; export it as IFC, gbXML or HBJSON",
+}
+MARKS = (  # in the first bytes of a file of any suffix
+    (b"#?RADIANCE\noconv", ".oct"), (b"<ifcXML", ".ifcxml"), (b":ifcXML", ".ifcxml"),
+    (b"ISO_10303_28", ".ifcxml"), (b"dragonfly_version", ".dfjson"),
+)  # fmt: skip
 IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join",))
 RADIANCE = BuildingFormat(
     "Radiance", (".rad",), _check_there, _read_radiance, ("apertures", "facade_panes")

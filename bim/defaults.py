@@ -85,45 +85,4 @@ def default_construction(kind: str, adjacency: str) -> Construction:
     return EXTERIOR_WALL if outdoors else INTERIOR_WALL
 
 
-# words in material names (English, German, Dutch, French, Spanish, Italian, some of Portuguese,
-# Polish, Czech, Russian, Japanese, Chinese; accents of Latin letters do not count) -> EN ISO 10456
-# table 3
-MATERIALS: tuple[tuple[tuple[str, ...], MaterialLayer], ...] = (
-    (("air gap", "airgap", "luft", "air space", "air infiltration", "lucht", "cavity", "misc. air"),
-     MaterialLayer("air layer 0.18 m2 K/W at 50 mm", 0.05, 0.28, 1.23, 1008.0)),
-    (("insul", "dämm", "daemm", "wool", "wolle", "isol", "aisl", "xps", "eps", "styro", "polyst",
-      "polyiso", "polyurethan", "pur ", "pir ", "断熱", "グラスウール", "保温", "утепл", "минват"),
-     INSULATION),
-    (("glas", "vidrio", "vidro", "verre", "vetro", "szklo", "sklo", "cristal",
-      "ガラス", "玻璃", "стекл"),
-     MaterialLayer("soda lime glass", 0.006, 1.0, 2500, 750)),
-    (("gypsum", "gips", "plasterboard", "drywall", "yeso", "cartongesso", "placo", "gesso",
-      "sadrokarton", "石膏", "гипс"),
-     MaterialLayer("gypsum plasterboard", 0.0125, 0.25, 900.0, 1000.0)),
-    (("screed", "estrich", "dekvloer", "chape", "mortar", "mörtel"), SCREED),
-    (("plaster", "putz", "stucco", "enduit", "intonaco", "render"), PLASTER),
-    (("aerated", "porenbeton", "lightweight concrete", "leichtbeton", "gasbeton", "ytong"),
-     MaterialLayer("autoclaved aerated concrete", 0.24, 0.16, 500.0, 1000.0)),
-    (("concrete", "beton", "hormig", "calcestruzzo", "cmu", "stahlbeton", "betao", "concreto",
-      "コンクリート", "混凝土", "бетон"), CONCRETE),
-    (("brick", "ziegel", "masonry", "mauerwerk", "baksteen", "metselwerk", "brique", "ladrillo",
-      "kalksand", "block", "mattone", "tijolo", "cegl", "cihl",
-      "煉瓦", "レンガ", "砖", "кирпич"), BRICK),
-    (("steel", "stahl", "staal", "acier", "acero", "metal", "metall", "iron", "ocel", "aco ",
-      "鋼", "鉄", "钢", "сталь"),
-     MaterialLayer("steel", 0.005, 50.0, 7800.0, 450.0)),
-    (("alum",), MaterialLayer("aluminium alloy", 0.003, 160.0, 2800.0, 880.0)),
-    (("wood", "holz", "timber", "hout", "bois", "madera", "legno", "plywood", "osb", "parket",
-      "parquet", "oak", "eiche", "pine", "laminat", "truss", "joist",
-      "contreplaque", "madeira", "drewn", "drev", "木", "合板", "дерев"), TIMBER),
-    (("carpet", "teppich"), MaterialLayer("carpet", 0.008, 0.06, 200.0, 1300.0)),
-    (("tile", "fliese", "ceramic", "keramik", "tegel"),
-     MaterialLayer("ceramic tiles", 0.01, 1.3, 2300.0, 840.0)),
-    (("membrane", "bitum", "folie", "roofing", "epdm", "vapor", "damp"),
-     MaterialLayer("bitumen felt", 0.005, 0.23, 1100.0, 1000.0)),
-    (("gravel", "kies", "sand", "soil", "earth", "erde", "site"),
-     MaterialLayer("sand and gravel", 0.2, 2.0, 1950.0, 1045.0)),
-    (("stone", "stein", "marble", "granit", "pietra", "piedra"),
-     MaterialLayer("limestone, hard", 0.05, 1.7, 2200.0, 1000.0)),
-)  # fmt: skip
 UNKNOWN_MATERIAL = MaterialLayer("brick masonry (unknown material)", 0.24, 0.80, 1800.0, 1000.0)

@@ -71,6 +71,13 @@ def shared_volumes(
     return each_apart(_shared, [(one, list(near)) for one, near in solids], limit_s=LIMIT_S)
 
 
+def largest_parts(
+    items: Sequence[tuple[PackedSolid, Sequence[Body]]],
+) -> list[PackedSolid | ProcessEnded | None]:
+    """The largest part of each solid that bodies cut through; None where they do not part it."""
+    return each_apart(_largest_part, [(one, list(by)) for one, by in items], limit_s=LIMIT_S)
+
+
 def united(solids: Sequence[PackedSolid], ways: Sequence[Outline]) -> PackedSolid | None:
     """Solids and the prisms between them as one; None where they stay apart.
 
@@ -104,6 +111,18 @@ def _space(body: Body) -> Packed | None:
     plane = plane_through(np.array([*body[0, 0, :2], low]), np.array([0.0, 0.0, 1.0]))
     outline = prism(shadow(body, plane), plane, 0.0, high - low)
     return None if outline is None else (packed(outline), "outline-extruded")
+
+
+def _largest_part(item: tuple[PackedSolid, list[Body]]) -> PackedSolid | None:
+    one, bodies = item
+    solids = [found.manifold for body in bodies if (found := solid_of(body)) is not None]
+    if not solids:
+        return None
+    whole = unpacked(one)
+    parts = [p for p in (whole - union(solids)).decompose() if p.volume() > SLIT]
+    if len(parts) < 2:
+        return None
+    return packed(max(parts, key=lambda part: part.volume()).as_original())
 
 
 def _shared(item: tuple[PackedSolid, list[PackedSolid]]) -> list[float]:

@@ -140,6 +140,7 @@ class Window:
     states: tuple[ShadingState, ...] = ()  # of a file that is no IFC: what it holds of the window
     is_open: bool = False  # no glass: a doorway, or where two rooms touch with nothing between
     glass: PlainGlass | None = None  # where the file describes the glazing as a single pane
+    up: NDArray[np.float64] | None = None  # [3] up of its BSDF; world up (north if horizontal)
     normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, outdoors
     area: float = field(init=False)  # of the glass [m2]
 

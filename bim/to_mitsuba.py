@@ -90,7 +90,7 @@ def _known(shape: ElementTree.Element, bsdf: BsdfFile, file: str, window: Window
     kind = "tensor_tree_bsdf" if is_tree else "klems_bsdf"
     plugin = ElementTree.SubElement(shape, "bsdf", type=kind)
     ElementTree.SubElement(plugin, "string", name="filename", value=file)
-    up = window_frame(window.normal)[1]
+    up = window_frame(window.normal, window.up)[1]
     ElementTree.SubElement(plugin, "vector", name="up", value=_numbers(up))
     ElementTree.SubElement(plugin, "boolean", name="peak", value="true")
 

@@ -57,9 +57,9 @@ def window_groups(space: Space) -> list[WindowGroup]:
     """
     groups: list[list[Window]] = []
     for window in space.windows:
-        frame = window_frame(window.normal)
+        frame = window_frame(window.normal, window.up)
         for group in groups:
-            difference = np.abs(window_frame(group[0].normal) - frame).max()
+            difference = np.abs(window_frame(group[0].normal, group[0].up) - frame).max()
             if difference < SAME_ORIENTATION:
                 group.append(window)
                 break
@@ -68,7 +68,7 @@ def window_groups(space: Space) -> list[WindowGroup]:
     groups.sort(key=lambda group: -round(sum(window.area for window in group), 6))
     names = numbered([orientation_name(group[0]) for group in groups])
     return [
-        WindowGroup(name, tuple(WindowSurface(w.name, w.triangles) for w in group))
+        WindowGroup(name, tuple(WindowSurface(w.name, w.triangles, w.up) for w in group))
         for name, group in zip(names, groups, strict=True)
     ]
 

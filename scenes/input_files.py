@@ -17,6 +17,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, silent, summed
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
 from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system
 from scenes.fenestration.thermal_system import checked_system
 from scenes.input_options import InputOptions
@@ -113,7 +114,16 @@ def overrides_of(
     """What replaces the windows' own data: the system, else the operation's states; U and g."""
     states = () if operation is None else operation.systems
     states = states if system is None else (system,)
-    return WindowOverrides(states, options.u_value, options.g_value, light_only=light_only)
+    if options.glazing is not None and options.glazing not in GENERIC_GLAZINGS:
+        message = f"{options.glazing!r} is none of {', '.join(GENERIC_GLAZINGS)}"
+        raise DataError(message, field="--glazing")
+    tau = options.visible_transmittance
+    if tau is not None and not 0 < tau <= 1:
+        raise DataError(f"expected more than 0, at most 1, got {tau:g}", field="--tau")
+    return WindowOverrides(
+        states, options.u_value, options.g_value, light_only=light_only,
+        visible=tau, glazing=options.glazing,
+    )  # fmt: skip
 
 
 def read_building(

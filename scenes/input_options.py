@@ -25,9 +25,12 @@ class InputOptions:
     quick: bool = False  # noted in the results; `scenes.quick` has the numbers
     surroundings: tuple[Path, ...] = ()  # files of buildings, terrain, trees and horizons outdoors
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
+    albedo: float | tuple[float, ...] | str | None = None  # of the ground, see `with_albedo`
     facade_panes: tuple[str, ...] = ()  # materials of a Radiance scene's panes before dark rooms
     u_value: float | None = None  # of every window, instead of the file's [W/(m2 K)]
     g_value: float | None = None  # of every window at normal incidence
+    glazing: str | None = None  # generic glazing for windows whose file states no data
+    visible_transmittance: float | None = None  # of windows without a BSDF, before the file's
     operation: Path | None = None  # shading control, gains, set points
 
     @property

@@ -15,6 +15,7 @@ from typing import Literal
 from bim.model import Building, Space
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.sky.albedo import with_albedo
 from mitsuba_cfs.sky.weather import Weather
 from scenes.chosen_rooms import chosen_spaces, named_spaces
 from scenes.fenestration.resolver import fill_windows, window_sources
@@ -127,7 +128,8 @@ def inputs_of(
 
     Raises: `DataError` for a room that is not in the building, a window that nothing fills.
     """
-    operation, weather, overrides = files.operation, files.weather, files.overrides
+    operation, overrides = files.operation, files.overrides
+    weather = with_albedo(files.weather, options.albedo)
     beyond: dict[str, list[Space]] = {}
     if inner:
         building = opened(building)

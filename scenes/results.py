@@ -104,6 +104,7 @@ class ThermalResult:
     comfort_summary: dict[str, float]  # by name; percentages as 0..100
     # by system: name; u_value, g_value, transmittances, ... at normal incidence
     fenestration: tuple[dict[str, float | str], ...]
+    issues: tuple[Issue, ...] = ()  # of the heat balance
 
     @property
     def air_c(self) -> pd.Series:

@@ -176,10 +176,17 @@ class ReadTable(TomlTable):
 
 
 class OutdoorTable(TomlTable):
-    """Files of the surroundings of a building."""
+    """What is around a building: files of obstructions, and the ground's reflectance."""
 
     surroundings: tuple[Path, ...] = ()  # of buildings, terrain, trees and horizons outdoors
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
+    # of the ground: a number, twelve by month, "file" (the weather's albedo) or "snow" (its depth)
+    albedo: (
+        Share
+        | Annotated[tuple[Share, ...], Field(min_length=12, max_length=12)]
+        | Literal["file", "snow"]
+        | None
+    ) = None
 
 
 def read_options(*tables: TomlTable) -> dict[str, object]:

@@ -1,7 +1,10 @@
-"""Outdoor air, supplied air and the slab's power at the start of a time step, compiled.
+"""Outdoor air, opened windows, supplied air and the slab's power in a time step, compiled.
 
-They follow from the room's air at the end of the step before and hold for the step; heat recovery
-goes with the air of the step itself.
+Leaks and the flow through opened windows follow the air of the last iterate.  Windows open where
+the air of the step would rise above their upper limit, and close where shut it would not exceed the
+lower one.  Where fully open it would fall below the lower limit, they are open in part and hold it.
+So no on and off of windows is left that the time step would have to resolve.  Supply air and
+slab follow the air at the start of the step.
 """
 
 from __future__ import annotations
@@ -12,17 +15,19 @@ from thermal.network import Network
 from thermal.records import AIR_HEAT, Drive, OutdoorConditions, State, Workspace, inlined
 from thermal.ventilation import REFERENCE_DENSITY
 
+SHUT, OPEN = 0, 1  # windows of a zone in an iterate
+TOO_WARM_SHUT, TOO_COLD_OPEN = 2, 4  # what was tried in the step, added to these
+
 
 @inlined
-def set_air_flows(
+def start_air_flows(
     net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
     t: int, hour: int,
 ) -> None:  # fmt: skip
-    """Set flow, supply and slab power of every zone for the step."""
+    """Set supply air, slab power and the windows' limits of every zone for the step."""
     for z in range(work.flow.size):
-        work.flow[z] = drive.airflow[hour, z] + _leaks(net, state, weather, drive, t, hour, z)
-        work.flow[z] += _airing(net, state, weather, drive, t, hour, z)
         _set_supply(net, state, work, weather, drive, t, hour, z)
+        _set_limits(net, state, work, weather, drive, t, z)
         face = net.emitters.slab[z]
         if face >= 0:
             full_heat, full_cold, band = net.emitters.power[z]
@@ -31,6 +36,19 @@ def set_air_flows(
             power = full_heat * min(max(lacks, 0.0), 1.0) - full_cold * min(max(exceeds, 0.0), 1.0)
             work.slab[z] = power
             work.source[face] = power / net.faces.area[face]
+
+
+@inlined
+def set_air_flows(
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
+    t: int, hour: int,
+) -> None:  # fmt: skip
+    """Set the outdoor air of every zone, and the air through its windows when open."""
+    for z in range(work.flow.size):
+        work.flow[z] = drive.airflow[hour, z] + _leaks(net, state, weather, drive, t, hour, z)
+        work.airing[z, 2] = 0.0
+        if drive.airing[hour, z] > 0.0:
+            work.airing[z, 2] = _airing(net, state, work, weather, drive, t, hour, z)
 
 
 @inlined
@@ -47,22 +65,35 @@ def _leaks(
 
 
 @inlined
+def _set_limits(
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
+    t: int, z: int,
+) -> None:  # fmt: skip
+    """Air temperatures at which the windows close and open."""
+    above, below, difference = net.paths.opens[z, 0], net.paths.opens[z, 1], net.paths.opens[z, 2]
+    lower = max(below, weather.outdoor[t] + difference)
+    if net.paths.opens[z, 5] == 0.0:
+        lower = max(lower, drive.heating_c[t, z])
+    upper = max(above, lower)
+    work.airing[z, 0], work.airing[z, 1] = lower, upper
+    work.windows[z] = OPEN if state.opened[z] else SHUT
+
+
+@inlined
 def _airing(
-    net: Network, state: State, weather: OutdoorConditions, drive: Drive, t: int, hour: int, z: int
-) -> float:
-    share = drive.airing[hour, z]
-    inside, out = state.air[z], weather.outdoor[t]
-    above, below, difference, greatest, least_out = net.paths.opens[z]
-    v = weather.speed[t] * net.paths.site
-    useful = share > 0.0 and inside - out >= difference and v <= greatest and out >= least_out
-    limit = below if state.opened[z] else above
-    state.opened[z] = useful and inside > limit
-    if not state.opened[z]:
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
+    t: int, hour: int, z: int,
+) -> float:  # fmt: skip
+    """Air through the windows when open [m3/s]; 0 where they must stay shut."""
+    greatest, least_out = net.paths.opens[z, 3], net.paths.opens[z, 4]
+    v, out = weather.speed[t] * net.paths.site, weather.outdoor[t]
+    if v > greatest or out < least_out or work.airing[z, 0] > drive.cooling_c[t, z]:
         return 0.0
-    w, s, both = net.paths.airing[z]
-    wind, stack = w * v * v, s * abs(inside - out)
+    w, s, both, flow = net.paths.airing[z]
+    wind, stack = w * v * v, s * abs(state.air[z] - out)
     squared = wind + stack if both > 0.0 else max(wind, stack)
-    return share * REFERENCE_DENSITY / weather.density[t] * np.sqrt(squared)
+    flow += REFERENCE_DENSITY / weather.density[t] * np.sqrt(squared)
+    return drive.airing[hour, z] * flow
 
 
 @inlined

@@ -22,8 +22,9 @@ class AirPaths(NamedTuple):
 
     leak: NDArray[np.float64]  # [Z, 8] a, b, c, d, s, m, w, n of `Leakage`
     wind: NDArray[np.float64]  # [Z] of the weather's, at the zone's height
-    airing: NDArray[np.float64]  # [Z, 3] w, s, 1 where both are added
-    # [Z, 5] opened above, closed below [degC], least difference [K], greatest wind, least outdoor
+    airing: NDArray[np.float64]  # [Z, 4] w, s, 1 where both are added, constant flow
+    # [Z, 6] opened above, closed below [degC], least difference [K], greatest wind, least outdoor,
+    # 1 where the zone may be heated while they are open
     opens: NDArray[np.float64]
     site: float  # wind on the site, of the weather's
     fan: NDArray[np.float64]  # [Z, 3] recovery, bypass above, least temperature
@@ -56,10 +57,10 @@ def air_paths(zones: Sequence[Zone], transfers: Sequence[AirTransfer], terrain: 
             [(*x.factors, x.stack, x.stack_exponent, x.wind, x.wind_exponent) for x in leaks]
         ),
         wind=np.array([local_wind_factor(_height(zone), terrain) for zone in zones]),
-        airing=np.array([(x.wind, x.stack, float(x.both)) for x in airings]),
+        airing=np.array([(x.wind, x.stack, float(x.both), x.flow) for x in airings]),
         opens=np.array(
             [(x.open_above_c, x.close_below_c, x.least_difference, x.greatest_wind,
-              x.least_outdoor_c) for x in airings]
+              x.least_outdoor_c, float(x.heating_while_open)) for x in airings]
         ),
         site=local_wind_factor(SITE_HEIGHT, terrain),
         fan=np.array([(x.recovery, x.bypass_above_c, x.least_c) for x in fans]),

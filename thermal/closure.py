@@ -32,20 +32,21 @@ U_MODELS = ("constant", "linear", "gap", "surface", "layers")
 # grey shade 50 mm behind and 100 mm before a low-e argon double glazing 6/16/6
 TYPICAL_FILMS = {"internal": (0.0715, None), "external": (None, 0.0236)}
 # RMSE [K] of air and of the window's inner face in the 128 cases (docs/thermal.md), by place and U
-# model, "+" with the films that the shade realises; outside: the larger of a blind's and a shade's
+# model, "+" with the films that the shade realises; outside: the larger of a blind's and a shade's;
+# "constant" and "gap": the larger of g by direction and of g at normal incidence, that in 64 cases
 ERRORS: dict[str, dict[str, tuple[float, float]]] = {
     "none": {
-        "constant": (0.30, 0.42), "linear": (0.61, 0.84), "gap": (0.13, 0.17),
+        "constant": (0.38, 0.55), "linear": (0.61, 0.84), "gap": (0.13, 0.17),
         "surface": (0.13, 0.16), "layers": (0.17, 0.21),
     },
     "external": {
-        "constant": (0.51, 0.83), "constant+": (0.22, 0.32), "linear": (0.45, 0.82),
-        "gap": (0.52, 0.85), "gap+": (0.18, 0.27), "surface+": (0.23, 0.34),
+        "constant": (0.92, 1.54), "constant+": (0.22, 0.32), "linear": (0.45, 0.82),
+        "gap": (0.52, 0.85), "gap+": (0.18, 0.28), "surface+": (0.23, 0.34),
         "layers+": (0.17, 0.29),
     },
     "internal": {
-        "constant": (0.70, 2.83), "constant+": (0.64, 0.74), "linear": (0.37, 2.45),
-        "gap": (0.49, 2.63), "gap+": (0.23, 0.55), "surface+": (0.47, 0.61),
+        "constant": (1.28, 3.50), "constant+": (0.75, 0.84), "linear": (0.37, 2.45),
+        "gap": (0.49, 2.63), "gap+": (0.31, 0.57), "surface+": (0.47, 0.61),
         "layers+": (0.44, 0.25),
     },
 }  # fmt: skip

@@ -42,7 +42,7 @@ def _account(
     for z in range(work.old_air.size):
         warmer = weather.outdoor[t] - state.air[z]
         terms[z, on.GAINS] += drive.convective[hour, z] + drive.radiant[hour, z]
-        terms[z, on.AIR] += heat * work.flow[z] * warmer + work.carried[z]
+        terms[z, on.AIR] += heat * (work.flow[z] + work.aired[z]) * warmer + work.carried[z]
         terms[z, on.AIR] -= work.passed[z] * state.air[z]
         terms[z, on.LOADS] += state.load[z]
         terms[z, on.SUPPLY] += work.supply[z, 1] - work.supply[z, 0] * state.air[z]
@@ -84,9 +84,11 @@ def _account(
             terms[faces.zone[i], on.PARTITIONS] += faces.area[i] * inward
             terms[faces.zone[i], on.STORAGE] += faces.area[i] * stored
     for z in range(work.old_air.size):
-        face = net.emitters.slab[z]  # in a wall between rooms its heat comes with the wall's
-        if face >= 0 and faces.kind[face] != TWIN and faces.kind[face] != PARTITION:
+        face = net.emitters.slab[z]
+        if face >= 0:
             terms[z, on.SLAB] += work.slab[z]
+            if faces.kind[face] == TWIN or faces.kind[face] == PARTITION:
+                terms[z, on.PARTITIONS] -= work.slab[z]  # it came with the heat of that wall
 
 
 @summed
@@ -138,7 +140,7 @@ def advance(
         for z in range(state.air.size):
             means.air[hour, z] += share * state.air[z]
             fan = drive.supply[hour, z]
-            means.air_flow[hour, z, 0] += share * (work.flow[z] + fan)
+            means.air_flow[hour, z, 0] += share * (work.flow[z] + work.aired[z] + fan)
             means.air_flow[hour, z, 1] += share * fan
             means.power[hour, z, 0] += share * work.supply[z, 2]
             means.power[hour, z, 1] += share * work.slab[z]

@@ -1,16 +1,21 @@
-"""Ideal plants in the linear system of a step: free, at a set point, or at their limit; compiled.
+"""Ideal plants and opened windows in the linear system of a step; compiled.
 
-What each plant does is guessed, and changed until temperatures and loads agree with it: the system
+A plant is free, holds a set point, or is at its limit; windows are shut, fully open, or partly open
+to hold a temperature (`air_flow`).
+
+What they do is guessed, and changed until temperatures and loads agree with it: the system
 is an M-matrix with bounds, for which that ends.  Source: Hintermueller, Ito and Kunisch 2002,
 doi:10.1137/S1052623401383558 (primal-dual active sets).
 """
 
 from __future__ import annotations
 
+from thermal.air_flow import OPEN, SHUT, TOO_COLD_OPEN, TOO_WARM_SHUT
 from thermal.network import Network
 from thermal.records import AIR_HEAT, Drive, OutdoorConditions, State, Workspace, inlined
 
 FREE, HEATS, HEATS_FULLY, COOLS, COOLS_FULLY = range(5)  # what the plant of a zone does
+VENTS = 5  # windows, partly open, hold the air at their lower limit
 ROUNDING = 1e-10  # of temperatures [K]
 RADIANT_PART = 1e-4  # that the shares of a load may be off, of it
 LEAST_REPLY = 0.01  # of the load's other part, less by each watt that is radiant
@@ -18,13 +23,16 @@ LEAST_REPLY = 0.01  # of the load's other part, less by each watt that is radian
 
 @inlined
 def is_held(plant: int) -> bool:
-    """Whether the plant holds its zone's air at a set point."""
-    return plant == HEATS or plant == COOLS
+    """Whether plant or windows hold the air of their zone at a temperature."""
+    return plant == HEATS or plant == COOLS or plant == VENTS
 
 
 @inlined
-def set_point(plant: int, drive: Drive, t: int, z: int) -> float:
-    """The set point that a plant holds [degC]."""
+def set_point(work: Workspace, drive: Drive, t: int, z: int) -> float:
+    """The air temperature that plant or windows hold [degC]."""
+    plant = work.plant[z]
+    if plant == VENTS:
+        return work.airing[z, 0]
     return drive.heating_c[t, z] if plant == HEATS else drive.cooling_c[t, z]
 
 
@@ -49,7 +57,7 @@ def close_air(
     for z in range(work.plant.size):
         k, plant = place[n + z], work.plant[z]
         if is_held(plant):
-            d[k], b[k] = 1.0, set_point(plant, drive, t, z)
+            d[k], b[k] = 1.0, set_point(work, drive, t, z)
             continue
         d[k], b[k] = work.air[z, 0], work.air[z, 1]
         if plant == HEATS_FULLY:
@@ -82,7 +90,10 @@ def plants_agree(
     for z in range(work.plant.size):
         air, stiffness, plant = x[n + z], work.air[z, 0], work.plant[z]
         state.load[z] = asked = 0.0
-        if is_held(plant):
+        if plant == VENTS:
+            asked = stiffness * air - work.air[z, 1]
+            work.aired[z] = asked / (heat * (weather.outdoor[t] - air))
+        elif is_held(plant):
             convective = stiffness * air - work.air[z, 1]
             state.load[z] = convective + work.radiant[z]
             asked = _whole_load(net, work, z, convective)
@@ -91,11 +102,41 @@ def plants_agree(
             state.load[z] = drive.limit[z, 0]
         elif plant == COOLS_FULLY:
             state.load[z] = -drive.limit[z, 1]
-        work.plant[z] = _plant(plant, air, asked, stiffness * ROUNDING, drive, t, z)
+        if plant != VENTS:
+            work.plant[z] = _plant(plant, air, asked, stiffness * ROUNDING, drive, t, z)
         agree &= work.plant[z] == plant
+        agree &= _windows_agree(work, z, air)
         if not is_held(work.plant[z]):
             work.radiant[z] = 0.0
     return agree
+
+
+@inlined
+def _windows_agree(work: Workspace, z: int, air: float) -> bool:
+    """Whether the windows do what this air temperature asks, else they change."""
+    lower, upper, full = work.airing[z]
+    windows = work.windows[z]
+    if work.plant[z] == VENTS:
+        if 0.0 <= work.aired[z] <= full:
+            return True
+        work.plant[z], work.windows[z] = FREE, OPEN if work.aired[z] > full else SHUT
+        return False
+    if windows & OPEN:
+        if full > 0.0 and air >= lower - ROUNDING:
+            return True
+        if windows & TOO_WARM_SHUT and full > 0.0:
+            work.plant[z] = VENTS
+        else:
+            work.windows[z] = SHUT | TOO_COLD_OPEN
+        return False
+    limit = lower if windows & TOO_COLD_OPEN else upper
+    if full == 0.0 or air <= limit + ROUNDING:
+        return True
+    if windows & TOO_COLD_OPEN:
+        work.plant[z] = VENTS
+    else:
+        work.windows[z] = OPEN | TOO_WARM_SHUT
+    return False
 
 
 @inlined

@@ -86,11 +86,15 @@ class Workspace(NamedTuple):
     right: NDArray[np.float64]  # [U]
     unknown: NDArray[np.float64]  # [U] inside faces, then air
     air: NDArray[np.float64]  # [Z, 2] conductance to all around [W/K], what flows in from it [W]
-    plant: NDArray[np.int64]  # [Z] what the plant does: FREE ... COOLS_FULLY
+    plant: NDArray[np.int64]  # [Z] what the plant does: FREE ... VENTS
+    windows: NDArray[np.int64]  # [Z] SHUT, OPEN; with what was tried in the step
+    # [Z, 3] air in which windows close or are partly open, in which they open [degC]; flow [m3/s]
+    airing: NDArray[np.float64]
     radiant: NDArray[np.float64]  # [Z] radiant part of its load [W]
     # [Z, 3] of that part: its load's other part, itself, both when last solved; less by its watt
     radiant_seen: NDArray[np.float64]
-    flow: NDArray[np.float64]  # [Z] outdoor air but that of fans [m3/s]
+    flow: NDArray[np.float64]  # [Z] outdoor air but that of fans and opened windows [m3/s]
+    aired: NDArray[np.float64]  # [Z] air through opened windows [m3/s]
     supply: NDArray[np.float64]  # [Z, 3] fans: conductance [W/K], it times temperature, coil [W]
     carried: NDArray[np.float64]  # [Z] heat of the air from other zones and neighbours [W]
     passed: NDArray[np.float64]  # [Z] conductance of the air to the neighbours [W/K]

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.air_flow import set_air_flows
+from thermal.air_flow import OPEN, set_air_flows, start_air_flows
 from thermal.climate import SIGMA
 from thermal.convection import (
     constant_inside,
@@ -34,7 +34,7 @@ from thermal.network import (
     Modes,
     Network,
 )
-from thermal.plant import close_air, is_held, plants_agree, radiant_load, set_point
+from thermal.plant import FREE, VENTS, close_air, is_held, plants_agree, radiant_load, set_point
 from thermal.records import (
     AIR_HEAT,
     Drive,
@@ -233,7 +233,7 @@ def _assemble(
         b[k] = area * r + drive.inner[sun, i] + radiant * faces.radiant_share[i]
         work.air[z, 0] += area * film
         if is_held(work.plant[z]):
-            b[k] += area * film * set_point(work.plant[z], drive, t, z)
+            b[k] += area * film * set_point(work, drive, t, z)
         else:
             e[pairs.at_film[i]] = -area * film
     for q in range(pairs.exchange.size):
@@ -259,7 +259,9 @@ def _assemble_air(
     hour, pairs = t // method.steps, net.couplings
     heat = weather.density[t] * AIR_HEAT
     for z in range(work.plant.size):
-        outdoor = heat * work.flow[z] + net.paths.bridges[z]
+        through = work.windows[z] & OPEN and work.plant[z] != VENTS
+        work.aired[z] = work.airing[z, 2] if through else 0.0
+        outdoor = heat * (work.flow[z] + work.aired[z]) + net.paths.bridges[z]
         store = heat * net.air_capacity[z] / method.step_s
         work.air[z, 0] = store + outdoor + work.supply[z, 0]
         work.air[z, 1] = store * work.old_air[z] + outdoor * weather.outdoor[t]
@@ -318,13 +320,17 @@ def step(
     method: Method,
 ) -> None:
     """One time step: iterate the coefficients."""
-    n = net.faces.area.size
-    set_air_flows(net, state, work, weather, drive, t, t // method.steps)
+    n, hour = net.faces.area.size, t // method.steps
+    start_air_flows(net, state, work, weather, drive, t, hour)
+    for z in range(work.plant.size):
+        if work.plant[z] == VENTS:
+            work.plant[z] = FREE
     _go_on(state.inner, work.old_inner)
     _go_on(state.outer, work.old_outer)
     _go_on(state.air, work.old_air)
     _still_modes(net.faces, net.modes, state, work)
     for _ in range(method.iterations):
+        set_air_flows(net, state, work, weather, drive, t, hour)
         for _ in range(MOST_CHANGES):
             _assemble(net, state, work, weather, drive, t, method)
             eliminate(net.system, work.diagonal, work.below, work.right)
@@ -342,3 +348,5 @@ def step(
         _outer_from_inner(net, state, work, drive, t)
         if change < method.tolerance:
             break
+    for z in range(work.plant.size):
+        state.opened[z] = work.aired[z] > 0.0

@@ -85,7 +85,11 @@ class SupplyAir:
 
 @dataclass(frozen=True, slots=True)
 class WindowAiring:
-    """Windows that are opened: sqrt of the greater of w v^2 and s dT, or of their sum [m3/s]."""
+    """Windows that are opened: sqrt of the greater of w v^2 and s dT, or of their sum [m3/s].
+
+    They cool: opened above `open_above_c`, they are opened in part where the air would fall below
+    `close_below_c`, or below the zone's heating set point unless `heating_while_open`.
+    """
 
     wind: float  # w [(m3/s)^2/(m/s)^2]
     stack: float  # s [(m3/s)^2/K]
@@ -96,6 +100,8 @@ class WindowAiring:
     least_difference: float = 0.0  # of the room's air above outdoors [K]
     greatest_wind: float = np.inf  # on the site [m/s]
     least_outdoor_c: float = -np.inf
+    heating_while_open: bool = False
+    flow: float = 0.0  # besides wind and stack, of open windows [m3/s]
 
     def __post_init__(self) -> None:
         require(self.wind >= 0 and self.stack >= 0, "opened windows", "negative flow")

@@ -71,7 +71,12 @@ def account_of(
         any(p.code == "file-cut-off" for p in issues),
         tuple(space.label for space in built if space.raised),
         shut_in_area(issues),
+        tuple(space.label for space in built if _has_inner_glass_only(space)),
     )
+
+
+def _has_inner_glass_only(space: Space) -> bool:
+    return not space.windows and any(face.pane is not None for face in space.faces)
 
 
 def _storeys(

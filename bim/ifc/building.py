@@ -17,11 +17,14 @@ from bim.boundaries import ElementRecord, Finishes, faces_and_windows, floor_are
 from bim.defaults import CLEAR_GLAZING
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
+from bim.ifc.cut_rooms import cut_rooms
 from bim.ifc.defects import DRAWN_TWICE, model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.furniture import furnished
 from bim.ifc.glass_of_rooms import apertures_in, glass_of_rooms, lost_glass
 from bim.ifc.joining import joined_rooms
+from bim.ifc.materials import SURFACES
+from bim.ifc.open_spaces import open_spaces
 from bim.ifc.passages import Passage, open_apertures
 from bim.ifc.placing import map_georeference
 from bim.ifc.raised_rooms import raised_rooms
@@ -30,7 +33,7 @@ from bim.ifc.schemes import one_of_each
 from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
 from bim.ifc.space_boundaries import boundary_issues
-from bim.ifc.spaces import SpaceRecord, enclosed_spaces, read_spaces
+from bim.ifc.spaces import SpaceRecord, read_spaces
 from bim.isolated_solids import RoomBoundary, room_boundaries
 from bim.mesh_simplification import simplified
 from bim.model import Building, Element, Space
@@ -82,8 +85,9 @@ def read_ifc(
     if any(record.raised for record in records):
         glass = glass_of_rooms(source, apertures, records, mesh)
     elements, finishes, faults = bounding_elements(
-        source.model, source.walls, source.placed.rotation, source.damage
-    )
+        source.model, source.walls, source.placed.rotation, source.damage,
+        materials=source.corrections.materials,
+    )  # fmt: skip
     issues += [*glass.issues, *faults]
     around = _surroundings(mesh, source.walls, records, source.ground)
     attached = [*glass.attachments, *(side for way in rooms.passages for side in way.sides)]
@@ -98,6 +102,7 @@ def read_ifc(
     again = {issue.where for issue in issues if issue.code == DRAWN_TWICE}
     issues += lost_glass(attached, spaces, again)
     issues += boundary_issues(source, spaces)
+    issues += guessed_walls(spaces)
     spaces, more = furnished(source, spaces, wanted=furniture)
     issues += more
     tell("surroundings", 0.0)
@@ -110,7 +115,10 @@ def read_ifc(
         account_of(
             source, rooms.read, spaces, glass, issues, repeated=[r.guid for r in rooms.repeated]
         ),
-        map_georeference(source.model, source.placed),
+        map_georeference(
+            source.model, source.placed,
+            north_is_corrected=source.corrections.north_deg is not None,
+        ),
         source.placed.matrix(),
     )  # fmt: skip
 
@@ -127,12 +135,17 @@ def _rooms(
     source: Source, mesh: RayMesh, tell: Callable[[float], None]
 ) -> tuple[_Rooms, list[Issue]]:
     """The spaces that are rooms; found from geometry where the file has none."""
+    stated = source.corrections.stated_outdoors(source.model)
     records, issues = read_spaces(
-        source.model, source.shapes, source.quantity_scales(), source.damage
+        source.model, source.shapes, source.quantity_scales(), source.damage, stated=stated
     )
     records, repeated, more = one_of_each(source.model, records)
     issues += more
-    read, more = enclosed_spaces(records, mesh)
+    by_guid = {r.guid: stated[r.step_id] for r in records if r.step_id in stated}
+    windows = [s.triangles for s in source.elements if s.ifc_class.startswith("IfcWindow")]
+    read, more = open_spaces(records, mesh, by_guid, windows)
+    issues += more
+    read, more = cut_rooms(source, read)
     issues += more
     apertures = open_apertures(source, read, mesh.triangles)
     records, ways, more = joined_rooms(source, read, apertures, mesh.triangles)
@@ -142,6 +155,26 @@ def _rooms(
         records = read
         issues += more
     return _Rooms(read, records, repeated, ways), issues
+
+
+def guessed_walls(spaces: Sequence[Space]) -> list[Issue]:
+    """Outer walls of which the file does not state all layers: their layers and U, by area."""
+    areas: Counter[tuple[str, tuple]] = Counter()
+    for face in (face for space in spaces for face in space.faces):
+        known = face.construction.source == "IFC"
+        if face.kind == "wall" and face.adjacency == "outside" and not known:
+            areas[face.construction.name, face.construction.layers] += face.area
+    return [
+        Issue("outer-wall-guessed", name, {
+            "wall": name, "area": area,
+            "u": 1 / (sum(layer.resistance for layer in layers) + SURFACES),
+            "layers": tuple(
+                f"{1000 * layer.thickness:.0f} mm {layer.name} ({layer.conductivity:.3g} W/mK)"
+                for layer in layers
+            ),
+        })
+        for (name, layers), area in areas.most_common()
+    ]  # fmt: skip
 
 
 def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, ...], list[Issue]]:

@@ -8,6 +8,9 @@
     only = ['IfcWall', 'IfcSlab', 'IfcWindow', 'IfcSpace']              # nothing else is read
     join = [["Hall", "Living"]] # rooms open to each other that are to be one
     surroundings = 0.2          # diffuse reflectance of everything outdoors
+    north = 30                  # direction of the model's +y axis, in degrees from north to east
+    outdoors = ['IfcSpace, LongName="Loggia"']     # spaces that are no rooms
+    indoors = ['IfcSpace, Name="A.12"']            # rooms, whatever their shape and name
 
     [[reflectance]]
     select = 'IfcWall, material="Brick"'
@@ -15,6 +18,12 @@
     solar = 0.35                # the visible one if left out
     specular = 0.04             # like a mirror besides, at normal incidence; 0 if left out
     roughness = 0.05            # of that, Radiance's (Ward's alpha); 0, a mirror, if left out
+
+    [[material]]
+    name = "Sandwich panel*"    # of the file's materials; * stands for any text
+    conductivity = 0.025        # W/(m K); or u = 0.3, of a wall of this layer alone, W/(m2 K)
+    density = 40                # kg/m3; as the file or the table of materials, if left out
+    heat_capacity = 1400        # J/(kg K); likewise
 
 Selectors choose by GUID, class, name, type, material, storey (location), property and more:
 https://docs.ifcopenshell.org/ifcopenshell-python/selector_syntax.html; and by CAD layer, which is
@@ -31,6 +40,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bim.material_names import MaterialCorrection
 from mitsuba_cfs.errors import DataError, no_such_key
 from mitsuba_cfs.files import reason
 from mitsuba_cfs.gloss import ROUGHEST, Gloss, lacquer
@@ -39,9 +49,14 @@ if TYPE_CHECKING:
     import ifcopenshell
 
 LAYER = re.compile(r'(?:^|,)\s*layer\s*=\s*("[^"]*"|[^,+]+)')  # CAD layer: ours, not ifcopenshell's
-KEYS = ("leave_out", "only", "opaque", "keep", "join", "surroundings", "reflectance")
+KEYS = ("leave_out", "only", "opaque", "keep", "join", "surroundings", "reflectance", "north",
+        "outdoors", "indoors", "material")  # fmt: skip
 OPEN = "open"  # asks for the rooms that are open to each other by more than a door
 PAINT_KEYS = ("select", "visible", "solar", "specular", "roughness")
+MATERIAL_KEYS = {  # of [[material]]: lowest and highest value
+    "conductivity": (0.005, 500.0), "u": (0.05, 10.0), "density": (0.5, 12000.0),
+    "heat_capacity": (100.0, 5000.0),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +82,10 @@ class Corrections:
     keep: tuple[str, ...] = ()  # shading devices that are traced before any BSDF
     opaque: tuple[str, ...] = ()  # elements without glass, whatever they are drawn as
     join_open: bool = False  # rooms open to each other by more than a door are one
+    north_deg: float | None = None  # direction of the model's +y axis, from north to east
+    outdoors: tuple[str, ...] = ()  # spaces that are no rooms
+    indoors: tuple[str, ...] = ()  # spaces that are rooms
+    materials: tuple[MaterialCorrection, ...] = ()  # the first that matches counts
 
     def removed(self, model: ifcopenshell.file) -> set[int]:
         """STEP ids of the products that are not to be read."""
@@ -88,6 +107,14 @@ class Corrections:
     def unglazed(self, model: ifcopenshell.file) -> set[int]:
         """STEP ids of the products that `opaque` chooses."""
         return set().union(*(chosen(model, query, self.file) for query in self.opaque))
+
+    def stated_outdoors(self, model: ifcopenshell.file) -> dict[int, bool]:
+        """Whether spaces are outdoors, by STEP id, where the corrections say so."""
+        result: dict[int, bool] = {}
+        for queries, outdoors in ((self.outdoors, True), (self.indoors, False)):
+            for query in queries:
+                result |= dict.fromkeys(chosen(model, query, self.file), outdoors)
+        return result
 
     def painted(self, model: ifcopenshell.file) -> dict[int, Paint]:
         """The paint by STEP id; later entries win."""
@@ -155,10 +182,7 @@ def read_corrections(path: str | PathLike[str]) -> Corrections:
     except OSError as error:
         raise DataError(f"cannot be read: {reason(error)}", file=path) from None
     _check_keys(table, KEYS, path)
-    entries = table.get("reflectance", [])
-    if not isinstance(entries, list):
-        raise DataError("expected tables, [[reflectance]]", file=path, field="reflectance")
-    paints = tuple(_paint(entry, path) for entry in entries)
+    paints = tuple(_paint(entry, path) for entry in _tables(table, "reflectance", path))
     surroundings = table.get("surroundings")
     if surroundings is not None:
         surroundings = _share(surroundings, path, "surroundings")
@@ -169,7 +193,47 @@ def read_corrections(path: str | PathLike[str]) -> Corrections:
     return Corrections(
         _texts(table, "leave_out", path), _texts(table, "only", path), paints, surroundings, join,
         str(path), _texts(table, "keep", path), _texts(table, "opaque", path),
+        north_deg=_north(table, path), outdoors=_texts(table, "outdoors", path),
+        indoors=_texts(table, "indoors", path),
+        materials=tuple(_material(entry, path) for entry in _tables(table, "material", path)),
     )  # fmt: skip
+
+
+def _tables(table: dict, key: str, path: Path) -> list:
+    entries = table.get(key, [])
+    if not isinstance(entries, list):
+        raise DataError(f"expected tables, [[{key}]]", file=path, field=key)
+    return entries
+
+
+def _north(table: dict, path: Path) -> float | None:
+    value = table.get("north")
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not -360 <= value <= 360:
+        message = f"expected degrees from -360 to 360, got {value!r}"
+        raise DataError(message, file=path, field="north")
+    return float(value)
+
+
+def _material(entry: dict, path: Path) -> MaterialCorrection:
+    if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
+        raise DataError("expected name = '...'", file=path, field="material")
+    _check_keys(entry, ("name", *MATERIAL_KEYS), path, "material.")
+    values = {key: value for key, value in entry.items() if key != "name"}
+    if not values or {"conductivity", "u"} <= set(values):
+        message = "expected conductivity or u, density, heat_capacity"
+        raise DataError(message, file=path, field="material")
+    for key, value in values.items():
+        low, high = MATERIAL_KEYS[key]
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not low <= value <= high
+        ):
+            message = f"expected a number from {low:g} to {high:g}, got {value!r}"
+            raise DataError(message, file=path, field=f"material.{key}")
+    return MaterialCorrection(entry["name"], {k: float(v) for k, v in values.items()})
 
 
 def _check_keys(table: dict, known: Sequence[str], path: Path, prefix: str = "") -> None:

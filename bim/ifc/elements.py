@@ -22,6 +22,7 @@ from bim.ifc.damage import Damage, entities
 from bim.ifc.materials import MaterialReader, materials_of
 from bim.ifc.project import storey_of
 from bim.ifc.shapes import Shape
+from bim.material_names import MaterialCorrection
 from bim.model import Element
 from bim.report.issue import Issue
 from mitsuba_cfs.gloss import Gloss
@@ -34,12 +35,16 @@ def bounding_elements(
     shapes: Sequence[Shape],
     rotation: NDArray[np.float64],
     damage: Damage | None = None,
+    *,
+    materials: Sequence[MaterialCorrection] = (),
 ) -> tuple[list[ElementRecord], Finishes, list[Issue]]:
     """Record of each shape, what their triangles reflect, issues.
 
-    Args: shapes: in world axes; rotation: [3, 3] from model axes to the world.
+    Args:
+        shapes: in world axes; rotation: [3, 3] from model axes to the world.
+        materials: corrected properties.
     """
-    reader = MaterialReader(model, Damage() if damage is None else damage)
+    reader = MaterialReader(model, Damage() if damage is None else damage, materials)
     records = [_record(model.by_id(shape.step_id), shape, reader, rotation) for shape in shapes]
     faults: dict[str, Issue] = {}
     values, gloss, hues = [], [], []

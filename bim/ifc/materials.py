@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,11 +10,10 @@ import ifcopenshell
 import ifcopenshell.util.element
 import numpy as np
 
-from bim.defaults import MATERIALS, UNKNOWN_MATERIAL
 from bim.ifc.damage import Damage, entities, instances, placement_of
 from bim.ifc.project import length_scale
+from bim.material_names import MaterialCorrection, NamedMaterial, material_named
 from bim.model import MaterialLayer
-from bim.names import plain_text
 from bim.report.issue import Issue, Phrase
 
 PHYSICAL = {  # name -> lowest and highest value of any building material
@@ -32,6 +31,7 @@ OPTICAL = {
     "solar": ("SolarReflectanceFront",),
 }
 
+SURFACES = 0.17  # resistances of both surfaces of an outer wall: EN ISO 6946:2017 [m2 K/W]
 DEEPEST = 20  # parts of parts of a whole
 
 
@@ -51,6 +51,7 @@ class MaterialReader:
 
     model: ifcopenshell.file
     damage: Damage = field(default_factory=Damage)
+    corrections: Sequence[MaterialCorrection] = ()
     issues: dict[str, Issue] = field(default_factory=dict)
     scale: float = field(init=False)  # metres in the file's unit of length
     _aspects: dict[int, str] = field(default_factory=dict)  # names of representation items' aspects
@@ -202,9 +203,15 @@ class MaterialReader:
             )
             self.issues.setdefault(f"{name} kJ", issue)
         wrong = sorted(set(given) - set(values))
+        values |= self._corrected(name, thickness)
         missing = sorted(set(NAMES) - set(values))
         if missing:
-            default = default_material(name)
+            default = named_material(material).of_thickness(thickness)
+            unknown = (
+                material is not None
+                and "conductivity" in missing
+                and not named_material(material).is_known
+            )
             known: dict[str, Any] = {
                 "material": name, "missing": tuple(map(Phrase, missing)), "default": default.name,
                 "impossible": tuple(
@@ -212,10 +219,22 @@ class MaterialReader:
                     for k in wrong
                 ),
             }  # fmt: skip
-            code = "material-impossible" if wrong else "material-incomplete"
+            code = "material-unknown" if unknown else "material-incomplete"
+            code = "material-impossible" if wrong else code
             self.issues.setdefault(name, Issue(code, name, known))
             values = {k: values.get(k, getattr(default, k)) for k in NAMES}
         return MaterialLayer(name, thickness, **values), not missing
+
+    def _corrected(self, name: str, thickness: float) -> dict[str, float]:
+        """Properties of a material that the corrections state."""
+        correction = next((one for one in self.corrections if one.matches(name)), None)
+        if correction is None:
+            return {}
+        values = dict(correction.values)
+        if "u" in values:
+            resistance = max(1 / values.pop("u") - SURFACES, 1e-3)
+            values["conductivity"] = thickness / resistance
+        return values
 
 
 def materials_of(
@@ -271,13 +290,28 @@ def _is_physical(name: str, value: float) -> bool:
     return low <= value <= high
 
 
-def default_material(name: str) -> MaterialLayer:
-    """The row of the table whose words occur in the name, in the order of the table."""
-    text = plain_text(name)
-    for words, material in MATERIALS:
-        if any(plain_text(word) in text for word in words):
-            return material
-    return UNKNOWN_MATERIAL
+def _classified(material: ifcopenshell.entity_instance) -> list[str]:
+    """Names of the classification entries of a material (IFC4), such as "Mineral wool slabs"."""
+    names = []
+    relations = [*(getattr(material, "HasExternalReferences", None) or ())]
+    for relation in relations:
+        reference = getattr(relation, "RelatingReference", None)
+        if reference is not None and reference.is_a("IfcClassificationReference"):
+            names.append(reference.Name or "")
+    for relation in material.file.get_inverse(material):
+        if relation.is_a("IfcRelAssociatesClassification"):
+            names.append(getattr(relation.RelatingClassification, "Name", None) or "")
+    return names
+
+
+def named_material(material: ifcopenshell.entity_instance | None) -> NamedMaterial:
+    """What a material is: by its classification, else its name, its category or its description."""
+    if material is None:
+        return material_named("")
+    texts = [*_classified(material), material.Name or ""]
+    texts += [getattr(material, key, None) or "" for key in ("Category", "Description")]
+    found = [material_named(text) for text in texts]
+    return next((one for one in found if one.is_known), found[-3])
 
 
 def _axis(element: ifcopenshell.entity_instance, usage, damage: Damage) -> np.ndarray | None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bim.georeference import Georeference, crs_name
 from bim.ifc.damage import Damage, placement_of
+from bim.ifc.north import map_conversions
 from bim.ifc.project import length_scale
 from bim.ifc.shapes import Shape
 from bim.report.issue import Issue
@@ -108,29 +109,28 @@ def ground_level(model: ifcopenshell.file, placed: Placed, damage: Damage | None
     return placed.scale * chosen[1] - float(placed.offset[2])
 
 
-def map_georeference(model: ifcopenshell.file, placed: Placed) -> Georeference | None:
-    """The way from map to world by the file's first map conversion; None without one (IFC2X3).
+def map_georeference(
+    model: ifcopenshell.file, placed: Placed, *, north_is_corrected: bool = False
+) -> Georeference | None:
+    """The way from map to world by the file's first map conversion; None without one.
 
     map = (Eastings, Northings, OrthogonalHeight) + turn @ model; model and map are in metres here,
     so that Scale, which only changes between their units, is not needed.
+
+    Args: north_is_corrected: the conversion's rotation is wrong then, and the map's north is north.
     """
-    found = [] if model.schema == "IFC2X3" else model.by_type("IfcMapConversion")
-    for one in found:
-        name = getattr(one.TargetCRS, "Name", None)
-        parts = (one.Eastings, one.Northings, one.OrthogonalHeight)
-        if not name or any(part is None or not math.isfinite(part) for part in parts):
+    for one in map_conversions(model):
+        if not one.crs or None in one.origin:
             continue
-        unit = getattr(one.TargetCRS, "MapUnit", None)
-        metres = _metres(model, unit)
-        x, y = one.XAxisAbscissa, one.XAxisOrdinate
-        turned = x is not None and y is not None and math.hypot(x, y) > 1e-9
-        c, s = (x / math.hypot(x, y), y / math.hypot(x, y)) if turned else (1.0, 0.0)
+        x, y = one.x_axis or (1.0, 0.0)
+        c, s = x / math.hypot(x, y), y / math.hypot(x, y)
         back = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])  # from map to model axes
-        turn = placed.scale * placed.rotation @ back
+        turn = placed.scale * (np.eye(3) if north_is_corrected else placed.rotation @ back)
         to_world = np.eye(4)
         to_world[:3, :3] = turn
-        to_world[:3, 3] = -turn @ (metres * np.array(parts, dtype=float)) - placed.offset
-        return Georeference(crs_name(str(name)), to_world)
+        origin = _metres(model, one.unit) * np.array(one.origin, dtype=float)
+        to_world[:3, 3] = -turn @ origin - placed.offset
+        return Georeference(crs_name(str(one.crs)), to_world)
     return None
 
 

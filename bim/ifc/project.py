@@ -1,18 +1,17 @@
-"""The IFC file itself: opening it, true north, site, units, and the text of its elements."""
+"""The IFC file itself: opening it, site, units, and the text of its elements."""
 
 from __future__ import annotations
 
-import math
 import shutil
 import tempfile
+import uuid
 import zipfile
 from pathlib import Path
 
 import ifcopenshell
+import ifcopenshell.guid
 import ifcopenshell.util.element
 import ifcopenshell.util.unit
-import numpy as np
-from numpy.typing import NDArray
 
 from bim.ifc.damage import Damage, entities, type_of
 from bim.ifc.head import SCHEMAS, ZIPPED, check_head, model_name
@@ -52,7 +51,28 @@ def _open_step(path: Path, shown: Path) -> ifcopenshell.file:
     if not model.by_type("IfcProject") and not model.by_type("IfcProduct"):
         raise DataError("holds no project and no products: damaged or cut off", file=shown)
     _mend_stars(model)
+    _mend_guids(model)
     return model
+
+
+def _mend_guids(model: ifcopenshell.file) -> None:
+    """Give products without a GlobalId the one of their STEP number."""
+    for product in model.by_type("IfcProduct"):
+        if not product.GlobalId:
+            product.GlobalId = numbered_guid(product.id())
+
+
+def numbered_guid(step_id: int) -> str:
+    """The GlobalId for a product without one: the same whenever the file is read."""
+    return ifcopenshell.guid.compress(uuid.uuid5(uuid.NAMESPACE_OID, str(step_id)).hex)
+
+
+def guid_issues(model: ifcopenshell.file) -> list[Issue]:
+    """An issue where products have no GlobalId in the file."""
+    products = model.by_type("IfcProduct")
+    missing = [one.id() for one in products if one.GlobalId == numbered_guid(one.id())]
+    values = {"count": len(missing), "first": min(missing, default=0)}
+    return [Issue("guid-missing", "project", values)] if missing else []
 
 
 def _mend_stars(model: ifcopenshell.file) -> None:
@@ -127,39 +147,6 @@ def _unit_scale(model: ifcopenshell.file, kind: str, damage: Damage) -> float:
             of=None, data="units", default=1.0,
         )
     )  # fmt: skip
-
-
-def north_rotation(model: ifcopenshell.file) -> tuple[NDArray[np.float64], list[Issue]]:
-    """Rotation [3, 3] about z from model axes to x east, y north; and what is odd about it.
-
-    TrueNorth is the direction of north in the model's own axes.  Without it the map conversion's
-    grid north is taken (IFC4: XAxisAbscissa, XAxisOrdinate), else +y is north.
-    """
-    for context in model.by_type("IfcGeometricRepresentationContext", include_subtypes=False):
-        north = getattr(context, "TrueNorth", None)
-        if north is None or context.ContextType == "Plan":
-            continue
-        ratios = [float(value) for value in north.DirectionRatios]
-        if len(ratios) == 2 and math.hypot(*ratios) > 1e-9:
-            return _turned(ratios[0], ratios[1]), []
-        return np.eye(3), [
-            Issue("true-north-invalid", "project", {"direction": str(tuple(ratios))})
-        ]
-    conversions = [] if model.schema == "IFC2X3" else model.by_type("IfcMapConversion")
-    for conversion in conversions:
-        x, y = conversion.XAxisAbscissa, conversion.XAxisOrdinate
-        if x is not None and y is not None and math.hypot(x, y) > 1e-9:
-            # the model's x axis has map coordinates (x, y): the model is turned by their angle
-            north = (y / math.hypot(x, y), x / math.hypot(x, y))
-            return _turned(*north), [Issue("true-north-from-map", "IfcMapConversion")]
-    return np.eye(3), [Issue("true-north-missing", "project")]
-
-
-def _turned(x: float, y: float) -> NDArray[np.float64]:
-    """Rotation [3, 3] about z that takes the direction (x, y) to +y."""
-    length = math.hypot(x, y)
-    c, s = y / length, x / length
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def site_location(

@@ -12,13 +12,14 @@ import numpy as np
 from bim.colours import GREY
 from bim.ifc.corrections import Corrections, Paint
 from bim.ifc.damage import Damage
+from bim.ifc.north import north_rotation
 from bim.ifc.placing import Placed, ground_level, in_world
 from bim.ifc.project import (
     area_scale,
     ending_issues,
+    guid_issues,
     length_issues,
     length_scale,
-    north_rotation,
     open_ifc,
     site_location,
 )
@@ -26,7 +27,9 @@ from bim.ifc.quantities import QuantityScales
 from bim.ifc.shapes import NO_ELEMENTS, Shape, read_shapes
 from bim.ifc.surface_styles import SurfaceStyle
 from bim.ifc.transparent import judged_transparent
+from bim.names import listed
 from bim.report.issue import Issue
+from mitsuba_cfs.errors import DataError
 
 Progress = Callable[[str, float], None]
 
@@ -87,9 +90,10 @@ def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> S
     """The opened model, its shapes meshed, corrected and placed."""
     tell("opening", 0.0)
     model, damage = open_ifc(path), Damage()
-    issues = ending_issues(path) + length_issues(model)
-    rotation, more = north_rotation(model)
+    issues = ending_issues(path) + length_issues(model) + guid_issues(model)
+    rotation, more = north_rotation(model, corrections.north_deg)
     latitude, longitude, elevation, site = site_location(model)
+    check_materials(model, corrections)
     removed = corrections.removed(model)
     shapes, faults = read_shapes(
         model, lambda fraction: tell("geometry", fraction), without=removed
@@ -112,6 +116,15 @@ def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> S
         Path(path), model, placed, corrections, latitude, longitude, elevation,
         tuple([*issues, *placed.issues]), damage,
     )  # fmt: skip
+
+
+def check_materials(model: ifcopenshell.file, corrections: Corrections) -> None:
+    """Raise `DataError` where corrections name a material that the file has not."""
+    names = [material.Name or "" for material in model.by_type("IfcMaterial")]
+    for one in corrections.materials:
+        if not any(map(one.matches, names)):
+            message = f"no material is named {one.name!r}; there are: {listed(one.name, names)}"
+            raise DataError(message, file=corrections.file or None, field="material.name")
 
 
 def opaque(shape: Shape) -> Shape:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import ifcopenshell
-import numpy as np
-from numpy.typing import NDArray
 
 from bim.ifc.damage import Damage, type_of
 from bim.ifc.project import psets_of, storey_of
@@ -15,19 +13,12 @@ from bim.ifc.quantities import QuantityScales, checked_volume, stated_quantities
 from bim.ifc.shapes import Shape
 from bim.isolated_solids import spaces_of
 from bim.names import label_of
-from bim.neighbours import sample_points
-from bim.planes import Facet
-from bim.rays import RayMesh
 from bim.report.issue import Effect, Issue, Phrase
 from bim.rooms import RoomSolid, room_solid
 from mitsuba_cfs.processes import ProcessEnded
 
 SMALLEST_SPACE = 0.2  # smaller spaces are beams or ducts of the wrong class [m3]
-UNCOVERED = 0.7  # share of the ceiling under the open sky from which a space has no roof
-WALLLESS = 0.5  # share of its sides without anything near from which it has no walls
-SIDE_REACH = 1.0  # how far from a side its wall may be [m]
 OVERLAPPING = "spaces-overlap"  # code of the issue
-INSIDE = 0.3  # rays start this far inside: rooms drawn into their walls and roof [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +34,7 @@ class SpaceRecord:
     stated_volume: float | None
     type_name: str = ""
     raised: float = 0.0  # of the volume: above the space as drawn, up to what covers it [m3]
+    step_id: int = 0  # of the space; 0 for a room found from geometry
 
     @property
     def guid(self) -> str:
@@ -60,8 +52,14 @@ def read_spaces(
     shapes: dict[int, Shape],
     scales: QuantityScales,
     damage: Damage | None = None,
+    *,
+    stated: Mapping[int, bool] | None = None,
 ) -> tuple[list[SpaceRecord], list[Issue]]:
-    """Every space that is indoors and has a body; the others are issues."""
+    """Every space that is indoors by the file and has a body; the others are issues.
+
+    Args: stated: whether spaces are outdoors, by STEP id, where the corrections say so.
+    """
+    stated = {} if stated is None else stated
     records: list[SpaceRecord] = []
     issues: list[Issue] = []
     seen: set[str] = set()
@@ -78,7 +76,7 @@ def read_spaces(
             issues.append(Issue("space-guid-repeated", space.GlobalId, values))
         seen.add(guid)
         psets = psets_of(space, damage)
-        if is_outdoors(space, psets):
+        if stated.get(space.id(), is_outdoors(space, psets)):
             issues.append(Issue("space-external", guid, {"room": label}, Effect("room")))
             continue
         if space.id() not in solids:
@@ -114,6 +112,7 @@ def read_spaces(
                 area,
                 volume,
                 _type_name(space, damage),
+                step_id=space.id(),
             )
         )
     return records, issues
@@ -133,42 +132,3 @@ def is_outdoors(space: ifcopenshell.entity_instance, psets: dict[str, dict]) -> 
         getattr(space, "PredefinedType", None),
     )
     return common.get("IsExternal") is True or "EXTERNAL" in kinds
-
-
-def enclosed_spaces(
-    records: Sequence[SpaceRecord], building: RayMesh
-) -> tuple[list[SpaceRecord], list[Issue]]:
-    """The spaces that building elements enclose; those under the open sky are issues.
-
-    Rays from just below its ceiling go up, rays from its sides go out: a space is outdoors where
-    most of both meet nothing.  A room whose roof is only missing in the file is kept.
-    """
-    kept, issues = [], []
-    for record in records:
-        facets = record.solid.facets
-        upper = [facet for facet in facets if facet.plane.normal[2] > 0.3]
-        sides = [facet for facet in facets if abs(facet.plane.normal[2]) <= 0.3]
-        roofless = _open_share(upper, np.array([0.0, 0.0, 1.0]), np.inf, building) > UNCOVERED
-        if roofless and _open_share(sides, None, SIDE_REACH, building) > WALLLESS:
-            values = {"room": record.solid.name}
-            issues.append(Issue("space-outdoors", record.solid.guid, values, Effect("room")))
-        else:
-            kept.append(record)
-    return kept, issues
-
-
-def _open_share(
-    facets: Sequence[Facet], direction: NDArray[np.float64] | None, reach: float, building: RayMesh
-) -> float:
-    """Share of the facets' area with nothing beyond; along their normals without a direction."""
-    if not facets or not len(building.triangles):
-        return 0.0
-    weights = np.array([facet.polygon.area for facet in facets])
-    points = [sample_points(facet)[0] for facet in facets]
-    index = np.repeat(np.arange(len(facets)), [len(p) for p in points])
-    normals = np.array([facet.plane.normal for facet in facets])[index]
-    directions = normals if direction is None else np.tile(direction, (len(index), 1))
-    start = np.concatenate(points) - INSIDE * directions
-    _, hit = building.first_hits(start, directions, reach + INSIDE)
-    shares = np.bincount(index, hit < 0) / np.bincount(index)
-    return float(np.average(shares, weights=weights))

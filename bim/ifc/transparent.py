@@ -33,10 +33,10 @@ import ifcopenshell
 import numpy as np
 
 from bim.apertures import FLAT, main_direction
-from bim.defaults import UNKNOWN_MATERIAL
 from bim.ifc.damage import Damage
-from bim.ifc.materials import default_material, own_materials
+from bim.ifc.materials import own_materials
 from bim.ifc.shapes import NO_ELEMENTS, Shape
+from bim.material_names import material_named
 from bim.names import plain_text
 from bim.planes import area_vectors, principal_extents
 from bim.rays import RayMesh, ray_mesh
@@ -193,7 +193,7 @@ def _is_air(text: str) -> bool:
 
 
 def _names_a_body(text: str) -> bool:
-    return default_material(text) is not UNKNOWN_MATERIAL
+    return material_named(text).group != "unknown"
 
 
 def _material_texts(element: ifcopenshell.entity_instance, damage: Damage | None) -> list[str]:

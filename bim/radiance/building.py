@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from bim.defaults import default_construction
 from bim.model import Building, Element, Face, Space, Window
 from bim.names import numbered
-from bim.radiance.daylight import held_states, opaque_objects, plain_glass
+from bim.radiance.daylight import opaque_objects, plain_glass
 from bim.radiance.indoors import THICK, Indoors, indoors_of
-from bim.radiance.materials import SYSTEMS
-from bim.radiance.panes import panes_of
+from bim.radiance.layers import layered_window
+from bim.radiance.panes import PanedWindow, is_pane, panes_of
 from bim.radiance.scene import RadianceObject, RadianceScene, read_radiance
 from bim.report.issue import Issue
 from bim.shell import enclosed_volume, open_edges
@@ -45,17 +45,13 @@ def read_radiance_building(
         message = "no pane has a room behind it: name the windows' material"
         raise DataError(message, file=path, field="aperture")
     names = numbered([window.surface.name for window in panes.windows])
+    layer_issues: dict[Issue, None] = {}
     windows = tuple(
-        Window(
-            name, name, triangles, opening_area=_area(triangles),
-            visible_transmittance=None if glass is None else glass.transmittance,
-            type_name=inner.material.name, states=held_states(inner), glass=glass,
-        )
+        _window(name, window, layer_issues)
         for name, window in zip(names, panes.windows, strict=True)
-        for triangles, inner in ((window.surface.triangles, window.panes[-1]),)
-        for glass in (plain_glass([pane.material for pane in window.panes]),)
-    )  # fmt: skip
-    objects = opaque_objects(scene, scene.of_modifiers(facades))
+    )
+    used = [pane for window in panes.windows for pane in window.panes]
+    objects = opaque_objects(scene, scene.of_modifiers(facades), used)
     if not objects:
         raise DataError("has no opaque surface", file=path)
     indoors = indoors_of(objects, windows)
@@ -67,7 +63,8 @@ def read_radiance_building(
         for i, thing in enumerate(objects)
         if not indoors.stands[indoors.owner == i].any()
     )
-    found = (*scene.issues, *panes.issues, *_material_issues(scene), *issues)
+    issues += [*layer_issues, *_material_issues(objects)]
+    found = (*scene.issues, *panes.issues, *issues)
     return Building(path.stem, (space,), elements, found, file=path)
 
 
@@ -87,33 +84,45 @@ def read_radiance_elements(
     return elements, scene.issues
 
 
+def _window(name: str, window: PanedWindow, issues: dict[Issue, None]) -> Window:
+    """A window with its glazing; `issues` takes those of its layers."""
+    triangles, glass = window.surface.triangles, plain_glass(window.panes)
+    states, up = (), None
+    if glass is None:
+        layered = layered_window(window.panes, window.outwards)
+        states, up = (layered.state,), layered.up
+        issues |= dict.fromkeys(layered.issues)
+    return Window(
+        name, name, triangles, opening_area=_area(triangles),
+        visible_transmittance=None if glass is None else glass.transmittance,
+        type_name=window.panes[-1].material.name, states=states, glass=glass, up=up,
+    )  # fmt: skip
+
+
 def _clear(scene: RadianceScene, path: Path, facades: Sequence[str]) -> list[str]:
-    kinds = ("glass", *SYSTEMS)
     dark = {id(thing) for thing in scene.of_modifiers(facades)} if facades else set()
     names = {
-        thing.material.name
-        for thing in scene.objects
-        if thing.material.kind in kinds and id(thing) not in dark
+        thing.material.name for thing in scene.objects if is_pane(thing) and id(thing) not in dark
     }
     if not names:
         there = ", ".join(sorted({thing.material.name for thing in scene.objects})[:12])
-        message = f"has no glass and no BSDF: name the windows' material, there are {there}"
+        message = f"has no glass, fabric or BSDF: name the windows' material, there are {there}"
         raise DataError(message, file=path, field="aperture")
     return sorted(names)
 
 
-def _material_issues(scene: RadianceScene) -> list[Issue]:
+def _material_issues(objects: Sequence[RadianceObject]) -> list[Issue]:
     """Materials that pass or emit light and are simulated as opaque and dark ones."""
-    codes = {"trans": "trans-as-opaque", "trans2": "trans-as-opaque"}
-    codes |= dict.fromkeys(("light", "glow", "illum", "spotlight"), "light-source-dark")
-    by_material = {o.material.name: o for o in scene.objects if o.material.kind in codes}
-    return [
-        Issue(
-            codes[thing.material.kind], f"{thing.primitive.file}:{thing.primitive.line}",
-            {"material": thing.material.name, "type": thing.material.kind},
-        )
-        for thing in by_material.values()
-    ]  # fmt: skip
+    codes = dict.fromkeys(("light", "glow", "illum", "spotlight"), "light-source-dark")
+    issues = {}
+    for thing in objects:
+        material = thing.material
+        code = "trans-as-opaque" if material.is_translucent else codes.get(material.kind)
+        if code is not None:
+            where = f"{thing.primitive.file}:{thing.primitive.line}"
+            values = {"material": material.name, "type": material.kind}
+            issues[material.name] = Issue(code, where, values)
+    return list(issues.values())
 
 
 def _space(

@@ -8,11 +8,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.fenestration import PlainGlass, ShadingState
-from bim.radiance.materials import SYSTEMS, RadianceMaterial
+from bim.fenestration import PlainGlass
+from bim.radiance.materials import RadianceMaterial
 from bim.radiance.scene import RadianceObject, RadianceScene
 from bim.rays import RayMesh, hemisphere, ray_mesh
-from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import pane_shares
 from mitsuba_cfs.surfaces import Surfaces, WindowSurface
@@ -45,11 +44,15 @@ def opaque_surfaces(scene: RadianceScene, facades: Iterable[str] = ()) -> Surfac
 
 
 def opaque_objects(
-    scene: RadianceScene, facades: Iterable[RadianceObject] = ()
+    scene: RadianceScene,
+    facades: Iterable[RadianceObject] = (),
+    panes: Iterable[RadianceObject] = (),
 ) -> list[RadianceObject]:
-    """The objects of `opaque_surfaces`, in its order."""
-    dark = {id(thing) for thing in facades}
-    return [o for o in scene.objects if o.material.is_opaque or id(o) in dark]
+    """The objects of `opaque_surfaces`, in its order, without translucent panes."""
+    dark, clear = {id(thing) for thing in facades}, {id(thing) for thing in panes}
+    return [
+        o for o in scene.objects if (o.material.is_opaque and id(o) not in clear) or id(o) in dark
+    ]
 
 
 def scene_windows(scene: RadianceScene, modifiers: Iterable[str]) -> list[WindowSurface]:
@@ -64,10 +67,17 @@ def scene_windows(scene: RadianceScene, modifiers: Iterable[str]) -> list[Window
     return list(map(pane_sides(scene), scene.of_modifiers(modifiers)))
 
 
-def pane_sides(scene: RadianceScene) -> Callable[[RadianceObject], WindowSurface]:
-    """A function from a pane of the scene to its surface seen from outdoors."""
-    solid = ray_mesh(opaque_surfaces(scene).triangles)
-    clear = [o.triangles for o in scene.objects if not o.material.is_opaque]
+def pane_sides(
+    scene: RadianceScene, translucent: Iterable[RadianceObject] = ()
+) -> Callable[[RadianceObject], WindowSurface]:
+    """A function from a pane of the scene to its surface seen from outdoors.
+
+    Args: translucent: opaque to the tracer where they are no windows, and not here.
+    """
+    walls = opaque_objects(scene, panes=translucent)
+    solid = ray_mesh(np.concatenate([np.empty((0, 3, 3)), *(o.triangles for o in walls)]))
+    known = {id(o) for o in walls}
+    clear = [o.triangles for o in scene.objects if id(o) not in known]
     panes = ray_mesh(np.concatenate([np.empty((0, 3, 3)), *clear]))
     return partial(_window, solid=solid, panes=panes)
 
@@ -97,20 +107,11 @@ def _sky_seen(
     return float(np.mean(is_free & (rays[:, 2] > 0)))
 
 
-def held_states(thing: RadianceObject) -> tuple[ShadingState, ...]:
-    """The BSDF file of a window's material, its front outdoors; none for other materials."""
-    material = thing.material
-    if material.kind in SYSTEMS:
-        path = thing.primitive.file.parent / material.bsdf
-        return (ShadingState(bands=dict(read_bsdf_xml(path).bands), file=path),)
-    return ()
-
-
-def plain_glass(materials: Sequence[RadianceMaterial]) -> PlainGlass | None:
-    """The panes of a window, the outer one first; None where one is no `glass`."""
-    if any(material.kind != "glass" for material in materials):
+def plain_glass(panes: Sequence[RadianceObject]) -> PlainGlass | None:
+    """The panes of a window, the outer one first; None where one is no `glass` without pattern."""
+    if any(pane.material.kind != "glass" or len(pane.definitions) > 1 for pane in panes):
         return None
-    return PlainGlass(tuple((one.transmissivity, one.index) for one in materials))
+    return PlainGlass(tuple((p.material.transmissivity, p.material.index) for p in panes))
 
 
 def glass_shares(

@@ -17,7 +17,7 @@ LUMINANCE = (0.265, 0.670, 0.065)  # of red, green, blue [1]
 OPAQUE = ("plastic", "metal", "plastic2", "metal2", "trans", "trans2")
 CLEAR = ("glass", "dielectric", "interface")
 SYSTEMS = ("BSDF", "aBSDF")
-BLACK = ("light", "glow", "illum", "spotlight", "mist")
+BLACK = ("light", "glow", "illum", "spotlight")
 MATERIALS = (*OPAQUE, *CLEAR, *SYSTEMS, *BLACK, "mirror", "BRTDfunc")
 PATTERNS = (
     "colorfunc", "brightfunc", "colordata", "brightdata", "colorpict", "colortext", "brighttext",
@@ -41,6 +41,11 @@ class RadianceMaterial:
     transmissivity: float = 1.0  # of glass: of one way through it, straight on [1]
     index: float = GLASS_INDEX  # of glass: refractive index [1]
     bsdf: str = ""  # file of a BSDF
+
+    @property
+    def is_translucent(self) -> bool:
+        """Whether it is a `trans` that transmits light."""
+        return self.transmitted + self.straight > 0
 
     @property
     def is_opaque(self) -> bool:

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
-from bim.planes import merged_polygons, plane_through
 from bim.radiance.daylight import LAYERS, pane_sides
+from bim.radiance.materials import SYSTEMS
 from bim.radiance.scene import RadianceObject, RadianceScene
-from bim.rays import RayMesh, hemisphere, ray_mesh
+from bim.rays import hemisphere, ray_mesh
 from bim.report.issue import Effect, Issue
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.surfaces import WindowSurface, triangle_areas
+from mitsuba_cfs.surfaces import WindowSurface, even_numbers, points_on_triangles, triangle_areas
 
 PARALLEL = 0.999  # cosine of 2.6 degrees
-REACH = 3.0  # parallel panes this near stand before a window [m]
-TOUCHING = 1e-3  # panes nearer than this lie in one plane [m]
-OVERLAP, COVER = 0.02, 0.98  # shares of a window from which a pane is before it, and covers it
+REACH = 3.0  # panes this near stand before a window [m]
+OVERLAP = 0.02  # share of a window from which a pane before it is reported
+COVER = 0.98  # share of a window from which a pane covers it
+MOSTLY = 0.5  # share from which it is refused
+MOST_LAYERS = 8
+POINTS = 256  # on a pane, from which rays along its normal start
 OPEN = 0.5  # share of the rays from the inner side of a pane without a room that meet nothing
+ESCAPING = 0.2  # share of the walks from the inner side of a fabric without a room that end
+BOUNCES = 6  # of these walks
 RAYS = 128  # from each triangle of a pane
+NARROW = 0.1  # translucent strips narrower than this are no panes [m]
 BEFORE = 1e-3  # distance from a pane at which its rays start [m]
 
 
@@ -33,6 +39,11 @@ class PanedWindow:
     surface: WindowSurface  # its innermost pane, seen from outdoors
     panes: tuple[RadianceObject, ...]  # the outer one first
 
+    @property
+    def outwards(self) -> list[bool]:
+        """Whether the front of each pane is outdoors."""
+        return [bool(pane.normal @ self.surface.normal > 0) for pane in self.panes]
+
 
 @dataclass(frozen=True, slots=True)
 class Panes:
@@ -42,98 +53,210 @@ class Panes:
     issues: tuple[Issue, ...]
 
 
+def is_pane(thing: RadianceObject) -> bool:
+    """Whether a surface can be a layer of a window."""
+    material = thing.material
+    return material.kind in ("glass", "BRTDfunc", *SYSTEMS) or material.is_translucent
+
+
 def panes_of(
     scene: RadianceScene, apertures: Sequence[str], facades: Sequence[str], *, named: bool
 ) -> Panes:
     """Windows of a scene's room, and its glass that is not simulated.
 
-    A pane of glass parallel to a window and in front of all of it, at most half a metre away, is a
-    layer of its glazing. Other panes in front of a window, and panes with no room behind them, are
-    left out and reported.
+    Panes of glass, fabrics, translucent panels and BSDF in front of a window, at most half a
+    metre away and parallel to it, are layers of its glazing. Panes farther in front are refused
+    where they cover most of a window, and else reported; panes with no room behind them are left
+    out and reported.
 
     Args:
         apertures: materials or modifiers of windows.
         facades: those of facades, which are simulated as mirrors.
-        named: whether the user named the apertures: then all of them are windows.
+        named: whether the user named the apertures: then all of them are windows, and panes far
+            in front of them are left out and reported.
 
-    Raises: `DataError` for a named aperture that sees about as much sky on either side.
+    Raises: `DataError` for a named aperture that sees about as much sky on either side, and for a
+        pane far in front of a window.
     """
     dark = {id(thing) for thing in scene.of_modifiers(facades)} if facades else set()
-    things = [thing for thing in scene.of_modifiers(apertures) if id(thing) not in dark]
-    sides = pane_sides(scene)
-    whole = ray_mesh(np.concatenate([np.empty((0, 3, 3)), *(o.triangles for o in scene.objects)]))
+    panes = [o for o in scene.objects if is_pane(o) and id(o) not in dark]
+    sides, space = pane_sides(scene, panes), _Space(scene, {id(pane) for pane in panes})
     chosen: list[tuple[RadianceObject, WindowSurface]] = []
-    for thing in things:
+    for thing in scene.of_modifiers(apertures):
+        if id(thing) in dark or not (named or _is_wide(thing)):
+            continue
         try:
             surface = sides(thing)
         except DataError:
             if named:
                 raise
             continue  # the sky on either side: no room
-        if named or not _is_free_standing(whole, surface):
+        if named or space.has_room(thing, surface):
             chosen.append((thing, surface))
-    layers, beyond, issues = _in_front(chosen)
-    windows = [
-        PanedWindow(surface, (*(chosen[j][0] for j in layers[i]), thing))
-        for i, (thing, surface) in enumerate(chosen)
-        if i not in beyond
-    ]
-    used = {id(thing) for thing, _ in chosen} | dark
+    fronts = [space.before(thing, surface, refuse=not named) for thing, surface in chosen]
+    layers = {pane for one in fronts for pane in one.hidden}
+    far = {id(pane) for one in fronts for pane in one.others}
+    windows, issues = [], []
+    for front, (thing, surface) in zip(fronts, chosen, strict=True):
+        reach = REACH if id(thing) in far else LAYERS
+        if id(thing) in layers | far and not space.is_open_behind(surface, reach):
+            continue
+        windows.append(PanedWindow(surface, (*front.layers, thing)))
+        issues += front.issues
+    used = {id(pane) for window in windows for pane in window.panes} | layers | far | dark
     rest = [o for o in scene.objects if not o.material.is_opaque and id(o) not in used]
     return Panes(tuple(windows), (*issues, *map(_left_out, rest)))
 
 
-def _in_front(
-    panes: Sequence[tuple[RadianceObject, WindowSurface]],
-) -> tuple[list[list[int]], set[int], list[Issue]]:
-    """Layers of each pane, the outer one first; panes that are before others; what is left out."""
-    layers: list[list[int]] = []
-    beyond: set[int] = set()
-    issues: list[Issue] = []
-    for thing, surface in panes:
-        before: list[tuple[float, int]] = []
-        triangles = surface.triangles
-        plane = plane_through(triangles[0, 0], _normal(triangles))
-        own = shapely.union_all(merged_polygons(plane.to_plane(triangles)[..., :2]))
-        for j, (other, outer) in enumerate(panes):
-            if other is thing or _normal(outer.triangles) @ plane.normal < PARALLEL:
+@dataclass(frozen=True, slots=True)
+class _Front:
+    """What is in front of a window."""
+
+    layers: tuple[RadianceObject, ...]  # of its glazing, the outer one first
+    hidden: set[int]  # identities of all that are near
+    others: tuple[RadianceObject, ...]  # panes that are left out
+    issues: tuple[Issue, ...]
+
+
+class _Space:
+    """A scene, and which of its surfaces are panes, for rays along the normals of panes."""
+
+    def __init__(self, scene: RadianceScene, panes: set[int]) -> None:
+        self._objects = scene.objects
+        triangles = [o.triangles for o in scene.objects]
+        self._mesh = ray_mesh(np.concatenate([np.empty((0, 3, 3)), *triangles]))
+        self._owner = np.repeat(np.arange(len(triangles)), list(map(len, triangles)))
+        self._is_pane = np.array([id(o) in panes for o in scene.objects], dtype=bool)
+
+    def before(self, thing: RadianceObject, surface: WindowSurface, *, refuse: bool) -> _Front:
+        """The layers in front of a window, by rays along its normal.
+
+        Raises: `DataError` for a pane far in front of most of it, with `refuse`.
+        """
+        stacks: Counter[tuple[object, ...]] = Counter()
+        examples: dict[tuple[object, ...], tuple[int, ...]] = {}
+        seen: set[int] = set()
+        others: dict[int, list[float]] = {}
+        for met, end in self._along(surface, surface.normal, REACH):
+            near = [n for n, away in met if away <= LAYERS and self._is_parallel(n, surface)]
+            for n, away in met:
+                if n not in near:
+                    others.setdefault(n, []).append(away)
+            seen.update(near)
+            if end > LAYERS:  # else a frame or wall is there
+                names = tuple(_optics(self._objects[n]) for n in near)
+                stacks[names] += 1
+                examples.setdefault(names, tuple(near))
+        usual = stacks.most_common(1)[0][0] if stacks else ()
+        if stacks[usual] < COVER * stacks.total():
+            usual = ()
+        layers = examples.get(usual, ())
+        for names, count in stacks.items():
+            for n in set(examples[names]) - set(layers) if names != usual else ():
+                others.setdefault(n, []).extend(count * [self._distance(n, surface)])
+        issues, left_out = [], []
+        for n, distances in others.items():
+            share = len(distances) / POINTS
+            if share <= OVERLAP or n in layers:
                 continue
-            flat = plane.to_plane(outer.triangles)
-            distance = float(flat[..., 2].mean())
-            if not TOUCHING < distance <= REACH:
-                continue
-            cover = shapely.union_all(merged_polygons(flat[..., :2])).intersection(own).area
-            share = cover / own.area
-            if share <= OVERLAP:
-                continue
-            beyond.add(j)
-            both_glass = thing.material.kind == other.material.kind == "glass"
-            if both_glass and share >= COVER and distance <= LAYERS:
-                before.append((distance, j))
-                continue
+            other, distance = self._objects[n], float(np.mean(distances))
+            if refuse and share >= MOSTLY and distance > LAYERS:
+                raise other.primitive.fault(
+                    f"is {distance:.2f} m in front of {share:.0%} of window {thing.name}: only "
+                    f"parallel panes within {LAYERS:g} m are computed; name the material "
+                    f"{thing.material.name} as the aperture to leave this pane out"
+                )
+            left_out.append(other)
             values = {"pane": other.name, "window": thing.name, "distance": distance,
                       "share": 100 * share}  # fmt: skip
             where = f"{other.primitive.file}:{other.primitive.line}"
-            effect = Effect(glass=float(triangle_areas(triangles).sum()))
-            issues.append(Issue("pane-before-window", where, values, effect))
-        layers.append([j for _, j in sorted(before, reverse=True)])
-    return layers, beyond, issues
+            issues.append(Issue("pane-before-window", where, values, Effect(glass=surface.area)))
+        panes = tuple(self._objects[n] for n in reversed(layers))
+        hidden = {id(self._objects[n]) for n in seen}
+        return _Front(panes, hidden, tuple(left_out), tuple(issues))
+
+    def is_open_behind(self, surface: WindowSurface, reach: float) -> bool:
+        """Whether some of a pane has neither another pane nor a wall on its room side."""
+        rays = self._along(surface, -surface.normal, reach)
+        return sum(not met and end > reach for met, end in rays) > OVERLAP * POINTS
+
+    def has_room(self, thing: RadianceObject, surface: WindowSurface) -> bool:
+        """Whether the inner side of a pane looks into a room.
+
+        From panes of glass most rays meet something; walks from fabrics and translucent panels,
+        which may also be awnings and lamps, stay inside.
+        """
+        triangles = surface.triangles
+        rays = np.tile(hemisphere(-surface.normal, RAYS), (len(triangles), 1))
+        starts = np.repeat(triangles.mean(axis=1) - BEFORE * surface.normal, RAYS, axis=0)
+        distance, hit = self._mesh.first_hits(starts, rays)
+        if thing.material.kind in ("glass", *SYSTEMS):
+            return bool(np.mean(hit < 0) <= OPEN)
+        rng, escaped = np.random.default_rng(0), np.mean(hit < 0)
+        for _ in range(BOUNCES):
+            inside = (hit >= 0) & ~self._is_pane[self._owner[hit]]
+            starts, rays, distance, hit = (v[inside] for v in (starts, rays, distance, hit))
+            if not len(hit):
+                break
+            corners = self._mesh.triangles[hit]
+            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            normals /= np.linalg.norm(normals, axis=1)[:, None]
+            normals *= -np.sign(np.einsum("ij,ij->i", normals, rays))[:, None]
+            starts = starts + distance[:, None] * rays + BEFORE * normals
+            ball = rng.normal(size=normals.shape)
+            rays = normals + ball / np.linalg.norm(ball, axis=1)[:, None]
+            rays /= np.linalg.norm(rays, axis=1)[:, None]
+            distance, hit = self._mesh.first_hits(starts, rays)
+            escaped += np.sum(hit < 0) / (RAYS * len(triangles))
+        return bool(escaped <= ESCAPING)
+
+    def _along(
+        self, surface: WindowSurface, direction: NDArray[np.float64], reach: float
+    ) -> list[tuple[list[tuple[int, float]], float]]:
+        """Panes and their distances on rays from a pane, and where the first wall is [m]."""
+        starts = points_on_triangles(surface.triangles, even_numbers(POINTS))[0]
+        met: list[list[tuple[int, float]]] = [[] for _ in starts]
+        ends, travelled = np.full(len(starts), np.inf), np.full(len(starts), BEFORE)
+        active = np.arange(len(starts))
+        for _ in range(MOST_LAYERS):
+            origins = starts[active] + travelled[active, None] * direction
+            ways = np.broadcast_to(direction, origins.shape)
+            distance, hit = self._mesh.first_hits(origins, ways, reach)
+            travelled[active] += distance
+            is_hit = (hit >= 0) & (travelled[active] <= reach)
+            owners = self._owner[hit]
+            is_pane = is_hit & self._is_pane[owners]
+            walls = active[is_hit & ~is_pane]
+            ends[walls] = travelled[walls]
+            for i, n in zip(active[is_pane], owners[is_pane], strict=True):
+                met[i].append((int(n), float(travelled[i])))
+            active = active[is_pane]
+            travelled[active] += BEFORE
+        return list(zip(met, ends.tolist(), strict=True))
+
+    def _is_parallel(self, number: int, surface: WindowSurface) -> bool:
+        return bool(abs(self._objects[number].normal @ surface.normal) >= PARALLEL)
+
+    def _distance(self, number: int, surface: WindowSurface) -> float:
+        apart = self._objects[number].triangles[0, 0] - surface.triangles[0, 0]
+        return float(apart @ surface.normal)
 
 
-def _is_free_standing(scene: RayMesh, surface: WindowSurface) -> bool:
-    """Whether most rays from the inner side of a pane meet nothing: it has no room behind it."""
-    triangles, inwards = surface.triangles, -_normal(surface.triangles)
-    rays = np.tile(hemisphere(inwards, RAYS), (len(triangles), 1))
-    starts = np.repeat(triangles.mean(axis=1) + BEFORE * inwards, RAYS, axis=0)
-    return bool(np.mean(scene.first_hits(starts, rays)[1] < 0) > OPEN)
+def _optics(thing: RadianceObject) -> object:
+    """What tells layers of different optics apart."""
+    return replace(thing.material, name=""), tuple(id(one) for one in thing.definitions[:-1])
+
+
+def _is_wide(thing: RadianceObject) -> bool:
+    """Whether a surface is no strip, such as a slat."""
+    if not thing.material.is_translucent:
+        return True
+    corners = thing.triangles.reshape(-1, 3)
+    sizes = np.linalg.svd(corners - corners.mean(axis=0))[2] @ corners.T
+    return bool(np.sort(np.ptp(sizes, axis=1))[1] >= NARROW)
 
 
 def _left_out(thing: RadianceObject) -> Issue:
     material, area = thing.material, float(triangle_areas(thing.triangles).sum())
     values = {"surface": thing.name, "material": material.name, "type": material.kind, "area": area}
     return Issue("clear-surface-left-out", f"{thing.primitive.file}:{thing.primitive.line}", values)
-
-
-def _normal(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    normal = np.cross(*np.diff(triangles[0], axis=0))
-    return normal / np.linalg.norm(normal)

@@ -11,6 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
 
@@ -37,6 +40,14 @@ class Primitive:
         return DataError(
             message, file=f"{self.file}:{self.line}", element=f"{self.kind} {self.name}"
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """A modifier with the transformation of the file that defines it."""
+
+    primitive: Primitive
+    frame: NDArray[np.float64]  # [4, 4] world = frame @ (x, y, z, 1) of its functions
 
 
 @dataclass(frozen=True, slots=True)

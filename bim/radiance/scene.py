@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 from bim.radiance import shapes
 from bim.radiance.generators import GENERATORS, Polygon
 from bim.radiance.materials import (
-    CLEAR,
     MATERIALS,
     PATTERNS,
-    SYSTEMS,
     RadianceMaterial,
     material_of,
 )
-from bim.radiance.primitives import VOID, Command, Primitive, read_statements
+from bim.radiance.patterns import COMPUTED_PATTERNS, pattern_values
+from bim.radiance.primitives import VOID, Command, Definition, Primitive, read_statements
 from bim.radiance.xform import Xform, read_xform
 from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
@@ -41,6 +40,13 @@ class RadianceObject:
     modifiers: tuple[str, ...]  # names from the surface to its material
     triangles: NDArray[np.float64]  # [T, 3, 3] [m], counter-clockwise seen from the front
     primitive: Primitive
+    definitions: tuple[Definition, ...] = ()  # patterns and, last, the material
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """Unit normal [3] of the front."""
+        area = np.cross(*np.diff(self.triangles, axis=1).transpose(1, 0, 2)).sum(axis=0)
+        return area / np.linalg.norm(area)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +106,7 @@ class _Reader:
         if not 0 < scale < np.inf:
             raise DataError(f"must be positive, got {scale}", field="scale")
         self.root = root
-        self.defined: dict[str, Primitive] = {}
+        self.defined: dict[str, Definition] = {}
         self.objects: list[RadianceObject] = []
         self.files: list[Path] = []
         self.left_out: Counter[tuple[str, str]] = Counter()  # by code and type
@@ -158,10 +164,11 @@ class _Reader:
         if kind in shapes.KINDS:
             self._add(primitive, outer)
         elif kind == "alias" or kind in MATERIALS or kind in PATTERNS:
-            self.defined[primitive.name] = primitive
+            self.defined[primitive.name] = Definition(primitive, _places(outer)[0])
         else:
             if kind not in ("source", "instance", "mesh"):
-                self.defined[primitive.name] = primitive  # a mixture, a prism ...
+                # a mixture, a prism ...
+                self.defined[primitive.name] = Definition(primitive, _places(outer)[0])
             self._leave_out("primitives-not-read", primitive, kind)
 
     def _add(self, primitive: Primitive, outer: tuple[Xform, ...]) -> None:
@@ -169,7 +176,7 @@ class _Reader:
         found = self._material(given, primitive)
         if found is None:
             return
-        material, modifiers = found
+        material, modifiers, definitions = found
         triangles = shapes.triangles_of(primitive)
         if not len(triangles):
             self._leave_out("surfaces-without-area", primitive)
@@ -182,38 +189,87 @@ class _Reader:
                 moved = moved[:, ::-1]
             if len(self.objects) >= MOST_OBJECTS:
                 raise primitive.fault(f"more than {MOST_OBJECTS} surfaces")
+            shown = self._with_patterns(material, definitions, moved)
             self.objects.append(
-                RadianceObject(_name(primitive, outer), material, modifiers, moved, primitive)
+                RadianceObject(
+                    _name(primitive, outer), shown, modifiers, moved, primitive, definitions
+                )
             )
 
     def _material(
         self, modifier: str, surface: Primitive
-    ) -> tuple[RadianceMaterial, tuple[str, ...]] | None:
-        """The material at the end of a surface's modifiers; None where none is read."""
+    ) -> tuple[RadianceMaterial, tuple[str, ...], tuple[Definition, ...]] | None:
+        """The material of a surface, its modifiers and definitions; None where none is read."""
         names: list[str] = []
+        patterns: list[Definition] = []
         while modifier != VOID:
-            definition = self.defined.get(modifier)
-            if definition is None:
+            known = self.defined.get(modifier)
+            if known is None:
                 raise surface.fault(f"its modifier {modifier} is not defined before it")
+            definition = known.primitive
             if modifier in names:
                 raise surface.fault(f"its modifier {modifier} modifies itself")
             names.append(modifier)
             if definition.kind == "alias":
                 modifier = definition.strings[0]
             elif definition.kind in MATERIALS:
-                if definition.modifier != VOID:
-                    opaque = definition.kind not in (*CLEAR, *SYSTEMS)
-                    code = "material-patterns-left-out" if opaque else "glass-patterns-left-out"
-                    self._leave_out(code, definition)
-                return replace(material_of(definition), name=definition.name), tuple(names)
+                patterns += self._patterns(definition, surface)
+                material = replace(material_of(definition), name=definition.name)
+                return material, tuple(names), (*patterns, known)
             elif definition.kind in PATTERNS:
-                self._leave_out("pattern-left-out", definition, definition.kind)
+                patterns.append(known)
                 modifier = definition.modifier
             else:
                 self._leave_out("surfaces-not-read", surface, definition.kind)
                 return None
         self._leave_out("surfaces-without-material", surface)
         return None
+
+    def _with_patterns(
+        self,
+        material: RadianceMaterial,
+        definitions: Sequence[Definition],
+        triangles: NDArray[np.float64],
+    ) -> RadianceMaterial:
+        """An opaque material with the mean of its patterns over a surface."""
+        patterns = definitions[:-1]
+        if not patterns or not material.is_opaque:
+            return material
+        first = next(
+            (one.primitive for one in patterns if one.primitive.kind not in COMPUTED_PATTERNS), None
+        )
+        patterns = [one for one in patterns if one.primitive.kind in COMPUTED_PATTERNS]
+        if first is not None:
+            self._leave_out("material-patterns-left-out", first, first.kind)
+        if not patterns or material.diffuse == 0:
+            return material
+        normal = np.cross(*np.diff(triangles, axis=1).transpose(1, 0, 2)).sum(axis=0)
+        normal /= np.linalg.norm(normal)
+        try:
+            mean = float(pattern_values(triangles, normal, patterns, np.zeros(1)).mean())
+        except DataError:
+            self._leave_out("material-patterns-left-out", patterns[0].primitive)
+            return material
+        self._leave_out("material-pattern-averaged", patterns[0].primitive)
+        shine = 0.0 if material.gloss is None else material.gloss.at_normal
+        return replace(material, diffuse=min(material.diffuse * mean, 1.0 - shine))
+
+    def _patterns(self, material: Primitive, surface: Primitive) -> list[Definition]:
+        """The patterns and textures of a material."""
+        patterns: list[Definition] = []
+        modifier = material.modifier
+        while modifier != VOID:
+            known = self.defined.get(modifier)
+            if known is None or any(one is known for one in patterns):
+                raise surface.fault(
+                    f"modifier {modifier} of {material.name} is not defined before it"
+                )
+            if known.primitive.kind == "alias":
+                modifier = known.primitive.strings[0]
+                continue
+            patterns.append(known)
+            modifier = known.primitive.modifier
+        return patterns
 
     def _leave_out(self, code: str, primitive: Primitive, kind: str = "") -> None:
         self.left_out[code, kind] += 1

@@ -142,7 +142,7 @@ def given_sky(
     sun: bool = True,
     solar: bool = False,
     ground: str = "reflected",
-    ground_reflectance: float = DEFAULT_ALBEDO,
+    ground_reflectance: float | NDArray[np.float64] = DEFAULT_ALBEDO,
 ) -> AnnualSky:
     """Perez skies of given suns and irradiances, wherever they come from; see `annual_sky`.
 
@@ -174,7 +174,7 @@ def _of_series(
     hours: ArrayLike | None,
     *,
     sun: bool,
-    reflectance: float,
+    reflectance: float | NDArray[np.float64],
     ground: str,
 ) -> AnnualSky:
     lit = np.flatnonzero(is_up(series.sun)) if hours is None else np.asarray(hours, dtype=np.int64)

@@ -63,6 +63,8 @@ def read_epw(path: str | PathLike[str]) -> Weather:
         wind_speed=column.required("wind speed"),
         wind_direction_deg=column.whole("wind direction"),
         horizontal_infrared=_infrared(column, dry, dew),
+        stated_albedo=column.unchecked("albedo"),
+        snow_depth_cm=column.unchecked("snow depth"),
         ground_depth_m=depth,
         ground_temperature_c=ground,
         first_weekday=weather_table.epw_first_weekday(head),

@@ -19,7 +19,7 @@ CLEAR_SKY = (2.766521, 0.547665, -0.369832, 0.009237, 0.059229)
 INTERMEDIATE_SKY = (3.5556, -2.7152, -1.3081, 1.0660, 0.60227)
 
 
-def reflected_ground(global_horizontal: FloatArray, reflectance: float) -> FloatArray:
+def reflected_ground(global_horizontal: FloatArray, reflectance: float | FloatArray) -> FloatArray:
     """Luminance [H] of a diffuse plain, rho E_gh / pi."""
     return reflectance / np.pi * global_horizontal
 
@@ -29,7 +29,7 @@ def gendaylit_ground(
     direct_horizontal: FloatArray,
     clearness: FloatArray,
     sun: FloatArray,
-    reflectance: float,
+    reflectance: float | FloatArray,
 ) -> FloatArray:
     """Luminance [H] of the ground by gendaylit, rho (L_z n + E_dh / pi).
 

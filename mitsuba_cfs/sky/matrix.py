@@ -62,7 +62,7 @@ class SkySeries:
         level *= self.diffuse_horizontal[hours] / total
         return level
 
-    def ground(self, hours: NDArray[np.int64], reflectance: float, model: str) -> FloatArray:
+    def ground(self, hours: NDArray[np.int64], reflectance: FloatArray, model: str) -> FloatArray:
         """Luminance or radiance [h] of the ground by one of `GROUNDS`."""
         if model not in GROUNDS:
             raise ValueError(f"ground: expected one of {GROUNDS}, got {model!r}")
@@ -166,7 +166,7 @@ def sky_matrix(
     sun_model: str = "spa",
     sun_patches: int = SUN_PATCHES,
     rotation_deg: float = 0.0,
-    ground_reflectance: float | None = None,
+    ground_reflectance: float | FloatArray | None = None,
     ground: str = "reflected",
     measured_illuminance: bool = False,
     sun_up_only: bool = False,
@@ -186,7 +186,7 @@ def sky_matrix(
         sun_patches: the sun is spread over so many nearest patches (1: only the nearest), weighted
             by 1/(1.002 - cosine of the distance), each share divided by the patch's solid angle.
         rotation_deg: turns sun and sky counter-clockwise seen from above, as `gendaymtx -r`.
-        ground_reflectance: the weather's albedo unless given.
+        ground_reflectance: one or [H]; the weather's albedo unless given.
         ground: `reflected` or `gendaylit`, see `mitsuba_cfs.sky.ground`.
         measured_illuminance: use the file's illuminances rather than Perez's efficacies.
         sun_up_only: leave out the time steps where `sun_up` is false.
@@ -217,7 +217,7 @@ def series_matrix(
     parts: str = "all",
     *,
     sun_patches: int = SUN_PATCHES,
-    ground_reflectance: float = DEFAULT_ALBEDO,
+    ground_reflectance: float | FloatArray = DEFAULT_ALBEDO,
     ground: str = "reflected",
     dtype: type = np.float64,
     progress: Progress = silent,
@@ -226,6 +226,7 @@ def series_matrix(
     if parts not in PARTS:
         raise ValueError(f"parts: expected one of {PARTS}, got {parts!r}")
     sky, hours = ReinhartSky(subdivision), np.asarray(hours, dtype=np.int64)
+    reflectance = np.broadcast_to(ground_reflectance, (len(series.sun),))
     lit = np.flatnonzero((series.diffuse_horizontal + series.direct_normal)[hours] > 0)
     result: NDArray[np.floating] = np.zeros((sky.size, len(hours)), dtype=dtype)
     size = max(1, CHUNK_BYTES // (8 * sky.size))
@@ -234,7 +235,7 @@ def series_matrix(
         h = hours[columns]
         block = np.zeros((sky.size, len(h)))
         if parts != "sun":
-            block[0] = series.ground(h, ground_reflectance, ground)
+            block[0] = series.ground(h, reflectance[h], ground)
             block[1:] = series.patches(sky, h)
         if parts != "sky":
             add_sun(block, sky, series.sun[h], series.direct_normal[h], sun_patches)

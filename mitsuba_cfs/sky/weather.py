@@ -41,7 +41,10 @@ class Weather:
         None  # [H] that the wind blows from, clockwise from north
     )
     horizontal_infrared: FloatArray | None = None  # [H] sky longwave on a horizontal plane [W/m2]
-    albedo: float = 0.2  # ground reflectance; 0.2 is gendaymtx's and EnergyPlus's default
+    # ground reflectance, one or [H], see `albedo`; 0.2 is gendaymtx's and EnergyPlus's default
+    albedo: float | FloatArray = 0.2
+    stated_albedo: FloatArray | None = None  # [H] of the file, NaN where missing
+    snow_depth_cm: FloatArray | None = None  # [H] of the file, NaN where missing
     ground_depth_m: FloatArray | None = None  # [G]
     ground_temperature_c: FloatArray | None = None  # [G, 12] monthly, January first
     turned_deg: float = 0.0  # north is so far counter-clockwise of +y, see `turned`

@@ -40,6 +40,8 @@ EPW_FIELDS: dict[str, tuple[int, float, float, float]] = {
     "wind speed": (21, 999.0, 0.0, 80.0),
     "total sky cover": (22, 99.0, 0.0, 10.0),
     "opaque sky cover": (23, 99.0, 0.0, 10.0),
+    "snow depth": (30, 999.0, 0.0, 998.0),
+    "albedo": (32, 999.0, 0.01, 1.0),
 }
 EPW_HEADER = (
     "LOCATION",
@@ -232,6 +234,14 @@ class EpwColumns:
         values = self._values(field)
         wrong = (values < low) | (values > high)
         return np.where(wrong, np.nan, values), wrong
+
+    def unchecked(self, field: str) -> NDArray[np.float64] | None:
+        """The field's values [H], NaN where missing or impossible; None where the file has none."""
+        column, missing, low, high = EPW_FIELDS[field]
+        texts = [row[column] if column < len(row) else "" for row in self.rows]
+        values = np.array([_number_or_nan(text) for text in texts])
+        wrong = ~(values >= low) | (values > high) | (values >= missing)
+        return None if wrong.all() else np.where(wrong, np.nan, values)
 
     def required(self, field: str) -> NDArray[np.float64]:
         """The field's values [H]; `DataError` where one is missing."""

@@ -450,7 +450,7 @@ def _print_shares(patterns: Sequence[Pattern], band: int) -> None:
 @click.option(
     "--glazing",
     type=click.Choice(["A", "B", "C", "D"]),
-    help="Reference glazing of EN 14501, with --place.",
+    help="Reference glazing by name; of EN 14501, with --place.",
 )
 @click.option(
     "--kappa", type=click.FloatRange(0, 1), default=0.4, show_default=True,

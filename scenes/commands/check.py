@@ -21,7 +21,7 @@ UNCUT = 100_000  # columns of a table that nobody sees
 
 
 @click.command()
-@input_options("all", weather="", system=False)
+@input_options("all", weather="", system=False, glazing=False)
 @click.option(
     "--csv",
     "issues",

@@ -73,8 +73,8 @@ def command(
 
     BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
 
-    Windows are exported with the BSDF, U and g in the file; the output states their source and
-    what is missing.
+    Windows are written with the BSDF, U, g and transmittance that the file holds or states;
+    sources, assumptions and unknown values are printed.
     """
     options = InputOptions(**chosen, weather=None)
     building = options.building
@@ -91,12 +91,12 @@ def command(
     from scenes.commands.progress_bar import ProgressBar
     from scenes.fenestration_exports import known_fenestration
     from scenes.head import head_of
-    from scenes.input_files import building_of
+    from scenes.input_files import building_of, overrides_of
 
     with ProgressBar() as progress:
         read = building_of(options, progress)
     spaces = named_spaces(read, options.spaces, building)
-    known = known_fenestration(spaces, building)
+    known = known_fenestration(spaces, building, overrides_of(options, None, light_only=True))
     head = PrintedHead()
     head(head_of(read, light_only=True).with_assumptions(known.notes()))
     writers = room_writers(

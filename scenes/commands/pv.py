@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@input_options("", system=False)
+@input_options("", system=False, glazing=False)
 @click.option(
     "--study",
     "study_file",
@@ -45,6 +45,7 @@ def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
     are selected by material, type, name or GUID.  Shading and reflections by all surfaces of the
     model are traced, with the true disc of the sun.
     """
+    from mitsuba_cfs.sky.albedo import with_albedo
     from mitsuba_cfs.sky.epw import read_epw
     from scenes.photovoltaics.study_file import read_pv_study
     from scenes.result_folder import ResultFolder
@@ -52,7 +53,7 @@ def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
     study = read_pv_study(study_file)
     options = InputOptions(**chosen)
     building, weather, quick = options.building, options.weather, options.quick
-    climate = read_epw(weather)
+    climate = with_albedo(read_epw(weather), options.albedo)
     folder = ResultFolder(out, "pv", inputs=(building, weather, study_file))
     # all that is small is read: what is heavy is loaded now
     from mitsuba_cfs import variants

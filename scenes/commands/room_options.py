@@ -16,6 +16,7 @@ import click
 
 from mitsuba_cfs.sky.options import GROUNDS, SUBDIVISIONS, SUN_MODELS
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
 from scenes.room.options import GLARE_SOURCES, GLARE_SUN, SensorGrid
 
 if TYPE_CHECKING:
@@ -116,6 +117,30 @@ surroundings_offset_option = click.option(
     "--surroundings-offset", type=float, nargs=3, metavar="X Y Z",
     help="Offset added to the surroundings' coordinates [m], instead of georeferences.",
 )  # fmt: skip
+
+
+class Albedo(click.ParamType):
+    """A number, twelve by month, `file` or `snow`."""
+
+    name = "albedo"
+
+    def convert(self, value, param, ctx) -> float | tuple[float, ...] | str:
+        """The albedo as of `with_albedo`."""
+        if value in ("file", "snow") or not isinstance(value, str):
+            return value
+        try:
+            numbers = tuple(float(part) for part in value.split(","))
+        except ValueError:
+            numbers = ()
+        if len(numbers) not in (1, 12) or not all(0 <= number <= 1 for number in numbers):
+            self.fail(f"expected a number from 0 to 1, twelve, 'file' or 'snow'; got {value!r}")
+        return numbers[0] if len(numbers) == 1 else numbers
+
+
+albedo_option = click.option(
+    "--albedo", type=Albedo(), metavar="A",
+    help="Ground reflectance: a number, 12 by month, 'file' or 'snow' (EPW); default: 0.2.",
+)  # fmt: skip
 needed_weather_option = click.option(
     "--weather", required=True, type=FILE, help="Hourly weather file (EPW)."
 )
@@ -125,6 +150,14 @@ weather_option = click.option(
 system_option = click.option(
     "--cfs", "system", type=FILE,
     help="BSDF XML file (Klems full or tensor tree) for all windows; default: those in BUILDING.",
+)  # fmt: skip
+glazing_option = click.option(
+    "--glazing", type=click.Choice(list(GENERIC_GLAZINGS)),
+    help="Reference glazing by name; of windows whose file states no glazing data.",
+)  # fmt: skip
+tau_option = click.option(
+    "--tau", "visible_transmittance", type=click.FloatRange(0, 1, min_open=True),
+    help="Visible transmittance of windows without a BSDF.",
 )  # fmt: skip
 u_option = click.option(
     "--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value of the windows [W/(m2 K)]."
@@ -260,14 +293,19 @@ def size_option(name: str, default: int, why: str) -> Option:
 
 
 def input_options(
-    spaces: str, *, several: bool = True, weather: str = "needed", system: bool = True
+    spaces: str,
+    *,
+    several: bool = True,
+    weather: str = "needed",
+    system: bool = True,
+    glazing: bool = True,
 ) -> Option:
     """The argument and the options of every command, named as in `InputOptions`.
 
     Args:
         spaces: what `--space` chooses by default, "" without rooms; several: may be repeated.
         weather: "needed", "demo" (with the demo's building where there is none) or "" (none).
-        system: whether `--cfs` is one of them.
+        system: whether `--cfs` is one of them; glazing: whether `--glazing` and `--tau` are.
     """
     demo = weather == "demo"
     weathers = {"needed": [needed_weather_option], "demo": [weather_option], "": []}
@@ -277,7 +315,9 @@ def input_options(
             metavar="[BUILDING]" if demo else "BUILDING",
         ),
         *weathers[weather],
+        *([albedo_option] if weather else []),
         *([system_option] if system else []),
+        *([glazing_option, tau_option] if glazing else []),
         *([] if not spaces else [
             space_option("spaces", f"default: {spaces}", several=several), join_option,
             furniture_option, surroundings_option, surroundings_offset_option,

@@ -27,7 +27,7 @@ from scenes.comply.assess import asked_of, assess_room, values_of
 from scenes.comply.blinds import open_and_closed
 from scenes.comply.dwellings import dwelling_words, judged
 from scenes.comply.files import ComplyFiles, read_files
-from scenes.comply.findings import Findings, GridLight, calendar_of
+from scenes.comply.findings import Findings, GridLight, RoomHeat, calendar_of
 from scenes.comply.glare import seat_glare
 from scenes.comply.glass import windows_without_view
 from scenes.comply.heat import room_heat
@@ -48,6 +48,7 @@ from scenes.language.catalogue import N_
 from scenes.report.method import METHODS
 from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.light import room_light
+from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.room import StageTimes
 from scenes.room.series import RoomSeries, corner
@@ -101,6 +102,7 @@ def check_rooms(
     if not glazed:
         raise no_window(building, check.file)
     views, view_issues = check.views(glazed)
+    check.asked_uses = uses
     check.asked = {s.guid: asked_of(files.rules, s, uses[s.guid]) for s in glazed}
     lights, issues, notes = check.lights(glazed)
     rooms = []
@@ -146,6 +148,7 @@ class Check:
         self.outdoors: OutdoorMesh = outdoors_of(in_month(self.building, options.day[0]))
         self.seconds: dict[str, float] = {}
         self.asked: Mapping[str, frozenset[str]] = {}  # parts that a room's own criteria need
+        self.asked_uses: Mapping[str, RoomUse] = {}
 
     def _shaded(self, systems: Mapping[str, States]) -> bool:
         """Whether there are real blinds: LM-83's default shade rates no glare."""
@@ -231,7 +234,8 @@ class Check:
         results, issues, notes = RoomSeries(
             self.building, spaces, self.systems, options.room.sampling, cache, compute,
             moved_lights, options.building,
-            alike=lambda one, other: self._costly(one) == self._costly(other),
+            alike=lambda one, other: self._costly(one) == self._costly(other)
+            and self._setups(one) == self._setups(other),
         ).results(self.progress)  # fmt: skip
         left = time.monotonic() - start - sum(self.seconds.get(name, 0.0) for name in PARTS)
         self._took({"what else light takes": max(left, 0.0)})
@@ -240,6 +244,20 @@ class Check:
     def _costly(self, space: Space) -> frozenset[str]:
         """What of glare and heat a rule looks at in a room."""
         return self.asked[space.guid] & {"glare", "heat"}
+
+    def _setups(self, space: Space) -> dict[str, OperationTables | None]:
+        """The operation of a room by rule, of the rules that look at its heat.
+
+        A rule whose weather is not this one has none: its heat is not computed.
+        """
+        if "heat" not in self._costly(space):
+            return {}
+        use = self.asked_uses[space.guid].key
+        return {
+            name: rule.operation_of(use)
+            for name, rule in self.files.rules.items()
+            if "heat" in rule.parts and rule.fits(self.files.weather)
+        }
 
     def _light(
         self, space: Space, skies: AnnualSky, cache: MatrixCache | None, progress: Progress
@@ -264,7 +282,7 @@ class Check:
             found = lights_of(room, light, operated)
         closed = next((one.closed for one in found if one.closed is not None), None)
         closed = closed if self.shaded else None
-        glare = heat = None
+        glare = None
         if self.glaring and "glare" in self._costly(space):
             state = None if closed is None else closed[skies.lit].T.astype(np.int64)
             with times.stage(GLARE):
@@ -273,20 +291,42 @@ class Check:
                     directions=self.options.directions, eye_height=self.options.eye_height,
                     progress=progress,
                 )  # fmt: skip
-        if "heat" in self._costly(space):
-            with times.stage(HEAT):
-                heat = room_heat(room, light, closed, progress=progress)
+        heats: dict[str, RoomHeat] = {}
+        with times.stage(HEAT):
+            distinct_setups: list[tuple[OperationTables | None, RoomHeat]] = []
+            for name, setup in self._setups(space).items():
+                heat = next((heat for one, heat in distinct_setups if one == setup), None)
+                if heat is None:
+                    operated_room = replace(room, operation=setup)
+                    heat = room_heat(operated_room, light, closed, progress=progress)
+                    distinct_setups.append((setup, heat))
+                heats[name] = heat
         self._took(times.seconds)
-        of_room = Findings(self.calendar, glare=glare, heat=heat)
+        of_room = Findings(self.calendar, glare=glare)
         lights = {name: found[distinct.index(grid)] for name, grid in grids.items()}
         values = {
-            name: values_of(rules[name], replace(of_room, light=grid), LIGHT)
+            name: values_of(rules[name], replace(of_room, light=grid, heat=heats.get(name)), LIGHT)
             for name, grid in lights.items()
         }
         summaries = {id(grid): self._summary(grid) for grid in found}
         by_rule = {name: summaries[id(grid)] for name, grid in lights.items()}
         groups = tuple(g.name for g in room.windows.groups)
         return RoomLights(space, by_rule, values, groups, glare)
+
+    def _setup_words(self) -> Iterator[str]:
+        """What rules of heat compute and leave out; those whose weather is another."""
+        weather = self.files.weather
+        for rule in self.files.rules.values():
+            if not rule.fits(weather):
+                yield Note(
+                    "{rule}: no verdict. It asks for the weather of {sites}; {file} is not that.",
+                    rule=Note(rule.title), sites=", ".join(rule.weather),
+                    file=weather.site if weather.file is None else weather.file.name,
+                )  # fmt: skip
+            for sentence in rule.included:
+                yield Note("{rule}. Included: {what}", rule=Note(rule.title), what=Note(sentence))
+            for sentence in rule.left_out:
+                yield Note("{rule}. Left out: {what}", rule=Note(rule.title), what=Note(sentence))
 
     def _took(self, seconds: Mapping[str, float]) -> None:
         """Add what parts of the check took."""
@@ -392,7 +432,9 @@ class Check:
                     "{air_changes:g} air changes per hour and gains in the hours of use."
                 )
             )
-            yield Note(template, air_changes=room.infiltration_ach)
+            if any("heat" in r.parts and not r.setup for r in self.files.rules.values()):
+                yield Note(template, air_changes=room.infiltration_ach)
+            yield from self._setup_words()
         if "open" in self.parts and self.calendar.median_diffuse is None:
             yield Note(
                 "The daylight factor method is not available: the weather file has no diffuse "

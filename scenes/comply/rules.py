@@ -10,9 +10,11 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.need import Need
 from scenes.comply.needs import AnyNeed
 from scenes.language.catalogue import N_
+from scenes.room.operation_tables import OperationTables
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 
 FOLDER = files(__package__) / "rules"
@@ -69,15 +71,47 @@ class CriterionTable(TomlTable):
         return (need for level in self.level for need in level.needs)
 
 
+class SetupTable(TomlTable):
+    """Gains, air and set points that a standard prescribes for rooms of some uses."""
+
+    uses: Annotated[tuple[str, ...], Field(min_length=1)]
+    operation: OperationTables
+
+
 class RuleTable(TomlTable):
     """A rule file."""
 
     title: str
     edition: str
     source: Annotated[tuple[str, ...], Field(min_length=1)]
+    included: tuple[str, ...] = ()  # parts of the standard that are computed, in sentences
+    left_out: tuple[str, ...] = ()  # parts that are not
+    # conditions without which there is no verdict: a word of the weather's site or file name
+    weather: tuple[str, ...] = ()
+    setup: tuple[SetupTable, ...] = ()  # of rooms by use; a heat criterion of others has no verdict
     grid: GridTable
     criterion: Annotated[tuple[CriterionTable, ...], Field(min_length=1)]
     least_altitude_deg: dict[str, float] = Field({})  # of the sun, by country of a weather file
+
+    @model_validator(mode="after")
+    def _is_set_up(self) -> RuleTable:
+        for criterion in self.criterion:
+            heats = any("heat" in need.parts for need in criterion.needs)
+            missing = [use for use in criterion.uses if self.operation_of(use) is None]
+            if self.setup and heats and (missing or not criterion.uses):
+                raise ValueError(f"criterion {criterion.key}: a setup is missing for its uses")
+        return self
+
+    def operation_of(self, use: str) -> OperationTables | None:
+        """The operation that the rule prescribes for a use; None: none."""
+        return next((one.operation for one in self.setup if use in one.uses), None)
+
+    def fits(self, weather: Weather) -> bool:
+        """Whether the weather is one that the rule asks for."""
+        name = "" if weather.file is None else weather.file.name
+        texts = (weather.site.casefold(), name.casefold())
+        words = [word.casefold() for word in self.weather]
+        return not words or any(word in text for word in words for text in texts)
 
     @property
     def parts(self) -> frozenset[str]:

@@ -3,7 +3,10 @@
     flag          --cfs; --u and --g in place of the windows' own U and g
     study file    its [[system]] tables
     attached      BSDF, U and g that the IFC file holds for the window or its type
-    stated        U, g and transmittances of the IFC file's property sets, as a clear glazing
+    stated        U, g and transmittances of the IFC file's property sets, as a clear glazing;
+                  --tau goes before the stated visible transmittance
+    generic       --glazing, for values that the file does not state; honeybee's default pane for
+                  an HBJSON file that states none
 
 The first of them that there is fills a window; where there is none, that is an error that says
 what to do.
@@ -34,6 +37,7 @@ from mitsuba_cfs.bsdf.simple_glazing import (
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.notes import Note
+from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS, HONEYBEE_DEFAULT
 from scenes.fenestration.systems import FenestrationSystem, States, WindowOverrides, system_of
 from scenes.fenestration.thermal_file import ThermalFile
 from scenes.language.catalogue import N_
@@ -84,7 +88,9 @@ def _system(state: ShadingState, window: Window, path: Path, source: str) -> Fen
         raise DataError(label, file=path, element=f"window {window.name or window.guid}")
     named = "" if state.file is None else f" as {state.file.name}"
     thermal = held_thermal(state)
-    return system_of(state.bands, name, path=path, source=f"{source}{named}", **thermal)
+    angular = thermal.pop("angular") if state.angular is not None else None
+    system = system_of(state.bands, name, path=path, source=f"{source}{named}", **thermal)
+    return system if angular is None else replace(system, angular=angular)
 
 
 def _source(states: Iterable[ShadingState], path: Path) -> str:
@@ -276,6 +282,7 @@ def _listed(names: list[str]) -> str:
 
 PANES = (1, 2, 3)  # that Roos' factor knows
 NO_SHADE = (None, "none")
+HONEYBEE_SUFFIXES = (".hbjson",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,6 +296,7 @@ class StatedValues:
     panes: int | None
     shade: bool = False  # there is one, of which no BSDF is known
     glass: PlainGlass | None = None  # a single pane, whose law of the angle is known
+    generic: str = ""  # name of the generic glazing that values come from
 
     def missing(self, light_only: bool) -> str:
         """What is needed and not stated, in words; empty where nothing is missing."""
@@ -326,14 +334,15 @@ def stated_values(
     by_patch = thermal.get("g_by_patch")
     attached_g = thermal.get("g_value") if by_patch is None else float(by_patch[0])
     values = StatedValues(
-        window.visible_transmittance,
+        _first(overrides.visible, window.visible_transmittance),
         window.solar_transmittance,
         _first(overrides.g_value, attached_g, window.g_value),
         _first(overrides.u_value, thermal.get("u_value"), window.u_value),
         window.panes if window.panes in PANES else None,
         any(state.shading_position not in NO_SHADE for state in states),
-        window.glass,
+        window.glass if overrides.visible is None else None,
     )
+    values = _completed(values, overrides, path)
     for name in ("visible", "solar", "g_value"):
         value = getattr(values, name)
         is_black = name == "visible" and value == 0 and values.glass is not None
@@ -342,6 +351,31 @@ def stated_values(
             message = f"states {value:g} as its {what}: expected more than 0, at most 1"
             raise DataError(message, file=path, element=f"window {window.name or window.guid}")
     return values
+
+
+def _completed(values: StatedValues, overrides: WindowOverrides, path: Path) -> StatedValues:
+    """The values with those of a generic glazing where the file states none."""
+    unknown = values.visible is None and values.g_value is None and values.u_value is None
+    if values.shade or values.glass is not None:
+        return values
+    if overrides.glazing is not None:
+        name, generic = overrides.glazing, GENERIC_GLAZINGS[overrides.glazing]
+    elif unknown and path.suffix.lower() in HONEYBEE_SUFFIXES:
+        name, generic = "honeybee's default pane", HONEYBEE_DEFAULT
+    else:
+        return values
+    if None not in (values.visible, values.g_value, values.u_value):
+        return values
+    solar = generic.solar if values.g_value is None else None
+    return replace(
+        values,
+        visible=_first(values.visible, generic.visible),
+        solar=_first(values.solar, solar),
+        g_value=_first(values.g_value, generic.g_value),
+        u_value=_first(values.u_value, generic.u_value),
+        panes=values.panes or generic.panes,
+        generic=name,
+    )
 
 
 def _first(*values: float | None) -> float | None:
@@ -382,6 +416,15 @@ def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
                 count=count,
             )
         ]
+    if values.generic:
+        notes.append(
+            Note(
+                "{system}: the file states no complete glazing data; missing values are those of "
+                "{generic}.",
+                system=name,
+                generic=values.generic,
+            )
+        )
     solar, tau, g = visible, values.solar, values.g_value
     if g is not None:
         tau = solar_transmittance(u, g) if tau is None else tau

@@ -73,7 +73,9 @@ class WindowOverrides:
     states: States = ()  # by a flag or a study file
     u_value: float | None = None  # of --u, in place of the file's [W/(m2 K)]
     g_value: float | None = None  # of --g, at normal incidence
-    ask: str = "--cfs FILE"  # how a system is given, for the error that none is
+    visible: float | None = None  # of --tau: visible transmittance of windows without a BSDF
+    glazing: str | None = None  # of --glazing, for what the file does not state: a generic one
+    ask: str = "--cfs FILE, --glazing or --tau"  # how a system is given, for the error that none is
     light_only: bool = False  # neither U nor g is needed
     named: tuple[tuple[tuple[str, ...], States], ...] = ()  # states of windows by name or GUID
 

@@ -23,7 +23,7 @@ from thermal.blackbox import (
 from thermal.closure import Closure
 from thermal.errors import ThermalInputError, require
 from thermal.glazing_unit import GlazingUnit
-from thermal.gvalue import thermal_data
+from thermal.gvalue import inward_share, position_of_share, thermal_data
 from thermal.layered import layered_thermal_data
 from thermal.notes import ThermalNote
 
@@ -88,10 +88,14 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     rho = solar.direct_hemispherical(solar.reflection_front)
     rho = np.minimum(rho, 1.0 - tau)
     place = _place(system)
+    guess = None if system.shading_position is not None else _guessed_place(system, tau, rho)
+    place = guess or place
     closure = (system.closure or Closure()).for_place(place)
     known = {"u_value": system.u_value, "g_normal": system.g_value, "item": system.name}
     if closure.unit is None:
-        data = thermal_data(tau, rho, shading_position=place, **known)
+        data = thermal_data(
+            tau, rho, shading_position=place, incidence=solar.basis_in.centres()[0], **known
+        )
     else:
         absorbed = sun_in_layers(closure.unit, tau, rho, solar.basis_in.centres()[0])
         data = layered_thermal_data(closure.unit, tau, rho, absorbed, **known)
@@ -109,7 +113,7 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
         g_value,
         back_rho,
         max(1.0 - back_rho - back_tau, 0.0),
-        (*map(_note, data.assumptions), *_unplaced(system, closure)),
+        (*map(_note, data.assumptions), *_unplaced(system, closure), *_guess_note(system, guess)),
         _note(closure.described(place)),
     )
 
@@ -132,6 +136,30 @@ def _place(system: FenestrationSystem) -> str:
     message = f"{stated!r}, but the layers have their shade {of_layers!r}"
     require(fits, f"{system.name}: shading_position", message)
     return stated or of_layers or "none"
+
+
+def _guessed_place(
+    system: FenestrationSystem, tau: NDArray[np.float64], rho: NDArray[np.float64]
+) -> str | None:
+    """Position of a shade whose U and g are known, from its inward share; None: not guessed."""
+    layered = system.closure is not None and system.closure.unit is not None
+    unknown = system.u_value is None or system.g_value is None
+    if layered or unknown or scattered_share(system.solar) < SHADE_SCATTERS:
+        return None
+    share = inward_share(float(tau[0]), float(rho[0]), system.g_value, item=system.name)
+    return position_of_share(share)
+
+
+def _guess_note(system: FenestrationSystem, guess: str | None) -> list[Note]:
+    if guess is None:
+        return []
+    return [
+        Note(
+            "{system}: scatters light like a shade, but its position is not stated; from g at "
+            "normal incidence it is taken as {position}. State shading_position.",
+            system=system.name, position=guess,
+        )
+    ]  # fmt: skip
 
 
 def _unplaced(system: FenestrationSystem, closure: Closure) -> list[Note]:

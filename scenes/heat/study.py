@@ -27,7 +27,7 @@ from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import comfort_summary, hourly_table, year_summary
 from scenes.inputs import Inputs, every_state, inputs_of
-from scenes.room.heat import felt_by, room_humidity
+from scenes.room.heat import felt_by, room_humidity, step_issues
 from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.leaks import leak_issues
 from scenes.room.light import visible_scene
@@ -156,7 +156,8 @@ def _balanced(
     in_windows: Mapping[str, States],
 ) -> BalancedRooms:
     """The rooms' years: together where the study couples them, else one by one."""
-    step_s, notes = study.options.heat_step_s, ()
+    step_s = study.options.heat_step_s
+    notes: tuple[str, ...] = ()
     progress("heat balance", 0.0)
     groups: list[tuple[Sequence[RoomZone], dict]] = [([room], {}) for room in rooms]
     if study.couple:
@@ -168,6 +169,8 @@ def _balanced(
         place = {"terrain": study.terrain}
         found = balances(together, weather, step_s, progress=progress, **air, **place)
         results += found
+        for issues in step_issues(together, found, weather, step_s, **air, **place):
+            notes += tuple(map(issue_note, issues))
         moist += room_humidity(together, found, weather, **air)
         if study.design is not None:
             cold = study.design.outdoor_c

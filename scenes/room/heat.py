@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -28,7 +29,13 @@ from scenes.results import (
 from scenes.room.operation_tables import ComfortTable, OperationTables
 from scenes.room.zone import RoomZone, balances, coupled
 from thermal.balance import ZoneResult
-from thermal.comfort import comfort_by_outdoors, pmv_ppd, standard_effective_temperature, summarise
+from thermal.comfort import (
+    comfort_by_outdoors,
+    degree_hours,
+    pmv_ppd,
+    standard_effective_temperature,
+    summarise,
+)
 from thermal.moisture import Humidity, MoistZone, humidity_ratio, zone_humidity
 from thermal.ventilation import AirTransfer
 from thermal.zone import Zone
@@ -205,10 +212,68 @@ class DaylitRoom:
     def with_heat(self, heat: Heat) -> RoomYear:
         """The room's year, with temperatures and operation."""
         thermal, operation = heat
-        names = (field.name for field in fields(self) if field.name != "zone")
+        names = (field.name for field in fields(self) if field.name not in {"zone", "issues"})
         return RoomYear(
-            heat=thermal, operation=operation, **{name: getattr(self, name) for name in names}
-        )
+            heat=thermal, operation=operation, issues=self.issues + thermal.issues,
+            **{name: getattr(self, name) for name in names},
+        )  # fmt: skip
+
+
+STEP_TOLERANCE = 0.02  # of a figure, when the time step is halved
+# figures that are compared, and the difference of each that never matters
+STEP_FIGURES = {"heating": 2.0, "cooling": 2.0, "heating_w": 20.0, "cooling_w": 20.0, "warm": 20.0}
+
+
+def step_issues(
+    rooms: Sequence[RoomZone],
+    results: Iterable[ZoneResult],
+    weather: Weather,
+    step_s: float,
+    **options: Any,
+) -> tuple[tuple[Issue, ...], ...]:
+    """For each room an issue where half the time step changes its results by more than 2 %.
+
+    Checked where a control depends on the temperatures of the step: opened windows, the bypass of a
+    heat recovery, a heated slab.
+
+    Args: results: of `balances` with the same options.
+    """
+    if not any(_is_controlled(room.zone) for room in rooms):
+        return ((),) * len(rooms)
+    halved = balances(rooms, weather, min(step_s, 3600.0 * weather.step_h) / 2.0, **options)
+    issues: list[tuple[Issue, ...]] = []
+    for room, whole, half in zip(rooms, results, halved, strict=True):
+        a, b = _step_figures(whole, weather), _step_figures(half, weather)
+        apart = [
+            abs(a[key] - b[key]) > max(STEP_TOLERANCE * max(a[key], b[key]), least)
+            for key, least in STEP_FIGURES.items()
+        ]
+        values = a | {f"{key}_half": value for key, value in b.items()}
+        issue = Issue("time-step-too-long", room.space.guid, values | {"room": room.zone.name})
+        issues.append((issue,) if any(apart) else ())
+    return tuple(issues)
+
+
+def _is_controlled(zone: Zone) -> bool:
+    """Whether a control of the zone depends on its temperatures, besides ideal heating."""
+    fan = zone.supply
+    bypass = fan is not None and fan.recovery > 0 and np.isfinite(fan.bypass_above_c)
+    return zone.airing is not None or bypass or zone.slab is not None
+
+
+def _step_figures(result: ZoneResult, weather: Weather) -> dict[str, float]:
+    """The figures of `STEP_FIGURES`, those of a slab included."""
+    heat = result.heating + np.maximum(result.slab, 0.0)
+    cold = result.cooling + np.maximum(-result.slab, 0.0)
+    kwh = weather.step_h / 1000.0
+    figures = {
+        "heating": heat.sum() * kwh,
+        "cooling": cold.sum() * kwh,
+        "heating_w": heat.max(),
+        "cooling_w": cold.max(),
+        "warm": degree_hours(result.operative_c, 26.0, step_h=weather.step_h),
+    }
+    return {key: float(value) for key, value in figures.items()}
 
 
 def heat_of(
@@ -232,11 +297,17 @@ def heat_of(
         rooms, weather, step_s, air_links=air_links, terrain=terrain, progress=progress, store=store
     )
     passed = iter if store is None else store.each
+    issues = step_issues(
+        rooms, passed(results), weather, step_s, air_links=air_links, terrain=terrain, store=store
+    )
     humidities = room_humidity(rooms, passed(results), weather, air_links=air_links)
     heats: list[Heat] = []
-    for room, balance, humidity in zip(rooms, passed(results), humidities, strict=True):
+    for room, balance, humidity, found in zip(
+        rooms, passed(results), humidities, issues, strict=True
+    ):
         comfort = (room.operation or OperationTables()).comfort
-        thermal = thermal_result(room, balance, weather, felt_by(comfort, balance, humidity))
+        felt = felt_by(comfort, balance, humidity)
+        thermal = replace(thermal_result(room, balance, weather, felt), issues=found)
         operation = None if room.operation is None else operated_year(room, balance, weather)
         heat = thermal, operation
         heats.append(heat if store is None else store.stored(heat))

@@ -144,8 +144,11 @@ class OperationHours:
             buoyant = large_opening(table.width, table.height, discharge=table.discharge)
         return NeighbourAir(beyond, flow / 3600.0, buoyant, share)
 
-    def airing(self, windows: Sequence[WindowElement]) -> WindowAiring | None:
-        """Airing by opened windows; None if no window is opened."""
+    def airing(self, windows: Sequence[WindowElement], volume: float) -> WindowAiring | None:
+        """Airing by opened windows; None if no window is opened.
+
+        Args: volume: of the room [m3].
+        """
         table = self.tables.air.windows
         if table is None or not windows:
             return None
@@ -155,7 +158,9 @@ class OperationHours:
         half = np.array([0.5 * w.glazing_height for w in windows])
         middle, areas = np.array([w.height for w in windows]), [w.area for w in windows]
         height = stack_height(middle - half, middle + half)
-        if table.flow == "cross":
+        if table.ach is not None:
+            wind = stack = 0.0
+        elif table.flow == "cross":
             azimuth = [np.degrees(np.arctan2(w.normal[0], w.normal[1])) for w in windows]
             wind, stack = cross_flow(areas, azimuth, height)
         else:
@@ -170,6 +175,8 @@ class OperationHours:
             least_difference=table.least_difference,
             greatest_wind=table.greatest_wind,
             least_outdoor_c=table.least_outdoor_c,
+            heating_while_open=table.heating_while_open,
+            flow=(table.ach or 0.0) * volume / 3600.0,
         )
 
     def states(self, count: int) -> NDArray[np.int64]:

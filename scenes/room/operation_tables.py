@@ -101,7 +101,10 @@ class OpenedTable(TomlTable):
     close_below_c: Annotated[float, plausible.TEMPERATURE] = 22.0
     least_difference: Annotated[float, Field(ge=-20, le=20)] = 0.0  # above outdoors [K]
     greatest_wind: Annotated[Positive, plausible.WIND] = 60.0  # [m/s]
-    least_outdoor_c: Annotated[float, plausible.OUTDOOR] = -30.0
+    least_outdoor_c: Annotated[float, plausible.OUTDOOR] = 10.0
+    # air change of open windows where a standard states it, instead of EN 16798-7's flow
+    ach: Annotated[Positive, plausible.AIR_CHANGE] | None = None
+    heating_while_open: bool = False  # else they close before the air needs heating
 
     @model_validator(mode="after")
     def _do_not_cross(self) -> OpenedTable:

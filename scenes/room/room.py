@@ -307,7 +307,8 @@ def states_by_rule(
         limit = control.limit_lx if control.limit_dgp is None else control.limit_dgp
         return by_glare(signal, limit)
     if control.rule == "cut-off":
-        local = sun_directions(weather) @ window_frame(space.windows[0].normal).T
+        window = space.windows[0]
+        local = sun_directions(weather) @ window_frame(window.normal, window.up).T
         beam = weather.direct_normal * np.maximum(local[:, 2], 0.0)
         tilts = np.radians(control.slat_tilts_deg)
         return by_cut_off(local, beam, tilts, control.slat_width, control.slat_spacing)

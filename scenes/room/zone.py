@@ -546,7 +546,7 @@ def operated(
     result = replace(
         zone,
         **hours.outdoor_air(),
-        airing=hours.airing(zone.windows),
+        airing=hours.airing(zone.windows, zone.volume),
         gains=split_gains(
             hours.heat(floor_area), gains.radiant_share, (lamps, gains.radiant_share)
         ),

@@ -68,6 +68,7 @@ class Case:
     referenced: tuple[InputFile, ...] = ()  # BSDF files that the building's names, and those beside
     surroundings: tuple[InputFile, ...] = ()  # around the building
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
+    albedo: float | tuple[float, ...] | str | None = None  # of the ground, as of `InputOptions`
     join: tuple[str, ...] = ()  # these four as of `InputOptions`
     furniture: bool = False
     apertures: tuple[str, ...] = ()
@@ -87,6 +88,7 @@ class Case:
             _plain(self.options.named()),
             self.glare,
             [source.sha256 for source in self.referenced],
+            self.albedo,
         )[:32]
 
     @property
@@ -124,6 +126,7 @@ class Case:
             facade_panes=self.facade_panes,
             surroundings=tuple(file.path for file in self.surroundings),
             surroundings_offset=self.surroundings_offset,
+            albedo=self.albedo,
         )
 
 
@@ -231,6 +234,7 @@ def _of_space(
                         options=RoomOptions.of(**options),
                         program=program_version(),
                         glare=study.glare,
+                        albedo=study.albedo,
                         chosen=AUTO if method == AUTO else "",
                     )
 

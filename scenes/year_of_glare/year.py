@@ -117,7 +117,7 @@ def read_year(
     chosen = [options.method, options.metric, options.samples, options.seed, options.join]
     chosen += [options.window_parts, options.glare_sources, options.glare_sun]
     chosen += [options.sun_model, options.sky_ground, options.furniture, options.apertures]
-    chosen += [options.surroundings_offset, options.facade_panes]
+    chosen += [options.surroundings_offset, options.facade_panes, options.albedo]
     # corrections change rooms and surroundings, as --join does, under the same GUID
     files_read = (options.building, options.weather, *files_beside(options.building))
     files_read += options.surroundings

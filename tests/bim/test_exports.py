@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,24 @@ import pytest
 import trimesh
 
 from bim.defaults import WINDOW_FRAME
+from bim.energyplus_parts import MOST_LAYERS, at_most_layers
+from bim.gbxml.building import read_gbxml
+from bim.gbxml.write import write_gbxml
+from bim.honeybee.building import read_honeybee
+from bim.honeybee.write import write_honeybee
+from bim.ifc.attach import attach
 from bim.ifc.building import read_ifc
+from bim.ifc.targets import Targets
+from bim.model import Construction, MaterialLayer
 from bim.shoebox import WindowRectangle, shoebox
 from bim.to_energyplus import DEFAULT_G, DEFAULT_U, write_epjson
 from bim.to_gltf import write_gltf
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_matrix
 from mitsuba_cfs.sky.patches import ReinhartSky
+from scenes.demo import VENETIAN_BLIND
+from scenes.fenestration.state_to_attach import state_to_attach
+from scenes.fenestration_exports import known_fenestration
 from tests.bim.small_ifc import box_room
 
 WINDOWS = (
@@ -152,3 +164,87 @@ def test_gltf_holds_rooms_glass_and_surroundings(tmp_path):
     assert scene.geometry["R1 Room glass"].area == pytest.approx(building.windows[0].area, rel=1e-5)
     low, high = scene.bounds
     assert high[1] - low[1] == pytest.approx(3.4, abs=1e-5)  # y is up in glTF
+
+
+THIN = {
+    "M": MaterialLayer("metal", 0.0015, 45.0, 7680.0, 418.0),
+    "A": MaterialLayer("air", 0.1, 0.667, 1.28, 1000.0),
+    "P": MaterialLayer("gypsum", 0.0127, 0.16, 800.0, 1090.0),
+}
+
+
+@pytest.mark.peer
+def test_thin_metal_and_many_layers_run_in_energyplus(tmp_path):
+    building = shoebox(windows=WINDOWS)
+    (space,) = building.spaces
+    rooms = []
+    for name in ("MAM", "MPM", "M", "PMAPMAPMAPMAP"):
+        construction = Construction(name, tuple(THIN[letter] for letter in name))
+        faces = tuple(
+            replace(face, construction=construction) if face.kind == "wall" else face
+            for face in space.faces
+        )
+        rooms.append(replace(space, guid=name, name=name, faces=faces))
+    path = tmp_path / "rooms.epJSON"
+    write_epjson(replace(building, spaces=tuple(rooms)), path, ground_c=[9.0] * 12)
+    errors, _ = run_energyplus(path, tmp_path)
+    assert "** Severe" not in errors and "Ground found but no" not in errors
+
+
+def test_merged_layers_keep_resistance_and_mass():
+    layers = tuple(THIN[letter] for letter in "PMAPMAPMAPMAP")
+    merged = at_most_layers(layers)
+    assert len(merged) == MOST_LAYERS
+
+    def sums(some):
+        return [sum(x.thickness / x.conductivity for x in some),
+                sum(x.thickness * x.density for x in some),
+                sum(x.thickness * x.density * x.heat_capacity for x in some)]  # fmt: skip
+
+    assert sums(merged) == pytest.approx(sums(layers))
+
+
+@pytest.mark.peer
+def test_a_bsdf_goes_to_energyplus_as_complex_fenestration(tmp_path):
+    building = read_ifc(attached(tmp_path))
+    known = known_fenestration(building.spaces, tmp_path / "attached.ifc")
+    glazing, _ = known.glazings()
+    path = tmp_path / "room.epJSON"
+    write_epjson(building, path, glazing=glazing)
+    model = json.loads(path.read_text())
+    assert "WindowMaterial:SimpleGlazingSystem" not in model
+    assert len(model["Construction:ComplexFenestrationState"]) == 1
+    errors, rows = run_energyplus(path, tmp_path)
+    assert "** Severe" not in errors and len(air_temperatures(rows)) == 8760
+
+
+def test_a_bsdf_and_its_u_g_and_tau_go_to_honeybee_and_gbxml(tmp_path):
+    building = read_ifc(attached(tmp_path))
+    glazing, _ = known_fenestration(building.spaces, tmp_path / "attached.ifc").glazings()
+    (first, *_) = glazing.values()
+    write_honeybee(building, tmp_path / "a.hbjson", glazing=glazing)
+    write_gbxml(building, tmp_path / "a.gbxml", glazing=glazing)
+    model = json.loads((tmp_path / "a.hbjson").read_text())
+    (material,) = [m for m in model["properties"]["energy"]["materials"]
+                   if m["type"] == "EnergyWindowMaterialSimpleGlazSys"]  # fmt: skip
+    stated = [material[key] for key in ("u_factor", "shgc", "vt")]
+    values = [first.u_value, first.g_value, first.visible_transmittance]
+    assert stated == pytest.approx(values, abs=1e-5)
+    window = read_honeybee(tmp_path / "a.hbjson").windows[0]
+    assert first.bsdf is not None and first.bsdf.bands["Visible"] is not None
+    np.testing.assert_allclose(
+        window.states[0].bands["Visible"].transmission_front,
+        first.bsdf.bands["Visible"].transmission_front, rtol=1e-5, atol=1e-7,
+    )  # fmt: skip
+    window = read_gbxml(tmp_path / "a.gbxml").windows[0]
+    found = [window.u_value, window.g_value, window.visible_transmittance]
+    assert found == pytest.approx(values, abs=1e-5)
+
+
+def attached(folder: Path) -> Path:
+    """A room whose windows hold the demo's blind."""
+    box_room("IFC4").write(str(folder / "room.ifc"))
+    state, _ = state_to_attach(VENETIAN_BLIND)
+    path = folder / "attached.ifc"
+    attach(folder / "room.ifc", path, state, Targets(every_window=True))
+    return path

@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 
 from bim.building_file import ReadOptions, check_building_file, held_states, read_building_file
+from bim.fenestration import PlainGlass
 from bim.sensors import sensor_grid, view_point
 from bim.shell import enclosed_volume
+from mitsuba_cfs.bsdf.angular import glass_table
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.trace.paths.scene import without_peaks
 from scenes.fenestration.resolver import glazing_system, stated_values
 from scenes.fenestration.systems import WindowOverrides
 
@@ -104,7 +108,7 @@ def test_windows_are_of_the_named_material(tmp_path):
     without = OFFICE.read_text().replace("void glass glazing", "void plastic glazing")
     path = tmp_path / "solid.rad"
     path.write_text(without.replace("3 .87 .87 .87", "5 .87 .87 .87 0 0"))
-    with pytest.raises(DataError, match="has no glass and no BSDF: name the windows' material"):
+    with pytest.raises(DataError, match="has no glass, fabric or BSDF: name the windows' material"):
         read_building_file(path)
 
 
@@ -147,7 +151,7 @@ def test_panes_behind_each_other_are_one_glazing(tmp_path):
 @pytest.mark.parametrize(
     ("text", "distance", "share"),
     [
-        (pane("outer", -0.8), 0.8, 100),  # too far for one glazing
+        (pane("outer", -0.8, x=(0.5, 1.8)), 0.8, 43),  # too far for one glazing
         (pane("outer", -0.05, x=(0.5, 2.0)), 0.05, 50),  # in front of half of it
     ],
 )
@@ -158,7 +162,7 @@ def test_a_pane_that_is_no_layer_of_the_window_is_reported(tmp_path, text, dista
     (issue,) = issue_of(building, "pane-before-window")
     assert issue.severity == "loss" and issue.effect.glass == pytest.approx(window.area)
     assert issue.values["distance"] == pytest.approx(distance)
-    assert issue.values["share"] == pytest.approx(share, abs=1)
+    assert issue.values["share"] == pytest.approx(share, abs=2)
     assert issue.where.startswith(str(building.file)) and issue.where.rpartition(":")[2].isdigit()
 
 
@@ -191,10 +195,104 @@ def test_materials_that_are_not_simulated_as_they_are_have_an_issue(tmp_path, ma
     assert issue.severity == ("unused" if code == "light-source-dark" else "loss")
 
 
-def test_a_pattern_on_glass_is_a_loss(tmp_path):
+FRIT = "void brightfunc frit\n2 if(mod(Pz*20,1)-.5,1,.1) .\n0\n0\n\n"
+
+
+def test_a_pattern_on_glass_counts_by_its_mean(tmp_path):
     text = OFFICE.read_text().replace("void glass glazing", "frit glass glazing")
-    frit = "void brightfunc frit\n2 if(mod(Pz*20,1)-.5,1,.1) .\n0\n0\n\n"
     path = tmp_path / "frit.rad"
-    path.write_text(frit + text)
-    (issue,) = issue_of(read_building_file(path), "glass-patterns-left-out")
+    path.write_text(FRIT + text)
+    building = read_building_file(path)
+    (issue,) = issue_of(building, "glass-pattern-averaged")
+    assert (issue.values["least"], issue.values["greatest"]) == (0.1, 1.0)
+    (state,) = building.windows[0].states
+    # half of the pane has a tenth of the transmissivity; 2,048 points
+    halves = [PlainGlass(((0.87 * share, 1.52),)).transmittance for share in (1.0, 0.1)]
+    assert state.angular.transmittance[0] == pytest.approx(np.mean(halves), rel=0.02)
+
+
+def test_a_pattern_on_glass_that_is_not_computed_is_refused(tmp_path):
+    text = OFFICE.read_text().replace("void glass glazing", "frit glass glazing")
+    path = tmp_path / "frit.rad"
+    path.write_text(FRIT.replace("mod(Pz*20,1)", "noise3(Px,Py,Pz)") + text)
+    with pytest.raises(DataError, match=r"frit\.rad:1: brightfunc frit: function noise3 is not"):
+        read_building_file(path)
+
+
+def test_a_pane_far_in_front_of_a_window_is_refused_unless_the_apertures_are_named(tmp_path):
+    with pytest.raises(DataError, match=r"outer: is 0\.80 m in front of 100% of window window"):
+        read(tmp_path, TINTED + pane("outer", -0.8))
+    building = read(tmp_path, TINTED + pane("outer", -0.8), "glazing")
+    (issue,) = issue_of(building, "pane-before-window")
     assert issue.severity == "loss"
+
+
+CLOTH = (
+    "void BRTDfunc cloth\n10 0 0 0 {tau} {tau} {tau} 0 0 0 {file}\n0\n"
+    "9 .4 .4 .4 .1 .1 .1 .02 .02 .02\n"
+)
+
+
+def test_a_fabric_behind_a_pane_is_a_layer_of_the_window(tmp_path):
+    (tmp_path / "weave.cal").write_text("{ a cosine } tau(t) = t*abs(Rdot); t0 : .5;\n")
+    cloth = CLOTH.format(tau="tau(.2*t0)", file="./elsewhere/weave.cal")
+    building = read(tmp_path, "\n" + cloth + pane("blind", 0.1, material="cloth"))
+    (window,) = building.windows
+    assert window.name == "blind" and window.glass is None
+    (state,) = window.states
+    glass = glass_table([(0.87, 1.52)])
+    theta = np.radians([0.0, 30.0, 60.0])
+    straight = glass.transmitted(theta) * 0.1 * np.cos(theta)
+    np.testing.assert_allclose(state.angular.transmitted(theta), straight, rtol=2e-3)
+    omega = KLEMS_FULL.projected_solid_angles()
+    scattered = without_peaks(state.bands["Visible"], "transmission").transmission_front
+    # 0.02, and what comes back: 0.4 of the fabric, 0.15 of the pane, 0.087 of the fabric
+    share = float(omega @ scattered[:, 0]) / float(glass.transmittance[0])
+    assert 0.023 < share < 0.025
+    (issue,) = issue_of(building, "function-file-elsewhere")
+    assert issue.severity == "assumption"
+
+
+@pytest.mark.parametrize(
+    ("strings", "told"),
+    [
+        ("10 0 0 0 0 0 0 .1 .1 .1 .", "functions of two directions"),
+        ("10 0 0 0 Dx*Dx Dx*Dx Dx*Dx 0 0 0 .", "depends on the azimuth"),
+        ("10 0 0 0 t t t 0 0 0 none.cal", "its function file none.cal is not there"),
+        ("10 0 0 0 2 2 2 0 0 0 .", "a function is 2: expected 1"),
+    ],
+)
+def test_a_fabric_that_is_not_computed_is_refused_with_its_line(tmp_path, strings, told):
+    cloth = f"\nvoid BRTDfunc cloth\n{strings}\n0\n9 .1 .1 .1 .1 .1 .1 .02 .02 .02\n"
+    with pytest.raises(DataError, match=f"scene.rad:.*BRTDfunc cloth: .*{told}"):
+        read(tmp_path, cloth + pane("blind", 0.1, material="cloth"))
+
+
+def test_a_translucent_panel_is_a_window(tmp_path):
+    trans = "glazing\n0\n0\n7 .8 .8 .8 0 0 .6 .2\n"
+    path = tmp_path / "panel.rad"
+    glass = "void glass glazing\n0\n0\n3 .87 .87 .87\n"
+    text = OFFICE.read_text().replace(glass, f"void trans {trans}")
+    assert trans in text
+    path.write_text(text)
+    building = read_building_file(path)
+    (window,) = building.windows
+    (state,) = window.states
+    assert state.angular.transmittance[0] == pytest.approx(0.8 * 0.6 * 0.2)
+    block = state.bands["Visible"].transmission_front
+    assert block[0, 100] == pytest.approx(0.8 * 0.6 * 0.8 / np.pi, rel=1e-6)
+    assert not issue_of(building, "trans-as-opaque")
+
+
+def test_a_fabric_before_panes_in_a_frame_has_both_as_layers(tmp_path):
+    bar = (
+        "\nplaster polygon bar\n0\n0\n12  1.8 0.02 0.9  2.2 0.02 0.9  2.2 0.02 2.5  1.8 0.02 2.5\n"
+    )
+    coat = "\nvoid glass coat\n0\n0\n4 1 1 1 1.05\n"
+    cloth = "\n" + CLOTH.format(tau="0.1", file=".")
+    layers = pane("coat", 0.08, material="coat") + pane("blind", 0.1, material="cloth")
+    building = read(tmp_path, bar + coat + cloth + layers)
+    (window,) = building.windows
+    straight = glass_table([(0.87, 1.52), (1.0, 1.05)]).transmittance[0] * 0.1
+    assert window.states[0].angular.transmittance[0] == pytest.approx(straight, rel=2e-3)
+    assert not issue_of(building, "pane-before-window")

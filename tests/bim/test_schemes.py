@@ -8,7 +8,7 @@ import pytest
 
 from bim.defaults import BRICK, CONCRETE, INSULATION, TIMBER, UNKNOWN_MATERIAL
 from bim.ifc.building import read_ifc
-from bim.ifc.materials import default_material
+from bim.material_names import material_named
 from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, WIDTH, add_material, box_model
 from tests.bim.test_account import read
 from tests.issues import of_code
@@ -79,12 +79,12 @@ def test_cupboard_drawn_inside_a_room_is_kept_and_named(tmp_path):
     ],
 )
 def test_materials_are_known_with_accents_and_in_other_scripts(name, expected):
-    assert default_material(name) == expected
+    assert material_named(name).layer == expected
 
 
 @pytest.mark.parametrize("name", ["ガラス", "Verre trempé", "szkło", "стекло"])
 def test_glass_is_known_in_other_scripts(name):
-    assert default_material(name).name == "soda lime glass"
+    assert material_named(name).layer.name == "soda lime glass"
 
 
 def test_heat_capacity_in_kilojoules_is_taken_as_such_and_named(tmp_path):

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from bim.building_file import read_building_file
+from bim.exported_glazing import normal_transmittance
 from bim.ifc.building import read_ifc
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.simple_glazing import solar_transmittance
@@ -19,9 +20,10 @@ from mitsuba_cfs.files import write_text
 from mitsuba_cfs.images.exr import read_exr
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
 from scenes.fenestration.resolver import fill_windows, windows_named
 from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system
-from scenes.fenestration.thermal_system import thermal_system
+from scenes.fenestration.thermal_system import checked_system, thermal_system
 from tests.bim.honeybee_models import two_rooms, write
 from tests.bim.small_ifc import box_room
 from tests.conftest import REPOSITORY
@@ -34,6 +36,7 @@ from tests.scenes.fenestration_models import (
     room,
     with_attached,
 )
+from thermal.ratings import REFERENCE_GLAZINGS
 
 pytestmark = pytest.mark.early
 
@@ -419,3 +422,52 @@ def test_u_and_g_given_for_a_radiance_scene_make_its_solar_transmittance(tmp_pat
     assert sun == pytest.approx(solar_transmittance(1.1, 0.4), rel=1e-3) and sun < 0.4 < light
     alone = fill_windows(windows, WindowOverrides(), scene)[windows[0].guid][0]
     assert alone.solar is alone.visible and any("Solar band" in note for note in alone.notes)
+
+
+@pytest.mark.parametrize("name", list(GENERIC_GLAZINGS))
+def test_a_generic_glazing_fills_windows_whose_file_states_nothing(tmp_path, name) -> None:
+    path = tmp_path / "room.ifc"
+    box_room("IFC4").write(str(path))
+    windows = read_ifc(path).windows
+    with pytest.raises(DataError, match="--glazing"):
+        fill_windows(windows, WindowOverrides(), path)
+    states = fill_windows(windows, WindowOverrides(glazing=name), path)
+    (system,) = next(iter(states.values()))
+    generic = GENERIC_GLAZINGS[name]
+    assert (system.u_value, system.g_value) == (generic.u_value, generic.g_value)
+    assert normal_transmittance(system.visible) == pytest.approx(generic.visible, abs=2e-3)
+    heat = checked_system(system, path)  # U, g and transmittance go together
+    assert float(heat.g_value[0]) == pytest.approx(generic.g_value, abs=1e-6)
+    assert any(name in str(note) for note in system.notes)
+
+
+def test_a_visible_transmittance_of_the_user_fills_windows_of_a_light_only_command(
+    tmp_path,
+) -> None:
+    path = tmp_path / "room.ifc"
+    box_room("IFC4").write(str(path))
+    overrides = WindowOverrides(visible=0.55, light_only=True)
+    (system,) = next(iter(fill_windows(read_ifc(path).windows, overrides, path).values()))
+    assert normal_transmittance(system.visible) == pytest.approx(0.55, abs=2e-3)
+
+
+def test_an_hbjson_without_glazing_has_the_default_pane_of_honeybee(tmp_path) -> None:
+    model = two_rooms()
+    model["properties"].pop("energy", None)
+    model["properties"].pop("radiance", None)
+    for one in model["rooms"]:
+        for face in one["faces"]:
+            for aperture in face.get("apertures", ()):
+                aperture["properties"] = {"type": "AperturePropertiesAbridged"}
+    path = write(model, tmp_path)
+    (system, *_) = {id(s): s for (s,) in fill_windows(
+        read_building_file(path).windows, WindowOverrides(), path
+    ).values()}.values()  # fmt: skip
+    assert normal_transmittance(system.visible) == pytest.approx(0.64, abs=2e-3)
+    assert any("honeybee's default pane" in str(note) for note in system.notes)
+
+
+def test_the_generic_glazings_are_the_reference_glazings_of_en_14501() -> None:
+    generic = [(g.u_value, g.g_value, g.solar) for g in GENERIC_GLAZINGS.values()]
+    reference = [(g.u_value, g.g_value, g.transmittance) for g in REFERENCE_GLAZINGS.values()]
+    assert generic[:3] == reference[1:]

@@ -148,8 +148,10 @@ def test_place_of_a_shade_gives_its_typical_films_unless_stated():
 def test_a_shade_is_not_taken_for_a_pane_by_silence():
     said = thermal_system(grey_system()).notes
     assert "State shading_position" in said[-1]
-    for known in ({"shading_position": "none"}, {"u_value": 1.1, "g_value": 0.4}):
-        assert not any("shading_position" in n for n in thermal_system(grey_system(**known)).notes)
+    stated = thermal_system(grey_system(shading_position="none")).notes
+    assert not any("shading_position" in note for note in stated)
+    guessed = thermal_system(grey_system(u_value=1.1, g_value=0.4)).notes
+    assert "from g at normal incidence it is taken as" in guessed[-1]
     wrong = grey_system(closure=Closure("layers", unit=INTERNAL), shading_position="external")
     with pytest.raises(ThermalInputError, match="layers have their shade 'internal'"):
         thermal_system(wrong)

@@ -21,6 +21,7 @@ from thermal.gvalue import (
     external_shade_g,
     integrated_shade_g,
     internal_shade_g,
+    position_of_share,
     thermal_data,
 )
 
@@ -119,3 +120,34 @@ def test_gap_resistance_keeps_u_and_follows_its_gas():
     assert abs(change[1] - 1) < abs(change[0] - 1)
     with pytest.raises(ThermalInputError, match=r"blind: U: 2 W/\(m2 K\) is above 1.11"):
         gap_resistance(2.0, gap, item="blind")
+
+
+def test_inward_share_of_a_blind_by_direction():
+    """WINDOW's engine, exterior blind at 45 degrees: from g at normal incidence alone, the inward
+    share of sky light falls to 0.05 and that of ground light rises to 0.18; a constant one is 0.10.
+    """
+    tau = np.array([0.134, 0.043, 0.256])  # normal, mean of the sky's and the ground's directions
+    rho = np.array([0.281, 0.368, 0.154])
+    found = thermal_data(
+        tau, rho, u_value=1.02, g_normal=0.191, shading_position="external",
+        incidence=np.radians([0.0, 40.0, 40.0]),
+    ).g_value  # fmt: skip
+    share = (found - tau) / (1 - tau - rho)
+    assert share[0] == pytest.approx((0.191 - 0.134) / (1 - 0.134 - 0.281))
+    assert share[1:] == pytest.approx([0.05, 0.185], abs=0.025)
+    np.testing.assert_allclose(found, [0.191, 0.073, 0.365], atol=0.02)
+
+
+def test_inward_share_of_a_fabric_inside_by_direction():
+    """The engine's interior shade: diffuse g 0.377 from 0.424 at normal; a constant share: 0.40."""
+    tau, rho = np.array([0.053, 0.044]), np.array([0.322, 0.359])
+    incidence = np.radians([0.0, 58.0])  # where the glazing transmits as for diffuse light
+    found = thermal_data(
+        tau, rho, u_value=1.1, g_normal=0.424, shading_position="internal", incidence=incidence
+    ).g_value
+    assert found == pytest.approx([0.424, 0.377], abs=0.01)
+
+
+def test_position_of_a_shade_from_its_inward_share():
+    shares = {0.072: "external", 0.098: "external", 0.30: "integrated", 0.595: "internal"}
+    assert {share: position_of_share(share) for share in shares} == shares

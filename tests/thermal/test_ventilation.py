@@ -126,14 +126,14 @@ def test_windows_flow_as_en_16798_7_says():
     site = WIND * local_wind_factor(10.0, "suburbs")
     density = 1.204 * 287.055 * (OUT + 273.15) / 101325.0
     wind, stack = single_sided(1.5, 1.2)
-    zone = sealed(loads=KEPT, airing=WindowAiring(wind, stack, share=0.5))
+    zone = sealed(loads=KEPT, airing=WindowAiring(wind, stack, share=0.5, heating_while_open=True))
     q = 0.75 * np.sqrt(max(0.001 * site**2, 0.0035 * 1.2 * 18.0))
     assert load(zone) == pytest.approx(HEAT * 0.5 * q * density * 18.0, rel=1e-9)
     wind, stack = cross_flow([1.0, 1.0], [180.0, 0.0], 1.2)
     # at 0 degrees one side each: 0.25 (1/sqrt 2) twice; at 45 the same
     across = 0.5 / np.sqrt(2)
     q = np.hypot(0.67 * across * site * np.sqrt(0.75), np.sqrt(0.0035 * 1.2 * 18.0))
-    zone = sealed(loads=KEPT, airing=WindowAiring(wind, stack, both=True))
+    zone = sealed(loads=KEPT, airing=WindowAiring(wind, stack, both=True, heating_while_open=True))
     assert load(zone) == pytest.approx(HEAT * q * density * 18.0, rel=1e-9)
     assert cross_flow([1.0, 1.0], [180.0, 180.0], 1.2)[0] == 0.0  # one facade: no wind through
     assert cross_flow([1.0, 1.0], [170.0, 190.0], 1.2)[0] == 0.0  # by the axis that passes less
@@ -156,6 +156,39 @@ def test_windows_open_and_close_by_temperature_wind_and_outdoors():
         closed = simulate(zone, climate(hours, outdoor=10.0), no_sun(hours, 2, 0), options=still)
         assert (closed.outdoor_air == 0.0).all()
         assert closed.air_c.max() > 30.0
+
+
+def aired_week(step_s: float, **airing):
+    """A heated room with gains by day and wide windows, in mild weather."""
+    hours = 24 * 7
+    by_day = np.tile(np.repeat([0.0, 900.0, 0.0], [8, 10, 6]), 7)
+    outdoor = 15.0 - 6.0 * np.cos((np.arange(hours) - 3.0) / 24 * 2 * np.pi)
+    wind, stack = cross_flow([2.0, 1.0], [180.0, 270.0], 1.5)
+    windows = WindowAiring(wind, stack, both=True, open_above_c=24.0, **airing)
+    room = box(loads=IdealLoads(21.0), gains=Gains(by_day), airing=windows)
+    dark = no_sun(hours, len(room.surfaces), 0)
+    result = simulate(room, climate(hours, outdoor=outdoor, wind=4.0), dark, step_s=step_s)
+    assert np.abs(result.residual).max() < 1e-6
+    return result
+
+
+@pytest.mark.parametrize(("step_s", "share"), [(600.0, 0.02), (1800.0, 0.04), (3600.0, 0.06)])
+def test_opened_windows_make_no_heat_of_the_time_step(step_s, share):
+    """Against steps of a minute; backward Euler itself is of first order in the step."""
+    fine, coarse = aired_week(60.0, close_below_c=20.0), aired_week(step_s, close_below_c=20.0)
+    assert fine.outdoor_air.max() > 0.1
+    assert coarse.heating.sum() == pytest.approx(fine.heating.sum(), rel=share)
+    assert coarse.heating.max() == pytest.approx(fine.heating.max(), rel=3 * share)
+    assert coarse.air_c.mean() == pytest.approx(fine.air_c.mean(), abs=0.1)
+    assert not ((coarse.heating > 1.0) & (coarse.outdoor_air > 0.1)).any()
+
+
+def test_windows_that_are_open_while_heated_only_where_asked():
+    """Closed at 15 degrees: the heating fights them where that is asked, else not."""
+    shut = aired_week(600.0, close_below_c=15.0)
+    fought = aired_week(600.0, close_below_c=15.0, heating_while_open=True)
+    assert fought.heating.sum() > 2.0 * shut.heating.sum()
+    assert fought.heating.max() > 1000.0
 
 
 def test_one_way_air_from_room_to_room():
@@ -218,3 +251,15 @@ def test_heated_slab_gives_in_proportion_and_keeps_the_account():
     assert result.heat_flow["heated slab"][-1] == pytest.approx(result.slab[-1])
     lost = -(result.heat_flow["facade"] + result.heat_flow["air exchange"])[-1]
     assert lost == pytest.approx(result.slab[-1], rel=2e-2)
+
+
+def test_heated_slab_between_equal_rooms_is_in_the_account():
+    """Its power is a flow of its own where the slab has the same room below it."""
+    hours = 24 * 5
+    room = box(outside="twin", loads=IdealLoads())
+    slab = HeatedSlab("floor", 0.05, heating_c=21.0, heating_limit=1200.0)
+    dark = no_sun(hours, len(room.surfaces), 0)
+    result = simulate(replace(room, slab=slab), climate(hours, outdoor=-5.0), dark)
+    assert result.slab.max() > 0
+    np.testing.assert_allclose(result.heat_flow["heated slab"], result.slab)
+    assert np.abs(result.residual).max() < 1e-6 * result.slab.max()

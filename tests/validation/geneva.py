@@ -68,6 +68,7 @@ def by_command(folder: Path, case: str, views: Sequence[int], size: int) -> Iter
             scene, out = Path(temporary) / "scene.rad", Path(temporary) / "out"
             for part in ("options", "RAD"):
                 shutil.copytree(folder / part, scene.with_name(part))
+            shutil.copy(folder / "roos_fabric.cal", scene.parent)
             files = f"options/{geneva.CASES[case]}.rad", "RAD/office.rad"
             scene.write_text("".join(f"!xform {file}\n" for file in files))
             words = [

@@ -9,6 +9,8 @@ A closure turns the same measurable data into the two-layer model:
     films     R(T_m, dT), and the resistances that the system's faces really have
     place     plain Kuhn with the films that a shade in its place typically has
     gap place `gap` with those films
+    normal    `place`, with g at normal incidence alone: g by direction as a study has it
+    constant  the same with one inward share for all directions, and nominal films
     layers    our own ISO 15099: U, g, R(T_m, dT) and films from the layers; the set's tau and rho
 
 All but `place`, `gap place` and `layers` take U, g and films of WINDOW's engine.
@@ -40,12 +42,14 @@ from thermal.blackbox import (
 from thermal.closure import Closure
 from thermal.glazing import Gap, gap_resistance
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
+from thermal.gvalue import thermal_data
 from thermal.iso15099 import iso15099_data, yearly_g_values
 from thermal.shade_layers import sheet_layer, venetian_layer
 
 FloatArray = NDArray[np.float64]
 SYSTEMS = ("dgu", "ext_blind", "ext_shade", "int_shade")
-CLOSURES = ("kuhn", "linear", "gap", "surface", "films", "place", "gap place", "layers")
+CLOSURES = ("kuhn", "linear", "gap", "surface", "films", "place", "gap place", "layers",
+            "normal", "normal gap", "constant")  # fmt: skip
 GAP = Gap(0.016, (("argon", 0.9), ("air", 0.1)), (0.84, 0.05))  # of the set's glazing
 REALISED_STATE = 0  # of the U list: 0/20 degC
 PLACES = {"dgu": "none", "int_shade": "internal", "ext_blind": "external", "ext_shade": "external"}
@@ -185,6 +189,21 @@ def _of_layers(folder: Path, name: str, optics: Optics) -> tuple[Closure, float,
     return Closure("layers", unit=unit), iso15099_data(unit).u_value, found
 
 
+def _normal_g(folder: Path, optics: Optics, position: str) -> Optics:
+    """Optics whose g by direction follows from that at normal incidence alone."""
+    first = int(np.argmin(optics.theta))
+    g = thermal_data(
+        optics.tau, optics.rho, u_value=1.0, g_normal=float(optics.g[first]), normal=first,
+        shading_position=position, incidence=optics.theta,
+    ).g_value  # fmt: skip
+    diffuse = optics.diffuse.copy()
+    if optics.phi is None:
+        diffuse[:, 2] = hemispherical_mean(g, optics.theta)
+    else:
+        diffuse[:, 2] = _halves(folder, optics.phi, g[None])[:, 0]
+    return replace(optics, g=g, diffuse=diffuse)
+
+
 def system(
     folder: Path,
     name: str,
@@ -212,8 +231,13 @@ def system(
     plain = Fenestration(
         name, u, R_OUTER, R_INNER, resistance, emissivity_in=emissivity, emissivity_out=outside
     )
-    if closure in ("place", "gap place"):
-        u_model = "gap" if closure == "gap place" else "constant"
+    if closure in ("normal", "normal gap", "constant"):
+        position = "none" if closure == "constant" else PLACES[name]
+        optics = _normal_g(folder, optics, position)
+    if closure == "constant":
+        plain = replace(plain, resistance=None)
+    if closure in ("place", "gap place", "normal", "normal gap"):
+        u_model = "gap" if "gap" in closure else "constant"
         known = Closure(u_model, gap=GAP if u_model == "gap" else None).for_place(PLACES[name])
         plain = known.close(replace(plain, resistance=None))
     if closure == "layers":

@@ -1,0 +1,121 @@
+"""Spaces that go through the slab, roof or ceiling over them, cut there.
+
+Revit draws rooms to an upper limit, 4 m by default, through whatever is drawn lower.  Where slabs,
+roofs and ceilings part the solid of a space, its largest part is the room.  A gallery, or a slab
+with an opening for a stair or a shaft, parts nothing; the openings of roofs and ceilings are for
+windows and do not count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bim.ifc.shapes import Shape, read_shapes
+from bim.ifc.source import Source
+from bim.ifc.spaces import SpaceRecord
+from bim.isolated_solids import largest_parts
+from bim.planes import area_vectors
+from bim.rays import ray_mesh
+from bim.report.issue import Issue
+from bim.rooms import room_solid
+from bim.solids import packed, unpacked
+from mitsuba_cfs.processes import ProcessEnded
+
+THROUGH = 0.1  # a space that ends less far beyond a slab is drawn into it [m]
+MOSTLY = 0.7  # share of the top of a space that has to lie beyond what cuts it
+LEAST_CUT = 0.02  # share of the volume: less is the drawing's
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+def cut_rooms(
+    source: Source, records: Sequence[SpaceRecord]
+) -> tuple[list[SpaceRecord], list[Issue]]:
+    """The rooms, those cut that go through what covers them, each with an issue."""
+    lids = _lids(source)
+    through = [index for index, record in enumerate(records) if _goes_through(record, lids)]
+    if not through:
+        return list(records), []
+    items = [(packed(records[i].solid.manifold), _near(records[i], lids)) for i in through]
+    result, issues = list(records), []
+    for index, part in zip(through, largest_parts(items), strict=True):
+        record = records[index]
+        if part is None or isinstance(part, ProcessEnded):
+            continue
+        solid = room_solid(record.guid, record.solid.name, unpacked(part))
+        after = solid.manifold.volume()
+        if after > (1 - LEAST_CUT) * record.volume:
+            continue
+        top, low = float(solid.high[2]), float(solid.low[2])
+        values = {
+            "room": record.label, "before": record.volume, "after": after,
+            "top": float(record.solid.high[2]) - top, "bottom": low - float(record.solid.low[2]),
+        }  # fmt: skip
+        issues.append(Issue("room-cut", record.guid, values))
+        result[index] = replace(record, solid=solid, volume=after)
+    return result, issues
+
+
+def _goes_through(record: SpaceRecord, lids: Sequence[Shape]) -> bool:
+    """Whether most of the top of a space, or of its bottom, is beyond a slab, roof or ceiling."""
+    near = _near(record, lids)
+    if not near:
+        return False
+    mesh = ray_mesh(np.concatenate(near))
+    height = float(record.solid.high[2] - record.solid.low[2])
+    for sign in (1.0, -1.0):
+        facets = [f for f in record.solid.facets if sign * f.plane.normal[2] > 0.5]
+        points = [
+            f.plane.to_world(np.array(f.polygon.representative_point().coords)) for f in facets
+        ]
+        weights = np.array([f.polygon.area for f in facets])
+        if not len(weights):
+            continue
+        start = np.concatenate(points)
+        directions = np.tile(sign * DOWN, (len(start), 1))
+        distance, hit = mesh.first_hits(start + THROUGH * directions, directions, height - 0.5)
+        if np.average((hit >= 0) & np.isfinite(distance), weights=weights) > MOSTLY:
+            return True
+    return False
+
+
+def _near(record: SpaceRecord, lids: Sequence[Shape]) -> list[np.ndarray]:
+    """Bodies of what may cut a space: inside of its height, over or under it."""
+    found = []
+    for lid in lids:
+        corners = lid.triangles.reshape(-1, 3)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        inside = low[2] < record.solid.high[2] - THROUGH and high[2] > record.solid.low[2] + THROUGH
+        if (
+            inside
+            and np.all(low[:2] < record.solid.high[:2])
+            and np.all(high[:2] > record.solid.low[:2])
+        ):
+            found.append(lid.triangles)
+    return found
+
+
+def _lids(source: Source) -> list[Shape]:
+    """Slabs with their openings, roofs and ceilings without, in the world."""
+    roofs = set()
+    for one in source.model.by_type("IfcProduct"):
+        kind = getattr(one, "PredefinedType", None)
+        is_roof = one.is_a("IfcRoof") or (one.is_a("IfcSlab") and kind == "ROOF")
+        if is_roof or (one.is_a("IfcCovering") and kind in ("CEILING", "ROOFING")):
+            roofs.add(one.id())
+    roofs &= set(source.shapes)
+    slabs = [s for s in source.elements if s.ifc_class.startswith("IfcSlab")]
+    level = [s for s in slabs if s.step_id not in roofs and _is_level(s)]
+    everything = {one.id() for one in source.model.by_type("IfcProduct")}
+    whole, _ = read_shapes(source.model, without=everything - roofs, cut_openings=False)
+    to_world = source.placed.to_world
+    return level + [replace(s, triangles=to_world(s.triangles)) for s in whole.values()]
+
+
+def _is_level(shape: Shape) -> bool:
+    vectors = area_vectors(shape.triangles)
+    size = np.ptp(shape.triangles.reshape(-1, 3), axis=0)
+    total = max(float(np.linalg.norm(vectors, axis=1).sum()), 1e-12)
+    return bool(np.abs(vectors[:, 2]).sum() > 0.5 * total and min(size[:2]) > 0.5)

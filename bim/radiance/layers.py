@@ -1,0 +1,250 @@
+"""Optics of the panes, fabrics and translucent panels in a Radiance window, as one system.
+
+Each layer has a specular part by the angle of incidence and a diffuse one. The specular parts
+are combined exactly, with all reflections between the layers and by polarisation; the diffuse
+ones by Klems matrices. A pattern counts by its mean over the surface.
+
+Source: "The RADIANCE 5.1 Synthetic Imaging System", 3.2 and 3.3; `normal.c`, `glass.c`,
+`m_brdf.c` of Radiance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.fenestration import ShadingState
+from bim.radiance.functions import find_functions
+from bim.radiance.materials import LUMINANCE, SYSTEMS, luminance
+from bim.radiance.patterns import (
+    COMPUTED_PATTERNS,
+    TURNS,
+    evaluated,
+    functions_of,
+    pattern_values,
+    ray_variables,
+)
+from bim.radiance.scene import RadianceObject
+from bim.report.issue import Issue
+from mitsuba_cfs.bsdf.angular import ANGLES, AngularTable
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.layers import combine_layers
+from mitsuba_cfs.bsdf.pane_stack import PaneOptics, stack
+from mitsuba_cfs.bsdf.resample import klems_of
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml
+from mitsuba_cfs.gloss import lacquer, polarised_shares
+
+SMOOTH = 1e-6  # squared roughness up to which Radiance takes a beam as sharp
+PARALLEL = 1e-3  # sine of the angle between up vector and normal
+APART = 0.02  # spread over azimuths from which a function depends on them, of its greatest value
+
+
+@dataclass(frozen=True, slots=True)
+class WindowLayer:
+    """A layer's shares of light by angle of incidence, front outdoors."""
+
+    specular: PaneOptics  # [2, N] by polarisation at `ANGLES`
+    scattered: NDArray[np.float64]  # [N] transmitted diffusely, from either side
+    reflected_front: NDArray[np.float64]  # [N] reflected diffusely
+    reflected_back: NDArray[np.float64]  # [N]
+
+    @property
+    def klems(self) -> KlemsBsdf:
+        """The layer as Klems matrices."""
+        omega = KLEMS_FULL.projected_solid_angles()
+        blocks = []
+        for share, diffuse in (
+            (self.specular.tau, self.scattered),
+            (self.specular.rho_front, self.reflected_front),
+            (self.specular.rho_back, self.reflected_back),
+        ):
+            beam, even = (_patch_means(values) for values in (share.mean(axis=0), diffuse))
+            blocks.append(np.diag(beam / omega) + np.tile(even / np.pi, (KLEMS_FULL.size, 1)))
+        return KlemsBsdf(KLEMS_FULL, KLEMS_FULL, blocks[0], blocks[0], blocks[1], blocks[2])
+
+
+@dataclass(frozen=True, slots=True)
+class LayeredWindow:
+    """A system of a window's layers."""
+
+    state: ShadingState
+    up: NDArray[np.float64] | None = None  # [3] of its BSDF
+    issues: tuple[Issue, ...] = ()
+
+
+def layered_window(things: Sequence[RadianceObject], outwards: Sequence[bool]) -> LayeredWindow:
+    """The system of a window's layers, the outer one first.
+
+    Args: outwards: whether the front of each layer is outdoors.
+
+    Raises: `DataError` naming file and line for a layer that cannot be computed.
+    """
+    issues = list(dict.fromkeys(issue for thing in things for issue in moved_files(thing)))
+    if len(things) == 1 and things[0].material.kind in SYSTEMS:
+        thing = things[0]
+        path = thing.primitive.file.parent / thing.material.bsdf
+        state = ShadingState(bands=dict(read_bsdf_xml(path).bands), file=path)
+        return LayeredWindow(state, up_vector(thing), tuple(issues))
+    layers = [
+        _bsdf_layer(thing) if thing.material.kind in SYSTEMS else _layer(thing, outward, issues)
+        for thing, outward in zip(things, outwards, strict=True)
+    ]
+    ups = [up for thing in things if (up := up_vector(thing)) is not None]
+    if any(ups[0] @ other < 0.9999 for other in ups[1:]):
+        raise things[-1].primitive.fault("two BSDF in series have different up vectors")
+    angular = None
+    plain = [layer for layer in layers if isinstance(layer, WindowLayer)]
+    if len(plain) == len(layers):
+        whole = stack([layer.specular for layer in plain])
+        values = (whole.tau, whole.rho_front, whole.rho_back)
+        angular = AngularTable(ANGLES, *(np.clip(one.mean(axis=0), 0, 1) for one in values))
+    klems = [layer.klems if isinstance(layer, WindowLayer) else layer for layer in layers]
+    system = klems[0] if len(klems) == 1 else combine_layers(klems).bsdf
+    state = ShadingState(bands={"Visible": system}, angular=angular)
+    return LayeredWindow(state, ups[0] if ups else None, tuple(issues))
+
+
+def up_vector(thing: RadianceObject) -> NDArray[np.float64] | None:
+    """The up vector [3] of a surface's BSDF; None for other materials."""
+    definition = thing.definitions[-1] if thing.definitions else None
+    if thing.material.kind not in SYSTEMS or definition is None:
+        return None
+    primitive = definition.primitive
+    start = 2 if thing.material.kind == "BSDF" else 1
+    if len(primitive.strings) < start + 4:
+        return None
+    functions, frame = functions_of(definition, primitive.strings[start + 3 :])
+    up = np.array(
+        [
+            float(evaluated(definition, functions, text, {}))
+            for text in primitive.strings[start : start + 3]
+        ]
+    )
+    up = frame[:3, :3] @ up
+    if not np.linalg.norm(up) > 0:
+        raise primitive.fault("its up vector is zero")
+    if np.linalg.norm(np.cross(up, thing.normal)) < PARALLEL * np.linalg.norm(up):
+        raise primitive.fault(f"its up vector is the normal of {thing.name}")
+    return up / np.linalg.norm(up)
+
+
+def moved_files(thing: RadianceObject) -> list[Issue]:
+    """Function files of a surface's modifiers that were not where their names say."""
+    issues = []
+    for one in thing.definitions:
+        for name in one.primitive.strings:
+            if not name.endswith(".cal"):
+                continue
+            path = find_functions(name, one.primitive.file)
+            if path is not None and not _is_stated(path, name, one.primitive.file.parent):
+                where = f"{one.primitive.file}:{one.primitive.line}"
+                values = {"name": name, "used": str(path)}
+                issues.append(Issue("function-file-elsewhere", where, values))
+    return issues
+
+
+def _is_stated(path: Path, name: str, folder: Path) -> bool:
+    """Whether a file is where its name says, from the working directory or the scene's folder."""
+    return any(place.is_file() and place.samefile(path) for place in (Path(name), folder / name))
+
+
+def _bsdf_layer(thing: RadianceObject) -> KlemsBsdf:
+    file = read_bsdf_xml(thing.primitive.file.parent / thing.material.bsdf)
+    return klems_of(file.bands.get("Visible") or file.bands["Solar"]).filled()
+
+
+def _layer(thing: RadianceObject, outward: bool, issues: list[Issue]) -> WindowLayer:
+    material, zero = thing.material, np.zeros(len(ANGLES))
+    patterns = thing.definitions[:-1]
+    for one in patterns:
+        if one.primitive.kind not in COMPUTED_PATTERNS:
+            raise one.primitive.fault(
+                f"on window {thing.name}: patterns of this type are not computed; "
+                "give the window's mean transmissivity without it"
+            )
+    scale = np.ones((len(ANGLES), 1))
+    if patterns:
+        scale = pattern_values(thing.triangles, thing.normal, patterns, ANGLES)
+    if patterns:
+        first = patterns[0].primitive
+        values = {"pattern": first.name, "surface": thing.name, "mean": float(scale.mean()),
+                  "least": float(scale.min()), "greatest": float(scale.max())}  # fmt: skip
+        issues.append(Issue("glass-pattern-averaged", f"{first.file}:{first.line}", values))
+    if material.kind == "glass":
+        passed = np.clip(material.transmissivity * scale, 0.0, 1.0)
+        tau, rho = polarised_shares(np.cos(ANGLES)[:, None], material.index, passed)
+        tau, rho = tau.mean(axis=2), rho.mean(axis=2)
+        return WindowLayer(PaneOptics(tau, rho, rho), zero, zero, zero)
+    colour = np.minimum(scale, 1.0).mean(axis=1)
+    if material.kind.startswith("trans"):
+        return _trans_layer(thing, colour)
+    if material.kind == "BRTDfunc":
+        return _function_layer(thing, outward, colour)
+    raise thing.primitive.fault(f"{material.kind} is not computed as a layer of a window")
+
+
+def _trans_layer(thing: RadianceObject, colour: NDArray[np.float64]) -> WindowLayer:
+    """A smooth `trans`: diffuse and straight transmission."""
+    numbers = thing.definitions[-1].primitive.numbers
+    specular, roughness, passed, straight = numbers[3], numbers[4], *numbers[-2:]
+    if passed * straight > 0 and roughness**2 > SMOOTH:
+        raise thing.definitions[-1].primitive.fault(
+            f"scatters its beam in a lobe of roughness {roughness:g}: make its BSDF by genBSDF"
+        )
+    mirrored = lacquer(specular, roughness).reflectance(np.cos(ANGLES))
+    rest = colour * luminance(numbers) * (1 - mirrored)
+    beam, mirror = (np.stack([v, v]) for v in (rest * passed * straight, mirrored))
+    diffuse = rest * (1 - passed)
+    scattered = rest * passed * (1 - straight)
+    return WindowLayer(PaneOptics(beam, mirror, mirror), scattered, diffuse, diffuse)
+
+
+def _function_layer(
+    thing: RadianceObject, outward: bool, colour: NDArray[np.float64]
+) -> WindowLayer:
+    """A `BRTDfunc` with specular functions of the angle of incidence and diffuse shares."""
+    definition = thing.definitions[-1]
+    primitive = definition.primitive
+    if len(primitive.strings) < 10 or len(primitive.numbers) < 9:
+        raise primitive.fault("expected 10 strings and 9 numbers")
+    functions, frame = functions_of(definition, primitive.strings[9:])
+    normal, shares = thing.normal, []
+    points = np.tile(thing.triangles.mean(axis=(0, 1)), (TURNS, 1))
+    for side in (1, -1):
+        names = ray_variables(points, frame, side * normal, normal, ANGLES)
+        texts = primitive.strings[:9]
+        each = [
+            np.maximum(evaluated(definition, functions, text, names), 0.0)
+            + np.zeros((len(ANGLES), TURNS))
+            for text in texts
+        ]
+        if any(values.max() > 0 for values in each[6:]):
+            raise primitive.fault(
+                "its functions of two directions (brtd) are not computed: give a BSDF"
+            )
+        grey = [np.tensordot(LUMINANCE, np.stack(each[i : i + 3]), axes=1) for i in (0, 3)]
+        for values in grey:
+            if not values.max() <= 1 + 1e-6:
+                raise primitive.fault(f"a function is {values.max():g}: expected 1 at the most")
+            if np.ptp(values, axis=1).max() > APART * max(values.max(), 1e-9):
+                raise primitive.fault(
+                    "depends on the azimuth of the light: make its BSDF by genBSDF"
+                )
+        shares.append([np.clip(values.mean(axis=1), 0, 1) for values in grey])
+    front, back, passed = (luminance(primitive.numbers[i : i + 3]) for i in (0, 3, 6))
+    if not outward:
+        shares, front, back = shares[::-1], back, front
+    tau = np.stack([shares[0][1]] * 2)
+    rho_front, rho_back = (np.stack([one[0]] * 2) for one in shares)
+    return WindowLayer(
+        PaneOptics(tau * colour, rho_front * colour, rho_back * colour),
+        passed * colour, front * colour, back * colour,
+    )  # fmt: skip
+
+
+def _patch_means(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return AngularTable(ANGLES, np.clip(values, 0, 1)).patch_means(KLEMS_FULL)

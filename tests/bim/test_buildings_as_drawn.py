@@ -1,0 +1,136 @@
+"""Outdoor spaces, heights, north and missing GlobalIds, as authoring programs draw them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bim.ifc.building import read_ifc
+from bim.ifc.north import north_rotation
+from tests.bim.small_ifc import DEPTH, HEIGHT, WALL, WIDTH, box_model, empty_project
+from tests.issues import codes, of_code
+
+OUT = 1.7  # depth of a balcony [m]
+
+
+def _read(small, tmp_path, corrections: str = ""):
+    path = tmp_path / "m.ifc"
+    small.model.write(str(path))
+    path.with_name("m.corrections.toml").write_text(corrections)
+    return read_ifc(path)
+
+
+def _balcony(name: str, *, roof: bool, front: float = 1.0):
+    """The box with a space outside of its window: two side walls and a front of so much height."""
+    small, _ = box_model()
+    low = -WALL - OUT
+    for x in (-WALL, WIDTH):
+        small.box("IfcWall", "side", (x, low, 0.0), (WALL, OUT, HEIGHT))
+    small.box("IfcWall", "front", (-WALL, low - 0.1, 0.0), (WIDTH + 2 * WALL, 0.1, front))
+    small.box("IfcSlab", "floor out", (-WALL, low, -0.2), (WIDTH + 2 * WALL, OUT, 0.2))
+    if roof:
+        small.box("IfcSlab", "roof out", (-WALL, low, HEIGHT), (WIDTH + 2 * WALL, OUT, 0.2))
+    small.box("IfcSpace", "2", (0.0, low, 0.0), (WIDTH, OUT, HEIGHT), LongName=name)
+    return small
+
+
+@pytest.mark.parametrize(
+    ("name", "roof", "front"),
+    [
+        ("Loggia", True, 1.0), ("Balkon", True, 1.0), ("Space 7", True, 1.0),
+        ("Terrasse", False, 1.0), ("Innenhof", False, HEIGHT), ("Space 7", False, HEIGHT),
+    ],
+)  # fmt: skip
+def test_spaces_open_to_the_air_are_outdoors_and_windows_look_out(tmp_path, name, roof, front):
+    building = _read(_balcony(name, roof=roof, front=front), tmp_path)
+    assert [space.name for space in building.spaces] == ["R1"]
+    assert len(building.spaces[0].windows) == 1
+    assert len(of_code(building, "space-outdoors")) == 1
+
+
+def test_an_enclosed_space_is_a_room_whatever_its_name(tmp_path):
+    building = _read(_balcony("Loggia", roof=True, front=HEIGHT), tmp_path)
+    assert len(building.spaces) == 2
+    # the window between them is inner glass then, and the verdict says so
+    assert building.account.inner_only == ("R1 Room", "2 Loggia")
+    assert any("inner glass" in reason for reason in building.account.reasons)
+
+
+def test_corrections_say_what_is_outdoors(tmp_path):
+    loggia = _balcony("Loggia", roof=True)
+    kept = _read(loggia, tmp_path, "indoors = ['IfcSpace, LongName=\"Loggia\"']")
+    assert len(kept.spaces) == 2
+    left = _read(loggia, tmp_path, "outdoors = ['IfcSpace, Name=\"R1\"']")
+    assert "R1" not in [space.name for space in left.spaces]
+
+
+def test_a_room_whose_roof_the_file_lacks_is_kept(tmp_path):
+    building = _read(box_model(roof=False)[0], tmp_path)
+    assert len(building.spaces) == 1
+
+
+def test_a_space_through_its_roof_is_cut_there(tmp_path):
+    building = _read(box_model(space_height=HEIGHT + 1.0)[0], tmp_path)
+    (space,) = building.spaces
+    assert space.drawn_volume == pytest.approx(WIDTH * DEPTH * HEIGHT, abs=0.01)
+    (issue,) = of_code(building, "room-cut")
+    assert issue.values["before"] == pytest.approx(WIDTH * DEPTH * (HEIGHT + 1), abs=0.01)
+    assert any(face.kind == "roof" and face.element is not None for face in space.faces)
+
+
+def test_a_gallery_cuts_nothing(tmp_path):
+    small, _ = box_model()
+    small.box("IfcSlab", "gallery", (0.0, 0.0, 1.5), (WIDTH, DEPTH - 1.5, 0.2))
+    assert "room-cut" not in codes(_read(small, tmp_path))
+
+
+def test_elements_without_a_guid_are_told_apart(tmp_path):
+    small, _ = box_model(places=((0.5, 1.0, 1.0, 1.2), (2.2, 1.0, 1.2, 1.2)))
+    for window in small.model.by_type("IfcWindow"):
+        window.GlobalId = ""
+    building = _read(small, tmp_path)
+    windows = building.spaces[0].windows
+    assert len({window.guid for window in windows}) == 2
+    assert of_code(building, "guid-missing")[0].values["count"] == 2
+
+
+def _north(x: float, y: float, *more: float, axis=None, origin=(4e5, 58e5, 30.0)):
+    model = empty_project(true_north=None).model
+    context = model.by_type("IfcGeometricRepresentationContext", include_subtypes=False)[0]
+    context.TrueNorth = model.create_entity("IfcDirection", (float(x), float(y), *more))
+    if axis is not None:
+        crs = model.create_entity("IfcProjectedCRS", Name="EPSG:25833")
+        model.create_entity("IfcMapConversion", context, crs, *origin, *axis, 1.0)
+    return model
+
+
+def _angle(model, corrected: float | None = None) -> tuple[float, list[str]]:
+    """Direction of +y from north to east [deg]."""
+    rotation, issues = north_rotation(model, corrected)
+    return float(np.degrees(np.arctan2(rotation[0, 1], rotation[1, 1]))), [i.code for i in issues]
+
+
+def test_a_third_component_of_true_north_changes_nothing():
+    assert _angle(_north(1.0, 1.0, 0.0)) == _angle(_north(1.0, 1.0)) == (pytest.approx(-45.0), [])
+    assert _angle(_north(0.0, 0.0, 1.0))[1] == ["true-north-invalid"]
+
+
+@pytest.mark.parametrize(
+    ("true", "turn", "origin", "angle", "codes_"),
+    [
+        ((0.0, 1.0), 45.0, (4e5, 58e5, 30.0), -45.0, ["north-contradicts-map"]),
+        ((1.0, 1.0), 0.0, (4e5, 58e5, 30.0), 0.0, ["north-contradicts-map"]),
+        ((1.0, 1.0), 43.0, (4e5, 58e5, 30.0), -45.0, []),  # convergence
+        ((1.0, 1.0), 0.0, (0.0, 0.0, 0.0), -45.0, []),  # what a program without a map writes
+    ],
+)
+def test_the_map_conversion_has_precedence(true, turn, origin, angle, codes_):
+    turned = np.radians(turn)
+    model = _north(*true, axis=(float(np.cos(turned)), float(np.sin(turned))), origin=origin)
+    assert _angle(model) == (pytest.approx(angle, abs=1e-6), codes_)
+
+
+def test_north_is_corrected(tmp_path):
+    assert _angle(_north(0.0, 1.0), 30.0) == (pytest.approx(30.0), ["north-corrected"])
+    building = _read(box_model()[0], tmp_path, "north = 90")
+    np.testing.assert_allclose(building.windows[0].normal, (-1, 0, 0), atol=1e-9)

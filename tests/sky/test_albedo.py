@@ -1,0 +1,81 @@
+"""Ground reflectance by number, month, weather file and snow, and what it changes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.sky.albedo import SNOW, with_albedo
+from mitsuba_cfs.sky.annual import annual_sky
+from mitsuba_cfs.sky.epw import read_epw
+from scenes.demo import WEATHER
+
+MONTHS = tuple(0.1 + 0.05 * month for month in range(12))
+
+
+@pytest.fixture(scope="module")
+def weather():
+    return read_epw(WEATHER)
+
+
+def snowed(weather, cm: float = 12.0, warmest: float = -2.0):
+    """The weather with snow in cold hours and none else."""
+    depth = np.where(weather.dry_bulb_c < warmest, cm, 0.0)
+    return replace(weather, snow_depth_cm=depth)
+
+
+def test_ground_of_the_sky_follows_number_and_month(weather):
+    """Patch 0 is rho E_gh / pi: in proportion to the albedo of its hour, all others unchanged."""
+    before = annual_sky(weather, 1, solar=True, sun=False)
+    half = annual_sky(with_albedo(weather, 0.1), 1, solar=True, sun=False)
+    np.testing.assert_allclose(half.whole[0], before.whole[0] / 2, rtol=1e-5)
+    np.testing.assert_array_equal(half.whole[1:], before.whole[1:])
+    monthly = annual_sky(with_albedo(weather, MONTHS), 1, solar=True, sun=False)
+    month = weather.midpoints.month.to_numpy()[before.lit] - 1
+    ratio = np.array(MONTHS)[month] / 0.2
+    for part in ("whole", "solar"):
+        a, b = getattr(monthly, part), getattr(before, part)
+        np.testing.assert_allclose(a[0], b[0] * ratio, rtol=1e-5)
+
+
+def test_snow_and_the_files_albedo(weather):
+    snow = snowed(weather)
+    bright = with_albedo(snow, "snow").albedo
+    assert set(np.unique(bright)) == {0.2, SNOW}
+    assert ((bright == SNOW) == (snow.snow_depth_cm >= 1)).all()
+    stated = np.where(weather.dry_bulb_c < 0, np.nan, 0.31)
+    filed = with_albedo(replace(weather, stated_albedo=stated), "file")
+    assert set(np.unique(filed.albedo)) == {0.2, 0.31}
+    assert "albedo is missing in" in str(filed.notes[-1])
+    (note,) = set(with_albedo(snow, None).notes) - set(weather.notes)
+    assert "snow lies in" in str(note)
+    assert with_albedo(weather, None).notes == weather.notes
+
+
+def test_what_cannot_be_is_refused(weather):
+    no_snow = replace(weather, snow_depth_cm=None, stated_albedo=None)
+    for source, message in (("snow", "no snow depth"), ("file", "no albedo")):
+        with pytest.raises(DataError, match=message):
+            with_albedo(no_snow, source)
+    with pytest.raises(DataError, match="days warmer than 10 °C"):
+        with_albedo(snowed(weather, warmest=99.0), "snow")
+    for wrong in (1.2, (0.2, 0.3), "grass"):
+        with pytest.raises(DataError, match="expected a number"):
+            with_albedo(weather, wrong)
+
+
+def test_columns_of_an_epw(tmp_path):
+    """Snow depth and albedo are columns 31 and 33; 999 and 0 are no albedo."""
+    lines = WEATHER.read_text(encoding="latin-1").splitlines()
+    rows = [line.split(",") for line in lines[8:]]
+    for i, row in enumerate(rows):
+        row[30], row[32] = ("15", "0.63") if i < 10 else ("0", "0")
+    path = tmp_path / "city.epw"
+    path.write_text("\n".join([*lines[:8], *map(",".join, rows)]) + "\n", encoding="latin-1")
+    weather = read_epw(path)
+    np.testing.assert_allclose(weather.stated_albedo[:10], 0.63)
+    assert np.isnan(weather.stated_albedo[10:]).all()
+    np.testing.assert_allclose(weather.snow_depth_cm[:11], [15.0] * 10 + [0.0])
