@@ -226,8 +226,8 @@ def _told(
         why: OSError | None = None
         if isinstance(error, OSError):
             about = place if error.filename is None else Path(os.fsdecode(error.filename))
-            own = TEMPORARY.fullmatch(about.name) and about.parent == place.parent
-            if not own and about not in (place, place.parent, Path(path)):
+            match = TEMPORARY.fullmatch(about.name) and about.parent == place.parent
+            if not match and about not in (place, place.parent, Path(path)):
                 raise
             why = error
         if probe is not None and getattr(error, "errno", None) is None:

@@ -130,8 +130,8 @@ class ResultFolder:
             earlier = set()
         FolderMark(self._command, files, tuple(earlier)).write(part)
 
-    def kept(self, name: str) -> Path:
-        """A folder inside for what is kept while the command works; it is never cleared."""
+    def checkpoints(self, name: str) -> Path:
+        """A folder inside for checkpoints of the command; it is never cleared."""
         made: list[Path] = []
         try:
             made = _make_folders(self._place / name)
@@ -252,7 +252,9 @@ def _files(folder: Path) -> Iterator[str]:
 def _taken(place: Path, name: str) -> bool:
     """Whether a name cannot be given to a result without touching something else."""
     path = place / name
-    folders = [one for one in path.parents if one.is_relative_to(place) and one != place]
+    folders = [
+        parent for parent in path.parents if parent.is_relative_to(place) and parent != place
+    ]
     return os.path.lexists(path) or any(os.path.lexists(p) and not p.is_dir() for p in folders)
 
 

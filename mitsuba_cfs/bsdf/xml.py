@@ -209,7 +209,7 @@ def _read_blocks(layer, path, notes: list[str], reader) -> dict[str, Bsdf]:
             blocks.setdefault(band, {})[name] = _without_negatives(block, where, notes)
     if not blocks:
         raise DataError("no scattering data", file=path, element="WavelengthData")
-    return {band: reader.band(found, band, path) for band, found in blocks.items()}
+    return {band: reader.band(result, band, path) for band, result in blocks.items()}
 
 
 def _without_negatives(block, where: str, notes: list[str]):
@@ -258,7 +258,7 @@ def _material(layer: ElementTree.Element, path: str | PathLike[str]) -> dict:
     material = layer.find("Material")
     if material is None:
         return {}
-    found = {
+    result = {
         "name": _text(material.find("Name")),
         "manufacturer": _text(material.find("Manufacturer")),
         "device_type": _text(material.find("DeviceType")) or "Other",
@@ -269,7 +269,7 @@ def _material(layer: ElementTree.Element, path: str | PathLike[str]) -> dict:
             unit = element.get("unit", "Meter")
             if unit.lower() not in UNIT_METRES:
                 raise DataError(f"unknown unit {unit!r}", file=path, element="Material", field=tag)
-            found[tag.lower()] = _number(element, path, 0.0) * UNIT_METRES[unit.lower()]
+            result[tag.lower()] = _number(element, path, 0.0) * UNIT_METRES[unit.lower()]
     for tag, name, most in (
         ("EmissivityFront", "emissivity_front", 1.0),
         ("EmissivityBack", "emissivity_back", 1.0),
@@ -277,17 +277,17 @@ def _material(layer: ElementTree.Element, path: str | PathLike[str]) -> dict:
         ("ThermalConductivity", "conductivity", math.inf),
     ):
         if _text(material.find(tag)):
-            found[name] = _number(material.find(tag), path, 0.0, most)
-    return found
+            result[name] = _number(material.find(tag), path, 0.0, most)
+    return result
 
 
 def _need(
     element: ElementTree.Element, tags: str, path: str | PathLike[str]
 ) -> ElementTree.Element:
-    found = element.find(tags)
-    if found is None:
+    need = element.find(tags)
+    if need is None:
         raise DataError("is missing", file=path, element=element.tag, field=tags)
-    return found
+    return need
 
 
 def _text(element: ElementTree.Element | None) -> str:

@@ -108,9 +108,9 @@ class MatrixCache:
 
     def trim(self, keep: Path | None = None) -> None:
         """Delete the longest unused files until the folder holds less than the limit."""
-        found = [(file, _status(file)) for file in self.folder.glob("*.npz")]
+        result = [(file, _status(file)) for file in self.folder.glob("*.npz")]
         files = sorted(
-            ((file, status) for file, status in found if status), key=lambda item: item[1].st_mtime
+            ((file, status) for file, status in result if status), key=lambda item: item[1].st_mtime
         )
         total = sum(status.st_size for _, status in files)
         for file, status in files:

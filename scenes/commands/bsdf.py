@@ -400,7 +400,7 @@ def _interpolated(measured: Sequence[Measurement], means: _Means) -> dict[str, B
         _print_shares(patterns, bands.index("Visible"))
         for band, values in zip(bands, means.of(interpolant), strict=True):
             blocks[band][block] = values
-    return {band: means.bsdf(found) for band, found in blocks.items()}
+    return {band: means.bsdf(result) for band, result in blocks.items()}
 
 
 @dataclass(frozen=True)
@@ -484,15 +484,15 @@ def thermal(
     missing = [path for path in states if not path.is_file()]
     if missing:
         raise DataError("no such file", file=missing[0])
-    found = [rated_state(path, place=place, glazing=glazing, kappa=kappa) for path in states]
-    rows = [row for state in found for row in state.rows()]
+    rated_states = [rated_state(path, place=place, glazing=glazing, kappa=kappa) for path in states]
+    rows = [row for state in rated_states for row in state.rows()]
     for line in printed(rows):
         click.echo(line)
-    for note in dict.fromkeys(n for s in found for n in s.notes):
+    for note in dict.fromkeys(n for s in rated_states for n in s.notes):
         if place is None:
             click.echo(f"note: {note}")
     if out is not None and out.suffix == ".json":
-        by_patch = {s.path.stem: [round(float(g), 5) for g in s.heat.g_value] for s in found}
+        by_patch = {s.path.stem: [round(float(g), 5) for g in s.heat.g_value] for s in rated_states}
         record = {"rows": rows} if place else {"rows": rows, "g by patch": by_patch}
         write_text(out, json.dumps(record, indent=2) + "\n")
     elif out is not None:
@@ -500,4 +500,4 @@ def thermal(
 
         write_table(pd.DataFrame(rows), out, index=False, float_format="%.4f")
     if toml is not None:
-        write_text(toml, thermal_toml(found[0]))
+        write_text(toml, thermal_toml(rated_states[0]))

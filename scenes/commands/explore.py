@@ -45,7 +45,7 @@ def command(
     from scenes.language.catalogue import in_language
     from scenes.result_folder import ResultFolder
 
-    folders = [explorer_of(one) for one in results]
+    folders = [explorer_of(result) for result in results]
     for one in results:
         _print_head(one, several=len(results) > 1)
     if out is not None:

@@ -312,8 +312,8 @@ def _plan(room: RoomYear) -> dict[str, Any]:
 
 
 def _rings(outline: shapely.Geometry) -> list[list[list[float]]]:
-    polygons = [one for one in shapely.get_parts(outline) if one.geom_type == "Polygon"]
-    rings = [ring for one in polygons for ring in (one.exterior, *one.interiors)]
+    polygons = [part for part in shapely.get_parts(outline) if part.geom_type == "Polygon"]
+    rings = [ring for polygon in polygons for ring in (polygon.exterior, *polygon.interiors)]
     return [np.round(shapely.get_coordinates(ring)[:-1], 3).tolist() for ring in rings]
 
 

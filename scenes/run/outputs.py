@@ -100,9 +100,12 @@ def _write_rooms(
     """The files of each room in its folder."""
     rooms = list(zip(result.spaces, places, strict=True))
     tasks = Tasks(
-        rooms, _Files(result.times), _fault,
-        key=lambda item: item[0].space.guid, scene=lambda item: item[0].space.guid,
-    )  # fmt: skip
+        rooms,
+        _Files(result.times),
+        _fault,
+        key=lambda item: item[0].space.guid,
+        scene=lambda item: item[0].space.guid,
+    )
     # a process takes as long to begin as it does to write some rooms
     processes = min(processes, len(rooms) // ROOMS_A_PROCESS)
     with closing(tasks.results(processes=processes)) as written:

@@ -22,7 +22,7 @@ from scenes.explore.folder import CASE, read_data, write_rooms
 from scenes.results import RunResult
 from scenes.study.one_case import ALONE, case_inputs, case_year
 from scenes.study.plan import Case
-from scenes.study.store import said
+from scenes.study.store import failure_line
 from scenes.workers import Tasks
 
 PHASED = ("three-phase", "five-phase")  # a path tracer has no matrices to compute an hour from
@@ -54,10 +54,10 @@ def compute_explorer(case: Case, progress: Progress = silent) -> ExploredCase:
         room, weather = case_year(inputs, case, explore=True, progress=progress), inputs.weather
         run = RunResult(
             inputs.building, weather.midpoints, sun_directions(weather), (room,), (), {}
-        )  # fmt: skip
+        )
         write_rooms(run, folder)
-        found = (one for one in folder.rglob("*") if one.is_file())
-        files = {one.relative_to(folder).as_posix(): one.read_bytes() for one in found}
+        result = (one for one in folder.rglob("*") if one.is_file())
+        files = {one.relative_to(folder).as_posix(): one.read_bytes() for one in result}
         return ExploredCase(explorer_key(case), files, read_data(folder / CASE))
 
 
@@ -85,10 +85,10 @@ def explorers(
     compute = partial(compute_explorer, progress=progress) if here else compute_explorer
     tasks = Tasks(left, compute, _failed, key=explorer_key, scene=attrgetter("scene"))
     with closing(tasks.results(processes=processes, scheduler=scheduler)) as results:
-        for found in results:
-            if not found.error:
-                _keep(found, folder)
-            yield once[found.key], ExploredCase(found.key, {}, found.shown, found.error)
+        for result in results:
+            if not result.error:
+                _keep(result, folder)
+            yield once[result.key], ExploredCase(result.key, {}, result.shown, result.error)
 
 
 def _kept(key: str, folder: Path) -> ExploredCase | None:
@@ -108,4 +108,4 @@ def _keep(explored: ExploredCase, folder: Path) -> None:
 
 
 def _failed(case: Case, error: BaseException) -> ExploredCase:
-    return ExploredCase(explorer_key(case), error=said(error))
+    return ExploredCase(explorer_key(case), error=failure_line(error))
