@@ -234,7 +234,6 @@ def _of_space(
                         options=RoomOptions.of(**options),
                         program=program_version(),
                         glare=study.glare,
-                        albedo=study.albedo,
                         chosen=AUTO if method == AUTO else "",
                     )
 
