@@ -7,6 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
 
 from bim.account import NOT_USABLE
 from bim.model import Building, Space
@@ -18,6 +22,7 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import source_notes, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.fenestration.thermal_system import thermal_system
+from scenes.toml_file import validated
 
 # Labels of the issues in a head, by severity, the gravest first; "info" changes nothing
 LABELS = {
@@ -89,15 +94,31 @@ class Head:
 NO_HEAD = Head(())
 
 
-def record_lines(record: Mapping[str, list]) -> tuple[str, ...]:
-    """The lines of a head from its record in a JSON file."""
+class IssueRecord(BaseModel):
+    """An issue as `Head.record` holds it, of which the lines need this."""
+
+    severity: str
+    text: str
+
+
+class HeadRecord(BaseModel):
+    """A head as `Head.record` holds it."""
+
+    model: tuple[str, ...]
+    issues: tuple[IssueRecord, ...]
+    assumed: tuple[str, ...]
+
+
+def record_lines(record: Any, file: Path) -> tuple[str, ...]:
+    """The lines of a head from its record in a JSON file; `DataError` where it is none."""
+    head = validated(HeadRecord, record, file)
     issues = (
-        f"{label}: {one['text']}"
+        f"{label}: {one.text}"
         for severity, label in LABELS.items()
-        for one in record["issues"]
-        if one["severity"] == severity
+        for one in head.issues
+        if one.severity == severity
     )
-    return (*record["model"], *issues, *(f"assumed: {text}" for text in record["assumed"]))
+    return (*head.model, *issues, *(f"assumed: {text}" for text in head.assumed))
 
 
 def joined(heads: Iterable[Head]) -> Head:

@@ -51,7 +51,7 @@ def read_table(path: Path) -> dict[str, Any]:
     """What a TOML file holds; `DataError` where it is none."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise DataError(f"is not TOML: {error}", file=path) from error
     except OSError as error:
         raise DataError(f"cannot be read: {reason(error)}", file=path) from error

@@ -11,6 +11,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
+from xml.parsers import expat
 from xml.sax.saxutils import escape
 
 import numpy as np
@@ -85,6 +86,7 @@ def _optical_layer(path: str | PathLike[str], notes: list[str]) -> ElementTree.E
     start = max(content.find(b"<"), 0)
     if content[:start].strip(b" \t\r\n\xef\xbb\xbf"):  # genBSDF may leave a line of its own
         notes.append(f"{start} bytes before the XML left out")
+    _refuse_entities(content[start:], path)
     try:
         root = ElementTree.fromstring(content[start:])
     except (ElementTree.ParseError, ValueError, LookupError) as error:
@@ -98,6 +100,30 @@ def _optical_layer(path: str | PathLike[str], notes: list[str]) -> ElementTree.E
     if len(layers) != 1:
         raise DataError(f"expected one Optical/Layer, got {len(layers)}", file=path)
     return layers[0]
+
+
+class _RootStarts(Exception):
+    """The part of a document that may declare entities has ended."""
+
+
+def _refuse_entities(content: bytes, path: str | PathLike[str]) -> None:
+    """Raise `DataError` for a document type with entities, which grow when they are read."""
+
+    def refuse(*_: object) -> None:
+        raise DataError("declares entities, which are not read", file=path)
+
+    def stop(*_: object) -> None:
+        raise _RootStarts
+
+    parser = expat.ParserCreate()
+    parser.EntityDeclHandler, parser.StartElementHandler = refuse, stop
+    try:
+        parser.Parse(content, True)
+    except (_RootStarts, expat.ExpatError, LookupError):
+        return  # no XML: told by the reader of the whole
+    except ValueError as error:
+        if isinstance(error, DataError):
+            raise
 
 
 def _angle_bases(layer: ElementTree.Element, path: str | PathLike[str]) -> dict[str, KlemsBasis]:

@@ -24,6 +24,7 @@ KINDS = {
     "s": "planispheric",
 }
 LETTERS = {kind: letter for letter, kind in KINDS.items()}
+MOST_SHIFT = 1000.0  # of a picture, in its own sizes
 WIDEST_DEG = {"perspective": 180, "hemispherical": 180, "angular": 360, "planispheric": 360}
 
 Triple = tuple[float, float, float]
@@ -57,6 +58,8 @@ class View:
         object.__setattr__(self, "up", _triple(up, "up"))
         if self.width < 1 or self.height < 1:
             raise ValueError(f"a picture of {self.width} x {self.height} pixels")
+        if not max(abs(self.shift), abs(self.lift)) <= MOST_SHIFT:
+            raise ValueError(f"a view shifted by {self.shift:g}, {self.lift:g} pictures")
         widest = WIDEST_DEG.get(self.kind, np.inf)
         open_end = self.kind in ("perspective", "planispheric")
         for name in ("horizontal_deg", "vertical_deg"):

@@ -361,8 +361,10 @@ def interpolate(
     """Convert goniophotometer files (pgII text, one or more per incident direction) to a BSDF.
 
     Prints the scattered fraction of each incident direction with its standard error, and the
-    symmetry that was assumed.
+    symmetry that was assumed.  A BSDF that scatters more light than it receives is refused, as
+    `cfs bsdf check` refuses it.
     """
+    from mitsuba_cfs.bsdf.energy import ENERGY_LIMIT, check_energy
     from mitsuba_cfs.bsdf.measured_file import read_measurement
     from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 
@@ -373,6 +375,10 @@ def interpolate(
         click.echo(f"{grazing} values along the sample's plane are left out")
     means = _klems(basis) if tensor_tree is None else _trees(tensor_tree, cull)
     file = BsdfFile(_interpolated(measured, means))
+    others = f" and {len(files) - 1} more" * (len(files) > 1)
+    for band, bsdf in file.bands.items():
+        for note in check_energy(bsdf, ENERGY_LIMIT, file=f"{files[0]}{others}", band=band):
+            click.echo(f"note: {note}", err=True)
     write_bsdf_xml(replace(file, name=name or measured[0].name), out)
     click.echo(f"{out}: {', '.join(file.bands)}")
 

@@ -81,7 +81,7 @@ def _check_files(request: Request, paths: list[Path]) -> None:
         if target is None:
             continue
         if flag == "--png" or (flag == "-c" and (len(paths) > 1 or target.is_dir())):
-            ResultFolder(target, "glare", adding=True, field=flag)
+            ResultFolder(target, "glare", adding=True, among=True, field=flag)
         else:
             check_file(target, field=flag, inputs=paths)
 
@@ -266,12 +266,16 @@ def _write_pictures(path: Path, picture: Picture, result: GlareResult, request, 
         pixels = check_radiance(result, uniform, show_task=blue)
         view, about = result.geometry.view, (VERSION,)
         if several or check.is_dir():
-            with ResultFolder(check, "glare", adding=True, field="-c").replaced() as place:
+            with ResultFolder(
+                check, "glare", adding=True, among=True, field="-c"
+            ).replaced() as place:
                 write_hdr(place / f"{path.stem}_check.hdr", pixels, view, comments=about)
         else:
             write_hdr(check, pixels, view, comments=about)
     if (folder := request.value("--png")) is not None:
-        with ResultFolder(folder, "glare", adding=True, field="--png").replaced() as place:
+        with ResultFolder(
+            folder, "glare", adding=True, among=True, field="--png"
+        ).replaced() as place:
             _write_png(place, path.stem, picture, result, request.stated.get("--scale"))
 
 

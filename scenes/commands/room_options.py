@@ -375,7 +375,7 @@ def named_settings(settings: Sequence[str], but: Collection[str] = ()) -> dict[s
             raise click.UsageError(f"--set {text!r}: {reason}")
         try:
             table[name] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
+        except (tomllib.TOMLDecodeError, RecursionError):
             table[name] = value  # a word needs no quotes
     result = validated(OptionsTable, table, Path("--set"))
     return {name: getattr(result, name) for name in table}

@@ -18,7 +18,8 @@ from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.source_code import code_version
-from scenes.explore.folder import CASE, read_data, write_rooms
+from scenes.explore.case_files import CASE, read_case
+from scenes.explore.folder import write_rooms
 from scenes.results import RunResult
 from scenes.study.one_case import ALONE, case_inputs, case_year
 from scenes.study.plan import Case
@@ -58,7 +59,7 @@ def compute_explorer(case: Case, progress: Progress = silent) -> ExploredCase:
         write_rooms(run, folder)
         result = (one for one in folder.rglob("*") if one.is_file())
         files = {one.relative_to(folder).as_posix(): one.read_bytes() for one in result}
-        return ExploredCase(explorer_key(case), files, read_data(folder / CASE))
+        return ExploredCase(explorer_key(case), files, read_case(folder))
 
 
 def explorers(
@@ -94,7 +95,7 @@ def explorers(
 def _kept(key: str, folder: Path) -> ExploredCase | None:
     """An explorer that an earlier run finished."""
     try:
-        return ExploredCase(key, {}, read_data(folder / key / CASE))
+        return ExploredCase(key, {}, read_case(folder / key))
     except DataError:
         return None
 

@@ -46,7 +46,10 @@ class CaseResult:
         with opened_arrays(path) as data:
             arrays = {name: data[name] for name in data.files}
         record = json.loads(arrays.pop("record").tobytes())
-        return cls(record["key"], record["figures"], arrays)
+        key, figures = record["key"], dict(record["figures"])
+        if not all(isinstance(value, float | int | str) for value in figures.values()):
+            raise ValueError("figures: expected numbers and texts")
+        return cls(key, figures, arrays)
 
 
 class Store:
