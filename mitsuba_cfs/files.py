@@ -28,6 +28,7 @@ try:
 except ImportError:  # Windows: what a killed process left stays
     fcntl = None  # type: ignore[assignment]
 
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # beginnings of a cell that is computed
 TEMPORARY = re.compile(r"\.cfs-[0-9a-f]{8}\.part(\.\w+)?")  # names of our temporaries
 REASONS = {
     errno.ENOSPC: "the disk is full",
@@ -139,10 +140,44 @@ def opened_arrays(path: str | PathLike[str]) -> Iterator[Any]:
 
 
 def write_table(table: pd.DataFrame, path: str | PathLike[str], **options: object) -> None:
-    """Write a pandas table by the suffix, as `.parquet` or text; options of its writer."""
+    """Write a pandas table by the suffix, as `.parquet` or text; options of its writer.
+
+    In text, entries of a file's words are no formulas of a spreadsheet (`without_formulas`).
+    """
     with replacing(path) as part:
-        write = table.to_parquet if part.suffix == ".parquet" else table.to_csv
-        write(part, **options)
+        if part.suffix == ".parquet":
+            table.to_parquet(part, **options)
+        else:
+            without_formulas(table).to_csv(part, **options)
+
+
+def without_formulas(table: pd.DataFrame) -> pd.DataFrame:
+    """The table with its texts, names of columns and rows as `plain_cell`."""
+    import pandas as pd
+
+    texts = [k for k, kind in enumerate(table.dtypes) if kind.kind not in "biufcmM"]
+    if texts:
+        table = table.copy(deep=False)
+        for k in texts:
+            column = table.iloc[:, k]
+            cells = [plain_cell(value) for value in column]
+            table.isetitem(k, pd.Series(cells, table.index, dtype=object))
+    index = table.index if table.index.dtype.kind in "biufcmM" else table.index.map(plain_cell)
+    return table.set_axis(table.columns.map(plain_cell), axis=1).set_axis(index, axis=0)
+
+
+def plain_cell(value: Any) -> Any:
+    """A cell that a spreadsheet does not compute: a text that begins as a formula gets a quote.
+
+    Source: OWASP, "CSV Injection". A number stays one, also as a text.
+    """
+    if not isinstance(value, str) or not value.lstrip(" ").startswith(FORMULA):
+        return value
+    try:
+        float(value)
+    except ValueError:
+        return f"'{value}"
+    return value
 
 
 def check_file(
@@ -226,8 +261,8 @@ def _told(
         why: OSError | None = None
         if isinstance(error, OSError):
             about = place if error.filename is None else Path(os.fsdecode(error.filename))
-            own = TEMPORARY.fullmatch(about.name) and about.parent == place.parent
-            if not own and about not in (place, place.parent, Path(path)):
+            match = TEMPORARY.fullmatch(about.name) and about.parent == place.parent
+            if not match and about not in (place, place.parent, Path(path)):
                 raise
             why = error
         if probe is not None and getattr(error, "errno", None) is None:

@@ -67,8 +67,8 @@ def candidates(
     by_target: dict[Path, Path] = {}
     for file in files:
         by_target.setdefault(file.resolve(), file)
-    found = [_judge(file, x86) for file in by_target.values()]
-    return sorted(found, key=lambda library: (not library.usable, _negated(library.version)))
+    judges = [_judge(file, x86) for file in by_target.values()]
+    return sorted(judges, key=lambda library: (not library.usable, _negated(library.version)))
 
 
 def select_library(
@@ -81,7 +81,7 @@ def select_library(
     own = os.environ.get(VARIABLE)
     if own:
         return Path(own)
-    best = next((found for found in candidates(folders, x86=x86) if found.usable), None)
+    best = next((candidate for candidate in candidates(folders, x86=x86) if candidate.usable), None)
     if best is None:
         return None
     os.environ[VARIABLE] = str(best.path)

@@ -44,20 +44,20 @@ def import_closure(modules: tuple[str, ...], root: Path = ROOT) -> frozenset[str
 
     Raises: `ValueError` for a module that is not there.
     """
-    found: set[str] = set()
+    result: set[str] = set()
     waiting = list(modules)
     for name in modules:
         if _file(name, root) is None:
             raise ValueError(f"no module {name} in {root}")
     while waiting:
         name = waiting.pop()
-        if name in found:
+        if name in result:
             continue
-        found.add(name)
+        result.add(name)
         file = _file(name, root)
         if file is not None:
             waiting += _imported(file.read_bytes(), root)
-    return frozenset(found)
+    return frozenset(result)
 
 
 def _imported(source: bytes, root: Path) -> Iterator[str]:
@@ -71,16 +71,16 @@ def _imported(source: bytes, root: Path) -> Iterator[str]:
 @cache
 def _import_statements(source: bytes) -> tuple[tuple[str, str], ...]:
     """Imports of a source as (module, name in it); no name for `import module`."""
-    found: list[tuple[str, str]] = []
+    result: list[tuple[str, str]] = []
     for node in _computing(ast.parse(source), b"import_module" in source):
         if isinstance(node, ast.Import):
-            found += ((alias.name, "") for alias in node.names)
+            result += ((alias.name, "") for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            found += ((node.module, alias.name) for alias in node.names)
+            result += ((node.module, alias.name) for alias in node.names)
         elif isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
             if ast.unparse(node.func).rpartition(".")[2] == "import_module":
-                found.append((str(node.args[0].value), ""))
-    return tuple(dict.fromkeys(found))
+                result.append((str(node.args[0].value), ""))
+    return tuple(dict.fromkeys(result))
 
 
 def _computing(tree: ast.Module, expressions: bool) -> Iterator[ast.AST]:

@@ -55,9 +55,11 @@ class StoredArrays:
 
     def forget(self) -> None:
         """Release arrays from memory until they are used again."""
-        found = [(one, map_) for one in self._maps if (map_ := one()) is not None]
-        self._maps = [one for one, _ in found]
-        for _, map_ in found:
+        result = [
+            (reference, map_) for reference in self._maps if (map_ := reference()) is not None
+        ]
+        self._maps = [one for one, _ in result]
+        for _, map_ in result:
             if hasattr(map_, "madvise"):
                 map_.madvise(mmap.MADV_DONTNEED)
 
@@ -69,9 +71,9 @@ class StoredArrays:
             self._last, self._next = _file(max(BLOCK, size)), 0
             self._maps.append(weakref.ref(self._last))
         start, self._next = self._next, self._next + size
-        found = memoryview(self._last)[start : start + data.nbytes]
-        found[:] = data
-        return found.toreadonly()
+        result = memoryview(self._last)[start : start + data.nbytes]
+        result[:] = data
+        return result.toreadonly()
 
 
 class PassedArrays(Sequence[T]):

@@ -165,7 +165,7 @@ def llvm_fault() -> str | None:
     dr = _tracer("drjit")  # raises where Dr.Jit itself cannot be loaded
     library = llvm.select_library()
     if library is None:
-        rejected = [f"{found.path}: {found.reason}" for found in llvm.candidates()]
+        rejected = [f"{candidate.path}: {candidate.reason}" for candidate in llvm.candidates()]
         return "; ".join(["no usable LLVM library", *rejected[:2]])
     if not _exists(library):
         return f"{llvm.VARIABLE}={library} is no such file"

@@ -94,12 +94,12 @@ def cut_group(group: WindowGroup, regions: Sequence[Region]) -> list[WindowGroup
     """The parts of a group's windows in each region: one group for each region with any."""
     if len(regions) == 1:
         return [group]
-    found = []
+    result = []
     for number, region in enumerate(regions, 1):
         windows = [w for window in group.windows if (w := _cut_window(window, group, region))]
         if windows:
-            found.append(WindowGroup(f"{group.name}, part {number}", tuple(windows)))
-    return found
+            result.append(WindowGroup(f"{group.name}, part {number}", tuple(windows)))
+    return result
 
 
 def _cut_window(window: WindowSurface, group: WindowGroup, region: Region) -> WindowSurface | None:

@@ -105,14 +105,14 @@ def fabric_file(
     shade = named_fabric(shades, fabric, fabrics)
     bands = {"Visible": shade.visible, "Solar": shade.solar}
     layer, more = layer_of_fabric(shade)
-    said = [f"{shade.name} (line {shade.line} of {fabrics})"]
+    message = [f"{shade.name} (line {shade.line} of {fabrics})"]
     for band, at in bands.items():
-        said.append(
+        message.append(
             f"{band}: transmittance {at.transmittance:.3f}, straight on {at.direct:.3f}; "
             f"reflectance {at.reflectance_front:.3f}, back {at.reflectance_back:.3f}"
         )
-    said += [f"as one of the layers of a .toml: {layer}"]
-    said += [f"note: {note}" for note in (*notes, *shade.notes, *more)]
+    message += [f"as one of the layers of a .toml: {layer}"]
+    message += [f"note: {note}" for note in (*notes, *shade.notes, *more)]
     file = BsdfFile(
         {band: fabric_klems(at, BASES[basis]) for band, at in bands.items()},
         name=name or shade.name,
@@ -122,7 +122,7 @@ def fabric_file(
         emissivity_back=shade.emissivity[1],
         infrared_transmittance=shade.infrared_transmittance,
     )
-    return file, "\n".join(said)
+    return file, "\n".join(message)
 
 
 def layer_of_fabric(shade: FabricShade) -> tuple[str, tuple[str, ...]]:

@@ -95,23 +95,23 @@ class KnownFenestration:
         nothing = FenestrationSystem("unknown", None, None)
         systems = {w.guid: (self.systems.get(w.guid, nothing),) for w in space.windows}
         windows = room_windows(space, systems)
-        found = []
+        result = []
         for group, (system,) in zip(windows.groups, windows.systems, strict=True):
             if system is nothing:
-                found.append(FilledGroup(group))
+                result.append(FilledGroup(group))
                 continue
             klems = BsdfFile({"Visible": system.visible, "Solar": system.solar}, system.name)
             tree = None if system.tree is None else BsdfFile({"Visible": system.tree}, system.name)
-            found.append(FilledGroup(group, klems, tree))
-        return found
+            result.append(FilledGroup(group, klems, tree))
+        return result
 
     def bsdfs(self, band: str = "visible") -> dict[str, BsdfFile]:
         """The band of each window, the visible one as finely as it is known, by GUID.
 
         Either stands as the visible one, which is what the scenes' plugins read.
         """
-        found = {g: s.fine if band == "visible" else s.solar for g, s in self.systems.items()}
-        return {g: BsdfFile({"Visible": bsdf}, self.systems[g].name) for g, bsdf in found.items()}
+        result = {g: s.fine if band == "visible" else s.solar for g, s in self.systems.items()}
+        return {g: BsdfFile({"Visible": bsdf}, self.systems[g].name) for g, bsdf in result.items()}
 
 
 def known_fenestration(

@@ -7,6 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
 
 from bim.account import NOT_USABLE
 from bim.model import Building, Space
@@ -18,12 +22,15 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import source_notes, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.fenestration.thermal_system import thermal_system
+from scenes.toml_file import validated
 
 # Labels of the issues in a head, by severity, the gravest first; "info" changes nothing
 LABELS = {
-    "loss": Note("left out"), "warning": Note("warning"), "unused": Note("not used"),
+    "loss": Note("left out"),
+    "warning": Note("warning"),
+    "unused": Note("not used"),
     "assumption": Note("assumed"),
-}  # fmt: skip
+}
 TREES = "trees-by-month"
 NOTED = ("rooms-joined-by-size", TREES)  # codes of issues that are notes of a result's pages
 SHOWN = 8  # kinds of issues of a severity that a head lists
@@ -71,34 +78,57 @@ class Head:
             "model": list(self.model),
             "issues": [
                 {
-                    "code": one.first.code, "severity": one.first.severity, "count": one.count,
-                    "glass_m2": round(one.glass, 3), "where": one.first.where,
+                    "code": one.first.code,
+                    "severity": one.first.severity,
+                    "count": one.count,
+                    "glass_m2": round(one.glass, 3),
+                    "where": one.first.where,
                     "text": one.text("command").line,
                 }
                 for one in ranked(self.issues)
             ],
             "assumed": list(self.assumed),
-        }  # fmt: skip
+        }
 
 
 NO_HEAD = Head(())
 
 
-def record_lines(record: Mapping[str, list]) -> tuple[str, ...]:
-    """The lines of a head from its record in a JSON file."""
+class IssueRecord(BaseModel):
+    """An issue as `Head.record` holds it, of which the lines need this."""
+
+    severity: str
+    text: str
+
+
+class HeadRecord(BaseModel):
+    """A head as `Head.record` holds it."""
+
+    model: tuple[str, ...]
+    issues: tuple[IssueRecord, ...]
+    assumed: tuple[str, ...]
+
+
+def record_lines(record: Any, file: Path) -> tuple[str, ...]:
+    """The lines of a head from its record in a JSON file; `DataError` where it is none."""
+    head = validated(HeadRecord, record, file)
     issues = (
-        f"{label}: {one['text']}"
+        f"{label}: {one.text}"
         for severity, label in LABELS.items()
-        for one in record["issues"]
-        if one["severity"] == severity
+        for one in head.issues
+        if one.severity == severity
     )
-    return (*record["model"], *issues, *(f"assumed: {text}" for text in record["assumed"]))
+    return (*head.model, *issues, *(f"assumed: {text}" for text in head.assumed))
 
 
 def joined(heads: Iterable[Head]) -> Head:
     """One head of several results, each line once."""
     heads = list(heads)
-    issues = {(one.code, one.where, str(one.values)): one for head in heads for one in head.issues}
+    issues = {
+        (issue.code, issue.where, str(issue.values)): issue
+        for head in heads
+        for issue in head.issues
+    }
     return Head(
         _once(line for head in heads for line in head.model),
         tuple(issues.values()),
@@ -124,7 +154,7 @@ def head_of(
     """
     systems = systems or {}
     windows = [w for space in spaces for w in space.windows if w.guid in systems]
-    used = {id(one): one for states in systems.values() for one in states}.values()
+    used = {id(state): state for states in systems.values() for state in states}.values()
     assumed = [
         *notes,
         *source_notes(window_sources(windows, systems)),
@@ -148,7 +178,7 @@ def model_lines(building: Building) -> tuple[str, ...]:
 def _issue_lines(issues: Iterable[Issue], severity: str, audience: Audience) -> list[str]:
     """The issues of a severity by kind, the largest glass area first."""
     kinds = ranked([issue for issue in issues if issue.severity == severity])
-    lines = [_issue_line(one, audience) for one in kinds[:SHOWN]]
+    lines = [_issue_line(kind, audience) for kind in kinds[:SHOWN]]
     if len(kinds) > SHOWN:
         count = sum(one.count for one in kinds[SHOWN:])
         lines.append(
@@ -177,12 +207,14 @@ def model_notes(building: Building) -> tuple[str, ...]:
     """Why the model cannot be used, what was joined, and what no result depends on."""
     account = building.account
     verdict = account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
-    issues = (one for one in building.issues if one.severity == "unused" or one.code in NOTED)
+    issues = (
+        issue for issue in building.issues if issue.severity == "unused" or issue.code in NOTED
+    )
     return (*verdict, *map(issue_note, issues))
 
 
 def unused_notes(building: Building) -> tuple[str, ...]:
-    """What of a building's file a command with uses, sensors and eyes of its own leaves out."""
+    """Uses, sensors and views of a building's file that a command does not use."""
     parts = (building.uses, building.grids, building.views)
     if not any(map(len, parts)) or building.file is None:
         return ()

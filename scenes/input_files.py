@@ -68,9 +68,9 @@ def check_building(options: InputOptions) -> None:
 
     Raises: `DataError` for a file of no format that is read, or an empty name.
     """
+    check_names(options.spaces)
     if options.building is not None:
         check_building_file(options.building)
-    check_names(options.spaces)
 
 
 def check_names(names: Sequence[str], field: str = "--space") -> None:
@@ -143,7 +143,7 @@ def read_building(
         join: rooms to make one, as "Hall + Living".
         furniture: whether furniture is in the light and the views of its room.
         apertures: materials of a Radiance scene's surfaces that are windows.
-        surroundings: files of what stands around, see `bim.with_surroundings`.
+        surroundings: files of the surroundings, see `bim.with_surroundings`.
         surroundings_offset: added to their coordinates [m] in place of any georeference.
         facade_panes: materials of a Radiance scene's panes before dark rooms; they mirror.
 
@@ -159,8 +159,8 @@ def read_building(
 
 def building_of(options: InputOptions, progress: Progress = silent) -> Building:
     """The building of a command's options; raises as `read_building`."""
-    steps = summed(progress, "inputs", STAGES)
-    return read_building_file(options.building, options.read, steps)
+    read = options.read
+    return read_building_file(options.building, read, summed(progress, "inputs", STAGES))
 
 
 def sha256(path: Path) -> str:

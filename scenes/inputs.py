@@ -56,7 +56,9 @@ class Inputs:
     @property
     def used_systems(self) -> list[FenestrationSystem]:
         """Each system of the windows once."""
-        return list({id(one): one for states in self.systems.values() for one in states}.values())
+        return list(
+            {id(state): state for states in self.systems.values() for state in states}.values()
+        )
 
     @property
     def sources(self) -> list[dict]:

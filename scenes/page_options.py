@@ -1,4 +1,4 @@
-"""What a user's file says of a page: title, author, logo, and which sections it has."""
+"""Title, author, logo and sections of a page, from a user's file."""
 
 from __future__ import annotations
 
@@ -17,15 +17,13 @@ from scenes.figures.picture import bytes_uri
 from scenes.language.catalogue import Language, gettext
 from scenes.toml_file import TomlTable, read_table, validated
 
-# Sections that a page can do without, by their names in a file; those of a room hold for each.
-# What was assumed, and the notes, always stand: figures without them mislead.
+# Optional sections of a page, by their names in a file; those of a room apply to each room.
+# Assumptions and notes are always shown: figures without them mislead.
 RunSection = Literal[
     "verdict", "rooms", "daylight", "glare", "operation", "temperatures", "glazing",
     "model", "problems", "method", "inputs", "glossary",
 ]  # fmt: skip
-StudySection = Literal[
-    "verdict", "comparison", "model", "problems", "method", "inputs", "glossary"
-]  # fmt: skip
+StudySection = Literal["verdict", "comparison", "model", "problems", "method", "inputs", "glossary"]
 DossierSection = Literal["rooms", "problems", "sources"]
 GlareSection = Literal["worst", "seats", "views"]
 
@@ -48,7 +46,7 @@ class PageTable(TomlTable, Generic[Section]):
 
 @dataclass(frozen=True, slots=True)
 class PageOptions:
-    """What a page is given beside its results."""
+    """Options of a page besides its results."""
 
     title: str = ""  # empty: the page's own
     author: str = ""
@@ -59,7 +57,7 @@ class PageOptions:
 
     @property
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """What stands in the page's head beside its own facts."""
+        """Additional facts in the page's head."""
         return ((gettext("Author"), self.author),) if self.author else ()
 
     def shows(self, section: str) -> bool:
@@ -74,7 +72,7 @@ def read_page(path: Path | None, sections: Any, language: Language | None = None
     """The options of a page; the page's own where there is no file.
 
     Args:
-        sections: literal type of the sections that this page can do without.
+        sections: literal type of the optional sections of this page.
         language: of the page; None: that of the file.
 
     Raises: `DataError` that names file and key.

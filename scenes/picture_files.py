@@ -8,7 +8,7 @@ from mitsuba_cfs.errors import DataError
 from scenes import input_files
 from scenes.picture_options import PictureOptions
 from scenes.room.picture_hours import hour_of
-from scenes.room_views import NamedView, given_views
+from scenes.room_views import NamedView, parsed_views
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,17 +26,17 @@ def read_files(options: PictureOptions) -> PictureFiles:
     Raises: `DataError` for a file that cannot be used, `PictureHourError` for a wrong hour.
     """
     input_files.check_building(options)
-    view = None if options.view is None else given_view(options.view)
+    view = None if options.view is None else parsed_view(options.view)
     files = input_files.read_files(options, light_only=True)
     return PictureFiles(files, hour_of(options.at, files.weather.midpoints, "--at"), view)
 
 
-def given_view(text: str) -> NamedView:
+def parsed_view(text: str) -> NamedView:
     """The view of a text, or of the first line of a file that holds one.
 
     Raises: `DataError` for one that cannot be traced.
     """
-    view = given_views(text)[0]
+    view = parsed_views(text)[0]
     if view.view.kind == "parallel":  # one eye's rays in one direction: one colour all over
         message = "a parallel view (-vtl) is not traced; expected -vtv, -vtc, -vth, -vta or -vts"
         raise DataError(message, field="--view")

@@ -1,7 +1,7 @@
 """Bounds of what a number in a user's file can mean: beyond them it is a slip of unit or digit.
 
 They are wide on purpose: no building, however odd, lies outside.  Each is stated once here, with
-its reason, and is told with the unit when a value lies outside.
+its reason, and its message states the unit.
 """
 
 from __future__ import annotations
@@ -51,9 +51,12 @@ def _thousandth(value: float) -> float:
 
 
 TEMPERATURE = Limits(
-    -30.0, 60.0, "C", "what rooms are kept at",
+    -30.0,
+    60.0,
+    "C",
+    "what rooms are kept at",
     (("F", lambda f: (f - 32.0) / 1.8 if f < 150 else 1e9), ("K", lambda k: k - 273.15)),
-)  # fmt: skip
+)
 OUTDOOR = Limits(-60.0, 60.0, "C", "weather")
 AIR_CHANGE = Limits(0.0, 200.0, "1/h", "a paint shop has 100")
 DOOR_FLOW = Limits(0.0, 50.0, "m3/s", "a hall's gate in the wind", (("m3/h", lambda v: v / 3600),))

@@ -32,18 +32,19 @@ def provision_levels() -> tuple[ProvisionLevel, ...]:
     """The levels of method 2, the lowest first."""
     criteria = read_table(RULE)["criterion"]
     levels = next(one["level"] for one in criteria if one["key"] == "provision")
-    found = []
+    result = []
     for level in levels:
         limits = {need["area"]: float(need["at_least"]) for need in level["needs"]}
-        found.append(ProvisionLevel(level["name"], limits[TARGET_AREA], limits[MINIMUM_AREA]))
-    return tuple(found)
+        result.append(ProvisionLevel(level["name"], limits[TARGET_AREA], limits[MINIMUM_AREA]))
+    return tuple(result)
 
 
-def level_number(found: DaylightProvision) -> int:
+def level_number(provision: DaylightProvision) -> int:
     """The highest level that a room reaches: 1 the lowest of them, 0 none."""
     met = [
         number
         for number, level in enumerate(provision_levels(), 1)
-        if found.target_illuminance >= level.target and found.minimum_illuminance >= level.minimum
+        if provision.target_illuminance >= level.target
+        and provision.minimum_illuminance >= level.minimum
     ]
     return max(met, default=0)

@@ -35,6 +35,6 @@ HEAT = {
 PV = {"samples": 512}  # of `scenes.photovoltaics.study.run_pv`
 
 
-def picks(table: Mapping[str, object], given: Collection[str]) -> dict:
-    """The choices of a table for options that the user has not given."""
-    return {name: value for name, value in table.items() if name not in given}
+def picks(table: Mapping[str, object], stated: Collection[str]) -> dict:
+    """The choices of a table for options that the user did not state."""
+    return {name: value for name, value in table.items() if name not in stated}

@@ -46,7 +46,7 @@ class FolderMark:
             names = (tuple(map(str, record[key])) for key in ("files", "removed"))
             command = str(record["command"])
             mark = cls(RENAMED.get(command, command), *names)
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return None
         return mark if known and all(map(_inside, mark.files + mark.removed)) else None
 
@@ -72,6 +72,7 @@ class ResultFolder:
         *,
         inputs: Iterable[Path | None] = (),
         adding: bool = False,
+        among: bool = False,
         field: str = "--out",
     ) -> None:
         """Check the folder.
@@ -79,12 +80,14 @@ class ResultFolder:
         Args:
             command: that writes; a folder of another command is refused.
             inputs: files of the command; the folder may not be or contain one.
-            adding: earlier results stay, and the folder may hold other files.
+            adding: earlier results stay.
+            among: the folder may hold files of others from the start.
             field: the option that named the folder.
 
         Raises: `DataError` where the folder is not ours to write into, or cannot be written to.
         """
-        self.folder, self._command, self._adding, self._field = folder, command, adding, field
+        self.folder, self._command, self._field = folder, command, field
+        self._adding, self._among = adding, among
         self._place = Path(os.path.realpath(folder))
         if not adding:
             self._refuse_inputs(inputs)
@@ -130,8 +133,8 @@ class ResultFolder:
             earlier = set()
         FolderMark(self._command, files, tuple(earlier)).write(part)
 
-    def kept(self, name: str) -> Path:
-        """A folder inside for what is kept while the command works; it is never cleared."""
+    def checkpoints(self, name: str) -> Path:
+        """A folder inside for checkpoints of the command; it is never cleared."""
         made: list[Path] = []
         try:
             made = _make_folders(self._place / name)
@@ -169,7 +172,7 @@ class ResultFolder:
             others = self._place.is_dir() and any(
                 not TEMPORARY.fullmatch(one.name) for one in self._place.iterdir()
             )
-            if others and not self._adding:
+            if others and not self._among:
                 raise self._error(
                     f"holds other files (and no {MARK} of earlier results): name another folder"
                 )
@@ -252,7 +255,9 @@ def _files(folder: Path) -> Iterator[str]:
 def _taken(place: Path, name: str) -> bool:
     """Whether a name cannot be given to a result without touching something else."""
     path = place / name
-    folders = [one for one in path.parents if one.is_relative_to(place) and one != place]
+    folders = [
+        parent for parent in path.parents if parent.is_relative_to(place) and parent != place
+    ]
     return os.path.lexists(path) or any(os.path.lexists(p) and not p.is_dir() for p in folders)
 
 

@@ -28,7 +28,7 @@ class NamedView:
     view: View
 
 
-def given_views(text: str, size: int = 800) -> list[NamedView]:
+def parsed_views(text: str, size: int = 800) -> list[NamedView]:
     """Views of a Radiance view file, a line each, or of the text itself.
 
     Args: size: of their pictures [px].
@@ -42,16 +42,16 @@ def given_views(text: str, size: int = 800) -> list[NamedView]:
         except (OSError, UnicodeDecodeError) as error:
             raise DataError(f"cannot be read: {reason(error)}", file=file, field="--view") from None
         stem = file.stem
-    found = []
+    result = []
     for number, line in enumerate(line for line in lines if "-v" in line):
         try:
             view = parse_view(line, size, size)
         except ValueError as error:
             raise DataError(str(error), file=file, field="--view") from None
-        found.append(NamedView(f"{stem}_{number + 1}", view))
-    if not found:
+        result.append(NamedView(f"{stem}_{number + 1}", view))
+    if not result:
         raise DataError("holds no view (a line with -vta -vp ... -vd ...)", file=file)
-    return found
+    return result
 
 
 def held_fisheyes(building: Building, space: Space, size: int) -> list[NamedView]:

@@ -50,9 +50,9 @@ class SimulatedYear(RoomYear):
         Raises: `DataError` where the folder holds anything else, or cannot be written to.
         """
         inputs = (Path(entry["path"]) for entry in self.run.manifest["inputs"].values())
-        place = ResultFolder(Path(folder), "run", inputs=inputs, field="folder")
+        result_folder = ResultFolder(Path(folder), "run", inputs=inputs, field="folder")
         page = write_report if report else None
-        write_results(self._whole_run(), place, page, netcdf=netcdf)
+        write_results(self._whole_run(), result_folder, page, netcdf=netcdf)
 
     def to_xarray(self) -> Dataset:
         """All numbers of the year with their units, see `scenes.run.netcdf`.

@@ -51,7 +51,7 @@ def read_table(path: Path) -> dict[str, Any]:
     """What a TOML file holds; `DataError` where it is none."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise DataError(f"is not TOML: {error}", file=path) from error
     except OSError as error:
         raise DataError(f"cannot be read: {reason(error)}", file=path) from error
@@ -70,7 +70,7 @@ def validated(model: type[T], table: dict[str, Any], path: Path) -> T:
         place = [str(part) for part in first["loc"] if part != "[key]"]
         more = f" (and {len(others)} more)" if others else ""
         field = ".".join(place) or None
-        raise DataError(_said(first, model) + more, file=path, field=field) from error
+        raise DataError(_message(first, model) + more, file=path, field=field) from error
 
 
 def tables_of(annotation: object) -> Iterator[type[BaseModel]]:
@@ -83,11 +83,11 @@ def tables_of(annotation: object) -> Iterator[type[BaseModel]]:
 
 def keys_of(annotation: object) -> tuple[str, ...] | None:
     """The keys that a type of table takes; None where it takes any, or is no table."""
-    for one in _alternatives(annotation):
-        if isinstance(one, type) and issubclass(one, BaseModel):
-            return tuple(one.model_fields)
-        if get_origin(one) is dict:
-            key = next(_alternatives(get_args(one)[0]))
+    for alternative in _alternatives(annotation):
+        if isinstance(alternative, type) and issubclass(alternative, BaseModel):
+            return tuple(alternative.model_fields)
+        if get_origin(alternative) is dict:
+            key = next(_alternatives(get_args(alternative)[0]))
             return tuple(map(str, get_args(key))) if get_origin(key) is Literal else None
     return None
 
@@ -96,8 +96,8 @@ def _is_key(fault: Mapping[str, Any]) -> bool:
     return fault["type"] == "extra_forbidden" or fault["loc"][-1:] == ("[key]",)
 
 
-def _said(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
-    """A fault in words of ours: what is expected, and what stands there."""
+def _message(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
+    """A fault as a message: the expected and the actual value."""
     *place, last = fault["loc"] or ("",)
     if last == "[key]":
         *place, last = place
@@ -120,7 +120,11 @@ def _said(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
 
 def _near(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
     """The choice that a wrong one most resembles."""
-    choices = [str(c) for one in _alternatives(_at(model, fault["loc"])) for c in get_args(one)]
+    choices = [
+        str(c)
+        for alternative in _alternatives(_at(model, fault["loc"]))
+        for c in get_args(alternative)
+    ]
     near = get_close_matches(str(fault["input"]), choices, n=1)
     return f"; did you mean {near[0]!r}?" if near else ""
 
@@ -136,18 +140,18 @@ def _shown(value: object) -> str:
 
 
 def _at(annotation: object, place: list[str | int] | tuple[str | int, ...]) -> object:
-    """The type of what stands at a place inside a type."""
+    """The type at a path inside a type."""
     for part in place:
-        found = None
-        for one in _alternatives(annotation):
-            if isinstance(one, type) and issubclass(one, BaseModel):
-                field = one.model_fields.get(str(part))
-                found = found or (field and field.annotation)
-            elif get_origin(one) is dict:
-                found = found or get_args(one)[1]
-            elif get_origin(one) in (tuple, list) and isinstance(part, int):
-                found = found or get_args(one)[0]
-        annotation = found
+        result = None
+        for alternative in _alternatives(annotation):
+            if isinstance(alternative, type) and issubclass(alternative, BaseModel):
+                field = alternative.model_fields.get(str(part))
+                result = result or (field and field.annotation)
+            elif get_origin(alternative) is dict:
+                result = result or get_args(alternative)[1]
+            elif get_origin(alternative) in (tuple, list) and isinstance(part, int):
+                result = result or get_args(alternative)[0]
+        annotation = result
     return annotation
 
 
@@ -156,8 +160,8 @@ def _alternatives(annotation: object) -> Iterator[object]:
     if get_origin(annotation) is Annotated:
         yield from _alternatives(get_args(annotation)[0])
     elif get_origin(annotation) in (Union, UnionType):
-        for one in get_args(annotation):
-            yield from _alternatives(one)
+        for arg in get_args(annotation):
+            yield from _alternatives(arg)
     else:
         yield annotation
 

@@ -23,7 +23,7 @@ class ViewedRoom:
 
     space: Space
     optics: list[list[BsdfOptics]]  # [G][1]
-    seasons: tuple[Season, ...]  # what stands outdoors in which months
+    seasons: tuple[Season, ...]  # surroundings outdoors by months
     scenes: tuple[DaylightScene, ...]  # of each season
     bands: tuple[DaylightScene, ...] = ()  # the first scene by red, green and blue
 
@@ -49,7 +49,7 @@ def viewed_room(
     Args:
         view_of: the view of a building's room; it refuses one that is not in the room.
         colour: the scene in three bands too.
-        month: 1 to 12, of what stands outdoors; None: all seasons.
+        month: 1 to 12, of the surroundings; None: all seasons.
     """
     building, room = inputs.building, inputs.spaces[0]
     view = view_of(building, room)

@@ -68,17 +68,7 @@ NOT_CLEAN: set[str] = {
     "bim",
     "bim/ifc",
     "bim/radiance",
-    "mitsuba_cfs/methods",
     "mitsuba_cfs/trace",
-    "scenes",
-    "scenes/calibration",
-    "scenes/commands",
-    "scenes/comply",
-    "scenes/heat",
-    "scenes/photovoltaics",
-    "scenes/report",
-    "scenes/study",
-    "scenes/year_of_glare",
 }
 
 PHRASE = re.compile("|".join(f"(?:{pattern})" for pattern in PHRASES), re.IGNORECASE)

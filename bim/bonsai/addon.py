@@ -71,12 +71,14 @@ def room_values(results: str, quantity: str) -> dict[str, float]:
         places = json.loads((folder / "run.json").read_text(encoding="utf-8"))["folders"]
         found = {}
         for guid, place in places.items():
+            if Path(place).is_absolute() or ".." in Path(place).parts:
+                raise ValueError(f"{place[:60]!r} is no name of a room's folder")
             with open(folder / place / wanted.file, encoding="utf-8", newline="") as file:
                 cells = [row[wanted.column] for row in csv.DictReader(file)]
             values = [float(cell) for cell in cells if cell]
             if values:
                 found[guid] = max(values)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"cfs: {folder} holds no results of cfs run ({error})") from None
     return found
 
@@ -137,12 +139,15 @@ def room_objects(ifc: Any, colours: Mapping[str, Colour]) -> list[tuple[Any, Col
 
 
 def add_on_classes(bpy: Any) -> Sequence[type]:
-    """The settings, operators and panel, made of Blender's own types."""
+    """The settings, operators and panel, made of Blender's own types.
+
+    The program that is run is a preference of the user: settings of a scene come with its file,
+    which may be a stranger's.
+    """
     props = bpy.props
 
     class CfsSettings(bpy.types.PropertyGroup):
         __annotations__ = {
-            "program": props.StringProperty(name="Command", default="cfs"),
             "weather": props.StringProperty(name="Weather (EPW)", subtype="FILE_PATH"),
             "system": props.StringProperty(name="BSDF of all windows", subtype="FILE_PATH"),
             "results": props.StringProperty(name="Results", subtype="DIR_PATH"),
@@ -153,16 +158,25 @@ def add_on_classes(bpy: Any) -> Sequence[type]:
             "said": props.StringProperty(),
         }
 
+    class CfsPreferences(bpy.types.AddonPreferences):
+        bl_idname = __package__ or __name__
+        __annotations__ = {"program": props.StringProperty(name="Command", default="cfs")}
+
+        def draw(self, context: Any) -> None:
+            self.layout.prop(self, "program")
+
     class CFS_OT_run(bpy.types.Operator):
         bl_idname, bl_label = "cfs.run", "Compute rooms"
 
         def execute(self, context: Any) -> set[str]:
             settings = context.scene.cfs
+            preferences = context.preferences.addons[CfsPreferences.bl_idname].preferences
             out = bpy.path.abspath(settings.results) or tempfile.mkdtemp(prefix="cfs-")
             try:
                 words = run_command(
-                    settings.program, _ifc().get_path() or "", bpy.path.abspath(settings.weather),
-                    out, quick=settings.quick, system=bpy.path.abspath(settings.system),
+                    preferences.program, _ifc().get_path() or "",
+                    bpy.path.abspath(settings.weather), out, quick=settings.quick,
+                    system=bpy.path.abspath(settings.system),
                 )  # fmt: skip
                 self.log = tempfile.TemporaryFile("w+", encoding="utf-8")
                 self.job = subprocess.Popen(words, stdout=self.log, stderr=subprocess.STDOUT)
@@ -209,14 +223,14 @@ def add_on_classes(bpy: Any) -> Sequence[type]:
 
         def draw(self, context: Any) -> None:
             settings = context.scene.cfs
-            for name in ("program", "weather", "system", "results", "quick"):
+            for name in ("weather", "system", "results", "quick"):
                 self.layout.prop(settings, name)
             self.layout.operator("cfs.run")
             self.layout.prop(settings, "quantity")
             self.layout.operator("cfs.colour")
             self.layout.label(text=settings.said)
 
-    return CfsSettings, CFS_OT_run, CFS_OT_colour, CFS_PT_panel
+    return CfsSettings, CfsPreferences, CFS_OT_run, CFS_OT_colour, CFS_PT_panel
 
 
 def _ifc() -> Any:

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import ifcopenshell
-import ifcopenshell.guid
 
 from bim.fenestration import ShadingState
 from bim.ifc.fenestration_write import attach_state
 from bim.ifc.project import open_ifc
-from bim.ifc.property_sets import owner_of, save
+from bim.ifc.property_sets import new_guid, owner_of, save
 from bim.ifc.targets import Targets, target_elements
 
 
@@ -48,7 +47,7 @@ def refer(
     )
     model.create_entity(
         "IfcRelAssociatesDocument",
-        GlobalId=ifcopenshell.guid.new(),
+        GlobalId=new_guid(model, location, *(target.GlobalId for target in targets)),
         OwnerHistory=owner_of(model),
         Name="BSDF",
         RelatedObjects=list(targets),

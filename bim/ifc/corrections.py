@@ -177,7 +177,7 @@ def read_corrections(path: str | PathLike[str]) -> Corrections:
     path = Path(path)
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise DataError(f"is not TOML: {error}", file=path) from None
     except OSError as error:
         raise DataError(f"cannot be read: {reason(error)}", file=path) from None

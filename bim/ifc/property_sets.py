@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
+from uuid import UUID, uuid5
 
 import ifcopenshell
 import ifcopenshell.guid
@@ -11,12 +13,25 @@ import ifcopenshell.guid
 from mitsuba_cfs.files import write_text
 
 Entity = ifcopenshell.entity_instance
+NAMESPACE = UUID("5f6c8a0e-2a5e-5d0c-9b1f-6d1d3c9a7e42")  # of the GlobalIds that are made here
 
 
 def owner_of(model: ifcopenshell.file) -> Entity | None:
     """The first owner history, which IFC2X3 demands of every set; None where there is none."""
     histories = model.by_type("IfcOwnerHistory")
     return histories[0] if histories else None
+
+
+def new_guid(model: ifcopenshell.file, *described: str) -> str:
+    """A GlobalId that the model does not have: the same one for the same model and description."""
+    for number in count():
+        name = "\n".join((*described, str(number)))
+        guid = ifcopenshell.guid.compress(uuid5(NAMESPACE, name).hex)
+        try:
+            model.by_guid(guid)
+        except RuntimeError:
+            return guid
+    raise RuntimeError("no GlobalId is left")
 
 
 def give_set(
@@ -30,17 +45,20 @@ def give_set(
     for target in targets:
         _take_off(model, target, name)
     owner = owner_of(model)
+    described = [name, *(target.GlobalId for target in targets)]
     pset = model.create_entity(
-        "IfcPropertySet", ifcopenshell.guid.new(), owner, name, description, list(properties)
-    )
+        "IfcPropertySet", new_guid(model, "set", *described), owner, name, description,
+        list(properties),
+    )  # fmt: skip
     types = [target for target in targets if target.is_a("IfcTypeObject")]
     for target in types:
         target.HasPropertySets = [*(target.HasPropertySets or ()), pset]
     objects = [target for target in targets if not target.is_a("IfcTypeObject")]
     if objects:
         model.create_entity(
-            "IfcRelDefinesByProperties", ifcopenshell.guid.new(), owner, None, None, objects, pset
-        )
+            "IfcRelDefinesByProperties", new_guid(model, "relation", *described), owner, None,
+            None, objects, pset,
+        )  # fmt: skip
 
 
 def _take_off(model: ifcopenshell.file, target: Entity, name: str) -> None:

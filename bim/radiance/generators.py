@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.radiance.primitives import count_of, number_of
+
 Polygon = tuple[str, NDArray[np.float64]]  # name, corners [n, 3]
 
 # corners of a unit box's sides, counter-clockwise seen from outside
@@ -41,9 +43,9 @@ def genprism(words: tuple[str, ...]) -> tuple[str, list[Polygon]]:
 
     Raises: `ValueError` for rounded prisms, outlines from files, or wrong numbers.
     """
-    if len(words) < 4 or not words[3].isdecimal():
+    if len(words) < 4:
         raise ValueError("takes a material, a name, the number of corners and their x and y")
-    material, name, count = words[1], words[2], int(words[3])
+    material, name, count = words[1], words[2], count_of(words[3])
     outline = _numbers(words[4 : 4 + 2 * count])
     if count < 3 or len(outline) < 2 * count:
         raise ValueError(f"expected the x and y of {words[3]} corners, at least three")
@@ -76,10 +78,4 @@ GENERATORS = {"genbox": genbox, "genprism": genprism}
 
 
 def _numbers(words: tuple[str, ...] | list[str]) -> NDArray[np.float64]:
-    try:
-        values = np.array([float(word) for word in words])
-    except ValueError:
-        raise ValueError(f"expected numbers, got {' '.join(words)}") from None
-    if not np.isfinite(values).all():
-        raise ValueError("expected finite numbers")
-    return values
+    return np.array([number_of(word) for word in words])

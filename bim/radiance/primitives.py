@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from mitsuba_cfs.files import reason
 VOID = "void"
 WORD = re.compile(r'"([^"]*)"|\'([^\']*)\'|(\S+)')
 LARGEST_FILE = 512 * 2**20  # of text [bytes]
-MOST = 1e30  # of a number: products of a few coordinates are still numbers
+MOST, LEAST = 1e30, 1e-100  # of a number: products of a few are still numbers; below, it is 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +82,24 @@ def parsed(text: str, path: Path) -> Iterator[Primitive | Command]:
             yield words.command()
         else:
             yield words.primitive(word)
+
+
+def number_of(word: str) -> float:
+    """The number that a word is; `ValueError` above `MOST`, 0 below `LEAST`."""
+    try:
+        value = float(word)
+    except ValueError:
+        value = float("nan")
+    if not abs(value) < MOST:
+        raise ValueError(f"a number is expected, got {word!r:.60}")
+    return value if abs(value) >= LEAST else 0.0
+
+
+def count_of(word: str) -> int:
+    """The whole number that a word is; `ValueError` for other words."""
+    if not (word.isdecimal() and len(word) < 10):
+        raise ValueError(f"a whole number is expected, got {word!r:.60}")
+    return int(word)
 
 
 class _Words:
@@ -150,21 +169,19 @@ class _Words:
 
     def _count(self, start: int, of: str) -> int:
         word = self._word(f"the count of {of}", start)
-        if not word.isdecimal():
-            self._refuse(start, f"the count of {of} is expected, got {word!r}")
-        return int(word)
+        try:
+            return count_of(word)
+        except ValueError as error:
+            self._refuse(start, f"the count of {of}: {error}")
 
     def _number(self, start: int) -> float:
         word = self._word("its numbers", start)
         try:
-            value = float(word)
-        except ValueError:
-            value = float("nan")
-        if not abs(value) < MOST:
-            self._refuse(start, f"a number is expected, got {word!r}")
-        return value
+            return number_of(word)
+        except ValueError as error:
+            self._refuse(start, str(error))
 
-    def _refuse(self, start: int, message: str) -> None:
+    def _refuse(self, start: int, message: str) -> NoReturn:
         raise DataError(f"no Radiance scene: {message}", file=f"{self.path}:{start}")
 
 

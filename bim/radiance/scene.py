@@ -28,6 +28,7 @@ from mitsuba_cfs.errors import DataError
 
 DEEPEST = 32  # files that call each other
 MOST_OBJECTS = 5_000_000
+FARTHEST = 1e7  # of a coordinate [m]
 PLAIN = RadianceMaterial("void", VOID)
 
 
@@ -183,6 +184,8 @@ class _Reader:
             return
         for place in _places(outer):
             moved = triangles @ place[:3, :3].T + place[:3, 3]
+            if not np.abs(moved).max() <= FARTHEST:
+                raise primitive.fault(f"lies farther than {FARTHEST:g} m from the origin")
             if np.linalg.det(place[:3, :3]) < 0:
                 moved = moved[:, ::-1]
             if sum(x.is_inverted for x in outer) % 2:

@@ -15,6 +15,7 @@ from bim.planes import newell_normal, plane_through, triangulated
 from bim.radiance.primitives import Primitive
 
 SIDES = 32  # of a circle
+FARTHEST = 1e10  # of a coordinate, in units of the file
 SUBDIVISIONS = 2  # of an icosahedron: 320 triangles
 
 INWARD = {"bubble": "sphere", "tube": "cylinder", "cup": "cone"}
@@ -29,6 +30,8 @@ def triangles_of(primitive: Primitive) -> NDArray[np.float64]:
     """
     kind = INWARD.get(primitive.kind, primitive.kind)
     numbers = np.asarray(primitive.numbers)
+    if not np.abs(numbers).max(initial=0.0) <= FARTHEST:
+        raise primitive.fault(f"a coordinate or size is above {FARTHEST:g}")
     if kind == "polygon":
         if len(numbers) < 9 or len(numbers) % 3:
             raise primitive.fault(

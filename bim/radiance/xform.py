@@ -6,11 +6,14 @@ follows; `-a n` puts n copies, each moved once more, the first not at all.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bim.radiance.primitives import count_of, number_of
 
 MOVES = {"-t": 3, "-rx": 1, "-ry": 1, "-rz": 1, "-s": 1, "-mx": 0, "-my": 0, "-mz": 0}
 MOST_COPIES = 1_000_000
@@ -42,7 +45,7 @@ def read_xform(words: tuple[str, ...]) -> Xform:
             modifier, prefix = (value, prefix) if option == "-m" else (modifier, value)
             at += 2
         elif option in ("-i", "-a"):
-            stages.append((option, _whole(_value(words, at), option), []))
+            stages.append((option, count_of(_value(words, at)), []))
             at += 2
         elif option in MOVES:
             numbers = [_number(w, option) for w in words[at + 1 : at + 1 + MOVES[option]]]
@@ -60,8 +63,8 @@ def read_xform(words: tuple[str, ...]) -> Xform:
 
 
 def _copies(stages: list[tuple[str, int, list[NDArray[np.float64]]]]) -> Iterator[NDArray]:
-    count = int(np.prod([n for kind, n, _ in stages if kind == "-a"], dtype=float))
-    if count > MOST_COPIES:
+    count = math.prod(n for kind, n, _ in stages if kind == "-a")
+    if max(count, *(n for kind, n, _ in stages if kind == "-i")) > MOST_COPIES:
         raise ValueError(f"{count} copies are more than {MOST_COPIES}")
     found = [np.eye(4)]
     for kind, times, moves in stages:
@@ -100,17 +103,8 @@ def _value(words: tuple[str, ...], at: int) -> str:
     return words[at + 1]
 
 
-def _whole(word: str, option: str) -> int:
-    if not word.isdecimal():
-        raise ValueError(f"{option} takes a whole number, got {word!r}")
-    return int(word)
-
-
 def _number(word: str, option: str) -> float:
     try:
-        value = float(word)
+        return number_of(word)
     except ValueError:
-        value = float("nan")
-    if not abs(value) < float("inf"):
-        raise ValueError(f"{option} takes numbers, got {word!r}")
-    return value
+        raise ValueError(f"{option} takes numbers, got {word!r:.60}") from None

@@ -78,6 +78,8 @@ def _geometry(thing: Any, name: str, path: Path) -> dict[str, Any] | None:
     listed = thing.get("geometry") or []
     if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
         raise DataError("expected a list", file=path, element=name[:60], field="geometry")
+    if not all(isinstance(one.get("type"), str | None) for one in listed):
+        raise DataError("expected a text", file=path, element=name[:60], field="geometry.type")
     found = [(_level(one), one) for one in listed if one.get("type") in DEPTH]
     found = [(level, one) for level, one in found if level < FINEST]
     return max(found, key=lambda pair: pair[0])[1] if found else None

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, polarised_values
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
+from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.bsdf.pane_stack import PaneOptics, pane_optics, stack
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import polarised_shares
+
+SCATTERED_LIMIT = 0.05  # share of what a specular system passes that may be scattered
+DIFFUSE_TOLERANCE = 0.05  # that function and BSDF may pass more or less of diffuse light
 
 FloatArray = NDArray[np.float64]
 ANGLES = np.radians(np.arange(0.0, 90.25, 0.5))  # that formulas are tabulated at
@@ -124,7 +130,7 @@ def _table_of(panes: Sequence[PaneOptics]) -> AngularTable:
     """The mean of both polarisations of panes [2, N] behind each other."""
     whole = stack(panes)
     values = (whole.tau, whole.rho_front, whole.rho_back)
-    tau, front, back = (np.clip(one.mean(axis=0), 0, 1) for one in values)
+    tau, front, back = (np.clip(value.mean(axis=0), 0, 1) for value in values)
     return AngularTable(ANGLES, tau, front, back)
 
 
@@ -136,3 +142,20 @@ def _by_polarisation(pane: Pane) -> PaneOptics:
         return PaneOptics(*both)
     tau, rho = polarised_values(pane.transmittance, pane.reflectance_front, ANGLES)
     return PaneOptics(tau, rho, rho)
+
+
+def check_specular(klems: KlemsBsdf, angular: AngularTable | None, path: Path) -> None:
+    """`DataError` where the BSDF is not that of a specular system with this function."""
+    if angular is None:
+        return
+    omega = klems.basis_in.projected_solid_angles()
+    peak = through_peak(klems.transmission_matrix() / omega, klems.basis_in)
+    beam, rest = omega @ peak.transmittance / np.pi, omega @ peak.scattered @ omega / np.pi
+    if rest > SCATTERED_LIMIT * (beam + rest):
+        share = 100 * rest / (beam + rest)
+        message = f"the BSDF scatters {share:.0f} % of what it passes: no function of an angle"
+        raise DataError(message, file=path, field="angular")
+    means = float(omega @ angular.patch_means(klems.basis_in) / np.pi)
+    if abs(means - beam) > DIFFUSE_TOLERANCE:
+        message = f"passes {means:.2f} of diffuse light, the BSDF {beam:.2f}: not the same system"
+        raise DataError(message, file=path, field="angular")

@@ -60,9 +60,9 @@ def colour_rendering_index(wavelength_nm: ArrayLike, value: ArrayLike) -> float:
     R_i = 100 - 4.6 dE in U* V* W*, R_a their mean (EN 410, 5.6).
     """
     nm, light, cmfs, samples = _colour_tables()
-    given = _rising(wavelength_nm)
-    _check_reach(given, nm, cmfs.sum(axis=1) * light)
-    spectrum = light * np.interp(nm, given, np.asarray(value, dtype=float))
+    rising = _rising(wavelength_nm)
+    _check_reach(rising, nm, cmfs.sum(axis=1) * light)
+    spectrum = light * np.interp(nm, rising, np.asarray(value, dtype=float))
     reference, test = _tristimulus(light, cmfs), _tristimulus(spectrum, cmfs)
     if not test[1] > 0:
         raise ValueError("colour rendering of what passes no light is not defined")
@@ -81,9 +81,9 @@ def _weighted(
     wavelength_nm: ArrayLike, value: ArrayLike, nm: NDArray[Any], weight: NDArray[Any]
 ) -> float:
     """Mean of the data at `nm` by `weight`; the data must reach over where the weight is."""
-    given = _rising(wavelength_nm)
-    _check_reach(given, nm, weight)
-    return float(np.interp(nm, given, np.asarray(value, dtype=float)) @ weight / weight.sum())
+    rising = _rising(wavelength_nm)
+    _check_reach(rising, nm, weight)
+    return float(np.interp(nm, rising, np.asarray(value, dtype=float)) @ weight / weight.sum())
 
 
 def _check_reach(given: NDArray[Any], nm: NDArray[Any], weight: NDArray[Any]) -> None:

@@ -114,15 +114,15 @@ def read_fabric_table(path: str | PathLike[str]) -> tuple[list[FabricShade], tup
 
 def named_fabric(shades: Sequence[FabricShade], name: str | None, path: Path) -> FabricShade:
     """The fabric of that name; `DataError` where there is none, or more than one."""
-    found = [s for s in shades if name is None or s.name.casefold() == name.strip().casefold()]
-    if len(found) == 1:
-        return found[0]
+    result = [s for s in shades if name is None or s.name.casefold() == name.strip().casefold()]
+    if len(result) == 1:
+        return result[0]
     known = "; ".join(dict.fromkeys(s.name for s in shades[:12])) + (" ..." * (len(shades) > 12))
     if name is None:
         raise DataError(f"holds {len(shades)} fabrics, name one: {known}", file=path)
-    if not found:
+    if not result:
         raise DataError(f"has no fabric {name!r}, but {known}", file=path)
-    lines = " and ".join(str(s.line) for s in found)
+    lines = " and ".join(str(s.line) for s in result)
     raise DataError(f"lines {lines} are both {name!r}", file=path)
 
 
@@ -142,10 +142,10 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
     except csv.Error as error:
         where = f"line {reader.line_num}"
         raise DataError(f"is no CSV: {error}", file=path, element=where) from None
-    found = [(line, cells) for line, cells in read if any(cells)]
-    if len(found) < 2:
+    lines = [(line, cells) for line, cells in read if any(cells)]
+    if len(lines) < 2:
         raise DataError("expected a line of titles and a row a fabric", file=path)
-    return found
+    return lines
 
 
 def _columns(path: Path, line: int, titles: list[str]) -> tuple[list[_Column], list[str]]:
@@ -160,14 +160,14 @@ def _columns(path: Path, line: int, titles: list[str]) -> tuple[list[_Column], l
         if quantity in known:
             message = f"states the same as {known[quantity].title!r}"
             raise DataError(message, file=path, element=f"line {line}", field=title)
-        found = None if unit is None else unit[1] or unit[2]
-        if quantity == "thickness" and found not in LENGTHS:
+        result = None if unit is None else unit[1] or unit[2]
+        if quantity == "thickness" and result not in LENGTHS:
             message = "expected its unit, [mm] or [m]"
             raise DataError(message, file=path, element=f"line {line}", field=title)
-        if quantity not in TEXTS and quantity != "thickness" and found in LENGTHS:
-            message = f"expected a share in [%] or [-], got [{found}]"
+        if quantity not in TEXTS and quantity != "thickness" and result in LENGTHS:
+            message = f"expected a share in [%] or [-], got [{result}]"
             raise DataError(message, file=path, element=f"line {line}", field=title)
-        known[quantity] = _Column(quantity, title, found, place)
+        known[quantity] = _Column(quantity, title, result, place)
     return list(known.values()), unknown
 
 
@@ -190,14 +190,14 @@ def _row(path: Path, line: int, cells: list[str], columns: list[_Column]) -> _Ro
     """Row with its numbers as written; those with their own % as shares of 1."""
     by_quantity = {one.quantity: cells[one.place] for one in columns}
     row = _Row(path, line, by_quantity, {one.quantity: one.title for one in columns}, {})
-    for one in columns:
-        text = cells[one.place]
-        if one.quantity in TEXTS or text.casefold() in NOTHING:
+    for column in columns:
+        text = cells[column.place]
+        if column.quantity in TEXTS or text.casefold() in NOTHING:
             continue
         number = text.removesuffix("%").strip()
         if not re.fullmatch(r"[+]?\d+([.,]\d+)?", number):
-            raise row.error(f"{text[:40]!r} is no number of 0 or more", one.quantity)
-        row.values[one.quantity] = float(number.replace(",", "."))
+            raise row.error(f"{text[:40]!r} is no number of 0 or more", column.quantity)
+        row.values[column.quantity] = float(number.replace(",", "."))
     return row
 
 
@@ -212,9 +212,13 @@ def _scale(
 
     Returns: titles without a unit that are in percent by their values; that are shares.
     """
-    shares = [one for one in columns if one.quantity not in TEXTS and one.quantity != "thickness"]
+    shares = [
+        column
+        for column in columns
+        if column.quantity not in TEXTS and column.quantity != "thickness"
+    ]
     bare = {one.quantity: _bare(one, rows) for one in shares}
-    by_value = [one for one in shares if max(bare[one.quantity], default=0) > 1]
+    by_value = [share for share in shares if max(bare[share.quantity], default=0) > 1]
     whole = [one for one in shares if any(bare[one.quantity]) and one not in by_value]
     percent = {one.quantity for one in [*by_value, *(c for c in shares if c.unit == "%")]}
     written = any(text.endswith("%") for row in rows for text in row.cells.values())

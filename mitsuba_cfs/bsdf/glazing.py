@@ -168,12 +168,15 @@ def specular_klems(pane: Pane | Glazing, basis: KlemsBasis, *, subdivision: int 
 
     Values are means over each ring, in cos(theta) d_omega.
     """
-    values = pane_values if isinstance(pane, Pane) else glazing_values
     sine2 = np.sin(basis.theta_bounds) ** 2
     step = (np.arange(subdivision) + 0.5) / subdivision
     theta = np.arcsin(np.sqrt(sine2[:-1, None] + np.diff(sine2)[:, None] * step))
+    if isinstance(pane, Pane):
+        values = pane_values(pane, theta)
+    else:
+        values = glazing_values(pane, theta)
     tau, rho_front, rho_back = (
         np.diag(value.mean(axis=1)[basis.rings] / basis.projected_solid_angles())
-        for value in values(pane, theta)
+        for value in values
     )
     return KlemsBsdf(basis, basis, tau, tau, rho_front, rho_back)

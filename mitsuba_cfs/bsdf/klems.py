@@ -187,9 +187,9 @@ class KlemsBsdf:
         reads such files.
         """
         front, back = self.transmission_front, self.transmission_back
-        if self.is_dummy(front) and not self.is_dummy(back):
+        if back is not None and self.is_dummy(front) and not self.is_dummy(back):
             front = self._reversed(back)
-        elif self.is_dummy(back) and not self.is_dummy(front):
+        elif front is not None and self.is_dummy(back) and not self.is_dummy(front):
             back = self._reversed(front)
         zero = np.zeros((self.basis_out.size, self.basis_in.size))
         return replace(
@@ -221,4 +221,6 @@ class KlemsBsdf:
         T = f cos(theta_i) d_omega_i, the T of the three-phase method's V T D s.
         """
         front = self.filled().transmission_front
+        if front is None:
+            raise ValueError("neither side of the BSDF transmits light")
         return front * self.basis_in.projected_solid_angles()

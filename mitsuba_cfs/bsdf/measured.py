@@ -142,15 +142,15 @@ def patterns_of(measurements: Sequence[Measurement], block: str) -> list[Pattern
             outgoing, values = measured.outgoing[kept], measured.values[kept]
             parts.setdefault((x, y), []).append(replace(measured, outgoing=outgoing, values=values))
     patterns = []
-    for incident, found in parts.items():
-        outgoing = np.concatenate([measured.outgoing[:, :2] for measured in found])
-        values = np.concatenate([measured.values for measured in found])
+    for incident, part in parts.items():
+        outgoing = np.concatenate([measured.outgoing[:, :2] for measured in part])
+        values = np.concatenate([measured.values for measured in part])
         step = np.round(outgoing / SAME)
         once, group = np.unique(step, axis=0, return_inverse=True)
         count = np.bincount(group)
         mean = [np.bincount(group, band) / count for band in values.T]
         patterns.append(
-            Pattern(found[0].path, np.array(incident), once * SAME, np.stack(mean, axis=-1))
+            Pattern(part[0].path, np.array(incident), once * SAME, np.stack(mean, axis=-1))
         )
     return patterns
 
@@ -265,12 +265,12 @@ class ScatteringInterpolant:
         chosen = [(order[low], 1 - rest)] + ([(order[low + 1], rest)] if rest > 0 else [])
         azimuth = np.arctan2(incident[1], incident[0])
         widest = self.points[order[-1]]  # normal incidence has no azimuth: the others' is its own
-        found = []
+        turned = []
         for index, weight in chosen:
             turn = azimuth - np.arctan2(widest[1], widest[0])
             matrix = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-            found.append((self.patterns[self.sources[index]], float(weight), matrix))
-        return found
+            turned.append((self.patterns[self.sources[index]], float(weight), matrix))
+        return turned
 
     def _corners(self, point: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
         """The measured points round a point of the disk and their weights; the rim's beyond it."""

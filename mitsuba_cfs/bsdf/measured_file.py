@@ -54,8 +54,8 @@ def read_measurement(path: str | PathLike[str], *, normal: str = "room") -> Meas
     if path.stat().st_size > LARGEST_BYTES:
         raise DataError(f"has more than {LARGEST_BYTES >> 20} MiB", file=path)
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    found = [match.groups() for line in lines if (match := HEADER.match(line))]
-    header = {key: text.strip() for key, text in found}
+    result = [match.groups() for line in lines if (match := HEADER.match(line))]
+    header = {key: text.strip() for key, text in result}
     bands = BANDS.get(header.get("colorimetry", "").casefold(), ("Visible",))
     kind = header.get("format", "").casefold().split()
     if kind[:2] != ["theta", "phi"] or len(kind) < 3 or kind[2] not in FORMATS:

@@ -79,7 +79,7 @@ def optical_data_of(document: dict[str, Any], path: Path) -> OpticalData:
     own = _table(_table(data, "serverSpecific", path), "igsdb", path)
     rows = [[nm, *table.triple(nm)] for nm in table.wavelengths]
     visible = table.triple("visible") if table.has("visible") else None
-    side = own.get("coatedSide")
+    coated_side = own.get("coatedSide")
     name = component.get("name") or own.get("marketingName")
     return OpticalData(
         name=name if isinstance(name, str) else None,
@@ -89,7 +89,9 @@ def optical_data_of(document: dict[str, Any], path: Path) -> OpticalData:
         infrared_transmittance=passed,
         thickness_mm=_stated(_table(own, "physicalProperties", path), "thickness", path),
         conductivity=_stated(_table(own, "materialBulkProperties", path), "conductivity", path),
-        coated=_differs(rows, visible, infrared) if side is None else side not in ("NEITHER", "NA"),
+        coated=_differs(rows, visible, infrared)
+        if coated_side is None
+        else coated_side not in ("NEITHER", "NA"),
     )
 
 
@@ -214,25 +216,25 @@ def _is_polarized(polarization: Any) -> bool:
 
 def _table(owner: Any, name: str, path: Path, where: str | None = None) -> dict[str, Any]:
     """The table of a name, empty where there is none."""
-    found = owner.get(name)
-    if found is not None and not isinstance(found, dict):
+    result = owner.get(name)
+    if result is not None and not isinstance(result, dict):
         raise DataError("expected a table", file=path, element=where, field=name)
-    return found or {}
+    return result or {}
 
 
 def _stated(table: dict[str, Any], name: str, path: Path, where: str | None = None) -> float | None:
     """The finite number of a name, with or without its uncertainty; None where there is none."""
-    found = table.get(name)
-    if isinstance(found, dict):
-        found = found.get("uncertainValue", "no uncertainValue")
-    if found is None:
+    result = table.get(name)
+    if isinstance(result, dict):
+        result = result.get("uncertainValue", "no uncertainValue")
+    if result is None:
         return None
     try:
-        value = float("nan") if isinstance(found, bool) else float(found)
+        value = float("nan") if isinstance(result, bool) else float(result)
     except (TypeError, ValueError, OverflowError):
         value = float("nan")
     if not isfinite(value):
-        message = f"expected a number, got {str(found)[:40]!r}"
+        message = f"expected a number, got {str(result)[:40]!r}"
         raise DataError(message, file=path, element=where, field=name)
     return value
 
@@ -251,8 +253,10 @@ class _Table:
             if before and before.polar == point.polar and before.value != point.value:
                 raise DataError(
                     f"says otherwise than {before.where}: expected one state of one sample",
-                    file=path, element=point.where, field=point.result,
-                )  # fmt: skip
+                    file=path,
+                    element=point.where,
+                    field=point.result,
+                )
             if before is None or point.polar < before.polar:
                 known[point.emergence] = point
 

@@ -134,13 +134,16 @@ def _optical(document: dict[str, Any], path: Path) -> PaneFile:
         message = "has no transmittance and reflectance near normal incidence"
         raise DataError(message, file=path, field="dataPoints")
     return PaneFile(
-        path, data.name or path.stem, spectrum, data.coated,
+        path,
+        data.name or path.stem,
+        spectrum,
+        data.coated,
         thickness=None if data.thickness_mm is None else data.thickness_mm / 1000.0,
         conductivity=data.conductivity,
         emissivity=data.emissivity,
         infrared_transmittance=data.infrared_transmittance,
         visible=data.visible,
-    )  # fmt: skip
+    )
 
 
 def product_pane(product: dict[str, Any], path: Path, *, material: bool = False) -> PaneFile:
@@ -169,7 +172,9 @@ def product_pane(product: dict[str, Any], path: Path, *, material: bool = False)
     tau, front, back = stated
     thickness = _stated(measured, "thickness", path)
     return PaneFile(
-        path, str(product.get("name") or path.stem), _spectrum(rows, path),
+        path,
+        str(product.get("name") or path.stem),
+        _spectrum(rows, path),
         material or _is_coated(product.get("coated_side")),
         thickness=None if thickness is None else thickness / 1000.0,
         conductivity=_stated(measured, "conductivity", path),
@@ -179,7 +184,7 @@ def product_pane(product: dict[str, Any], path: Path, *, material: bool = False)
         ),
         infrared_transmittance=_stated(measured, "tir_front", path),
         visible=None if tau is None or front is None or back is None else (tau, front, back),
-    )  # fmt: skip
+    )
 
 
 def _stated(table: dict[str, Any], name: str, path: Path) -> float | None:
@@ -218,13 +223,15 @@ def _optics(text: str, path: Path) -> PaneFile:
     front, back, *_ = [*(float(n) for n in numbers[:2]), None, None]
     millimetres = _number(headers.get("thickness"))
     return PaneFile(
-        path, headers.get("product name") or path.stem, _spectrum(rows, path),
+        path,
+        headers.get("product name") or path.stem,
+        _spectrum(rows, path),
         _is_coated(headers.get("coated side")),
         thickness=None if millimetres is None else millimetres / 1000.0,
         conductivity=_number(headers.get("conductivity")),
         emissivity=(front, back),
         infrared_transmittance=_number(headers.get("ir transmittance", "").partition("=")[2]),
-    )  # fmt: skip
+    )
 
 
 def _number(text: str | None) -> float | None:

@@ -137,11 +137,11 @@ def _behind(panes: Sequence[Pane], tau: FloatArray) -> FloatArray:
 
 def _diffuse(panes: Sequence[Pane], *, from_room: bool = False) -> tuple[float, FloatArray]:
     """Transmittance and absorptances [n] for diffuse light, as it meets the panes in turn."""
-    found = _stacked(panes, HEMISPHERE, from_room=from_room)
-    passed = hemispherical_mean(found.tau, HEMISPHERE)
-    return float(passed), hemispherical_mean(found.absorptance, HEMISPHERE)
+    stacked = _stacked(panes, HEMISPHERE, from_room=from_room)
+    passed = hemispherical_mean(stacked.tau, HEMISPHERE)
+    return float(passed), hemispherical_mean(stacked.absorptance, HEMISPHERE)
 
 
 def _stacked(panes: Sequence[Pane], theta: FloatArray, *, from_room: bool = False) -> StackOptics:
     optics = [pane_optics(pane, theta) for pane in panes]
-    return stack([one.turned() for one in optics] if from_room else optics)
+    return stack([optic.turned() for optic in optics] if from_room else optics)

@@ -63,7 +63,7 @@ def _primitives(path: str | PathLike[str]) -> list[tuple[str, str, str, list[flo
     lines = [line.split("#")[0] for line in text.splitlines()]
     if any(line.startswith("!") for line in lines):
         raise DataError("holds a command: expand it first (xform)", file=path)
-    words, found = " ".join(lines).split(), []
+    words, primitives = " ".join(lines).split(), []
     place = 0
     try:
         while place < len(words):
@@ -77,7 +77,7 @@ def _primitives(path: str | PathLike[str]) -> list[tuple[str, str, str, list[flo
             place += 1 + count
             if len(numbers) != count or not np.isfinite(numbers).all():
                 raise ValueError(f"expected {count} numbers")
-            found.append((modifier, kind, name, numbers))
+            primitives.append((modifier, kind, name, numbers))
     except (ValueError, IndexError) as error:
         raise DataError(f"word {place}: {error}", file=path) from None
-    return found
+    return primitives

@@ -63,9 +63,12 @@ class ShadeFile:
         try:
             if self.kind == "venetian":
                 return venetian_blind(
-                    sheet, depth=size["slat_width"], spacing=size["slat_spacing"],
-                    tilt=size["slat_tilt"], radius=size["slat_curvature"] or np.inf,
-                )  # fmt: skip
+                    sheet,
+                    depth=size["slat_width"],
+                    spacing=size["slat_spacing"],
+                    tilt=size["slat_tilt"],
+                    radius=size["slat_curvature"] or np.inf,
+                )
             if self.kind == "woven":
                 diameter, spacing = size["thread_diameter"], size["thread_spacing"]
                 return thread_screen(sheet, diameter=diameter, spacing=spacing)
@@ -143,7 +146,7 @@ def read_shade_file(path: str | PathLike[str]) -> ShadeFile:
 
 def _geometry(table: dict[str, Any], kind: str, path: Path) -> dict[str, float]:
     """The lengths [m] of a kind and the tilt [rad]."""
-    found = {}
+    geometry = {}
     for name in KINDS[kind]:
         try:
             value = float(table.get(name) or 0.0)
@@ -156,10 +159,10 @@ def _geometry(table: dict[str, Any], kind: str, path: Path) -> dict[str, float]:
                 f"expected a number from {low:g} to {high:g}, got {str(table.get(name))[:40]!r}"
             )
             raise DataError(message, file=path, field=name)
-        found[name] = float(np.radians(value)) if name == "slat_tilt" else value / 1000
-    if kind == "perforated-screen" and found["spacing_x"] != found["spacing_y"]:
+        geometry[name] = float(np.radians(value)) if name == "slat_tilt" else value / 1000
+    if kind == "perforated-screen" and geometry["spacing_x"] != geometry["spacing_y"]:
         raise DataError("differs from spacing_x: no square grid", file=path, field="spacing_y")
-    return found
+    return geometry
 
 
 def _are_round(table: dict[str, Any], path: Path) -> bool:

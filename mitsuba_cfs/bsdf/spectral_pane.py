@@ -66,8 +66,10 @@ def read_spectral_pane(
     if not thickness:
         raise DataError("states no thickness", file=file.path)
     front, back = (EMISSIVITY if e is None else e for e in file.emissivity)
+    wavelength_nm, tau, rho_front, rho_back = file.spectrum.T
     return SpectralPane(
-        file.name, *file.spectrum.T, thickness, file.conductivity or 1.0, (front, back),
+        file.name, wavelength_nm, tau, rho_front, rho_back, thickness,
+        file.conductivity or 1.0, (front, back),
         file.infrared_transmittance or 0.0, file.coated,
     )  # fmt: skip
 
@@ -101,12 +103,12 @@ def spectral_glazing(
     angles = np.atleast_1d(np.asarray(theta, dtype=float))
     nm, whole = _whole(panes, angles)
     stacked = (whole.tau, whole.rho_front, whole.rho_back, whole.absorptance)
-    found = {}
+    result = {}
     for band in ("Solar", "Visible"):
         average = visible_average if band == "Visible" else solar_average(spectrum)
         tau, front, back, absorbed = (_averaged(nm, values, average) for values in stacked)
-        found[band] = BandValues(tau, front, back, absorbed)
-    return found
+        result[band] = BandValues(tau, front, back, absorbed)
+    return result
 
 
 @dataclass(frozen=True, slots=True)

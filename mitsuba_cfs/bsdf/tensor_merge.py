@@ -35,7 +35,7 @@ def merged_tree(
     width = 1 << rank
     values = grid.ravel()[row_major_order(rank, levels)].astype(np.float32)
     lowest = highest = values
-    codes, found = [], []  # leaves: Morton code at the deepest level, (depth, value)
+    codes, result = [], []  # leaves: Morton code at the deepest level, (depth, value)
     whole = np.ones(len(values), dtype=bool)  # cells of this level that are one leaf so far
     for depth in range(levels, 0, -1):
         families = values.reshape(-1, width)
@@ -49,14 +49,14 @@ def merged_tree(
         fits &= spread <= bound + single / np.sqrt(float(width ** (levels - depth)))
         index = np.flatnonzero(whole & ~np.repeat(fits, width))
         codes.append(index << (rank * (levels - depth)))
-        found.append((np.full(len(index), depth), values[index]))
+        result.append((np.full(len(index), depth), values[index]))
         values, lowest, highest, whole = mean, low, high, fits
     if whole[0]:
         codes.append(np.zeros(1, dtype=np.int64))
-        found.append((np.zeros(1, dtype=np.int64), values))
+        result.append((np.zeros(1, dtype=np.int64), values))
     order = np.argsort(np.concatenate(codes), kind="stable")
-    depths = np.concatenate([depth for depth, _ in found])[order]
-    return TensorTree(rank, depths, np.concatenate([v for _, v in found])[order].astype(float))
+    depths = np.concatenate([depth for depth, _ in result])[order]
+    return TensorTree(rank, depths, np.concatenate([v for _, v in result])[order].astype(float))
 
 
 def culled_tree(

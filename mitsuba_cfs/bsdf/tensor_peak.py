@@ -91,14 +91,14 @@ def _upright(disk: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _places() -> NDArray[np.float64]:
     """The places [29, 2] that are looked at, in steps."""
-    found = {
+    result = {
         place
         for a, others in STEPS
         for b in others
         for x, y in ((a, b), (b, a))
         for place in ((x, y), (-x, y), (x, -y), (-x, -y))
     }
-    return np.array(sorted(found), dtype=float)
+    return np.array(sorted(result), dtype=float)
 
 
 def _peak(

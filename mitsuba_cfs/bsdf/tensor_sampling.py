@@ -86,12 +86,12 @@ def _nodes(tree: TensorTree) -> tuple[NDArray, NDArray, NDArray]:
         child = (codes[:, None] << rank) + np.arange(width)
         shift = rank * (tree.depth - level - 1)
         leaf = np.searchsorted(tree.codes, child << shift, side="right") - 1
-        found = -1 - leaf
+        result = -1 - leaf
         if level + 1 < tree.depth:
             node = np.searchsorted(numbers[level + 1], child)
             node = np.minimum(node, len(numbers[level + 1]) - 1)
-            found = np.where(numbers[level + 1][node] == child, first[level + 1] + node, found)
-        children[first[level] : first[level + 1]] = found
+            result = np.where(numbers[level + 1][node] == child, first[level + 1] + node, result)
+        children[first[level] : first[level + 1]] = result
     levels = np.repeat(np.arange(tree.depth), np.diff(first))
     return levels, children, values
 

@@ -54,9 +54,12 @@ def _grid_levels(counts: NDArray[np.int64], rank: int) -> NDArray[np.int64]:
 
 
 def _check_nesting(
-    opening: NDArray[Any], nesting: NDArray[Any], is_grid: NDArray[Any], depths: NDArray[Any],
+    opening: NDArray[Any],
+    nesting: NDArray[Any],
+    is_grid: NDArray[Any],
+    depths: NDArray[Any],
     rank: int,
-) -> None:  # fmt: skip
+) -> None:
     """Every branch has 2^rank children: the volumes of what is inside it add up to its own."""
     deepest = int(nesting.max())
     volume = np.zeros(len(opening), dtype=np.int64)

@@ -92,11 +92,11 @@ class TracedTrees:
         leaf, inside = mi.Int32(0), mi.Mask(active)
         for _ in range(self.levels):
             child, position = self._halve(position)
-            found = gather_integer(self.children, node * self.width + child, inside)
-            is_leaf = inside & (found < 0)
-            leaf = dr.select(is_leaf, -1 - found, leaf)
-            inside = inside & (found >= 0)
-            node = dr.select(inside, found, node)
+            result = gather_integer(self.children, node * self.width + child, inside)
+            is_leaf = inside & (result < 0)
+            leaf = dr.select(is_leaf, -1 - result, leaf)
+            inside = inside & (result >= 0)
+            node = dr.select(inside, result, node)
         return leaf
 
     def _halve(self, position):
@@ -142,11 +142,11 @@ class TracedTrees:
             child, incident = self._halve(incident)
             child += dr.select(right, mi.Int32(1 << self.known), mi.Int32(0))
             child += dr.select(upper, mi.Int32(2 << self.known), mi.Int32(0))
-            found = gather_integer(self.children, node * self.width + child, inside)
-            is_leaf = inside & (found < 0)
-            leaf = dr.select(is_leaf, -1 - found, leaf)
-            inside = inside & (found >= 0)
-            node = dr.select(inside, found, node)
+            result = gather_integer(self.children, node * self.width + child, inside)
+            is_leaf = inside & (result < 0)
+            leaf = dr.select(is_leaf, -1 - result, leaf)
+            inside = inside & (result >= 0)
+            node = dr.select(inside, result, node)
         value = gather(self.values, leaf, active)
         return low_u + u * size, low_v + v * size, value, leaf
 

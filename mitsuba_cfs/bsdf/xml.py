@@ -11,6 +11,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
+from xml.parsers import expat
 from xml.sax.saxutils import escape
 
 import numpy as np
@@ -85,6 +86,7 @@ def _optical_layer(path: str | PathLike[str], notes: list[str]) -> ElementTree.E
     start = max(content.find(b"<"), 0)
     if content[:start].strip(b" \t\r\n\xef\xbb\xbf"):  # genBSDF may leave a line of its own
         notes.append(f"{start} bytes before the XML left out")
+    _refuse_entities(content[start:], path)
     try:
         root = ElementTree.fromstring(content[start:])
     except (ElementTree.ParseError, ValueError, LookupError) as error:
@@ -98,6 +100,30 @@ def _optical_layer(path: str | PathLike[str], notes: list[str]) -> ElementTree.E
     if len(layers) != 1:
         raise DataError(f"expected one Optical/Layer, got {len(layers)}", file=path)
     return layers[0]
+
+
+class _RootStarts(Exception):
+    """The part of a document that may declare entities has ended."""
+
+
+def _refuse_entities(content: bytes, path: str | PathLike[str]) -> None:
+    """Raise `DataError` for a document type with entities, which grow when they are read."""
+
+    def refuse(*_: object) -> None:
+        raise DataError("declares entities, which are not read", file=path)
+
+    def stop(*_: object) -> None:
+        raise _RootStarts
+
+    parser = expat.ParserCreate()
+    parser.EntityDeclHandler, parser.StartElementHandler = refuse, stop
+    try:
+        parser.Parse(content, True)
+    except (_RootStarts, expat.ExpatError, LookupError):
+        return  # no XML: told by the reader of the whole
+    except ValueError as error:
+        if isinstance(error, DataError):
+            raise
 
 
 def _angle_bases(layer: ElementTree.Element, path: str | PathLike[str]) -> dict[str, KlemsBasis]:
@@ -209,7 +235,7 @@ def _read_blocks(layer, path, notes: list[str], reader) -> dict[str, Bsdf]:
             blocks.setdefault(band, {})[name] = _without_negatives(block, where, notes)
     if not blocks:
         raise DataError("no scattering data", file=path, element="WavelengthData")
-    return {band: reader.band(found, band, path) for band, found in blocks.items()}
+    return {band: reader.band(result, band, path) for band, result in blocks.items()}
 
 
 def _without_negatives(block, where: str, notes: list[str]):
@@ -258,7 +284,7 @@ def _material(layer: ElementTree.Element, path: str | PathLike[str]) -> dict:
     material = layer.find("Material")
     if material is None:
         return {}
-    found = {
+    result = {
         "name": _text(material.find("Name")),
         "manufacturer": _text(material.find("Manufacturer")),
         "device_type": _text(material.find("DeviceType")) or "Other",
@@ -269,7 +295,7 @@ def _material(layer: ElementTree.Element, path: str | PathLike[str]) -> dict:
             unit = element.get("unit", "Meter")
             if unit.lower() not in UNIT_METRES:
                 raise DataError(f"unknown unit {unit!r}", file=path, element="Material", field=tag)
-            found[tag.lower()] = _number(element, path, 0.0) * UNIT_METRES[unit.lower()]
+            result[tag.lower()] = _number(element, path, 0.0) * UNIT_METRES[unit.lower()]
     for tag, name, most in (
         ("EmissivityFront", "emissivity_front", 1.0),
         ("EmissivityBack", "emissivity_back", 1.0),
@@ -277,17 +303,17 @@ def _material(layer: ElementTree.Element, path: str | PathLike[str]) -> dict:
         ("ThermalConductivity", "conductivity", math.inf),
     ):
         if _text(material.find(tag)):
-            found[name] = _number(material.find(tag), path, 0.0, most)
-    return found
+            result[name] = _number(material.find(tag), path, 0.0, most)
+    return result
 
 
 def _need(
     element: ElementTree.Element, tags: str, path: str | PathLike[str]
 ) -> ElementTree.Element:
-    found = element.find(tags)
-    if found is None:
+    need = element.find(tags)
+    if need is None:
         raise DataError("is missing", file=path, element=element.tag, field=tags)
-    return found
+    return need
 
 
 def _text(element: ElementTree.Element | None) -> str:

@@ -279,6 +279,8 @@ def prepare(
         raise ValueError(f"a picture of shape {luminance.shape} for a view of {expected}")
     if luminance.dtype not in (np.float32, np.float64):
         luminance = luminance.astype(np.float64)
+    if not geometry.total_solid_angle > 0:
+        raise ValueError("the view has no pixel in front of the eye")
     picture = np.empty(geometry.valid.shape)
     Ev, flux, largest, bad = passes.gather(luminance, geometry.weight, geometry.projected, picture)
     if bad:

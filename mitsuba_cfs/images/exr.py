@@ -57,7 +57,7 @@ def read_exr(path: str | PathLike[str]) -> tuple[NDArray[np.float32], View | Non
     values = np.array(bitmap.convert(component_format=mi.Struct.Type.Float32))
     height, width = values.shape[:2]
     about = bitmap.metadata()
-    view = parse_view(about["VIEW"], width, height) if "VIEW" in about else None
+    view = parse_view(str(about["VIEW"]), width, height) if "VIEW" in about else None
     return (values[..., 0] if values.shape[2:] == (1,) else values), view
 
 

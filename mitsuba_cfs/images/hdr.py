@@ -28,6 +28,8 @@ EFFICACY = 179.0  # [lm/W] Radiance's luminous efficacy of white
 LUMINANCE_WEIGHTS = (0.26510582, 0.67010582, 0.06478836)
 
 FORMATS = {"32-bit_rle_rgbe": "rgb", "32-bit_rle_xyze": "xyz"}
+MOST_PIXELS = 1 << 28  # of a picture: 16384 x 16384
+LARGEST = 1e15  # of a pixel [W/m2/sr] or [cd/m2]: a hundred thousand times the sun
 VIEW_PROGRAMS = ("VIEW=", "rpict", "rview", "rvu", "rpiece", "pinterp")
 
 
@@ -66,7 +68,8 @@ def read_hdr(path: str | PathLike[str]) -> Picture:
     """Picture of a Radiance file in any orientation and encoding, RGB or XYZ.
 
     Raises:
-        DataError: no such file, not a Radiance picture, or one that ends too early.
+        DataError: no such file, not a Radiance picture, one that ends too early, is too large, or
+            has pixels above `LARGEST`.
     """
     try:
         data = Path(path).read_bytes()
@@ -74,6 +77,9 @@ def read_hdr(path: str | PathLike[str]) -> Picture:
         raise DataError(f"cannot be read ({reason(error)})", file=path) from None
     header, resolution, start = _header(data, path)
     signs, shape, transposed = _orientation(resolution, path)
+    if shape[0] * shape[1] > MOST_PIXELS or 4 * shape[0] > len(data) - start:
+        message = f"{resolution!r:.60}: more pixels than {len(data)} bytes or this program can hold"
+        raise DataError(message, file=path, field="resolution")
     rgbe = np.empty((*shape, 4), dtype=np.uint8)
     lines = codec.decode_scanlines(np.frombuffer(data, dtype=np.uint8)[start:], rgbe)
     if lines < shape[0]:
@@ -86,7 +92,11 @@ def read_hdr(path: str | PathLike[str]) -> Picture:
     rgbe = np.ascontiguousarray(rgbe.swapaxes(0, 1) if transposed else rgbe)
     exposure, correction = _exposure(header, path)
     pixels = codec.pixels_from_rgbe(rgbe)
-    pixels *= (1.0 / (exposure * correction)).astype(np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):
+        pixels *= (1.0 / (exposure * correction)).astype(np.float32)
+    if not pixels.max() <= LARGEST:  # nor NaN: 0 times an infinite exposure
+        message = f"holds {pixels.max():g}; expected at most {LARGEST:g}"
+        raise DataError(message, file=path, field="pixels")
     view = _view(header, width=rgbe.shape[1], height=rgbe.shape[0])
     return Picture(pixels, view, exposure, header, _colours(header, path))
 
@@ -117,7 +127,7 @@ def _orientation(
     known = sorted(axes) == ["X", "Y"] and all(w in ("+X", "-X", "+Y", "-Y") for w in words[::2])
     if not known or min(shape) < 1:
         raise DataError(
-            f"expected a resolution like -Y 800 +X 800, found {resolution!r}",
+            f"expected a resolution like -Y 800 +X 800, found {resolution!r:.60}",
             file=path,
             field="resolution",
         )
@@ -136,10 +146,11 @@ def _exposure(
             if name == "EXPOSURE":
                 exposure *= float(value.split()[0])
             elif name == "COLORCORR":
-                correction = correction * [float(word) for word in value.split()[:3]]
+                red, green, blue = map(float, value.split()[:3])
+                correction = correction * (red, green, blue)
         except (IndexError, ValueError):
-            raise DataError(f"not a number: {value!r}", file=path, field=name) from None
-    if not (np.isfinite(exposure) and exposure > 0 and np.all(correction > 0)):
+            raise DataError(f"not a number: {value!r:.60}", file=path, field=name) from None
+    if not (0 < exposure < np.inf and np.all((correction > 0) & (correction < np.inf))):
         raise DataError(
             f"expected a positive factor, found {exposure:g}", file=path, field="EXPOSURE"
         )
@@ -162,7 +173,7 @@ def _view(header: tuple[str, ...], width: int, height: int) -> View | None:
 def _colours(header: tuple[str, ...], path: str | PathLike[str]) -> str:
     formats = [line[7:].strip() for line in header if line.startswith("FORMAT=")]
     if formats and formats[-1] not in FORMATS:
-        raise DataError(f"unknown pixel format {formats[-1]!r}", file=path, field="FORMAT")
+        raise DataError(f"unknown pixel format {formats[-1]!r:.60}", file=path, field="FORMAT")
     return FORMATS[formats[-1]] if formats else "rgb"
 
 

@@ -24,6 +24,7 @@ KINDS = {
     "s": "planispheric",
 }
 LETTERS = {kind: letter for letter, kind in KINDS.items()}
+MOST_SHIFT = 1000.0  # of a picture, in its own sizes
 WIDEST_DEG = {"perspective": 180, "hemispherical": 180, "angular": 360, "planispheric": 360}
 
 Triple = tuple[float, float, float]
@@ -57,6 +58,8 @@ class View:
         object.__setattr__(self, "up", _triple(up, "up"))
         if self.width < 1 or self.height < 1:
             raise ValueError(f"a picture of {self.width} x {self.height} pixels")
+        if not max(abs(self.shift), abs(self.lift)) <= MOST_SHIFT:
+            raise ValueError(f"a view shifted by {self.shift:g}, {self.lift:g} pictures")
         widest = WIDEST_DEG.get(self.kind, np.inf)
         open_end = self.kind in ("perspective", "planispheric")
         for name in ("horizontal_deg", "vertical_deg"):
@@ -303,19 +306,19 @@ _VECTORS = {"p": "position", "d": "direction", "u": "up"}
 def view_changes(text: str) -> dict[str, Any]:
     """The fields of `View` that a line in Radiance's view syntax sets; unknown words are left."""
     words, at = text.split(), 0
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     while at < len(words):
         word, at = words[at], at + 1
         if not word.startswith("-v") or len(word) < 3:
             continue
         letter = word[2]
         if letter == "t" and len(word) == 4 and word[3] in KINDS:
-            found["kind"] = KINDS[word[3]]
+            result["kind"] = KINDS[word[3]]
         elif len(word) == 3 and letter in _SIZES and (numbers := _numbers(words, at, 1)):
-            found[_SIZES[letter]] = numbers[0]
+            result[_SIZES[letter]] = numbers[0]
         elif len(word) == 3 and letter in _VECTORS and (numbers := _numbers(words, at, 3)):
-            found[_VECTORS[letter]] = numbers
-    return found
+            result[_VECTORS[letter]] = numbers
+    return result
 
 
 def _numbers(words: list[str], at: int, count: int) -> tuple[float, ...] | None:

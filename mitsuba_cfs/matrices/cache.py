@@ -29,7 +29,10 @@ VARIABLE = "CFS_CACHE"  # environment variable with the folder
 DEFAULT_LIMIT = 4 << 30  # [bytes] of all files; the longest unused go first
 RECENT_HASHES = 32  # of dataclasses
 PLAIN = {type(None), bool, int, float, str, bytes}  # whose `repr` tells values apart
-UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
+UNREADABLE = (
+    OSError, ValueError, KeyError, TypeError, IndexError, EOFError, MemoryError, RecursionError,
+    zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
 
 log = logging.getLogger(__name__)
 
@@ -108,9 +111,9 @@ class MatrixCache:
 
     def trim(self, keep: Path | None = None) -> None:
         """Delete the longest unused files until the folder holds less than the limit."""
-        found = [(file, _status(file)) for file in self.folder.glob("*.npz")]
+        result = [(file, _status(file)) for file in self.folder.glob("*.npz")]
         files = sorted(
-            ((file, status) for file, status in found if status), key=lambda item: item[1].st_mtime
+            ((file, status) for file, status in result if status), key=lambda item: item[1].st_mtime
         )
         total = sum(status.st_size for _, status in files)
         for file, status in files:

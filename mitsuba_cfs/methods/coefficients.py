@@ -51,7 +51,9 @@ class StraightView:
     """The outdoors or the adjacent room that sensors see through a group in one state."""
 
     values: Estimate  # B [S, P]
-    direct: Array | None  # B_d [S, P], without what the outdoors reflects; None by three phases
+    direct: (
+        Array | None
+    )  # B_d [S, P], without what the outdoors reflects; None with the three-phase method
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +187,7 @@ def _straight_view(
 def reflection_shares(
     matrices: PhaseMatrices, optics: Sequence[SystemOptics]
 ) -> tuple[NDArray[np.floating] | None, Array | None]:
-    """Shares [S, Q * K] of the luminance before the windows that sensors get by their reflection.
+    """Shares [S, Q * K] of the luminance outside the windows that sensors get by their reflection.
 
     All of them, and those by way of the outdoors; None where there are none.
 
@@ -206,7 +208,7 @@ def reflection_shares(
 
 
 def coefficients_of(matrices: PhaseMatrices, shares: NDArray[np.floating]) -> Array:
-    """Shares [n, Q * K] of the luminance before the windows as coefficients [n, P] of the sky."""
+    """Shares [n, Q * K] of the luminance outside the windows as coefficients [n, P] of the sky."""
     daylight = matrices.daylight.values
     coefficients: Array = shares @ daylight.reshape(shares.shape[1], -1)
     return coefficients

@@ -140,10 +140,13 @@ def seasonal_light(
         hours = np.flatnonzero(season == i)
         lights.append(
             phase_light(
-                of_season, filled, sky.part(hours), needs=needs if len(hours) else (),
+                of_season,
+                filled,
+                sky.part(hours),
+                needs=needs if len(hours) else (),
                 progress=part(progress, i / count, (i + 1) / count),
             )
-        )  # fmt: skip
+        )
     return SeasonalLight(tuple(lights), sky, season)
 
 
@@ -193,7 +196,7 @@ def eye_illuminance(light: Light, state: State | None = None) -> Array:
 
 
 def direct_sun(light: ByPhases, state: State | None = None) -> Array | None:
-    """Illuminance of the sensors directly from the sun [S, L] [lx]; None by three phases."""
+    """Illuminance of the sensors directly from the sun [S, L] [lx]; None for three phases."""
     groups = direct_sun_by_group(light, state)
     return None if groups is None else np.sum(groups, axis=0)
 

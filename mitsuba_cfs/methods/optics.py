@@ -142,10 +142,12 @@ class AngularOptics:
         shares = {
             name: np.asarray(values, dtype=float)
             for name, values in (
-                ("straight", straight), ("scattered", scattered),
-                ("mirrored", mirrored), ("reflected", reflected),
+                ("straight", straight),
+                ("scattered", scattered),
+                ("mirrored", mirrored),
+                ("reflected", reflected),
             )
-        }  # fmt: skip
+        }
         for name, values in shares.items():
             if values.ndim != 1 or len(values) < 2 or (values < 0).any():
                 raise ValueError(

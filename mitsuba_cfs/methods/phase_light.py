@@ -74,7 +74,9 @@ class WindowLight:
     """The luminance of a window part towards the room in one state [cd/m2]."""
 
     whole: NDArray[np.float32]  # [K, L] T D s
-    sun: NDArray[np.float32] | None  # [K, L] T D_d s_d, the sun alone; None by three phases
+    sun: (
+        NDArray[np.float32] | None
+    )  # [K, L] T D_d s_d, the sun alone; None with the three-phase method
     beam: NDArray[np.float32] | None  # [K, L] its straight beam; None where none passes
 
 
@@ -87,7 +89,7 @@ class SensorLight:
 
     coefficients: GroupCoefficients
     added: Array | None = None  # [S, L] the reflected sun in place of `coefficients.by_sun` [lx]
-    sun: Array | None = None  # [S, L] C_ds s_sun [lx]; None by three phases
+    sun: Array | None = None  # [S, L] C_ds s_sun [lx]; None with the three-phase method
     sun_error: Array | float = 0.0  # [S] of the hours' sums of these two
 
 
@@ -156,7 +158,7 @@ def phase_light(
 def with_reflected_sun(light: PhaseLight) -> PhaseLight:
     """The light with the sun that outdoor surfaces reflect to the windows.
 
-    By three phases, and where surfaces of the room mirror it, the sun's patches are taken.
+    The three-phase method, and rooms with mirroring surfaces, use the sun's patches instead.
     """
     matrices = light.matrices
     by_patches = not matrices.five_phase or matrices.scene.interior.glossy
@@ -166,7 +168,7 @@ def with_reflected_sun(light: PhaseLight) -> PhaseLight:
 
 
 def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> PhaseLight:
-    """The light with that of the sensors, from V and, by five phases, C_ds."""
+    """The light with that of the sensors, from V and, with the five-phase method, C_ds."""
     if light.sensors is not None:
         return light
     light = replace(light, matrices=with_sensors(light.matrices, progress=progress))
@@ -208,7 +210,7 @@ def illuminance_of_all(light: PhaseLight, state: State | None) -> Array:
 def direct_sun_by_group(light: PhaseLight, state: State | None) -> list[Array] | None:
     """Illuminance of the sensors directly from the sun through each window group [G][S, L] [lx].
 
-    None by three phases.
+    None with the three-phase method.
     """
     if not light.matrices.five_phase:
         return None
@@ -377,7 +379,7 @@ def _sensor_light(
     room: SunlitRoom | None,
     direct: tuple[Estimate | None, NDArray[np.int64]],
 ) -> SensorLight:
-    """The light of the sensors through a group in a state, by five phases.
+    """The light of the sensors through a group in a state, with the five-phase method.
 
     Args: direct: C_ds [G, S, h], and the hours h that it is of.
     """

@@ -197,9 +197,11 @@ def with_exchange(
     """The matrices with W (indoors) and X (outdoors), for windows that reflect."""
     parts = matrices.parts.groups
     common: dict[str, Any] = {
-        "stopping": Stopping(batches=2), "seed": matrices.sampling.seed,
-        "cache": matrices.cache, "scenes": matrices.scenes,
-    }  # fmt: skip
+        "stopping": Stopping(batches=2),
+        "seed": matrices.sampling.seed,
+        "cache": matrices.cache,
+        "scenes": matrices.scenes,
+    }
     if indoors and matrices.exchange is None:
         exchange = window_exchange(
             matrices.scene.interior,

@@ -123,7 +123,7 @@ def _five_phase_pictures(
     *,
     direct: bool = False,
 ) -> FivePhasePictures:
-    """Pictures by five phases; without `view` the caller sets the matrices (`see_by`)."""
+    """Five-phase pictures; without `view` the caller sets the matrices (`see_by`)."""
     matrices, sky, optics = light.matrices, light.sky, light.optics(state)
     windows, interior = _windows(light, hours, state), matrices.scene.interior
     exterior, parts = matrices.scene.exterior, matrices.parts.groups
@@ -178,7 +178,7 @@ def _window_luminance(
 ) -> NDArray[np.floating]:
     """Luminance of the windows [Q, K, n] towards the room, with what they reflect.
 
-    Args: sun: in the view, by five phases.
+    Args: sun: in the view, with the five-phase method.
     """
     luminance: NDArray[np.floating] = np.stack([one.whole for one in windows])
     matrices = with_exchange_of(light.matrices, optics)
@@ -200,7 +200,7 @@ def _window_luminance(
 
 
 def _before_windows(light: PhaseLight, hours: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Luminance before the windows [Q * K, h], without what they reflect there themselves."""
+    """Luminance outside the windows [Q * K, h], without what they reflect there themselves."""
     daylight, reflected = light.matrices.daylight.values, with_reflected_sun(light).reflected
     before: NDArray[np.float64] = daylight.reshape(-1, daylight.shape[2]) @ sky_in(light, hours)
     if reflected is not None:

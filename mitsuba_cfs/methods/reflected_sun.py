@@ -49,7 +49,7 @@ class ReflectedSun:
     shining: NDArray[np.int64]  # [h] hours L with the sun up
     inside: TracedScene
     outside: TracedScene  # what is in front of the window parts, in the room's coordinates
-    before: tuple[NDArray[np.float32], ...]  # [BATCHES][Q, K, h] luminance before the windows
+    before: tuple[NDArray[np.float32], ...]  # [BATCHES][Q, K, h] luminance outside the windows
     by_patches: Array  # D - D_d [Q, K, P], which it replaces; 0 without outdoor surfaces
 
     @property
@@ -97,11 +97,14 @@ def sunlit_room(matrices: PhaseMatrices, sun: ReflectedSun) -> SunlitRoom | None
     cells = room_cells(sun.inside, interior, samples=samples)
     shares = tuple(
         room_shares(
-            cells, sun.inside, matrices.scene.sensors(), samples=samples,
+            cells,
+            sun.inside,
+            matrices.scene.sensors(),
+            samples=samples,
             seed=_seed(matrices, batch),
         )
         for batch in range(BATCHES)
-    )  # fmt: skip
+    )
     return SunlitRoom(cells[0], shares)
 
 
@@ -152,7 +155,7 @@ def reflected_to_sensors(
 
 
 def replaced_luminance(sun: ReflectedSun, hours: NDArray[np.bool_]) -> Array:
-    """Luminance before the windows [Q, K], the sum over some hours, by shadow rays less by patches.
+    """Luminance outside windows [Q, K], the sum over some hours, by shadow rays less by patches.
 
     Args: hours: [L] which.
     """

@@ -18,7 +18,7 @@ def _no_points() -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class AdjacentRoom:
-    """The room behind a window group that looks into another room; several groups may share it."""
+    """The adjacent room that a window group faces; several groups may share it."""
 
     scene: DaylightScene  # its interior without the glass that is looked through
     transmission: tuple[NDArray[np.float64], ...]  # [G][K, K] T of its window groups

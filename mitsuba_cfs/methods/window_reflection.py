@@ -64,7 +64,7 @@ def reflected_luminance(
         exchange: W [Q, K, Q * K].
         luminance: of the windows [Q, K, H].
         in_sun: the part of it that is the sun's beam [Q, K, H], and the luminance of the room in
-            that beam before the windows [Q * K, H], by shadow rays: few paths of W would meet the
+            that beam outside the windows [Q * K, H], by shadow rays: few paths of W would meet the
             sun's patch.
     """
     added: NDArray[np.float64] = np.zeros(luminance.shape)
@@ -102,7 +102,7 @@ def sensor_reflection(
 def by_way_of_outdoors(
     exchange: NDArray[np.float64], optics: Sequence[SystemOptics], shares: NDArray[np.floating]
 ) -> NDArray[np.float64]:
-    """Shares [n, Q * K] of the luminance before the windows, by their reflection outdoors.
+    """Shares [n, Q * K] of the luminance outside the windows, by their reflection outdoors.
 
     F (X R_f + (X R_f)^2 + ...)
 
@@ -145,7 +145,7 @@ def returned_from_outdoors(
 def shares_before_windows(
     matrices: PhaseMatrices, view: NDArray[np.float64], optics: Sequence[SystemOptics]
 ) -> NDArray[np.float64]:
-    """Light of the sensors per unit luminance before the windows, by patches [S, Q * K].
+    """Light of the sensors per unit luminance outside the windows, by patches [S, Q * K].
 
     Args: view: V [S, Q, K].
     """

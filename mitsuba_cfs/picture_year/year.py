@@ -10,6 +10,7 @@ its own.  The sun's disc is apart, as it is for glare (`mitsuba_cfs.glare.sun_di
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -21,9 +22,139 @@ from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order
 from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View
-from mitsuba_cfs.picture_year.codes import coded, packed, unpacked
-from mitsuba_cfs.picture_year.low_rank import MOST, Patterns, patterns_of
 from mitsuba_cfs.progress import Progress, silent
+
+FINEST = 5e-4  # of the typical value: step of the patterns' whole numbers
+MOST = 32767  # of a whole number of 16 bits
+
+
+@dataclass(frozen=True, slots=True)
+class Patterns:
+    """Low-rank form of values that vary slowly from hour to hour.
+
+        x[h, i] = scale[h] typical[i] sum over r of amount[h, r] pattern[r, i]
+
+    Hours are scaled to one mean and pixels to one root mean square first, so that dim hours and
+    dark corners keep their accuracy.  Patterns are the leading right singular vectors of a sample
+    of hours.
+
+    Source: truncated singular value decomposition (Eckart and Young 1936, Psychometrika 1:211-218).
+    """
+
+    typical: NDArray[np.float32]  # [n]
+    weight: NDArray[np.float64]  # [n] of a place, in the sums over places
+    pattern: NDArray[np.int16]  # [r, n] in steps
+    step: float
+    axes: NDArray[np.float64]  # [r, n] orthonormal, of weighted values over typical ones
+    spread: NDArray[np.float64]  # [r] root mean square of each axis in the sample
+
+    @property
+    def rank(self) -> int:
+        """Number of patterns."""
+        return len(self.pattern)
+
+    def amounts(self, values: NDArray[np.floating]) -> tuple[NDArray, NDArray]:
+        """Scale [h] and amounts [h, r] of hours of values [h, n]."""
+        scale = mean_of(values, self.weight)
+        relative = values / scale[:, None] / self.typical * np.sqrt(self.weight)
+        return scale, (relative @ self.axes.T) / self.spread
+
+    def values(self, scale: NDArray, amounts: NDArray) -> NDArray[np.float32]:
+        """Values of hours [h, n], reconstructed and non-negative."""
+        relative = amounts.astype(np.float32) @ (self.pattern.astype(np.float32) * self.step)
+        return np.maximum(relative, 0.0) * self.typical * scale[:, None].astype(np.float32)
+
+
+def patterns_of(sample: NDArray[np.floating], weight: NDArray[np.floating], rank: int) -> Patterns:
+    """The leading patterns of a sample of hours [s, n].
+
+    Args: weight: [n] of each place; rank: of the patterns at most, fewer where the sample is small.
+    """
+    weight = np.asarray(weight, dtype=float)
+    relative = sample / mean_of(sample, weight)[:, None]
+    typical = np.sqrt(np.mean(relative.astype(float) ** 2, axis=0))
+    typical = np.maximum(typical, 1e-6 * typical.max(initial=1e-6)).astype(np.float32)
+    relative = (relative / typical * np.sqrt(weight)).astype(float)
+    square, vectors = np.linalg.eigh(relative @ relative.T)
+    kept = np.flatnonzero(square[::-1] > 1e-12 * square.max(initial=1e-30))[:rank]
+    length = np.sqrt(square[::-1][kept])
+    axes = (vectors[:, ::-1][:, kept].T @ relative) / length[:, None]
+    spread = length / np.sqrt(len(sample))
+    whole = axes * spread[:, None] / np.sqrt(weight)
+    step = max(FINEST, float(np.abs(whole).max(initial=0.0)) / MOST)
+    return Patterns(typical, weight, np.round(whole / step).astype(np.int16), step, axes, spread)
+
+
+def mean_of(values: NDArray[np.floating], weight: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Mean [h] of values [h, n] by weight, above 0."""
+    return np.maximum(values @ weight / max(float(np.sum(weight)), 1e-30), 1e-6)
+
+
+LEVELS = 255  # and 0 for none
+STEP = 0.04  # of the logarithm between levels, at least
+DEFLATED = -15  # raw deflate, as a browser inflates it
+SMALL = 1e-3  # of the logarithm: what levels of one step may leave out
+
+
+@dataclass(frozen=True, slots=True)
+class Codes:
+    """One level for each pixel, 0 for none."""
+
+    level: NDArray[np.float32]  # [k] level of the codes 1..k
+    code: NDArray[np.uint8]  # [n]
+
+    def values(self, otherwise: float) -> NDArray[np.float32]:
+        """The level [n] of each pixel, `otherwise` for none."""
+        return np.append(np.float32(otherwise), self.level)[self.code]
+
+
+def coded(values: NDArray[np.floating], chosen: NDArray[np.bool_]) -> Codes:
+    """Codes of positive values [n] at chosen pixels [n]."""
+    code = np.zeros(len(values), dtype=np.uint8)
+    if not chosen.any():
+        return Codes(np.empty(0, dtype=np.float32), code)
+    logarithm = np.log(values[chosen].astype(float))
+    low, high = logarithm.min(), logarithm.max()
+    step = max(STEP, (high - low) / (LEVELS - 1) + SMALL)
+    place = np.round((logarithm - low) / step).astype(np.int64)
+    used, number = np.unique(place, return_inverse=True)
+    total = np.bincount(number, values[chosen].astype(float), minlength=len(used))
+    level = total / np.bincount(number, minlength=len(used))
+    code[chosen] = number + 1
+    return Codes(level.astype(np.float32), code)
+
+
+def packed(*parts: Codes) -> bytes:
+    """Several codes, concatenated and deflated; b"" for none.
+
+    Counts of levels (16 bits each), levels (32-bit numbers), then a byte for each place; little
+    end first.
+    """
+    if not any(len(part.level) for part in parts):
+        return b""
+    counts = np.array([len(part.level) for part in parts], dtype="<u2").tobytes()
+    levels = b"".join(part.level.astype("<f4").tobytes() for part in parts)
+    codes = b"".join(part.code.tobytes() for part in parts)
+    press = zlib.compressobj(9, zlib.DEFLATED, DEFLATED)
+    return press.compress(counts + levels + codes) + press.flush()
+
+
+def unpacked(data: bytes, sizes: tuple[int, ...]) -> list[Codes]:
+    """The codes in `packed` for parts of these lengths."""
+    if not data:
+        empty = np.empty(0, dtype=np.float32)
+        return [Codes(empty, np.zeros(size, dtype=np.uint8)) for size in sizes]
+    raw = zlib.decompress(data, DEFLATED)
+    counts = np.frombuffer(raw, "<u2", len(sizes))
+    at, levels, result = 2 * len(sizes), [], []
+    for count in counts.tolist():
+        levels.append(np.frombuffer(raw, "<f4", count, at))
+        at += 4 * count
+    for level, size in zip(levels, sizes, strict=True):
+        result.append(Codes(level, np.frombuffer(raw, np.uint8, size, at)))
+        at += size
+    return result
+
 
 SAMPLE = 400  # hours that the patterns are found from
 ROWS, WINDOWS = 64, 32  # patterns of surfaces, of pixels that show windows
@@ -71,13 +202,13 @@ class PictureYear:
     def values(self, hour: int) -> NDArray[np.float32]:
         """Luminance [n] of the pixels in an hour, without the sun's disc."""
         beam, ratio = unpacked(self.codes[hour], (len(self.pixels), len(self.window)))
-        found = self._part(0, hour)[self.row] * self.share + beam.values(0.0)
+        result = self._part(0, hour)[self.row] * self.share + beam.values(0.0)
         shown = self._part(1, hour)
         if ratio.code.any():
             known = np.maximum(shown, self.floor[hour])
             shown = np.where(ratio.code > 0, known * ratio.values(1.0), shown)
-        found[self.window] += shown
-        return found
+        result[self.window] += shown
+        return result
 
     def _part(self, which: int, hour: int) -> NDArray[np.float32]:
         patterns = (self.rows, self.windows)[which]
@@ -106,8 +237,8 @@ def picture_year(pictures: Pictures, *, seed: int = 0, progress: Progress = sile
         progress("explorer", done / max(pictures.hours, 1))
     year = work.year()
     hours = np.array(sorted(rated), dtype=np.int64)
-    kept = [work.dgp(year.values(h), year.discs[h]) for h in hours.tolist()]
-    check = DgpCheck(hours, np.array([rated[h] for h in hours.tolist()]), np.array(kept))
+    dgps = [work.dgp(year.values(h), year.discs[h]) for h in hours.tolist()]
+    check = DgpCheck(hours, np.array([rated[h] for h in hours.tolist()]), np.array(dgps))
     return work.year(check)
 
 

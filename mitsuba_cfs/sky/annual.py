@@ -179,8 +179,10 @@ def _of_series(
 ) -> AnnualSky:
     lit = np.flatnonzero(is_up(series.sun)) if hours is None else np.asarray(hours, dtype=np.int64)
     options: dict[str, Any] = {
-        "ground_reflectance": reflectance, "ground": ground, "dtype": np.float32,
-    }  # fmt: skip
+        "ground_reflectance": reflectance,
+        "ground": ground,
+        "dtype": np.float32,
+    }
     return AnnualSky(
         series_matrix(series, lit, subdivision, **options),
         series.sun[lit],

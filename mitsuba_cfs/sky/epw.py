@@ -14,14 +14,21 @@ from mitsuba_cfs.sky.plausible import checked_sun
 from mitsuba_cfs.sky.weather import Weather
 
 FloatArray = NDArray[np.float64]
+# Values that no weather has.  Records by the WMO: 56.7 and -89.2 degC (Antarctica apart -67.8), a
+# mean wind of 60 m/s in tropical cyclones; a dew point rounded as the temperature is
+HOTTEST_C, COLDEST_C, STRONGEST_WIND = 57.0, -68.0, 60.0
+SPIKE_K = 15.0  # of one hour against both neighbours
+DEW_ABOVE_K, LEAST_HUMIDITY = 3.0, 0.005
 
 
 def read_epw(path: str | PathLike[str]) -> Weather:
     """The weather of an EnergyPlus EPW file of a whole year (8760 or 8784 hours, or parts of them).
 
-    Dew point, humidity, pressure and sky longwave are derived where the file marks them missing;
-    a missing temperature, irradiance or wind speed is an error.  A pressure out of bounds is
-    replaced and noted.  Whether the radiation is that of the stated place and clock is checked.
+    Dew point, humidity, pressure and sky longwave are derived where the file marks them missing.
+    A missing temperature, irradiance or wind speed is interpolated over up to six hours and noted;
+    a longer gap is an error.  A pressure out of bounds is replaced and noted; values that no
+    weather has, but within the format's bounds, are noted.  Whether the radiation is that of the
+    stated place and clock is checked.
 
     Raises: `DataError` that names the file, the line and the field.
     Source: EnergyPlus Auxiliary Programs, "EnergyPlus Weather File (EPW) Data Dictionary".
@@ -34,14 +41,16 @@ def read_epw(path: str | PathLike[str]) -> Weather:
     dry = column.required("dry bulb temperature")
     dew = column.optional("dew point temperature")
     humidity = column.optional("relative humidity") / 100
-    unknown = np.isnan(dew) & np.isnan(humidity)
-    if unknown.any():
-        raise column.error(
-            "relative humidity", int(np.argmax(unknown)), "missing, and so is the dew point"
-        )
+    if (np.isnan(dew) & np.isnan(humidity)).any():  # of neither there is a value
+        humidity = column.filled("relative humidity", humidity)
+    wind = column.required("wind speed")
+    notes = implausible(column, site.name, dry, dew, humidity, wind)
     humidity = np.where(np.isnan(humidity), air.relative_humidity(dry, dew), humidity)
     dew = np.where(np.isnan(dew), air.dew_point(dry, humidity), dew)
-    pressure, notes = _pressure(column, site)
+    pressure, more = _pressure(column, site)
+    infrared = _infrared(column, dry, dew)
+    direct = column.required("direct normal irradiance")
+    diffuse = column.required("diffuse horizontal irradiance")
     weather = Weather(
         site=site.name,
         latitude_deg=site.latitude_deg,
@@ -50,8 +59,8 @@ def read_epw(path: str | PathLike[str]) -> Weather:
         elevation_m=site.elevation_m,
         step_h=step_h,
         times=times,
-        direct_normal=column.required("direct normal irradiance"),
-        diffuse_horizontal=column.required("diffuse horizontal irradiance"),
+        direct_normal=direct,
+        diffuse_horizontal=diffuse,
         global_horizontal=column.whole("global horizontal irradiance"),
         direct_normal_illuminance=column.whole("direct normal illuminance"),
         diffuse_horizontal_illuminance=column.whole("diffuse horizontal illuminance"),
@@ -60,18 +69,73 @@ def read_epw(path: str | PathLike[str]) -> Weather:
         dew_point_c=dew,
         relative_humidity=humidity,
         pressure_pa=pressure,
-        wind_speed=column.required("wind speed"),
+        wind_speed=wind,
         wind_direction_deg=column.whole("wind direction"),
-        horizontal_infrared=_infrared(column, dry, dew),
+        horizontal_infrared=infrared,
         stated_albedo=column.unchecked("albedo"),
         snow_depth_cm=column.unchecked("snow depth"),
         ground_depth_m=depth,
         ground_temperature_c=ground,
         first_weekday=weather_table.epw_first_weekday(head),
-        notes=notes,
+        notes=(*filled_gaps(column, site.name), *notes, *more),
         file=Path(path),
     )
     return checked_sun(weather, path)
+
+
+def filled_gaps(column: weather_table.EpwColumns, site: str) -> tuple[str, ...]:
+    """A note for each field that has interpolated values."""
+    return tuple(
+        Note(
+            "Weather {site}: {field}: {count} missing values, the first in line {line}, are "
+            "interpolated.",
+            site=site,
+            field=field,
+            count=len(rows),
+            line=column.first_line + int(rows[0]),
+        )
+        for field, rows in column.gaps.items()
+    )
+
+
+def implausible(
+    column: weather_table.EpwColumns,
+    site: str,
+    dry: FloatArray,
+    dew: FloatArray,
+    humidity: FloatArray,
+    wind: FloatArray,
+) -> tuple[str, ...]:
+    """A note for each field with values that no weather has; they are used as they are.
+
+    Args: dry, dew: temperatures [H] [deg C]; humidity: [H] 0 to 1; wind: speed [H] [m/s]; NaN
+        where missing.
+    """
+    cases = {
+        "dry bulb temperature": (dry, spikes(dry) | (dry > HOTTEST_C) | (dry < COLDEST_C)),
+        "dew point temperature": (dew, spikes(dew) | (dew > dry + DEW_ABOVE_K)),
+        "relative humidity": (100 * humidity, humidity < LEAST_HUMIDITY),
+        "wind speed": (wind, wind > STRONGEST_WIND),
+    }
+    return tuple(
+        Note(
+            "Weather {site}: {field}: {count} implausible values, the first in line {line}: "
+            "{value:g}; they are used as they are.",
+            site=site,
+            field=field,
+            count=np.count_nonzero(wrong),
+            line=column.first_line + int(np.argmax(wrong)),
+            value=values[np.argmax(wrong)],
+        )
+        for field, (values, wrong) in cases.items()
+        if wrong.any()
+    )
+
+
+def spikes(values: FloatArray) -> NDArray[np.bool_]:
+    """Values [H] that are far above or below both of their neighbours."""
+    before, after = values - np.roll(values, 1), values - np.roll(values, -1)
+    return (np.minimum(abs(before), abs(after)) > SPIKE_K) & (before * after > 0)
 
 
 def _pressure(

@@ -45,8 +45,9 @@ def maximum_heat_island(
     doi 10.1002/joc.4717; the range from memory, as the paper was not available.
     """
     for name, value, (low, high) in (
-        ("sky_view", sky_view, SKY_VIEW), ("vegetation", vegetation, VEGETATION),
-    ):  # fmt: skip
+        ("sky_view", sky_view, SKY_VIEW),
+        ("vegetation", vegetation, VEGETATION),
+    ):
         if not low <= value <= high:
             raise ValueError(f"{name}: expected {low:g} to {high:g} ({SOURCE}), got {value:g}")
     wind = np.asarray(wind, dtype=float)
@@ -90,22 +91,26 @@ def in_city(
         pressure = weather.pressure_pa
     density = pressure / (GAS * (dry + 273.15))
     maximum = maximum_heat_island(
-        sky_view, vegetation, (sun / (density * HEAT)).reshape(-1, 24).mean(axis=1),
-        np.ptp(days(dry), axis=1), np.maximum(days(wind).mean(axis=1), CALM),
-    )  # fmt: skip
+        sky_view,
+        vegetation,
+        (sun / (density * HEAT)).reshape(-1, 24).mean(axis=1),
+        np.ptp(days(dry), axis=1),
+        np.maximum(days(wind).mean(axis=1), CALM),
+    )
     excess = np.roll(np.repeat(maximum, 24), FIRST_HOUR) * np.tile(shares, hours // 24)
     warm = dry + excess
     return replace(
-        weather, dry_bulb_c=warm,
+        weather,
+        dry_bulb_c=warm,
         relative_humidity=relative_humidity(warm, dew),
         notes=(*weather.notes, *_notes(weather, maximum, excess)),
-    )  # fmt: skip
+    )
 
 
 def _notes(
     weather: Weather, maximum: NDArray[np.float64], excess: NDArray[np.float64]
 ) -> list[str]:
-    found: list[str] = [
+    notes: list[str] = [
         Note(
             "Weather {site}: air of an urban street, on average {mean:.1f} K and at most "
             "{most:.1f} K warmer than in the file (urban heat island by {source}, median of the "
@@ -123,7 +128,7 @@ def _notes(
         (weather.longitude_deg, EAST_DEG),
     ):
         if not low <= value <= high:
-            found.append(
+            notes.append(
                 Note(
                     "Weather {site}: the heat island equation is for cities in north-western "
                     "Europe; this site is elsewhere.",
@@ -131,4 +136,4 @@ def _notes(
                 )
             )
             break
-    return found
+    return notes

@@ -104,9 +104,7 @@ def series_for_suns(
             f"suns {towards.shape}, irradiances {direct.shape}, {diffuse.shape}: "
             "expected [H, 3], [H], [H]"
         )
-    model = perez_sky(
-        direct, diffuse, towards, day_of_year=day_of_year, dew_point_c=dew_point_c
-    )  # fmt: skip
+    model = perez_sky(direct, diffuse, towards, day_of_year=day_of_year, dew_point_c=dew_point_c)
     dark = direct + diffuse <= DARK
     if band == "visible":
         direct, diffuse = direct * model.direct_efficacy, diffuse * model.diffuse_efficacy

@@ -84,9 +84,12 @@ def _clock(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]
         field = fits[0].rpartition(" ")[0] if len(fits) == 1 else "time zone"
         raise DataError(what + text, file=file, field=field)
     values = {
-        "site": weather.site, "hours": abs(late), "longitude": weather.longitude_deg,
-        "zone": weather.timezone_h, "fits": ", ".join(fits),
-    }  # fmt: skip
+        "site": weather.site,
+        "hours": abs(late),
+        "longitude": weather.longitude_deg,
+        "zone": weather.timezone_h,
+        "fits": ", ".join(fits),
+    }
     note = (
         Note(
             "Weather {site}: on clear days the radiation is centred {hours:.1f} h before the solar "
@@ -107,13 +110,13 @@ def _clock(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]
 
 def _fitting(weather: Weather, late: float) -> dict[str, float]:
     """Time zone, and longitude with the other sign, that agree with the noon of the radiation."""
-    found = {}
+    fitting = {}
     zone = round(2 * late) / 2
     if abs(late - zone) < SAME_H:
-        found["time zone"] = _wrapped(weather.timezone_h + zone)
+        fitting["time zone"] = _wrapped(weather.timezone_h + zone)
     if abs(_wrapped(late - 2 * weather.longitude_deg / 15)) < SAME_H:
-        found["longitude"] = -weather.longitude_deg
-    return found
+        fitting["longitude"] = -weather.longitude_deg
+    return fitting
 
 
 def noon_offset(

@@ -28,8 +28,10 @@ def sun_directions(weather: Weather, *, model: str = "spa") -> NDArray[np.float6
     if model not in SUN_MODELS:
         raise ValueError(f"sun model: expected one of {SUN_MODELS}, got {model!r}")
     spa = model == "spa"
-    found = _spa_directions(weather, weather.midpoints) if spa else _radiance_directions(weather)
-    return rotated(found, weather.turned_deg) if weather.turned_deg else found
+    directions = (
+        _spa_directions(weather, weather.midpoints) if spa else _radiance_directions(weather)
+    )
+    return rotated(directions, weather.turned_deg) if weather.turned_deg else directions
 
 
 def day_of_sun(weather: Weather, day: pd.Timestamp) -> NDArray[np.float64]:
@@ -38,8 +40,8 @@ def day_of_sun(weather: Weather, day: pd.Timestamp) -> NDArray[np.float64]:
     Local standard time at the weather's place; by the Solar Position Algorithm, as above.
     """
     times = pd.date_range(day, periods=24 * 60 + 1, freq="min")
-    found = _spa_directions(weather, times)
-    return rotated(found, weather.turned_deg) if weather.turned_deg else found
+    directions = _spa_directions(weather, times)
+    return rotated(directions, weather.turned_deg) if weather.turned_deg else directions
 
 
 def _spa_directions(weather: Weather, times: pd.DatetimeIndex) -> NDArray[np.float64]:

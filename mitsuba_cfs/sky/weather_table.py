@@ -20,6 +20,7 @@ FilePath = str | PathLike[str]
 TYPICAL_YEAR, TYPICAL_LEAP_YEAR = 2017, 2012
 WEEK = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
 STEPS_PER_DAY = 24
+LONGEST_GAP_H = 6  # of missing values that are interpolated
 
 # EPW field: column, value that means "missing" (at or above it), least and greatest valid value.
 # Source: EnergyPlus Auxiliary Programs, EPW data dictionary.  The irradiance bound is ours: more
@@ -183,6 +184,7 @@ class EpwColumns:
 
     def __init__(self, path: FilePath, header_lines: int, lines: list[str]) -> None:
         self.path, self.first_line = path, header_lines + 1
+        self.gaps: dict[str, NDArray[np.int64]] = {}  # rows of fields that were interpolated
         self.rows = [line.split(",") for line in lines]
         for i, row in enumerate(self.rows):
             if len(row) < 24:
@@ -244,14 +246,29 @@ class EpwColumns:
         return None if wrong.all() else np.where(wrong, np.nan, values)
 
     def required(self, field: str) -> NDArray[np.float64]:
-        """The field's values [H]; `DataError` where one is missing."""
-        values = self.optional(field)
-        if np.isnan(values).any():
-            row = int(np.argmax(np.isnan(values)))
-            raise self.error(
-                field, row, f"missing (the file has {self.rows[row][EPW_FIELDS[field][0]]})"
-            )
-        return values
+        """The field's values [H], gaps of a few hours filled; `DataError` for a longer one."""
+        return self.filled(field, self.optional(field))
+
+    def filled(self, field: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The values [H] with gaps (NaN) of a few hours interpolated linearly, which `gaps` names.
+
+        Raises: `DataError` for a gap of more than `LONGEST_GAP_H`, and at both ends of the file.
+        """
+        missing = np.isnan(values)
+        if not missing.any():
+            return values
+        steps = max(1, len(values) // (STEPS_PER_DAY * 365))  # in an hour
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], missing, [0]])))
+        for start, end in edges.reshape(-1, 2):
+            at_end = start == 0 or end == len(values)
+            if at_end or end - start > LONGEST_GAP_H * steps:
+                found = self.rows[start][EPW_FIELDS[field][0]]
+                most = f"between others up to {LONGEST_GAP_H} hours are filled"
+                message = f"missing (the file has {found}; {(end - start) / steps:g} hours; {most})"
+                raise self.error(field, int(start), message)
+        rows = np.arange(len(values))
+        self.gaps[field] = np.flatnonzero(missing)
+        return np.where(missing, np.interp(rows, rows[~missing], values[~missing]), values)
 
     def whole(self, field: str) -> NDArray[np.float64] | None:
         """The field's values [H], or None where any is missing."""

@@ -1,12 +1,12 @@
-"""Which method and which glare metric to take: measured errors, and a clock.
+"""Choice of a daylight method and a glare metric, by measured errors and by time.
 
 - Specular surfaces in the room are outside of what eDGP and sDGP assume, and the phase methods'
   direct sun does not know their reflections: full DGP by point-in-time paths, whatever it takes.
   (The rule of the dissertation's 3.2.8.  Our tracer knows no mirrors in a room either, and the
   reason says so.)
-- Otherwise what is near enough and quick enough; of these the nearest, of equals the quickest, with
-  full DGP where it costs no more.  What is near is what was measured of systems like the ones at
-  hand, see `scenes.calibration.errors`.
+- Otherwise a method within the limits of error and time; of these the most accurate, of equals the
+  quickest, with full DGP where its time is about equal.  Errors are those measured for similar
+  systems, see `scenes.calibration.errors`.
 """
 
 from __future__ import annotations

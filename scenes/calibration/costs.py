@@ -93,7 +93,7 @@ class Calibration:
             return cls.of(json.loads(path.read_text(encoding="utf-8")))
         except FileNotFoundError:
             raise DataError("is not there: run `cfs calibrate` first", file=path) from None
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
             message = f"is no calibration ({error}): delete it, or run `cfs calibrate`"
             raise DataError(message, file=path) from error
 

@@ -9,10 +9,10 @@ UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 def seconds_of(text: str) -> float:
     """The seconds [s] of a time such as "20min"; `ValueError` for anything else."""
-    found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*(s|min|h)\s*", text)
-    if not found or float(found[1]) == 0:
+    match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*(s|min|h)\s*", text)
+    if not match or float(match[1]) == 0:
         raise ValueError(f"expected a time such as 90s, 20min or 2h, got {text!r}")
-    return float(found[1]) * UNITS[found[2]]
+    return float(match[1]) * UNITS[match[2]]
 
 
 def spoken_time(seconds: float) -> str:
@@ -23,8 +23,8 @@ def spoken_time(seconds: float) -> str:
 
 def share_of(text: str) -> float:
     """The share 0 to 1 of a text such as "10%" or "0.1"; `ValueError` for anything else."""
-    found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*(%?)\s*", text)
-    value = float(found[1]) / (100.0 if found[2] else 1.0) if found else 0.0
+    match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*(%?)\s*", text)
+    value = float(match[1]) / (100.0 if match[2] else 1.0) if match else 0.0
     if not 0 < value <= 1:
         raise ValueError(f"expected a share such as 10%, got {text!r}")
     return value

@@ -128,7 +128,7 @@ def _meets(
     """Whether rays from a point along `ways` [N, 3] meet any triangle [T, 3, 3]."""
     a, b, c = (triangles[:, i] for i in range(3))
     first, second, to_start = b - a, c - a, start - a
-    found = np.zeros(len(ways), dtype=bool)
+    meets = np.zeros(len(ways), dtype=bool)
     across = np.cross(to_start, first)
     for i, way in enumerate(ways):
         normal = np.cross(way, second)
@@ -138,8 +138,8 @@ def _meets(
         u = (to_start * normal).sum(-1) / scale
         v = across @ way / scale
         t = (second * across).sum(-1) / scale
-        found[i] = bool(np.any(~flat & (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)))
-    return found
+        meets[i] = bool(np.any(~flat & (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)))
+    return meets
 
 
 FILE = Path(__file__).with_name("errors.json")
@@ -197,16 +197,16 @@ class MeasuredErrors:
         distance = replace(self, cases=tuple(cases)).distances(traits)
         width = max(WIDTH, float(distance.min()))
         weight = np.exp(-0.5 * (distance / width) ** 2)
-        found = {}
+        result = {}
         for pair in cases[0].errors:
             squares = [max(case.errors[pair], LEAST) ** 2 for case in cases]
             method, metric = pair.rsplit(" ", 1)
-            found[method, metric] = float(np.sqrt(weight @ squares / weight.sum()))
-        return found
+            result[method, metric] = float(np.sqrt(weight @ squares / weight.sum()))
+        return result
 
     def of_all(self, traits: Iterable[Traits]) -> dict[Pair, float]:
         """Root mean squares of what is expected of several."""
-        each = [self.expected(one) for one in traits]
+        each = [self.expected(trait) for trait in traits]
         return {pair: float(np.sqrt(np.mean([e[pair] ** 2 for e in each]))) for pair in each[0]}
 
     def distances(self, traits: Traits) -> np.ndarray:
@@ -218,9 +218,9 @@ class MeasuredErrors:
         """Where the errors come from, in a sentence's part; the nearest case of each."""
         traits = list(traits)
         each = [
-            self.distances(replace(one, sun=sun))
-            for one in traits
-            for sun in ([0.0] if one.sun == 0 else [0.0, 1.0])
+            self.distances(replace(trait, sun=sun))
+            for trait in traits
+            for sun in ([0.0] if trait.sun == 0 else [0.0, 1.0])
         ]
         nearest = [int(np.argmin(distance)) for distance in each]
         far = max(float(distance.min()) for distance in each)
@@ -228,11 +228,11 @@ class MeasuredErrors:
             f"{self.cases[i].system} {self.cases[i].room}" for i in sorted(set(nearest))
         )
         words = ", ".join(list(names)[:3]) + (" and others" if len(names) > 3 else "")
-        said = (
+        message = (
             f"errors measured against paths on {self.made} ({self.script}, {len(self.cases)} "
             f"cases; nearest: {words})"
         )
-        return said if far < FAR else f"{said}; NOTHING LIKE IT was measured"
+        return message if far < FAR else f"{message}; NOTHING LIKE IT was measured"
 
 
 @cache

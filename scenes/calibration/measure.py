@@ -49,7 +49,7 @@ def room_costs(progress: Progress = silent, options: RoomOptions | None = None) 
     options = options or RoomOptions()
     weather, system = read_weather(WEATHER), read_system(VENETIAN_BLIND)
     building = shoebox(3.65, 4.6, 3.0)
-    space, found = building.spaces[0], []
+    space, result = building.spaces[0], []
     darker = replace(
         system.visible, transmission_front=0.9 * np.asarray(system.visible.transmission_front)
     )
@@ -72,6 +72,6 @@ def room_costs(progress: Progress = silent, options: RoomOptions | None = None) 
             stages["thermal"] = HEAT
         for stage, name in stages.items():
             once = max(first[stage] - again[stage], 0.0)
-            found.append(Cost(*name, once, 0.0, again[stage] / len(skies.lit)))
+            result.append(Cost(*name, once, 0.0, again[stage] / len(skies.lit)))
         progress("calibration", (number + 1) / len(PHASES))
-    return found
+    return result

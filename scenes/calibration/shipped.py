@@ -77,10 +77,10 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=300, help="pixels of a side")
     size = parser.parse_args().size
     before = speed.measured_speed()
-    found = calibrated(size)
+    result = calibrated(size)
     after = speed.measured_speed()
     least = {name: min(getattr(before, name), getattr(after, name)) for name in asdict(before)}
-    table = {"speed": least} | asdict(found)
+    table = {"speed": least} | asdict(result)
     FILE.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
 
 

@@ -361,8 +361,10 @@ def interpolate(
     """Convert goniophotometer files (pgII text, one or more per incident direction) to a BSDF.
 
     Prints the scattered fraction of each incident direction with its standard error, and the
-    symmetry that was assumed.
+    symmetry that was assumed.  A BSDF that scatters more light than it receives is refused, as
+    `cfs bsdf check` refuses it.
     """
+    from mitsuba_cfs.bsdf.energy import ENERGY_LIMIT, check_energy
     from mitsuba_cfs.bsdf.measured_file import read_measurement
     from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 
@@ -373,6 +375,10 @@ def interpolate(
         click.echo(f"{grazing} values along the sample's plane are left out")
     means = _klems(basis) if tensor_tree is None else _trees(tensor_tree, cull)
     file = BsdfFile(_interpolated(measured, means))
+    others = f" and {len(files) - 1} more" * (len(files) > 1)
+    for band, bsdf in file.bands.items():
+        for note in check_energy(bsdf, ENERGY_LIMIT, file=f"{files[0]}{others}", band=band):
+            click.echo(f"note: {note}", err=True)
     write_bsdf_xml(replace(file, name=name or measured[0].name), out)
     click.echo(f"{out}: {', '.join(file.bands)}")
 
@@ -400,7 +406,7 @@ def _interpolated(measured: Sequence[Measurement], means: _Means) -> dict[str, B
         _print_shares(patterns, bands.index("Visible"))
         for band, values in zip(bands, means.of(interpolant), strict=True):
             blocks[band][block] = values
-    return {band: means.bsdf(found) for band, found in blocks.items()}
+    return {band: means.bsdf(result) for band, result in blocks.items()}
 
 
 @dataclass(frozen=True)
@@ -484,15 +490,15 @@ def thermal(
     missing = [path for path in states if not path.is_file()]
     if missing:
         raise DataError("no such file", file=missing[0])
-    found = [rated_state(path, place=place, glazing=glazing, kappa=kappa) for path in states]
-    rows = [row for state in found for row in state.rows()]
+    rated_states = [rated_state(path, place=place, glazing=glazing, kappa=kappa) for path in states]
+    rows = [row for state in rated_states for row in state.rows()]
     for line in printed(rows):
         click.echo(line)
-    for note in dict.fromkeys(n for s in found for n in s.notes):
+    for note in dict.fromkeys(n for s in rated_states for n in s.notes):
         if place is None:
             click.echo(f"note: {note}")
     if out is not None and out.suffix == ".json":
-        by_patch = {s.path.stem: [round(float(g), 5) for g in s.heat.g_value] for s in found}
+        by_patch = {s.path.stem: [round(float(g), 5) for g in s.heat.g_value] for s in rated_states}
         record = {"rows": rows} if place else {"rows": rows, "g by patch": by_patch}
         write_text(out, json.dumps(record, indent=2) + "\n")
     elif out is not None:
@@ -500,4 +506,4 @@ def thermal(
 
         write_table(pd.DataFrame(rows), out, index=False, float_format="%.4f")
     if toml is not None:
-        write_text(toml, thermal_toml(found[0]))
+        write_text(toml, thermal_toml(rated_states[0]))

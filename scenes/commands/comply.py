@@ -16,11 +16,11 @@ from scenes.commands.room_options import (
     chosen_language,
     directions_option,
     eye_height_option,
-    given,
     grid_option,
     input_options,
     named_settings,
     room_options,
+    stated_options,
     taken,
     write_ifc_option,
 )
@@ -73,7 +73,7 @@ def command(
     """
     named = named_settings(settings, OF_RULES)
     if chosen["quick"]:
-        chosen |= quick_run.picks(quick_run.ROOM, given())
+        chosen |= quick_run.picks(quick_run.ROOM, stated_options())
     chosen |= named
     own = taken(ComplyOptions, chosen)
     options = ComplyOptions(**own, day=day_of(day), room=RoomOptions.of(**chosen))
@@ -115,8 +115,8 @@ def command(
 
 def day_of(text: str) -> tuple[int, int]:
     """Month and day of "MM-DD", between those of EN 17037."""
-    found = re.fullmatch(r"(\d{1,2})-(\d{1,2})", text)
-    day = (int(found[1]), int(found[2])) if found else (0, 0)
+    match = re.fullmatch(r"(\d{1,2})-(\d{1,2})", text)
+    day = (int(match[1]), int(match[2])) if match else (0, 0)
     if not DAYS[0] <= day <= DAYS[1] or day[1] > (29 if day[0] == 2 else 31) or day[1] < 1:
         raise click.UsageError(f"--day {text!r}: expected a day from 02-01 to 03-21, as 03-21")
     return day

@@ -12,9 +12,12 @@ from scenes.demo import STUDY
 
 @click.command()
 @click.option(
-    "--out", default="cfs-demo", show_default=True, type=click.Path(path_type=Path),
+    "--out",
+    default="cfs-demo",
+    show_default=True,
+    type=click.Path(path_type=Path),
     help="Folder of results.",
-)  # fmt: skip
+)
 def command(out: Path) -> None:
     """Compare an office in Chicago with its blind up, down and controlled."""
     from scenes.study.study_file import read_study

@@ -12,7 +12,6 @@ from scenes.commands.room_options import (
     chosen_language,
     directions_option,
     eye_height_option,
-    given,
     grid_option,
     input_options,
     light_options,
@@ -22,6 +21,7 @@ from scenes.commands.room_options import (
     quick_option,
     samples_option,
     size_option,
+    stated_options,
     subdivide_option,
     view_option,
     with_demo,
@@ -84,7 +84,7 @@ def command(out: Path, page: Path | None, **chosen) -> None:
     from scenes.year_of_glare.views import read_files
 
     if chosen["quick"]:
-        chosen |= quick.picks(quick.VIEWS, given())
+        chosen |= quick.picks(quick.VIEWS, stated_options())
     page_options = read_page(page, GlareSection, chosen_language())
     named = (chosen["building"], chosen["weather"], chosen["system"])
     files = (*named, *map(Path, chosen["views"]), *chosen["surroundings"], *page_options.inputs)
@@ -102,7 +102,7 @@ def command(out: Path, page: Path | None, **chosen) -> None:
     head = PrintedHead()
     with ProgressBar() as progress:
         year = read_year(options, progress, read, head)
-        views = rate_views(year, folder.kept(outputs.KEPT), progress)
+        views = rate_views(year, folder.checkpoints(outputs.KEPT), progress)
         with folder.replaced() as place:
             rows = [outputs.write_view(year, rated, place) for rated in views]
             table = outputs.write_summary(year, rows, place)

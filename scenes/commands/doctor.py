@@ -51,16 +51,16 @@ def self_test() -> str | None:
         return f"self-test: no result after {TIME_LIMIT} s"
     if done.returncode != 0:
         return f"self-test: {_cause(done.returncode, done.stderr)}; {llvm.INSTALL_HINT}"
-    found = json.loads(done.stdout.splitlines()[-1])
-    click.echo(f"{'variant':<16} {found['variant']} ({found['reason']})")
-    traced = f"{found['rays']} rays: view factor {found['traced']:.5f}"
+    result = json.loads(done.stdout.splitlines()[-1])
+    click.echo(f"{'variant':<16} {result['variant']} ({result['reason']})")
+    traced = f"{result['rays']} rays: view factor {result['traced']:.5f}"
     click.echo(
-        f"{'self-test':<16} {'passed' if found['agrees'] else 'FAILED'}: {traced}, "
-        f"closed form {found['expected']:.5f}, {found['seconds']:.1f} s"
+        f"{'self-test':<16} {'passed' if result['agrees'] else 'FAILED'}: {traced}, "
+        f"closed form {result['expected']:.5f}, {result['seconds']:.1f} s"
     )
-    if not found["agrees"]:
+    if not result["agrees"]:
         return f"self-test: the traced rays miss the closed form; {llvm.INSTALL_HINT}"
-    if found["variant"].startswith("scalar"):
+    if result["variant"].startswith("scalar"):
         return f"rays are traced one by one: only slow single images work; {llvm.INSTALL_HINT}"
     return None
 
@@ -101,11 +101,11 @@ def _print_llvm() -> None:
     if own:
         click.echo(f"{'LLVM':<16} {own} (set by you in {llvm.VARIABLE})")
     chosen = own
-    for found in llvm.candidates():
-        mark = found.reason if found.usable else f"rejected: {found.reason}"
-        if found.usable and not chosen:
-            mark, chosen = "chosen", str(found.path)
-        click.echo(f"LLVM {found.version_text:<11} {found.path} ({mark})")
+    for candidate in llvm.candidates():
+        mark = candidate.reason if candidate.usable else f"rejected: {candidate.reason}"
+        if candidate.usable and not chosen:
+            mark, chosen = "chosen", str(candidate.path)
+        click.echo(f"LLVM {candidate.version_text:<11} {candidate.path} ({mark})")
     if not chosen:
         click.echo(f"{'LLVM':<16} none usable: {llvm.INSTALL_HINT}")
 

@@ -30,7 +30,7 @@ RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 )
 @click.option(
     "--language", type=click.Choice(["en", "de", "fr"]), default="en", show_default=True,
-    help="Language of the page; of several runs, or of --out.",
+    help="Language of the page.",
 )  # fmt: skip
 @click.option("--no-browser", is_flag=True, help="Print the address only.")
 def command(
@@ -41,11 +41,11 @@ def command(
     RESULTS are folders of `cfs run --explore`; several are shown side by side.  The page is served
     to this machine only, until Ctrl-C, and loads nothing from the network.
     """
-    from scenes.explore.folder import explorer_of, join_explorers
+    from scenes.explore.folder import copy_explorer, explorer_of, join_explorers
     from scenes.language.catalogue import in_language
     from scenes.result_folder import ResultFolder
 
-    folders = [explorer_of(one) for one in results]
+    folders = [explorer_of(result) for result in results]
     for one in results:
         _print_head(one, several=len(results) > 1)
     if out is not None:
@@ -57,26 +57,31 @@ def command(
         click.echo(f"explorer: {out / 'index.html'}")
         return
     with tempfile.TemporaryDirectory() as place:
-        folder = folders[0]
-        if len(results) > 1:
-            folder = Path(place)
-            with in_language(language):
-                join_explorers(results, folder)
-        _serve(folder, port, open_it=not no_browser)
+        with in_language(language):
+            if len(results) > 1:
+                join_explorers(results, Path(place))
+            else:
+                copy_explorer(folders[0], Path(place))
+        _serve(Path(place), port, open_it=not no_browser)
 
 
 def _print_head(results: Path, *, several: bool) -> None:
     """What was left out and assumed of the inputs of a run."""
     from scenes.head import record_lines
+    from scenes.user_errors import one_line
 
     try:
         record = json.loads((results / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):  # an explorer that was copied without its run
+    except FileNotFoundError:  # an explorer that was copied without its run
         return
+    except (OSError, ValueError, RecursionError) as error:
+        raise DataError(f"cannot be read: {reason(error)}", file=results / "run.json") from None
     if several:
         click.echo(f"{results}:")
-    for line in record_lines(record["head"]) if "head" in record else ():
-        click.echo(line)
+    if not isinstance(record, dict):
+        raise DataError("is no record of a run", file=results / "run.json")
+    for line in record_lines(record["head"], results / "run.json") if "head" in record else ():
+        click.echo(one_line(line))
 
 
 def _serve(folder: Path, port: int, *, open_it: bool) -> None:

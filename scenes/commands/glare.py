@@ -48,7 +48,7 @@ def command(words: tuple[str, ...]) -> None:
     files; with several pictures each one's lines follow its name and class.
     """
     request = glare_flags.parse(words)
-    if "-v" in request.given:
+    if "-v" in request.stated:
         click.echo(VERSION)
         return
     paths = pictures(request.paths or [Path("/dev/stdin")])
@@ -81,25 +81,25 @@ def _check_files(request: Request, paths: list[Path]) -> None:
         if target is None:
             continue
         if flag == "--png" or (flag == "-c" and (len(paths) > 1 or target.is_dir())):
-            ResultFolder(target, "glare", adding=True, field=flag)
+            ResultFolder(target, "glare", adding=True, among=True, field=flag)
         else:
             check_file(target, field=flag, inputs=paths)
 
 
 def pictures(paths: list[Path]) -> list[Path]:
     """The picture files that the paths stand for, folders as what is in them."""
-    found: list[Path] = []
+    result: list[Path] = []
     for path in paths:
         if path.is_dir():
             inside = sorted(p for p in path.iterdir() if p.suffix.lower() in SUFFIXES)
             if not inside:
                 raise DataError("no .hdr or .pic file in this folder", file=path)
-            found += inside
+            result += inside
         elif path.exists():
-            found.append(path)
+            result.append(path)
         else:
             raise DataError("no such file", file=path)
-    return found
+    return result
 
 
 def _one(
@@ -117,8 +117,8 @@ def _one(
     from mitsuba_cfs.glare.evaluation import evaluate
 
     luminance = picture.luminance
-    if "-I" in request.given:
-        luminance = filled(luminance, *request.given["-I"][1:])
+    if "-I" in request.stated:
+        luminance = filled(luminance, *request.stated["-I"][1:])
     try:
         if (cut := request.value("-g")) is not None:
             _write_cut(luminance, geometry, cut, request)
@@ -135,7 +135,7 @@ def _one(
         click.echo(f"Notice: {notice}", err=True)
     _write_pictures(path, picture, result, request, several)
     name = {"picture": str(path), "class": glare_class(result.dgp), "sources": result.count}
-    return name | report.detailed_figures(result) if "--csv" in request.given else None
+    return name | report.detailed_figures(result) if "--csv" in request.stated else None
 
 
 def _view(picture: Picture, request: Request, path: Path) -> View:
@@ -147,7 +147,7 @@ def _view(picture: Picture, request: Request, path: Path) -> View:
             file=path,
             field="EXPOSURE",
         )
-    view = glare_flags.given_view(request, width, height) or picture.view
+    view = glare_flags.parsed_view(request, width, height) or picture.view
     if view is None:
         raise DataError(
             "no valid view in its header: give one, for example -vta -vh 180 -vv 180",
@@ -158,7 +158,7 @@ def _view(picture: Picture, request: Request, path: Path) -> View:
         raise DataError("a parallel view has no glare: expected a fisheye", file=path, field="VIEW")
     if view.kind == "perspective":
         click.echo(f"warning: {path}: a perspective view in its header", err=True)
-        if black_corners(picture.luminance) > 0.7 and "-f" not in request.given:
+        if black_corners(picture.luminance) > 0.7 and "-f" not in request.stated:
             raise DataError(
                 "black corners, but a perspective view: is it a fisheye? (-f goes on)",
                 file=path,
@@ -178,7 +178,7 @@ def _warn_of_crop(view: View, request: Request, path: Path) -> None:
             err=True,
         )
     narrow = min(view.horizontal_deg, view.vertical_deg) < 180
-    if narrow and not {"-i", "-I"} & request.given.keys():
+    if narrow and not {"-i", "-I"} & request.stated.keys():
         click.echo(
             f"warning: {path}: it shows less than 180 degrees, so its illuminance is too low "
             "(-i gives it)",
@@ -212,24 +212,24 @@ def _lines(result: GlareResult, request: Request) -> list[str]:
     from mitsuba_cfs.glare import areas, report
     from mitsuba_cfs.images.hdr import read_hdr
 
-    given, lines = request.given, []
-    if "-V" in given:
+    stated, lines = request.stated, []
+    if "-V" in stated:
         return [f"{result.Ev:f}"]
     geometry, luminance = result.geometry, result.luminance
-    if "-B" in given:
-        area = areas.band(given["-B"][0], geometry)
+    if "-B" in stated:
+        area = areas.band(stated["-B"][0], geometry)
         lines.append(report.band_line(areas.statistics(luminance, area, geometry)))
-    if "-A" in given:
-        area = areas.mask_area(read_hdr(given["-A"][0]).luminance, geometry)
+    if "-A" in stated:
+        area = areas.mask_area(read_hdr(stated["-A"][0]).luminance, geometry)
         lines.append(report.mask_line(areas.statistics(luminance, area, geometry), result))
-    if result.options.zones is not None and ("-d" in given or "-A" in given):
+    if result.options.zones is not None and ("-d" in stated or "-A" in stated):
         zone = areas.zone_map(result.options.zones, geometry)
         for number in (1, 2) if result.options.zones.outer is not None else (1,):
             area = areas.statistics(luminance, zone == number, geometry)
             lines.append(report.area_line(f"z{number}", area))
-    if "-d" in given or "-A" in given:
+    if "-d" in stated or "-A" in stated:
         return lines + report.detailed_lines(result)
-    line = report.brief_line(result) if "-D" in given else report.short_line(result)
+    line = report.brief_line(result) if "-D" in stated else report.short_line(result)
     return [*lines, line]
 
 
@@ -250,7 +250,7 @@ def _write_cut(luminance, geometry: GlareView, cut: int, request: Request) -> No
     from mitsuba_cfs.glare.glare_view import in_picture_order, seen
     from mitsuba_cfs.images.hdr import write_hdr
 
-    if cut not in CUTS or "-c" not in request.given:
+    if cut not in CUTS or "-c" not in request.stated:
         raise click.UsageError("-g needs 1 or 2, and -c FILE for the picture")
     inside = in_picture_order(seen(geometry, CUTS[cut]))
     write_hdr(request.value("-c"), np.where(inside, luminance, 0.0), geometry.view)
@@ -262,17 +262,21 @@ def _write_pictures(path: Path, picture: Picture, result: GlareResult, request, 
         from mitsuba_cfs.images.hdr import write_hdr
         from scenes.pictures import check_radiance
 
-        uniform, blue = request.given.get("-u"), "-T" in request.given
+        uniform, blue = request.stated.get("-u"), "-T" in request.stated
         pixels = check_radiance(result, uniform, show_task=blue)
         view, about = result.geometry.view, (VERSION,)
         if several or check.is_dir():
-            with ResultFolder(check, "glare", adding=True, field="-c").replaced() as place:
+            with ResultFolder(
+                check, "glare", adding=True, among=True, field="-c"
+            ).replaced() as place:
                 write_hdr(place / f"{path.stem}_check.hdr", pixels, view, comments=about)
         else:
             write_hdr(check, pixels, view, comments=about)
     if (folder := request.value("--png")) is not None:
-        with ResultFolder(folder, "glare", adding=True, field="--png").replaced() as place:
-            _write_png(place, path.stem, picture, result, request.given.get("--scale"))
+        with ResultFolder(
+            folder, "glare", adding=True, among=True, field="--png"
+        ).replaced() as place:
+            _write_png(place, path.stem, picture, result, request.stated.get("--scale"))
 
 
 def _write_png(folder: Path, name: str, picture: Picture, result: GlareResult, limits) -> None:

@@ -44,7 +44,7 @@ FLAGS: dict[str, tuple[tuple[type, ...], str, str]] = {
     "-c": ((Path,), "FILE", "Check picture (.hdr), sources coloured."),
     "-u": ((float, float, float), "R G B", "One colour for all sources in the check picture."),
     "-f": ((), "", "Go on with a perspective view that has black corners."),
-    "-vf": ((Path,), "FILE", "View file; views given here replace the picture's."),
+    "-vf": ((Path,), "FILE", "View file; views stated here replace the picture's."),
     "--age": ((float,), "YEARS", "Age correction of DGP (evalglare had it until 1.17)."),
     "--csv": ((Path,), "FILE", "A table of all pictures, a row each."),
     "--png": ((Path,), "FOLDER", "Falsecolour, tone-mapped and check pictures (.png)."),
@@ -57,13 +57,13 @@ VIEW_FLAGS = "-vta, -vth, -vtv, -vh DEGREES, -vv DEGREES, -vp, -vd, -vu X Y Z, -
 class Request:
     """What a command line asks for."""
 
-    given: dict[str, tuple] = field(default_factory=dict)  # flag: values
+    stated: dict[str, tuple] = field(default_factory=dict)  # flag: values
     view: dict = field(default_factory=dict)  # fields of `View`
     paths: list[Path] = field(default_factory=list)
 
     def value(self, flag: str):
-        """The flag's only value, or None where it was not given."""
-        return self.given[flag][0] if flag in self.given else None
+        """The flag's only value, or None where it was not stated."""
+        return self.stated[flag][0] if flag in self.stated else None
 
 
 def help_text() -> str:
@@ -82,7 +82,7 @@ def parse(words: tuple[str, ...]) -> Request:
         word, at = words[at], at + 1
         if word in FLAGS:
             types, names, _ = FLAGS[word]
-            request.given[word] = _values(word, types, names, words[at : at + len(types)])
+            request.stated[word] = _values(word, types, names, words[at : at + len(types)])
             at += len(types)
         elif word.startswith("-v") and len(word) > 2:
             at = _view_option(request, words, at - 1)
@@ -119,8 +119,8 @@ def options(request: Request) -> GlareOptions:
     from mitsuba_cfs.glare.areas import Zones
     from mitsuba_cfs.glare.evaluation import BACKGROUNDS, GlareOptions, Task
 
-    task = request.given.get("-T", request.given.get("-t"))
-    zones = request.given.get("-L", request.given.get("-l"))
+    task = request.stated.get("-T", request.stated.get("-t"))
+    zones = request.stated.get("-L", request.stated.get("-l"))
     corrections = request.value("-C")
     if corrections not in (None, "l+", "l-", "0"):
         raise click.UsageError(f"-C {corrections}: expected l+, l- or 0")
@@ -129,12 +129,12 @@ def options(request: Request) -> GlareOptions:
             threshold=request.value("-b"),
             task=Task(*task) if task else None,
             search_radius=request.value("-r") or 0.2,
-            peak=None if "-x" in request.given else request.value("-Y") or 50000.0,
-            smoothing="-s" in request.given,
+            peak=None if "-x" in request.stated else request.value("-Y") or 50000.0,
+            smoothing="-s" in request.stated,
             field_of_view=_choice(request, "-G", {1: "total", 2: "both eyes"}, "all"),
             background=_choice(request, "-q", dict(enumerate(BACKGROUNDS)), BACKGROUNDS[0]),
             position_model=_choice(request, "-P", {0: "guth", 1: "kim"}, "guth"),
-            illuminance=request.given.get("-I", request.given.get("-i", (None,)))[0],
+            illuminance=request.stated.get("-I", request.stated.get("-i", (None,)))[0],
             low_light=corrections == "l+",
             age=request.value("--age"),
             zones=Zones(*zones) if zones else None,
@@ -152,7 +152,7 @@ def _choice(request: Request, flag: str, meanings: dict[int, str], default: str)
     return meanings[number]
 
 
-def given_view(request: Request, width: int, height: int) -> View | None:
+def parsed_view(request: Request, width: int, height: int) -> View | None:
     """The view of the command line, None where it has none; it must have type and both sizes."""
     from mitsuba_cfs.images.view import View, view_changes
 

@@ -189,14 +189,14 @@ def query(building: Path, selector: str) -> None:
 
     from bim.ifc.query import query as chosen_elements
 
-    found = chosen_elements(building, selector)
+    elements = chosen_elements(building, selector)
     table = Table()
     for head in ("class", "name", "type", "storey", "material", "layer", "GUID"):
         table.add_column(head, overflow="fold")
-    for one in found:
+    for one in elements:
         row = (one.ifc_class, one.name, one.type_name, one.storey, one.material, one.layer)
         table.add_row(*map(escape, row), one.guid)
     console = Console(width=None if Console().is_terminal else UNCUT)
-    if found:
+    if elements:
         console.print(table)
-    console.print(f"{len(found)} elements")
+    console.print(f"{len(elements)} elements")

@@ -41,9 +41,12 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 )
 @light_options
 @click.option(
-    "--out", type=click.Path(dir_okay=False, path_type=Path), multiple=True, required=True,
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    multiple=True,
+    required=True,
     help=f"File to write ({', '.join(SUFFIXES)}); may be repeated.",
-)  # fmt: skip
+)
 def command(out: tuple[Path, ...], tone: bool, **chosen) -> None:
     """Render a luminance picture of a room under sun and sky of one hour by path tracing.
 
@@ -64,12 +67,12 @@ def command(out: tuple[Path, ...], tone: bool, **chosen) -> None:
 
     head = PrintedHead()
     with ProgressBar() as progress:
-        found = room_picture(options, progress, read, head)
+        result = room_picture(options, progress, read, head)
     for file in out:
-        write_picture(found, file, print_like=tone)
-    view, rated = found.view, found.glare
-    says = f"{found.room}, {found.time:%d %B %H:%M}: {view.width} x {view.height} pixels"
+        write_picture(result, file, print_like=tone)
+    view, rated = result.view, result.glare
+    says = f"{result.room}, {result.time:%d %B %H:%M}: {view.width} x {view.height} pixels"
     if rated is not None:
         says += f", Ev {rated.Ev:,.0f} lx, DGP {rated.dgp:.3f}, {rated.count} glare source(s)"
     click.echo(f"{says}; {time.perf_counter() - start:.1f} s")
-    head.notes(found.notes)
+    head.notes(result.notes)

@@ -43,8 +43,8 @@ class _Pass:
 class ProgressBar:
     """A `Progress` callback drawn on stderr: one bar per stage, in the order they come.
 
-    A bar never goes back, and one that is ticked stays so: a stage that begins again gets a bar of
-    its own.  Of items alike (`mitsuba_cfs.progress.item`) one bar says which is computed and how
+    A bar never moves backwards, and a ticked bar stays ticked: a stage that begins again gets a new
+    bar.  Of items alike (`mitsuba_cfs.progress.item`) one bar says which is computed and how
     long the others take; only its own stages are shown.  Where stderr is no terminal, one line per
     finished stage, and lines of the items from time to time.  Use as a context manager:
 
@@ -205,10 +205,10 @@ COMPILE = "from scenes.commands.progress_bar import compile_now; compile_now()"
 
 @contextmanager
 def compiled_beside() -> Iterator[None]:
-    """Where the heat balance has to be compiled yet, let another process do so in the meantime.
+    """Compile the heat balance in another process meanwhile, if it is not compiled yet.
 
-    It keeps what it compiles where this process looks for it; too late or failed, this one compiles
-    for itself.
+    That process stores the compiled code in this process's cache; if it is late or fails, this
+    process compiles.
     """
     from mitsuba_cfs.compiled import must_compile
     from thermal.kernel import advance

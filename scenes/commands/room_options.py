@@ -76,7 +76,7 @@ quick_option = click.option(
 )
 
 
-def given() -> set[str]:
+def stated_options() -> set[str]:
     """Names of the parameters of the command under way that do not have their default."""
     context = click.get_current_context()
     return {
@@ -375,10 +375,10 @@ def named_settings(settings: Sequence[str], but: Collection[str] = ()) -> dict[s
             raise click.UsageError(f"--set {text!r}: {reason}")
         try:
             table[name] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
+        except (tomllib.TOMLDecodeError, RecursionError):
             table[name] = value  # a word needs no quotes
-    found = validated(OptionsTable, table, Path("--set"))
-    return {name: getattr(found, name) for name in table}
+    result = validated(OptionsTable, table, Path("--set"))
+    return {name: getattr(result, name) for name in table}
 
 
 processes_option = click.option(

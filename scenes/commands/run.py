@@ -14,7 +14,6 @@ from scenes.commands.room_options import (
     PrintedHead,
     chosen_language,
     explore_option,
-    given,
     height_option,
     input_options,
     method_option,
@@ -24,6 +23,7 @@ from scenes.commands.room_options import (
     scheduler_option,
     size_option,
     spacing_option,
+    stated_options,
     taken,
     u_option,
 )
@@ -100,7 +100,7 @@ def command(
         raise click.UsageError("--inner-glass and --explore exclude each other")
     named = named_settings(settings)
     if chosen["quick"]:
-        chosen |= quick_run.picks(quick_run.ROOM, given())
+        chosen |= quick_run.picks(quick_run.ROOM, stated_options())
     chosen |= named
     colour = not (chosen.pop("no_colour") or chosen["quick"])
     own = taken(JobOptions, chosen)
@@ -181,9 +181,11 @@ class _RoomLines:
 
     def year(self, room) -> None:
         """Print those of its heat, and of its light where that was not said."""
-        said = room.space.guid in self._lit
-        click.echo(f"{room.space.label}: {_heat_figures(room)}" if said else summary_line(room))
-        if not said:
+        light_printed = room.space.guid in self._lit
+        click.echo(
+            f"{room.space.label}: {_heat_figures(room)}" if light_printed else summary_line(room)
+        )
+        if not light_printed:
             _print_grids(room)
 
 

@@ -295,9 +295,9 @@ def read_weather(path: Path) -> Weather:
             start = file.read(6).lower()
     except OSError as error:
         raise DataError(f"cannot be read: {reason(error)}", file=path) from error
-    found = read_wea(path, whole_year=False) if start.startswith(b"place") else read_epw(path)
-    _tell(found)
-    return found
+    weather = read_wea(path, whole_year=False) if start.startswith(b"place") else read_epw(path)
+    _tell(weather)
+    return weather
 
 
 def _tell(weather: Weather) -> None:

@@ -151,7 +151,7 @@ def level_value(
     rooms: Sequence[tuple[RoomVerdict, float]],
     dwellings: Sequence[str],
 ) -> float | None:
-    """What of the rooms with their areas is compared with a level; None where not computed.
+    """Quantity of the rooms, with their areas, that a level limits; None if not computed.
 
     "area mean": the mean of its one need over the floor area; "room of each dwelling": the share
     of the dwellings of which a room meets the level, a room in none being one by itself; else the

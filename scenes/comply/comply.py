@@ -370,7 +370,7 @@ class Check:
         return CheckedRoom(space, use, verdicts, None, None, None)
 
     def assumptions(self, rooms: list[CheckedRoom], left: list[Space]) -> list[str]:
-        """What was assumed, in sentences; `left` are rooms that no rule was held against."""
+        """What was assumed, in sentences; `left` are rooms without a rule."""
         found = [*self._ray_words(), *self._light_words()]
         found += dwelling_words(rooms)
         if left:
@@ -484,10 +484,10 @@ def free_shares(free: NDArray[np.bool_]) -> tuple[float, float]:
     return float(np.mean(free.any(axis=1))), float(np.mean(free.all(axis=1)))
 
 
-def moved_lights(found: RoomLights, space: Space) -> RoomLights:
+def moved_lights(lights: RoomLights, space: Space) -> RoomLights:
     """The light of a template room for one equal to it, moved to where that stands."""
-    shift = corner(space) - corner(found.space)
-    grids = {name: replace(grid, points=grid.points + shift) for name, grid in found.grids.items()}
-    glare = found.glare and replace(found.glare, eyes=found.glare.eyes + shift)
-    template = found.space.label
-    return replace(found, space=space, grids=grids, glare=glare, template=template)
+    shift = corner(space) - corner(lights.space)
+    grids = {name: replace(grid, points=grid.points + shift) for name, grid in lights.grids.items()}
+    glare = lights.glare and replace(lights.glare, eyes=lights.glare.eyes + shift)
+    template = lights.space.label
+    return replace(lights, space=space, grids=grids, glare=glare, template=template)

@@ -34,7 +34,7 @@ class SightThrough:
 
 
 def sight_through(system: FenestrationSystem) -> SightThrough:
-    """What of the light of normal incidence passes, and what straight on, in the visible band."""
+    """Visible transmittance at normal incidence: total, and specular alone."""
     klems = system.visible
     block = klems.transmission_matrix() / klems.basis_in.projected_solid_angles()
     straight = through_peak(block, klems.basis_in).transmittance[0]

@@ -1,4 +1,4 @@
-"""What stands outdoors of a whole building, asked by rays: one mesh that serves every room."""
+"""Surroundings and shell of a whole building as one mesh that rays of every room intersect."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FloatArray = NDArray[np.float64]
 
 TERRAIN = ("IfcSite", "IfcGeographicElement", "IfcCivilElement")
 MOST_PANES = 24  # surfaces of a room's own windows that one ray passes
-STEP = 1e-5  # behind a pane that was passed [m]
+STEP = 1e-5  # offset of a ray's new origin after a pane [m]
 _NOTHING = Element("", "nothing", "IfcSite", -1e9 + np.eye(3)[None], 0.0, 0.0)
 
 

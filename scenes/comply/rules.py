@@ -19,7 +19,7 @@ from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 
 FOLDER = files(__package__) / "rules"
 NOT_MET = N_("not met")
-# What of the rooms is compared over the building; "no building": nothing, and no room misses it
+# How rooms are aggregated over the building; "no building": nothing, and no room misses it
 Over = Literal[
     "room", "area mean", "each room", "area of rooms", "room of each dwelling", "no building"
 ]
@@ -62,7 +62,7 @@ class CriterionTable(TomlTable):
 
     @property
     def over(self) -> Over:
-        """What of the rooms its levels compare over the building."""
+        """How its levels aggregate rooms over the building."""
         return self.level[0].over
 
     @property

@@ -73,13 +73,13 @@ def measure(
         clock: elapsed seconds; `time.process_time` gives processor seconds of all threads, which
             other work on the machine disturbs less.
     """
-    sampling, found = sampling or Sampling(), []
+    sampling, result = sampling or Sampling(), []
     pairs = [(method, metric) for method in methods for metric in metrics]
     for number, (method, metric) in enumerate(pairs):
         progress("calibration", number / len(pairs))
-        found.append(_measure((method, metric), scene, optics, sky, sampling, clock))
+        result.append(_measure((method, metric), scene, optics, sky, sampling, clock))
     progress("calibration", 1.0)
-    return found
+    return result
 
 
 def _measure(

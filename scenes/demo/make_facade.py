@@ -122,9 +122,12 @@ def _project(model: ifcopenshell.file) -> tuple[ifcopenshell.entity_instance, ..
     project.UnitsInContext.Units = units  # assigned as a set, in an order of their own
     whole = ifcopenshell.api.context.add_context(model, context_type="Model")
     body = ifcopenshell.api.context.add_context(
-        model, context_type="Model", context_identifier="Body", target_view="MODEL_VIEW",
+        model,
+        context_type="Model",
+        context_identifier="Body",
+        target_view="MODEL_VIEW",
         parent=whole,
-    )  # fmt: skip
+    )
     site = create(model, ifc_class="IfcSite", name="Site")
     building = create(model, ifc_class="IfcBuilding", name="Office")
     storey = create(model, ifc_class="IfcBuildingStorey", name="Ground floor")

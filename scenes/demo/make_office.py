@@ -77,9 +77,10 @@ class Office:
         self._place(slab, _frame((0.0, 0.0, z), (1.0, 0.0)))
         self._layered(slab, layers, "AXIS3")
         self._pset(
-            slab, "Pset_SlabCommon",
+            slab,
+            "Pset_SlabCommon",
             {"IsExternal": True, "LoadBearing": True, "ThermalTransmittance": u_value(layers)},
-        )  # fmt: skip
+        )
 
     def wall(
         self, name: str, layers: str, start: Point, end: Point, height: float, style: str
@@ -141,9 +142,10 @@ class Office:
              "ThermalTransmittanceWinter": GLAZING["u"]},
         )  # fmt: skip
         self._quantities(
-            window, "Qto_WindowBaseQuantities",
+            window,
+            "Qto_WindowBaseQuantities",
             {"Width": width, "Height": height, "Area": width * height},
-        )  # fmt: skip
+        )
 
     def door(self, name: str, wall: str, along: float, width: float, height: float) -> None:
         """A single-leaf inner door in a wall, its leaf in the middle of the wall."""
@@ -224,9 +226,11 @@ class Office:
     def _layered(self, product: Entity, layers: str, direction: str) -> None:
         """The layer set, from the reference line in the positive direction."""
         ifcopenshell.api.material.assign_material(
-            self._model, products=[product], type="IfcMaterialLayerSetUsage",
+            self._model,
+            products=[product],
+            type="IfcMaterialLayerSetUsage",
             material=self.palette.layer_set(layers),
-        )  # fmt: skip
+        )
         usage = product.HasAssociations[0].RelatingMaterial
         usage.LayerSetDirection, usage.DirectionSense = direction, "POSITIVE"
         usage.OffsetFromReferenceLine = 0.0
@@ -237,13 +241,14 @@ class Office:
         )
         for name, substance in parts.items():
             ifcopenshell.api.material.add_constituent(
-                self._model, constituent_set=constituents, name=name,
+                self._model,
+                constituent_set=constituents,
+                name=name,
                 material=self.palette.material(substance),
-            )  # fmt: skip
+            )
         ifcopenshell.api.material.assign_material(
-            self._model, products=[product], type="IfcMaterialConstituentSet",
-            material=constituents,
-        )  # fmt: skip
+            self._model, products=[product], type="IfcMaterialConstituentSet", material=constituents
+        )
 
     def _pset(self, product: Entity, name: str, properties: dict[str, object]) -> None:
         pset = ifcopenshell.api.pset.add_pset(self._model, product=product, name=name)
@@ -283,9 +288,12 @@ class Office:
         """A frame of the x-z plane, from y = 0 in the direction of +y."""
         inner = _rectangle(border, border, width - 2 * border, height - 2 * border)
         profile = self._model.create_entity(
-            "IfcArbitraryProfileDefWithVoids", "AREA", None,
-            self._polyline(_rectangle(0.0, 0.0, width, height)), [self._polyline(inner)],
-        )  # fmt: skip
+            "IfcArbitraryProfileDefWithVoids",
+            "AREA",
+            None,
+            self._polyline(_rectangle(0.0, 0.0, width, height)),
+            [self._polyline(inner)],
+        )
         return self._solid(profile, depth, (0.0, 0.0, 0.0), upright=True)
 
     def _solid(
@@ -367,13 +375,15 @@ def project(model: ifcopenshell.file) -> tuple[ifcopenshell.entity_instance, ...
     whole = add_context(model, context_type="Model")
     plan = add_context(model, context_type="Plan")
     body = add_context(
-        model, context_type="Model", context_identifier="Body", target_view="MODEL_VIEW",
+        model,
+        context_type="Model",
+        context_identifier="Body",
+        target_view="MODEL_VIEW",
         parent=whole,
-    )  # fmt: skip
+    )
     axis = add_context(
-        model, context_type="Plan", context_identifier="Axis", target_view="GRAPH_VIEW",
-        parent=plan,
-    )  # fmt: skip
+        model, context_type="Plan", context_identifier="Axis", target_view="GRAPH_VIEW", parent=plan
+    )
     ifcopenshell.api.georeference.edit_true_north(model, true_north=TRUE_NORTH_DEG)
     site = create(model, ifc_class="IfcSite", name="Site")
     site.RefLatitude, site.RefLongitude, site.RefElevation = LATITUDE, LONGITUDE, ELEVATION

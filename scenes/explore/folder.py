@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Sequence
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,9 +19,10 @@ from numpy.typing import ArrayLike, NDArray
 from bim.model import Building
 from bim.to_tracer import exterior_surfaces, furnished_surfaces
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason, write_text
+from mitsuba_cfs.files import write_text
 from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.picture_year.year import PictureYear
+from scenes.explore.case_files import AFTER, BEFORE, CASE, case_files, read_case
 from scenes.figures.plan import PlanFrame, plan_frame
 from scenes.figures.scale import ColourScale
 from scenes.language.catalogue import current_language, gettext, in_language, messages
@@ -31,8 +32,6 @@ from scenes.report.page import environment
 from scenes.report.page_files import page_files
 from scenes.result_folder import EXPLORER
 from scenes.results import ExploredRoom, RoomYear, RunResult
-
-BEFORE, AFTER = "cfs.give(", ");\n"  # of the JSON in a data file, a script
 
 
 def packed(array: ArrayLike, kind: str) -> dict[str, Any]:
@@ -52,19 +51,7 @@ def write_data(path: Path, data: object) -> None:
     write_text(path, BEFORE + json.dumps(data, separators=(",", ":")) + AFTER)
 
 
-def read_data(path: Path) -> Any:
-    """The data of such a script.
-
-    Raises: `DataError` for a file that is none.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-        return json.loads(text.removeprefix(BEFORE).removesuffix(AFTER))
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise DataError(f"is no data of an explorer: {reason(error)}", file=path) from None
-
-
-CASE, PAGE = "case.js", "index.html"
+PAGE = "index.html"
 SCRIPTS = "scenes/explore/templates/"  # where the messages of scripts are from
 FILES = page_files("scenes.explore") | {"style.css": page_files("scenes.report")["style.css"]}
 STEPS = 256  # of the palette
@@ -135,23 +122,38 @@ def explorer_of(results: Path) -> Path:
     raise DataError("holds no explorer: compute it again with --explore", file=results)
 
 
+def copy_explorer(folder: Path, target: Path) -> None:
+    """Write the explorer of a folder elsewhere: its data, checked, and the page of this program.
+
+    Raises: `DataError` for data that are missing or not of an explorer (`case_files`).
+    """
+    case = read_case(folder)
+    _copy_files(folder, case, target)
+    write_joined(case, target)
+
+
 def join_explorers(folders: Sequence[Path], target: Path) -> None:
     """Write one explorer of several, with the data of each in its own folder.
 
-    Raises: `DataError` where their years are not of one length.
+    Raises: `DataError` where their years are not of one length, and as `copy_explorer`.
     """
-    cases = [read_data(explorer_of(folder) / CASE) for folder in folders]
+    cases = [read_case(explorer_of(folder)) for folder in folders]
     joined: dict[str, Any] = cases[0] | {"rooms": []}
     for number, (folder, case) in enumerate(zip(folders, cases, strict=True)):
         if case["hours"] != joined["hours"]:
             message = f"has {case['hours']} hours, {folders[0]} has {joined['hours']}"
             raise DataError(message, file=folder)
-        for place in {PurePosixPath(entry["file"]).parent for entry in case["rooms"]}:
-            shutil.copytree(explorer_of(folder) / place, target / str(number) / place)
+        _copy_files(explorer_of(folder), case, target / str(number))
         for entry in case["rooms"]:
             moved = moved_entry(entry, str(number), f"{folder.name}: {entry['name']}")
             joined["rooms"].append({key: v for key, v in moved.items() if key != "id"})
     write_joined(joined, target)
+
+
+def _copy_files(folder: Path, case: dict[str, Any], target: Path) -> None:
+    for name in dict.fromkeys(case_files(folder, case)):
+        (target / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(folder / name, target / name)
 
 
 def moved_entry(entry: dict[str, Any], place: str, name: str) -> dict[str, Any]:
@@ -312,8 +314,8 @@ def _plan(room: RoomYear) -> dict[str, Any]:
 
 
 def _rings(outline: shapely.Geometry) -> list[list[list[float]]]:
-    polygons = [one for one in shapely.get_parts(outline) if one.geom_type == "Polygon"]
-    rings = [ring for one in polygons for ring in (one.exterior, *one.interiors)]
+    polygons = [part for part in shapely.get_parts(outline) if part.geom_type == "Polygon"]
+    rings = [ring for polygon in polygons for ring in (polygon.exterior, *polygon.interiors)]
     return [np.round(shapely.get_coordinates(ring)[:-1], 3).tolist() for ring in rings]
 
 

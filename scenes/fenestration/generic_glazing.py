@@ -1,9 +1,9 @@
 """Generic glazings, for windows whose building file holds no glazing data.
 
 U, g and solar transmittance of the double glazings are those of EN 14501:2021, annex A (reference
-glazings B to D). Visible transmittance: of uncoated panes by Fresnel's equations
-(4 mm, n = 1.52); of coated panes, and all values of the triple glazing, usual values of data
-sheets. A product differs by up to 0.1 in g and visible transmittance.
+glazings B to D). Visible transmittances, and all values of the triple glazing, are usual values of
+makers' data sheets, without a standard behind them. A product differs by up to 0.1 in g and
+visible transmittance.
 """
 
 from __future__ import annotations
@@ -28,6 +28,6 @@ GENERIC_GLAZINGS = {
     "double solar control": GenericGlazing(1.1, 0.32, 0.60, 0.27, 2),
     "triple low-e": GenericGlazing(0.7, 0.50, 0.72, None, 3),
 }
-# honeybee-radiance "generic_exterior_window_vis_0.64"; honeybee-energy "Generic Double Pane" (U and
-# SHGC as that program computes them from its panes)
-HONEYBEE_DEFAULT = GenericGlazing(1.69, 0.42, 0.64, None, 2)
+# honeybee-radiance "generic_exterior_window_vis_0.64"; U, SHGC and solar transmittance of
+# honeybee-energy's "Generic Double Pane" as honeybee-energy 1.126 computes them
+HONEYBEE_DEFAULT = GenericGlazing(1.69, 0.42, 0.64, 0.36, 2)

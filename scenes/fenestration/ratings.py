@@ -93,11 +93,11 @@ def system_ratings(system: FenestrationSystem, heat: ThermalSystem) -> list[Ther
     Raises: `ThermalInputError` for layers that do not go together.
     """
     tau, rho = (float(np.clip(v[0], 0.0, 1.0)) for v in (heat.transmittance, heat.reflectance))
-    found = [ThermalRating("heat balance", heat.fenestration.u_value, tau, float(heat.g_value[0]))]
+    result = [ThermalRating("heat balance", heat.fenestration.u_value, tau, float(heat.g_value[0]))]
     unit = None if system.closure is None else system.closure.unit
     if unit is not None:
-        found += layered_ratings(unit, tau, sun_in_layers(unit, [tau], [rho], [0.0])[0])
-    return found
+        result += layered_ratings(unit, tau, sun_in_layers(unit, [tau], [rho], [0.0])[0])
+    return result
 
 
 def thermal_toml(state: RatedState) -> str:

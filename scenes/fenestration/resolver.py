@@ -59,13 +59,13 @@ def attached_systems(held: Held, windows: Iterable[Window], path: Path) -> dict[
         states = usual_first(held.get(window.guid, ()))
         if any(state.bands for state in states):
             equal.setdefault(digest(*(_content(state) for state in states)), []).append(window)
-    found = {}
+    result = {}
     for group in equal.values():
         states = usual_first(held[group[0].guid])
         source = _source([usual_first(held[window.guid])[0] for window in group], path)
         systems = tuple(_system(state, group[0], path, source) for state in states)
-        found |= {window.guid: systems for window in group}
-    return found
+        result |= {window.guid: systems for window in group}
+    return result
 
 
 def usual_first(states: Iterable[ShadingState]) -> list[ShadingState]:
@@ -152,7 +152,7 @@ def fill_windows(
     Raises: `DataError` that names the windows that nothing fills, and says what to give.
     """
     windows = list(windows)
-    found, unfilled = held_systems(windows, overrides, file)
+    result, unfilled = held_systems(windows, overrides, file)
     for missing, names in unfilled.items():
         attach = (
             ", attach data (cfs ifc attach), or state VisibleLightTransmittance and "
@@ -163,7 +163,7 @@ def fill_windows(
             file=file,
             element=f"window {_listed(names)}",
         )
-    return found
+    return result
 
 
 def held_systems(
@@ -181,15 +181,15 @@ def held_systems(
         raise DataError(message, element=element, field="box")
 
     held = held_states(windows, file)
-    found = _with_overrides(attached_systems(held, windows, file), overrides)
-    left = [window for window in windows if window.guid not in found]
-    found |= stated_systems(held, left, file, overrides)
+    result = _with_overrides(attached_systems(held, windows, file), overrides)
+    left = [window for window in windows if window.guid not in result]
+    result |= stated_systems(held, left, file, overrides)
     unfilled: dict[str, list[str]] = {}
     for window in left:
-        if window.guid not in found:
+        if window.guid not in result:
             missing = stated_values(held, window, file, overrides).missing(overrides.light_only)
             unfilled.setdefault(missing, []).append(window.name or window.guid)
-    return own | found, unfilled
+    return own | result, unfilled
 
 
 def _by_name(
@@ -199,7 +199,7 @@ def _by_name(
 
     Raises: `DataError` for a name that no window has, or that two systems have.
     """
-    found: dict[str, States] = {}
+    result: dict[str, States] = {}
     for names, states in overrides.named:
         for name in names:
             meant = [window.guid for window in windows if name in (window.guid, window.name)]
@@ -207,12 +207,12 @@ def _by_name(
                 there = _listed([window.name or window.guid for window in windows])
                 message = f"no window of the rooms is called {name!r}; there are {there}"
                 raise DataError(message, file=file, field="system.windows")
-            twice = [guid for guid in meant if guid in found and found[guid] is not states]
+            twice = [guid for guid in meant if guid in result and result[guid] is not states]
             if twice:
                 message = f"{name!r} is named with other windows too: name a window's states alike"
                 raise DataError(message, file=file, field="system.windows")
-            found |= dict.fromkeys(meant, states)
-    return found
+            result |= dict.fromkeys(meant, states)
+    return result
 
 
 def _with_overrides(systems: Mapping[str, States], overrides: WindowOverrides) -> dict[str, States]:
@@ -239,13 +239,13 @@ def _changed(system: FenestrationSystem, overrides: WindowOverrides) -> Fenestra
 
 def window_sources(windows: Iterable[Window], systems: Mapping[str, States]) -> list[dict]:
     """Each system once: its name, its source, and the windows that it fills."""
-    found: dict[int, dict] = {}
+    result: dict[int, dict] = {}
     for window in windows:
         for system in systems[window.guid]:
             about = {"system": system.name, "source": system.source, "windows": []}
-            of_system = found.setdefault(id(system), about)["windows"]
+            of_system = result.setdefault(id(system), about)["windows"]
             of_system.append(window.name or window.guid)
-    return list(found.values())
+    return list(result.values())
 
 
 def source_notes(sources: Iterable[dict]) -> tuple[str, ...]:
@@ -313,7 +313,7 @@ def stated_systems(
     held: Held, windows: Iterable[Window], path: Path, overrides: WindowOverrides
 ) -> dict[str, States]:
     """The glazing of each window of which enough is attached or stated, the same ones shared."""
-    found: dict[str, States] = {}
+    result: dict[str, States] = {}
     known: dict[StatedValues, States] = {}
     for window in windows:
         values = stated_values(held, window, path, overrides)
@@ -321,8 +321,8 @@ def stated_systems(
             continue
         if values not in known:
             known[values] = (glazing_system(values, path.name),)
-        found[window.guid] = known[values]
-    return found
+        result[window.guid] = known[values]
+    return result
 
 
 def stated_values(

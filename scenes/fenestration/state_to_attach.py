@@ -37,7 +37,7 @@ def state_to_attach(
     g = _given_g(g_value)
     table = g if isinstance(g, AngularGValue) else None
     number = g if isinstance(g, float) else None
-    one = ShadingState(
+    shading_state = ShadingState(
         name,
         file.bands if file is not None and copy_bsdf else {},
         table,
@@ -47,8 +47,8 @@ def state_to_attach(
         beside.closure,
         beside.shading_position,
     )
-    notes += _origins(one, beside, source.name, u_value=u_value, g_value=g_value)
-    return one, tuple(notes)
+    notes += _origins(shading_state, beside, source.name, u_value=u_value, g_value=g_value)
+    return shading_state, tuple(notes)
 
 
 def _given_g(text: str | None) -> AngularGValue | float | None:

@@ -10,7 +10,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.bsdf.angular import ANGLES, AngularTable, specular_matrices, stack_table
+from mitsuba_cfs.bsdf.angular import (
+    ANGLES,
+    AngularTable,
+    check_specular,
+    specular_matrices,
+    stack_table,
+)
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.glazing import Pane
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
@@ -23,7 +29,6 @@ from mitsuba_cfs.notes import Note
 from scenes.fenestration.thermal_file import (
     GlazingLayerTable,
     ThermalFile,
-    check_specular,
     spectral_panes,
 )
 from thermal.closure import Closure
@@ -194,7 +199,7 @@ def system_of_panes(layers: Sequence[GlazingLayerTable]) -> FenestrationSystem:
 
 
 def _by_wavelength(panes: Sequence[SpectralPane]) -> dict[str, AngularTable]:
-    found = spectral_glazing(panes, ANGLES)
+    result = spectral_glazing(panes, ANGLES)
     return {
         band: AngularTable(
             ANGLES,
@@ -203,7 +208,7 @@ def _by_wavelength(panes: Sequence[SpectralPane]) -> dict[str, AngularTable]:
                 for values in (one.transmittance, one.reflectance_front, one.reflectance_back)
             ),
         )
-        for band, one in found.items()
+        for band, one in result.items()
     }
 
 

@@ -34,8 +34,7 @@ from pydantic import Field, model_validator
 
 from mitsuba_cfs.bsdf.angular import AngularTable, roos_table, stack_table
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane
-from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.pane_file import read_glazing_layers, read_pane_file
 from mitsuba_cfs.bsdf.spectral_pane import (
     SpectralPane,
@@ -56,8 +55,6 @@ from thermal.shade_layers import perforated_layer, sheet_layer, venetian_layer, 
 
 ANGULAR_COLUMNS = ("theta_deg", "transmittance")
 ANGULAR_OPTIONAL = ("reflectance_front", "reflectance_back")
-SCATTERED_LIMIT = 0.05  # share of what a specular system passes that may be scattered
-DIFFUSE_TOLERANCE = 0.05  # that function and BSDF may pass more or less of diffuse light
 Film = Annotated[Positive, plausible.RESISTANCE]  # [m2 K/W]
 PATCHES = KLEMS_FULL.size
 ByPatch = Annotated[tuple[float, ...], Field(min_length=PATCHES, max_length=PATCHES)]
@@ -170,23 +167,6 @@ def read_angular_table(path: Path) -> AngularTable:
         return AngularTable(np.radians(columns.pop("theta_deg")), **columns)
     except ValueError as error:
         raise DataError(str(error), file=path) from error
-
-
-def check_specular(klems: KlemsBsdf, angular: AngularTable | None, path: Path) -> None:
-    """`DataError` where the BSDF is not that of a specular system with this function."""
-    if angular is None:
-        return
-    omega = klems.basis_in.projected_solid_angles()
-    peak = through_peak(klems.filled().transmission_front, klems.basis_in)
-    beam, rest = omega @ peak.transmittance / np.pi, omega @ peak.scattered @ omega / np.pi
-    if rest > SCATTERED_LIMIT * (beam + rest):
-        share = 100 * rest / (beam + rest)
-        message = f"the BSDF scatters {share:.0f} % of what it passes: no function of an angle"
-        raise DataError(message, file=path, field="angular")
-    means = float(omega @ angular.patch_means(klems.basis_in) / np.pi)
-    if abs(means - beam) > DIFFUSE_TOLERANCE:
-        message = f"passes {means:.2f} of diffuse light, the BSDF {beam:.2f}: not the same system"
-        raise DataError(message, file=path, field="angular")
 
 
 Length = Annotated[Positive, plausible.LAYER]
@@ -365,8 +345,8 @@ class ClosureTable(TomlTable):
     def placed(self: Table, folder: Path) -> Table:
         """The table with the files of its panes in a folder."""
         layers = tuple(
-            one if one.pane is None else one.model_copy(update={"pane": folder / one.pane})
-            for one in self.layers
+            layer if layer.pane is None else layer.model_copy(update={"pane": folder / layer.pane})
+            for layer in self.layers
         )
         return self.model_copy(update={"layers": layers})
 

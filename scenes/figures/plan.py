@@ -160,11 +160,11 @@ def _eye(position: NDArray[np.float64], direction: NDArray[np.float64]) -> str:
 
 def rings(geometry: shapely.Geometry) -> str:
     """SVG path of polygons with their holes."""
-    found = []
+    result = []
     for part in shapely.get_parts(geometry):
         if part.geom_type == "Polygon":
-            found += [part.exterior, *part.interiors]
-    return "".join(_path(shapely.get_coordinates(ring)[:-1], closed=True) for ring in found)
+            result += [part.exterior, *part.interiors]
+    return "".join(_path(shapely.get_coordinates(ring)[:-1], closed=True) for ring in result)
 
 
 def _path(points: NDArray[np.float64], *, closed: bool) -> str:

@@ -33,11 +33,11 @@ def design_loads(
     transfers: Sequence[AirTransfer] = (),
     terrain: str = "suburbs",
 ) -> pd.DataFrame:
-    """The greatest loads of rooms, each day repeated until it ends as it began, without limits.
+    """Peak loads of rooms, each day repeated until it ends as it began, without limits.
 
     Args: outdoor_c: of the cold day; None: the weather's, that 0.4 % of the hours lie below.
 
-    Returns: a row a room and case: day, outdoor mean and extreme [degC], peak [W] and its hour.
+    Returns: one row per room and case: day, outdoor mean and extreme [degC], peak [W] and its hour.
     """
     whole, hours, day_rows = climate(weather), len(weather.times), weather.per_day
     zones = [_unlimited(room.zone) for room in rooms]

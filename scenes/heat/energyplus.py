@@ -20,15 +20,15 @@ def check_twin(study: StudyFile) -> None:
         raise DataError(message, file=study.weather, field="heat_island")
 
 
-def energyplus_twin(study: StudyFile, found: BalancedRooms) -> EnergyPlusTwin:
+def energyplus_twin(study: StudyFile, balanced: BalancedRooms) -> EnergyPlusTwin:
     """The model of a study's rooms as they were balanced.
 
     Raises: `DataError` for what EnergyPlus cannot take.
     """
     optics: dict[int, WindowOptics] = {}
     rooms = []
-    for room in found.rooms:
-        windows = {w.guid: found.in_windows[w.guid] for w in room.space.windows}
+    for room in balanced.rooms:
+        windows = {w.guid: balanced.in_windows[w.guid] for w in room.space.windows}
         for system in (one for states in windows.values() for one in states):
             optics.setdefault(id(system), window_optics(system, thermal_system(system)))
         of_window = {
@@ -36,10 +36,10 @@ def energyplus_twin(study: StudyFile, found: BalancedRooms) -> EnergyPlusTwin:
         }
         rooms.append(TwinRoom(room.space, room.room, of_window, room.state))
     return EnergyPlusTwin(
-        found.building,
+        balanced.building,
         rooms,
-        climate(found.weather),
-        air=TwinAir(found.air_links, found.transfers),
+        climate(balanced.weather),
+        air=TwinAir(balanced.air_links, balanced.transfers),
         terrain=study.terrain,
         steps=60 // study.step_minutes,
     )

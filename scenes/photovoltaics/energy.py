@@ -143,9 +143,7 @@ def _made_table(cell: Cell, largest: float) -> _DiodeTable:
 
 
 @compiled(parallel=True)
-def _string_voltage(
-    current, photo, temperature, cells, substring, table, reach, series, bypass
-):  # fmt: skip
+def _string_voltage(current, photo, temperature, cells, substring, table, reach, series, bypass):
     total = np.zeros(current.shape)
     rows, columns = table.shape
     per_step = (columns - 1) / (2 * reach)
@@ -205,7 +203,7 @@ def cell_temperatures(
 
     T = T_air + G alpha (1 - eta) / (u_c + u_v wind), alpha = 0.9; u_c = 29 (freestanding),
     20 (semi_integrated), 15 W/m2K (insulated back).  Source: pvlib `temperature.pvsyst_cell`.
-    """  # fmt: skip
+    """
     if weather.dry_bulb_c is None:
         raise ValueError("weather: has no air temperature")
     wind = np.full(len(steps), CALM) if weather.wind_speed is None else weather.wind_speed[steps]
@@ -253,9 +251,12 @@ def subsystem_yields(
         light = irradiance.effective[rows].T.astype(float)
         area = np.mean([modules[m].area for m in subsystem.modules])
         warm = cell_temperatures(
-            irradiance.plain[rows], weather, irradiance.steps, mounting=mounting,
+            irradiance.plain[rows],
+            weather,
+            irradiance.steps,
+            mounting=mounting,
             efficiency=min(0.9, sheet.power / 1000.0 / area),
-        ).T  # fmt: skip
+        ).T
         members = irradiance.module[rows]
         groups = np.bincount(members)[members]
         cells = sheet.cells / groups

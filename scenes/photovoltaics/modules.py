@@ -63,7 +63,7 @@ def pv_modules(
         if element.guid in guids:
             parts.setdefault(element.guid, []).append(element)
     mesh = ray_mesh(np.concatenate([e.triangles for e in elements] or [np.empty((0, 3, 3))]))
-    return [_module(own, mesh, substrings, along) for own in parts.values()]
+    return [_module(part, mesh, substrings, along) for part in parts.values()]
 
 
 def _module(parts: Sequence[Element], mesh: RayMesh, substrings: int, along: int) -> PvModule:

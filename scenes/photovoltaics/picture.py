@@ -29,7 +29,7 @@ def irradiation_picture(result: PvResult, towards: NDArray[np.float64]) -> NDArr
     Modules carry the annual irradiation of their groups of cells, everything else is grey; they
     are drawn over whatever obstructs them.
     """
-    elements = result.standing.elements
+    elements = result.outdoors.elements
     triangles = np.concatenate([element.triangles for element in elements])
     owner = np.repeat([e.guid for e in elements], [len(e.triangles) for e in elements])
     number = {module.guid: k for k, module in enumerate(result.modules)}
@@ -42,9 +42,9 @@ def irradiation_picture(result: PvResult, towards: NDArray[np.float64]) -> NDArr
     colour = np.full((len(origins), 3), float(SKY))
     seen = hit >= 0
     colour[seen] = GREY * shade[hit[seen], None]
-    own = np.flatnonzero(module_of >= 0)
-    behind, face = ray_mesh(triangles[own]).first_hits(origins, np.tile(-w, (len(origins), 1)))
-    face = np.where(face >= 0, own[face], -1)
+    indices = np.flatnonzero(module_of >= 0)
+    behind, face = ray_mesh(triangles[indices]).first_hits(origins, np.tile(-w, (len(origins), 1)))
+    face = np.where(face >= 0, indices[face], -1)
     values, scale = cell_irradiation(result), irradiation_scale(result)
     for k, module in enumerate(result.modules):
         active = (face >= 0) & (module_of[face] == k) & (normals[face] @ module.normal > 0.9)

@@ -31,9 +31,9 @@ FLAT = 30.0  # a face tilted less looks up [degrees]
 
 @dataclass(frozen=True, slots=True)
 class PvResult:
-    """All that came out."""
+    """Result of a photovoltaic study."""
 
-    standing: OutdoorModel
+    outdoors: OutdoorModel
     modules: tuple[PvModule, ...]
     subsystems: tuple[Subsystem, ...]
     irradiance: CellIrradiance
@@ -45,7 +45,7 @@ class PvResult:
     def module_table(self) -> pd.DataFrame:
         """Annual irradiation of each module, in the plane and below its glass [kWh/m2]."""
         step = self.weather.step_h / 1000
-        owner = {m: one.name for one in self.subsystems for m in one.modules}
+        owner = {m: subsystem.name for subsystem in self.subsystems for m in subsystem.modules}
         rows = []
         for number, module in enumerate(self.modules):
             own = self.irradiance.module == number
@@ -111,25 +111,27 @@ def run_pv(
     if options.building is None:
         raise ValueError("modules are searched in a building's file")
     queries = [study.module.select, *(table.select for table in study.subsystem)]
-    standing = read_standing_file(
+    outdoors = read_standing_file(
         options.building, queries, options=options.read, leave_out=study.leave_out,
         reflectance=study.surroundings, selected_in=file or "", progress=progress,
     )  # fmt: skip
     modules = pv_modules(
-        standing.elements, standing.chosen[0],
-        substrings=study.module.substrings, along=study.module.groups,
-    )  # fmt: skip
+        outdoors.elements,
+        outdoors.chosen[0],
+        substrings=study.module.substrings,
+        along=study.module.groups,
+    )
     if not modules:
         message = f"chooses no element with a shape in {options.building}"
         raise DataError(message, file=file, field=f"module.select = {study.module.select!r}")
     cell = fitted_cell(study.module.datasheet())
-    subsystems, issues = _subsystems(study, standing, modules, file)
-    issues = [*standing.issues, *issues]
-    model = (f"Elements read: {len(standing.elements)}", f"Modules: {len(modules)}")
+    subsystems, issues = _subsystems(study, outdoors, modules, file)
+    issues = [*outdoors.issues, *issues]
+    model = (f"Elements read: {len(outdoors.elements)}", f"Modules: {len(modules)}")
     head = Head(model, tuple(issues), weather.notes)
     on_head(head)
     irradiance = cell_irradiance(
-        standing.elements, modules, weather, samples=samples, seed=seed, progress=progress,
+        outdoors.elements, modules, weather, samples=samples, seed=seed, progress=progress,
         cache=cache,
     )  # fmt: skip
     yields = subsystem_yields(
@@ -138,13 +140,13 @@ def run_pv(
         inverter_efficiency=study.inverter_efficiency, progress=progress,
     )  # fmt: skip
     return PvResult(
-        standing, tuple(modules), subsystems, irradiance, tuple(yields), weather,
+        outdoors, tuple(modules), subsystems, irradiance, tuple(yields), weather,
         tuple(issues), head,
     )  # fmt: skip
 
 
 def _subsystems(
-    study: PvStudy, standing: OutdoorModel, modules: Sequence[PvModule], file: Path | None
+    study: PvStudy, outdoors: OutdoorModel, modules: Sequence[PvModule], file: Path | None
 ) -> tuple[tuple[Subsystem, ...], list[Issue]]:
     """Modules of each stated subsystem; without any, those of each orientation."""
     issues = _unalike(modules)
@@ -156,7 +158,7 @@ def _subsystems(
         ), issues
     taken: dict[str, str] = {}
     result = []
-    for table, guids in zip(study.subsystem, standing.chosen[1:], strict=True):
+    for table, guids in zip(study.subsystem, outdoors.chosen[1:], strict=True):
         own = tuple(number for number, module in enumerate(modules) if module.guid in guids)
         if not own:
             field = f"subsystem {table.name}: select"

@@ -99,7 +99,11 @@ def fitted_cell(sheet: Datasheet) -> Cell:
         return sheet.current - voltage * conductance / (1 + series * conductance)
 
     tried = np.linspace(0.0, 0.999 * (open_circuit - voltage) / sheet.current, 400)
-    values = np.array([slope(series) for series in tried])
+    try:
+        with np.errstate(over="raise", invalid="raise"):
+            values = np.array([slope(series) for series in tried])
+    except (FloatingPointError, np.linalg.LinAlgError):  # currents of a pA or of a GA
+        values = np.empty(0)
     for k in np.flatnonzero(np.diff(np.sign(values))):
         series = brentq(slope, tried[k], tried[k + 1], xtol=1e-14)
         photo, first, second = currents(series)

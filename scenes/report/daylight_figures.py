@@ -70,8 +70,8 @@ def plans(room: RoomYear, beside: Sequence[RoomYear] = ()) -> tuple[FloorPlan, .
 
 def _of_all(column: str, room: RoomYear, beside: Sequence[RoomYear]) -> NDArray[np.float64]:
     """A metric of the sensors of a room and those beside it."""
-    found = [one.daylight.sensor_metrics for one in (room, *beside)]
-    return np.concatenate([one[column].to_numpy(dtype=float) for one in found if column in one])
+    result = [one.daylight.sensor_metrics for one in (room, *beside)]
+    return np.concatenate([one[column].to_numpy(dtype=float) for one in result if column in one])
 
 
 def useful_column(room: RoomYear, names: tuple[str, ...]) -> str | None:

@@ -25,8 +25,11 @@ PROTECTION = {  # DGP of EN 17037's levels
     "none": N_("above 0.45"),
 }
 LEVEL_WORDS = {
-    "high": N_("high"), "medium": N_("medium"), "minimum": N_("minimum"), "none": N_("none"),
-}  # fmt: skip
+    "high": N_("high"),
+    "medium": N_("medium"),
+    "minimum": N_("minimum"),
+    "none": N_("none"),
+}
 GOOD, FAIR, POOR, PLAIN = "good", "fair", "poor", "plain"
 
 

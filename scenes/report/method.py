@@ -185,8 +185,9 @@ def _sources(result: RunResult) -> str:
 
 
 def _moved(result: RunResult) -> bool:
-    return any(room.operation is not None and len(room.operation.states) > 1
-               for room in result.spaces)  # fmt: skip
+    return any(
+        room.operation is not None and len(room.operation.states) > 1 for room in result.spaces
+    )
 
 
 def _glare(result: RunResult) -> str:

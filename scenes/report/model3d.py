@@ -20,15 +20,15 @@ from scenes.report.names import quantity
 from scenes.report.storeys import storey_name
 from scenes.results import RunResult
 
-MOST_TRIANGLES = 24_000  # of what stands outdoors; the smallest are left out beyond
+MOST_TRIANGLES = 24_000  # of the surroundings; beyond, the smallest are left out
 KINDS = ("floor", "ceiling", "wall", "door", "frame", "glass", "furniture", "outdoors")
 KIND_OF_FACE = {
     "floor": "floor", "ceiling": "ceiling", "roof": "ceiling", "wall": "wall", "door": "door",
     "window frame": "frame", "reveal": "wall",
 }  # fmt: skip
-ON_TOP = 0.1  # what stands outdoors and begins so far below a storey's end lies on it [m]
+ON_TOP = 0.1  # surroundings that begin at most so far below a storey's top are on it [m]
 TERRAIN = ("IfcSite", "IfcGeographic")
-BESIDE = 1.0  # what stands this near belongs to the building [m]
+BESIDE = 1.0  # elements this near belong to the building [m]
 STOREYS_ABOVE = 3  # without rooms, the roof with them
 SHOWN = 300.0  # of the surroundings at the least, from the rooms [m]
 SHOWN_SIZES = 5  # or so many times the rooms' size
@@ -113,9 +113,10 @@ def model3d(result: RunResult) -> Model3D:
         cells.append(np.concatenate([flat, z], axis=-1))
         owners += [index] * len(flat)
     sensors = {
-        "room": owners, "storey": [levels[owner] for owner in owners],
+        "room": owners,
+        "storey": [levels[owner] for owner in owners],
         "corners": packed(np.concatenate(cells)),
-    }  # fmt: skip
+    }
     labels = tuple(space.label for space in spaces)
     whole = tuple(map(tuple, (building_box(result.building) - centre).round(3).tolist()))
     return Model3D(
@@ -126,7 +127,7 @@ def model3d(result: RunResult) -> Model3D:
 def cut_to(
     triangles: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """What of the triangles [T, 3, 3] lies in an upright box."""
+    """The part of the triangles [T, 3, 3] within an upright box."""
     for axis, sign, corner in [(a, s, c) for a in range(3) for s, c in ((1.0, low), (-1.0, high))]:
         if (sign * (triangles[..., axis] - corner[axis]) < 0).any():
             triangles = beyond(triangles, sign * np.eye(3)[axis], corner)
@@ -136,7 +137,7 @@ def cut_to(
 def building_box(building: Building) -> NDArray[np.float64]:
     """Corners [2, 3] of the box round all rooms of a building and what touches them, its roof [m].
 
-    Terrain is left out, and so is what stands more than a metre away.
+    Terrain and elements more than a metre away are left out.
     """
     shells = [space.shell for space in building.spaces]
     parts = [e.triangles for e in building.elements if not e.ifc_class.startswith(TERRAIN)]

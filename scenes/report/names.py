@@ -40,8 +40,8 @@ WORDS = _words()
 
 def glossary() -> tuple[tuple[str, str], ...]:
     """Terms and their meanings, in the alphabet's order."""
-    found = ((gettext(term), gettext(meaning)) for term, meaning in WORDS["glossary"].items())
-    return tuple(sorted(found, key=lambda item: item[0].lower()))
+    result = ((gettext(term), gettext(meaning)) for term, meaning in WORDS["glossary"].items())
+    return tuple(sorted(result, key=lambda item: item[0].lower()))
 
 
 STAGES = {  # whose seconds are noted

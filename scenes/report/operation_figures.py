@@ -66,10 +66,9 @@ def loads_chart(room: RoomYear) -> Chart | None:
     marks = []
     for number, name in enumerate(names):
         path = "".join(
-            box(i + 0.1 + number * width, i + 0.1 + (number + 0.92) * width, 0, v,
-                x_range, y_range)
+            box(i + 0.1 + number * width, i + 0.1 + (number + 0.92) * width, 0, v, x_range, y_range)
             for i, v in enumerate(monthly[name])
-        )  # fmt: skip
+        )
         marks.append(ChartMark(path, LOADS[name], quantity(name).label, filled=True))
     return month_chart(
         monthly,

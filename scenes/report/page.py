@@ -84,13 +84,17 @@ def storey_data(metrics: Sequence[RoomMetric], rooms: int) -> list[dict]:
     """Words and colours of every room, for the plans of the storeys."""
     return [
         {
-            "unit": one.scale.unit,
+            "unit": metric.scale.unit,
             "rooms": [
-                [one.words(i), one.scale.hex(one.values[i]), one.scale.ink(one.values[i])]
+                [
+                    metric.words(i),
+                    metric.scale.hex(metric.values[i]),
+                    metric.scale.ink(metric.values[i]),
+                ]
                 for i in range(rooms)
             ],
         }
-        for one in metrics
+        for metric in metrics
     ]
 
 

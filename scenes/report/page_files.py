@@ -12,5 +12,5 @@ from importlib.resources import files
 def page_files(package: str) -> dict[str, str]:
     """The text of every file in the folder `templates` of a package, by its name."""
     folder = files(package) / "templates"
-    found = sorted((one for one in folder.iterdir() if one.is_file()), key=lambda one: one.name)
-    return {one.name: one.read_text("utf-8") for one in found}
+    result = sorted((one for one in folder.iterdir() if one.is_file()), key=lambda one: one.name)
+    return {one.name: one.read_text("utf-8") for one in result}

@@ -174,7 +174,7 @@ def problems_table(result: RunResult) -> Table:
 def issues_table(issues: Iterable[Issue]) -> Table:
     """The issues of a building's file, one a row."""
     titles = (gettext("Element"), gettext("Problem"), gettext("Treatment in the model"))
-    rows = [(one.where, *issue_cells(issue_text(one, "command", gettext))) for one in issues]
+    rows = [(issue.where, *issue_cells(issue_text(issue, "command", gettext))) for issue in issues]
     columns = tuple(Column(title, numeric=False) for title in titles)
     return Table(gettext("Problems by element"), columns, tuple(rows))
 

@@ -65,12 +65,15 @@ def comfort_carpet(result: RunResult, room: RoomYear) -> Chart | None:
     order = np.full(6, -1)
     order[used] = np.arange(len(used))
     return class_carpet(
-        result.times, order[classes], tuple(names[i] for i in used),
-        title=gettext("Adaptive comfort"), explanation=gettext(
+        result.times,
+        order[classes],
+        tuple(names[i] for i in used),
+        title=gettext("Adaptive comfort"),
+        explanation=gettext(
             "Occupied hours by operative temperature relative to the adaptive comfort bands; "
             "unoccupied hours are blank."
         ),
-    )  # fmt: skip
+    )
 
 
 def duration_curve(room: RoomYear, beside: Sequence[RoomYear] = ()) -> Chart:
@@ -234,7 +237,7 @@ def month_chart(
 ) -> Chart:
     """Marks over months, from 0 to a top [kWh].
 
-    Args: names: columns of `monthly` [kWh] that are told under the pointer.
+    Args: names: columns of `monthly` [kWh] that are shown under the pointer.
     """
     ticks = tuple(
         Tick(100 * (i + 0.5) / len(monthly), name[0], name[1:], False)

@@ -27,7 +27,7 @@ from scenes.report.names import rooms_counted, systems_counted
 from scenes.report.tables import GLARE_WORDS, Column, Table, glare_class, step_hours
 from scenes.results import ExploredRoom, LuminancePicture, RoomYear, RunResult
 
-MOST_ROOMS = 6  # whose figures stand each for itself on the page of the verdict
+MOST_ROOMS = 6  # whose figures are shown one by one on the page of the verdict
 WORST = 3  # rooms that are named where there are more
 GRADES = (GOOD, FAIR, POOR)
 
@@ -36,7 +36,7 @@ Named = tuple[str, RoomYear, Sequence[Card]]  # a room or case, its results, its
 
 @dataclass(frozen=True, slots=True)
 class LimitTables:
-    """What stands on the page of the verdict, and what is folded below it."""
+    """Tables of the page of the verdict: one shown, one folded below it."""
 
     shown: Table
     folded: Table | None  # every figure of every room; None: it is shown
@@ -80,13 +80,13 @@ def _by_figure(rooms: Sequence[Named]) -> Table:
     rows = []
     judged = [(name, room, card) for name, room, own in rooms for card in own if card.verdict]
     for label in dict.fromkeys(card.label for _, _, card in judged):
-        found = sorted(
+        result = sorted(
             (one for one in judged if one[2].label == label), key=lambda one: one[2].worth
         )
-        counts = Counter((GRADES.index(card.grade), card.verdict) for _, _, card in found)
+        counts = Counter((GRADES.index(card.grade), card.verdict) for _, _, card in result)
         meets = semicolons([colon(str(counts[key]), key[1]) for key in sorted(counts)])
-        worst = semicolons([colon(name, _value(card)) for name, _, card in found[:WORST]])
-        rows.append((label, meets, worst, _error(*found[0][1:])))
+        worst = semicolons([colon(name, _value(card)) for name, _, card in result[:WORST]])
+        rows.append((label, meets, worst, _error(*result[0][1:])))
     return Table(gettext("Results and limits of the standards"), columns, tuple(rows))
 
 
@@ -149,7 +149,7 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
         (gettext("Overheating"), _overheating(result)),
         (gettext("Shading"), _shading(result)),
     )
-    named = [(r.space.label, r, own) for r, own in zip(result.spaces, cards, strict=True)]
+    named = [(r.space.label, r, card) for r, card in zip(result.spaces, cards, strict=True)]
     return Verdict(question, sentences, limits(named, gettext("Room")))
 
 
@@ -338,5 +338,5 @@ def _autonomies(room: RoomYear, explored: ExploredRoom) -> tuple[float, float]:
     lit = used[explored.lit]
     state, light = explored.operated[explored.lit], np.stack(explored.illuminance)
     as_run = light[state, :, np.arange(len(state))]  # [L, S]
-    found = [(one[lit] >= LIT_LX).sum(axis=0).mean() for one in (light[0].T, as_run)]
-    return 100 * float(found[0]) / total, 100 * float(found[1]) / total
+    means = [(one[lit] >= LIT_LX).sum(axis=0).mean() for one in (light[0].T, as_run)]
+    return 100 * float(means[0]) / total, 100 * float(means[1]) / total

@@ -53,11 +53,14 @@ def glare_by_state(
     J, count = light.states, len(light.sky.lit)
     lit = [
         hourly_glare(
-            light, "DGP", np.full(count, j), options=rating,
+            light,
+            "DGP",
+            np.full(count, j),
+            options=rating,
             progress=part(progress, j / J, (j + 1) / J, "glare control"),
         ).dgp
         for j in range(J)
-    ]  # fmt: skip
+    ]
     return light.sky.whole_year(np.stack(lit))
 
 
@@ -66,9 +69,12 @@ def annual_glare(
 ) -> pd.DataFrame:
     """Glare of every hour with the shading state of that hour [H]; NaN in the dark."""
     rated = hourly_glare(
-        light.light, "DGP", room.lit_state(state), options=rating_of(room.options.outputs),
+        light.light,
+        "DGP",
+        room.lit_state(state),
+        options=rating_of(room.options.outputs),
         progress=part(progress, 0.0, 1.0, "annual glare"),
-    )  # fmt: skip
+    )
     table = np.full((room.skies.hours, len(COLUMNS)), np.nan)
     table[room.skies.lit] = np.stack([getattr(rated, name) for name in COLUMNS.values()], axis=1)
     frame = pd.DataFrame(table, index=room.weather.midpoints, columns=list(COLUMNS))

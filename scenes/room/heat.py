@@ -82,8 +82,8 @@ def room_humidity(
     if transfers:
         between = np.repeat(between[None], len(weather.times), axis=0)
         index = {room.zone.name: z for z, room in enumerate(rooms)}
-        for one in transfers:
-            between[:, index[one.target], index[one.source]] += one.flow
+        for transfer in transfers:
+            between[:, index[transfer.target], index[transfer.source]] += transfer.flow
     outdoors = outdoor_humidity(weather)
     return zone_humidity(
         zones, outdoors, weather.dry_bulb_c, weather.pressure_pa, between,
@@ -294,9 +294,8 @@ def heat_of(
         store: of balances and results on disk; None: in memory.
     """
     results = balances(
-        rooms, weather, step_s, air_links=air_links, terrain=terrain, progress=progress,
-        store=store,
-    )  # fmt: skip
+        rooms, weather, step_s, air_links=air_links, terrain=terrain, progress=progress, store=store
+    )
     passed = iter if store is None else store.each
     issues = step_issues(
         rooms, passed(results), weather, step_s, air_links=air_links, terrain=terrain, store=store

@@ -135,11 +135,11 @@ def _inner_glass(
         scene, transmission = _room_beyond(building, other, pairs, systems, onward)
         used += [face for face, _ in pairs]
         for optics, group in _groups(space, [face for face, _ in pairs]):
-            given = MatrixOptics(optics.transmission, dark, reflection=optics.reflection)
+            matrix_optics = MatrixOptics(optics.transmission, dark, reflection=optics.reflection)
             beam = np.diag(optics.transmission)
             named = replace(group, name=f"{group.name}, to {other.label}")
             beyond = AdjacentRoom(scene, transmission, beam)
-            panes.append((named, (given,), beyond, other.label))
+            panes.append((named, (matrix_optics,), beyond, other.label))
     if not panes:
         return None
     names = frozenset(face.name for face in used)
@@ -189,9 +189,10 @@ def _light_sources(
     """The rooms behind a room's panes that are fewer than `below` panes away from a window."""
     pairs = panes_between(building, space)
     return [
-        other for other in building.spaces
+        other
+        for other in building.spaces
         if other.guid in pairs and away.get(other.guid, below) < below
-    ]  # fmt: skip
+    ]
 
 
 def _groups(space: Space, faces: Sequence[Face]) -> list[tuple[SystemOptics, WindowGroup]]:

@@ -36,7 +36,11 @@ class FileSensors:
     @classmethod
     def of(cls, building: Building, space: Space) -> FileSensors:
         """The sensors of a room."""
-        fisheyes = [one.view for one in model_views(building, space) if one.view.covers_hemisphere]
+        fisheyes = [
+            model_view.view
+            for model_view in model_views(building, space)
+            if model_view.view.covers_hemisphere
+        ]
         return cls(tuple(model_grids(building, space)), fisheyes[0] if fisheyes else None)
 
 

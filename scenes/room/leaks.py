@@ -35,9 +35,8 @@ def leak_issues(
     """
     points, directions = scene.sensors()
     escape = escaped_view(
-        scene.interior, scene.groups, points, directions,
-        seed=seed, progress=progress, cache=cache,
-    )  # fmt: skip
+        scene.interior, scene.groups, points, directions, seed=seed, progress=progress, cache=cache
+    )
     if not (escape.share - 2 * escape.error > MOST_LOST).any():
         return ()
     return (_issue(space, points, escape),)

@@ -246,7 +246,7 @@ class Operation:
     @property
     def files(self) -> tuple[Path, ...]:
         """The BSDF files and CSV schedules that the file names."""
-        tables = (one.csv for one in self.tables.schedules.values())
+        tables = (schedule.csv for schedule in self.tables.schedules.values())
         states = [table.placed(self.file.parent) for table in self.tables.system]
         panes = [layer.pane for table in states if table.bsdf is None for layer in table.layers]
         named = [None if table.bsdf is None else self.file.parent / table.bsdf for table in states]
@@ -297,12 +297,12 @@ def schedules_there(tables: Tables, path: Path) -> Tables:
     Raises: `DataError` for a file that does not exist.
     """
     schedules = {}
-    for name, one in tables.schedules.items():
-        csv = None if one.csv is None else (path.parent / one.csv).absolute()
+    for name, schedule in tables.schedules.items():
+        csv = None if schedule.csv is None else (path.parent / schedule.csv).absolute()
         if csv is not None and not csv.is_file():
             field = f"schedules.{name}.csv"
-            raise DataError(f"no such file: {one.csv}", file=path, field=field)
-        schedules[name] = one.model_copy(update={"csv": csv})
+            raise DataError(f"no such file: {schedule.csv}", file=path, field=field)
+        schedules[name] = schedule.model_copy(update={"csv": csv})
     return tables.model_copy(update={"schedules": schedules})
 
 
@@ -328,7 +328,7 @@ def read_state(table: StateTable, path: Path | None, *, by: str = "") -> Fenestr
 
 def check_states(operation: Operation, states: int) -> None:
     """Raise `DataError` for a control that names states that the windows do not have."""
-    for fault in (one.control_fault(states) for one in operation.tables.variants):
+    for fault in (variant.control_fault(states) for variant in operation.tables.variants):
         if fault is None:
             continue
         field, message = fault
@@ -447,8 +447,9 @@ def stated_fields(use: StatedUse, space: Space, schedules: _Schedules) -> dict[s
     if use.lighting_w is not None and use.lighting_target_lx is None:
         gains["lighting_dimmed"] = False
     for key, value in (
-        ("infiltration_ach", use.infiltration_m3_s), ("ventilation_ach", use.ventilation_m3_s),
-    ):  # fmt: skip
+        ("infiltration_ach", use.infiltration_m3_s),
+        ("ventilation_ach", use.ventilation_m3_s),
+    ):
         if value is not None:
             air[key] = schedules.value(value, changes)
     for key, schedule in (("heating_c", use.heating_c), ("cooling_c", use.cooling_c)):

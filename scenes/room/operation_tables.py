@@ -86,9 +86,8 @@ class LeakageTable(TomlTable):
         if self.area_cm2 is not None:
             return sherman_grimsrud(self.area_cm2, stack=self.stack, wind=self.wind)
         return aim2(
-            self.coefficient, self.exponent,
-            stack=self.stack, wind=self.wind, shelter=self.shelter,
-        )  # fmt: skip
+            self.coefficient, self.exponent, stack=self.stack, wind=self.wind, shelter=self.shelter
+        )
 
 
 class OpenedTable(TomlTable):

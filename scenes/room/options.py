@@ -153,8 +153,8 @@ CHOICES = {
 
 def named_types() -> dict[str, Any]:
     """The type of each option by its name in `NAMES`."""
-    own = get_type_hints(RoomOptions)
+    type_hints = get_type_hints(RoomOptions)
     return {
-        name: (get_type_hints(own[part]) if part else own)[key]
+        name: (get_type_hints(type_hints[part]) if part else type_hints)[key]
         for name, (part, key) in NAMES.items()
     }

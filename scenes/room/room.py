@@ -346,7 +346,7 @@ def explored_room(
         made = pictures_in_state(small, hours, of_groups)
         pictures.append(picture_year(made, seed=light.sampling.seed, progress=steps))
         optics = [states[k] for states, k in zip(light.systems, of_groups, strict=True)]
-        scattering = [one.scattering for one in optics]
+        scattering = [optic.scattering for optic in optics]
         through.append(through_beams(scene.groups, scattering, sky.direction))
     triangles = [np.concatenate([w.triangles for w in g.windows]) for g in scene.groups]
     return ExploredRoom(

@@ -71,8 +71,9 @@ def _profile(value: Any) -> Any:
     """A number, 24 numbers, or ranges: all as ranges."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return ({"hours": (0, CLOCK), "value": value},)
-    if not isinstance(value, list | tuple) or any(not isinstance(v, dict | RangeTable | int | float)
-                                                  for v in value):  # fmt: skip
+    if not isinstance(value, list | tuple) or any(
+        not isinstance(v, dict | RangeTable | int | float) for v in value
+    ):
         raise ValueError(f"expected a number, 24 of them, or ranges of hours, got {value!r}")
     if any(isinstance(v, dict | RangeTable) for v in value):
         return value
@@ -139,7 +140,7 @@ class ScheduleTable(DaysTable):
         if self._year is not None:
             return tuple(float(value) for value in np.unique(self.peak * self._year.values))
         days = (self, *self.season)
-        profiles = (getattr(one, key) for one in days for key in DaysTable.model_fields)
+        profiles = (getattr(day, key) for day in days for key in DaysTable.model_fields)
         values = [one.value for profile in profiles if profile is not None for one in profile]
         return tuple(self.peak * value for value in (self.otherwise, *values))
 

@@ -90,7 +90,7 @@ class OutdoorLight:
                         scene, self.sampling, five_phase=False, needs=(), cache=self.cache
                     )
                 )
-        return np.concatenate([one.daylight.values for one in matrices])
+        return np.concatenate([matrix.daylight.values for matrix in matrices])
 
 
 def same_matrix(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
@@ -257,6 +257,7 @@ class _Templates:
         group = self._group[space.guid]
         group[:] = [light for light in group if light.space.guid != space.guid]
         self._template = {
-            guid: twin for guid, twin in self._template.items()
+            guid: twin
+            for guid, twin in self._template.items()
             if twin is None or twin.guid != space.guid
-        }  # fmt: skip
+        }

@@ -83,9 +83,11 @@ def seasonal_outdoors(
     first, *others = (
         exterior_surfaces(season.building, room.space, "solar") for season in room.seasons
     )
-    if light is not None and light.inner is None and np.array_equal(
-        first.reflectance, light.scene.exterior.reflectance
-    ):  # fmt: skip
+    if (
+        light is not None
+        and light.inner is None
+        and np.array_equal(first.reflectance, light.scene.exterior.reflectance)
+    ):
         matrices = light.matrices
     else:
         traced = None if light is None else light.matrices.scenes
@@ -173,9 +175,12 @@ def solar_gains(
         back = np.array([heat.back_reflectance for heat in heats])
         if heats and back.tobytes() not in absorption:
             absorption[back.tobytes()] = absorption_matrix(
-                in_sun.interior, outdoors.first.scene.groups, window_reflectance=back,
-                progress=part(steps, 0.6, 1.0), **_sampled(outdoors.first),
-            ).values  # fmt: skip
+                in_sun.interior,
+                outdoors.first.scene.groups,
+                window_reflectance=back,
+                progress=part(steps, 0.6, 1.0),
+                **_sampled(outdoors.first),
+            ).values
         absorbed = absorption.get(back.tobytes())
         suns.append(_gains_in_state(in_sun, j, outdoors, room.skies, absorbed))
     gains = {

@@ -71,17 +71,19 @@ def enveloped(
         for number in range(len(room.zone.surfaces))
     ]
     surfaces = [
-        one if one.outside != "outdoor" or own[0].kind == "window frame" else replace(
-            one, absorptance_out=envelope.outside_absorptance,
-            roughness=envelope.outside_roughness,
-        ) for one, own in zip(room.zone.surfaces, faces, strict=True)
-    ]  # fmt: skip
+        one
+        if one.outside != "outdoor" or own[0].kind == "window frame"
+        else replace(
+            one, absorptance_out=envelope.outside_absorptance, roughness=envelope.outside_roughness
+        )
+        for one, own in zip(room.zone.surfaces, faces, strict=True)
+    ]
     try:
         if envelope.frame_u is not None:
             layer = Layer(1.0, 1.0 / (1.0 / envelope.frame_u - FILMS), 0.0, 0.0)
             surfaces = [
-                replace(one, layers=(layer,)) if own[0].kind == "window frame" else one
-                for one, own in zip(surfaces, faces, strict=True)
+                replace(surface, layers=(layer,)) if own[0].kind == "window frame" else surface
+                for surface, own in zip(surfaces, faces, strict=True)
             ]
         if envelope.ground is not None:
             surfaces = _grounded(surfaces, envelope.ground, weather)
@@ -124,15 +126,15 @@ def _grounded(
     floors = [s for s in surfaces if s.outside == "ground" and s.normal[2] < DOWNWARDS]
     area = table.area or sum(s.area for s in floors)
     grounded = []
-    for one in surfaces:
-        if one.outside != "ground":
-            grounded.append(one)
+    for surface in surfaces:
+        if surface.outside != "ground":
+            grounded.append(surface)
             continue
-        element = _element(one, floors, table, area, wind)
+        element = _element(surface, floors, table, area, wind)
         grounded.append(
             replace(
-                one,
-                layers=element.layers(one.layers),
+                surface,
+                layers=element.layers(surface.layers),
                 outside="known",
                 beyond_c=element.temperature(table.indoor_c, *year, hours),
             )
@@ -141,9 +143,12 @@ def _grounded(
 
 
 def _element(
-    one: OpaqueSurface, floors: Sequence[OpaqueSurface], table: GroundTable, area: float,
+    one: OpaqueSurface,
+    floors: Sequence[OpaqueSurface],
+    table: GroundTable,
+    area: float,
     wind: float,
-) -> GroundElement:  # fmt: skip
+) -> GroundElement:
     """The floor or wall by ISO 13370."""
     soil = SOILS[table.soil]
     soil = Soil(table.conductivity or soil.conductivity, table.heat_capacity or soil.heat_capacity)
@@ -390,18 +395,24 @@ def room_zone(
         area = room.space.floor_area
         operated_zone, lamps = operated(zone.zone, room.operation, area, room.weather, plane)
         zone = enveloped(
-            replace(zone, zone=operated_zone), room.building, room.space, room.operation,
+            replace(zone, zone=operated_zone),
+            room.building,
+            room.space,
+            room.operation,
             room.weather,
-        )  # fmt: skip
+        )
         services = services_of(room.operation, area, room.weather)
     else:
         services = plain_services(room.space, room.occupied, room.options.occupancy)
     shares = [len(season.months) / 12 for season in room.seasons]
     exteriors = [scene.scene.exterior for scene in outdoors.scenes]
     zone = with_sky_view(
-        zone, surfaces.outer, list(zip(exteriors, shares, strict=True)),
-        seed=room.options.sampling.seed, cache=room.cache,
-    )  # fmt: skip
+        zone,
+        surfaces.outer,
+        list(zip(exteriors, shares, strict=True)),
+        seed=room.options.sampling.seed,
+        cache=room.cache,
+    )
     solar, gains = solar_gains(
         room, outdoors, surfaces.room, surfaces.outer, state,
         thermals=surfaces.thermals, progress=progress,

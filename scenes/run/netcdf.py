@@ -100,30 +100,30 @@ def attributes(key: str) -> dict[str, str]:
     known = quantity(key)
     unit, label = UNITS.get(known.unit, known.unit).replace("²", "2"), known.label
     unit, label = LABELS.get(key, (unit, label))
-    found = {"units": unit, "long_name": label}
+    result = {"units": unit, "long_name": label}
     if known.meaning:
-        found["comment"] = known.meaning
+        result["comment"] = known.meaning
     if key in STANDARD:
-        found["standard_name"] = STANDARD[key]
+        result["standard_name"] = STANDARD[key]
     if known.values:
-        found["flag_meanings"] = ", ".join(known.values)
-    return found
+        result["flag_meanings"] = ", ".join(known.values)
+    return result
 
 
 def _hours(rooms: Iterable[RoomYear]) -> Variables:
     """Every column of the hours, by time and room; NaN for a room that has none of it."""
     tables = [room.hours.drop(columns=_surface_names(room)) for room in rooms]
     columns = dict.fromkeys(name for table in tables for name in table.columns)
-    found = {}
+    result = {}
     for name in columns:
         values = [table[name] if name in table else np.nan for table in tables]
-        kinds = {getattr(one, "dtype", np.dtype(float)).kind for one in values}
+        kinds = {getattr(value, "dtype", np.dtype(float)).kind for value in values}
         kind = bool if kinds == {"b"} else np.float32
         length = len(tables[0])
         stack = [np.broadcast_to(np.asarray(one, dtype=kind), length) for one in values]
-        said = attributes(name) | ({"units": "1"} if kind is bool else {})
-        found[name] = (("time", "room"), np.stack(stack, axis=1), said)
-    return found
+        message = attributes(name) | ({"units": "1"} if kind is bool else {})
+        result[name] = (("time", "room"), np.stack(stack, axis=1), message)
+    return result
 
 
 def _sensors(rooms: Iterable[RoomYear], names: Iterable[str]) -> Variables:
@@ -138,15 +138,15 @@ def _sensors(rooms: Iterable[RoomYear], names: Iterable[str]) -> Variables:
         owners += [name] * len(metrics)
     whole = pd.concat(tables, ignore_index=True)
     lux = {"units": "lx", "long_name": "illuminance"}
-    found: Variables = {
+    variables: Variables = {
         "illuminance": (("time", "sensor"), np.concatenate(light, axis=1), lux),
         "sensor_room": (("sensor",), np.array(owners), {"long_name": "room of the sensor"}),
     }
     for name in whole:
         own = name if name in PLACES else f"sensor_{name}"
         what = PLACES.get(name) or attributes(name)
-        found[own] = (("sensor",), whole[name].to_numpy(dtype=float), what)
-    return found
+        variables[own] = (("sensor",), whole[name].to_numpy(dtype=float), what)
+    return variables
 
 
 def _surfaces(rooms: Iterable[RoomYear], names: Iterable[str]) -> Variables:
@@ -182,14 +182,14 @@ def _pictures(result: RunResult, names: Iterable[str]) -> Variables:
     if not tables:
         return {}
     whole = pd.concat(tables, ignore_index=True)
-    found: Variables = {
+    variables: Variables = {
         "picture_time": (("picture",), whole.pop("time").to_numpy(), {"long_name": "hour shown"}),
         "picture_room": (("picture",), whole.pop("room").to_numpy(str), {"long_name": "room"}),
     }
     for name in whole:
         values = whole[name].to_numpy(dtype=float)
-        found[f"picture_{name}"] = (("picture",), values, attributes(name))
-    return found
+        variables[f"picture_{name}"] = (("picture",), values, attributes(name))
+    return variables
 
 
 def _years(rooms: Iterable[RoomYear]) -> Variables:

@@ -16,7 +16,7 @@ import pandas as pd
 
 from bim.names import folder_names
 from bim.report.issue import COLUMNS, issue_rows
-from mitsuba_cfs.files import write_table, write_text
+from mitsuba_cfs.files import without_formulas, write_table, write_text
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.progress import Progress, silent
 from scenes.pictures import write_falsecolour, write_tone_mapped
@@ -100,9 +100,12 @@ def _write_rooms(
     """The files of each room in its folder."""
     rooms = list(zip(result.spaces, places, strict=True))
     tasks = Tasks(
-        rooms, _Files(result.times), _fault,
-        key=lambda item: item[0].space.guid, scene=lambda item: item[0].space.guid,
-    )  # fmt: skip
+        rooms,
+        _Files(result.times),
+        _fault,
+        key=lambda item: item[0].space.guid,
+        scene=lambda item: item[0].space.guid,
+    )
     # a process takes as long to begin as it does to write some rooms
     processes = min(processes, len(rooms) // ROOMS_A_PROCESS)
     with closing(tasks.results(processes=processes)) as written:
@@ -187,7 +190,8 @@ DIGITS = "%.6g"
 
 
 def csv_text(table: pd.DataFrame, *, index: bool = True) -> str:
-    """What `table.to_csv(float_format="%.6g")` gives, byte for byte."""
+    """What `table.to_csv(float_format="%.6g")` gives of a table `without_formulas`."""
+    table = without_formulas(table)
     columns = [_entries(table.iloc[:, k]) for k in range(table.shape[1])]
     names = list(map(str, table.columns))
     if index:

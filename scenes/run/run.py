@@ -273,9 +273,8 @@ def run_job(
     if on_head is not None:
         on_head(inputs.head)
     return run_inputs(
-        inputs, options, progress,
-        on_room=on_room, on_light=on_light, workers=workers, start=start,
-    )  # fmt: skip
+        inputs, options, progress, on_room=on_room, on_light=on_light, workers=workers, start=start
+    )
 
 
 def run_inputs(
@@ -346,7 +345,7 @@ def _manifest(
         "building": inputs.building.name,
         "site": inputs.weather.site,
         "weather_notes": list(inputs.weather.notes),
-        "system": ", ".join(dict.fromkeys(one.name for one in inputs.used_systems)),
+        "system": ", ".join(dict.fromkeys(used_system.name for used_system in inputs.used_systems)),
         "fenestration": inputs.sources,
         "options": {
             key: str(value)

@@ -96,7 +96,7 @@ def case_traits(cases: list[Case], plan: StudyPlan) -> list[Traits]:
     """What a method's error goes by, of each system in each room under each climate."""
     rooms: dict[tuple, tuple[float, float]] = {}
     systems: dict[tuple, list[tuple[float, float, float, float]]] = {}
-    found: dict[Traits, None] = {}
+    result: dict[Traits, None] = {}
     for case in cases:
         building, space = plan.rooms[case.scene]
         filled = (case.scene, case.bsdf, case.operation)
@@ -105,8 +105,8 @@ def case_traits(cases: list[Case], plan: StudyPlan) -> list[Traits]:
         seen = (case.scene, case.weather, case.orientation_deg)
         if seen not in rooms:
             rooms[seen] = room_traits(case, building, space)
-        found |= {Traits(*one, *rooms[seen]): None for one in systems[filled]}
-    return list(found)
+        result |= {Traits(*system, *rooms[seen]): None for system in systems[filled]}
+    return list(result)
 
 
 def filled_traits(case: Case, building: Building) -> list[tuple[float, float, float, float]]:

@@ -18,11 +18,12 @@ from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.source_code import code_version
-from scenes.explore.folder import CASE, read_data, write_rooms
+from scenes.explore.case_files import CASE, read_case
+from scenes.explore.folder import write_rooms
 from scenes.results import RunResult
 from scenes.study.one_case import ALONE, case_inputs, case_year
 from scenes.study.plan import Case
-from scenes.study.store import said
+from scenes.study.store import failure_line
 from scenes.workers import Tasks
 
 PHASED = ("three-phase", "five-phase")  # a path tracer has no matrices to compute an hour from
@@ -54,11 +55,11 @@ def compute_explorer(case: Case, progress: Progress = silent) -> ExploredCase:
         room, weather = case_year(inputs, case, explore=True, progress=progress), inputs.weather
         run = RunResult(
             inputs.building, weather.midpoints, sun_directions(weather), (room,), (), {}
-        )  # fmt: skip
+        )
         write_rooms(run, folder)
-        found = (one for one in folder.rglob("*") if one.is_file())
-        files = {one.relative_to(folder).as_posix(): one.read_bytes() for one in found}
-        return ExploredCase(explorer_key(case), files, read_data(folder / CASE))
+        result = (one for one in folder.rglob("*") if one.is_file())
+        files = {one.relative_to(folder).as_posix(): one.read_bytes() for one in result}
+        return ExploredCase(explorer_key(case), files, read_case(folder))
 
 
 def explorers(
@@ -85,16 +86,16 @@ def explorers(
     compute = partial(compute_explorer, progress=progress) if here else compute_explorer
     tasks = Tasks(left, compute, _failed, key=explorer_key, scene=attrgetter("scene"))
     with closing(tasks.results(processes=processes, scheduler=scheduler)) as results:
-        for found in results:
-            if not found.error:
-                _keep(found, folder)
-            yield once[found.key], ExploredCase(found.key, {}, found.shown, found.error)
+        for result in results:
+            if not result.error:
+                _keep(result, folder)
+            yield once[result.key], ExploredCase(result.key, {}, result.shown, result.error)
 
 
 def _kept(key: str, folder: Path) -> ExploredCase | None:
     """An explorer that an earlier run finished."""
     try:
-        return ExploredCase(key, {}, read_data(folder / key / CASE))
+        return ExploredCase(key, {}, read_case(folder / key))
     except DataError:
         return None
 
@@ -108,4 +109,4 @@ def _keep(explored: ExploredCase, folder: Path) -> None:
 
 
 def _failed(case: Case, error: BaseException) -> ExploredCase:
-    return ExploredCase(explorer_key(case), error=said(error))
+    return ExploredCase(explorer_key(case), error=failure_line(error))

@@ -202,24 +202,24 @@ def glare_figures(
     used = int(np.count_nonzero(working_hours(weather, *occupied)))
     every = np.concatenate([dgp, np.zeros(used - len(dgp))])
     hours = class_hours(every) * weather.step_h
-    found: dict[str, float | str] = {
+    result: dict[str, float | str] = {
         f"glare_{name}_h": float(count) for name, count in zip(CLASSES, hours, strict=True)
     }
-    found["dgp_max"] = float(np.max(dgp, initial=0.0))
-    found["dgp_mean"] = float(np.mean(dgp)) if len(dgp) else 0.0
-    found["dgp_5_percent"] = hour_not_exceeded(every)
-    found["glare_protection"] = protection_level(every)
-    return found
+    result["dgp_max"] = float(np.max(dgp, initial=0.0))
+    result["dgp_mean"] = float(np.mean(dgp)) if len(dgp) else 0.0
+    result["dgp_5_percent"] = hour_not_exceeded(every)
+    result["glare_protection"] = protection_level(every)
+    return result
 
 
 def rating_figures(rated: AnnualGlare) -> dict[str, float | str]:
     """What a glare source is, and the standard error of DGP: root mean square, and of the worst."""
     dgp, error = rated.dgp, rated.dgp_standard_error
-    found: dict[str, float | str] = {"glare_rule": rated.rule}
+    result: dict[str, float | str] = {"glare_rule": rated.rule}
     if len(dgp) and not np.isnan(error).any():
-        found["dgp_standard_error"] = float(np.sqrt(np.mean(error**2)))
-        found["dgp_max_standard_error"] = float(error[np.argmax(dgp)])
-    return found
+        result["dgp_standard_error"] = float(np.sqrt(np.mean(error**2)))
+        result["dgp_max_standard_error"] = float(error[np.argmax(dgp)])
+    return result
 
 
 def room_figures(room: RoomYear) -> tuple[dict[str, float | str], dict[str, NDArray]]:
@@ -257,15 +257,15 @@ def heat_figures(temperatures: pd.DataFrame, comfort: pd.DataFrame) -> dict[str,
     """Operative temperatures of the occupied hours, and how many are warm or comfortable [h]."""
     used = comfort["occupied"].to_numpy(bool)
     operative = temperatures["operative_c"].to_numpy()[used]
-    found = {
+    result = {
         "operative_min_c": float(operative.min()),
         "operative_mean_c": float(operative.mean()),
         "operative_max_c": float(operative.max()),
         "warm_h": float(np.count_nonzero(operative > WARM_C)),
     }
     for band in ("within_90", "within_80"):
-        found[f"comfortable_{band[-2:]}_h"] = float(comfort.loc[used, band].sum())
-    return found
+        result[f"comfortable_{band[-2:]}_h"] = float(comfort.loc[used, band].sum())
+    return result
 
 
 def straight_view(

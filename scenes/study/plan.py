@@ -164,7 +164,7 @@ def plan_of(study: Study) -> StudyPlan:
     held = SystemTable.model_construct(name=AS_HELD)
     systems = [_of_system(study, system) for system in study.system or (held,)]
     climates = [{"climate": c.name, "weather": InputFile.of(c.weather)} for c in study.climate]
-    found: list[Case] = []
+    cases: list[Case] = []
     rooms = {}
     _check_turning(study)
     around = tuple(map(InputFile.of, study.surroundings))
@@ -186,8 +186,8 @@ def plan_of(study: Study) -> StudyPlan:
             mine = [one | {"referenced": (*held_files, *one["referenced"])} for one in systems]
             of_space = list(_of_space(study, about, mine, climates))
             rooms[of_space[0].scene] = building, space
-            found += of_space
-    return StudyPlan(tuple(found), rooms)
+            cases += of_space
+    return StudyPlan(tuple(cases), rooms)
 
 
 def _check_turning(study: Study) -> None:
@@ -234,7 +234,6 @@ def _of_space(
                         options=RoomOptions.of(**options),
                         program=program_version(),
                         glare=study.glare,
-                        albedo=study.albedo,
                         chosen=AUTO if method == AUTO else "",
                     )
 

@@ -46,7 +46,10 @@ class CaseResult:
         with opened_arrays(path) as data:
             arrays = {name: data[name] for name in data.files}
         record = json.loads(arrays.pop("record").tobytes())
-        return cls(record["key"], record["figures"], arrays)
+        key, figures = record["key"], dict(record["figures"])
+        if not all(isinstance(value, float | int | str) for value in figures.values()):
+            raise ValueError("figures: expected numbers and texts")
+        return cls(key, figures, arrays)
 
 
 class Store:
@@ -62,7 +65,7 @@ class Store:
 
     def open(self) -> None:
         """Make the folder, for cases to be kept in."""
-        self._results.kept("cases")
+        self._results.checkpoints("cases")
 
     def load(self, key: str) -> CaseResult | None:
         """The finished case of that key; None where there is none, or none that can be read."""
@@ -104,7 +107,7 @@ class Store:
 
     def explorers(self) -> Path:
         """The folder of the cases' explorers, made; it is never cleared."""
-        return self._results.kept(EXPLORER)
+        return self._results.checkpoints(EXPLORER)
 
     def _place(self, key: str) -> Path:
         return self.folder / "cases" / f"{key}.npz"
@@ -144,11 +147,11 @@ def computed(
 
 
 def _failed(case: Case, error: BaseException) -> CaseResult:
-    return CaseResult(case.key, error=said(error))
+    return CaseResult(case.key, error=failure_line(error))
 
 
-def said(error: BaseException) -> str:
-    """A failure in one line: the message of an expected one, what is known of another."""
+def failure_line(error: BaseException) -> str:
+    """A failure in one line: the message of an expected error, the type of any other."""
     message = user_message(error)
     fault = f"fault of the program: {one_line(repr(error))}; cfs -vv tells where"
     return message or fault

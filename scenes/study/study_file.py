@@ -201,20 +201,20 @@ def _with_places(study: Study, path: Path) -> Study:
             raise DataError(f"no such file: {name}", file=path, field=key)
         return place
 
-    found = {}
+    result = {}
     for key, file in (("room", "building"), ("system", "bsdf"), ("climate", "weather")):
         entries = []
         for number, entry in enumerate(getattr(study, key)):
             named = [name for name in (file, "operation") if name in type(entry).model_fields]
             update = {n: there(getattr(entry, n), f"{key}.{number}.{n}") for n in named}
             entries.append(entry.model_copy(update=update))
-        found[key] = tuple(entries)
-    found["operation"] = there(study.operation, "operation")
-    found["surroundings"] = tuple(there(name, "surroundings") for name in study.surroundings)
-    _check_systems(found["operation"], states=False)
-    for system in found["system"]:
+        result[key] = tuple(entries)
+    result["operation"] = there(study.operation, "operation")
+    result["surroundings"] = tuple(there(name, "surroundings") for name in study.surroundings)
+    _check_systems(result["operation"], states=False)
+    for system in result["system"]:
         _check_systems(system.operation, states=system.bsdf is None)
-    return study.model_copy(update=found)
+    return study.model_copy(update=result)
 
 
 def _check_systems(operation: Path | None, *, states: bool) -> None:

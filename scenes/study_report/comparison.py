@@ -84,9 +84,7 @@ def scatter(study: StudyResult) -> Scatter:
     (x0, x1), (y0, y1) = round_limits([*x, 0.0, 100.0]), round_limits([*y, 0.0, 1.0])
 
     def words(case: Case, light: float, share: float) -> str:
-        values = {
-            "case": case_label(study, case), "light": percent(light), "share": percent(share)
-        }  # fmt: skip
+        values = {"case": case_label(study, case), "light": percent(light), "share": percent(share)}
         if rated:
             return gettext("{case}: daylight {light} %, disturbing glare {share} %", **values)
         return gettext("{case}: daylight {light} %, overheating {share} %", **values)

@@ -147,7 +147,7 @@ def _seconds(study: StudyResult) -> str:
 
 def inputs_table(study: StudyResult) -> tables.Table:
     """The files of the study with their hashes."""
-    found = {}
+    result = {}
     for case in study.plan.cases:
         for kind, source in (
             (gettext("Building"), case.building),
@@ -157,9 +157,9 @@ def inputs_table(study: StudyResult) -> tables.Table:
             (gettext("Operation"), case.operation),
         ):
             if path := getattr(source, "path", None):
-                found[kind, path] = source.sha256
+                result[kind, path] = source.sha256
     columns = tuple(tables.Column(title, numeric=False) for title in run_page.input_titles())
-    rows = tuple((kind, path.name, digest) for (kind, path), digest in found.items())
+    rows = tuple((kind, path.name, digest) for (kind, path), digest in result.items())
     return tables.Table(gettext("Input files"), columns, rows)
 
 
@@ -273,14 +273,14 @@ class CaseLine:
 
     def path(self, axes: tuple[ParallelAxis, ...]) -> str:
         """SVG path on a square of 1000; broken where there is no value."""
-        found, pen = [], "M"
+        result, pen = [], "M"
         for axis, height in zip(axes, self.at, strict=True):
             if np.isnan(height):
                 pen = "M"
                 continue
-            found.append(f"{pen}{10 * axis.x:.1f} {1000 - 10 * height:.1f}")
+            result.append(f"{pen}{10 * axis.x:.1f} {1000 - 10 * height:.1f}")
             pen = "L"
-        return "".join(found)
+        return "".join(result)
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,12 +41,12 @@ def study_verdict(study: StudyResult) -> Verdict:
         ),
         systems=named([c.system for c in cases], systems_counted),
     )
-    found = (
+    result = (
         (gettext("Daylight"), _daylight),
         (gettext("Glare"), _glare),
         (gettext("Heat and energy"), _heat),
     )
-    sentences = tuple((heading, sentence(study)) for heading, sentence in found)
+    sentences = tuple((heading, sentence(study)) for heading, sentence in result)
     return Verdict(question, sentences, _limits(study))
 
 
@@ -96,9 +96,7 @@ def _heat(study: StudyResult) -> str:
     least, most = _extremes(study, lambda result: sum(result.figures[e] for e in ENERGIES))
     if most[1] <= 0:
         return text + " " + gettext("Without heating and cooling.")
-    values = {
-        "case": least[0], "energy": rounded(least[1], 0), "parts": _parts(study, least[0])
-    }  # fmt: skip
+    values = {"case": least[0], "energy": rounded(least[1], 0), "parts": _parts(study, least[0])}
     energy = (
         gettext(
             "Heating, cooling and lighting energy, unweighted: {energy} kWh a year ({case}; "

@@ -101,8 +101,9 @@ def write_heat_map(path: Path, year: GlareYear, rated: ViewYear) -> None:
         f"{year.options.metric}, {year.options.method}, {year.room}, {rated.view.name}: "
         f"above 0.45 in {100 * exceeded_share(dgp, 0.45):.1f} % of the hours of use "
         f"({start} to {end} o'clock), protection: {protection_level(dgp)}",
-        fontsize=8, loc="left",
-    )  # fmt: skip
+        fontsize=8,
+        loc="left",
+    )
     for hour in (start, end):
         axes.axhline(hour, color="black", linewidth=0.6, linestyle=":")
     bar = figure.colorbar(image, cax=figure.add_axes((0.88, 0.15, 0.02, 0.70)), extend="both")

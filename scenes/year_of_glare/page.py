@@ -209,12 +209,14 @@ def _seats(table: pd.DataFrame) -> Table:
         )
     limit = rounded(LIMITS[-1], 2)
     columns = (
-        Column(gettext("Seat")), Column("x", "m"), Column("y", "m"),
+        Column(gettext("Seat")),
+        Column("x", "m"),
+        Column("y", "m"),
         Column(gettext("Protection, worst direction"), numeric=False),
         Column(gettext("Protection, best direction"), numeric=False),
         Column(gettext("Above {limit} in the worst direction", limit=limit), "%"),
         Column(gettext("Maximum")),
-    )  # fmt: skip
+    )
     return Table(gettext("Protection from glare by seat (EN 17037)"), columns, tuple(rows))
 
 
@@ -222,9 +224,11 @@ def _views(table: pd.DataFrame) -> Table:
     columns = (
         Column(gettext("View"), numeric=False),
         *(Column(gettext("Above {limit}", limit=rounded(limit, 2)), "%") for limit in LIMITS),
-        Column(gettext("Exceeded in 5 %")), Column(gettext("Maximum")),
-        Column(gettext("Worst hour"), numeric=False), Column(gettext("Protection"), numeric=False),
-    )  # fmt: skip
+        Column(gettext("Exceeded in 5 %")),
+        Column(gettext("Maximum")),
+        Column(gettext("Worst hour"), numeric=False),
+        Column(gettext("Protection"), numeric=False),
+    )
     rows = [
         (
             str(row["view"]),

@@ -6,7 +6,7 @@ from bim.model import Building, Space
 from mitsuba_cfs.errors import DataError
 from scenes import input_files
 from scenes.input_files import InputFiles, check_building
-from scenes.room_views import NamedView, check_eye, eyes_of, given_views, held_fisheyes
+from scenes.room_views import NamedView, check_eye, eyes_of, held_fisheyes, parsed_views
 from scenes.year_of_glare.options import YearOptions
 
 
@@ -15,23 +15,23 @@ def chosen_views(building: Building, space: Space, options: YearOptions) -> list
 
     Where it holds none, the room's middle towards its biggest window.
     """
-    found = rated_views(options)
-    if not found and options.grid is None and options.directions == 1:
-        found = held_fisheyes(building, space, options.size)
-    found = found or eyes_of(
+    eyes = rated_views(options)
+    if not eyes and options.grid is None and options.directions == 1:
+        eyes = held_fisheyes(building, space, options.size)
+    eyes = eyes or eyes_of(
         space, options.grid, options.directions, options.eye_height, options.size
     )
-    for each in found:
+    for each in eyes:
         check_eye(each, space)
-    return found
+    return eyes
 
 
 def rated_views(options: YearOptions) -> list[NamedView]:
     """The views that the options state; they can be read and rated before a room is known."""
-    found = [view for text in options.views for view in given_views(text, options.size)]
-    for each in found:
+    result = [view for text in options.views for view in parsed_views(text, options.size)]
+    for each in result:
         _check_kind(each)
-    return found
+    return result
 
 
 def read_files(options: YearOptions) -> InputFiles:

@@ -107,9 +107,12 @@ def read_year(
     variants.activate()
     sampling = sampling_of(options)
     sky = annual_sky(
-        weather, sampling.subdivision, sun=options.method == "five-phase",
-        sun_model=options.sun_model, ground=options.sky_ground,
-    )  # fmt: skip
+        weather,
+        sampling.subdivision,
+        sun=options.method == "five-phase",
+        sun_model=options.sun_model,
+        ground=options.sky_ground,
+    )
     progress("inputs", 1.0)
     chosen = [options.method, options.metric, options.samples, options.seed, options.join]
     chosen += [options.window_parts, options.glare_sources, options.glare_sun]
@@ -135,9 +138,11 @@ def sampling_of(options: YearOptions) -> Sampling:
     """How finely the year is computed."""
     memory = options.memory_gb * 2**30
     return Sampling(
-        view_samples=options.samples, memory=memory, window_parts=options.window_parts,
+        view_samples=options.samples,
+        memory=memory,
+        window_parts=options.window_parts,
         seed=options.seed,
-    )  # fmt: skip
+    )
 
 
 def rating_of(options: YearOptions) -> GlareOptions:
@@ -145,8 +150,10 @@ def rating_of(options: YearOptions) -> GlareOptions:
     return GlareOptions(grouping=options.glare_sources, sun=options.glare_sun)
 
 
-def rate_views(year: GlareYear, kept: Path, progress: Progress = silent) -> Iterator[ViewYear]:
-    """Rate one view after the other; what lies in the folder `kept` is not computed again."""
+def rate_views(
+    year: GlareYear, checkpoints: Path, progress: Progress = silent
+) -> Iterator[ViewYear]:
+    """Rate one view after the other; views in the folder `checkpoints` are read from it."""
     options = year.options
     first = phase_matrices(
         year.scene,
@@ -161,19 +168,22 @@ def rate_views(year: GlareYear, kept: Path, progress: Progress = silent) -> Iter
         steps = item(progress, "view", number + 1, len(year.views), named.name, whole=True)
         start = time.monotonic()
         text = f"{year.digest} {format_view(named.view)} {named.view.width}"
-        checkpoint = kept / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.npy"
-        found = finished_glare(checkpoint, len(times)) if checkpoint.is_file() else None
+        checkpoint = checkpoints / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.npy"
+        result = finished_glare(checkpoint, len(times)) if checkpoint.is_file() else None
         tracing = summed(part(steps, 0.0, 0.3), named.name, TRACING)
-        matrices = [with_eye(one, named.view) for one in seasons]
-        light = _light(year, matrices, () if found else (options.metric,), tracing)
-        found = found or hourly_glare(
-            light, options.metric, options=rating_of(options), checkpoint=checkpoint,
+        matrices = [with_eye(season, named.view) for season in seasons]
+        light = _light(year, matrices, () if result else (options.metric,), tracing)
+        result = result or hourly_glare(
+            light,
+            options.metric,
+            options=rating_of(options),
+            checkpoint=checkpoint,
             progress=part(steps, 0.3, 1.0),
-        )  # fmt: skip
-        table = pd.DataFrame(
-            {name: getattr(found, name) for name in FIGURES}, index=times.rename("time")
         )
-        shown = _pictures(light, year, found)
+        table = pd.DataFrame(
+            {name: getattr(result, name) for name in FIGURES}, index=times.rename("time")
+        )
+        shown = _pictures(light, year, result)
         steps("", 1.0)
         yield ViewYear(named, table, shown, time.monotonic() - start)
 

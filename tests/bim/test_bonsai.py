@@ -85,6 +85,43 @@ def test_rooms_of_another_file_are_passed_over(results):
     assert shown.hidden is False and shown.color == addon.colour(90, 0, 100)
 
 
+def test_a_strangers_results_lead_out_of_no_folder(results, tmp_path):
+    (tmp_path / "run.json").write_text(json.dumps({"folders": {"guid-a": "../victim"}}))
+    with pytest.raises(ValueError, match="is no name of a room's folder"):
+        addon.room_values(results, "SDA")
+
+
+def test_the_program_is_no_setting_of_a_scene(tmp_path, monkeypatch):
+    """A scene comes with its file: a stranger's would name the program to run."""
+    kinds = dict.fromkeys(("PropertyGroup", "AddonPreferences", "Operator", "Panel"), object)
+    prop = {f"{kind}Property": dict for kind in ("String", "Bool", "Enum")}
+    blender = SimpleNamespace(
+        types=SimpleNamespace(**kinds), props=SimpleNamespace(**prop),
+        path=SimpleNamespace(abspath=str),
+    )  # fmt: skip
+    settings, preferences, run, *_ = addon.add_on_classes(blender)
+    assert "program" not in settings.__annotations__ and "program" in preferences.__annotations__
+    for name in ("model.ifc", "weather.epw"):
+        (tmp_path / name).write_text("")
+    monkeypatch.setattr(addon, "_ifc", lambda: SimpleNamespace(
+        get_path=lambda: str(tmp_path / "model.ifc")))  # fmt: skip
+    started = []
+    monkeypatch.setattr(addon.subprocess, "Popen", lambda words, **_: started.append(words))
+    scene = SimpleNamespace(
+        program="evil", weather=str(tmp_path / "weather.epw"), system="", results="out", quick=True
+    )
+    own = SimpleNamespace(preferences=SimpleNamespace(program="cfs"))
+    manager = SimpleNamespace(event_timer_add=lambda *_, **__: 0, modal_handler_add=lambda _: None)
+    context = SimpleNamespace(
+        scene=SimpleNamespace(cfs=scene), window=None, window_manager=manager,
+        preferences=SimpleNamespace(addons={preferences.bl_idname: own}),
+    )  # fmt: skip
+    job = run()
+    job.execute(context)
+    job.log.close()
+    assert started[0][:2] == ["cfs", "run"]
+
+
 def test_the_zip_is_an_extension_of_blender(tmp_path):
     path = tmp_path / "addon.zip"
     write_add_on(path)

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bim_fuzz import mutations, refusals
 
 from bim import xml_elements
 from bim.georeference import Georeference, crs_name
@@ -16,6 +15,7 @@ from bim.shoebox import shoebox
 from bim.surroundings import citygml
 from bim.surroundings.placement import read_surroundings, with_surroundings
 from mitsuba_cfs.errors import DataError
+from tests.bim.bim_fuzz import mutations, refusals
 
 GERMAN = "urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH"
 CORNER = np.array([456000.0, 5430000.0, 110.0])

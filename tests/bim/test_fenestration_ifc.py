@@ -219,3 +219,19 @@ def test_real_bsdf_files_come_back_bit_for_bit(real_data, tmp_path, schema, name
                 np.testing.assert_array_equal(back.depths, there.depths)
             elif there is not None:
                 np.testing.assert_array_equal(back, there)
+
+
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
+def test_the_same_command_gives_the_same_bytes(tmp_path, schema):
+    """Identifiers of what is attached depend on the model and the state, not on chance."""
+    path, again = tmp_path / "box.ifc", tmp_path / "again.ifc"
+    box_room(schema).write(str(path))
+    state = ShadingState("", u_value=1.1, g_normal=0.5)
+    texts = []
+    for name in ("a.ifc", "b.ifc"):
+        attach(path, tmp_path / name, state, Targets(every_window=True), bsdf_reference="blind.xml")
+        texts.append((tmp_path / name).read_bytes())
+    assert texts[0] == texts[1]
+    attach(tmp_path / "a.ifc", again, state, Targets(every_window=True), bsdf_reference="blind.xml")
+    guids = [one.GlobalId for one in ifcopenshell.open(again).by_type("IfcRoot")]
+    assert len(set(guids)) == len(guids)

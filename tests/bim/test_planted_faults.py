@@ -13,7 +13,6 @@ import ifcopenshell.api.pset
 import ifcopenshell.util.element
 import numpy as np
 import pytest
-from honeybee_models import write
 
 import bim
 from bim.fenestration import ShadingState
@@ -24,6 +23,7 @@ from bim.ifc.project import open_ifc
 from bim.ifc.targets import Targets
 from bim.shoebox import shoebox
 from mitsuba_cfs.bsdf.klems import KLEMS_QUARTER, KlemsBsdf
+from tests.bim.honeybee_models import write
 from tests.bim.small_ifc import HEIGHT, WIDTH, box_model, box_room
 from tests.bim.test_space_boundaries import boundary
 from tests.bim.test_stated_use import used_gbxml, used_model

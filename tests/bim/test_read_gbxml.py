@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bim_fuzz import mutations, refusals
 
 from bim.building_file import read_building_file
 from bim.gbxml.building import read_gbxml
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
+from tests.bim.bim_fuzz import mutations, refusals
 from tests.issues import of_code
 
 MATERIALS = """

@@ -6,14 +6,14 @@ import json
 
 import numpy as np
 import pytest
-from bim_fuzz import mutations, odd_values, refusals
-from honeybee_models import two_rooms, write
 
 import bim
 from bim.building_file import read_building_file
 from bim.honeybee.building import read_honeybee
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
+from tests.bim.bim_fuzz import mutations, odd_values, refusals
+from tests.bim.honeybee_models import two_rooms, write
 from tests.issues import of_code
 from thermal.glazing_unit import Environment, GlazingLayer, GlazingUnit
 from thermal.iso15099 import Conditions, iso15099_g_values, iso15099_u_value

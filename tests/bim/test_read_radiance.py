@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bim_fuzz import mutations, refusals
 
 import bim
 from bim.radiance.scene import read_radiance
 from mitsuba_cfs.errors import CfsError, DataError
 from mitsuba_cfs.surfaces import triangle_areas
+from tests.bim.bim_fuzz import mutations, refusals
 from tests.conftest import REPOSITORY
 from tests.radiance import run
 

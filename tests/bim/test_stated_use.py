@@ -6,8 +6,6 @@ import datetime
 
 import numpy as np
 import pytest
-from bim_fuzz import mutations, odd_values, refusals
-from honeybee_models import used_model, write
 from test_read_gbxml import two_rooms as gbxml_rooms
 
 from bim.gbxml.building import read_gbxml
@@ -16,6 +14,8 @@ from bim.honeybee.use import sensible_heat
 from bim.report.issue import Phrase
 from bim.use import KINDS, YearSchedule, day_of_year, hourly_means
 from mitsuba_cfs.errors import DataError
+from tests.bim.bim_fuzz import mutations, odd_values, refusals
+from tests.bim.honeybee_models import used_model, write
 from tests.issues import of_code
 
 

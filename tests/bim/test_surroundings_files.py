@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from bim_fuzz import mutations, refusals
 
 from bim.georeference import Georeference, crs_name, local_metres
 from bim.ifc.building import read_ifc
@@ -17,6 +16,7 @@ from bim.shoebox import WindowRectangle, shoebox
 from bim.surroundings.horizon import horizon_wall, read_horizon
 from bim.surroundings.placement import read_surroundings, with_surroundings
 from mitsuba_cfs.errors import DataError
+from tests.bim.bim_fuzz import mutations, refusals
 from tests.bim.small_ifc import box_room
 from tests.issues import of_code
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bim_fuzz import mutations
 
 from bim.georeference import Georeference
 from bim.rays import ray_mesh
@@ -14,6 +13,7 @@ from bim.shoebox import WindowRectangle, shoebox
 from bim.surroundings.placement import read_surroundings, with_surroundings
 from bim.surroundings.terrain import graded
 from mitsuba_cfs.errors import DataError
+from tests.bim.bim_fuzz import mutations
 
 HEAD = "ncols 4\nnrows 3\nxllcorner 500000\nyllcorner 5600000\ncellsize 50\nNODATA_value -9999\n"
 ROWS = "90 91 92 93\n80 81 82 83\n70 71 -9999 73\n"  # from north to south

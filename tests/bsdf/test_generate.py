@@ -207,8 +207,8 @@ def test_flat_diffuse_slats_are_those_of_window(
     variant, real_data, reflectance, tilt_deg, depth, spacing
 ):
     """WINDOW's engine: Windows-CalcEngine's own test values (`VenetianDirectionalMatrix`)."""
+    from mitsuba_cfs.bsdf.generate import TracedLayer
     from mitsuba_cfs.bsdf.traced_klems import TracedBasis
-    from mitsuba_cfs.bsdf.traced_layer import TracedLayer
 
     layer = venetian_blind(
         plastic("slat", reflectance), depth=depth, spacing=spacing, tilt=np.radians(tilt_deg)

@@ -251,6 +251,21 @@ def test_the_command_writes_a_tree_and_colours(tmp_path, capsys):
         np.testing.assert_allclose(tree.transmission_back.values, value, rtol=1e-4)
 
 
+def test_a_bsdf_of_more_light_than_it_receives_is_refused(tmp_path, capsys):
+    """A measurement in another unit gave a file that scatters 120 %, without a word."""
+    out, texts = tmp_path / "out.xml", {}
+    for value in (1.2 / np.pi, 1.02 / np.pi):
+        rows = [f"{180 - t} {p} {value}\n" for t in range(0, 90, 10) for p in range(0, 360, 30)]
+        texts[value] = HEAD + "".join(rows)
+    path = tmp_path / "measured.txt"
+    for text in texts.values():
+        path.write_text(text)
+        assert cli.run(["bsdf", "interpolate", str(path), "--out", str(out)]) == 1
+        error = capsys.readouterr().err
+        assert "measured.txt: Visible: transmission" in error and "of its light" in error
+        assert not out.exists()
+
+
 @pytest.mark.slow
 def test_the_commands_patches_are_nearer_to_the_lobe_than_radiances(tmp_path):
     """Of noisy values (5 %).  Judges: the lobe's closed form; pabopto2bsdf with bsdf2klems."""

@@ -118,8 +118,8 @@ def test_blinds_are_those_of_windows_engine(variant, real_data, tmp_path, name, 
     """Curved slats at 45 degrees.  The engine shares out diffuse light evenly over five strips of a
     slat (1 % at a reflectance of 0.1 and 0.2, see test_generate); more light, more of that."""
     pywincalc = pytest.importorskip("pywincalc")
+    from mitsuba_cfs.bsdf.generate import TracedLayer
     from mitsuba_cfs.bsdf.traced_klems import TracedBasis
-    from mitsuba_cfs.bsdf.traced_layer import TracedLayer
 
     content = json.loads((real_data / "bsdf" / "products_spectral" / name).read_text())
     material = content["composition"][0]["child_product"]

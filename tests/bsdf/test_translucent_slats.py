@@ -77,8 +77,8 @@ class Normal:
     [(0.1, 0.7, 0.010, 0.010), (0.1, 0.7, 0.016, 0.012), (0.2, 0.6, 0.016, 0.012)],
 )
 def test_traced_slats_are_those_of_radiosity(variant, transmittance, reflectance, depth, spacing):
+    from mitsuba_cfs.bsdf.generate import TracedLayer
     from mitsuba_cfs.bsdf.traced_klems import TracedBasis
-    from mitsuba_cfs.bsdf.traced_layer import TracedLayer
 
     slat = SlatMaterial("slat", (reflectance,), (reflectance,), transmittance=(transmittance,))
     layer = venetian_blind(slat, depth=depth, spacing=spacing, tilt=TILT)

@@ -170,3 +170,16 @@ def test_mutated_files_never_crash(text, tree_text, tmp_path, seed, kind):
         read_bsdf_xml(path)
     except DataError as error:
         assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_entities_are_refused(text, tmp_path, encoding):
+    """Ten of ten of ten: a file of a kilobyte fills the memory."""
+    start = text.index("<WindowElement")
+    bomb = '<!DOCTYPE WindowElement [<!ENTITY a "0.1 0.1"><!ENTITY b "&a;&a;">]>'
+    path = tmp_path / "bomb.xml"
+    path.write_bytes(
+        (f'<?xml version="1.0" encoding="{encoding}"?>{bomb}' + text[start:]).encode(encoding)
+    )
+    with pytest.raises(DataError, match="declares entities"):
+        read_bsdf_xml(path)

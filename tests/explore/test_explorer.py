@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import re
+import shutil
 import threading
 import urllib.error
 import urllib.request
@@ -16,12 +17,14 @@ from click.testing import CliRunner
 from bim.model import Element
 from mitsuba_cfs.errors import DataError
 from scenes.cli import cfs
+from scenes.explore.case_files import read_data
 from scenes.explore.folder import (
+    copy_explorer,
     explorer_of,
     join_explorers,
     packed,
-    read_data,
     server,
+    write_data,
     write_explorer,
 )
 from scenes.report import write_report
@@ -166,3 +169,73 @@ def test_point_in_time_has_no_explorer(tmp_path) -> None:
     command = ["run", str(OFFICE), "--weather", str(WEATHER), "--out", str(tmp_path / "x")]
     done = CliRunner().invoke(cfs, [*command, "--method", "point-in-time", "--explore"])
     assert done.exit_code == 2 and "--explore needs --method" in done.output
+
+
+FILES = {"file": "../../../victim/room0", "models": ["data/../../x"], "lux": ["/etc/lux"]}
+
+
+@pytest.mark.parametrize("key", FILES)
+def test_files_outside_the_data_of_a_strangers_results_are_refused(key, results, tmp_path) -> None:
+    """A case that names the user's own folder would have it copied and served."""
+    folder = shutil.copytree(results, tmp_path / "stranger")
+    case = read_data(folder / "explore" / "case.js")
+    case["rooms"][0][key] = FILES[key]
+    write_data(folder / "explore" / "case.js", case)
+    victim = tmp_path / "victim"
+    victim.mkdir()
+    (victim / "room0.js").write_text("the user's own")
+    done = CliRunner().invoke(cfs, ["explore", str(folder), "--out", str(tmp_path / "one")])
+    assert isinstance(done.exception, DataError)
+    assert f"room 0: {key}" in str(done.exception) and "no plain name" in str(done.exception)
+    assert not (tmp_path / "one").exists()
+
+
+def _emptied(file: Path) -> None:
+    file.write_text("")
+
+
+def _script(file: Path) -> None:
+    file.write_text(file.read_text() + "alert(1);\n")
+
+
+def _link(file: Path) -> None:
+    outside = file.parents[3] / "outside.js"
+    file.rename(outside)
+    file.symlink_to(outside)
+
+
+DAMAGES = {
+    Path.unlink: "No such file",
+    _emptied: "is empty",
+    _script: "is no data of an explorer",
+    _link: "link",
+}
+
+
+@pytest.mark.parametrize(("damage", "words"), DAMAGES.items())
+@pytest.mark.parametrize("name", ["room0", "room0_state1", "room0_state0_0", "room0_lux0"])
+def test_missing_empty_and_foreign_data_are_refused(name, damage, words, results, tmp_path) -> None:
+    folder = shutil.copytree(results, tmp_path / "damaged")
+    damage(folder / "explore" / "data" / f"{name}.js")
+    done = CliRunner().invoke(cfs, ["explore", str(folder), "--out", str(tmp_path / "one")])
+    assert isinstance(done.exception, DataError), done.output
+    assert f"{name}.js" in str(done.exception) and words in str(done.exception)
+    assert not (tmp_path / "one").exists()
+
+
+def test_the_page_that_is_served_is_the_programs(results, tmp_path) -> None:
+    """The script of a stranger's page would run at the address of this machine."""
+    folder = shutil.copytree(results, tmp_path / "stranger") / "explore"
+    (folder / "index.html").write_text("<script>fetch('/')</script>")
+    (folder / "extra.js").write_text("alert(1)")
+    copy_explorer(folder, tmp_path / "served")
+    assert "Explorer" in (tmp_path / "served" / "index.html").read_text()
+    assert not (tmp_path / "served" / "extra.js").exists()
+
+
+@pytest.mark.parametrize("text", ["[", "[1]", '{"head": 3}', '{"head": {"model": [1]}}'])
+def test_a_record_of_a_run_that_is_none_is_one_line(text, results, tmp_path) -> None:
+    folder = shutil.copytree(results, tmp_path / "damaged")
+    (folder / "run.json").write_text(text)
+    done = CliRunner().invoke(cfs, ["explore", str(folder), "--out", str(tmp_path / "one")])
+    assert isinstance(done.exception, DataError) and "run.json" in str(done.exception)

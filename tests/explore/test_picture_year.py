@@ -8,7 +8,8 @@ import pytest
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order
 from mitsuba_cfs.images.view import fisheye
-from mitsuba_cfs.picture_year import codes, low_rank
+from mitsuba_cfs.picture_year import year as codes
+from mitsuba_cfs.picture_year import year as low_rank
 from mitsuba_cfs.picture_year.year import PictureYear, picture_year
 from tests.explore.synthetic import MadeUpPictures
 from tests.glare.test_annual import made_up

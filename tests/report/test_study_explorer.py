@@ -9,7 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 from scenes.cli import cfs
-from scenes.explore.folder import CASE, read_data, write_rooms
+from scenes.explore.case_files import CASE, read_data
+from scenes.explore.folder import write_rooms
 from scenes.study.explored import ExploredCase
 from scenes.study.study import StudyResult
 from scenes.study_report.page import (

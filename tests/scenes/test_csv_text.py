@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import csv
+import io
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from mitsuba_cfs.files import write_table
 from scenes.run.outputs import csv_text
 
 TIMES = pd.date_range("2021-01-01 00:30", periods=6, freq="h", name="time")
@@ -30,3 +34,18 @@ TABLES = {
 def test_as_pandas_writes_it(name, index):
     table = TABLES[name]
     assert csv_text(table, index=index) == table.to_csv(index=index, float_format="%.6g")
+
+
+def test_a_spreadsheet_computes_no_name(tmp_path):
+    """A space of that name would be a formula in summary.csv."""
+    evil = '=HYPERLINK("http://a.b","x")'
+    names = [evil, "@SUM(1)", "+cmd|x", "-1+1|x", "-5", "R-1", " =1", "\tx"]
+    table = pd.DataFrame({"room": names, "lux": range(8), evil: -1.5}, index=pd.Index(names))
+    write_table(table, tmp_path / "a.csv")
+    for text in ((tmp_path / "a.csv").read_text(), csv_text(table)):
+        rows = list(csv.reader(io.StringIO(text)))
+        assert rows[0] == ["", "room", "lux", f"'{evil}"]
+        quoted = [f"'{name}" if number not in (4, 5) else name for number, name in enumerate(names)]
+        assert [row[1] for row in rows[1:]] == [row[0] for row in rows[1:]] == quoted
+        assert {row[3] for row in rows[1:]} == {"-1.5"}
+    assert table["room"].tolist() == names  # the caller's table stays

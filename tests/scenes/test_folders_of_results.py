@@ -26,7 +26,7 @@ from tests.scenes.writing_jobs import (
 pytestmark = [pytest.mark.early, pytest.mark.usefixtures("own_cache")]
 
 
-@pytest.mark.parametrize("name", heavy_ones_slow(OWN))
+@pytest.mark.parametrize("name", heavy_ones_slow([*OWN, "export --radiance"]))
 def test_a_folder_is_ours_by_its_mark_alone(name, place, capsys):
     """A `run.json` of somebody else's, and a mark that another program wrote."""
     here = place(name)
@@ -34,11 +34,12 @@ def test_a_folder_is_ours_by_its_mark_alone(name, place, capsys):
     (here.out / "thesis.docx").write_text("mine")
     (here.out / "run.json").write_text('{"inputs": {}, "options": {}}')
     before = here.content()
-    refused(here, capsys, "--out", "holds other files")
+    option = "--radiance" if name == "export --radiance" else "--out"
+    refused(here, capsys, option, "holds other files")
     assert here.content() == before
     for wrong in ("{", "[]", '{"program": "other"}', '{"program": "mitsuba-cfs", "format": 99}'):
         (here.out / MARK).write_text(wrong)
-        refused(here, capsys, "--out", "holds other files")
+        refused(here, capsys, option, "holds other files")
     assert (here.out / "thesis.docx").read_text() == "mine"
 
 

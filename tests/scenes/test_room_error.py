@@ -104,8 +104,8 @@ def test_a_fault_of_the_program_is_no_news_about_a_room(
 def test_a_study_says_which_is_which() -> None:
     with pytest.raises(ValueError, match="broadcast") as caught:
         shape_bug()
-    assert schedule.said(caught.value).startswith("fault of the program: ValueError")
-    assert schedule.said(RoomError("space low: no room")) == "space low: no room"
+    assert schedule.failure_line(caught.value).startswith("fault of the program: ValueError")
+    assert schedule.failure_line(RoomError("space low: no room")) == "space low: no room"
 
 
 def test_surfaces_that_are_no_zone_are_the_rooms_fault(variant) -> None:

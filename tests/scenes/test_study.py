@@ -269,15 +269,15 @@ def test_failed_cases_end_with_exit_1_and_their_number(tmp_path, capsys, monkeyp
     ],
 )
 def test_a_case_that_fails_says_why_without_a_class(error, words):
-    from scenes.study.store import said
+    from scenes.study.store import failure_line
 
-    assert said(error) == words
+    assert failure_line(error) == words
 
 
 def test_a_fault_of_the_program_is_called_so():
-    from scenes.study.store import said
+    from scenes.study.store import failure_line
 
-    assert said(KeyError("D")).startswith("fault of the program: KeyError('D')")
+    assert failure_line(KeyError("D")).startswith("fault of the program: KeyError('D')")
 
 
 def test_a_file_that_changed_since_the_plan_is_said(tmp_path):

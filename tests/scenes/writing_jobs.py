@@ -15,7 +15,8 @@ from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import fisheye
 from scenes import cli
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.explore.folder import CASE, write_data
+from scenes.explore.case_files import CASE
+from scenes.explore.folder import write_data
 from tests.conftest import REPOSITORY
 from tests.scenes.study_files import study_file
 from tests.thermal.test_study import study_file as thermal_file

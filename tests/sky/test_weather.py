@@ -12,7 +12,7 @@ from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.wea import read_wea, write_wea
 
 FEBRUARY_3_14H = 24 * (31 + 2) + 13  # row of the hour that ends at 14:00
-DNI, DRY, DEW, HUMIDITY, PRESSURE, INFRARED, COVER = 14, 6, 7, 8, 9, 12, 23
+DNI, DRY, DEW, HUMIDITY, PRESSURE, INFRARED, COVER, WIND = 14, 6, 7, 8, 9, 12, 23, 21
 
 
 def test_reads_site_and_series(tmp_path, year):
@@ -89,7 +89,8 @@ def test_blank_fields_are_missing_and_a_byte_order_mark_is_not_text(tmp_path, ye
     assert weather.dew_point_c[3] == pytest.approx(4.97, abs=0.02)
     assert weather.pressure_pa[4] == pytest.approx(98358, abs=20)
     assert weather.wind_direction_deg is None
-    year[6][DNI] = ""
+    for row in year[6:13]:
+        row[DNI] = ""
     with pytest.raises(DataError, match="line 15: direct normal irradiance: missing"):
         read_epw(write_epw(path, year))
 
@@ -102,15 +103,24 @@ def spoil(row, column, text):
     return change
 
 
+def gap(row, column, text, hours=7):
+    def change(rows):
+        for at in range(row, row + hours):
+            rows[at][column] = text
+        return rows
+
+    return change
+
+
 FAULTS = {
-    "missing DNI": (spoil(FEBRUARY_3_14H, DNI, "9999"), ("line 814", "direct normal", "hour 14")),
+    "missing DNI": (gap(FEBRUARY_3_14H, DNI, "9999"), ("line 814", "direct normal", "hour 14")),
     "no number": (spoil(9, DNI, "abc"), ("line 18", "direct normal irradiance", "'abc'")),
     "not finite": (spoil(9, DRY, "nan"), ("line 18", "dry bulb temperature", "'nan'")),
     "negative": (spoil(9, DNI, "-5"), ("line 18", "0 to 1500", "-5")),
     "missing temperature": (spoil(0, DRY, "99.9"), ("line 9", "dry bulb temperature", "missing")),
     "dew and humidity": (
-        lambda rows: spoil(3, DEW, "99.9")(spoil(3, HUMIDITY, "999")(rows)),
-        ("line 12", "relative humidity", "dew point"),
+        lambda rows: gap(3, DEW, "99.9")(gap(3, HUMIDITY, "999")(rows)),
+        ("line 12", "relative humidity", "7 hours"),
     ),
     "hour left out": (
         lambda rows: rows[:100] + rows[101:],
@@ -126,6 +136,35 @@ FAULTS = {
     "no rows": (lambda rows: [], ("8760 or 8784", "0 rows")),
     "short row": (lambda rows: [*rows[:-1], rows[-1][:10]], ("line 8768", "24 fields")),
 }
+
+
+def test_gaps_of_six_hours_are_interpolated_and_noted(tmp_path, year):
+    year[99][DRY], year[106][DRY] = "3.0", "10.0"
+    for change in (gap(100, DRY, "99.9", 6), gap(40, DEW, "99.9", 2), gap(40, HUMIDITY, "999", 2)):
+        change(year)
+    weather = read_epw(write_epw(tmp_path / "a.epw", year))
+    np.testing.assert_allclose(weather.dry_bulb_c[99:107], np.arange(3.0, 11.0))
+    np.testing.assert_allclose(weather.relative_humidity[39:43], 0.71)
+    notes = " ".join(weather.notes)
+    assert "dry bulb temperature: 6 missing values, the first in line 109, are interp" in notes
+    assert "relative humidity: 2 missing values, the first in line 49, are interp" in notes
+
+
+@pytest.mark.parametrize(
+    ("column", "text", "words"),
+    [
+        (DRY, "70", "dry bulb temperature: 1 implausible values, the first in line 109: 70"),
+        (DEW, "30", "dew point temperature: 1 implausible values, the first in line 109: 30"),
+        (HUMIDITY, "0", "relative humidity: 1 implausible values, the first in line 109: 0"),
+        (WIND, "75", "wind speed: 1 implausible values, the first in line 109: 75"),
+    ],
+)
+def test_values_that_no_weather_has_are_named(tmp_path, year, column, text, words):
+    path = write_epw(tmp_path / "plain.epw", year)
+    year[100][column] = text
+    weather = read_epw(write_epw(tmp_path / "a.epw", year))
+    assert any(words in note for note in weather.notes)
+    assert not any("implausible" in note for note in read_epw(path).notes)
 
 
 @pytest.mark.parametrize("fault", FAULTS)

@@ -20,7 +20,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.explore.folder import CASE, explorer_of, read_data
+from scenes.explore.case_files import CASE, read_data
+from scenes.explore.folder import explorer_of
 from tests.devtools import Page
 
 WALK = """(async () => {

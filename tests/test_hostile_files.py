@@ -1,0 +1,302 @@
+"""Files that mostly still parse, but hold odd numbers, types and structures: read, or one line.
+
+Every reader of a format that comes from others has a row.  40 mutations of each in the quick tests,
+20,000 in the slow ones; a mutation is given by the row's name and its number (`mutated`).
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bim.building_file import read_building_file
+from bim.ifc.corrections import read_corrections
+from bim.surroundings.horizon import read_horizon
+from bim.surroundings.placement import read_surroundings
+from mitsuba_cfs.bsdf.klems import KLEMS_QUARTER, KlemsBsdf
+from mitsuba_cfs.bsdf.measured_file import read_measurement
+from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
+from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
+from mitsuba_cfs.errors import CfsError
+from mitsuba_cfs.glare.evaluation import evaluate
+from mitsuba_cfs.images.hdr import read_hdr, write_hdr
+from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.matrices.mtx_io import read_matrix, write_matrix
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.measured import read_measured
+from mitsuba_cfs.sky.wea import read_wea
+from scenes.demo import WEATHER
+from scenes.explore.case_files import case_files, read_case
+from scenes.explore.folder import write_explorer
+from scenes.fenestration.systems import read_system
+from scenes.heat.study_file import read_study as read_heat_study
+from scenes.photovoltaics.study_file import read_pv_study
+from scenes.result_folder import FolderMark, ResultFolder
+from scenes.room.operation import read_operation
+from scenes.study.store import CaseResult, Store
+from scenes.study.study_file import read_study
+from scenes.user_errors import LONGEST, user_message
+from tests import mutators
+from tests.bim.honeybee_models import two_rooms as honeybee_rooms
+from tests.bim.test_citygml import PART, RELIEF, WHOLE, model
+from tests.bim.test_read_gbxml import two_rooms as gbxml_rooms
+from tests.bim.test_surroundings_files import city
+from tests.conftest import REPOSITORY
+from tests.explore.synthetic import explored_run
+
+QUICK, SLOW = 40, 20_000
+YEAR = 10  # times fewer of a file of 8,760 lines: 1 s each
+SILENT = ("mark", "case of a study")  # results of this program that are then computed again
+HOSTILE = REPOSITORY.parent / "shared" / "cases" / "hostile"
+DEMO = WEATHER.parent
+ROOM = """void plastic white
+0 0 5 .7 .7 .7 0 0
+void glass pane
+0 0 3 .8 .8 .8
+white polygon floor 0 0 12 0 0 0 4 0 0 4 6 0 0 6 0
+white polygon ceiling 0 0 12 0 6 3 4 6 3 4 0 3 0 0 3
+white polygon east 0 0 12 4 0 0 4 0 3 4 6 3 4 6 0
+white polygon west 0 0 12 0 0 0 0 6 0 0 6 3 0 0 3
+white polygon north 0 0 12 0 6 0 4 6 0 4 6 3 0 6 3
+white polygon south 0 0 12 0 0 0 0 0 1 4 0 1 4 0 0
+pane polygon window 0 0 12 0 0 1 0 0 3 4 0 3 4 0 1
+!genbox white table 1 1 .7 | xform -t 1 1 0 -a 2 -t 0 2 0
+"""
+GONIOMETER = "#format: theta phi BSDF\n#incident_angle 30 0\n" + "".join(
+    f"{180 - theta} {phi} 0.{theta}1\n" for theta in (10, 40, 70) for phi in (0, 90, 180, 270)
+)
+BLOCKS = ("transmission_front", "transmission_back", "reflection_front", "reflection_back")
+CORRECTIONS = """leave_out = ["a wall"]
+keep = ["blind"]
+join = [["R1", "R2"]]
+[[reflectance]]
+select = "IfcWall"
+visible = 0.6
+"""
+
+
+def klems(file: Path) -> None:
+    values = np.random.default_rng(1).uniform(0, 0.1, (4, 41, 41))
+    blocks = dict(zip(BLOCKS, values, strict=True))
+    visible = KlemsBsdf(KLEMS_QUARTER, KLEMS_QUARTER, **blocks)
+    write_bsdf_xml(BsdfFile({"Visible": visible, "Solar": visible}, name="b", thickness=0.02), file)
+
+
+def tree(file: Path) -> None:
+    values = np.random.default_rng(1).uniform(0, 0.1, 16)
+    leaf = TensorTree(4, np.full(16, 1, dtype=np.int64), values)
+    write_bsdf_xml(BsdfFile({"Visible": TensorTreeBsdf(**dict.fromkeys(BLOCKS, leaf))}), file)
+
+
+def picture(file: Path) -> None:
+    values = np.random.default_rng(1).uniform(1, 3000, (24, 24))
+    values[4:6, 7:9] = 1e6
+    write_hdr(file, values, fisheye((0, 0, 1.2), (0, 1, 0), 24), exposure=0.5)
+
+
+def glare_of(file: Path) -> None:
+    """What `cfs glare` does with a picture: every figure of it is a number."""
+    picture = read_hdr(file)
+    if picture.view is None or picture.view.kind == "parallel":
+        return
+    try:
+        result = evaluate(picture.luminance, picture.view)
+    except ValueError:  # which the command tells with the file's name
+        return
+    assert np.isfinite(
+        [result.dgp, result.Ev, result.dgi, result.mean_luminance, result.Lveil]
+    ).all()
+
+
+def explorer(file: Path) -> None:
+    write_explorer(explored_run(step=400, size=16), file.parent)
+
+
+def explored(file: Path) -> None:
+    list(case_files(file.parent, read_case(file.parent)))
+
+
+def mark(file: Path) -> None:
+    with ResultFolder(file.parent / "made", "run").replaced() as part:
+        (part / "a.csv").write_text("1")
+        (part / "b").mkdir()
+        (part / "b" / "c.csv").write_text("1")
+    file.write_bytes((file.parent / "made" / file.name).read_bytes())
+
+
+def results_again(file: Path) -> None:
+    """A folder with that mark, that a command would write into."""
+    FolderMark.read(file.parent)
+    with ResultFolder(file.parent, "run", adding=True, among=True).replaced():
+        pass
+
+
+def case_result(file: Path) -> None:
+    arrays = {"lux": np.ones((3, 4)), "hours": np.arange(3)}
+    file.write_bytes(CaseResult("key", {"sDA": 40.0, "name": "a"}, arrays).to_bytes())
+
+
+def stored(file: Path) -> None:
+    store = Store(file.parent / "study")
+    store.open()
+    (store.folder / "cases" / "key.npz").write_bytes(file.read_bytes())
+    result = store.load("key")
+    assert result is None or result.key == "key"
+
+
+def copied(source: Path) -> Callable[[Path], object]:
+    """A base with the files that it names beside it."""
+
+    def write(file: Path) -> None:
+        for other in source.parent.iterdir():
+            link = file.parent / other.name
+            if other.is_file() and not link.exists() and link != file:
+                link.symlink_to(other)
+        file.unlink(missing_ok=True)
+        file.write_bytes(source.read_bytes())
+
+    return write
+
+
+def text(content: str) -> Callable[[Path], object]:
+    return lambda file: file.write_text(content)
+
+
+def weather(file: Path) -> None:
+    file.write_bytes(WEATHER.read_bytes())
+
+
+def heat_study(file: Path) -> None:
+    source = REPOSITORY / "docs" / "tutorials" / "office_heated_slab.toml"
+    file.write_text(source.read_text().replace("../../scenes/demo", str(DEMO)))
+
+
+def wea(file: Path) -> None:
+    head = "place X\nlatitude 42\nlongitude 88\ntime_zone 90\nsite_elevation 200\n"
+    rows = (
+        f"6 {day} {hour}.5 {500 if 6 < hour < 18 else 0} {100 if 5 < hour < 19 else 0}\n"
+        for day in range(1, 8)
+        for hour in range(24)
+    )
+    file.write_text(head + "weather_data_file_units 1\n" + "".join(rows))
+
+
+def measured(file: Path) -> None:
+    light = [max(0, 6 - abs(hour - 12)) for hour in range(24)]
+    rows = (
+        f"2024-06-{day:02} {hour:02}:30,{60 * light[hour]},{20 * light[hour]}\n"
+        for day in range(1, 4)
+        for hour in range(24)
+    )
+    file.write_text("time,global_horizontal,diffuse_horizontal\n" + "".join(rows))
+
+
+def matrix(file: Path) -> None:
+    write_matrix(file, np.ones((4, 3, 3)))
+
+
+def matrix_of_text(file: Path) -> None:
+    write_matrix(file, np.ones((4, 3, 3)), format="ascii")
+
+
+def beside(file: Path) -> None:
+    file.with_suffix(".xml").write_bytes((DEMO / "venetian_blind.xml").read_bytes())
+    file.write_bytes((DEMO / "venetian_blind.toml").read_bytes())
+
+
+@dataclass(frozen=True)
+class Row:
+    """A format: its file, how a good one is made, mutated and read."""
+
+    name: str
+    make: Callable[[Path], object]
+    mutate: mutators.Mutator
+    read: Callable[[Path], object]
+
+
+def json_text(content: object) -> Callable[[Path], object]:
+    return text(json.dumps(content))
+
+
+ROWS = {
+    "klems": Row("b.xml", klems, mutators.of_xml, read_bsdf_xml),
+    "tensor tree": Row("b.xml", tree, mutators.of_xml, read_bsdf_xml),
+    "beside a bsdf": Row("b.toml", beside, mutators.of_toml,
+                         lambda file: read_system(file.with_suffix(".xml"))),
+    "goniometer": Row("m.txt", text(GONIOMETER), mutators.of_text, read_measurement),
+    "epw": Row("w.epw", weather, mutators.of_text, read_epw),
+    "wea": Row("w.wea", wea, mutators.of_text, lambda file: read_wea(file, whole_year=False)),
+    "measured": Row("w.csv", measured, mutators.of_text, lambda file: read_measured(
+        file, latitude_deg=42, longitude_deg=-88, timezone_h=-6)),
+    "gbxml": Row("b.gbxml", text(gbxml_rooms()), mutators.of_xml, read_building_file),
+    "hbjson": Row("b.hbjson", json_text(honeybee_rooms()), mutators.of_json, read_building_file),
+    "radiance": Row("b.rad", text(ROOM), mutators.of_text, read_building_file),
+    "cityjson": Row("c.city.json", json_text(city({"a": ((0, 0, 0), (9, 9, 9))})),
+                    mutators.of_json, read_surroundings),
+    "citygml": Row("c.gml", text(model(WHOLE, PART, RELIEF)), mutators.of_xml, read_surroundings),
+    "horizon": Row("h.csv", text("A,H_hor\n-180,5\n-90,10\n0,3\n90,2\n"), mutators.of_text,
+                   read_horizon),
+    "picture": Row("p.hdr", picture, mutators.of_picture, glare_of),
+    "matrix": Row("m.mtx", matrix,
+                  mutators.of_picture, read_matrix),
+    "matrix of text": Row("m.mtx", matrix_of_text,
+                          mutators.of_text, read_matrix),
+    "study": Row("study.toml", copied(DEMO / "study.toml"), mutators.of_toml, read_study),
+    "operation": Row("controlled.toml", copied(DEMO / "controlled.toml"), mutators.of_toml,
+                     read_operation),
+    "heat study": Row("office.toml", heat_study,
+                      mutators.of_toml, read_heat_study),
+    "pv study": Row("facade_pv.toml", copied(DEMO / "facade_pv.toml"), mutators.of_toml,
+                    read_pv_study),
+    "corrections": Row("c.toml", text(CORRECTIONS), mutators.of_toml, read_corrections),
+    "explorer": Row("case.js", explorer, mutators.of_script, explored),
+    "mark": Row("cfs-results.json", mark, mutators.of_json, results_again),
+    "case of a study": Row("case.npz", case_result, mutators.of_arrays, stored),
+}  # fmt: skip
+
+# Mutations that were no line once: row, number
+REGRESSIONS: list[tuple[str, int]] = [("pv study", 82)]
+
+
+def unread(name: str, folder: Path, numbers: range | list[int]) -> list[str]:
+    """Mutations that end in anything but a result or one line, as text."""
+    row, faults, refused = ROWS[name], [], 0
+    file = folder / row.name
+    row.make(file)
+    good = file.read_bytes()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of NumPy; what leaves the reader is looked at
+        row.read(file)
+        for number in numbers:
+            file.write_bytes(row.mutate(good, np.random.default_rng([0, number])))
+            try:
+                row.read(file)
+            except (CfsError, ValueError, OSError) as error:
+                message = user_message(error)
+                refused += 1
+                if message is None or len(message) > LONGEST + 40 or "\n" in message:
+                    faults.append(f"{name} {number}: {error!r:.300}")
+            except Exception as error:
+                faults.append(f"{name} {number}: {error!r:.300}")
+    assert refused or len(numbers) < QUICK or name in SILENT
+    return faults
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_odd_files_are_read_or_one_line(name, tmp_path) -> None:
+    kept = [number for row, number in REGRESSIONS if row == name]
+    count = QUICK // YEAR if name == "epw" else QUICK
+    assert not unread(name, tmp_path, [*kept, *range(count)])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROWS)
+def test_many_odd_files_are_read_or_one_line(name, tmp_path) -> None:
+    count = SLOW // YEAR if name == "epw" else SLOW
+    assert not unread(name, tmp_path, range(count))
