@@ -21,7 +21,9 @@ NO_EVIDENCE = {
         "| part of a five-phase picture | resolution |",
     },
     "radiance.md": {"| type | as | status | how |"},
-    "thermal.md": {"| to | read |", "| closure | absorptances from | layer resistance | film resistances |"},
+    "thermal.md": {
+        "| to | read |", "| closure | absorptances from | layer resistance | film resistances |",
+    },
     "comply.md": {"| in the folder of results | what |", "| option | what |"},
     "studies.md": {"| in the folder | what |"},
     "pv.md": {"| key | meaning |"},
