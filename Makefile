@@ -12,13 +12,14 @@ INPUTS := pyproject.toml constraints.txt .ci/set-up
 # Some hundred tests start Python anew; each would compile the program's source to bytecode again
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo test test-all matrix lint format catalogues docs clean
+.PHONY: help demo test test-all matrix audit lint format catalogues docs clean
 
 help:
 	@echo "make demo      compare the office that the repository ships, blind up, down and controlled"
 	@echo "make test      lint and the quick tests"
 	@echo "make test-all  lint, all tests, the slow ones too, with coverage, and the documentation"
 	@echo "make matrix    the quick tests with every installed Python from 3.11 to 3.14"
+	@echo "make audit     known vulnerabilities and licences of the installed packages; their list, sbom.json"
 	@echo "make lint      check style and types; make format repairs what it can"
 	@echo "make catalogues  bring the pages' translations up to date with the code; name what is missing"
 	@echo "make docs      the documentation as a site, in site/index.html"
@@ -35,6 +36,9 @@ test-all: lint docs
 
 matrix:
 	WORKERS=$(WORKERS) bash .ci/matrix
+
+audit: $(VENV)/.run
+	bash .ci/audit $(BIN)/python
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -60,5 +64,5 @@ catalogues: $(VENV)/.dev
 	$(BIN)/python -m scenes.language.extraction
 
 clean:
-	rm -rf $(VENV) .venv-matrix build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .coverage site out cfs-demo
+	rm -rf $(VENV) .venv-matrix .venv-audit sbom.json build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .coverage site out cfs-demo
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

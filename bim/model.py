@@ -176,6 +176,7 @@ class Space:
     area_to_middles: float | None = None  # floor to the middle of the walls, if that is stated [m2]
     type_name: str = ""  # of the IfcSpaceType, or the space's ObjectType
     raised: float = 0.0  # of room_volume: above the space as drawn, up to what covers it [m3]
+    cut: float = 0.0  # drawn beyond the slab, roof or ceiling that ends the room [m3]
     furniture: tuple[Element, ...] = ()  # in light and views, not in the heat balance
 
     @property
@@ -191,7 +192,7 @@ class Space:
     @property
     def drawn_volume(self) -> float:
         """Volume of the space as the file draws it [m3]."""
-        return self.room_volume - self.raised
+        return self.room_volume - self.raised + self.cut
 
     @property
     def shell(self) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ from bim.solids import prism, triangles_of, union
 REACH = 1.0  # a room's face this far inside the glazing plane still belongs to the window [m]
 BEYOND = 0.5  # and this far outside of it: rooms drawn to the wall's axis or outer face [m]
 FACING = 0.3  # cosine between window and face: up to 72 degrees for roof windows and curved walls
+ALONG = 0.9  # cosine: a face turned by more from a window may only touch its edge
 SMALLEST_SHARE = 0.05  # of the opening: a smaller part before a room is drawing noise
 FLUSH = 0.005  # recesses shallower than this are none [m]
 OVERLAP = 0.001  # the recess enters the room this far, so that the union leaves no slit [m]
@@ -238,6 +239,10 @@ def _painted(facet: Facet, painted: Sequence[Attachment]) -> list[Piece]:
             continue
         region = project(attachment.region, plane, facet.plane)
         glass = project(attachment.glass, plane, facet.plane)
+        if facet.plane.normal @ plane.normal < ALONG:
+            met = sum(polygon.intersection(glass).area for polygon in rest)
+            if met < SMALLEST_SHARE * attachment.glass.area:
+                continue  # the edge of a roof that begins at the pane
         glazed = "glass" if attachment.neighbour is None else "inner glass"
         opaque = "door" if attachment.aperture.filling.is_door else "frame"
         left: list[shapely.Polygon] = []

@@ -8,8 +8,10 @@ import logging
 import os
 import signal
 import sys
+import threading
 from collections.abc import Sequence
 from importlib import import_module, metadata
+from types import FrameType
 
 import click
 
@@ -79,6 +81,8 @@ COMMANDS = {
     "calibrate": "Measure the computing time of each method on this machine.",
 }
 USAGE, FAILED, INTERRUPTED = 2, 1, 130
+FOREIGN = ("ifcopenshell", "mitsuba", "drjit")  # modules whose calls no signal may end
+AGAIN_S = 0.05  # after which a signal that came in one of their calls is sent again
 SIGNALLED = 128  # and the signal's number
 # OpenBLAS reads it when NumPy is loaded: its threads wait for work in 2^4 turns of a loop, not in
 # the 2^28 that they are busy for between two small products of a room, beside Dr.Jit's own
@@ -156,14 +160,30 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     os.environ.update(BLAS_WAIT | os.environ | SAFE_PATH)
     open_streams()
-    for name in ("SIGTERM", "SIGHUP"):  # Windows has no SIGHUP
+    for name in ("SIGTERM", "SIGHUP", "SIGINT"):  # Windows has no SIGHUP
         number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
-            signal.signal(number, _terminate)
+        own = (signal.SIG_DFL, signal.default_int_handler)
+        if number is not None and signal.getsignal(number) in own:  # not under nohup
+            signal.signal(number, stop)
     sys.exit(run(sys.argv[1:] if arguments is None else arguments))
 
 
-def _terminate(number: int, _frame: object) -> None:
+def stop(number: int, frame: FrameType | None) -> None:
+    """Handler of signals: end the program, but not inside of a library or while it cleans up.
+
+    What is raised there is lost, or answered with `SystemError`; the signal is sent again until
+    that code has returned.
+    """
+    while frame is not None:
+        module = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+        if module in FOREIGN or frame.f_code.co_name == "__del__":
+            again = threading.Timer(AGAIN_S, signal.raise_signal, (number,))
+            again.daemon = True
+            again.start()
+            return
+        frame = frame.f_back
+    if number == signal.SIGINT:
+        raise KeyboardInterrupt
     raise Terminated(number)
 
 

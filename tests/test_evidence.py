@@ -20,7 +20,10 @@ NO_EVIDENCE = {
         "| index | of | source |", "| option | default | |",
         "| part of a five-phase picture | resolution |",
     },
-    "thermal.md": {"| closure | absorptances from | layer resistance | film resistances |"},
+    "radiance.md": {"| type | as | status | how |"},
+    "thermal.md": {
+        "| to | read |", "| closure | absorptances from | layer resistance | film resistances |",
+    },
     "comply.md": {"| in the folder of results | what |", "| option | what |"},
     "studies.md": {"| in the folder | what |"},
     "pv.md": {"| key | meaning |"},

@@ -266,7 +266,7 @@ def _closed_space(
         record.guid, record.name, record.storey, boundary.volume, area, tuple(faces),
         tuple(windows),
         record.volume, record.stated_area, record.stated_volume, record.long_name, middles,
-        record.type_name, record.raised,
+        record.type_name, record.raised, record.cut,
     )  # fmt: skip
     return space, boundary.issues + _assumptions(record, assumed) + soundness_issues(space)
 

@@ -34,8 +34,8 @@ def cut_rooms(
     source: Source, records: Sequence[SpaceRecord]
 ) -> tuple[list[SpaceRecord], list[Issue]]:
     """The rooms, those cut that go through what covers them, each with an issue."""
-    lids = _lids(source)
-    through = [index for index, record in enumerate(records) if _goes_through(record, lids)]
+    lids = room_lids(source)
+    through = [index for index, record in enumerate(records) if goes_through(record, lids)]
     if not through:
         return list(records), []
     items = [(packed(records[i].solid.manifold), _near(records[i], lids)) for i in through]
@@ -54,11 +54,11 @@ def cut_rooms(
             "top": float(record.solid.high[2]) - top, "bottom": low - float(record.solid.low[2]),
         }  # fmt: skip
         issues.append(Issue("room-cut", record.guid, values))
-        result[index] = replace(record, solid=solid, volume=after)
+        result[index] = replace(record, solid=solid, volume=after, cut=record.volume - after)
     return result, issues
 
 
-def _goes_through(record: SpaceRecord, lids: Sequence[Shape]) -> bool:
+def goes_through(record: SpaceRecord, lids: Sequence[Shape]) -> bool:
     """Whether most of the top of a space, or of its bottom, is beyond a slab, roof or ceiling."""
     near = _near(record, lids)
     if not near:
@@ -97,7 +97,7 @@ def _near(record: SpaceRecord, lids: Sequence[Shape]) -> list[np.ndarray]:
     return found
 
 
-def _lids(source: Source) -> list[Shape]:
+def room_lids(source: Source) -> list[Shape]:
     """Slabs with their openings, roofs and ceilings without, in the world."""
     roofs = set()
     for one in source.model.by_type("IfcProduct"):

@@ -100,7 +100,9 @@ def _reason(
         high = [r for r in records if r.solid.high[2] > record.solid.high[2] - SAME_TOP]
         tops = np.array([shares[r.guid].top for r in high])
         drawn = np.sum(tops < COVERED) >= np.sum(tops > UNCOVERED)
-        if drawn or named or share.sides > WALLLESS:
+        # nothing is outdoors in a file that draws no building
+        built = any(s.top <= UNCOVERED or s.sides <= WALLLESS for s in shares.values())
+        if drawn or named or (share.sides > WALLLESS and built):
             return Phrase("open-above", values)
     if named and (share.top > HINTED_TOP or share.sides > HINTED):
         return Phrase("open-and-named", values)

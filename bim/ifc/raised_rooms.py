@@ -20,6 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bim.ifc.cut_rooms import goes_through, room_lids
 from bim.ifc.glass_of_rooms import GlassOfRooms
 from bim.ifc.project import psets_of
 from bim.ifc.quantities import BASE_SETS
@@ -49,7 +50,7 @@ def raised_rooms(
     low = {one.low.guid for one in glass.glass if one.low is not None}
     if not low:
         return list(records), []
-    lids = _lids(source)
+    lids, covers = _lids(source), room_lids(source)
     result, issues = list(records), []
     for index, record in enumerate(records):
         if record.guid not in low:
@@ -60,6 +61,8 @@ def raised_rooms(
         most = max(float(np.ptp([record.solid.low[2], record.solid.high[2]])), 2 * reach + PLENUM)
         share = _share_above(record, area, glass)
         raised, why = _raised(source, index, result, lids, share, most)
+        if goes_through(record, covers):  # glass above that slab or ceiling is another room's
+            raised, why = record, Phrase("ceiling-drawn")
         top = float(record.solid.high[2])
         values = {"room": record.label, "top": top, "area": area}
         if why is None:

@@ -34,6 +34,7 @@ class SpaceRecord:
     stated_volume: float | None
     type_name: str = ""
     raised: float = 0.0  # of the volume: above the space as drawn, up to what covers it [m3]
+    cut: float = 0.0  # drawn beyond the slab, roof or ceiling that ends the room [m3]
     step_id: int = 0  # of the space; 0 for a room found from geometry
 
     @property

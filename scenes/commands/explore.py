@@ -30,7 +30,7 @@ RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 )
 @click.option(
     "--language", type=click.Choice(["en", "de", "fr"]), default="en", show_default=True,
-    help="Language of the page.",
+    help="Language of the page; results of a run state none.",
 )  # fmt: skip
 @click.option("--no-browser", is_flag=True, help="Print the address only.")
 def command(

@@ -9,6 +9,7 @@ import pytest
 from test_read_gbxml import two_rooms as gbxml_rooms
 
 from bim.gbxml.building import read_gbxml
+from bim.gbxml.document import SI
 from bim.honeybee.building import read_honeybee
 from bim.honeybee.use import sensible_heat
 from bim.report.issue import Phrase
@@ -228,3 +229,18 @@ def test_random_bytes_of_gbxmls_use_give_one_line(tmp_path):
     spoilt = (text[:start].encode() + tail for tail in mutations(text[start:].encode(), 60))
     refused = refusals(path, spoilt, read_gbxml)
     assert refused > 20
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"),
+    [
+        ("LPerSecPerSquareM", 1e-3),
+        ("CFMPerSquareFoot", 5.08e-3),  # 0.3048 m a minute: 0.3048 / 60
+        ("CubicMPerHourPerSquareM", 1 / 3600),
+        ("CubicMPerSecPerSquareM", 1.0),
+    ],
+)
+def test_flows_per_area_have_the_sizes_of_their_units(unit, factor):
+    """A foot of air a minute through each area; its units inverted gave 116 times as much."""
+    assert SI["InfiltrationFlowPerArea"][unit] == pytest.approx(factor, rel=1e-6)
+    assert SI["OAFlowPerArea"][unit] == pytest.approx(factor, rel=1e-6)

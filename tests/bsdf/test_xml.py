@@ -183,3 +183,19 @@ def test_entities_are_refused(text, tmp_path, encoding):
     )
     with pytest.raises(DataError, match="declares entities"):
         read_bsdf_xml(path)
+
+
+@pytest.mark.parametrize(
+    ("unit", "metres"),
+    [
+        ("meter", 1.0),
+        ("foot", 0.3048),
+        ("inch", 0.0254),
+        ("centimeter", 0.01),
+        ("millimeter", 1e-3),
+    ],
+)
+def test_lengths_are_metres(text, tmp_path, unit, metres):
+    changed = text.replace('<Thickness unit="meter">0.024<', f'<Thickness unit="{unit}">0.5<')
+    assert changed != text
+    assert read_bsdf_xml(write(tmp_path, changed)).thickness == pytest.approx(0.5 * metres)

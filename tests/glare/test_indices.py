@@ -102,3 +102,10 @@ def test_classes_and_the_rule_of_en_17037():
     assert list(classes.class_hours(year)) == [949, 0, 0, 51]
     with pytest.raises(ValueError, match="finite"):
         classes.protection_level([0.3, np.nan])
+
+
+def test_veiling_luminance_by_hand():
+    """At 30 and 60 degrees: 5 L omega cos(sigma)/sigma."""
+    sigma = np.radians([30.0, 60.0])
+    by_hand = 5 * (1e4 * 0.01 * math.sqrt(3) / 2 / 30 + 2e4 * 0.02 * 0.5 / 60)
+    assert indices.veiling_luminance([1e4, 2e4], [0.01, 0.02], sigma) == pytest.approx(by_hand)

@@ -112,8 +112,12 @@ def test_the_longest_unused_files_go_first(cache):
     small.trim()
     left = {file for file in cache.folder.iterdir()}
     assert sum(file.stat().st_size for file in left) <= small.limit
-    newest, oldest = (small.entry("m", number, by=BY).path for number in (5, 0))
-    assert newest in left and oldest not in left
+    paths = [small.entry("m", number, by=BY).path for number in range(6)]
+    assert left and left == set(paths[-len(left) :])  # the newest
+    oldest_left = paths[-len(left)]
+    os.utime(oldest_left, (1, 1))
+    replace(small, limit=0).trim(keep=oldest_left)
+    assert set(cache.folder.iterdir()) == {oldest_left}
 
 
 def test_every_input_counts():

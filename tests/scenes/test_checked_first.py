@@ -219,7 +219,7 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
     "dgp, view file": (lambda p: _dgp("--view", "none.vf"), "none.vf: --view: cannot be read"),
     "dgp, --space": (lambda p: _dgp("--space", ""), "--space: expected the name"),
     "dgp, folder": (lambda p: _dgp("--out", p.folder), "--out: "),
-    "dgp, no weather": (lambda p: ["dgp", "house.ifc", "--out", "out"], "--weather: give the EPW"),
+    "dgp, no weather": (lambda p: ["dgp", "house.ifc", "--out", "out"], "--weather is required"),
     "comply, head": (lambda p: _comply(building="word.ifc"), "word.ifc: not an IFC file"),
     "comply, weather": (lambda p: _comply("--weather", "short.epw"), SHORT),
     "comply, rule": (lambda p: _comply("--standard", "en17073"), "--standard: no rule 'en17073'"),
@@ -232,7 +232,7 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
     "comply, folder": (lambda p: _comply("--out", p.folder), "--out: "),
     "picture, no weather": (
         lambda p: ["picture", "house.ifc", "--at", "06-21 12:00", "--out", "a.hdr"],
-        "--weather: give the EPW",
+        "--weather is required",
     ),
     "thermal, box without a system": (
         lambda p: ["thermal", _box_study(p), "--out", "out"],

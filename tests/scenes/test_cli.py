@@ -205,3 +205,26 @@ def test_progress_of_a_stage_that_failed_is_not_reported_as_done(capsys) -> None
         progress("reading", 0.5)
         raise DataError("bad")
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("name", [*cli.FOREIGN, "__del__"])
+@pytest.mark.parametrize(
+    ("number", "raised"),
+    [(signal.SIGTERM, cli.Terminated), (signal.SIGHUP, cli.Terminated),
+     (signal.SIGINT, KeyboardInterrupt)],
+)  # fmt: skip
+def test_no_signal_ends_a_call_of_a_library(name, number, raised):
+    """IfcOpenShell answers an exception in its calls with `SystemError`, Python's `__del__` with
+    a printed traceback: the signal comes once they have returned."""
+    function = "__del__" if name == "__del__" else "call"
+    space = {"__name__": f"{name}.fake", "signal": signal, "ended": []}
+    exec(f"def {function}(n):\n    signal.raise_signal(n)\n    ended.append(n)\n", space)
+    before = signal.signal(number, cli.stop)
+    try:
+        with pytest.raises(raised):
+            space[function](number)
+            assert space["ended"] == [number]
+            time.sleep(5)
+    finally:
+        signal.signal(number, before)
+    assert space["ended"] == [number]

@@ -218,7 +218,7 @@ when = "occupied"
     np.testing.assert_array_equal(air["supply"].ach, 2.0 * present)
     np.testing.assert_allclose(hours.vapour(), (3 * 50 + 20) / 3.6e6 * present)
     windows = thermal_room(BOX.spaces[0], Fenestration("glass", 1.1)).zone.windows
-    airing = hours.airing(windows)
+    airing = hours.airing(windows, BOX.spaces[0].volume)
     assert airing.both and set(np.unique(airing.share)) == {0.0, 0.2}
     assert airing.wind == 0.0  # all windows in one facade
 

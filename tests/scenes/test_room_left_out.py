@@ -86,9 +86,11 @@ def test_the_tables_of_check_are_whole_when_piped(tmp_path, capsys):
     assert cli.run(["check", str(path), "--csv", str(table)]) == 0
     said = capsys.readouterr().out
     assert "…" not in said and space.LongName in said
-    for row in csv.reader(io.StringIO(table.read_text())):
-        if row[0] != "where":
-            assert all(cell in said for cell in row[:3])  # not code and severity
+    first = {}  # of a repeated issue the list has one example
+    for row in list(csv.reader(io.StringIO(table.read_text())))[1:]:
+        first.setdefault(row[3], row)
+    for row in first.values():
+        assert all(cell in said for cell in row[:3])  # not code and severity
 
 
 @pytest.mark.parametrize(

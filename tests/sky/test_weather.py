@@ -154,6 +154,8 @@ def test_gaps_of_six_hours_are_interpolated_and_noted(tmp_path, year):
     ("column", "text", "words"),
     [
         (DRY, "70", "dry bulb temperature: 1 implausible values, the first in line 109: 70"),
+        (DRY, "40", "dry bulb temperature: 1 implausible values, the first in line 109: 40"),
+        (DRY, "-20", "dry bulb temperature: 1 implausible values, the first in line 109: -20"),
         (DEW, "30", "dew point temperature: 1 implausible values, the first in line 109: 30"),
         (HUMIDITY, "0", "relative humidity: 1 implausible values, the first in line 109: 0"),
         (WIND, "75", "wind speed: 1 implausible values, the first in line 109: 75"),
