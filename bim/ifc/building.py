@@ -17,7 +17,7 @@ from bim.boundaries import ElementRecord, Finishes, faces_and_windows, floor_are
 from bim.defaults import CLEAR_GLAZING
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
-from bim.ifc.cut_rooms import cut_rooms
+from bim.ifc.cut_rooms import cut_rooms, room_lids
 from bim.ifc.defects import DRAWN_TWICE, model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.furniture import furnished
@@ -80,7 +80,7 @@ def read_ifc(
     apertures, more = apertures_in(source)
     issues += more
     glass = glass_of_rooms(source, apertures, records, mesh)
-    records, more = raised_rooms(source, records, glass)
+    records, more = raised_rooms(source, records, glass, rooms.covers)
     issues += more
     if any(record.raised for record in records):
         glass = glass_of_rooms(source, apertures, records, mesh)
@@ -129,6 +129,7 @@ class _Rooms:
     records: list[SpaceRecord]  # the rooms
     repeated: list[SpaceRecord]  # spaces that draw a room again
     passages: list[Passage]  # openings between rooms that nothing fills
+    covers: list[Shape]  # slabs, roofs and ceilings that end rooms
 
 
 def _rooms(
@@ -145,7 +146,8 @@ def _rooms(
     windows = [s.triangles for s in source.elements if s.ifc_class.startswith("IfcWindow")]
     read, more = open_spaces(records, mesh, by_guid, windows)
     issues += more
-    read, more = cut_rooms(source, read)
+    covers = room_lids(source)
+    read, more = cut_rooms(read, covers)
     issues += more
     apertures = open_apertures(source, read, mesh.triangles)
     records, ways, more = joined_rooms(source, read, apertures, mesh.triangles)
@@ -154,7 +156,7 @@ def _rooms(
         read, more = rooms_from_geometry(source, tell)
         records = read
         issues += more
-    return _Rooms(read, records, repeated, ways), issues
+    return _Rooms(read, records, repeated, ways, covers), issues
 
 
 def guessed_walls(spaces: Sequence[Space]) -> list[Issue]:

@@ -31,10 +31,12 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def cut_rooms(
-    source: Source, records: Sequence[SpaceRecord]
+    records: Sequence[SpaceRecord], lids: Sequence[Shape]
 ) -> tuple[list[SpaceRecord], list[Issue]]:
-    """The rooms, those cut that go through what covers them, each with an issue."""
-    lids = room_lids(source)
+    """The rooms, those cut that go through what covers them, each with an issue.
+
+    Args: lids: of `room_lids`.
+    """
     through = [index for index, record in enumerate(records) if goes_through(record, lids)]
     if not through:
         return list(records), []

@@ -20,11 +20,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from bim.ifc.cut_rooms import goes_through, room_lids
+from bim.ifc.cut_rooms import goes_through
 from bim.ifc.glass_of_rooms import GlassOfRooms
 from bim.ifc.project import psets_of
 from bim.ifc.quantities import BASE_SETS
-from bim.ifc.shapes import read_shapes
+from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.isolated_solids import solids_of
@@ -44,13 +44,20 @@ SAME_HEIGHT = 0.05  # heights stated and drawn that agree to this are one [m]
 
 
 def raised_rooms(
-    source: Source, records: Sequence[SpaceRecord], glass: GlassOfRooms
+    source: Source,
+    records: Sequence[SpaceRecord],
+    glass: GlassOfRooms,
+    covers: Sequence[Shape],
 ) -> tuple[list[SpaceRecord], list[Issue]]:
-    """The rooms, those raised that end below their glass, and what was done with each of these."""
+    """The rooms, those raised that end below their glass, and what was done with each of these.
+
+    Args: covers: of `bim.ifc.cut_rooms.room_lids`; above one that a room goes through, glass is
+        another room's.
+    """
     low = {one.low.guid for one in glass.glass if one.low is not None}
     if not low:
         return list(records), []
-    lids, covers = _lids(source), room_lids(source)
+    lids = _lids(source)
     result, issues = list(records), []
     for index, record in enumerate(records):
         if record.guid not in low:
@@ -60,9 +67,10 @@ def raised_rooms(
             continue
         most = max(float(np.ptp([record.solid.low[2], record.solid.high[2]])), 2 * reach + PLENUM)
         share = _share_above(record, area, glass)
-        raised, why = _raised(source, index, result, lids, share, most)
-        if goes_through(record, covers):  # glass above that slab or ceiling is another room's
+        if goes_through(record, covers):
             raised, why = record, Phrase("ceiling-drawn")
+        else:
+            raised, why = _raised(source, index, result, lids, share, most)
         top = float(record.solid.high[2])
         values = {"room": record.label, "top": top, "area": area}
         if why is None:

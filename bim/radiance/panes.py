@@ -18,7 +18,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.surfaces import WindowSurface, even_numbers, points_on_triangles, triangle_areas
 
 PARALLEL = 0.999  # cosine of 2.6 degrees
-REACH = 3.0  # panes this near stand before a window [m]
+REACH = 3.0  # greatest distance of a pane in front of a window [m]
 OVERLAP = 0.02  # share of a window from which a pane before it is reported
 COVER = 0.98  # share of a window from which a pane covers it
 MOSTLY = 0.5  # share from which it is refused

@@ -37,7 +37,7 @@ class IfcFile(click.Path):
     """An IFC file whose head and corrections file are sound; nothing heavy is loaded for that."""
 
     def convert(self, value, param, ctx) -> Path:
-        """The path; `DataError` where the file is none of ours."""
+        """The path; `DataError` where the file is not of a kind that is read."""
         from bim.building_file import check_ifc
 
         path = super().convert(value, param, ctx)
@@ -49,7 +49,7 @@ class BuildingFile(click.Path):
     """A file of any format that a building is read from, sound as far as it can be seen at once."""
 
     def convert(self, value, param, ctx) -> Path:
-        """The path; `DataError` where the file is none of ours."""
+        """The path; `DataError` where the file is not of a kind that is read."""
         from bim.building_file import check_building_file
 
         path = super().convert(value, param, ctx)
