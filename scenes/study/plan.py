@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +14,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.source_code import code_version
 from scenes.chosen_rooms import chosen_spaces
+from scenes.cluster import Requirements
 from scenes.fenestration.thermal_file import files_beside
 from scenes.heat.box import building_or_box
 from scenes.input_options import InputOptions
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 
 AUTO = "auto"
+COMPUTED_BY = "scenes.study.one_case"  # the module of a case's results
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +143,13 @@ def with_method(case: Case, method: str, metric: str, why: str) -> Case:
 
 def program_version() -> str:
     """A hash of the source that computes a case, and of what it is built on."""
-    return code_version("scenes.study.one_case")
+    return code_version(COMPUTED_BY)
+
+
+def requirements(cases: Iterable[Case]) -> Requirements:
+    """What a worker of a cluster needs for these cases: this program, and their files."""
+    files = [source for case in cases for source in case.files if isinstance(source, InputFile)]
+    return Requirements.of(COMPUTED_BY, {file.path: file.sha256 for file in files})
 
 
 AS_HELD = "as in the building's file"  # the system of a study that names none
