@@ -18,7 +18,8 @@ import pytest
 from mitsuba_cfs.errors import DataError
 from scenes.cluster import Requirements
 from scenes.demo import WEATHER
-from scenes.study.plan import Case, InputFile, plan_of
+from scenes.input_files import sha256
+from scenes.study.plan import Case, plan_of
 from scenes.study.store import computed
 from scenes.study.study_file import read_study
 from tests.conftest import REPOSITORY
@@ -307,7 +308,7 @@ def test_a_case_without_memory_or_files_is_tried_on_another_worker(cluster, tmp_
 def test_what_a_worker_lacks_is_named(tmp_path, monkeypatch):
     file = tmp_path / "weather.epw"
     file.write_text("a")
-    needs = Requirements.of("scenes.study.plan", {file: InputFile.of(file).sha256})
+    needs = Requirements.of("scenes.study.plan", {file: sha256(file)})
     assert needs.missing() == needs.missing(2**50) == ""
     assert replace(needs, version="0").missing().startswith("has another version of the program")
     assert "has 0.0 GiB of memory, and 1 GiB are needed" in needs.missing(2**20)
