@@ -140,10 +140,11 @@ class ResultFolder:
         """A folder inside for checkpoints of the command; it is never cleared."""
         made: list[Path] = []
         try:
-            made = _make_folders(self._place / name)
-            self._mark.write(self._place)
+            made = _make_folders(self._place)
+            self._mark.write(self._place)  # first: without it a folder in it would be another's
+            made = _make_folders(self._place / name) + made
         except (OSError, DataError) as error:
-            _remove_empty(made)  # without a mark they would be another's
+            _remove_empty(made)
             if isinstance(error, DataError):
                 raise
             raise self._error(f"cannot be written: {reason(error)}") from error
