@@ -326,6 +326,7 @@ def run_inputs(
         manifest,
         tuple(dict.fromkeys(notes)),
         room.method,
+        head,
     )
 
 
