@@ -13,6 +13,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.source_code import code_version
 from scenes.chosen_rooms import chosen_spaces
+from scenes.cluster import Requirements
 from scenes.fenestration.thermal_file import files_beside
 from scenes.heat.box import building_or_box
 from scenes.input_files import named_files, sha256
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 
 AUTO = "auto"
+COMPUTED_BY = "scenes.study.one_case"  # the module of a case's results
 OF_BUILDING = ("building", "corrections", "surroundings")  # names of files that a room is made of
 # options that are no files, of the room and of what is in its windows and outdoors
 OF_ROOM = ("spaces", "surroundings_offset", *ReadTable.model_fields)
@@ -99,7 +101,13 @@ def with_method(case: Case, method: str, metric: str, why: str) -> Case:
 
 def program_version() -> str:
     """A hash of the source that computes a case, and of what it is built on."""
-    return code_version("scenes.study.one_case")
+    return code_version(COMPUTED_BY)
+
+
+def requirements(cases: Iterable[Case]) -> Requirements:
+    """What a worker of a cluster needs for these cases: this program, and their files."""
+    files = {file.path: file.sha256 for case in cases for file in case.files}
+    return Requirements.of(COMPUTED_BY, files)
 
 
 @dataclass(frozen=True, slots=True)
