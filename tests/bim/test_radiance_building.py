@@ -284,6 +284,22 @@ def test_a_translucent_panel_is_a_window(tmp_path):
     assert not issue_of(building, "trans-as-opaque")
 
 
+def test_a_rough_translucent_panel_scatters_its_beam_in_a_lobe(tmp_path):
+    glass = "void glass glazing\n0\n0\n3 .87 .87 .87\n"
+    path = tmp_path / "panel.rad"
+    text = OFFICE.read_text()
+    path.write_text(text.replace(glass, "void trans glazing\n0\n0\n7 .8 .8 .8 0 .1 .6 .2\n"))
+    (window,) = read_building_file(path).windows
+    bsdf = window.states[0].bands["Visible"]
+    shares = bsdf.direct_hemispherical(bsdf.transmission_front)
+    assert bsdf.see_through == 0 and shares[-1] == pytest.approx(0.8 * 0.6, rel=1e-3)
+    lobe = 0.8 * 0.6 * 0.2 / (np.pi * 0.1**2)
+    assert bsdf.transmission_front.values.max() > 0.9 * lobe
+    path.write_text(text.replace(glass, "void trans glazing\n0\n0\n7 .8 .8 .8 0 .01 .6 .2\n"))
+    with pytest.raises(DataError, match=r"panel.rad:\d+: .*lobe of roughness 0.01"):
+        read_building_file(path)
+
+
 def test_a_fabric_before_panes_in_a_frame_has_both_as_layers(tmp_path):
     bar = (
         "\nplaster polygon bar\n0\n0\n12  1.8 0.02 0.9  2.2 0.02 0.9  2.2 0.02 2.5  1.8 0.02 2.5\n"
