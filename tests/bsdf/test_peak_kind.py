@@ -20,7 +20,8 @@ from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from scenes.fenestration.resolver import fill_windows
 from scenes.fenestration.systems import WindowOverrides, system_of, with_see_through
 from scenes.head import system_notes
-from scenes.input_files import peak_share
+from scenes.input_files import overrides_of, peak_share
+from scenes.input_options import InputOptions
 
 OMEGA = KLEMS_FULL.projected_solid_angles()
 PASSED = 0.3
@@ -122,7 +123,7 @@ def test_the_user_says_what_a_peak_is(tmp_path):
     assert "do not show" in note and "--see-through shade.xml=lobe" in note and "0.22" in note
     for text, share in (("a/shade.xml=lobe", 0.0), ("shade=0.25", 0.25)):
         windows = [type("W", (), {"guid": "w", "name": "w"})()]
-        overrides = WindowOverrides((beam,), see_through=(peak_share(text),))
+        overrides = overrides_of(InputOptions(None, None, see_through=(text,)), beam)
         ((changed,),) = fill_windows(windows, overrides, None).values()
         assert changed.visible.see_through == share
         (note,) = system_notes([changed], light_only=True)
