@@ -14,6 +14,7 @@ from bim.report.issue import Issue
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.picture_year.year import PictureYear
+from scenes.head import NO_HEAD, Head
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,6 +204,7 @@ class RunResult:
     manifest: dict  # of run.json: inputs with hashes, options, versions, seed, timings
     notes: tuple[str, ...] = field(default=())  # sentences for the head of the results
     method: str = "three-phase"  # one of mitsuba_cfs.methods.METHODS
+    head: Head = NO_HEAD  # what was left out, what was assumed
 
     def __repr__(self) -> str:
         return f"<RunResult {self.building.name!r}: {len(self.spaces)} rooms, {self.method}>"

@@ -332,6 +332,7 @@ def run_inputs(
         manifest,
         tuple(dict.fromkeys(notes)),
         room.method,
+        head,
     )
 
 

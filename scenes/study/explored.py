@@ -53,9 +53,8 @@ def compute_explorer(case: Case, progress: Progress = silent) -> ExploredCase:
         variants.activate()
         inputs, folder = case_inputs(case), Path(name)
         room, weather = case_year(inputs, case, explore=True, progress=progress), inputs.weather
-        run = RunResult(
-            inputs.building, weather.midpoints, sun_directions(weather), (room,), (), {}
-        )
+        sun = sun_directions(weather)
+        run = RunResult(inputs.building, weather.midpoints, sun, (room,), (), {}, head=inputs.head)
         write_rooms(run, folder)
         result = (one for one in folder.rglob("*") if one.is_file())
         files = {one.relative_to(folder).as_posix(): one.read_bytes() for one in result}
