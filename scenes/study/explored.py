@@ -52,9 +52,8 @@ def compute_explorer(case: Case, progress: Progress = silent) -> ExploredCase:
         variants.activate()
         inputs = case_inputs(case)
         room, weather = case_year(inputs, case, explore=True, progress=progress), inputs.weather
-        run = RunResult(
-            inputs.building, weather.midpoints, sun_directions(weather), (room,), (), {}
-        )
+        sun = sun_directions(weather)
+        run = RunResult(inputs.building, weather.midpoints, sun, (room,), (), {}, head=inputs.head)
         write_rooms(run, folder)
         result = (one for one in folder.rglob("*") if one.is_file())
         files = {one.relative_to(folder).as_posix(): one.read_bytes() for one in result}
