@@ -11,7 +11,13 @@ from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 
-from bim.building_file import STAGES, ReadOptions, check_building_file, read_building_file
+from bim.building_file import (
+    STAGES,
+    ReadOptions,
+    building_files,
+    check_building_file,
+    read_building_file,
+)
 from bim.model import Building
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, silent, summed
@@ -69,8 +75,8 @@ def check_building(options: InputOptions) -> None:
     Raises: `DataError` for a file of no format that is read, or an empty name.
     """
     check_names(options.spaces)
-    if options.building is not None:
-        check_building_file(options.building)
+    for path in building_files(options.building_files):
+        check_building_file(path)
 
 
 def check_names(names: Sequence[str], field: str = "--space") -> None:
@@ -127,7 +133,7 @@ def overrides_of(
 
 
 def read_building(
-    path: str | PathLike[str],
+    path: str | PathLike[str] | Sequence[str | PathLike[str]],
     *,
     join: Sequence[str] = (),
     furniture: bool = False,
@@ -140,6 +146,7 @@ def read_building(
     """The building of an IFC file, with the corrections kept beside it, or of another format.
 
     Args:
+        path: a file, several IFC files of one building, or a folder of them.
         join: rooms to make one, as "Hall + Living".
         furniture: whether furniture is in the light and the views of its room.
         apertures: materials of a Radiance scene's surfaces that are windows.
@@ -150,11 +157,12 @@ def read_building(
     Raises: `DataError` for a file that cannot be used; faults of the model are the building's
         `problems`.
     """
+    first, *linked = building_files([path] if isinstance(path, str | PathLike) else path)
     read = ReadOptions(
         tuple(join), furniture, tuple(apertures), tuple(map(Path, surroundings)),
-        surroundings_offset, tuple(facade_panes),
+        surroundings_offset, tuple(facade_panes), tuple(linked),
     )  # fmt: skip
-    return read_building_file(path, read, summed(progress, "inputs", STAGES))
+    return read_building_file(first, read, summed(progress, "inputs", STAGES))
 
 
 def building_of(options: InputOptions, progress: Progress = silent) -> Building:

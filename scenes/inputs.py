@@ -80,6 +80,7 @@ class Inputs:
         options = self.options
         named = {"building": options.building, "weather": options.weather}
         files = {name: path for name, path in named.items() if path is not None}
+        files |= {f"linked_{i}": path for i, path in enumerate(options.linked)}
         if options.system is not None:
             files["system"] = options.system
             for i, path in enumerate(files_beside(options.system)):

@@ -31,11 +31,12 @@ UNCUT = 100_000  # columns of a table that nobody sees
 def command(issues: Path | None, **chosen) -> None:
     """List rooms, windows and problems of a building model as the simulation reads them.
 
-    BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
+    BUILDING is a honeybee model (.hbjson), gbXML, a Radiance scene (.rad) or IFC: one file or
+    several of one building (architecture, facade, site), a folder or an .ifczip of them.
     """
     options = InputOptions(**chosen, weather=None)
     if issues is not None:
-        check_file(issues, field="--csv", inputs=[options.building])
+        check_file(issues, field="--csv", inputs=options.building_files)
     from rich.console import Console
 
     from scenes.commands.progress_bar import ProgressBar

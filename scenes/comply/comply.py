@@ -181,7 +181,7 @@ class Check:
         if self.building.file is not None and is_ifc(self.building.file):
             from bim.ifc.room_uses import read_room_uses  # reads IFC: only where there is a file
 
-            texts = read_room_uses(self.building.file)
+            texts = read_room_uses(self.building.file, *self.options.linked)
         found = {}
         for space in spaces:
             use = self.files.uses.of(space, texts.get(space.guid, ()))
