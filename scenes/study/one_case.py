@@ -296,7 +296,8 @@ def straight_view(
 
 def _normal_beam(system: FenestrationSystem) -> float:
     """The beam through the patch at normal incidence."""
-    block = system.visible.transmission_front
-    if block is None:
+    bsdf = system.visible
+    if bsdf.transmission_front is None:
         raise ValueError(f"{system.name} has no transmission")
-    return float(through_peak(block, KLEMS_FULL).transmittance[0])
+    peak = through_peak(bsdf.transmission_front, KLEMS_FULL, bsdf.see_through)
+    return float(peak.transmittance[0])
