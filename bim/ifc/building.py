@@ -36,6 +36,7 @@ from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
 from bim.ifc.space_boundaries import boundary_issues
 from bim.ifc.spaces import SpaceRecord, read_spaces
+from bim.ifc.zones import read_zones
 from bim.isolated_solids import RoomBoundary, room_boundaries
 from bim.mesh_simplification import simplified
 from bim.model import Building, Element, Space
@@ -126,6 +127,7 @@ def read_ifc(
             north_is_corrected=source.corrections.north_deg is not None,
         ),
         source.placed.matrix(),
+        zones=read_zones(source.model, source.damage),
     )  # fmt: skip
 
 

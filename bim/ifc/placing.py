@@ -81,11 +81,21 @@ def _typical_height(shapes: dict[int, Shape]) -> float:
     return 0.0
 
 
+def _whole_height(shapes: dict[int, Shape]) -> float:
+    """Height of all shapes together [m]."""
+    z = [
+        (shape.triangles[..., 2].min(), shape.triangles[..., 2].max()) for shape in shapes.values()
+    ]
+    return float(max(top for _, top in z) - min(bottom for bottom, _ in z))
+
+
 def _unit_slip(shapes: dict[int, Shape]) -> float:
     """Factor that makes the building's height possible; 1 where it already is or nothing helps."""
     height = _typical_height(shapes)
     low, high = STOREY_HEIGHTS
     if height == 0.0 or 0.1 * low <= height <= high:
+        return 1.0
+    if height < low <= _whole_height(shapes):  # low spaces, such as beams of the wrong class
         return 1.0
     fits = [factor for factor in UNIT_SLIPS if low * 1.5 <= height * factor <= 0.1 * high]
     return fits[0] if fits else 1.0

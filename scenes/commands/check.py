@@ -39,6 +39,7 @@ def command(issues: Path | None, **chosen) -> None:
         check_file(issues, field="--csv", inputs=options.building_files)
     from rich.console import Console
 
+    from scenes.chosen_rooms import named_spaces
     from scenes.commands.progress_bar import ProgressBar
     from scenes.fenestration_exports import known_fenestration
     from scenes.head import head_of
@@ -46,7 +47,7 @@ def command(issues: Path | None, **chosen) -> None:
 
     with ProgressBar() as progress:
         read = building_of(options, progress)
-    spaces = [read.space(name) for name in options.spaces] or list(read.spaces)
+    spaces = named_spaces(read, options.spaces, options.building) if options.spaces else read.spaces
     known = known_fenestration(spaces, options.building)
     # a file or a program that reads on gets every line whole, however long
     console = Console(width=None if Console().is_terminal else UNCUT)

@@ -175,3 +175,11 @@ def test_listed_materials_with_insulation_are_layers(tmp_path, name, kind, fract
     layers = _with_list(tmp_path, name, kind, fractions)
     assert [one for one, _ in layers] == list(LIST)
     assert [d for _, d in layers] == pytest.approx(expected, abs=2e-4)
+
+
+def test_a_beam_that_is_a_space_is_no_wrong_unit(tmp_path):
+    """A space 0.1 m tall in a house of usual height: the file's unit is right."""
+    small, _ = box_model(space=False)
+    small.box("IfcSpace", "SHS beam", (0.0, 0.0, 2.5), (WIDTH, 0.1, 0.1))
+    building = _read(small, tmp_path)
+    assert not of_code(building, "length-unit-wrong")
