@@ -11,6 +11,7 @@
     north = 30                  # direction of the model's +y axis, in degrees from north to east
     outdoors = ['IfcSpace, LongName="Loggia"']     # spaces that are no rooms
     indoors = ['IfcSpace, Name="A.12"']            # rooms, whatever their shape and name
+    close_gaps = 0.3            # in a file without spaces: gaps between elements to close [m]
 
     [[reflectance]]
     select = 'IfcWall, material="Brick"'
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
 
 LAYER = re.compile(r'(?:^|,)\s*layer\s*=\s*("[^"]*"|[^,+]+)')  # CAD layer: ours, not ifcopenshell's
 KEYS = ("leave_out", "only", "opaque", "keep", "join", "surroundings", "reflectance", "north",
-        "outdoors", "indoors", "material")  # fmt: skip
+        "outdoors", "indoors", "material", "close_gaps")  # fmt: skip
 OPEN = "open"  # asks for the rooms that are open to each other by more than a door
 PAINT_KEYS = ("select", "visible", "solar", "specular", "roughness")
 MATERIAL_KEYS = {  # of [[material]]: lowest and highest value
@@ -86,6 +87,7 @@ class Corrections:
     outdoors: tuple[str, ...] = ()  # spaces that are no rooms
     indoors: tuple[str, ...] = ()  # spaces that are rooms
     materials: tuple[MaterialCorrection, ...] = ()  # the first that matches counts
+    close_gaps: float | None = None  # between elements, where rooms are searched [m]
 
     def removed(self, model: ifcopenshell.file) -> set[int]:
         """STEP ids of the products that are not to be read."""
@@ -196,6 +198,9 @@ def read_corrections(path: str | PathLike[str]) -> Corrections:
         north_deg=_north(table, path), outdoors=_texts(table, "outdoors", path),
         indoors=_texts(table, "indoors", path),
         materials=tuple(_material(entry, path) for entry in _tables(table, "material", path)),
+        close_gaps=(
+            None if "close_gaps" not in table else _share(table["close_gaps"], path, "close_gaps")
+        ),
     )  # fmt: skip
 
 
