@@ -155,7 +155,8 @@ def _rooms(
     read, more = open_spaces(records, mesh, by_guid, windows)
     issues += more
     covers = room_lids(source)
-    read, more = cut_rooms(read, covers)
+    fixed = source.corrections.heights_as_drawn(source.model)
+    read, more = cut_rooms(read, covers, fixed)
     issues += more
     apertures = open_apertures(source, read, mesh.triangles)
     records, ways, more = joined_rooms(source, read, apertures, mesh.triangles)
