@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 import uuid
 import zipfile
 from collections.abc import Iterator, Sequence
@@ -18,6 +17,7 @@ from bim.ifc.damage import Damage, entities, type_of
 from bim.ifc.head import SCHEMAS, ZIPPED, check_head, model_names
 from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import scratch_folder
 
 END = 4096  # bytes in which the end of a STEP file is looked for
 
@@ -48,8 +48,8 @@ def open_all(paths: Sequence[str | Path]) -> dict[str, ifcopenshell.file]:
 def _open_zipped(path: Path) -> dict[str, ifcopenshell.file]:
     models = {}
     try:
-        with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
-            inner = Path(folder) / "model.ifc"
+        with zipfile.ZipFile(path) as archive, scratch_folder() as folder:
+            inner = folder / "model.ifc"
             names = model_names(archive, path)
             for name in names:
                 with archive.open(name) as packed, inner.open("wb") as unpacked:

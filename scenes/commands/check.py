@@ -77,9 +77,9 @@ def command(issues: Path | None, fix: Path | None, **chosen) -> None:
     for line in _issues(read):
         console.print(line, markup=False, highlight=False)
     console.print(
-        f"{len(read.spaces)} rooms, {sum(bool(s.windows) for s in read.spaces)} with windows, "
-        f"{len(read.windows)} windows, {sum(w.area for w in read.windows):.1f} m2 of glass, "
-        f"{len(read.issues)} problems"
+        f"rooms: {len(read.spaces)} (with windows: {sum(bool(s.windows) for s in read.spaces)}), "
+        f"windows: {len(read.windows)} ({sum(w.area for w in read.windows):.1f} m2 of glass), "
+        f"problems: {len(read.issues)}"
     )
     if fix is not None:
         from bim.ifc.corrections_draft import corrections_draft
