@@ -239,7 +239,7 @@ class Element:
 
 
 @dataclass(frozen=True, slots=True)
-class Zone:
+class SpaceGroup:
     """Rooms that belong together: a dwelling, a thermal zone, a fire compartment."""
 
     name: str
@@ -265,7 +265,7 @@ class Building:
     uses: Mapping[str, StatedUse] = field(default_factory=dict)  # of rooms, by the space's GUID
     grids: tuple[ModelGrid, ...] = ()  # sensors that the file holds
     views: tuple[ModelView, ...] = ()  # that the file holds
-    zones: tuple[Zone, ...] = ()  # of the rooms, as the file has them
+    zones: tuple[SpaceGroup, ...] = ()  # of the rooms, as the file has them
 
     @property
     def windows(self) -> tuple[Window, ...]:

@@ -6,12 +6,12 @@ import ifcopenshell
 
 from bim.ifc.damage import Damage, entities, instances
 from bim.ifc.project import psets_of
-from bim.model import Zone
+from bim.model import SpaceGroup
 
 DEEPEST = 20  # zones of zones
 
 
-def read_zones(model: ifcopenshell.file, damage: Damage | None = None) -> tuple[Zone, ...]:
+def read_zones(model: ifcopenshell.file, damage: Damage | None = None) -> tuple[SpaceGroup, ...]:
     """The IfcZone with spaces, each with those of its parts; its kind is what its texts say.
 
     Kind: ObjectType, LongName, Description and Pset_ZoneCommon's Category and Reference.
@@ -24,7 +24,7 @@ def read_zones(model: ifcopenshell.file, damage: Damage | None = None) -> tuple[
         texts += [common.get("Category"), common.get("Reference")]
         if rooms:
             kind = ", ".join(str(text) for text in texts if text)
-            zones.append(Zone(zone.Name or kind or zone.GlobalId, kind, rooms))
+            zones.append(SpaceGroup(zone.Name or kind or zone.GlobalId, kind, rooms))
     return tuple(zones)
 
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from bim.model import Building, Zone
+from bim.model import Building, SpaceGroup
 from bim.shoebox import shoebox
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.comply.assess import NOT_FOR_IT, assess_room, values_of
@@ -99,14 +99,16 @@ def test_offices_have_hours_and_miss_nothing_wards_are_asked_each(calendar):
     assert not list(dwelling_words(rooms))
 
 
-def _zoned(*zones: Zone) -> Building:
+def _zoned(*zones: SpaceGroup) -> Building:
     return Building("house", (), zones=zones)
 
 
 def test_zones_of_the_model_are_dwellings():
-    named = _zoned(Zone("Wohnung 2", "", ("a", "b")), Zone("Heizkreis", "", ("a", "b", "c")))
+    named = _zoned(
+        SpaceGroup("Wohnung 2", "", ("a", "b")), SpaceGroup("Heizkreis", "", ("a", "b", "c"))
+    )
     assert dwellings_of(named) == {"a": "Wohnung 2", "b": "Wohnung 2"}
-    plain = _zoned(Zone("Top 1", "", ("a",)), Zone("HVAC 1", "", ("a", "b")))
+    plain = _zoned(SpaceGroup("Top 1", "", ("a",)), SpaceGroup("HVAC 1", "", ("a", "b")))
     assert dwellings_of(plain) == {"a": "Top 1"}
-    by_kind = _zoned(Zone("WE 01", "Apartment", ("a",)), Zone("Block", "", ("a", "b")))
+    by_kind = _zoned(SpaceGroup("WE 01", "Apartment", ("a",)), SpaceGroup("Block", "", ("a", "b")))
     assert dwellings_of(by_kind) == {"a": "WE 01"}
