@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bim.ifc.corrections import corrections_file
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, write_table, write_text
 from scenes.commands.room_options import check_is_ifc, input_options
@@ -49,6 +48,8 @@ def command(issues: Path | None, fix: Path | None, **chosen) -> None:
     if issues is not None:
         check_file(issues, field="--csv", inputs=options.building_files)
     if fix is not None:
+        from bim.ifc.corrections import corrections_file
+
         check_is_ifc(options.building, "--fix")
         fix = corrections_file(options.building) if fix == Path("-") else fix
         check_file(fix, field="--fix", inputs=options.building_files)
