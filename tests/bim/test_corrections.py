@@ -115,7 +115,7 @@ def test_query_lists_what_a_selector_chooses(path):
     say = CliRunner().invoke(command, ["query", str(path), "IfcWall, Name=/south.*/"])
     assert say.exit_code == 0, say.output
     assert "south again" in say.output and "north" not in say.output
-    assert say.output.splitlines()[-1] == "2 elements"
+    assert say.output.splitlines()[-1] == "elements: 2"
     wall = next(w for w in ifcopenshell.open(str(path)).by_type("IfcWall") if w.Name == "east")
     assert [one.name for one in query(path, wall.GlobalId)] == ["east"]
     wrong = CliRunner().invoke(command, ["query", str(path), "IfcWall,,,="])
