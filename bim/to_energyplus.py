@@ -7,7 +7,6 @@ which stands for the frame.  Faces towards other rooms are adiabatic: a room can
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
@@ -30,7 +29,7 @@ from bim.energyplus_windows import complex_state
 from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of
 from bim.model import Building, Construction, Face, Space
 from bim.to_thermal import layers_of
-from mitsuba_cfs.files import write_text
+from mitsuba_cfs.files import json_text, write_text
 from thermal.zone import OUTSIDE_ABSORPTANCE
 
 BOUNDARY = {"outside": "Outdoors", "ground": "Ground"}  # all others: adiabatic
@@ -75,7 +74,7 @@ def write_epjson(
     windows = _Windows(model, (u_value, g_value), glazing or {})
     for number, space in enumerate(building.spaces if spaces is None else spaces):
         _zone(model, f"Z{number} {object_name(space.label)}", space, windows, air_changes)
-    write_text(path, json.dumps(model, indent=1))
+    write_text(path, json_text(model, indent=1))
 
 
 def _zone(model: Model, zone: str, space: Space, windows: _Windows, air_changes: float) -> None:
