@@ -168,6 +168,8 @@ def model_lines(building: Building) -> tuple[str, ...]:
     """Rooms and glass that were read; with the verdict where the reader gives an account."""
     if building.account is not None:
         return building.account.lines
+    if not building.spaces:
+        return (Note("Elements read: {count}", count=len(building.elements)),)
     glass = sum(window.area for window in building.windows)
     return (
         Note("Rooms read: {count}", count=len(building.spaces)),

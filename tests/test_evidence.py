@@ -28,7 +28,7 @@ NO_EVIDENCE = {
         "| in the folder of results | what |", "| option | what |",
         "| rule | quantity | set-up | weather that it asks for |",
     },
-    "studies.md": {"| in the folder | what |"},
+    "studies.md": {"| in the folder | what |", "| event | what is done |"},
     "pv.md": {"| key | meaning |"},
 }  # fmt: skip
 ONCE = {"benchmarks.md", "reliability.md"}  # pages that say it once, for all of their tables
