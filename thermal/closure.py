@@ -36,9 +36,9 @@ BY_DIRECTION = ", g by direction"  # of a key of `ERRORS`
 # the larger of a blind's and a shade's
 ERRORS: dict[str, dict[str, tuple[float, float]]] = {
     "none": {
-        "typical": (0.17, 0.21), "typical" + BY_DIRECTION: (0.13, 0.17),
-        "gap": (0.17, 0.21), "constant": (0.27, 0.38),
-        "linear": (0.65, 0.89), "layers": (0.17, 0.21),
+        "typical": (0.14, 0.17), "typical" + BY_DIRECTION: (0.13, 0.17),
+        "gap": (0.14, 0.18), "constant": (0.29, 0.41),
+        "linear": (0.61, 0.85), "layers": (0.17, 0.21),
     },
     "external": {
         "typical": (0.17, 0.25), "typical" + BY_DIRECTION: (0.27, 0.39),

@@ -33,8 +33,9 @@ def layered_thermal_data(
         transmittance, reflectance: [K] of the whole system, direction to hemisphere, solar.
         absorbed: [K, N] solar absorptance of every layer.
 
-    A g that is stated at normal incidence (the first direction) is taken as that of `STATED_G`; its
-    secondary heat gain over the computed one scales that of the year in all directions.
+    A g that is stated at normal incidence (the first direction) scales the secondary heat gain in
+    all directions.  With a shade, whose air flow depends on the state, it is that of `STATED_G`,
+    and that of the year differs; panes alone keep it.
     """
     tau = np.asarray(transmittance, dtype=float)
     notes = []
@@ -58,6 +59,8 @@ def layered_thermal_data(
     rho, alpha = np.asarray(reflectance, dtype=float), np.asarray(absorbed, dtype=float)
     share = inward_share(float(tau[0]), float(rho[0]), g_normal, item=item)
     total = np.maximum(1.0 - tau - rho, 0.0)
-    computed = iso15099_g_values(unit, prescribed(*STATED_G), tau[:1], alpha[:1])[0] - tau[0]
-    ratio = share * total[0] / max(computed, 1e-9)
+    stated_state = g[:1]
+    if unit.shade_place != "none":
+        stated_state = iso15099_g_values(unit, prescribed(*STATED_G), tau[:1], alpha[:1])
+    ratio = share * total[0] / max(float(stated_state[0] - tau[0]), 1e-9)
     return ThermalData(u_value, tau + np.minimum((g - tau) * ratio, total), tuple(notes))
