@@ -10,13 +10,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel
 
 from bim.account import NOT_USABLE
 from bim.model import Building, Space
 from bim.report.issue import Audience, Issue, issue_note
 from bim.report.ranking import Ranked, ranked
-from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.bsdf.klems_peak import HIDDEN, SPECULAR, SPILL, peak_spill, through_peak
+from mitsuba_cfs.bsdf.tensor_peak import UNRESOLVED
+from mitsuba_cfs.glare.sun_disc import spread_sun_dgp
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import source_notes, window_sources
@@ -56,6 +59,11 @@ class Head:
     def notes(self) -> tuple[str, ...]:
         """The assumptions as sentences, for a page that has account and issues elsewhere."""
         return (*self.noted, *self.assumed)
+
+    def further(self, notes: Iterable[str]) -> tuple[str, ...]:
+        """Those of the notes that the head does not have, each once."""
+        known = {*self.lines, *self.notes}
+        return tuple(note for note in _once(notes) if note not in known)
 
     def text(self, audience: Audience) -> tuple[str, ...]:
         """The lines of the head; audience: whom the fixes are for."""
@@ -173,7 +181,12 @@ def model_lines(building: Building) -> tuple[str, ...]:
     glass = sum(window.area for window in building.windows)
     return (
         Note("Rooms read: {count}", count=len(building.spaces)),
-        Note("Glass: {area:.1f} m2 in {count} windows", area=glass, count=len(building.windows)),
+        Note(
+            "Glass: {area:.1f} m2 in {count} windows",
+            "Glass: {area:.1f} m2 in {count} window",
+            area=glass,
+            count=len(building.windows),
+        ),
     )
 
 
@@ -185,7 +198,7 @@ def _issue_lines(issues: Iterable[Issue], severity: str, audience: Audience) -> 
         count = sum(one.count for one in kinds[SHOWN:])
         lines.append(
             Note(
-                "{count} more of {kinds} other kinds; cfs check lists all",
+                "{count} more (other kinds: {kinds}); cfs check lists all",
                 count=count,
                 kinds=len(kinds) - SHOWN,
             )
@@ -221,8 +234,8 @@ def unused_notes(building: Building) -> tuple[str, ...]:
     if not any(map(len, parts)) or building.file is None:
         return ()
     note = Note(
-        "{file} contains {uses} uses of rooms, {grids} sensor grids and {views} views; they are "
-        "not used here.",
+        "{file} contains uses of rooms ({uses}), sensor grids ({grids}) and views ({views}); they "
+        "are not used here.",
         file=building.file.name,
         uses=len(building.uses),
         grids=len(building.grids),
@@ -252,19 +265,55 @@ def system_notes(
 
 
 def _peak_note(system: FenestrationSystem) -> tuple[str, ...]:
-    """A sentence where the light that passes straight on is taken from the Klems patches."""
-    if system.angular is not None or system.tree is not None:
+    """A sentence on whether a transmission peak passes straight on, and on the error of that."""
+    bsdf, tree = system.visible.filled(), system.tree
+    basis, omega = bsdf.basis_in, bsdf.basis_in.projected_solid_angles()
+    share = bsdf.see_through if tree is None else tree.see_through
+    is_stated = (tree is None and share is not None) or (tree is not None and share != 1.0)
+    beam = through_peak(bsdf.transmission_front, basis, 1.0).transmittance
+    if system.angular is not None or beam[0] < LEAST_PEAK:
         return ()
-    bsdf = system.visible.filled()
-    peak = float(through_peak(bsdf.transmission_front, bsdf.basis_in).transmittance[0])
-    if peak < LEAST_PEAK:
-        return ()
-    note = Note(
-        "{system}: direct sun and view out use the specular peak of the Klems patches, "
-        "transmittance {peak:.2f} at normal incidence.",
-        system=system.name,
-        peak=peak,
-    )
+    passed = omega @ bsdf.direct_hemispherical(bsdf.transmission_front)
+    spill = peak_spill(bsdf.transmission_front, basis) if tree is None else 0.0
+    width = HIDDEN
+    if tree is not None:
+        width = UNRESOLVED * np.sqrt(np.pi) / (1 << max(t.depth for t in tree.blocks().values()))
+    values = {"system": system.name, "peak": float(beam[0]),
+              "file": system.file.name if system.file else system.name}  # fmt: skip
+    if is_stated:
+        note = Note(
+            "{system}: {share:.0f} % of the transmission peak ({peak:.2f} at normal incidence) "
+            "passes straight on, as stated; the rest is a lobe.",
+            share=100 * share,
+            **values,
+        )
+    elif spill > SPILL:
+        peaked = beam >= LEAST_PEAK
+        widest = float((omega / np.cos(basis.centres()[0]))[peaked].max())
+        note = Note(
+            "{system}: the transmission peak ({peak:.2f} at normal incidence) is a lobe, as it "
+            "spreads into the neighbouring Klems patches: no sun or view passes straight on. In "
+            "patches it is wider: DGP is up to {error:.2f} too low where the sun is seen through "
+            "it. If it is specular: --see-through {file}=specular.",
+            error=max(spread_sun_dgp(HIDDEN) - spread_sun_dgp((widest / 2 / np.pi) ** 0.5), 0.0),
+            **values,
+        )
+    elif omega @ beam >= SPECULAR * passed:
+        note = Note(
+            "{system}: the transmission peak ({peak:.2f} at normal incidence) is specular, as "
+            "hardly any light is scattered; direct sun and view out use it.",
+            **values,
+        )
+    else:
+        note = Note(
+            "{system}: the data do not show whether the transmission peak ({peak:.2f} at normal "
+            "incidence) is specular or a lobe of less than {width:.1f} degrees; it is taken as "
+            "specular. As a lobe, DGP is up to {error:.2f} lower where the sun is seen through "
+            "it: --see-through {file}=lobe.",
+            width=float(np.degrees(width)),
+            error=-spread_sun_dgp(width),
+            **values,
+        )
     return (note,)
 
 

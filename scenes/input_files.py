@@ -162,10 +162,30 @@ def overrides_of(
     tau = options.visible_transmittance
     if tau is not None and not 0 < tau <= 1:
         raise DataError(f"expected more than 0, at most 1, got {tau:g}", field="--tau")
+    see_through = tuple(map(peak_share, options.see_through))
     return WindowOverrides(
         states, options.u_value, options.g_value, light_only=light_only,
-        visible=tau, glazing=options.glazing,
+        visible=tau, glazing=options.glazing, see_through=see_through,
     )  # fmt: skip
+
+
+def peak_share(text: str) -> tuple[str, float]:
+    """File or system, and the share of its peak that passes straight on, of FILE=KIND.
+
+    Args: KIND: specular, lobe, or the share, 0 to 1.
+
+    Raises: `DataError` for another text.
+    """
+    name, _, kind = text.rpartition("=")
+    known = {"specular": 1.0, "lobe": 0.0}
+    try:
+        share = known[kind] if kind in known else float(kind)
+    except ValueError:
+        share = -1.0
+    if not name or not 0 <= share <= 1:
+        message = f"expected FILE=specular, FILE=lobe or FILE=0.3, got {text!r}"
+        raise DataError(message, field="--see-through")
+    return Path(name).name, share
 
 
 def read_building(

@@ -15,6 +15,7 @@ NO_EVIDENCE = {
     "issues.md": "all",
     "quickstart.md": "all",
     "validation.md": {"| subject | judged by | page |"},
+    "bsdf.md": {"| stated | by | used as | DGP |"},
     "daylight.md": {"| function | gives |"},
     "glare.md": {
         "| index | of | source |", "| option | default | |",
