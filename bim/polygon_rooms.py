@@ -251,7 +251,7 @@ def _wound(
 def _faces_and_windows(
     parts: Sequence[_Part], meshes: Sequence[NDArray[np.float64]]
 ) -> tuple[list[Face], list[Window]]:
-    """Faces in the file's order; windows that look out, all panes of one opening as one."""
+    """Faces in the file's order; exterior windows, all panes of one opening as one."""
     faces: list[Face] = []
     panes: dict[str, list[tuple[_Part, NDArray[np.float64]]]] = {}
     count: Counter[str] = Counter()

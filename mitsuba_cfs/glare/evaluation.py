@@ -204,7 +204,7 @@ def evaluate(
 
 
 def _placed(
-    picture: NDArray,
+    picture: NDArray[np.float64],
     geometry: GlareView,
     threshold: float,
     options: GlareOptions,
@@ -230,7 +230,7 @@ def _disc_illuminance(disc: SunDisc, geometry: GlareView) -> float:
 
 
 def _sources(
-    picture: NDArray, geometry: GlareView, threshold: float, options: GlareOptions
+    picture: NDArray[np.float64], geometry: GlareView, threshold: float, options: GlareOptions
 ) -> tuple[Sources, NDArray[np.int64]]:
     """The picture's sources, and the zone [n] of each."""
     if options.grouping == "pixels":
@@ -250,7 +250,10 @@ def _sources(
 
 
 def _positions(
-    options: GlareOptions, geometry: GlareView, pixel: tuple[NDArray, NDArray], direction: NDArray
+    options: GlareOptions,
+    geometry: GlareView,
+    pixel: tuple[NDArray[np.int64], NDArray[np.int64]],
+    direction: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Position index [n] of pixels in directions [n, 3]."""
     if options.position_model == "guth" and options.grouping == "pixels":
@@ -288,7 +291,7 @@ def prepare(
     return picture, Ev, flux / geometry.total_solid_angle, largest
 
 
-def task_luminance(picture: NDArray, geometry: GlareView, task: Task) -> float:
+def task_luminance(picture: NDArray[np.float64], geometry: GlareView, task: Task) -> float:
     """Average luminance [cd/m2] over solid angle of a task area; `picture` in scan order."""
     within = 2 * angles_to(task.x, task.y, geometry) <= task.angle
     weight = geometry.solid_angle[within]
@@ -305,7 +308,14 @@ def _threshold(options: GlareOptions, task: float) -> float:
     return factor if factor > 100 else factor * task
 
 
-def _background(options, geometry, sources: Sources, Ev, direct, mean) -> float:
+def _background(
+    options: GlareOptions,
+    geometry: GlareView,
+    sources: Sources,
+    Ev: float,
+    direct: float,
+    mean: float,
+) -> float:
     """Background luminance [cd/m2]."""
     if options.background == "indirect":
         return (Ev - direct) / np.pi
