@@ -25,6 +25,7 @@ from bim.planes import Plane, rings_of
 from bim.to_radiance import identifier
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.xml import bsdf_xml
+from mitsuba_cfs.directions import default_up
 from mitsuba_cfs.files import write_text
 
 TYPES = {"floor": "Floor", "ceiling": "RoofCeiling", "roof": "RoofCeiling"}
@@ -86,7 +87,7 @@ class _Library:
         self._materials: dict[str, dict] = {}
         self._constructions: dict[str, dict] = {}
         self._modifiers: dict[str, dict] = {}
-        self._bsdfs: dict[int, str] = {}  # modifier of each BSDF
+        self._bsdfs: dict[tuple, str] = {}  # modifier by BSDF and up vector
 
     def construction(self, one: Construction, solar: float, visible: float) -> str:
         """Name of layers whose room side reflects so much."""
@@ -147,16 +148,18 @@ class _Library:
         visible = None if file is None else file.bands.get("Visible") or file.bands.get("Solar")
         if file is None or visible is None:
             return None
-        if id(visible) not in self._bsdfs:
+        up = default_up(window.normal) if window.up is None else window.up
+        key = (id(visible), *np.round(up, 6).tolist())
+        if key not in self._bsdfs:
             name = f"bsdf_{len(self._bsdfs)}_{identifier(file.name)[:50]}"
-            self._bsdfs[id(visible)] = name
+            self._bsdfs[key] = name
             self._modifiers[name] = {
                 "type": "BSDF", "identifier": name, "display_name": file.name or name,
-                "modifier": None, "dependencies": [], "up_orientation": [0.0, 0.01, 1.0],
+                "modifier": None, "dependencies": [], "up_orientation": list(key[1:]),
                 "thickness": 0.0, "function_file": ".", "transform": None,
                 "bsdf_data": bsdf_xml(BsdfFile({"Visible": visible}, file.name)),
             }  # fmt: skip
-        return self._bsdfs[id(visible)]
+        return self._bsdfs[key]
 
     def modifier(self, reflectance: float) -> str:
         """Name of a grey diffuse plastic."""
