@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from mitsuba_cfs.bsdf.blinds import venetian_blind
 from mitsuba_cfs.bsdf.generate import generate_klems
-from mitsuba_cfs.bsdf.klems import KLEMS_QUARTER, KlemsBsdf
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_QUARTER, KlemsBsdf
 from mitsuba_cfs.bsdf.periodic import plastic, write_radiance
 from mitsuba_cfs.bsdf.radiance_geometry import read_radiance_layer
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
@@ -68,6 +68,20 @@ def test_info_lists_bands_and_angles(real_data):
     assert "LBNL/Klems Full, 145 x 145" in text and "thickness: 65.7 mm" in text
     normal = next(line for line in text.splitlines() if "normal" in line).split()
     assert normal[2:] == ["0.6477", "0.1225", "0.6623", "0.0980"]  # the file inventory's figures
+
+
+def test_a_missing_band_is_stated_wherever_its_values_are_printed(tmp_path, dummy_back):
+    """tau_e and g_tot of a file with a Visible band alone are those of light."""
+    assert "note: no Solar band: results use the Visible band instead" in run(
+        "info", dummy_back
+    ).stdout
+    flat = np.full((145, 145), 0.3 / np.pi)
+    shade = tmp_path / "shade.xml"
+    write_bsdf_xml(BsdfFile({"Visible": KlemsBsdf(KLEMS_FULL, KLEMS_FULL, *4 * [flat])}), shade)
+    alone = run("thermal", shade, "--place", "external", "--glazing", "C").stdout
+    shade.with_suffix(".toml").write_text("u_value = 1.3\ng_value = 0.4\n")
+    for text in (alone, run("thermal", shade).stdout):
+        assert "tau_e" in text and "shade has no Solar band; its Visible band is used" in text
 
 
 def test_check_finds_what_is_planted(dummy_back):
