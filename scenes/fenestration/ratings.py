@@ -71,7 +71,10 @@ def rated_state(path: Path, *, place: str | None, glazing: str | None, kappa: fl
         known = REFERENCE_GLAZINGS[glazing]
         tau, rho = (float(np.clip(v[0], 0.0, 1.0)) for v in (heat.transmittance, heat.reflectance))
         return RatedState(
-            path, system, heat, tuple(shade_ratings(tau, rho, place, known, kappa=kappa)),
+            path,
+            system,
+            heat,
+            tuple(shade_ratings(tau, rho, place, known, kappa=kappa)),
             notes=tuple(map(str, system.notes)),
         )
     try:

@@ -1,4 +1,4 @@
-"""gbXML: an optional value never refuses a file, whatever it holds; each removed and spoilt alone."""
+"""gbXML: an optional value never refuses a file; each is removed and spoilt alone."""
 
 from __future__ import annotations
 

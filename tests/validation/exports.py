@@ -3,10 +3,11 @@
     python -m tests.validation exports [FILES...] [--peers PYTHON] [--keep FOLDER]
 
 By default three buildings of ../shared/data/ifc/buildings.  `cfs ifc attach` gives U and g alone to
-the windows that face south, and the demo's venetian blind (BSDF, U, g) to the others; `cfs export --tau` writes the three formats.  honeybee and OpenStudio are those of another
-Python (`pip install honeybee-energy honeybee-radiance honeybee-openstudio openstudio`); EnergyPlus
-is that of pyenergyplus-lbnl.  EnergyPlus runs each model for DAYS days as it was written, and is
-then stopped; its table of the glazing is that of a copy that asks for it.
+the windows that face south, and the demo's venetian blind (BSDF, U, g) to the others; `cfs export
+--tau` writes the three formats.  honeybee and OpenStudio are those of another Python (`pip install
+honeybee-energy honeybee-radiance honeybee-openstudio openstudio`); EnergyPlus is that of
+pyenergyplus-lbnl.  EnergyPlus runs each model for DAYS days as it was written, and is then stopped;
+its table of the glazing is that of a copy that asks for it.
 
 Columns: rooms; faults (of honeybee's own check, of gbXML's schema 7.03 in OpenStudio, severe errors
 of EnergyPlus); EnergyPlus' warnings of surfaces that it drops or changes; then of the glazing the
