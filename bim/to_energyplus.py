@@ -30,6 +30,7 @@ from bim.energyplus_windows import complex_state
 from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of
 from bim.model import Building, Construction, Face, Space
 from bim.to_thermal import layers_of
+from mitsuba_cfs.errors import check_number
 from mitsuba_cfs.files import write_text
 from thermal.zone import OUTSIDE_ABSORPTANCE
 
@@ -62,6 +63,10 @@ def write_epjson(
         ground_c: [12] monthly temperature below floors and outside walls in the ground [degC];
             without it EnergyPlus takes 18 degC.
     """
+    for name, value in (("u_value", u_value), ("g_value", g_value)):
+        if value is not None:
+            check_number(name, value, 1e-3, 1.0 if name == "g_value" else 100.0)
+    check_number("air_changes", air_changes, 0.0)
     model = model_frame(building.name)
     if ground_c is not None:
         if len(ground_c) != len(MONTHS):

@@ -13,6 +13,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.errors import check_number
 from mitsuba_cfs.files import replacing
 
 
@@ -40,16 +41,19 @@ class SlatMaterial:
             raise ValueError(f"material {self.name}: front and back have different channels")
         if self.transmittance and len(self.transmittance) != self.channels:
             raise ValueError(f"material {self.name}: one transmittance for each channel")
+        check_number("roughness", self.roughness, 0.0)
+        for name in ("specular", "straight", "pane"):
+            check_number(name, getattr(self, name), 0.0, 1.0)
+        for share in (*self.reflectance_front, *self.reflectance_back, *self.transmittance):
+            check_number(f"material {self.name}: a reflectance or transmittance", share, 0.0, 1.0)
         worst = (
             np.maximum(self.reflectance_front, self.reflectance_back) + self.diffuse_transmittance
         )
-        if min(*self.reflectance_front, *self.reflectance_back, self.specular) < 0:
-            raise ValueError(f"material {self.name}: a reflectance is negative")
         whole = np.max(worst) + self.specular + self.straight
         if self.index and (self.index < 1 or whole > 0):
             raise ValueError(f"material {self.name}: a clear body has an index above 1, no colour")
-        if self.straight < 0 or not 0 <= self.pane <= 1 or (self.pane and not self.index):
-            raise ValueError(f"material {self.name}: expected shares of 1, a pane with an index")
+        if self.pane and not self.index:
+            raise ValueError(f"material {self.name}: a pane needs an index")
         if whole > 1 + 1e-9:
             raise ValueError(f"material {self.name}: reflects and transmits more than it gets")
 

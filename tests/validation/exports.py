@@ -5,8 +5,9 @@
 By default three buildings of ../shared/data/ifc/buildings.  `cfs ifc attach` gives U and g alone to
 the windows that face south, and the demo's venetian blind (BSDF, U, g) to the others; `cfs export
 --tau` writes the three formats.  honeybee and OpenStudio are those of another Python (`pip install
-honeybee-energy honeybee-radiance honeybee-openstudio openstudio`); EnergyPlus is that of
-pyenergyplus-lbnl.  EnergyPlus runs each model for DAYS days as it was written, and is then stopped;
+honeybee-energy honeybee-radiance honeybee-openstudio openstudio`): honeybee checks the model and
+writes its own input of EnergyPlus and its Radiance folder, which `oconv` compiles.  EnergyPlus is that
+of pyenergyplus-lbnl; it runs each model for DAYS days as it was written, and is then stopped;
 its table of the glazing is that of a copy that asks for it.
 
 Columns: rooms; faults (of honeybee's own check, of gbXML's schema 7.03 in OpenStudio, severe errors
@@ -114,8 +115,6 @@ def rows(path: Path, folder: Path, peers: Path | None) -> list[str]:
             "oconv model/scene/*.mat model/scene/*.rad model/aperture/*.mat model/aperture/*.rad "
             "> scene.oct", folder / "radiance",
         )  # fmt: skip
-        counts = energyplus(folder / "honeybee.idf", folder / "honeybee")
-        result.append(("honeybee's EnergyPlus", part["rooms"], *counts, []))
     counts = energyplus(folder / "model.epJSON", folder / "energyplus")
     rooms = len(json.loads((folder / "model.epJSON").read_text())["Zone"])
     result.append(("epJSON", rooms, *counts, tabled_panes(folder)))
