@@ -15,7 +15,7 @@ from bim.fenestration import ShadingState
 from bim.ifc.corrections import corrections_beside, corrections_file
 from bim.ifc.head import check_head
 from bim.model import Building, Window
-from bim.outdoor_model import OutdoorModel, selected
+from bim.outdoor_model import selected
 from mitsuba_cfs.errors import DataError
 
 Progress = Callable[[str, float], None]
@@ -67,7 +67,7 @@ def read_building_file(
     return surrounded(building, options.surroundings, options.surroundings_offset)
 
 
-def read_standing_file(
+def read_elements(
     path: Path,
     select: Sequence[str],
     *,
@@ -76,8 +76,8 @@ def read_standing_file(
     reflectance: float | None = None,
     selected_in: str | Path = "",
     progress: Progress | None = None,
-) -> OutdoorModel:
-    """All elements of a file of any format, and those that selectors choose.
+) -> tuple[Building, tuple[frozenset[str], ...]]:
+    """Building without rooms, of a file of any format, and the GUIDs that each selector chooses.
 
     Args:
         select: selectors, in an IFC file those of ifcopenshell, else those of `selected`.
@@ -115,7 +115,7 @@ def read_standing_file(
     if reflectance is not None:
         both = {"reflectance_visible": reflectance, "reflectance_solar": reflectance}
         elements = tuple(replace(element, **both) for element in elements)
-    return OutdoorModel(elements, chosen, tuple(issues), name)
+    return Building(name, (), elements, tuple(issues), file=path), chosen
 
 
 def surrounded(

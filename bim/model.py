@@ -140,11 +140,13 @@ class Window:
     is_open: bool = False  # no glass: a doorway, or where two rooms touch with nothing between
     glass: PlainGlass | None = None  # where the file describes the glazing as a single pane
     up: NDArray[np.float64] | None = None  # [3] up of its BSDF; world up (north if horizontal)
+    covered_area: float = 0.0  # of the glass, by layers that belong to another window [m2]
     normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, outdoors
-    area: float = field(init=False)  # of the glass [m2]
+    area: float = field(init=False)  # of the glass, without what is covered [m2]
 
     def __post_init__(self) -> None:
         set_normal_and_area(self)
+        object.__setattr__(self, "area", max(self.area - self.covered_area, 0.0))
 
     @property
     def frame_area(self) -> float:

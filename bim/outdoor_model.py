@@ -1,14 +1,12 @@
-"""Everything that stands outdoors in a model of any format, and what selectors choose of it."""
+"""The elements of a model of any format that a selector chooses."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
 from bim.model import Element
-from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
 
 # Properties of an element that a selector names, by its keys
@@ -17,16 +15,6 @@ KEYS = {
     "location": "storey", "class": "ifc_class",
 }  # fmt: skip
 FACET = re.compile(r'\s*(\w+)\s*(!?=)\s*("[^"]*"|/[^/]*/|[^,+]+)')
-
-
-@dataclass(frozen=True, slots=True)
-class OutdoorModel:
-    """Every element and terrain of a model, in world axes."""
-
-    elements: tuple[Element, ...]
-    chosen: tuple[frozenset[str], ...]  # GUIDs that each selector chose, in their order
-    issues: tuple[Issue, ...]
-    name: str
 
 
 def selected(elements: Iterable[Element], selector: str, file: str | Path = "") -> frozenset[str]:

@@ -10,13 +10,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel
 
 from bim.account import NOT_USABLE
 from bim.model import Building, Space
 from bim.report.issue import Audience, Issue, issue_note
 from bim.report.ranking import Ranked, ranked
-from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.bsdf.klems_peak import HIDDEN, SPECULAR, SPILL, peak_spill, through_peak
+from mitsuba_cfs.bsdf.tensor_peak import UNRESOLVED
+from mitsuba_cfs.glare.sun_disc import spread_sun_dgp
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import source_notes, window_sources
@@ -168,6 +171,8 @@ def model_lines(building: Building) -> tuple[str, ...]:
     """Rooms and glass that were read; with the verdict where the reader gives an account."""
     if building.account is not None:
         return building.account.lines
+    if not building.spaces:
+        return (Note("Elements read: {count}", count=len(building.elements)),)
     glass = sum(window.area for window in building.windows)
     return (
         Note("Rooms read: {count}", count=len(building.spaces)),
@@ -250,19 +255,55 @@ def system_notes(
 
 
 def _peak_note(system: FenestrationSystem) -> tuple[str, ...]:
-    """A sentence where the light that passes straight on is taken from the Klems patches."""
-    if system.angular is not None or system.tree is not None:
+    """A sentence on whether a transmission peak passes straight on, and on the error of that."""
+    bsdf, tree = system.visible.filled(), system.tree
+    basis, omega = bsdf.basis_in, bsdf.basis_in.projected_solid_angles()
+    share = bsdf.see_through if tree is None else tree.see_through
+    is_stated = (tree is None and share is not None) or (tree is not None and share != 1.0)
+    beam = through_peak(bsdf.transmission_front, basis, 1.0).transmittance
+    if system.angular is not None or beam[0] < LEAST_PEAK:
         return ()
-    bsdf = system.visible.filled()
-    peak = float(through_peak(bsdf.transmission_front, bsdf.basis_in).transmittance[0])
-    if peak < LEAST_PEAK:
-        return ()
-    note = Note(
-        "{system}: direct sun and view out use the specular peak of the Klems patches, "
-        "transmittance {peak:.2f} at normal incidence.",
-        system=system.name,
-        peak=peak,
-    )
+    passed = omega @ bsdf.direct_hemispherical(bsdf.transmission_front)
+    spill = peak_spill(bsdf.transmission_front, basis) if tree is None else 0.0
+    width = HIDDEN
+    if tree is not None:
+        width = UNRESOLVED * np.sqrt(np.pi) / (1 << max(t.depth for t in tree.blocks().values()))
+    values = {"system": system.name, "peak": float(beam[0]),
+              "file": system.file.name if system.file else system.name}  # fmt: skip
+    if is_stated:
+        note = Note(
+            "{system}: {share:.0f} % of the transmission peak ({peak:.2f} at normal incidence) "
+            "passes straight on, as stated; the rest is a lobe.",
+            share=100 * share,
+            **values,
+        )
+    elif spill > SPILL:
+        peaked = beam >= LEAST_PEAK
+        widest = float((omega / np.cos(basis.centres()[0]))[peaked].max())
+        note = Note(
+            "{system}: the transmission peak ({peak:.2f} at normal incidence) is a lobe, as it "
+            "spreads into the neighbouring Klems patches: no sun or view passes straight on. In "
+            "patches it is wider: DGP is up to {error:.2f} too low where the sun is seen through "
+            "it. If it is specular: --see-through {file}=specular.",
+            error=max(spread_sun_dgp(HIDDEN) - spread_sun_dgp((widest / 2 / np.pi) ** 0.5), 0.0),
+            **values,
+        )
+    elif omega @ beam >= SPECULAR * passed:
+        note = Note(
+            "{system}: the transmission peak ({peak:.2f} at normal incidence) is specular, as "
+            "hardly any light is scattered; direct sun and view out use it.",
+            **values,
+        )
+    else:
+        note = Note(
+            "{system}: the data do not show whether the transmission peak ({peak:.2f} at normal "
+            "incidence) is specular or a lobe of less than {width:.1f} degrees; it is taken as "
+            "specular. As a lobe, DGP is up to {error:.2f} lower where the sun is seen through "
+            "it: --see-through {file}=lobe.",
+            width=float(np.degrees(width)),
+            error=-spread_sun_dgp(width),
+            **values,
+        )
     return (note,)
 
 

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 
 from bim.building_file import STAGES, ReadOptions, check_building_file, read_building_file
+from bim.building_file import files_beside as building_files_beside
 from bim.model import Building
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, silent, summed
@@ -19,6 +20,7 @@ from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
 from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system
+from scenes.fenestration.thermal_file import files_beside
 from scenes.fenestration.thermal_system import checked_system
 from scenes.input_options import InputOptions
 from scenes.room.operation import (
@@ -40,27 +42,65 @@ class InputFiles:
     operation: Operation | None = None
 
 
-def read_files(options: InputOptions, *, light_only: bool = False) -> InputFiles:
+def read_files(
+    options: InputOptions,
+    *,
+    light_only: bool = False,
+    hourly: bool = True,
+    weather: Weather | None = None,
+    table: str = "",
+) -> InputFiles:
     """Read and check the weather, the system and the operation, the quick ones first.
 
-    Args: light_only: neither U nor g is needed.
+    Args:
+        light_only: neither U nor g is needed; hourly: the weather must have steps of 1 h.
+        weather: of the options' file, where it is read already.
+        table: of a study file that names a system, for messages; by default the flags do.
 
     Raises: `DataError` for a file that cannot be used.
     """
     check_building(options)
     if options.weather is None:
         raise ValueError("inputs from files need a weather file")
-    weather = read_weather(options.weather)
+    if weather is None:
+        weather = read_weather(options.weather, hourly=hourly)
     operation = None if options.operation is None else read_operation(options.operation)
-    system = read_override(options, heat=not light_only)
+    system = read_override(options, heat=not light_only, by="" if table else "--cfs")
     if operation is not None:
         check_systems(operation)
         states = () if system is None else (system,)
         if states or operation.systems:
             check_states(operation, len(states or operation.systems))
-        check_schedules(operation.tables, weather, operation.file)
-        operation.outdoors(weather)  # a street out of range is named before the building is read
-    return InputFiles(weather, overrides_of(options, system, operation, light_only), operation)
+        check_hours(operation, weather)
+    overrides = overrides_of(options, system, operation, light_only)
+    if table:
+        overrides = replace(overrides, ask=table)
+    return InputFiles(weather, overrides, operation)
+
+
+def check_hours(operation: Operation, weather: Weather) -> None:
+    """Raise `DataError` for schedules or a street of an operation that do not fit the weather."""
+    check_schedules(operation.tables, weather, operation.file)
+    operation.outdoors(weather)
+
+
+def named_files(options: InputOptions, operation: Operation | None) -> dict[str, Path]:
+    """The files that inputs are made of, by what they are; those that the building names are not.
+
+    Args: operation: of the options' file, or the building's own.
+    """
+    named = {"building": options.building, "weather": options.weather, "system": options.system}
+    files = {name: path for name, path in named.items() if path is not None}
+    if options.building is not None:
+        beside = building_files_beside(options.building)
+        files |= dict(zip(("corrections",), beside, strict=False))
+    if options.system is not None:
+        for i, path in enumerate(files_beside(options.system)):
+            files[f"system_angular_{i}" if i else "system_thermal"] = path
+    if operation is not None and operation.file != options.building:
+        files["operation"] = operation.file
+        files |= {f"state_{i}": path for i, path in enumerate(operation.files)}
+    return files | {f"surroundings_{i}": path for i, path in enumerate(options.surroundings)}
 
 
 def check_building(options: InputOptions) -> None:
@@ -80,26 +120,28 @@ def check_names(names: Sequence[str], field: str = "--space") -> None:
             raise DataError("expected the name or GUID of a room, got nothing", field=field)
 
 
-def read_weather(path: str | PathLike[str]) -> Weather:
-    """Hourly weather of one year from an EPW file.
+def read_weather(path: str | PathLike[str], *, hourly: bool = True) -> Weather:
+    """Weather of one year from an EPW file; hourly: in steps of 1 h.
 
     Raises: `DataError` for a file that cannot be used.
     """
     weather = read_epw(path)
-    if weather.step_h != 1.0:
+    if hourly and weather.step_h != 1.0:
         raise DataError(f"has steps of {weather.step_h:g} h; the run needs hours", file=path)
     return weather
 
 
-def read_override(options: InputOptions, *, heat: bool) -> FenestrationSystem | None:
+def read_override(
+    options: InputOptions, *, heat: bool, by: str = "--cfs"
+) -> FenestrationSystem | None:
     """The system of `options.system` for every window.
 
-    Args: heat: whether its U, g and BSDF must go together.
+    Args: heat: whether its U, g and BSDF must go together; by: as of `read_system`.
     """
     if options.system is None:
         return None
     values = {"u_value": options.u_value, "g_value": options.g_value}
-    system = read_system(options.system, **values, by="--cfs")
+    system = read_system(options.system, **values, by=by)
     if heat:
         checked_system(system, options.system)
     return system
@@ -120,10 +162,30 @@ def overrides_of(
     tau = options.visible_transmittance
     if tau is not None and not 0 < tau <= 1:
         raise DataError(f"expected more than 0, at most 1, got {tau:g}", field="--tau")
+    see_through = tuple(map(peak_share, options.see_through))
     return WindowOverrides(
         states, options.u_value, options.g_value, light_only=light_only,
-        visible=tau, glazing=options.glazing,
+        visible=tau, glazing=options.glazing, see_through=see_through,
     )  # fmt: skip
+
+
+def peak_share(text: str) -> tuple[str, float]:
+    """File or system, and the share of its peak that passes straight on, of FILE=KIND.
+
+    Args: KIND: specular, lobe, or the share, 0 to 1.
+
+    Raises: `DataError` for another text.
+    """
+    name, _, kind = text.rpartition("=")
+    known = {"specular": 1.0, "lobe": 0.0}
+    try:
+        share = known[kind] if kind in known else float(kind)
+    except ValueError:
+        share = -1.0
+    if not name or not 0 <= share <= 1:
+        message = f"expected FILE=specular, FILE=lobe or FILE=0.3, got {text!r}"
+        raise DataError(message, field="--see-through")
+    return Path(name).name, share
 
 
 def read_building(

@@ -31,6 +31,7 @@ class InputOptions:
     g_value: float | None = None  # of every window at normal incidence
     glazing: str | None = None  # generic glazing for windows whose file states no data
     visible_transmittance: float | None = None  # of windows without a BSDF, before the file's
+    see_through: tuple[str, ...] = ()  # FILE=specular, lobe or a share, see `input_files`
     operation: Path | None = None  # shading control, gains, set points
 
     @property

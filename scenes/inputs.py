@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from bim.building_file import read_elements
 from bim.model import Building, Space
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, part, silent
@@ -20,9 +21,8 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.chosen_rooms import chosen_spaces, named_spaces
 from scenes.fenestration.resolver import fill_windows, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
-from scenes.fenestration.thermal_file import files_beside
 from scenes.head import Head, head_of
-from scenes.input_files import InputFiles, building_of, read_files
+from scenes.input_files import InputFiles, building_of, named_files, read_files
 from scenes.input_options import NO_OPTIONS, InputOptions
 from scenes.room.inner_glass import opened, source_rooms
 from scenes.room.operation import (
@@ -77,17 +77,7 @@ class Inputs:
     @property
     def files(self) -> dict[str, Path]:
         """The files that the inputs are made of, by what they are."""
-        options = self.options
-        named = {"building": options.building, "weather": options.weather}
-        files = {name: path for name, path in named.items() if path is not None}
-        if options.system is not None:
-            files["system"] = options.system
-            for i, path in enumerate(files_beside(options.system)):
-                files[f"system_angular_{i}" if i else "system_thermal"] = path
-        if self.operation is not None and self.operation.file != options.building:
-            files["operation"] = self.operation.file
-            files |= {f"state_{i}": path for i, path in enumerate(self.operation.files)}
-        return files | {f"surroundings_{i}": path for i, path in enumerate(options.surroundings)}
+        return named_files(self.options, self.operation)
 
 
 def read_inputs(
@@ -161,6 +151,32 @@ def inputs_of(
         traced_building(building, systems), spaces, weather, systems, used, options, filled,
         notes, overrides.light_only,
     )  # fmt: skip
+
+
+def outdoor_inputs(
+    options: InputOptions,
+    files: InputFiles,
+    select: Sequence[str],
+    *,
+    leave_out: Sequence[str] = (),
+    reflectance: float | None = None,
+    file: Path | None = None,
+    progress: Progress = silent,
+) -> tuple[Inputs, tuple[frozenset[str], ...]]:
+    """The inputs of a command without rooms, and the GUIDs of the elements that selectors choose.
+
+    Args: file: that has the selectors, for messages; select to reflectance: as of `read_elements`.
+
+    Raises: `DataError` for a building that cannot be used, or a text that is no selector.
+    """
+    if options.building is None:
+        raise ValueError("elements are selected in a building's file")
+    building, chosen = read_elements(
+        options.building, select, options=options.read, leave_out=leave_out,
+        reflectance=reflectance, selected_in=file or "", progress=progress,
+    )  # fmt: skip
+    weather = with_albedo(files.weather, options.albedo)
+    return Inputs(building, (), weather, {}, files.operation, options), chosen
 
 
 def first_states(systems: Systems) -> Systems:

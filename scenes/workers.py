@@ -20,7 +20,8 @@ from concurrent.futures import (
     wait,
 )
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, field
 from functools import partial
 from importlib.util import find_spec
 from multiprocessing.process import BaseProcess
@@ -31,11 +32,10 @@ from typing import Any, ClassVar, Generic, TypeVar
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.processes import MOST_ENDED, how_it_ended, process_pool
 from mitsuba_cfs.variants import share_cores
-from scenes.user_errors import one_line
+from scenes.cluster import Cluster, Requirements
 
 T = TypeVar("T")
 R = TypeVar("R")
-CONNECT_SECONDS = 10
 AHEAD = 2  # tasks submitted for each process: one that runs and one that waits
 FETCHED = 8  # results of a cluster that are fetched ahead of their use
 
@@ -51,6 +51,7 @@ class Tasks(Generic[T, R]):
     failed: Callable[[T, BaseException], R]
     key: Callable[[T], str]  # unique
     scene: Callable[[T], str]
+    needs: Requirements = field(default_factory=Requirements)  # of a worker of a cluster
 
     def results(self, *, processes: int = 1, scheduler: str | None = None) -> Generator[R]:
         """The result of each task, in the order in which the tasks end.
@@ -124,42 +125,13 @@ class Tasks(Generic[T, R]):
 
     def _on_cluster(self, address: str) -> Iterator[R]:
         check_dask()
-        from distributed import Client, as_completed
-
-        try:
-            client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
-        except (OSError, ValueError) as error:
-            message = f"no Dask scheduler answers there: {one_line(str(error))}"
-            raise DataError(message, element=address, field="--scheduler") from error
         leaders, followers = self._waves()
-        by_key = {self._name(item): item for item in self.items}
-        held: dict[str, Any] = {}
-
-        def begin(some: Sequence[T]) -> list:
-            # one task for each key: Dask repeats the tasks of a worker that dies
-            started = [
-                client.submit(
-                    _attempted, self.compute, self.failed, item, key=self._name(item), pure=True
-                )
-                for item in some
-            ]
-            held.update({future.key: future for future in started})
-            return started
-
-        def ready() -> Iterator[R]:
-            done = as_completed(begin(leaders), loop=client.loop)
-            for future in done:
-                item = by_key[future.key]
-                result = self._collected(future.result, item)
-                held.pop(future.key).release()  # else a dying worker would make Dask repeat it
-                done.update(begin(followers.pop(self.key(item), [])))
-                yield result
-
-        with client:
-            yield from _fetched(ready(), lambda: client.cancel(list(held.values())))
-
-    def _name(self, item: T) -> str:
-        return f"cfs-{self.key(item)}"
+        cluster = Cluster[T, R](
+            address, self.needs, partial(_outcome, self.compute, self.failed), self.failed, self.key
+        )
+        results = cluster.results(leaders, lambda item: followers.pop(self.key(item), []))
+        with closing(results):
+            yield from _fetched(results, cluster.stop)
 
 
 def _fetched(ready: Iterator[R], cancel: Callable[[], object]) -> Iterator[R]:
@@ -205,11 +177,18 @@ class _Work:
 
 
 def _attempted(compute: Callable[[T], R], failed: Callable[[T, BaseException], R], item: T) -> R:
+    return _outcome(compute, failed, item)[0]
+
+
+def _outcome(
+    compute: Callable[[T], R], failed: Callable[[T, BaseException], R], item: T
+) -> tuple[R, BaseException | None]:
+    """The result of a task, and its error if it has failed."""
     try:
-        return compute(item)
+        return compute(item), None
     except Exception as error:
         log.debug("%s failed", item, exc_info=True)
-        return failed(item, error)
+        return failed(item, error), error
 
 
 class _Crew(Generic[T]):

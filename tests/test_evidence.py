@@ -15,6 +15,7 @@ NO_EVIDENCE = {
     "issues.md": "all",
     "quickstart.md": "all",
     "validation.md": {"| subject | judged by | page |"},
+    "bsdf.md": {"| stated | by | used as | DGP |"},
     "daylight.md": {"| function | gives |"},
     "glare.md": {
         "| index | of | source |", "| option | default | |",
@@ -25,7 +26,7 @@ NO_EVIDENCE = {
         "| to | read |", "| closure | absorptances from | layer resistance | film resistances |",
     },
     "comply.md": {"| in the folder of results | what |", "| option | what |"},
-    "studies.md": {"| in the folder | what |"},
+    "studies.md": {"| in the folder | what |", "| event | what is done |"},
     "pv.md": {"| key | meaning |"},
 }  # fmt: skip
 ONCE = {"benchmarks.md", "reliability.md"}  # pages that say it once, for all of their tables

@@ -96,6 +96,7 @@ def _window(name: str, window: PanedWindow, issues: dict[Issue, None]) -> Window
         name, name, triangles, opening_area=_area(triangles),
         visible_transmittance=None if glass is None else glass.transmittance,
         type_name=window.panes[-1].material.name, states=states, glass=glass, up=up,
+        covered_area=window.covered * _area(triangles),
     )  # fmt: skip
 
 

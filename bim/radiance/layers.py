@@ -2,7 +2,8 @@
 
 Each layer has a specular part by the angle of incidence and a diffuse one. The specular parts
 are combined exactly, with all reflections between the layers and by polarisation; the diffuse
-ones by Klems matrices. A pattern counts by its mean over the surface.
+ones by Klems matrices. A pattern counts by its mean over the surface. A rough translucent panel
+is a tensor tree with its lobe; behind or in front of other layers its lobe is that of its patches.
 
 Source: "The RADIANCE 5.1 Synthetic Imaging System", 3.2 and 3.3; `normal.c`, `glass.c`,
 `m_brdf.c` of Radiance.
@@ -11,7 +12,8 @@ Source: "The RADIANCE 5.1 Synthetic Imaging System", 3.2 and 3.3; `normal.c`, `g
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -33,8 +35,10 @@ from bim.report.issue import Issue
 from mitsuba_cfs.bsdf.angular import ANGLES, AngularTable
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
+from mitsuba_cfs.bsdf.lobe import NARROWEST, lobe_tree
 from mitsuba_cfs.bsdf.pane_stack import PaneOptics, stack
 from mitsuba_cfs.bsdf.resample import klems_of
+from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.gloss import lacquer, polarised_shares
 
@@ -93,6 +97,9 @@ def layered_window(things: Sequence[RadianceObject], outwards: Sequence[bool]) -
         _bsdf_layer(thing) if thing.material.kind in SYSTEMS else _layer(thing, outward, issues)
         for thing, outward in zip(things, outwards, strict=True)
     ]
+    rough = [layer for layer in layers if isinstance(layer, TensorTreeBsdf)]
+    if rough and len(layers) == 1:
+        return LayeredWindow(ShadingState(bands={"Visible": rough[0]}), issues=tuple(issues))
     ups = [up for thing in things if (up := up_vector(thing)) is not None]
     if any(ups[0] @ other < 0.9999 for other in ups[1:]):
         raise things[-1].primitive.fault("two BSDF in series have different up vectors")
@@ -102,8 +109,9 @@ def layered_window(things: Sequence[RadianceObject], outwards: Sequence[bool]) -
         whole = stack([layer.specular for layer in plain])
         values = (whole.tau, whole.rho_front, whole.rho_back)
         angular = AngularTable(ANGLES, *(np.clip(one.mean(axis=0), 0, 1) for one in values))
-    klems = [layer.klems if isinstance(layer, WindowLayer) else layer for layer in layers]
+    klems = [layer.klems if isinstance(layer, WindowLayer) else klems_of(layer) for layer in layers]
     system = klems[0] if len(klems) == 1 else combine_layers(klems).bsdf
+    system = replace(system, see_through=0.0) if rough else system
     state = ShadingState(bands={"Visible": system}, angular=angular)
     return LayeredWindow(state, ups[0] if ups else None, tuple(issues))
 
@@ -157,7 +165,9 @@ def _bsdf_layer(thing: RadianceObject) -> KlemsBsdf:
     return klems_of(file.bands.get("Visible") or file.bands["Solar"]).filled()
 
 
-def _layer(thing: RadianceObject, outward: bool, issues: list[Issue]) -> WindowLayer:
+def _layer(
+    thing: RadianceObject, outward: bool, issues: list[Issue]
+) -> WindowLayer | TensorTreeBsdf:
     material, zero = thing.material, np.zeros(len(ANGLES))
     patterns = thing.definitions[:-1]
     for one in patterns:
@@ -187,20 +197,30 @@ def _layer(thing: RadianceObject, outward: bool, issues: list[Issue]) -> WindowL
     raise thing.primitive.fault(f"{material.kind} is not computed as a layer of a window")
 
 
-def _trans_layer(thing: RadianceObject, colour: NDArray[np.float64]) -> WindowLayer:
-    """A smooth `trans`: diffuse and straight transmission."""
+def _trans_layer(
+    thing: RadianceObject, colour: NDArray[np.float64]
+) -> WindowLayer | TensorTreeBsdf:
+    """A `trans`: diffuse and straight transmission; a rough one scatters both beams in lobes."""
     numbers = thing.definitions[-1].primitive.numbers
     specular, roughness, passed, straight = numbers[3], numbers[4], *numbers[-2:]
-    if passed * straight > 0 and roughness**2 > SMOOTH:
+    is_rough = passed * straight > 0 and roughness**2 > SMOOTH
+    if is_rough and roughness < NARROWEST:
         raise thing.definitions[-1].primitive.fault(
-            f"scatters its beam in a lobe of roughness {roughness:g}: make its BSDF by genBSDF"
+            f"scatters its beam in a lobe of roughness {roughness:g}: computed are 0 and "
+            f"{NARROWEST:.3f} or more"
         )
     mirrored = lacquer(specular, roughness).reflectance(np.cos(ANGLES))
     rest = colour * luminance(numbers) * (1 - mirrored)
     beam, mirror = (np.stack([v, v]) for v in (rest * passed * straight, mirrored))
     diffuse = rest * (1 - passed)
     scattered = rest * passed * (1 - straight)
-    return WindowLayer(PaneOptics(beam, mirror, mirror), scattered, diffuse, diffuse)
+    if not is_rough:
+        return WindowLayer(PaneOptics(beam, mirror, mirror), scattered, diffuse, diffuse)
+    through, back = (
+        lobe_tree(roughness, *(partial(np.interp, xp=ANGLES, fp=values) for values in pair))
+        for pair in ((beam[0], scattered), (mirrored, diffuse))
+    )
+    return TensorTreeBsdf(through, through, back, back, see_through=0.0)
 
 
 def _function_layer(

@@ -23,11 +23,13 @@ OVERLAP = 0.02  # share of a window from which a pane before it is reported
 COVER = 0.98  # share of a window from which a pane covers it
 MOSTLY = 0.5  # share from which it is refused
 MOST_LAYERS = 8
-POINTS = 256  # on a pane, from which rays along its normal start
+POINTS = 256  # on a pane, from which rays start
+EYES = 16  # points on a window, from which what is in its room is seen
 OPEN = 0.5  # share of the rays from the inner side of a pane without a room that meet nothing
 ESCAPING = 0.2  # share of the walks from the inner side of a fabric without a room that end
 BOUNCES = 6  # of these walks
-RAYS = 128  # from each triangle of a pane
+RAYS = 128  # from each triangle, or each point, of a pane
+PAST = 3e-4  # share of a pane's light that misses the layers behind it, from which it is a window
 NARROW = 0.1  # translucent strips narrower than this are no panes [m]
 BEFORE = 1e-3  # distance from a pane at which its rays start [m]
 
@@ -38,6 +40,7 @@ class PanedWindow:
 
     surface: WindowSurface  # its innermost pane, seen from outdoors
     panes: tuple[RadianceObject, ...]  # the outer one first
+    covered: float = 0.0  # share of the pane that layers of another window cover
 
     @property
     def outwards(self) -> list[bool]:
@@ -65,9 +68,10 @@ def panes_of(
     """Windows of a scene's room, and its glass that is not simulated.
 
     Panes of glass, fabrics, translucent panels and BSDF in front of a window, at most half a
-    metre away and parallel to it, are layers of its glazing. Panes farther in front are refused
-    where they cover most of a window, and else reported; panes with no room behind them are left
-    out and reported.
+    metre away and parallel to it, are layers of its glazing. A pane past whose layers light
+    reaches the room, beside a fabric, is a window too. Panes farther in front are refused where
+    they cover most of a window, and else reported; panes with no room behind them are left out
+    and reported.
 
     Args:
         apertures: materials or modifiers of windows.
@@ -94,16 +98,24 @@ def panes_of(
         if named or space.has_room(thing, surface):
             chosen.append((thing, surface))
     fronts = [space.before(thing, surface, refuse=not named) for thing, surface in chosen]
-    layers = {pane for one in fronts for pane in one.hidden}
+    layers: dict[int, list[WindowSurface]] = {}  # the windows behind each
+    for one, (_, surface) in zip(fronts, chosen, strict=True):
+        for pane in one.hidden:
+            layers.setdefault(pane, []).append(surface)
     far = {id(pane) for one in fronts for pane in one.others}
     windows, issues = [], []
     for front, (thing, surface) in zip(fronts, chosen, strict=True):
-        reach = REACH if id(thing) in far else LAYERS
-        if id(thing) in layers | far and not space.is_open_behind(surface, reach):
-            continue
-        windows.append(PanedWindow(surface, (*front.layers, thing)))
+        covered = 0.0
+        if id(thing) in far:
+            if space.free_share(surface, REACH) <= OVERLAP:
+                continue
+        elif id(thing) in layers:
+            if space.past_share(surface, layers[id(thing)]) <= PAST:
+                continue
+            covered = 1.0 - space.free_share(surface, LAYERS)
+        windows.append(PanedWindow(surface, (*front.layers, thing), covered))
         issues += front.issues
-    used = {id(pane) for window in windows for pane in window.panes} | layers | far | dark
+    used = {id(pane) for window in windows for pane in window.panes} | set(layers) | far | dark
     rest = [o for o in scene.objects if not o.material.is_opaque and id(o) not in used]
     return Panes(tuple(windows), (*issues, *map(_left_out, rest)))
 
@@ -175,10 +187,36 @@ class _Space:
         hidden = {id(self._objects[n]) for n in seen}
         return _Front(panes, hidden, tuple(left_out), tuple(issues))
 
-    def is_open_behind(self, surface: WindowSurface, reach: float) -> bool:
-        """Whether some of a pane has neither another pane nor a wall on its room side."""
+    def free_share(self, surface: WindowSurface, reach: float) -> float:
+        """Share of a pane with neither another pane nor a wall on its room side."""
         rays = self._along(surface, -surface.normal, reach)
-        return sum(not met and end > reach for met, end in rays) > OVERLAP * POINTS
+        return sum(not met and end > reach for met, end in rays) / POINTS
+
+    def past_share(self, surface: WindowSurface, behind: Sequence[WindowSurface]) -> float:
+        """Share of diffuse light from a pane that reaches the room past the windows behind it.
+
+        Rays that meet nothing up to the farthest of these windows' planes, and then something
+        that one of them sees.
+        """
+        inwards = -surface.normal
+        points = points_on_triangles(surface.triangles, even_numbers(POINTS))[0]
+        points += BEFORE * (surface.triangles.mean(axis=(0, 1)) - points)  # off the pane's edges
+        starts = np.repeat(points + BEFORE * inwards, RAYS, axis=0)
+        rays = np.tile(hemisphere(inwards, RAYS), (POINTS, 1))
+        cosine = rays @ inwards
+        depth = max(
+            float((one.triangles[0, 0] - surface.triangles[0, 0]) @ inwards) for one in behind
+        )
+        distance, hit = self._mesh.first_hits(starts, rays)
+        past = np.flatnonzero((hit >= 0) & (distance * cosine > depth + BEFORE))
+        ends = starts[past] + (distance[past, None] - BEFORE) * rays[past]
+        seen = np.zeros(len(past), dtype=bool)
+        for one in behind:
+            for point in points_on_triangles(one.triangles, even_numbers(EYES))[0]:
+                ways = ends[~seen] - (point - BEFORE * one.normal)
+                meets = self._mesh.first_hits(ends[~seen] - ways, ways, 1.0)[1] >= 0
+                seen[~seen] = ~meets & (ways @ one.normal < 0)
+        return float(cosine[past[seen]].sum() / cosine.sum())
 
     def has_room(self, thing: RadianceObject, surface: WindowSurface) -> bool:
         """Whether the inner side of a pane looks into a room.

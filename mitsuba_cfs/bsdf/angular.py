@@ -149,7 +149,7 @@ def check_specular(klems: KlemsBsdf, angular: AngularTable | None, path: Path) -
     if angular is None:
         return
     omega = klems.basis_in.projected_solid_angles()
-    peak = through_peak(klems.transmission_matrix() / omega, klems.basis_in)
+    peak = through_peak(klems.transmission_matrix() / omega, klems.basis_in, 1.0)
     beam, rest = omega @ peak.transmittance / np.pi, omega @ peak.scattered @ omega / np.pi
     if rest > SCATTERED_LIMIT * (beam + rest):
         share = 100 * rest / (beam + rest)

@@ -149,6 +149,7 @@ class KlemsBsdf:
     transmission_back: NDArray[np.float64] | None = None  # [K out, K in] [1/sr]
     reflection_front: NDArray[np.float64] | None = None  # [K out, K in] [1/sr]
     reflection_back: NDArray[np.float64] | None = None  # [K out, K in] [1/sr]
+    see_through: float | None = None  # share of its peak that passes straight on; None: by the data
 
     def __post_init__(self) -> None:
         shape = (self.basis_out.size, self.basis_in.size)

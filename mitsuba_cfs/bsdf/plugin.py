@@ -64,8 +64,11 @@ def klems_plugin(
             entry[prefix + name] = mi.TensorXf(np.ascontiguousarray(block, dtype=np.float32))
     if up is not None:
         entry["up"] = list(map(float, up))
+    if klems.see_through is not None:
+        entry["see_through"] = klems.see_through
     if angular is not None:
-        entry |= {"peak": True, "angular": mi.TensorXf(angular.by_cosine().astype(np.float32))}
+        table = mi.TensorXf(angular.by_cosine().astype(np.float32))
+        entry |= {"peak": True, "angular": table, "see_through": 1.0}
     return entry
 
 
@@ -99,7 +102,7 @@ def without_peak(klems: KlemsBsdf) -> tuple[KlemsBsdf, NDArray[np.float64]]:
     """The system without its through beams, and their transmittances [front and back, K]."""
     full = klems.filled()
     peaks = [
-        through_peak(block, klems.basis_in)
+        through_peak(block, klems.basis_in, klems.see_through)
         for block in (full.transmission_front, full.transmission_back)
     ]
     rest = replace(
@@ -119,7 +122,8 @@ def _read(props) -> tuple[KlemsBsdf, tuple[KlemsBsdf, KlemsBsdf] | None]:
     bands = []
     for prefix in PREFIXES:
         blocks = {n: np.float64(props[prefix + n]) for n in names if prefix + n in props}
-        bands.append(KlemsBsdf(basis, basis, **blocks))
+        share = float(props["see_through"]) if "see_through" in props else None
+        bands.append(KlemsBsdf(basis, basis, **blocks, see_through=share))
     return bands[0], tuple(bands[1:]) if bands[1].blocks() else None
 
 

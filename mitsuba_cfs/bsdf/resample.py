@@ -29,7 +29,8 @@ def klems_of(bsdf: Bsdf, basis: KlemsBasis = KLEMS_FULL, *, samples: int = 64) -
         return bsdf.filled()
     rest = without_beam(bsdf) if isinstance(bsdf, TensorTreeBsdf) else bsdf
     blocks = {name: _block(bsdf, rest, name, basis, samples) for name in BLOCKS}
-    return KlemsBsdf(basis, basis, **blocks)
+    straight = bsdf.see_through if bsdf.see_through is not None else 1.0
+    return KlemsBsdf(basis, basis, **blocks, see_through=straight)
 
 
 def _block(

@@ -75,9 +75,9 @@ def _without_peaks(
         share = np.zeros((1,) * (tree.rank - 2))
         if own is not None and name.startswith("transmission"):
             if tree.rank == 4:
-                tree, share = through_peak(tree)
+                tree, share = through_peak(tree, bsdf.see_through)
             else:  # the beam of the other side is equal
-                tree, share = through_peak(own)
+                tree, share = through_peak(own, bsdf.see_through)
                 tree = tree.reversed() if turned else tree
         rest.append(tree)
         shares.append(share)
@@ -140,7 +140,7 @@ def tensor_tree_plugin(
     variants.activate(vectorised=False)
     import mitsuba as mi
 
-    entry = {"type": PLUGIN, "peak": peak}
+    entry = {"type": PLUGIN, "peak": peak, "see_through": bsdf.see_through}
     for prefix, band in zip(PREFIXES, (bsdf, *(colour or ())), strict=False):
         for name, tree in band.blocks().items():
             entry[f"{prefix}{name}_depths"] = mi.TensorXf(tree.depths.astype(np.float32))
@@ -149,7 +149,8 @@ def tensor_tree_plugin(
     if up is not None:
         entry["up"] = list(map(float, up))
     if angular is not None:
-        entry |= {"peak": True, "angular": mi.TensorXf(angular.by_cosine().astype(np.float32))}
+        table = mi.TensorXf(angular.by_cosine().astype(np.float32))
+        entry |= {"peak": True, "angular": table, "see_through": 1.0}
     return entry
 
 
@@ -166,7 +167,7 @@ def _read(props) -> tuple[TensorTreeBsdf, tuple[TensorTreeBsdf, TensorTreeBsdf] 
                 depths, values = (np.array(part).ravel() for part in parts)
                 rank = int(props["rank"])
                 trees[name] = TensorTree(rank, depths.astype(np.int64), values.astype(float))
-        bands.append(TensorTreeBsdf(**trees))
+        bands.append(TensorTreeBsdf(**trees, see_through=float(props["see_through"])))
     return bands[0], tuple(bands[1:]) if bands[1].blocks() else None
 
 

@@ -197,6 +197,7 @@ class TensorTreeBsdf:
     transmission_back: TensorTree | None = None
     reflection_front: TensorTree | None = None
     reflection_back: TensorTree | None = None
+    see_through: float = 1.0  # share of its peak that passes straight on
 
     def blocks(self) -> dict[str, TensorTree]:
         """The trees that are there, by name."""

@@ -39,3 +39,14 @@ def seen_disc(directions: ArrayLike, luminance: ArrayLike) -> SunDisc | None:
         float(square / flux),
         float(flux**2 / square * SUN_SOLID_ANGLE / len(L)),
     )
+
+
+def spread_sun_dgp(width: float) -> float:
+    """Change of DGP, 0 or less, where a lobe spreads the sun's disc: the greatest in amount.
+
+    The lobe has the same flux, so that sum L^2 omega falls by the ratio of the solid angles, and
+    DGP by at most 0.092 times its logarithm (`daylight_glare_probability`).
+
+    Args: width: half width at 1/e of the Gaussian lobe [rad], as bright as 2 pi width^2 [sr].
+    """
+    return -0.092 * float(np.log10(max(2 * np.pi * width**2 / SUN_SOLID_ANGLE, 1.0)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Protocol
 
@@ -68,7 +68,8 @@ class BsdfOptics:
             angular: transmittance and reflectances of a specular system by angle; the matrices
                 have their means over patches.
         """
-        self._coarse = bsdf if isinstance(bsdf, KlemsBsdf) else klems_of(bsdf)
+        coarse = bsdf if isinstance(bsdf, KlemsBsdf) else klems_of(bsdf)
+        self._coarse = coarse if angular is None else replace(coarse, see_through=1.0)
         self._fine, self._angular = bsdf if fine is None else fine, angular
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:

@@ -70,7 +70,7 @@ def system_traits(bsdf: Bsdf) -> tuple[float, float, float, float]:
     klems: KlemsBsdf = klems_of(bsdf)
     basis = klems.basis_in
     omega = basis.projected_solid_angles()
-    peak = through_peak(klems.filled().transmission_front, basis)
+    peak = through_peak(klems.filled().transmission_front, basis, klems.see_through)
     beam, scattered = omega @ peak.transmittance, peak.scattered * omega * omega[:, None]
     whole = beam + scattered.sum()
     if not whole > 0:

@@ -45,15 +45,14 @@ def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
     are selected by material, type, name or GUID.  Shading and reflections by all surfaces of the
     model are traced, with the true disc of the sun.
     """
-    from mitsuba_cfs.sky.albedo import with_albedo
-    from mitsuba_cfs.sky.epw import read_epw
+    from scenes.input_files import read_files
     from scenes.photovoltaics.study_file import read_pv_study
     from scenes.result_folder import ResultFolder
 
     study = read_pv_study(study_file)
     options = InputOptions(**chosen)
     building, weather, quick = options.building, options.weather, options.quick
-    climate = with_albedo(read_epw(weather), options.albedo)
+    files = read_files(options, hourly=False)
     folder = ResultFolder(out, "pv", inputs=(building, weather, study_file))
     # all that is small is read: what is heavy is loaded now
     from mitsuba_cfs import variants
@@ -67,7 +66,7 @@ def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
         click.echo(quick_run.NOTE)
     with ProgressBar() as progress:
         result = run_pv(
-            options, climate, study, file=study_file, seed=seed, progress=progress,
+            options, files, study, file=study_file, seed=seed, progress=progress,
             cache=MatrixCache.of_user() if options.cache else None, on_head=head,
             **(quick_run.PV if quick else {}),
         )  # fmt: skip
@@ -85,7 +84,7 @@ def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
             f"{row.yield_kwh:.0f} kWh a year ({row.kwh_per_kw:.0f} kWh/kW), "
             f"mismatch {100 * row.mismatch_loss:.1f} %"
         )
-    head.notes(climate.notes)
+    head.notes(result.weather.notes)
     click.echo(f"results: {out}")
 
 

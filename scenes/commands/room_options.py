@@ -159,6 +159,10 @@ tau_option = click.option(
     "--tau", "visible_transmittance", type=click.FloatRange(0, 1, min_open=True),
     help="Visible transmittance of windows without a BSDF.",
 )  # fmt: skip
+see_through_option = click.option(
+    "--see-through", multiple=True, metavar="FILE=KIND",
+    help="Whether the transmission peak of a BSDF is 'specular', a 'lobe', or the specular share.",
+)  # fmt: skip
 u_option = click.option(
     "--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value of the windows [W/(m2 K)]."
 )
@@ -318,6 +322,7 @@ def input_options(
         *([albedo_option] if weather else []),
         *([system_option] if system else []),
         *([glazing_option, tau_option] if glazing else []),
+        *([see_through_option] if weather and system else []),
         *([] if not spaces else [
             space_option("spaces", f"default: {spaces}", several=several), join_option,
             furniture_option, surroundings_option, surroundings_offset_option,

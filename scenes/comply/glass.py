@@ -37,7 +37,7 @@ def sight_through(system: FenestrationSystem) -> SightThrough:
     """Visible transmittance at normal incidence: total, and specular alone."""
     klems = system.visible
     block = klems.transmission_matrix() / klems.basis_in.projected_solid_angles()
-    straight = through_peak(block, klems.basis_in).transmittance[0]
+    straight = through_peak(block, klems.basis_in, klems.see_through).transmittance[0]
     return SightThrough(float(klems.direct_hemispherical(block)[0]), float(straight))
 
 

@@ -38,7 +38,13 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.notes import Note
 from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS, HONEYBEE_DEFAULT
-from scenes.fenestration.systems import FenestrationSystem, States, WindowOverrides, system_of
+from scenes.fenestration.systems import (
+    FenestrationSystem,
+    States,
+    WindowOverrides,
+    system_of,
+    with_see_through,
+)
 from scenes.fenestration.thermal_file import ThermalFile
 from scenes.language.catalogue import N_
 from thermal.gvalue import TYPICAL_SYSTEMS
@@ -89,7 +95,8 @@ def _system(state: ShadingState, window: Window, path: Path, source: str) -> Fen
     named = "" if state.file is None else f" as {state.file.name}"
     thermal = held_thermal(state)
     angular = thermal.pop("angular") if state.angular is not None else None
-    system = system_of(state.bands, name, path=path, source=f"{source}{named}", **thermal)
+    thermal |= {"source": f"{source}{named}", "file": state.file}
+    system = system_of(state.bands, name, path=path, **thermal)
     return system if angular is None else replace(system, angular=angular)
 
 
@@ -153,6 +160,7 @@ def fill_windows(
     """
     windows = list(windows)
     result, unfilled = held_systems(windows, overrides, file)
+    result = _with_peaks(result, overrides)
     for missing, names in unfilled.items():
         attach = (
             ", attach data (cfs ifc attach), or state VisibleLightTransmittance and "
@@ -164,6 +172,22 @@ def fill_windows(
             element=f"window {_listed(names)}",
         )
     return result
+
+
+def _with_peaks(systems: dict[str, States], overrides: WindowOverrides) -> dict[str, States]:
+    """The systems with the user's shares of their peaks that pass straight on.
+
+    Raises: `DataError` for a name that is of no system.
+    """
+    known = {id(s): s for states in systems.values() for s in states}
+    for name, share in overrides.see_through:
+        names = {i: (s.name, s.file.name if s.file else s.name) for i, s in known.items()}
+        meant = [i for i, both in names.items() if name in both]
+        if not meant:
+            there = ", ".join(dict.fromkeys(file for _, file in names.values()))
+            raise DataError(f"no system is {name!r}; there are {there}", field="--see-through")
+        known |= {i: with_see_through(known[i], share) for i in meant}
+    return {guid: tuple(known[id(s)] for s in states) for guid, states in systems.items()}
 
 
 def held_systems(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -78,6 +78,8 @@ class WindowOverrides:
     ask: str = "--cfs FILE, --glazing or --tau"  # how a system is given, for the error that none is
     light_only: bool = False  # neither U nor g is needed
     named: tuple[tuple[tuple[str, ...], States], ...] = ()  # states of windows by name or GUID
+    # of --see-through: share of the peak that passes straight on, by name of file or system
+    see_through: tuple[tuple[str, float], ...] = ()
 
 
 def read_system(
@@ -85,20 +87,23 @@ def read_system(
     *,
     u_value: float | None = None,
     g_value: float | None = None,
+    see_through: float | None = None,
     by: str = "",
 ) -> FenestrationSystem:
     """The system of a BSDF XML file, with U and g given, or of the `.toml` file beside it.
 
     The `.toml` file has the name of the XML file; see `ThermalFile`.
 
-    Args: by: what names the file, such as "--cfs"; goes before its name in the system's source.
+    Args:
+        see_through: as of `with_see_through`; None: by the data.
+        by: what names the file, such as "--cfs"; goes before its name in the system's source.
 
     Raises: `DataError` for a file that cannot be used.
     """
     path = Path(path)
     file = read_bsdf_xml(path)
     beside = ThermalFile.read(path.with_suffix(".toml"))
-    return system_of(
+    system = system_of(
         file.bands,
         file.name or path.stem,
         path=path,
@@ -113,6 +118,26 @@ def read_system(
         file=path,
         source=f"{by} {path.name}".strip(),
     )
+    return system if see_through is None else with_see_through(system, see_through)
+
+
+def with_see_through(system: FenestrationSystem, share: float) -> FenestrationSystem:
+    """The system with the share of its transmission peak that passes straight on.
+
+    Args: share: 1: the peak is specular; 0: it is a lobe, as wide as the data resolve it.
+
+    Raises: `DataError` for a system of panes or with an angular function: its beam is known.
+    """
+    if not 0 <= share <= 1:
+        raise DataError(f"expected 0 to 1, got {share:g}", file=system.file, field="see_through")
+    if system.angular is not None:
+        message = f"{system.name} has an angular function: it is specular"
+        raise DataError(message, file=system.file, field="see_through")
+    if system.tree is None:
+        visible = replace(system.visible, see_through=share)
+        return replace(system, visible=visible)
+    tree = replace(system.tree, see_through=share)
+    return replace(system, tree=tree, visible=klems_of(tree))
 
 
 def system_of(

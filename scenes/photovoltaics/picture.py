@@ -29,7 +29,7 @@ def irradiation_picture(result: PvResult, towards: NDArray[np.float64]) -> NDArr
     Modules carry the annual irradiation of their groups of cells, everything else is grey; they
     are drawn over whatever obstructs them.
     """
-    elements = result.outdoors.elements
+    elements = result.building.elements
     triangles = np.concatenate([element.triangles for element in elements])
     owner = np.repeat([e.guid for e in elements], [len(e.triangles) for e in elements])
     number = {module.guid: k for k, module in enumerate(result.modules)}

@@ -1,25 +1,27 @@
-"""From a building's file and a weather file to the yield of its photovoltaic modules."""
+"""From the inputs of a command to the yield of a building's photovoltaic modules."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from bim.building_file import read_standing_file
-from bim.outdoor_model import OutdoorModel
+from bim.model import Building
 from bim.report.issue import Issue
 from bim.to_tracer import COMPASS
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes.head import NO_HEAD, Head
+from scenes.input_files import InputFiles
 from scenes.input_options import InputOptions
+from scenes.inputs import outdoor_inputs
 from scenes.photovoltaics.energy import Subsystem, SubsystemYield, subsystem_yields
 from scenes.photovoltaics.irradiance import CellIrradiance, cell_irradiance
 from scenes.photovoltaics.modules import PvModule, pv_modules
@@ -33,7 +35,7 @@ FLAT = 30.0  # a face tilted less looks up [degrees]
 class PvResult:
     """Result of a photovoltaic study."""
 
-    outdoors: OutdoorModel
+    building: Building  # with every element, without rooms
     modules: tuple[PvModule, ...]
     subsystems: tuple[Subsystem, ...]
     irradiance: CellIrradiance
@@ -91,7 +93,7 @@ class PvResult:
 
 def run_pv(
     options: InputOptions,
-    weather: Weather,
+    files: InputFiles,
     study: PvStudy,
     *,
     file: Path | None = None,
@@ -104,34 +106,30 @@ def run_pv(
     """Find the modules, trace their irradiance and model their yield.
 
     Args:
-        options: the building of any format, and how it is read.
+        options: the building of any format, how it is read, and the weather.
+        files: of `read_files`; the weather's steps may have any length.
         file: of the study, for messages.
         on_head: called with what was left out and assumed, before anything is traced.
     """
-    if options.building is None:
-        raise ValueError("modules are searched in a building's file")
     queries = [study.module.select, *(table.select for table in study.subsystem)]
-    outdoors = read_standing_file(
-        options.building, queries, options=options.read, leave_out=study.leave_out,
-        reflectance=study.surroundings, selected_in=file or "", progress=progress,
+    inputs, (selected, *of_subsystems) = outdoor_inputs(
+        options, files, queries, leave_out=study.leave_out,
+        reflectance=study.surroundings, file=file, progress=progress,
     )  # fmt: skip
-    modules = pv_modules(
-        outdoors.elements,
-        outdoors.chosen[0],
-        substrings=study.module.substrings,
-        along=study.module.groups,
-    )
+    building, weather = inputs.building, inputs.weather
+    along, substrings = study.module.groups, study.module.substrings
+    modules = pv_modules(building.elements, selected, substrings=substrings, along=along)
     if not modules:
         message = f"chooses no element with a shape in {options.building}"
         raise DataError(message, file=file, field=f"module.select = {study.module.select!r}")
     cell = fitted_cell(study.module.datasheet())
-    subsystems, issues = _subsystems(study, outdoors, modules, file)
-    issues = [*outdoors.issues, *issues]
-    model = (f"Elements read: {len(outdoors.elements)}", f"Modules: {len(modules)}")
-    head = Head(model, tuple(issues), weather.notes)
+    subsystems, issues = _subsystems(study, of_subsystems, modules, file)
+    head = inputs.head
+    model = (*head.model, Note("Modules: {count}", count=len(modules)))
+    head = replace(head, model=model, issues=(*building.issues, *issues))
     on_head(head)
     irradiance = cell_irradiance(
-        outdoors.elements, modules, weather, samples=samples, seed=seed, progress=progress,
+        building.elements, modules, weather, samples=samples, seed=seed, progress=progress,
         cache=cache,
     )  # fmt: skip
     yields = subsystem_yields(
@@ -140,15 +138,20 @@ def run_pv(
         inverter_efficiency=study.inverter_efficiency, progress=progress,
     )  # fmt: skip
     return PvResult(
-        outdoors, tuple(modules), subsystems, irradiance, tuple(yields), weather,
-        tuple(issues), head,
-    )  # fmt: skip
+        building, tuple(modules), subsystems, irradiance, tuple(yields), weather, head.issues, head
+    )
 
 
 def _subsystems(
-    study: PvStudy, outdoors: OutdoorModel, modules: Sequence[PvModule], file: Path | None
+    study: PvStudy,
+    selected: Sequence[frozenset[str]],
+    modules: Sequence[PvModule],
+    file: Path | None,
 ) -> tuple[tuple[Subsystem, ...], list[Issue]]:
-    """Modules of each stated subsystem; without any, those of each orientation."""
+    """Modules of each stated subsystem; without any, those of each orientation.
+
+    Args: selected: GUIDs that the selector of each subsystem chooses.
+    """
     issues = _unalike(modules)
     if not study.subsystem:
         names = [orientation(module) for module in modules]
@@ -158,7 +161,7 @@ def _subsystems(
         ), issues
     taken: dict[str, str] = {}
     result = []
-    for table, guids in zip(study.subsystem, outdoors.chosen[1:], strict=True):
+    for table, guids in zip(study.subsystem, selected, strict=True):
         own = tuple(number for number, module in enumerate(modules) if module.guid in guids)
         if not own:
             field = f"subsystem {table.name}: select"

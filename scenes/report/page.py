@@ -6,7 +6,7 @@ import base64
 import json
 import re
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import jinja2
@@ -219,17 +219,17 @@ def options_table(manifest: Mapping) -> tables.Table:
 
 def inputs_table(inputs: Mapping) -> tables.Table:
     """Input files with their hashes."""
-    columns = tuple(tables.Column(title, numeric=False) for title in input_titles())
-    rows = []
-    for name, entry in inputs.items():
-        digest = entry.get("sha256", "–") if isinstance(entry, Mapping) else "–"
-        rows.append((_title(name), file_name(entry), str(digest)))
-    return tables.Table(gettext("Input files"), columns, tuple(rows))
+    digests = (e.get("sha256") if isinstance(e, Mapping) else None for e in inputs.values())
+    names = map(file_name, inputs.values())
+    return files_table(zip(inputs, names, (str(d or "–") for d in digests), strict=True))
 
 
-def input_titles() -> tuple[str, str, str]:
-    """Headings of a table of input files."""
-    return gettext("Input"), gettext("File"), "SHA-256"
+def files_table(files: Iterable[tuple[str, str, str]]) -> tables.Table:
+    """Input files: what each is (a name of `named_files`), its name and hash."""
+    titles = (gettext("Input"), gettext("File"), "SHA-256")
+    columns = tuple(tables.Column(title, numeric=False) for title in titles)
+    rows = tuple((_title(kind), name, digest) for kind, name, digest in files)
+    return tables.Table(gettext("Input files"), columns, rows)
 
 
 def file_name(entry: object) -> str:
@@ -292,5 +292,9 @@ def _title(name: str) -> str:
         "building": gettext("Model file"),
         "weather": gettext("Weather"),
         "surroundings": gettext("Surroundings"),
+        "corrections": gettext("Corrections"),
+        "system_angular": gettext("Angular data of the system"),
+        "state": gettext("Fenestration system of a state"),
+        "held": gettext("Fenestration system that the model names"),
     }
-    return known.get(name, name.replace("_", " ").capitalize())
+    return known.get(name.rstrip("_0123456789"), name)

@@ -25,6 +25,7 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.source_code import code_version
 from mitsuba_cfs.stored_arrays import PassedArrays, StoredArrays
+from scenes.cluster import Requirements
 from scenes.head import Head
 from scenes.input_files import InputFiles, sha256
 from scenes.inputs import Inputs, read_inputs
@@ -182,8 +183,9 @@ class RoomWork:
         run = "" if here else _identity(self.options, self.inputs)
         compute = _Here(self) if here else _FromFiles(self.with_heat, self.options, run)
         tasks = Tasks(
-            list(rooms), compute, _failed, key=lambda guid: f"{run}{guid}", scene=lambda guid: guid
-        )
+            list(rooms), compute, _failed, key=lambda guid: f"{run}{guid}", scene=lambda guid: guid,
+            needs=Requirements() if here else _requirements(self.inputs),
+        )  # fmt: skip
         with closing(tasks.results(**asdict(workers))) as results:
             for guid, result in results:
                 yield rooms[guid], result
@@ -241,6 +243,10 @@ def _identity(options: JobOptions, inputs: Inputs) -> str:
     parts = [repr(options), code_version(__name__)]
     parts += map(sha256, inputs.files.values())
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16] + "-"
+
+
+def _requirements(inputs: Inputs) -> Requirements:
+    return Requirements.of(__name__, {path: sha256(path) for path in inputs.files.values()})
 
 
 OnHead = Callable[[Head], None]  # called as soon as all inputs are read

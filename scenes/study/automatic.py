@@ -22,9 +22,7 @@ from scenes.calibration.errors import (
     system_traits,
 )
 from scenes.calibration.shipped import this_machines_costs
-from scenes.fenestration.systems import read_system
-from scenes.input_files import read_weather
-from scenes.study.one_case import case_inputs
+from scenes.study.one_case import case_inputs, case_weather
 from scenes.study.plan import AUTO, Case, StudyPlan, with_method
 from scenes.study.study_file import Study
 
@@ -83,12 +81,14 @@ def work_of(cases: list[Case]) -> Workload:
     systems = len({case.system for case in cases})
     hours = {}
     for case in cases:
-        if case.weather not in hours:
-            weather = read_weather(case.weather.path)
+        if case.inputs.weather not in hours:
+            weather = case_weather(case)
             used = working_hours(weather, *case.options.occupancy.hours)
             up = is_up(sun_directions(weather))
-            hours[case.weather] = np.array([np.count_nonzero(used & up), np.count_nonzero(up)])
-    rated, lit = sum(hours[case.weather] for case in cases) / (scenes * systems)
+            hours[case.inputs.weather] = np.array(
+                [np.count_nonzero(used & up), np.count_nonzero(up)]
+            )
+    rated, lit = sum(hours[case.inputs.weather] for case in cases) / (scenes * systems)
     return Workload(scenes, systems, round(rated), round(lit))
 
 
@@ -99,10 +99,10 @@ def case_traits(cases: list[Case], plan: StudyPlan) -> list[Traits]:
     result: dict[Traits, None] = {}
     for case in cases:
         building, space = plan.rooms[case.scene]
-        filled = (case.scene, case.bsdf, case.operation)
+        filled = (case.scene, case.inputs.system, case.inputs.operation)
         if filled not in systems:
             systems[filled] = filled_traits(case, building)
-        seen = (case.scene, case.weather, case.orientation_deg)
+        seen = (case.scene, case.inputs.weather, case.orientation_deg)
         if seen not in rooms:
             rooms[seen] = room_traits(case, building, space)
         result |= {Traits(*system, *rooms[seen]): None for system in systems[filled]}
@@ -111,8 +111,6 @@ def case_traits(cases: list[Case], plan: StudyPlan) -> list[Traits]:
 
 def filled_traits(case: Case, building: Building) -> list[tuple[float, float, float, float]]:
     """The traits of what fills a case's windows, each in its first state."""
-    if case.bsdf is not None:
-        return [system_traits(read_system(case.bsdf.path).fine)]
     filled = case_inputs(case, building).systems.values()
     first = {id(states[0]): states[0] for states in filled}
     return [system_traits(system.fine) for system in first.values()]
@@ -122,7 +120,7 @@ def room_traits(case: Case, building: Building, space: Space) -> tuple[float, fl
     """Share of the occupied hours with the sun in view, and of the sky that is hidden."""
     if not space.windows:
         return 0.0, 0.0
-    weather = read_weather(case.weather.path).turned(case.orientation_deg)
+    weather = case_weather(case)
     suns = sun_directions(weather)
     rated = working_hours(weather, *case.options.occupancy.hours) & is_up(suns)
     shining = (weather.direct_normal > SHINING)[rated]

@@ -22,7 +22,7 @@ from scenes.explore.case_files import CASE, read_case
 from scenes.explore.folder import write_rooms
 from scenes.results import RunResult
 from scenes.study.one_case import ALONE, case_inputs, case_year
-from scenes.study.plan import Case
+from scenes.study.plan import Case, requirements
 from scenes.study.store import failure_line
 from scenes.workers import Tasks
 
@@ -84,7 +84,10 @@ def explorers(
             yield case, kept
     here = processes == 1 and scheduler is None
     compute = partial(compute_explorer, progress=progress) if here else compute_explorer
-    tasks = Tasks(left, compute, _failed, key=explorer_key, scene=attrgetter("scene"))
+    tasks = Tasks(
+        left, compute, _failed, key=explorer_key, scene=attrgetter("scene"),
+        needs=requirements(left),
+    )  # fmt: skip
     with closing(tasks.results(processes=processes, scheduler=scheduler)) as results:
         for result in results:
             if not result.error:

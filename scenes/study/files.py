@@ -7,18 +7,9 @@ from pathlib import Path
 
 from bim.building_file import check_building_file
 from mitsuba_cfs.errors import DataError
-from scenes.fenestration.systems import read_system
-from scenes.fenestration.thermal_system import checked_system
 from scenes.heat.box import box_building
-from scenes.input_files import check_names, read_weather
-from scenes.room.operation import (
-    Operation,
-    check_schedules,
-    check_states,
-    check_systems,
-    read_operation,
-)
-from scenes.study.study_file import Study, SystemTable
+from scenes.input_files import check_hours, check_names, read_files, read_weather
+from scenes.study.study_file import NO_SYSTEM, SYSTEM_TABLE, Study
 
 
 def check_files(study: Study) -> None:
@@ -32,29 +23,12 @@ def check_files(study: Study) -> None:
             check_building_file(room.building)
         else:
             box_building(room.box)
-    operations = [_checked_operation(study, system) for system in study.system or (None,)]
-    for climate in study.climate:
-        weather = read_weather(climate.weather)
-        for operation in operations:
-            if operation is not None:
-                check_schedules(operation.tables, weather, operation.file)
-                operation.outdoors(weather)
-    for system in study.system:
-        if system.bsdf is not None:
-            read = read_system(system.bsdf, u_value=system.u_value, g_value=system.g_value)
-            checked_system(read, system.bsdf)
-
-
-def _checked_operation(study: Study, system: SystemTable | None) -> Operation | None:
-    """The operation of a system, its states checked; None as for a study that names no system."""
-    path = system.operation or study.operation if system is not None else study.operation
-    if path is None:
-        return None
-    operation = read_operation(path)
-    check_systems(operation)
-    if system is not None:
-        check_states(operation, len(operation.systems) or 1)
-    return operation
+    first, *others = [read_weather(climate.weather) for climate in study.climate]
+    for system in study.system or (NO_SYSTEM,):
+        options = study.inputs(None, system, study.climate[0])
+        operation = read_files(options, weather=first, table=SYSTEM_TABLE).operation
+        for weather in others if operation is not None else ():
+            check_hours(operation, weather)
 
 
 def one_building(buildings: Iterable[Path | None]) -> Path:

@@ -28,23 +28,24 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import source_notes
-from scenes.fenestration.systems import FenestrationSystem, States, WindowOverrides, read_system
+from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.head import Head, joined, model_lines, tree_notes
 from scenes.heat.box import building_or_box
-from scenes.input_files import InputFiles, building_of, read_weather
+from scenes.input_files import building_of, read_files, read_weather, sha256
 from scenes.input_options import InputOptions
 from scenes.inputs import Inputs, inputs_of
 from scenes.results import RoomYear
 from scenes.room.inputs import skies_for
-from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
 from scenes.room.room import RoomChoices, compute_room
-from scenes.study.plan import Case, InputFile, StudyPlan, program_version
+from scenes.study.plan import OF_BUILDING, OF_ROOM, Case, InputFile, StudyPlan, program_version
 from scenes.study.store import CaseResult
+from scenes.study.study_file import SYSTEM_TABLE
 
 WARM_C = 26.0  # operative temperature above which hours are counted
 KEPT_TEMPERATURES = ("outdoor_c", "air_c", "operative_c")
+OF_READING = ("building", "surroundings", *OF_ROOM[1:])  # options that a building is read with
 ALONE = threading.Lock()  # Dr.Jit has all cores already, and a worker may have several threads
 
 
@@ -60,15 +61,9 @@ def case_inputs(
     if case.program != program_version():
         raise DataError("this process runs another version of the program than the study's")
     for source in case.files:
-        if isinstance(source, InputFile) and InputFile.of(source.path) != source:
+        if sha256(source.path) != source.sha256:
             raise DataError("is not the file that it was when the study began", file=source.path)
-    operation = None if case.operation is None else read_operation(case.operation.path)
-    states: States = () if operation is None else operation.systems
-    if case.bsdf is not None:
-        values = {"u_value": case.u_value, "g_value": case.g_value}
-        states = (read_system(case.bsdf.path, **values),)
-    overrides = WindowOverrides(states, ask="a [[system]]")
-    files = InputFiles(_weather(case.weather, case.orientation_deg), overrides, operation)
+    files = read_files(case.inputs, weather=case_weather(case), table=SYSTEM_TABLE)
     options = replace(case.inputs, spaces=spaces) if spaces else case.inputs
     return inputs_of(_building(case) if building is None else building, options, files)
 
@@ -78,7 +73,7 @@ def plan_head(plan: StudyPlan) -> Head:
     rooms: dict[tuple, tuple[Case, Building, list[str]]] = {}
     for case in plan.cases:
         building, space = plan.rooms[case.scene]
-        key = (id(building), case.bsdf, case.operation, case.u_value, case.g_value, case.weather)
+        key = (id(building), replace(case.inputs, spaces=()))
         rooms.setdefault(key, (case, building, []))[2].append(space.guid)
     heads = []
     for case, building, guids in rooms.values():
@@ -93,13 +88,8 @@ def plan_head(plan: StudyPlan) -> Head:
 def case_year(inputs: Inputs, case: Case, **chosen: Unpack[RoomChoices]) -> RoomYear:
     """The room's year by the case's options; chosen: as of `lit_room`."""
     options, (space,) = case.options, inputs.spaces
-    skies = _skies(
-        case.weather,
-        case.orientation_deg,
-        options.method,
-        options.sampling,
-        *options.sky.items(),
-    )
+    weather = _file(case, "weather"), case.orientation_deg
+    skies = _skies(*weather, options.method, options.sampling, *options.sky.items())
     return compute_room(
         inputs.building, space, inputs.systems, inputs.weather, options,
         operation=inputs.operation, skies=skies, cache=MatrixCache.of_user(), pictures=False,
@@ -133,11 +123,11 @@ def _computed(case: Case, progress: Progress) -> CaseResult:
         figures |= rating_figures(room.dgp)
         arrays["dgp"] = np.full(len(weather.times), np.nan, dtype=np.float32)
         arrays["dgp"][hours] = room.dgp.dgp
-    if case.bsdf is None:  # else the table says it: names are no part of a case's key
+    if case.inputs.system is None:  # else the table says it: names are no part of a case's key
         figures["fenestration"] = " ".join(source_notes(inputs.sources))
     models = (thermal_system(system).named_model for system in inputs.used_systems)
     figures["window_model"] = " ".join(dict.fromkeys(models))
-    of_file = _weather(case.weather, case.orientation_deg).notes
+    of_file = case_weather(case).notes
     if street := [note for note in weather.notes if note not in of_file]:
         figures["heat_island"] = " ".join(street)
     if trees := tree_notes(inputs.building):
@@ -156,15 +146,20 @@ def _straight_view(room: RoomYear, systems: dict[str, States], hours: NDArray[np
 
 def _building(case: Case) -> Building:
     """The building of a case: files are read once for neighbours in the grid."""
-    options = replace(case.inputs, spaces=(), weather=None)
-    if isinstance(case.building, InputFile):
-        return _read_building(case.building, options)
-    return building_or_box(case.building, options)
+    if case.box is not None:
+        return building_or_box(case.box, case.inputs)
+    files = tuple(file for file in case.files if file.name.startswith(OF_BUILDING))
+    named = {name: value for name, value in case.inputs.named().items() if name in OF_READING}
+    return _read_building(files, InputOptions(weather=None, **named))
+
+
+def _file(case: Case, name: str) -> InputFile:
+    return next(file for file in case.files if file.name == name)
 
 
 @lru_cache(maxsize=4)
-def _read_building(source: InputFile, options: InputOptions) -> Building:
-    """The building of a file that has not changed since: `source` tells files apart."""
+def _read_building(files: tuple[InputFile, ...], options: InputOptions) -> Building:
+    """The building of files that have not changed since: `files` tells them apart."""
     return building_of(options)
 
 
@@ -173,7 +168,12 @@ def _read_weather(source: InputFile) -> Weather:
     return read_weather(source.path)
 
 
-def _weather(source: InputFile, angle: float) -> Weather:
+def case_weather(case: Case) -> Weather:
+    """The weather of a case, turned against its model."""
+    return _turned(_file(case, "weather"), case.orientation_deg)
+
+
+def _turned(source: InputFile, angle: float) -> Weather:
     return _read_weather(source).turned(angle)
 
 
@@ -181,7 +181,7 @@ def _weather(source: InputFile, angle: float) -> Weather:
 def _skies(
     source: InputFile, angle: float, method: str, sampling: Sampling, *sky: tuple[str, str]
 ) -> AnnualSky:
-    return skies_for(_weather(source, angle), method, sampling, **dict(sky))
+    return skies_for(_turned(source, angle), method, sampling, **dict(sky))
 
 
 def _rated_hours(weather: Weather, options: RoomOptions) -> NDArray[np.int64]:
@@ -296,7 +296,8 @@ def straight_view(
 
 def _normal_beam(system: FenestrationSystem) -> float:
     """The beam through the patch at normal incidence."""
-    block = system.visible.transmission_front
-    if block is None:
+    bsdf = system.visible
+    if bsdf.transmission_front is None:
         raise ValueError(f"{system.name} has no transmission")
-    return float(through_peak(block, KLEMS_FULL).transmittance[0])
+    peak = through_peak(bsdf.transmission_front, KLEMS_FULL, bsdf.see_through)
+    return float(peak.transmittance[0])

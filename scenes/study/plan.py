@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,33 +13,35 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.source_code import code_version
 from scenes.chosen_rooms import chosen_spaces
+from scenes.cluster import Requirements
 from scenes.fenestration.thermal_file import files_beside
 from scenes.heat.box import building_or_box
+from scenes.input_files import named_files, sha256
 from scenes.input_options import InputOptions
 from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
-from scenes.study.study_file import RoomTable, Study, SystemTable
-from scenes.toml_file import read_options
+from scenes.study.study_file import NO_SYSTEM, RoomTable, Study
+from scenes.toml_file import ReadTable
 
 if TYPE_CHECKING:
     from scenes.heat.study_file import BoxTable
 
 
 AUTO = "auto"
+COMPUTED_BY = "scenes.study.one_case"  # the module of a case's results
+OF_BUILDING = ("building", "corrections", "surroundings")  # names of files that a room is made of
+# options that are no files, of the room and of what is in its windows and outdoors
+OF_ROOM = ("spaces", "surroundings_offset", *ReadTable.model_fields)
+OF_CASE = ("u_value", "g_value", "albedo")
 
 
 @dataclass(frozen=True, slots=True)
 class InputFile:
     """An input file as it was when the study was planned."""
 
+    name: str  # what it is, as of `named_files`
     path: Path
     sha256: str
-
-    @classmethod
-    def of(cls, path: Path) -> InputFile:
-        """The file with the hash of its bytes."""
-        with open(path, "rb") as file:
-            return cls(path, hashlib.file_digest(file, "sha256").hexdigest())
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,54 +49,31 @@ class Case:
     """Everything that one result depends on; can be sent to another process."""
 
     room: str  # name of the [[room]] entry
-    space: str  # GUID
     space_name: str
-    building: InputFile | BoxTable
-    specular: bool
     system: str
-    bsdf: InputFile | None  # None: what the building's file holds
-    thermal: InputFile | None  # the .toml file beside the BSDF
-    u_value: float | None
-    g_value: float | None
     climate: str
-    weather: InputFile
+    inputs: InputOptions  # the building with its one room, weather, system, operation
+    files: tuple[InputFile, ...]  # of the inputs, and those that the building names
+    box: BoxTable | None  # in place of a building's file
+    specular: bool
     orientation_deg: float  # the model is turned clockwise by it
     options: RoomOptions  # the method with them
-    operation: InputFile | None  # the file of the room's control, gains and set points
     program: str  # `program_version()` of the plan
     glare: str  # DGP, eDGP, sDGP or none
     chosen: str = ""  # why this method, where `auto` chose it
-    referenced: tuple[InputFile, ...] = ()  # BSDF files that the building's names, and those beside
-    surroundings: tuple[InputFile, ...] = ()  # around the building
-    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
-    albedo: float | tuple[float, ...] | str | None = None  # of the ground, as of `InputOptions`
-    join: tuple[str, ...] = ()  # these four as of `InputOptions`
-    furniture: bool = False
-    apertures: tuple[str, ...] = ()
-    facade_panes: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
         """A hash of what the numbers depend on: not of names, paths or reasons."""
-        files = [s.sha256 if s is not None else None for s in self.files[:4]]
         return digest(
             self.program,
             self.scene,
-            files,
-            self.u_value,
-            self.g_value,
+            [[file.name, file.sha256] for file in self.files],
+            _plain(self.inputs.named(), OF_CASE),
             self.orientation_deg % 360.0,
             _plain(self.options.named()),
             self.glare,
-            [source.sha256 for source in self.referenced],
-            self.albedo,
         )[:32]
-
-    @property
-    def files(self) -> tuple[InputFile | BoxTable | None, ...]:
-        """What it is read from; the building last."""
-        own = (self.bsdf, self.thermal, self.weather, self.operation)
-        return (*own, *self.referenced, *self.surroundings, self.building)
 
     @property
     def place(self) -> str:
@@ -105,33 +83,15 @@ class Case:
     @property
     def scene(self) -> str:
         """A hash of the room alone: cases that have it share traced matrices."""
-        building = self.building
-        source = building.sha256 if isinstance(building, InputFile) else building.model_dump_json()
-        around = [file.sha256 for file in self.surroundings]
-        offset = self.surroundings_offset and list(self.surroundings_offset)
-        read = [list(self.join), self.furniture, list(self.apertures), list(self.facade_panes)]
-        return digest(source, self.space, around, offset, read)[:32]
-
-    @property
-    def inputs(self) -> InputOptions:
-        """The options of its building and room."""
-        file = self.building.path if isinstance(self.building, InputFile) else None
-        return InputOptions(
-            file,
-            self.weather.path,
-            spaces=(self.space,),
-            join=self.join,
-            furniture=self.furniture,
-            apertures=self.apertures,
-            facade_panes=self.facade_panes,
-            surroundings=tuple(file.path for file in self.surroundings),
-            surroundings_offset=self.surroundings_offset,
-            albedo=self.albedo,
-        )
+        files = [[f.name, f.sha256] for f in self.files if f.name.startswith(OF_BUILDING)]
+        box = None if self.box is None else self.box.model_dump_json()
+        return digest(files, box, _plain(self.inputs.named(), OF_ROOM))[:32]
 
 
-def _plain(table: dict) -> list:
-    return [[name, list(v) if isinstance(v, tuple) else v] for name, v in sorted(table.items())]
+def _plain(table: dict, names: Iterable[str] | None = None) -> list:
+    names = sorted(table) if names is None else names
+    values = ((name, table[name]) for name in names)
+    return [[name, list(v) if isinstance(v, tuple) else v] for name, v in values]
 
 
 def with_method(case: Case, method: str, metric: str, why: str) -> Case:
@@ -141,10 +101,13 @@ def with_method(case: Case, method: str, metric: str, why: str) -> Case:
 
 def program_version() -> str:
     """A hash of the source that computes a case, and of what it is built on."""
-    return code_version("scenes.study.one_case")
+    return code_version(COMPUTED_BY)
 
 
-AS_HELD = "as in the building's file"  # the system of a study that names none
+def requirements(cases: Iterable[Case]) -> Requirements:
+    """What a worker of a cluster needs for these cases: this program, and their files."""
+    files = {file.path: file.sha256 for case in cases for file in case.files}
+    return Requirements.of(COMPUTED_BY, files)
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,30 +124,15 @@ def plan_of(study: Study) -> StudyPlan:
 
     Raises: `DataError` for a file that cannot be read or has no such room.
     """
-    held = SystemTable.model_construct(name=AS_HELD)
-    systems = [_of_system(study, system) for system in study.system or (held,)]
-    climates = [{"climate": c.name, "weather": InputFile.of(c.weather)} for c in study.climate]
     cases: list[Case] = []
     rooms = {}
+    hashes: dict[Path, str] = {}
     _check_turning(study)
-    around = tuple(map(InputFile.of, study.surroundings))
     for room in study.room:
-        read = read_options(room, study)
         building, spaces = rooms_of(room, study)
-        source = room.box if room.box is not None else InputFile.of(room.building)
-        held_files = () if study.system else _referenced(building)
+        held = () if study.system else _held_files(building)
         for space in spaces:
-            about = {
-                "room": room.name,
-                "space": space.guid,
-                "space_name": room.name if room.box else space.label,
-                "building": source,
-                "specular": room.specular,
-                **read,
-                "surroundings": around,
-            }
-            mine = [one | {"referenced": (*held_files, *one["referenced"])} for one in systems]
-            of_space = list(_of_space(study, about, mine, climates))
+            of_space = list(_of_space(study, room, space, held, hashes))
             rooms[of_space[0].scene] = building, space
             cases += of_space
     return StudyPlan(tuple(cases), rooms)
@@ -197,59 +145,54 @@ def _check_turning(study: Study) -> None:
         raise DataError(message, field="orientations_deg")
 
 
-def _of_system(study: Study, system: SystemTable) -> dict:
-    """The system of a case, with its operation."""
-    beside = None if system.bsdf is None else system.bsdf.with_suffix(".toml")
-    operation = system.operation or study.operation
-    referenced = () if system.bsdf is None else files_beside(system.bsdf)[1:]
-    if operation is not None:
-        referenced += read_operation(operation).files
-    return {
-        "system": system.name,
-        "bsdf": None if system.bsdf is None else InputFile.of(system.bsdf),
-        "thermal": InputFile.of(beside) if beside is not None and beside.is_file() else None,
-        "u_value": system.u_value,
-        "g_value": system.g_value,
-        "operation": None if operation is None else InputFile.of(operation),
-        "referenced": tuple(map(InputFile.of, referenced)),
-    }
-
-
 def _of_space(
-    study: Study, room: dict, systems: list[dict], climates: list[dict]
+    study: Study, room: RoomTable, space: Space, held: Iterable[Path], hashes: dict[Path, str]
 ) -> Iterator[Case]:
-    """Every case of one room."""
-    for climate in climates:
+    """Every case of one room.
+
+    Args: held: files that the building names; hashes: of files that were read, added to.
+    """
+    for climate in study.climate:
+        systems = []
+        for system in study.system or (NO_SYSTEM,):
+            options = study.inputs(room, system, climate, spaces=(space.guid,))
+            systems.append((system.name, options, _input_files(options, held, hashes)))
         for angle in study.orientations_deg:
             for method in study.methods:
                 # an open method keeps the default's place until `auto` is settled
-                options = {} if method == AUTO else {"method": method}
-                options |= study.options.model_dump()
-                for system in systems:
+                chosen = {} if method == AUTO else {"method": method}
+                chosen |= study.options.model_dump()
+                for name, options, files in systems:
                     yield Case(
-                        **room,
-                        **system,
-                        **climate,
-                        orientation_deg=angle,
-                        options=RoomOptions.of(**options),
-                        program=program_version(),
-                        glare=study.glare,
-                        chosen=AUTO if method == AUTO else "",
-                    )
+                        room.name, room.name if room.box else space.label, name, climate.name,
+                        options, files, room.box, room.specular, angle, RoomOptions.of(**chosen),
+                        program_version(), study.glare, AUTO if method == AUTO else "",
+                    )  # fmt: skip
 
 
-def _referenced(building: Building) -> tuple[InputFile, ...]:
+def _input_files(
+    options: InputOptions, held: Iterable[Path], hashes: dict[Path, str]
+) -> tuple[InputFile, ...]:
+    """The files of a case with the hashes of their bytes."""
+    operation = None if options.operation is None else read_operation(options.operation)
+    named = named_files(options, operation) | {f"held_{i}": path for i, path in enumerate(held)}
+    for path in named.values():
+        if path not in hashes:
+            hashes[path] = sha256(path)
+    return tuple(InputFile(name, path, hashes[path]) for name, path in named.items())
+
+
+def _held_files(building: Building) -> tuple[Path, ...]:
     """The BSDF files that a building's file names, and the `.toml` files beside them."""
     held = held_states(building.windows, building.file).values()
-    named = {state.file for states in held for state in states if state.file is not None}
-    beside = (other for file in sorted(named) for other in files_beside(file))
-    return tuple(InputFile.of(file) for file in (*sorted(named), *beside) if file.is_file())
+    named = sorted({s.file for states in held for s in states if s.file is not None})
+    beside = (other for file in named for other in files_beside(file))
+    return tuple(file for file in (*named, *beside) if file.is_file())
 
 
 def rooms_of(room: RoomTable, study: Study) -> tuple[Building, list[Space]]:
     """The building of an entry and the rooms asked for."""
-    options = InputOptions(room.building, None, **read_options(room, study))
-    building = building_or_box(room.box, options)
+    building = building_or_box(room.box, study.inputs(room))
     if room.box is not None:
         return building, list(building.spaces)
     return building, chosen_spaces(building, room.spaces, room.building)

@@ -18,7 +18,7 @@ from mitsuba_cfs.files import opened_arrays, write_bytes, write_table, write_tex
 from mitsuba_cfs.matrices.cache import UNREADABLE
 from mitsuba_cfs.progress import Progress, silent
 from scenes.result_folder import EXPLORER, ResultFolder
-from scenes.study.plan import Case
+from scenes.study.plan import Case, requirements
 from scenes.user_errors import one_line, user_message
 from scenes.workers import Tasks
 
@@ -135,14 +135,17 @@ def computed(
 
     Args:
         processes: how many cases at a time on this machine.
-        scheduler: address of a Dask scheduler, whose workers then do the work.  They read the
-            input files under the same paths.
+        scheduler: address of a Dask scheduler, whose workers compute the cases.  They read the
+            input files under the same paths; those that cannot are left out.
         progress: of the case under way, where this process computes the cases itself.
     """
     once = list({case.key: case for case in cases}.values())
     here = processes == 1 and scheduler is None
     of_case = partial(compute, progress=progress) if here else compute
-    tasks = Tasks(once, of_case, _failed, key=attrgetter("key"), scene=attrgetter("scene"))
+    tasks = Tasks(
+        once, of_case, _failed, key=attrgetter("key"), scene=attrgetter("scene"),
+        needs=requirements(once),
+    )  # fmt: skip
     return tasks.results(processes=processes, scheduler=scheduler)
 
 

@@ -21,9 +21,9 @@ from scenes.report.glare_figures import compass
 from scenes.study.automatic import settled
 from scenes.study.explored import ExploredCase, explorer_key, explorers
 from scenes.study.one_case import compute_case, plan_head
-from scenes.study.plan import AS_HELD, Case, StudyPlan, plan_of
+from scenes.study.plan import Case, StudyPlan, plan_of
 from scenes.study.store import CaseResult, Compute, Store, computed
-from scenes.study.study_file import Study
+from scenes.study.study_file import NO_SYSTEM, Study
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,8 +214,8 @@ def described(case: Case, space: Space) -> dict:
 
 def source_of(case: Case) -> str:
     """Where a case's systems come from, in words."""
-    file = case.bsdf or (case.operation if case.system != AS_HELD else None)
-    return "held by the building's file" if file is None else f"[[system]] {file.path.name}"
+    file = case.inputs.system or (case.inputs.operation if case.system != NO_SYSTEM.name else None)
+    return "held by the building's file" if file is None else f"[[system]] {file.name}"
 
 
 def facing(space: Space, orientation_deg: float) -> str:
@@ -233,11 +233,7 @@ def _status(result: CaseResult) -> str:
 
 def manifest(study: Study, plan: StudyPlan) -> dict:
     """What makes the same table again: the study, and the hashes of its files."""
-    files = {}
-    for case in plan.cases:
-        for source in case.files:
-            if path := getattr(source, "path", None):
-                files[str(path)] = source.sha256
+    files = {str(file.path): file.sha256 for case in plan.cases for file in case.files}
     return {
         "quick": study.quick,
         "study": study.model_dump(mode="json"),

@@ -12,11 +12,12 @@ from mitsuba_cfs.errors import DataError
 from scenes import plausible
 from scenes.calibration.durations import seconds_of, share_of
 from scenes.heat.study_file import BoxTable
+from scenes.input_options import InputOptions
 from scenes.quick import ROOM, picks
 from scenes.room.operation import read_operation
 from scenes.room.options import CHOICES, RoomOptions, named_types
 from scenes.room.schedules import Hours
-from scenes.toml_file import OutdoorTable, ReadTable, TomlTable, read_table, validated
+from scenes.toml_file import OutdoorTable, ReadTable, TomlTable, read_options, read_table, validated
 
 OF_THE_GRID = ("method", "annual_glare")
 # Options that mean what a key of an operation file means
@@ -70,6 +71,10 @@ class SystemTable(_Table):
         if self.bsdf is None and not (self.u_value is None and self.g_value is None):
             raise ValueError("`u_value` and `g_value` belong to a `bsdf`")
         return self
+
+
+SYSTEM_TABLE = "a [[system]]"  # how a study gives a system, for messages
+NO_SYSTEM = SystemTable.model_construct(name="as in the building's file")
 
 
 class ClimateTable(_Table):
@@ -132,6 +137,27 @@ class Study(_Table, OutdoorTable):
         _unique("orientations_deg", turned)
         _unique("methods", self.methods)
         return self
+
+    def inputs(
+        self,
+        room: RoomTable | None,
+        system: SystemTable = NO_SYSTEM,
+        climate: ClimateTable | None = None,
+        spaces: tuple[str, ...] | None = None,
+    ) -> InputOptions:
+        """The options of a room with a system under a climate.
+
+        Args: room: None for those of the other files; spaces: in place of the room's own.
+        """
+        tables = (self,) if room is None else (room, self)
+        if spaces is None:
+            spaces = () if room is None else room.spaces
+        return InputOptions(
+            None if room is None else room.building,
+            None if climate is None else climate.weather,
+            system.bsdf, spaces, u_value=system.u_value, g_value=system.g_value,
+            operation=system.operation or self.operation, **read_options(*tables),
+        )  # fmt: skip
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -10,7 +10,7 @@ from bim.model import Space
 from bim.report.issue import Issue
 from mitsuba_cfs.files import replacing
 from scenes.study.files import one_building
-from scenes.study.plan import Case, InputFile
+from scenes.study.plan import Case
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
 
@@ -22,8 +22,7 @@ def write_study_ifc(study: StudyResult, out: Path) -> tuple[Issue, ...]:
 
     A set is named after its case, "CFS results: system, climate, angle, method".
     """
-    buildings = (case.building for case in study.plan.cases)
-    source = one_building(one.path if isinstance(one, InputFile) else None for one in buildings)
+    source = one_building(case.inputs.building for case in study.plan.cases)
     done = [
         (case, result)
         for case, result in zip(study.plan.cases, study.results, strict=True)

@@ -147,20 +147,8 @@ def _seconds(study: StudyResult) -> str:
 
 def inputs_table(study: StudyResult) -> tables.Table:
     """The files of the study with their hashes."""
-    result = {}
-    for case in study.plan.cases:
-        for kind, source in (
-            (gettext("Building"), case.building),
-            (gettext("Fenestration"), case.bsdf),
-            (gettext("Thermal data of the system"), case.thermal),
-            (gettext("Weather"), case.weather),
-            (gettext("Operation"), case.operation),
-        ):
-            if path := getattr(source, "path", None):
-                result[kind, path] = source.sha256
-    columns = tuple(tables.Column(title, numeric=False) for title in run_page.input_titles())
-    rows = tuple((kind, path.name, digest) for (kind, path), digest in result.items())
-    return tables.Table(gettext("Input files"), columns, rows)
+    files = dict.fromkeys(file for case in study.plan.cases for file in case.files)
+    return run_page.files_table((f.name, f.path.name, f.sha256) for f in files)
 
 
 SHOWN = ("da300", "udi_300_3000")

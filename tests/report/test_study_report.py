@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from bim.report.issue import Issue
+from scenes.input_options import InputOptions
 from scenes.language.numbers import percent
 from scenes.report.daylight_figures import plans
 from scenes.study.one_case import glare_figures, room_figures
@@ -65,18 +66,20 @@ class AnyWeather:
     midpoints = pd.date_range("2023-01-01 00:30", periods=8760, freq="h")
 
 
+NOWHERE = InputOptions(Path("nowhere"), Path("nowhere"), Path("nowhere"))
+
+
 def study(systems: int = 2, failed: bool = True) -> StudyResult:
     """Two rooms with some systems, from the made-up run; one case without a result."""
     run = run_result(picture_size=48, pictures=1)
-    none = InputFile(Path("nowhere"), "0")
     cases, results, rooms = [], [], {}
     for room in run.spaces:
         for number in range(systems):
             case = Case(
-                room="house.ifc", space=room.space.guid, space_name=room.space.name, building=none,
-                specular=False, system=f"system <{number}>", bsdf=none, thermal=none, u_value=None,
-                g_value=None, climate="Lyon", weather=none, orientation_deg=0.0,
-                options=OPTIONS, operation=None, program="", glare="DGP",
+                room="house.ifc", space_name=room.space.name, system=f"system <{number}>",
+                climate="Lyon", inputs=replace(NOWHERE, spaces=(room.space.guid,)), box=None,
+                files=(InputFile("building", NOWHERE.building, "0"),), specular=False,
+                orientation_deg=0.0, options=OPTIONS, program="", glare="DGP",
             )  # fmt: skip
             heat = room.heat
             dim = replace(

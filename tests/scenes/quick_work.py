@@ -70,14 +70,14 @@ def _checked(space):
     return CheckedRoom(space, RoomUse("office", True, "made up"), (), None, None, None)
 
 
-def _pv(_building, weather, _study, **_options):
+def _pv(_options, files, _study, **_others):
     yields = pd.DataFrame(
         {"subsystem": ["roof"], "modules": [1], "peak_kw": [1.0], "yield_kwh": [900.0],
          "kwh_per_kw": [900.0], "mismatch_loss": [0.01]}
     )  # fmt: skip
     steps = np.arange(100)
     return SimpleNamespace(
-        weather=weather, irradiance=SimpleNamespace(steps=steps, diffuse_error=0.01),
+        weather=files.weather, irradiance=SimpleNamespace(steps=steps, diffuse_error=0.01),
         yields=(SimpleNamespace(name="roof", alternating_current=np.ones(100)),), issues=(),
         yield_table=lambda: yields, module_table=lambda: yields,
     )  # fmt: skip

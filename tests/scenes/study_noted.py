@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 
@@ -35,3 +36,22 @@ def held_up(case: Case, *, progress: Progress = silent) -> CaseResult:
     while case.orientation_deg and not go.exists() and time.monotonic() < end:
         time.sleep(0.05)
     return noted(case, progress=progress)
+
+
+def deadly(case: Case, *, progress: Progress = silent) -> CaseResult:
+    """The same; the case of 13 degrees ends its process."""
+    if case.orientation_deg == 13:
+        os._exit(1)
+    return noted(case, progress=progress)
+
+
+def elsewhere(case: Case, *, progress: Progress = silent) -> CaseResult:
+    """A case of 13 degrees fails on the first disk, one of 20 degrees has no memory anywhere."""
+    log = Path(case.room)
+    with log.open("a") as file:
+        file.write(f"begin {case.orientation_deg:g}\n")
+    if case.orientation_deg == 20:
+        raise MemoryError
+    if case.orientation_deg == 13 and log.read_text().count("begin 13") == 1:
+        raise DataError("cannot be read") from OSError(5, "Input/output error")
+    return CaseResult(case.key, dict.fromkeys(SAID, 0.0))

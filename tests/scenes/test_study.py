@@ -99,17 +99,35 @@ def test_a_case_is_known_by_what_its_numbers_depend_on(tmp_path):
     case = grid(tmp_path).cases[0]
     twin = replace(case, room="other name", system="x", climate="y", chosen="why")
     assert twin.key == case.key
-    for other in (
+    others = [
         {"orientation_deg": 1.0},
-        {"u_value": 2.0},
-        {"weather": replace(case.weather, sha256="0")},
         {"options": case.options.changed(seed=1)},
         {"glare": "sDGP"},
-        {"space": "another"},
         {"program": "newer"},
-        {"operation": case.bsdf},
-    ):
+        *(
+            {"inputs": replace(case.inputs, **one)}
+            for one in ({"u_value": 2.0}, {"spaces": ("b",)})
+        ),
+    ]
+    for number, file in enumerate(case.files):
+        changed = (*case.files[:number], replace(file, sha256="0"), *case.files[number + 1 :])
+        others.append({"files": changed})
+        moved = (*case.files[:number], replace(file, path=Path("b")), *case.files[number + 1 :])
+        assert replace(case, files=moved).key == case.key
+    assert {"weather", "system"} <= {file.name for file in case.files}
+    for other in others:
         assert replace(case, **other).key != case.key, other
+
+
+def test_corrections_beside_a_building_make_it_another_case(tmp_path):
+    office = tmp_path / "office.ifc"
+    office.write_bytes(OFFICE.read_bytes())
+    path = tmp_path / "study.toml"
+    path.write_text('[[room]]\nbuilding = "office.ifc"\n' + SYSTEM + CLIMATE)
+    before, _ = plan_of(read_study(path)).cases
+    (tmp_path / "office.corrections.toml").write_text("surroundings = 0.3\n")
+    after, _ = plan_of(read_study(path)).cases
+    assert before.key != after.key and before.scene != after.scene
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -365,7 +383,7 @@ def test_results_go_back_into_the_ifc(tmp_path, capsys):
     table = pd.read_parquet(tmp_path / "out" / "results.parquet")
     case = plan_of(read_study(path)).cases[0]
     model = ifcopenshell.open(target)
-    sets = get_psets(model.by_guid(case.space))
+    sets = get_psets(model.by_guid(case.inputs.spaces[0]))
     for _, row in table.iterrows():
         name = f"CFS results: blind, Chicago, {row['orientation_deg']:g} deg, three-phase"
         assert sets[name]["da300"] == pytest.approx(row["da300"])

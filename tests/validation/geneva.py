@@ -76,14 +76,19 @@ def by_command(folder: Path, case: str, views: Sequence[int], size: int) -> Iter
                 "--view", format_view(geneva.view(folder, number, size)), "--size", size,
                 "--sun-model", "radiance", "--sky-ground", "gendaylit", "--worst", 0,
             ]  # fmt: skip
-            command = [sys.executable, "-m", "scenes.cli", *map(str, words)]
-            done = subprocess.run(command, check=True, capture_output=True, text=True)
-            print(done.stdout, file=sys.stderr)
-            (file,) = out.glob("*.parquet")
-            table = pd.read_parquet(file)
+            command, tables = [sys.executable, "-m", "scenes.cli", *map(str, words)], {}
+            for sources in ("pixels", "evalglare"):
+                done = subprocess.run(
+                    [*command, "--glare-sources", sources],
+                    check=True, capture_output=True, text=True,
+                )  # fmt: skip
+                print(done.stdout, file=sys.stderr)
+                (file,) = out.glob("*.parquet")
+                tables[sources] = pd.read_parquet(file)
+        table = tables["evalglare"][["dgp", "Ev"]].assign(pixels=tables["pixels"].dgp)
         time = pd.DatetimeIndex(table.index)
         table.index = (time.dayofyear - 1) * 24 + time.hour
-        yield table[["dgp", "Ev"]]
+        yield table
 
 
 def error_row(table: pd.DataFrame, folder: Path, case: str, number: int) -> dict[str, object]:

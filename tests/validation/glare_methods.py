@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
-from mitsuba_cfs.glare.evaluation import evaluate
+from mitsuba_cfs.glare.evaluation import GlareOptions, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.methods import METHODS
-from mitsuba_cfs.methods.glare import metric_values
+from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.light import daylight
 from mitsuba_cfs.methods.optics import SystemOptics
 from mitsuba_cfs.methods.point_in_time import path_tracing_room, picture_with_disc
@@ -71,7 +71,7 @@ class GlareCase:
     sky: AnnualSky
     times: tuple[str, ...]
     raised: tuple[float, ...] = (0.0,)  # [m] eyes of the measurement above the view's, for a mean
-    sun: str = "source"  # the disc in the measurement: apart as in the methods, or in its pixels
+    sun: str = "source"  # `GlareOptions.sun` of measurement and methods: a source or its pixels
 
 
 def measured(
@@ -121,7 +121,8 @@ def rated(
                     scene, [[case.system]] * len(scene.groups), case.sky,
                     method=method, sampling=sampling, needs=(), matrices=matrices,
                 )  # fmt: skip
-                dgp = metric_values(light, metric)
+                options = GlareOptions(sun=case.sun)
+                dgp = hourly_glare(light, metric, options=options).dgp
                 run["methods"][f"{method} {metric}"] = dgp.round(5).tolist()
             seconds = time.monotonic() - start
             print(f"{method} {metric}: {seconds:.0f} s", file=sys.stderr, flush=True)

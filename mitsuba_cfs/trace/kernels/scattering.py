@@ -51,7 +51,8 @@ def sun_scattering(bsdf: Bsdf, angular: AngularTable | None = None) -> Scatterin
     if isinstance(bsdf, TensorTreeBsdf):
         found: Scattering = TreeScattering(bsdf)
     else:
-        peak = through_peak(bsdf.filled().transmission_front, bsdf.basis_in)
+        share = bsdf.see_through if angular is None else 1.0
+        peak = through_peak(bsdf.filled().transmission_front, bsdf.basis_in, share)
         exponent = None if angular is not None else specular_exponent(peak, bsdf.basis_in)
         beams = bsdf.basis_in, peak.scattered, peak.transmittance, exponent
         found = KlemsScattering(*beams)

@@ -122,10 +122,10 @@ def path_optics(bsdf: Bsdf, angular: AngularTable | None = None) -> PathOptics:
     Args: angular: as for `sun_scattering`; its reflectances are specular.
     """
     if angular is not None:
-        return _specular_system(bsdf, angular)
+        return _specular_system(replace(bsdf, see_through=1.0), angular)
     if isinstance(bsdf, TensorTreeBsdf):
         return PathOptics(loaded(tensor_tree_plugin(without_beam(bsdf))), TreeBeam(bsdf))
-    front = through_peak(bsdf.filled().transmission_front, bsdf.basis_in)
+    front = through_peak(bsdf.filled().transmission_front, bsdf.basis_in, bsdf.see_through)
     beam = PatchBeam(bsdf.basis_in, front.transmittance, specular_exponent(front, bsdf.basis_in))
     return PathOptics(loaded(klems_plugin(without_peaks(bsdf, "transmission"))), beam)
 
@@ -136,7 +136,9 @@ def without_peaks(bsdf: KlemsBsdf, *kinds: str) -> KlemsBsdf:
     blocks = {f"{kind}_{side}": None for kind in kinds for side in ("front", "back")}
     for name in blocks:
         block = getattr(full, name)
-        blocks[name] = None if block is None else through_peak(block, full.basis_in).scattered
+        share = bsdf.see_through if name.startswith("transmission") else None
+        if block is not None:
+            blocks[name] = through_peak(block, full.basis_in, share).scattered
     return replace(full, **blocks)
 
 
