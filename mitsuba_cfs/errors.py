@@ -7,6 +7,7 @@ import numbers
 from collections.abc import Iterable
 from difflib import get_close_matches
 from os import PathLike
+from typing import Any
 
 
 class CfsError(Exception):
@@ -38,7 +39,7 @@ class VariantError(CfsError, RuntimeError):
 
 
 def check_number(
-    name: str, value: object, low: float, high: float = math.inf, *, whole: bool = False
+    name: str, value: Any, low: float, high: float = math.inf, *, whole: bool = False
 ) -> None:
     """Raise `ValueError` that names an argument unless it is a finite number from low to high.
 

@@ -6,9 +6,9 @@ By default three buildings of ../shared/data/ifc/buildings.  `cfs ifc attach` gi
 the windows that face south, and the demo's venetian blind (BSDF, U, g) to the others; `cfs export
 --tau` writes the three formats.  honeybee and OpenStudio are those of another Python (`pip install
 honeybee-energy honeybee-radiance honeybee-openstudio openstudio`): honeybee checks the model and
-writes its own input of EnergyPlus and its Radiance folder, which `oconv` compiles.  EnergyPlus is that
-of pyenergyplus-lbnl; it runs each model for DAYS days as it was written, and is then stopped;
-its table of the glazing is that of a copy that asks for it.
+writes its own input of EnergyPlus and its Radiance folder, which `oconv` compiles.  EnergyPlus (of
+pyenergyplus-lbnl) runs each model for DAYS days as it was written, and is then stopped; its table
+of the glazing is that of a copy that asks for it.
 
 Columns: rooms; faults (of honeybee's own check, of gbXML's schema 7.03 in OpenStudio, severe errors
 of EnergyPlus); EnergyPlus' warnings of surfaces that it drops or changes; then of the glazing the
@@ -46,6 +46,7 @@ FILES = ("Duplex_A_20110907.ifc", "AC20-FZK-Haus.ifc", "House_Renga.ifc")
 U_VALUE, G_VALUE, VISIBLE = 1.1, 0.5, 0.7  # of the windows without a BSDF
 SOUTH, OTHERS = "134-226", "226-134"  # azimuths [deg]
 DAYS = 2
+COMPLEX = "Construction:ComplexFenestrationState"
 GEOMETRY = ("egenerate", "olinear", "collapsed", "zero area", "not convex", "Dropping Vertex")
 HEAD = (
     "| building | format | rooms | faults | surfaces | area | U | g | visible | BSDF |\n"
@@ -182,7 +183,10 @@ def weather() -> Path:
 
 
 def tabled_panes(folder: Path) -> list[Pane]:
-    """EnergyPlus' table of the glazing, of a copy of the model that asks for it."""
+    """EnergyPlus' table of the glazing, of a copy of the model that asks for it.
+
+    It has neither g nor transmittance of a system with a BSDF: its matrix is that of the model.
+    """
     model = json.loads((folder / "model.epJSON").read_text())
     report = {"reports": [{"report_name": "EnvelopeSummary"}]}
     model["Output:Table:SummaryReports"] = {"tables": report}
@@ -199,11 +203,19 @@ def tabled_panes(folder: Path) -> list[Pane]:
     titles = next(line for line in table[start:] if "Construction" in line)
     columns = [titles.index(next(t for t in titles if t.startswith(name))) for name in (
         "Glass Area", "Glass U-Factor", "Glass SHGC", "Glass Visible")]  # fmt: skip
-    panes = []
+    panes, construction = [], titles.index("Construction")
+    systems = {name.upper(): name for name in model.get(COMPLEX, {})}
     for line in table[table.index(titles) + 1 :]:
         if len(line) < 2 or "Total" in line[1]:
             break
-        panes.append(Pane(*(float(line[c]) for c in columns)))
+        area, u_value, *values = (float(line[c]) for c in columns)
+        system = systems.get(line[construction])
+        if system is None:
+            panes.append(Pane(area, u_value, *values))
+        else:
+            matrix = model["Matrix:TwoDimension"][f"{system} visible front_transmittance"]
+            numbers = [entry["value"] for entry in matrix["values"]]
+            panes.append(Pane(area, u_value, None, None, np.reshape(numbers, (145, 145))))
     return panes
 
 
@@ -214,24 +226,27 @@ def differences(panes: Sequence[Pane], expected: Sequence[Pane]) -> list[str]:
     area = sum(p.area for p in panes) / sum(p.area for p in expected)
     cells = [f"{area:.4f}"]
     for field in ("u_value", "g_value", "visible"):
-        pairs = [by_value(some, field) for some in (panes, expected)]
-        if any(value is None for value, _ in pairs[0]):
+        is_partial = any(getattr(p, field) is None for p in panes)
+        chosen = [
+            [p for p in some if not (is_partial and p.bsdf is not None)]
+            for some in (panes, expected)
+        ]
+        if any(getattr(p, field) is None for p in chosen[0]) or not chosen[0]:
             cells.append("none")
             continue
-        cells.append(f"{distance(*pairs):.4f}")
+        cells.append(f"{distance(*(by_value(some, field) for some in chosen)):.4f}")
     bsdfs = [[p for p in some if p.bsdf is not None] for some in (panes, expected)]
     if not bsdfs[0]:
         return [*cells, "-"]
     shares = [sum(p.area for p in some) for some in bsdfs]
-    largest = expected_bsdf = bsdfs[1][0].bsdf
-    apart = max(float(np.abs(p.bsdf - expected_bsdf).max()) for p in bsdfs[0]) / largest.max()
+    expected_bsdf = bsdfs[1][0].bsdf
+    apart = max(float(np.abs(p.bsdf - expected_bsdf).max()) for p in bsdfs[0]) / expected_bsdf.max()
     return [*cells, f"{apart:.0e} on {shares[0] / shares[1]:.3f} of it"]
 
 
-def by_value(panes: Sequence[Pane], field: str) -> list[tuple[float | None, float]]:
+def by_value(panes: Sequence[Pane], field: str) -> list[tuple[float, float]]:
     """Values of the panes with their areas, in rising order."""
-    pairs = [(getattr(pane, field), pane.area) for pane in panes]
-    return pairs if any(v is None for v, _ in pairs) else sorted(pairs)
+    return sorted((getattr(pane, field), pane.area) for pane in panes)
 
 
 def distance(read: list[tuple[float, float]], expected: list[tuple[float, float]]) -> float:
