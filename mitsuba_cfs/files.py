@@ -47,7 +47,7 @@ def reason(error: Exception) -> str:
 
 
 def wrong_encoding(content: bytes) -> str | None:
-    """Why a text is not UTF-8, with its line and what to do; None where it is, or states another."""
+    """Why a text is not UTF-8, with line and remedy; None where it is, or states another."""
     if b"encoding" in content[:200] and b"utf-8" not in content[:200].lower():
         return None
     try:
