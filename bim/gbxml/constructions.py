@@ -13,6 +13,9 @@ from bim.polygon_rooms import GlazingValues, SurfaceFinish
 from bim.report.issue import Issue
 
 
+PARTS = ("Glaze", "Gap", "Frame", "Blind")  # of a window type: its values are used, not these
+
+
 class Constructions:
     """What the surfaces and openings of a document refer to, read when they do."""
 
@@ -121,6 +124,12 @@ class Constructions:
             self.issues.append(Issue("window-type-of-zeros", known.get("id", ""), values))
             return GlazingValues(panes=panes, name=name)
         visible, solar = (self._share(known, "Transmittance", k) for k in ("Visible", "Solar"))
+        unread = {one.tag for one in known if one.tag in PARTS}
+        if None not in (u_value, g_value, visible):  # those of panes and gaps are not needed
+            unread -= {"Glaze", "Gap"}
+        for part in sorted(unread):
+            values = {"element": name, "part": part, "glazing": known.get("id", "")}
+            self.issues.append(Issue("glazing-part-not-read", known.get("id", ""), values))
         return GlazingValues(u_value, g_value, visible, solar, panes, name)
 
     def _quantity(self, owner: ElementTree.Element, name: str) -> float | None:

@@ -194,6 +194,9 @@ class _Reader:
         if name is not None and self.energy.has_shade(name):
             known = {"element": one.label, "construction": name}
             self.issues.append(Issue("construction-shade-not-read", one.identifier, known))
+        if name is not None and self.energy.has_frame(name):
+            known = {"element": one.label, "part": "EnergyWindowFrame", "glazing": name}
+            self.issues.append(Issue("glazing-part-not-read", one.identifier, known))
         field = f"{fields}_modifier"
         modifier = self.light.objects.name(own.radiance, of_room.radiance, part, field)
         glazing = self._by_modifier(one, values or GlazingValues(name=name or ""), modifier)
