@@ -12,7 +12,6 @@ from bim.model import Construction, MaterialLayer
 from bim.polygon_rooms import GlazingValues, SurfaceFinish
 from bim.report.issue import Issue
 
-
 PARTS = ("Glaze", "Gap", "Frame", "Blind")  # of a window type: its values are used, not these
 
 
