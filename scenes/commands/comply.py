@@ -69,7 +69,8 @@ def command(
 ) -> None:
     """Check the rooms of a building against daylight rules; write a dossier and a table of values.
 
-    BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
+    BUILDING is a honeybee model (.hbjson), gbXML, a Radiance scene (.rad) or IFC: one file or
+    several of one building (architecture, facade, site), a folder or an .ifczip of them.
     """
     named = named_settings(settings, OF_RULES)
     if chosen["quick"]:
@@ -85,7 +86,7 @@ def command(
 
     page_options = read_page(page, DossierSection, chosen_language())
     inputs = (building, options.weather, options.system, options.closed, options.uses)
-    inputs += (*options.surroundings, *page_options.inputs)
+    inputs += (*options.linked, *options.surroundings, *page_options.inputs)
     folder = ResultFolder(out, "comply", inputs=inputs)
     if write_ifc is not None:
         check_is_ifc(building, "--write-ifc")

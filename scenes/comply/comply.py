@@ -25,7 +25,7 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from scenes.chosen_rooms import no_window
 from scenes.comply.assess import asked_of, assess_room, values_of
 from scenes.comply.blinds import open_and_closed
-from scenes.comply.dwellings import dwelling_words, judged
+from scenes.comply.dwellings import dwelling_words, dwellings_of, judged
 from scenes.comply.files import ComplyFiles, read_files
 from scenes.comply.findings import Findings, GridLight, RoomHeat, calendar_of
 from scenes.comply.glare import seat_glare
@@ -181,10 +181,19 @@ class Check:
         if self.building.file is not None and is_ifc(self.building.file):
             from bim.ifc.room_uses import read_room_uses  # reads IFC: only where there is a file
 
-            texts = read_room_uses(self.building.file)
+            texts = read_room_uses(self.building.file, *self.options.linked)
         found = {}
+        homes = dwellings_of(self.building)
         for space in spaces:
             use = self.files.uses.of(space, texts.get(space.guid, ()))
+            if not use.dwelling and not self.files.uses.dwellings:
+                use = replace(use, dwelling=homes.get(space.guid, ""))
+            if use.key == UNKNOWN and use.dwelling and space.windows:
+                source = Note(
+                    "in {dwelling}, no information on its use, taken as a habitable room",
+                    dwelling=use.dwelling,
+                )
+                use = replace(use, key="living", source=source, assumed=True)
             if use.key == UNKNOWN and not space.windows:
                 use = replace(
                     use, occupied=False, source=Note("no window and no use, not occupied")
