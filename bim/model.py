@@ -22,7 +22,7 @@ from bim.held_sensors import ModelGrid, ModelView
 from bim.names import AmbiguousName, UnknownName, item_named, label_of
 from bim.report.issue import Issue
 from bim.use import StatedUse
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.errors import DataError, check_number
 from mitsuba_cfs.gloss import Gloss
 
 FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "reveal")
@@ -45,8 +45,7 @@ class MaterialLayer:
 
     def __post_init__(self) -> None:
         for name in ("thickness", "conductivity", "density", "heat_capacity"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"layer {self.name}: {name} must be positive")
+            check_number(f"layer {self.name}: {name}", getattr(self, name), 1e-9)
 
     @property
     def resistance(self) -> float:

@@ -77,6 +77,7 @@ class DrawnOpening:
     glazing: GlazingValues | None = None  # None: an opaque door
     states: tuple[ShadingState, ...] = ()  # BSDFs that the file holds for it
     holes: tuple[NDArray[np.float64], ...] = ()  # each [N, 3] [m]: there is wall
+    up: NDArray[np.float64] | None = None  # [3] of its BSDFs
 
     @property
     def area(self) -> float:
@@ -305,7 +306,7 @@ def _window(parts: Sequence[tuple[_Part, NDArray[np.float64]]]) -> Window:
         opening.guid, opening.name, triangles, part.face.guid,
         float(sum(one.facet.polygon.area for one, _ in parts)),
         values.u_value, values.g_value, values.visible, values.name, values.solar, values.panes,
-        opening.states, glass=values.glass,
+        opening.states, glass=values.glass, up=opening.up,
     )  # fmt: skip
 
 

@@ -24,7 +24,7 @@ from mitsuba_cfs.bsdf.klems import STANDARD_BASES, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_text import format_tree
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason, replacing
+from mitsuba_cfs.files import reason, replacing, wrong_encoding
 
 __all__ = ["BsdfFile", "read_bsdf_xml", "write_bsdf_xml"]
 
@@ -92,7 +92,8 @@ def _optical_layer(path: str | PathLike[str], notes: list[str]) -> ElementTree.E
     try:
         root = ElementTree.fromstring(content[start:])
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise DataError(f"is not well-formed XML: {error}", file=path) from None
+        message = wrong_encoding(content) or f"is not well-formed XML: {error}"
+        raise DataError(message, file=path) from None
     for element in root.iter():
         if isinstance(element.tag, str):
             element.tag = element.tag.rpartition("}")[2]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.errors import check_number
 from mitsuba_cfs.glare import indices, passes
 from mitsuba_cfs.glare.areas import Zones, angles_to, split_by_zone
 from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order, seen
@@ -20,6 +21,8 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.notes import Note
 
 BACKGROUNDS = ("indirect", "average", "illuminance")
+FIELDS = ("all", "total", "both eyes")
+POSITION_MODELS = ("guth", "kim")
 GROUPINGS = {  # what a source is
     "evalglare": Note("groups of adjacent bright pixels (evalglare)"),
     "pixels": Note("each bright pixel (raytools)"),
@@ -64,10 +67,15 @@ class GlareOptions:
             raise ValueError("zones cut grouped sources: not with grouping 'pixels'")
         if self.sun not in ("source", "pixels"):
             raise ValueError(f"sun {self.sun!r}: expected 'source' or 'pixels'")
-        if not self.search_radius > 0:
-            raise ValueError(f"search radius {self.search_radius:g}: expected an angle above 0")
-        if self.illuminance is not None and not self.illuminance >= 0:
-            raise ValueError(f"illuminance {self.illuminance:g}: expected lx")
+        if self.field_of_view not in FIELDS:
+            raise ValueError(f"field_of_view {self.field_of_view!r}: expected one of {FIELDS}")
+        if self.position_model not in POSITION_MODELS:
+            message = f"position_model {self.position_model!r}: expected one of {POSITION_MODELS}"
+            raise ValueError(message)
+        check_number("search_radius [rad]", self.search_radius, 1e-6, np.pi)
+        for name in ("threshold", "peak", "illuminance", "age"):
+            if getattr(self, name) is not None:
+                check_number(name, getattr(self, name), 0.0)
 
     @property
     def rule(self) -> str:
