@@ -238,6 +238,15 @@ class Element:
         return _in_band(self, band)
 
 
+@dataclass(frozen=True, slots=True)
+class SpaceGroup:
+    """Rooms that belong together: a dwelling, a thermal zone, a fire compartment."""
+
+    name: str
+    kind: str  # what the file says it is, "" where it does not
+    rooms: tuple[str, ...]  # GUIDs of spaces
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Building:
     """Rooms, what stands around them, and the faults found on the way."""
@@ -256,6 +265,7 @@ class Building:
     uses: Mapping[str, StatedUse] = field(default_factory=dict)  # of rooms, by the space's GUID
     grids: tuple[ModelGrid, ...] = ()  # sensors that the file holds
     views: tuple[ModelView, ...] = ()  # that the file holds
+    zones: tuple[SpaceGroup, ...] = ()  # of the rooms, as the file has them
 
     @property
     def windows(self) -> tuple[Window, ...]:
@@ -265,6 +275,17 @@ class Building:
     def space(self, name_or_guid: str) -> Space:
         """The space of that GUID, number, name or both; see `bim.names.found_by_name`."""
         return found_by_name(self.spaces, name_or_guid, "space")
+
+    def zone(self, name: str) -> tuple[Space, ...]:
+        """The spaces of the zones of that name; none where there is none."""
+        key = " ".join(name.split()).casefold()
+        rooms = {
+            guid
+            for z in self.zones
+            if " ".join(z.name.split()).casefold() == key
+            for guid in z.rooms
+        }
+        return tuple(space for space in self.spaces if space.guid in rooms)
 
     def room(self, name_or_guid: str) -> Room:
         """The space of that GUID, number, name or both, together with its building.

@@ -71,7 +71,8 @@ def command(
 ) -> None:
     """Write the rooms for Radiance, Mitsuba, EnergyPlus, Honeybee, gbXML or glTF viewers.
 
-    BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
+    BUILDING is a honeybee model (.hbjson), gbXML, a Radiance scene (.rad) or IFC: one file or
+    several of one building (architecture, facade, site), a folder or an .ifczip of them.
 
     Windows are written with the BSDF, U, g and transmittance that the file holds or states;
     sources, assumptions and unknown values are printed.
@@ -84,7 +85,7 @@ def command(
         raise click.UsageError(f"nothing to write: give one of {', '.join(asked)}")
     for field, path in files.items():
         if path is not None:
-            check_file(path, field=field, inputs=[building])
+            check_file(path, field=field, inputs=options.building_files)
     folders = result_folders({"--radiance": radiance, "--mitsuba": mitsuba})
 
     from scenes.chosen_rooms import named_spaces
