@@ -49,7 +49,7 @@ PATTERNS = {  # of the files that an export writes
 @click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
 @click.option(
     "--weather", "weather", type=FILE,
-    help="Weather file (EPW) whose ground temperatures --epjson takes.",
+    help="Hourly weather file (EPW); for the ground temperatures of --epjson.",
 )  # fmt: skip
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
 @click.option("--honeybee", type=click.Path(path_type=Path), help="Honeybee model (.hbjson).")
