@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bim.model import Space, Window
 from bim.names import numbered
 from bim.sensors import in_room
-from bim.to_tracer import orientation_name, window_groups
+from bim.to_tracer import orientation_groups, orientation_name
 from mitsuba_cfs.errors import DataError
 from scenes.room.operation_tables import ControlTable, GroupTable, ShadingRule
 
@@ -54,19 +54,17 @@ def control_groups(space: Space, control: ControlTable | None = None) -> Control
         names.append(_name(windows, table, control.groups))
         rules.append(control.rule_of(table))
         places.append("control" if table is None else f"control.group.{key[1]}")
-    for rule, place in zip(rules, places, strict=True):
-        if rule.seat is not None and not in_room(space, np.array([rule.seat]))[0]:
+    leaves = [(leaf, p) for rule, p in zip(rules, places, strict=True) for leaf in rule.leaves]
+    for leaf, place in leaves:
+        if leaf.seat is not None and not in_room(space, np.array([leaf.seat]))[0]:
             raise DataError("is outside the room", element=space.label, field=f"{place}.seat")
     return ControlGroups(tuple(numbered(names)), tuple(rules), tuple(places), number)
 
 
 def _facades(space: Space) -> list[int]:
     """The number of the orientation of each window [W], that of the largest area first."""
-    groups = [{id(w.triangles) for w in group.windows} for group in window_groups(space)]
-    return [
-        next(f for f, members in enumerate(groups) if id(window.triangles) in members)
-        for window in space.windows
-    ]
+    number = {w: f for f, group in enumerate(orientation_groups(space)) for w in group}
+    return [number[w] for w in range(len(space.windows))]
 
 
 def _names(table: GroupTable, window: Window) -> bool:
