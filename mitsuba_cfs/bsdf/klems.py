@@ -216,6 +216,20 @@ class KlemsBsdf:
         theta, phi = basis.centres()
         return other.index(theta, phi + np.pi)
 
+    def turned_round(self) -> KlemsBsdf:
+        """The same system with its back outdoors, turned by pi about its up."""
+        mirrored = []
+        for basis in (self.basis_out, self.basis_in):
+            theta, phi = basis.centres()
+            mirrored.append(basis.index(theta, np.pi - phi))
+        blocks = {
+            f"{kind}_{other}": None if block is None else block[np.ix_(*mirrored)]
+            for kind in ("transmission", "reflection")
+            for side, other in (("front", "back"), ("back", "front"))
+            for block in (getattr(self, f"{kind}_{side}"),)
+        }
+        return replace(self, **blocks)
+
     def transmission_matrix(self) -> NDArray[np.float64]:
         """T [K out, K in]: radiance into the room for radiance from the sky, L_o = T L_i.
 
