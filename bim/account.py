@@ -149,7 +149,13 @@ class Account:
             found.append(Note("rooms found from geometry"))
         elif self.rooms < self.spaces:
             lost = self.spaces - self.rooms
-            found.append(Note("{count} of {all} spaces are no rooms", count=lost, all=self.spaces))
+            note = Note(
+                "{count} of {all} spaces are no rooms",
+                "{count} of {all} spaces is no room",
+                count=lost,
+                all=self.spaces,
+            )
+            found.append(note)
         if self.overlapping:
             found.append(Note("pairs of overlapping spaces: {count}", count=len(self.overlapping)))
         if self.inner_only:
@@ -174,9 +180,10 @@ class Account:
         if self.found:
             return Note("{count} found from geometry ({storeys})", count=self.rooms, storeys=listed)
         return Note(
-            "{count} of {all} spaces ({storeys})",
-            count=self.rooms,
-            all=self.spaces,
+            "{rooms} of {count} spaces ({storeys})",
+            "{rooms} of {count} space ({storeys})",
+            rooms=self.rooms,
+            count=self.spaces,
             storeys=listed,
         )
 
@@ -185,12 +192,14 @@ class Account:
         if self.glass_out > 0:
             used = Note(
                 "{used:.1f} of {all:.1f} m2 of exterior glass used ({percent:.0f} %, {windows} of "
-                "{all_windows} windows)",
+                "{count} windows)",
+                "{used:.1f} of {all:.1f} m2 of exterior glass used ({percent:.0f} %, {windows} of "
+                "{count} window)",
                 used=self.glass_used,
                 all=self.glass_out,
                 percent=100 * self.share_used,
                 windows=self.windows_used,
-                all_windows=self.windows_out,
+                count=self.windows_out,
             )
         losses = [
             Note("{area:.1f} m2 assumed", area=self.glass_assumed),

@@ -74,7 +74,7 @@ class TwinRoom:
     space: Space
     room: ThermalRoom
     optics: Mapping[str, Sequence[WindowOptics]]  # by window GUID, in each shading state
-    state: NDArray[np.int64]  # [H] shading state
+    state: NDArray[np.int64]  # [H, W] shading state of each window
 
     @property
     def zone(self) -> Zone:
@@ -235,7 +235,7 @@ class EnergyPlusTwin:
         known = room.optics[window.guid]
         states = [self._state(optics, panes=len(known) == 1) for optics in known]
         write_window(self.model, name, zone, window, frame=frame, glazing=states[0])
-        held = np.minimum(room.state, len(states) - 1)
+        held = np.minimum(room.state[:, index], len(states) - 1)
         if np.any(held):
             schedule = self.schedules.name(f"{name} state", held)
             number = len(self.model.get("EnergyManagementSystem:Sensor", {}))

@@ -206,13 +206,18 @@ def view_point(
     position = np.array([middle.x, middle.y, z])
     direction = np.array([0.0, 0.0, 0.0])
     if space.windows:
-        biggest = max(space.windows, key=lambda window: window.area)
+        # of equal windows in several orientations, one that does not depend on the file's order
+        biggest = min(space.windows, key=_size_and_normal)
         direction = (biggest.centre - position) * [1, 1, 0]
         if np.linalg.norm(direction) < 0.1:  # below a skylight
             direction = biggest.normal * [1, 1, 0]
     if np.linalg.norm(direction) < 1e-6:
         direction = np.append(_along_longest_edge(section)[1][:, 0], 0.0)
     return position, direction / np.linalg.norm(direction)
+
+
+def _size_and_normal(window: Window) -> tuple[float, ...]:
+    return -window.area, *np.round(window.normal, 3).tolist()
 
 
 def in_room(space: Space, points: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -65,7 +65,13 @@ def window_groups(space: Space) -> list[WindowGroup]:
                 break
         else:
             groups.append([window])
-    groups.sort(key=lambda group: -round(sum(window.area for window in group), 6))
+    # groups of equal area in an order that does not depend on that of the windows
+    groups.sort(
+        key=lambda group: (
+            -round(sum(window.area for window in group), 6),
+            *np.round(group[0].normal, 3).tolist(),
+        )
+    )
     names = numbered([orientation_name(group[0]) for group in groups])
     return [
         WindowGroup(name, tuple(WindowSurface(w.name, w.triangles, w.up) for w in group))

@@ -6,6 +6,7 @@ A process holds a lock on what it is writing, so that what a killed one left is 
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import re
 import secrets
@@ -83,14 +84,57 @@ def replacing(path: str | PathLike[str], *, field: str | None = None) -> Iterato
 
 
 @contextmanager
-def temporary_folder(parent: Path) -> Iterator[Path]:
+def temporary_folder(parent: Path, *, mode: int = 0o777) -> Iterator[Path]:
     """A folder inside `parent` to fill and then to rename; deleted at the end if still there."""
-    part, release = _held(parent, "", Path.mkdir)
+    part, release = _held(parent, "", partial(Path.mkdir, mode=mode))
     try:
         yield part
     finally:
         shutil.rmtree(part, ignore_errors=True)
         release()
+
+
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """A folder for this user in the system's temporary folder; deleted at the end.
+
+    What killed processes left there is removed first.
+    """
+    parent = Path(tempfile.gettempdir())
+    remove_stale(parent)
+    with temporary_folder(parent, mode=0o700) as part:
+        yield part
+
+
+def taken(folder: Path) -> Callable[[], None] | None:
+    """Function that gives a folder free, which this process has until then; None if another has.
+
+    For processes of one machine, or rather of one temporary folder, where the lock is.
+    """
+    name = hashlib.sha256(os.fsencode(os.path.realpath(folder))).hexdigest()[:8]
+    lock = Path(tempfile.gettempdir()) / f".cfs-{name}.part.lock"
+    if fcntl is None:
+        return lambda: None
+    while True:
+        try:
+            handle = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+        except OSError:  # no room for it, or another user's: nothing is known of that folder
+            return lambda: None
+        try:
+            fcntl.lockf(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)  # once more by this process: yes
+        except OSError:
+            os.close(handle)
+            return None
+        _locked(handle, wait=False)  # by which `stale` knows that it is in use
+        with suppress(OSError):
+            if os.path.samestat(os.stat(lock), os.fstat(handle)):
+                return partial(_freed, lock, handle)
+        os.close(handle)  # another process has just removed it
+
+
+def _freed(lock: Path, handle: int) -> None:
+    lock.unlink(missing_ok=True)
+    os.close(handle)
 
 
 @contextmanager

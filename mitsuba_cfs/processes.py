@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import base64
 import contextlib
 import os
 import pickle
@@ -10,18 +11,16 @@ import queue
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import connection, get_context, parent_process
 from multiprocessing.process import BaseProcess
-from pathlib import Path
 from typing import Any, ClassVar
 
 Told = Callable[[str], None]
-TOLD, DONE = "told ", "done"  # how lines of a process apart begin
+TOLD, DONE = "told ", "done "  # how lines of a process apart begin
 ENDS_WITHIN = 10.0  # s: processes that were told to end
 MOST_ENDED = 5  # items that end their process, one after the other, before the rest is given up
 
@@ -113,26 +112,24 @@ class _Apart:
         process, stopped = self._process, threading.Event()
         timer = threading.Timer(limit_s, lambda: (stopped.set(), process.kill()))
         timer.start()
-        last, done = "", False
-        with tempfile.TemporaryDirectory() as folder:
-            try:
-                (Path(folder) / "task").write_bytes(pickle.dumps(task))
-                with contextlib.suppress(BrokenPipeError):  # it died while it had nothing to do
-                    process.stdin.write(folder + "\n")
-                    process.stdin.flush()
-                for line in process.stdout or ():
-                    done = line.startswith(DONE)
-                    if done:
-                        break
-                    if line.startswith(TOLD):
-                        last = line.removeprefix(TOLD).rstrip("\n")
-                        told(last)
-            finally:
-                timer.cancel()
-            if not done or stopped.is_set():
-                self.end()
-                raise ProcessEnded(_reason(process.returncode, stopped.is_set(), limit_s), last)
-            return pickle.loads((Path(folder) / "answer").read_bytes())
+        last, answer = "", ""
+        try:
+            with contextlib.suppress(BrokenPipeError):  # it died while it had nothing to do
+                process.stdin.write(_packed(task) + "\n")
+                process.stdin.flush()
+            for line in process.stdout or ():
+                if line.startswith(DONE):
+                    answer = line.removeprefix(DONE)
+                    break
+                if line.startswith(TOLD):
+                    last = line.removeprefix(TOLD).rstrip("\n")
+                    told(last)
+        finally:
+            timer.cancel()
+        if not answer.endswith("\n") or stopped.is_set():  # or it died in the midst of the line
+            self.end()
+            raise ProcessEnded(_reason(process.returncode, stopped.is_set(), limit_s), last)
+        return _unpacked(answer)
 
 
 @atexit.register
@@ -198,25 +195,32 @@ def _reason(code: int, stopped: bool, limit_s: float) -> str:
 
 
 def _work() -> None:
-    """In the subprocess: do the tasks of the folders that stdin names."""
-    folders: queue.Queue[str] = queue.Queue()
+    """In the subprocess: do the tasks that stdin has, one in each line."""
+    tasks: queue.Queue[str] = queue.Queue()
 
     def read() -> None:
         with open(0, encoding="utf-8", closefd=False) as lines:
             for line in lines:
-                folders.put(line.rstrip("\n"))
+                tasks.put(line)
 
     _end_after(read)
     while True:
-        folder = Path(folders.get())
-        function, arguments = pickle.loads((folder / "task").read_bytes())
+        function, arguments = _unpacked(tasks.get())
         value, error = None, None
         try:
             value = function(*arguments, _tell)
         except Exception as raised:  # raised again by the parent, whatever it is
             error = raised
-        (folder / "answer").write_bytes(pickle.dumps((value, error)))
-        _send(DONE)
+        _send(DONE + _packed((value, error)))
+
+
+def _packed(value: object) -> str:
+    """A value as one line for a pipe: no file of it is left where the processes are killed."""
+    return base64.b64encode(pickle.dumps(value)).decode()
+
+
+def _unpacked(line: str) -> Any:
+    return pickle.loads(base64.b64decode(line))
 
 
 def _tell(text: str) -> None:

@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Sequence
 from importlib import import_module, metadata
 from types import FrameType
@@ -83,6 +84,7 @@ COMMANDS = {
 USAGE, FAILED, INTERRUPTED = 2, 1, 130
 FOREIGN = ("ifcopenshell", "mitsuba", "drjit")  # modules whose calls no signal may end
 AGAIN_S = 0.05  # after which a signal that came in one of their calls is sent again
+CLEANING_S = 5.0  # after a signal, in which others are ignored
 SIGNALLED = 128  # and the signal's number
 # OpenBLAS reads it when NumPy is loaded: its threads wait for work in 2^4 turns of a loop, not in
 # the 2^28 that they are busy for between two small products of a room, beside Dr.Jit's own
@@ -160,31 +162,45 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     os.environ.update(BLAS_WAIT | os.environ | SAFE_PATH)
     open_streams()
+    stop, handled = Stop(), []
     for name in ("SIGTERM", "SIGHUP", "SIGINT"):  # Windows has no SIGHUP
         number = getattr(signal, name, None)
         own = (signal.SIG_DFL, signal.default_int_handler)
         if number is not None and signal.getsignal(number) in own:  # not under nohup
             signal.signal(number, stop)
-    sys.exit(run(sys.argv[1:] if arguments is None else arguments))
+            handled.append(number)
+    code = run(sys.argv[1:] if arguments is None else arguments)
+    for number in handled:
+        signal.signal(number, signal.SIG_IGN)  # the exit code is that of what has been done
+    sys.exit(code)
 
 
-def stop(number: int, frame: FrameType | None) -> None:
+class Stop:
     """Handler of signals: end the program, but not inside of a library or while it cleans up.
 
-    What is raised there is lost, or answered with `SystemError`; the signal is sent again until
-    that code has returned.
+    What is raised in a library is lost, or answered with `SystemError`; the signal is sent again
+    until that code has returned. A second signal does not end the cleaning up after the first.
     """
-    while frame is not None:
-        module = str(frame.f_globals.get("__name__", "")).partition(".")[0]
-        if module in FOREIGN or frame.f_code.co_name == "__del__":
-            again = threading.Timer(AGAIN_S, signal.raise_signal, (number,))
-            again.daemon = True
-            again.start()
+
+    def __init__(self) -> None:
+        self._cleaning = -CLEANING_S  # when it began, by `time.monotonic`
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Raise what ends the program."""
+        if time.monotonic() < self._cleaning + CLEANING_S:
             return
-        frame = frame.f_back
-    if number == signal.SIGINT:
-        raise KeyboardInterrupt
-    raise Terminated(number)
+        while frame is not None:
+            module = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+            if module in FOREIGN or frame.f_code.co_name == "__del__":
+                again = threading.Timer(AGAIN_S, signal.raise_signal, (number,))
+                again.daemon = True
+                again.start()
+                return
+            frame = frame.f_back
+        self._cleaning = time.monotonic()
+        if number == signal.SIGINT:
+            raise KeyboardInterrupt
+        raise Terminated(number)
 
 
 def run(arguments: Sequence[str]) -> int:

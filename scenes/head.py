@@ -60,6 +60,11 @@ class Head:
         """The assumptions as sentences, for a page that has account and issues elsewhere."""
         return (*self.noted, *self.assumed)
 
+    def further(self, notes: Iterable[str]) -> tuple[str, ...]:
+        """Those of the notes that the head does not have, each once."""
+        known = {*self.lines, *self.notes}
+        return tuple(note for note in _once(notes) if note not in known)
+
     def text(self, audience: Audience) -> tuple[str, ...]:
         """The lines of the head; audience: whom the fixes are for."""
         of_model = (
@@ -176,7 +181,12 @@ def model_lines(building: Building) -> tuple[str, ...]:
     glass = sum(window.area for window in building.windows)
     return (
         Note("Rooms read: {count}", count=len(building.spaces)),
-        Note("Glass: {area:.1f} m2 in {count} windows", area=glass, count=len(building.windows)),
+        Note(
+            "Glass: {area:.1f} m2 in {count} windows",
+            "Glass: {area:.1f} m2 in {count} window",
+            area=glass,
+            count=len(building.windows),
+        ),
     )
 
 
@@ -188,7 +198,7 @@ def _issue_lines(issues: Iterable[Issue], severity: str, audience: Audience) -> 
         count = sum(one.count for one in kinds[SHOWN:])
         lines.append(
             Note(
-                "{count} more of {kinds} other kinds; cfs check lists all",
+                "{count} more (other kinds: {kinds}); cfs check lists all",
                 count=count,
                 kinds=len(kinds) - SHOWN,
             )
@@ -224,8 +234,8 @@ def unused_notes(building: Building) -> tuple[str, ...]:
     if not any(map(len, parts)) or building.file is None:
         return ()
     note = Note(
-        "{file} contains {uses} uses of rooms, {grids} sensor grids and {views} views; they are "
-        "not used here.",
+        "{file} contains uses of rooms ({uses}), sensor grids ({grids}) and views ({views}); they "
+        "are not used here.",
         file=building.file.name,
         uses=len(building.uses),
         grids=len(building.grids),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import weakref
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from mitsuba_cfs.files import (
     reason,
     remove_stale,
     stale,
+    taken,
     temporary_folder,
     write_text,
 )
@@ -94,6 +96,7 @@ class ResultFolder:
         if self._place.exists() and not self._place.is_dir():
             raise self._error("is a file; results need a folder")
         try:
+            self._take()
             self._finish_cut_off()
             self._mark = self._own_mark()
             self._try_to_write()
@@ -137,10 +140,11 @@ class ResultFolder:
         """A folder inside for checkpoints of the command; it is never cleared."""
         made: list[Path] = []
         try:
-            made = _make_folders(self._place / name)
-            self._mark.write(self._place)
+            made = _make_folders(self._place)
+            self._mark.write(self._place)  # first: without it a folder in it would be another's
+            made = _make_folders(self._place / name) + made
         except (OSError, DataError) as error:
-            _remove_empty(made)  # without a mark they would be another's
+            _remove_empty(made)
             if isinstance(error, DataError):
                 raise
             raise self._error(f"cannot be written: {reason(error)}") from error
@@ -155,6 +159,15 @@ class ResultFolder:
                 raise self._error(
                     f"is or contains the input {one}: name a folder for results alone"
                 )
+
+    def _take(self) -> None:
+        """Have the folder for this process, as long as this object exists."""
+        release = taken(self._place)
+        if release is None:
+            raise self._error(
+                "another run of cfs is writing there: wait for it, or name another folder"
+            )
+        weakref.finalize(self, release)
 
     def _finish_cut_off(self) -> None:
         """Do what a killed process left: finished results go in place, the rest goes."""

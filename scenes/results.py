@@ -14,6 +14,7 @@ from bim.report.issue import Issue
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.picture_year.year import PictureYear
+from scenes.head import NO_HEAD, Head
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,21 +124,50 @@ class ThermalResult:
 
 
 @dataclass(frozen=True, slots=True)
+class ShadingYear:
+    """Shading states of a year of the groups of windows that move together (axis N)."""
+
+    groups: tuple[str, ...]  # [N] names
+    rules: tuple[str, ...]  # [N] of the control
+    states: NDArray[np.int64]  # [H, N]
+    number: NDArray[np.int64]  # [W] group of each window of the room
+
+    @property
+    def columns(self) -> dict[str, NDArray[np.int64]]:
+        """Columns [H] of tables: shading_state, with several groups one for each."""
+        if len(self.groups) < 2:
+            dark = np.zeros(len(self.states), dtype=np.int64)  # a room without windows
+            return {"shading_state": self.states[:, 0] if self.groups else dark}
+        names = [f"shading_state_{name.replace(' ', '_')}" for name in self.groups]
+        return dict(zip(names, self.states.T, strict=True))
+
+    @property
+    def of_windows(self) -> NDArray[np.int64]:
+        """The state of each window [H, W]."""
+        return self.states[:, self.number]
+
+
+@dataclass(frozen=True, slots=True)
 class OperationResult:
     """Shading states, heating, cooling and lamps of an operated room."""
 
     states: tuple[str, ...]  # names of the shading states, from open to closed
-    hours: pd.DataFrame  # [H] index time: shading_state, heating_w, cooling_w, lighting_w
+    # [H] index time: columns of `ShadingYear`, heating_w, cooling_w, lighting_w
+    hours: pd.DataFrame
     summary: dict[str, float]  # heating_kwh, cooling_kwh, lighting_kwh, peaks
-    rule: str  # of the shading control
+    shading: ShadingYear
 
 
 @dataclass(frozen=True, slots=True)
 class ExploredRoom:
-    """A room in every lit hour and every shading state, for the explorer."""
+    """A room in every lit hour and every combination of shading states, for the explorer.
+
+    The combinations J are all windows in each state, then those of the operated year in which
+    groups of windows are in different states.
+    """
 
     states: tuple[str, ...]  # [J] names, from open to closed
-    operated: NDArray[np.int64]  # [H] state of each hour of the year
+    operated: NDArray[np.int64]  # [H] combination of each hour of the year
     lit: NDArray[np.int64]  # [L] hours of the year with the sun up
     pictures: tuple[PictureYear, ...]  # [J]
     illuminance: tuple[NDArray[np.float32], ...]  # [J] of the sensors [S, L] [lx]
@@ -203,6 +233,7 @@ class RunResult:
     manifest: dict  # of run.json: inputs with hashes, options, versions, seed, timings
     notes: tuple[str, ...] = field(default=())  # sentences for the head of the results
     method: str = "three-phase"  # one of mitsuba_cfs.methods.METHODS
+    head: Head = NO_HEAD  # what was left out, what was assumed
 
     def __repr__(self) -> str:
         return f"<RunResult {self.building.name!r}: {len(self.spaces)} rooms, {self.method}>"

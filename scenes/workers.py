@@ -20,16 +20,16 @@ from concurrent.futures import (
     wait,
 )
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from functools import partial
 from importlib.util import find_spec
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, ClassVar, Generic, TypeVar
 
 from mitsuba_cfs.errors import DataError, RoomError
+from mitsuba_cfs.files import scratch_folder
 from mitsuba_cfs.processes import MOST_ENDED, how_it_ended, process_pool
 from mitsuba_cfs.variants import share_cores
 from scenes.cluster import Cluster, Requirements
@@ -200,8 +200,8 @@ class _Crew(Generic[T]):
 
     def __init__(self, processes: int, work: tuple[Callable, Callable]) -> None:
         pickled = pickle.dumps(work)
-        self._folder = TemporaryDirectory()
-        file = Path(self._folder.name) / "work"
+        self._folder = ExitStack()
+        file = self._folder.enter_context(scratch_folder()) / "work"
         file.write_bytes(pickled)
         self._processes, self._first = processes, partial(_Work.load, file, processes)
         self._pool = process_pool(processes, self._first)
@@ -240,7 +240,7 @@ class _Crew(Generic[T]):
     def end(self) -> None:
         """Terminate the processes without waiting for their tasks."""
         _end(self._pool)
-        self._folder.cleanup()
+        self._folder.close()
 
 
 def _lost(future: Future) -> bool:

@@ -6,7 +6,7 @@ together: `switched` picks the sun, and hands the state to the heat balance.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,15 +49,30 @@ def by_irradiance(
     return state
 
 
-def by_glare(glare: ArrayLike, limit: float) -> StateArray:
-    """The most open state [H] whose glare stays below a limit; the last one where none does.
+def by_glare(
+    closure: ArrayLike, excess: Callable[[int, StateArray], NDArray[np.float64]], hours: int
+) -> StateArray:
+    """The most open combination of states [H] without glare; the last one where none has none.
 
-    glare: [J, H] DGP (limit 0.35 to 0.45) or vertical eye illuminance [lx] in each state.
+    Of equally open ones the one with the least glare. Combinations are rated only in the hours in
+    which each more open one has glare.
+
+    Args:
+        closure: [M] of each combination; the last is the most closed.
+        excess: of a combination and some hours [h]: glare beyond its limit [h], negative below it.
     """
-    values = np.asarray(glare, dtype=float)
-    require(values.ndim == 2, "glare", f"expected [states, hours], got {values.shape}")
-    fine = values < limit
-    return np.where(fine.any(axis=0), fine.argmax(axis=0), len(values) - 1).astype(np.int64)
+    steps = np.round(np.asarray(closure, dtype=float), 9)
+    chosen = np.full(hours, len(steps) - 1, dtype=np.int64)
+    left = np.arange(hours)
+    for step in np.unique(steps):
+        equal = np.flatnonzero(steps == step)
+        values = np.stack([excess(int(one), left) for one in equal])
+        best, fine = values.argmin(axis=0), values.min(axis=0) < 0
+        chosen[left[fine]] = equal[best[fine]]
+        left = left[~fine]
+        if not len(left):
+            break
+    return chosen
 
 
 def profile_angle(sun_local: ArrayLike) -> NDArray[np.float64]:
@@ -94,28 +109,32 @@ def by_cut_off(
     return np.where(np.asarray(beam, dtype=float) > 0, state, 0).astype(np.int64)
 
 
-def switched(states: Sequence[Solar], chosen: ArrayLike) -> Solar:
-    """The sun of the chosen state in every hour, all windows of the zone switching together.
+def switched(suns: Sequence[Solar], chosen: ArrayLike, states: ArrayLike | None = None) -> Solar:
+    """The sun of the chosen combination of states in every hour.
 
-    Args: states: the sun in each state, alike in shape; chosen: [H] index of the state.
+    Args:
+        suns: the sun in each combination, alike in shape.
+        chosen: [H] index of the combination.
+        states: [H, W] state of each window; by default the index, of all windows.
     """
     choice = np.asarray(chosen, dtype=np.int64)
-    require(len(states) > 0, "shading states", "there is none")
-    rows, windows = states[0].absorbed_outer.shape
+    require(len(suns) > 0, "shading states", "there is none")
+    rows, windows = suns[0].absorbed_outer.shape
     fits = len(choice) > 0 and rows % len(choice) == 0
     require(fits, "shading state", f"{len(choice)} hours do not fit {rows} rows of sun")
-    inside = bool(np.all((choice >= 0) & (choice < len(states))))
-    require(inside, "shading state", f"expected 0 to {len(states) - 1}")
+    inside = bool(np.all((choice >= 0) & (choice < len(suns))))
+    require(inside, "shading state", f"expected 0 to {len(suns) - 1}")
     at = np.repeat(choice, rows // len(choice))
 
     def pick(name: str) -> NDArray[np.float64] | None:
-        arrays = [getattr(s, name) for s in states]
+        arrays = [getattr(s, name) for s in suns]
         if any(a is None for a in arrays):
             return None
         same = all(a.shape == arrays[0].shape for a in arrays)
-        require(same, f"solar {name}", "the states differ in shape")
+        require(same, f"solar {name}", "the combinations differ in shape")
         return np.stack(arrays)[at, np.arange(rows)]
 
     names = ("absorbed_outer", "absorbed_inner", "inside", "facade", "window_inside")
     parts: dict[str, Any] = {name: pick(name) for name in (*names, "window_facade")}
-    return Solar(**parts, state=np.repeat(choice[:, None], windows, axis=1))
+    of_windows = np.repeat(choice[:, None], windows, axis=1) if states is None else states
+    return Solar(**parts, state=np.asarray(of_windows, dtype=np.int64))

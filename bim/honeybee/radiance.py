@@ -8,7 +8,6 @@ Source: honeybee-schema, "Modifier" and "ModifierSet".
 from __future__ import annotations
 
 import base64
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -23,6 +22,7 @@ from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import scratch_folder
 
 COLOURS = ("r", "g", "b")
 OPAQUE_FIELDS = {
@@ -103,8 +103,8 @@ class ModifierLibrary:
         if not isinstance(data, str):
             raise DataError("expected the text of a BSDF XML", file=self.file, element=name,
                             field="bsdf_data")  # fmt: skip
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "bsdf.xml"
+        with scratch_folder() as folder:
+            path = folder / "bsdf.xml"
             path.write_bytes(_decoded(data))
             try:
                 bands = read_bsdf_xml(path).bands

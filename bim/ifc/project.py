@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 import uuid
 import zipfile
 from pathlib import Path
@@ -17,6 +16,7 @@ from bim.ifc.damage import Damage, entities, type_of
 from bim.ifc.head import SCHEMAS, ZIPPED, check_head, model_name
 from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import scratch_folder
 
 END = 4096  # bytes in which the end of a STEP file is looked for
 
@@ -30,8 +30,8 @@ def open_ifc(path: str | Path) -> ifcopenshell.file:
 
 def _open_zipped(path: Path) -> ifcopenshell.file:
     try:
-        with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
-            inner = Path(folder) / "model.ifc"
+        with zipfile.ZipFile(path) as archive, scratch_folder() as folder:
+            inner = folder / "model.ifc"
             with archive.open(model_name(archive, path)) as packed, inner.open("wb") as unpacked:
                 shutil.copyfileobj(packed, unpacked)
             return _open_step(inner, path)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import resource
 import sys
-import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
@@ -20,6 +19,7 @@ from bim.to_energyplus import write_epjson
 from bim.to_gltf import write_gltf
 from bim.to_radiance import write_radiance
 from mitsuba_cfs.errors import CfsError
+from mitsuba_cfs.files import scratch_folder
 from mitsuba_cfs.processes import process_pool
 
 
@@ -72,8 +72,8 @@ def _surveyed(path: Path) -> Surveyed:
         return Surveyed(path.name, megabytes, refused=str(error))
     check_s = time.perf_counter() - start
     start = time.perf_counter()
-    with tempfile.TemporaryDirectory() as folder:
-        _export(building, Path(folder))
+    with scratch_folder() as folder:
+        _export(building, folder)
     export_s, cpu_s = time.perf_counter() - start, time.process_time() - cpu
     # ru_maxrss counts kilobytes, on macOS bytes
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

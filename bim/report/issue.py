@@ -18,11 +18,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
-from mitsuba_cfs.notes import Note
+from mitsuba_cfs.notes import Note, filled
 
 Severity = Literal["loss", "warning", "unused", "assumption", "info"]
 Audience = Literal["python", "command"]  # whom a fix is for: an argument, or a flag
-Fill = Callable[..., str]  # of a template's text, by name the values of its fields
+Fill = Callable[..., str]  # as `mitsuba_cfs.notes.filled`: template, singular, values by name
 SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 CATALOGUE = Path(__file__).parent / "catalogue.toml"
 LISTED = 6  # names that a text lists before it counts the rest
@@ -38,6 +38,7 @@ class Template(NamedTuple):
     fix: str = ""  # for Python callers
     fix_command: str = ""  # for the command line; "" where it is as for Python callers
     group: tuple[str, ...] = ()  # values that tell issues of the code apart where they are counted
+    singular: Mapping[str, str] = {}  # templates in place of these where the value `count` is 1
 
     @property
     def fields(self) -> frozenset[str]:
@@ -122,25 +123,26 @@ def catalogue() -> Mapping[str, Template]:
 @cache
 def phrases() -> Mapping[str, str]:
     """The English templates of the phrases."""
-    return _tables()["phrase"]
+    return {key: text for key, text in _tables()["phrase"].items() if not key.endswith("-one")}
 
 
-def issue_text(issue: Issue, audience: Audience = "python", fill: Fill = str.format) -> IssueText:
+def issue_text(issue: Issue, audience: Audience = "python", fill: Fill = filled) -> IssueText:
     """The text of an issue.
 
     Args:
         audience: whom the fix is for.
-        fill: fills a template, called with its text and by name its values: in another language
-            with its translation.
+        fill: fills a template: in another language with its translation.
     """
     template = catalogue()[issue.code]
     words = {key: _words(value, fill) for key, value in issue.values.items()}
     fix = template.fix if audience == "python" else template.fix_command or template.fix
-    filled = (
-        fill(text, **{"where": issue.where, **words}) if text else ""
+    texts = (
+        fill(text, template.singular.get(text, ""), **{"where": issue.where, **words})
+        if text
+        else ""
         for text in (template.what, template.effect, fix)
     )
-    return IssueText(*filled)
+    return IssueText(*texts)
 
 
 def issue_note(issue: Issue, audience: Audience = "command") -> Note:
@@ -154,7 +156,7 @@ def issue_note(issue: Issue, audience: Audience = "command") -> Note:
 def issue_rows(
     issues: Iterable[Issue],
     audience: Audience = "python",
-    fill: Fill = str.format,
+    fill: Fill = filled,
 ) -> list[tuple[str, str, str, str, str]]:
     """Rows of `COLUMNS`; the consequence is the effect with the fix."""
     rows: list[tuple[str, str, str, str, str]] = []
@@ -167,14 +169,15 @@ def issue_rows(
 def templates() -> tuple[str, ...]:
     """Every English template of the catalogue, each once: what a language translates."""
     texts = [text for template in catalogue().values() for text in template[1:5] if text]
-    return tuple(dict.fromkeys([*texts, *phrases().values()]))
+    texts += [text for template in catalogue().values() for text in template.singular.values()]
+    return tuple(dict.fromkeys([*texts, *_tables()["phrase"].values()]))
 
 
 def _words(value: object, fill: Fill) -> object:
     """A value as the templates take it: phrases and lists as text, numbers as they are."""
     if isinstance(value, Phrase):
         words = {key: _words(one, fill) for key, one in value.values.items()}
-        return fill(phrases()[value.key], **words)
+        return fill(phrases()[value.key], _tables()["phrase"].get(f"{value.key}-one", ""), **words)
     if isinstance(value, tuple):
         listed = ", ".join(str(_words(one, fill)) for one in value[:LISTED])
         if len(value) <= LISTED:
@@ -196,5 +199,10 @@ def _tables() -> Mapping[str, dict[str, Any]]:
 def _template(code: str, table: Mapping[str, Any]) -> Template:
     if table["severity"] not in SEVERITIES:
         raise ValueError(f"issue {code}: severity {table['severity']!r} is none of {SEVERITIES}")
-    texts = {key.replace("-", "_"): value for key, value in table.items() if key != "group"}
-    return Template(**texts, group=tuple(table.get("group", ())))
+    singular = {table[key]: table[f"{key}-one"] for key in table if f"{key}-one" in table}
+    texts = {
+        key.replace("-", "_"): value
+        for key, value in table.items()
+        if key != "group" and not key.endswith("-one")
+    }
+    return Template(**texts, group=tuple(table.get("group", ())), singular=singular)

@@ -15,6 +15,7 @@ from bim.report.issue import (
     issue_text,
     phrases,
 )
+from mitsuba_cfs.notes import filled
 
 LOST = {"room": 2, "window": 1}
 
@@ -27,7 +28,7 @@ class Ranked:
     glass: float  # [m2]
     first: Issue
 
-    def text(self, audience: Audience = "python", fill: Fill = str.format) -> IssueText:
+    def text(self, audience: Audience = "python", fill: Fill = filled) -> IssueText:
         """The text of the first issue as an example, after the number of issues."""
         text = issue_text(self.first, audience, fill)
         if self.count == 1:

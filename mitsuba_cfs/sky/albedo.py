@@ -66,6 +66,7 @@ def _from_file(weather: Weather, source: str) -> Weather:
     if missing.any():
         note = Note(
             "{file}: the albedo is missing in {count} hours; {albedo:g} is used there.",
+            "{file}: the albedo is missing in {count} hour; {albedo:g} is used there.",
             file=_name(weather), count=int(missing.sum()), albedo=float(np.mean(weather.albedo)),
         )  # fmt: skip
         notes = (*notes, note)

@@ -89,6 +89,7 @@ def filled_gaps(column: weather_table.EpwColumns, site: str) -> tuple[str, ...]:
         Note(
             "Weather {site}: {field}: {count} missing values, the first in line {line}, are "
             "interpolated.",
+            "Weather {site}: {field}: {count} missing value, in line {line}, is interpolated.",
             site=site,
             field=field,
             count=len(rows),
@@ -121,9 +122,11 @@ def implausible(
         Note(
             "Weather {site}: {field}: {count} implausible values, the first in line {line}: "
             "{value:g}; they are used as they are.",
+            "Weather {site}: {field}: {count} implausible value, in line {line}: {value:g}; it is "
+            "used as it is.",
             site=site,
             field=field,
-            count=np.count_nonzero(wrong),
+            count=int(np.count_nonzero(wrong)),
             line=column.first_line + int(np.argmax(wrong)),
             value=values[np.argmax(wrong)],
         )
@@ -155,8 +158,10 @@ def _pressure(
             Note(
                 "Weather {site}: {count} impossible pressures, the first in line {line}; "
                 "{pressure:.0f} Pa (standard atmosphere) is used.",
+                "Weather {site}: {count} impossible pressure, in line {line}; {pressure:.0f} Pa "
+                "(standard atmosphere) is used.",
                 site=site.name,
-                count=np.count_nonzero(wrong),
+                count=int(np.count_nonzero(wrong)),
                 line=column.first_line + row,
                 pressure=standard,
             ),

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import replace
 from datetime import datetime
-from pathlib import Path
 
 import numpy as np
 
 from bim.shoebox import shoebox
+from mitsuba_cfs.files import scratch_folder
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, part, silent
 from scenes.calibration.costs import GLARE, HEAT, Calibration, machine_name
@@ -57,8 +56,8 @@ def room_costs(progress: Progress = silent, options: RoomOptions | None = None) 
     for number, method in enumerate(PHASES):
         chosen = replace(options, method=method)
         skies = skies_for(weather, method, chosen.sampling)
-        with tempfile.TemporaryDirectory() as folder:
-            cold, warm = MatrixCache(Path(folder) / "cold"), MatrixCache(Path(folder) / "warm")
+        with scratch_folder() as folder:
+            cold, warm = MatrixCache(folder / "cold"), MatrixCache(folder / "warm")
             timed = [
                 compute_room(
                     building, space, in_all_windows(space, each), weather, chosen,

@@ -58,9 +58,9 @@ def command(issues: Path | None, **chosen) -> None:
     for line in _issues(read):
         console.print(line, markup=False, highlight=False)
     console.print(
-        f"{len(read.spaces)} rooms, {sum(bool(s.windows) for s in read.spaces)} with windows, "
-        f"{len(read.windows)} windows, {sum(w.area for w in read.windows):.1f} m2 of glass, "
-        f"{len(read.issues)} problems"
+        f"rooms: {len(read.spaces)} (with windows: {sum(bool(s.windows) for s in read.spaces)}), "
+        f"windows: {len(read.windows)} ({sum(w.area for w in read.windows):.1f} m2 of glass), "
+        f"problems: {len(read.issues)}"
     )
     if issues is not None:
         import pandas as pd

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tempfile
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +10,7 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason
+from mitsuba_cfs.files import reason, scratch_folder
 
 RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 
@@ -56,13 +55,13 @@ def command(
             join_explorers(results, place)
         click.echo(f"explorer: {out / 'index.html'}")
         return
-    with tempfile.TemporaryDirectory() as place:
+    with scratch_folder() as place:
         with in_language(language):
             if len(results) > 1:
-                join_explorers(results, Path(place))
+                join_explorers(results, place)
             else:
-                copy_explorer(folders[0], Path(place))
-        _serve(Path(place), port, open_it=not no_browser)
+                copy_explorer(folders[0], place)
+        _serve(place, port, open_it=not no_browser)
 
 
 def _print_head(results: Path, *, several: bool) -> None:

@@ -129,7 +129,7 @@ def attach(
     )
     for note in notes:
         click.echo(f"note: {note}")
-    click.echo(f"{out}: {count} windows or window types")
+    click.echo(f"{out}: windows and window types: {count}")
 
 
 @command.command()
@@ -199,4 +199,4 @@ def query(building: Path, selector: str) -> None:
     console = Console(width=None if Console().is_terminal else UNCUT)
     if elements:
         console.print(table)
-    console.print(f"{len(elements)} elements")
+    console.print(f"elements: {len(elements)}")

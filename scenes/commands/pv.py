@@ -80,7 +80,7 @@ def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
         progress("results", 1.0)
     for row in result.yield_table().itertuples():
         click.echo(
-            f"{row.subsystem}: {row.modules} modules, {row.peak_kw:.2f} kW, "
+            f"{row.subsystem} (modules: {row.modules}): {row.peak_kw:.2f} kW, "
             f"{row.yield_kwh:.0f} kWh a year ({row.kwh_per_kw:.0f} kWh/kW), "
             f"mismatch {100 * row.mismatch_loss:.1f} %"
         )

@@ -121,7 +121,7 @@ def study_to_folder(
     with ProgressBar() as progress, compiled_beside():
         result = run_study(
             parsed, store, plan=plan, processes=processes, scheduler=scheduler,
-            progress=progress, on_case=_print_case,
+            progress=progress, on_case=_print_case, on_head=PrintedHead(),
         )  # fmt: skip
         nothing = result.failed == len(result.results)
         if explore and not nothing:
@@ -192,10 +192,7 @@ def _checked(
 
 
 def _print_plan(plan: StudyPlan) -> None:
-    """What was left out and assumed, and why methods were chosen."""
-    from scenes.study.one_case import plan_head
-
-    PrintedHead()(plan_head(plan))
+    """Why methods were chosen."""
     for why in dict.fromkeys(case.chosen for case in plan.cases if case.chosen):
         click.echo(f"auto: {why}")
 

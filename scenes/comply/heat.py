@@ -24,12 +24,11 @@ def room_heat(
     """Operative temperatures of a room that neither heats nor cools.
 
     Args:
-        closed: [H, G] when the blinds of each window group are closed; the heat balance has one
-            state for all windows, closed when any group is. None: open all year.
+        closed: [H, G] when the blinds of each window group are closed. None: open all year.
     """
-    state = np.zeros(room.skies.hours, dtype=np.int64)
+    state = np.zeros((room.skies.hours, len(room.windows.groups)), dtype=np.int64)
     if closed is not None:
-        state = np.where(closed.any(axis=1), 1, 0)
+        state = closed[:, : state.shape[1]].astype(np.int64)
     outdoors = seasonal_outdoors(room, light, progress=progress)
     zone = room_zone(room, zone_surfaces(room), outdoors, state, progress=progress)
     thermal, _ = heat_alone(zone, room.weather, room.options.heat_step_s, progress)

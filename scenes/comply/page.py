@@ -22,7 +22,7 @@ from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report.names import stage_words
 from scenes.report.page import FILES as SHARED
-from scenes.report.page import environment
+from scenes.report.page import environment, head_lines
 from scenes.report.page_files import page_files
 from scenes.report.room import RoomSection, facts
 from scenes.report.tables import Table, issues_table
@@ -68,10 +68,7 @@ def _filled(result: Compliance, *, quick: bool, page: PageOptions) -> str:
         page=page,
         title=page.title or result.building.name or gettext("Building"),
         facts=summary(result) + page.facts,
-        notes=[
-            *([gettext(NOTE)] if quick else []),
-            *map(translated, (*result.head.lines, *result.notes)),
-        ],
+        notes=head_lines(result.head, (*([NOTE] if quick else []), *result.notes)),
         assumptions=[translated(text) for text in result.assumptions],
         rules=[dossier_rule(result, name) for name in result.rules],
         rooms=rooms,

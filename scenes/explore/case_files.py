@@ -49,6 +49,9 @@ def read_case(folder: Path) -> dict[str, Any]:
         raise DataError("is no case of an explorer: no list of rooms", file=file)
     if not isinstance(case.get("hours"), int):
         raise DataError("is no case of an explorer: no number of hours", file=file)
+    lines = case.get("head", [])
+    if not isinstance(lines, list) or not all(isinstance(line, str) for line in lines):
+        raise DataError("is no case of an explorer: no list of texts", file=file, field="head")
     for number, entry in enumerate(case["rooms"]):
         _check_entry(entry, file, f"room {number}")
     return case

@@ -28,7 +28,7 @@ from scenes.figures.scale import ColourScale
 from scenes.language.catalogue import current_language, gettext, in_language, messages
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.report.model3d import largest_triangles
-from scenes.report.page import environment
+from scenes.report.page import environment, head_lines
 from scenes.report.page_files import page_files
 from scenes.result_folder import EXPLORER
 from scenes.results import ExploredRoom, RoomYear, RunResult
@@ -64,7 +64,7 @@ def write_explorer(result: RunResult, folder: Path, page: PageOptions = OWN_PAGE
     """
     with in_language(page.language):
         write_rooms(result, folder)
-        write_page(folder)
+        write_page(folder, head_lines(result.head, result.notes))
 
 
 def write_rooms(result: RunResult, folder: Path) -> None:
@@ -85,18 +85,22 @@ def write_rooms(result: RunResult, folder: Path) -> None:
             "site": str(result.manifest.get("site", "")),
             "first_day": f"{first:%Y-%m-%d}",
             "hours": len(result.times),
+            "head": head_lines(result.head, result.notes),
             "palette": base64.b64encode(colours.tobytes()).decode("ascii"),
             "rooms": entries,
         },
     )
 
 
-def write_page(folder: Path) -> None:
-    """Write the page with its style and scripts, in the language of the context."""
+def write_page(folder: Path, head: Sequence[str]) -> None:
+    """Write the page with its style and scripts, in the language of the context.
+
+    Args: head: what was left out and assumed, in that language.
+    """
     for name, text in FILES.items():
         if name == PAGE:
             template = environment(FILES).get_template(PAGE)
-            text = template.render(language=current_language(), words=script_words())
+            text = template.render(language=current_language(), words=script_words(), head=head)
         write_text(folder / name, text)
 
 
@@ -138,7 +142,8 @@ def join_explorers(folders: Sequence[Path], target: Path) -> None:
     Raises: `DataError` where their years are not of one length, and as `copy_explorer`.
     """
     cases = [read_case(explorer_of(folder)) for folder in folders]
-    joined: dict[str, Any] = cases[0] | {"rooms": []}
+    lines = dict.fromkeys(line for case in cases for line in case.get("head", ()))
+    joined: dict[str, Any] = cases[0] | {"rooms": [], "head": list(lines)}
     for number, (folder, case) in enumerate(zip(folders, cases, strict=True)):
         if case["hours"] != joined["hours"]:
             message = f"has {case['hours']} hours, {folders[0]} has {joined['hours']}"
@@ -165,7 +170,7 @@ def moved_entry(entry: dict[str, Any], place: str, name: str) -> dict[str, Any]:
 def write_joined(case: dict[str, Any], target: Path) -> None:
     """Write the page of rooms whose files are there."""
     write_data(target / CASE, case)
-    write_page(target)
+    write_page(target, case.get("head", ()))
 
 
 HOURS_A_FILE = 400  # whose codes are loaded together: about a month of daylight

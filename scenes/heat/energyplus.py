@@ -34,7 +34,7 @@ def energyplus_twin(study: StudyFile, balanced: BalancedRooms) -> EnergyPlusTwin
         of_window = {
             guid: [optics[id(system)] for system in states] for guid, states in windows.items()
         }
-        rooms.append(TwinRoom(room.space, room.room, of_window, room.state))
+        rooms.append(TwinRoom(room.space, room.room, of_window, room.shading.of_windows))
     return EnergyPlusTwin(
         balanced.building,
         rooms,

@@ -143,7 +143,7 @@ def _check_states(study: StudyFile, in_windows: Mapping[str, States]) -> None:
         if fault is None:
             continue
         field, message = fault
-        raise DataError(message, file=study.building, field=f"control.{field}")
+        raise DataError(message, file=study.building, field=field)
 
 
 def _balanced(
@@ -224,7 +224,7 @@ def _year(
     return ThermalYear(
         result.name,
         area,
-        hourly_table(result, room.state, room.daylight, weather, felt_by_person),
+        hourly_table(result, room.shading, room.daylight, weather, felt_by_person),
         summary
         | comfort_summary(result, felt_by_person["pmv"], weather, room.occupied)
         | energy_summary(powers, area),

@@ -7,6 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.weather import Weather
+from scenes.results import ShadingYear
 from thermal.balance import ZoneResult
 from thermal.comfort import ADAPTIVE_BANDS, comfort_by_outdoors, degree_hours, summarise
 
@@ -17,12 +18,12 @@ WARM = 26.0  # [degC] operative, above which overheating is counted, ISO 17772, 
 
 def hourly_table(
     result: ZoneResult,
-    state: NDArray[np.int64],
+    shading: ShadingYear,
     daylight: FloatArray | None,
     weather: Weather,
     felt: dict[str, FloatArray],
 ) -> pd.DataFrame:
-    """Temperatures, votes, loads, state and heat flows by hour; felt: `felt_by`."""
+    """Temperatures, votes, loads, shading states and heat flows by hour; felt: `felt_by`."""
     table = {
         "outdoor_c": weather.dry_bulb_c,
         "air_c": result.air_c,
@@ -31,7 +32,7 @@ def hourly_table(
         **felt,
         "heating_w": result.heating,
         "cooling_w": result.cooling,
-        "shading_state": state,
+        **shading.columns,
     }
     if daylight is not None:
         table["daylight_lx"] = daylight

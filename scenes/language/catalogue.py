@@ -44,12 +44,20 @@ def current_language() -> str:
     return _language.get()
 
 
-def gettext(message: str, /, **values: object) -> str:
+def gettext(message: str, singular: str = "", /, **values: object) -> str:
     """A message in the page's language, its fields in braces filled.
 
     Numbers have the decimal mark of the language; what is not in the catalogue stays English.
+
+    Args: singular: the message where the value `count` is 1, where that differs.
     """
-    text = translations(_language.get()).gettext(message) if message else ""
+    known = translations(_language.get())
+    if singular:
+        text = known.ngettext(singular, message, values["count"])
+    else:
+        text = known.gettext(message) if message else ""
+        if text == message:  # it may be the singular of another message
+            text = known.ngettext(message, message, 1)
     return FORMATTER.format(text, **values) if values else text
 
 
@@ -61,7 +69,7 @@ def ngettext(singular: str, plural: str, count: int, **values: object) -> str:
 
 def translated(text: str) -> str:
     """A note in the page's language; other text as it is."""
-    return gettext(text.template, **text.values) if isinstance(text, Note) else text
+    return gettext(text.template, text.singular, **text.values) if isinstance(text, Note) else text
 
 
 def N_(message: str) -> str:

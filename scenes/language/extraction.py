@@ -39,7 +39,9 @@ msgstr ""
 def extract_python(
     fileobj: IO[bytes], keywords: object, comment_tags: object, options: object
 ) -> Iterator[tuple[int, str, str | tuple[str, ...], list[str]]]:
-    """Messages of a Python file: literal texts of `gettext`, `ngettext` and `N_`.
+    """Messages of a Python file: literal texts of `gettext`, `Note`, `ngettext` and `N_`.
+
+    A second literal text of `gettext` and `Note` is the singular.
 
     Babel's own extraction loses calls inside another call's arguments.
     """
@@ -48,21 +50,30 @@ def extract_python(
             continue
         name = getattr(node.func, "id", getattr(node.func, "attr", ""))
         count = ARGUMENTS.get(name, 0)
-        texts = [a.value for a in node.args[:count] if isinstance(a, ast.Constant)]
-        if count and len(texts) == count:
-            yield node.lineno, name, tuple(texts) if count > 1 else texts[0], []
+        texts = [a.value for a in node.args[:2] if isinstance(a, ast.Constant)]
+        if name == "ngettext" and len(texts) == count:
+            yield node.lineno, name, tuple(texts), []
+        elif count == 1 and len(texts) == 2:
+            yield node.lineno, "ngettext", tuple(reversed(texts)), []
+        elif count == 1 and texts:
+            yield node.lineno, name, texts[0], []
 
 
 def extract_table(
     fileobj: IO[bytes], keywords: object, comment_tags: object, options: dict[str, str]
 ) -> Iterator[tuple[int, str, str, list[str]]]:
-    """Messages of a TOML table: texts at the keys of the option `keys`; all of `whole`'s tables."""
+    """Messages of a TOML table: texts at the keys of the option `keys`; all of `whole`'s tables.
+
+    The text at a key with "-one" after it is the singular of that at the key.
+    """
     keys, whole = options.get("keys", "").split(), options.get("whole", "").split()
     for text in _texts(tomllib.load(fileobj), keys, whole, taken=False):
-        yield 1, "gettext", text, []
+        yield 1, "gettext" if isinstance(text, str) else "ngettext", text, []
 
 
-def _texts(value: Any, keys: list[str], whole: list[str], *, taken: bool) -> Iterator[str]:
+def _texts(
+    value: Any, keys: list[str], whole: list[str], *, taken: bool
+) -> Iterator[str | tuple[str, str]]:
     if isinstance(value, str):
         if taken and any(letter.isalpha() for letter in value):
             yield value
@@ -73,6 +84,9 @@ def _texts(value: Any, keys: list[str], whole: list[str], *, taken: bool) -> Ite
         for key, one in value.items():
             if key in whole:
                 yield from _texts(list(one), keys, whole, taken=True)
+            if f"{key}-one" in value and (taken or key in keys):
+                yield value[f"{key}-one"], one
+                continue
             yield from _texts(one, keys, whole, taken=taken or key in keys or key in whole)
 
 

@@ -27,29 +27,35 @@ RULES = {
 }
 
 
-def state_carpet(result: RunResult, room: RoomYear) -> Chart | None:
-    """The shading state of every hour with the sun up; None where there is only one."""
+def state_carpets(result: RunResult, room: RoomYear) -> tuple[Chart, ...]:
+    """The shading state of every hour with the sun up, of each group of windows that moves."""
     ran = room.operation
     if ran is None or len(ran.states) < 2:
-        return None
-    state = ran.hours["shading_state"].to_numpy()
-    lit = result.sun[:, 2] > 0
-    count = np.bincount(state[lit], minlength=len(ran.states))
-    legend = tuple(
-        (STATE_COLOURS[i % len(STATE_COLOURS)], f"{name}: {percent(100 * n / lit.sum())} %")
-        for i, (name, n) in enumerate(zip(ran.states, count, strict=True))
-    )
-    return class_carpet(
-        result.times,
-        np.where(lit, state, -1),
-        legend,
-        title=gettext("Shading state"),
-        explanation=gettext(
-            "Control: {rule}. Hours with the sun up; optical and thermal properties change "
-            "together.",
-            rule=gettext(RULES[ran.rule]) if ran.rule in RULES else ran.rule,
-        ),
-    )
+        return ()
+    lit, shading = result.sun[:, 2] > 0, ran.shading
+    several = len(shading.groups) > 1
+    charts = []
+    for group, rule, state in zip(shading.groups, shading.rules, shading.states.T, strict=True):
+        count = np.bincount(state[lit], minlength=len(ran.states))
+        legend = tuple(
+            (STATE_COLOURS[i % len(STATE_COLOURS)], f"{name}: {percent(100 * n / lit.sum())} %")
+            for i, (name, n) in enumerate(zip(ran.states, count, strict=True))
+        )
+        title = gettext("Shading state")
+        charts.append(
+            class_carpet(
+                result.times,
+                np.where(lit, state, -1),
+                legend,
+                title=f"{title}: {group}" if several else title,
+                explanation=gettext(
+                    "Control: {rule}. Hours with the sun up; optical and thermal properties change "
+                    "together.",
+                    rule=gettext(RULES[rule]) if rule in RULES else rule,
+                ),
+            )
+        )
+    return tuple(charts)
 
 
 def loads_chart(room: RoomYear) -> Chart | None:

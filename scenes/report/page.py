@@ -13,6 +13,7 @@ import jinja2
 from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
+from scenes.head import Head
 from scenes.language.catalogue import gettext, in_language, ngettext, translated
 from scenes.language.numbers import cell, day_and_month, rounded, semicolons
 from scenes.page_options import OWN_PAGE, PageOptions
@@ -57,7 +58,7 @@ def _filled(result: RunResult, page: PageOptions) -> str:
         page=page,
         title=page.title or result.building.name or gettext("Building"),
         result=result,
-        notes=notes(result),
+        head=head_lines(result.head, result.notes),
         rooms=rooms,
         verdict=verdict(result, [room.cards for room in rooms]),
         model=model,
@@ -181,9 +182,14 @@ def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
     return (*rows, *((translated(title), prose(translated(text))) for title, text in read))
 
 
-def notes(result: RunResult) -> tuple[str, ...]:
-    """Assumptions and limits of the run, in the page's language."""
-    return tuple(gettext(NOTE) if note == NOTE else translated(note) for note in result.notes)
+def head_lines(head: Head, notes: Iterable[str] = ()) -> tuple[str, ...]:
+    """What was left out and assumed, and notes that the head does not have, in the page's language.
+
+    That the run was quick comes first.
+    """
+    notes = head.further(notes)
+    quick = [gettext(NOTE)] if NOTE in notes else []
+    return (*quick, *(translated(line) for line in (*head.lines, *notes) if line != NOTE))
 
 
 def comparison(result: RunResult, rooms) -> tables.Table | None:

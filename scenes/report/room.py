@@ -51,7 +51,7 @@ class RoomPage(RoomSection):
     weeks: tuple[Chart, ...]
     gains: Chart | None
     gains_table: tables.Table
-    states: Chart | None
+    states: tuple[Chart, ...]
     loads: Chart | None
     loads_table: tables.Table | None
     comfort_table: tables.Table
@@ -84,7 +84,7 @@ def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
         weeks=thermal_figures.extreme_weeks(room),
         gains=thermal_figures.gains_chart(monthly),
         gains_table=tables.gains_table(monthly),
-        states=operation_figures.state_carpet(result, room),
+        states=operation_figures.state_carpets(result, room),
         loads=operation_figures.loads_chart(room),
         loads_table=None
         if room.operation is None

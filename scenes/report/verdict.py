@@ -303,7 +303,7 @@ def _drawn(room: RoomYear) -> float:
     """Occupied hours with daylight in which the shading is not in its first state [%]."""
     if room.operation is None:
         return 0.0
-    states = room.operation.hours["shading_state"].to_numpy()
+    states = room.operation.shading.states.max(axis=1, initial=0)
     used = occupied(room).to_numpy() & (room.daylight.illuminance.max(axis=1) > 0)
     return 100 * float((states[used] > 0).mean()) if used.any() else 0.0
 

@@ -36,9 +36,9 @@ def room_daylight(
     *,
     progress: Progress = silent,
 ) -> DaylightResult:
-    """Illuminance of the year with the shading state of each hour [H], and its metrics."""
+    """Illuminance of the year with the shading states of each hour [H, G], and its metrics."""
     progress("daylight", 0.0)
-    lights, lit_state, points = light.light, room.lit_state(state), light.scene.points
+    lights, lit_state, points = light.light, light.states(state), light.scene.points
     lit, error = illuminance_with_error(
         picture_light(room, light), lit_state, progress=part(progress, 0.9, 1.0, "daylight")
     )

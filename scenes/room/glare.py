@@ -19,7 +19,6 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import CacheEntry, digest
 from mitsuba_cfs.methods.colour_view import coloured_picture, has_colour
 from mitsuba_cfs.methods.glare import hourly_glare, rated_pictures
-from mitsuba_cfs.methods.light import SeasonalLight
 from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
@@ -46,32 +45,14 @@ DEFAULT_DAYS = ((3, 21), (6, 21), (12, 21))  # month, day
 DEFAULT_CLOCK = (9, 12, 15)  # the hour that begins then, local standard time
 
 
-def glare_by_state(
-    light: PhaseLight | SeasonalLight, rating: GlareOptions, progress: Progress
-) -> NDArray[np.float64]:
-    """DGP of every hour in every state [J, H], 0 in the dark."""
-    J, count = light.states, len(light.sky.lit)
-    lit = [
-        hourly_glare(
-            light,
-            "DGP",
-            np.full(count, j),
-            options=rating,
-            progress=part(progress, j / J, (j + 1) / J, "glare control"),
-        ).dgp
-        for j in range(J)
-    ]
-    return light.sky.whole_year(np.stack(lit))
-
-
 def annual_glare(
     room: RoomInputs, light: RoomLight, state: NDArray[np.int64], *, progress: Progress = silent
 ) -> pd.DataFrame:
-    """Glare of every hour with the shading state of that hour [H]; NaN in the dark."""
+    """Glare of every hour with the shading states of that hour [H, G]; NaN in the dark."""
     rated = hourly_glare(
         light.light,
         "DGP",
-        room.lit_state(state),
+        light.states(state),
         options=rating_of(room.options.outputs),
         progress=part(progress, 0.0, 1.0, "annual glare"),
     )
@@ -96,7 +77,7 @@ def rated_hours(
     if isinstance(source, PhaseLight) and light.inner is None:
         cached = cached_glare(source, room.windows, metric, columns, rating)
     return hourly_glare(
-        source, metric, room.lit_state(state), hours=columns, options=rating, cached=cached,
+        source, metric, light.states(state), hours=columns, options=rating, cached=cached,
         progress=part(progress, 0.0, 1.0, "annual glare"),
     )  # fmt: skip
 
@@ -181,15 +162,15 @@ def room_glare(
     """Pictures of hours of the year and their glare.
 
     Args:
-        state: [H] of the shading.
+        state: [H, G] of the shading.
         hours: indices; none: the worst hours of `year`, else `default_hours`.
         year: `annual_glare`.
     """
-    outputs, lit_state = room.options.outputs, room.lit_state(state)
+    outputs, lit_state = room.options.outputs, light.states(state)
     if not hours and year is not None:
         hours = worst_hours(year, min(WORST, outputs.picture_count))
     if not hours:
-        eye = light.eye()[lit_state, np.arange(len(room.skies.lit))]
+        eye = light.eye(state)
         hours = default_hours(room.weather.midpoints, room.skies.lit, eye, outputs.picture_count)
     progress("pictures", 0.0)
     columns, rating = np.searchsorted(room.skies.lit, hours), rating_of(outputs)
@@ -263,7 +244,7 @@ def coloured(
     sky = annual_sky(room.weather, sampling.subdivision, hours=[hour], **room.options.sky)
     result = with_colour(
         glare, band_scenes(building, room.space, groups, glare.view),
-        light.light.systems[: len(groups)], sky, state=int(state[hour]), sampling=sampling,
+        light.light.systems[: len(groups)], sky, state=state[hour].tolist(), sampling=sampling,
         progress=part(progress, 0.0, 1.0, "colour"),
     )  # fmt: skip
     progress("colour", 1.0)
@@ -276,7 +257,7 @@ def with_colour(
     systems: Sequence[States],
     sky: AnnualSky,
     *,
-    state: int,
+    state: Sequence[int],
     sampling: Sampling,
     progress: Progress,
 ) -> GlareResults:
@@ -287,13 +268,13 @@ def with_colour(
     Args:
         bands: the room's scene with its view by red, green and blue.
         sky: of the picture's hour alone.
-        state: of the shading in that hour.
+        state: [G] of the window groups in that hour.
     """
     shown = brightest_picture(glare)
     if not bands[0].groups or not has_colour(bands, sky, 0):
         return glare
     rgb = coloured_picture(
         shown.luminance, bands, systems, sky, 0,
-        sampling=sampling, state=[state] * len(systems), progress=progress,
+        sampling=sampling, state=state, progress=progress,
     )  # fmt: skip
     return replace(glare, colour=ColourPicture(shown.hour, rgb))

@@ -109,10 +109,10 @@ BANDS = {"within_90": "ASHRAE 55 90 %", "within_80": "ASHRAE 55 80 %"}
 
 
 def operated_year(room: RoomZone, result: ZoneResult, weather: Weather) -> OperationResult:
-    """Shading state and power of heating, cooling and lamps by hour, with their sums."""
+    """Shading states and power of heating, cooling and lamps by hour, with their sums."""
     hours = pd.DataFrame(
         {
-            "shading_state": room.state,
+            **room.shading.columns,
             "heating_w": result.heating,
             "cooling_w": result.cooling,
             "lighting_w": room.lamps,
@@ -127,7 +127,7 @@ def operated_year(room: RoomZone, result: ZoneResult, weather: Weather) -> Opera
         "peak_cooling_w": result.cooling.max(),
     }
     summary = {key: float(value) for key, value in summary.items()}
-    return OperationResult(room.states, hours, summary, room.operation.control.rule)
+    return OperationResult(room.states, hours, summary, room.shading)
 
 
 def thermal_result(

@@ -20,6 +20,8 @@ from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import States
+from scenes.results import ShadingYear
+from scenes.room.control_groups import ControlGroups, control_groups
 from scenes.room.operation import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
@@ -55,6 +57,7 @@ class RoomInputs:
     space: Space
     systems: Mapping[str, States]  # by window GUID; also of rooms that lend light
     windows: RoomWindows
+    control: ControlGroups  # of the windows
     weather: Weather
     skies: AnnualSky
     options: RoomOptions
@@ -68,8 +71,12 @@ class RoomInputs:
     @property
     def season(self) -> NDArray[np.int64]:
         """The season of every lit hour [L], as an index into `seasons`."""
-        months = self.weather.midpoints[self.skies.lit].month.to_numpy()
-        return season_of(self.seasons, months)
+        return self.season_of_year[self.skies.lit]
+
+    @property
+    def season_of_year(self) -> NDArray[np.int64]:
+        """The season of every hour [H], as an index into `seasons`."""
+        return season_of(self.seasons, self.weather.midpoints.month.to_numpy())
 
     @property
     def occupied(self) -> NDArray[np.bool_]:
@@ -78,9 +85,11 @@ class RoomInputs:
             return OperationHours(self.operation, self.weather).present > 0
         return working_hours(self.weather, *self.options.occupancy.hours)
 
-    def lit_state(self, state: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The shading state of the lit hours [L], from that of all hours [H]."""
-        return state[self.skies.lit]
+    def shading(self, state: NDArray[np.int64]) -> ShadingYear:
+        """The year of the control groups, from the states of the window groups [H, G]."""
+        firsts = [int(np.argmax(self.windows.control == c)) for c in range(len(self.control.names))]
+        rules = tuple(rule.rule for rule in self.control.rules)
+        return ShadingYear(self.control.names, rules, state[:, firsts], self.control.number)
 
 
 def room_inputs(
@@ -110,16 +119,19 @@ def room_inputs(
     """
     if skies is None:
         skies = skies_for(weather, options.method, options.sampling, cache, **options.sky)
+    tables = None if operation is None else operation.of_room(building, space)
+    control = control_groups(space, None if tables is None else tables.control)
     return RoomInputs(
         building,
         space,
         systems,
-        room_windows(space, systems),
+        room_windows(space, systems, control),
+        control,
         weather,
         skies,
         options,
         seasons(building),
-        None if operation is None else operation.of_room(building, space),
+        tables,
         tuple(grids) or (options.grid,),
         file_sensors,
         inner_glass,

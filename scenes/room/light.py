@@ -47,11 +47,18 @@ class RoomLight:
     light: PhaseLight | SeasonalLight
     inner: InnerGlass | None  # glass to other rooms that gives light
 
-    def eye(self) -> NDArray[np.float32]:
-        """Illuminance at the eye in every shading state [J, L] [lx]."""
-        hours = np.ones(len(self.light.sky.lit), dtype=np.int64)
-        states = range(self.light.states)
-        return np.stack([eye_illuminance(self.light, j * hours) for j in states]).astype(np.float32)
+    def states(self, state: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The states of all window groups in the lit hours [G, L], glass to other rooms included.
+
+        Args: state: [H, G] of the groups to the outdoors in all hours.
+        """
+        rows = state[self.light.sky.lit].T
+        inner = len(self.light.systems) - len(rows)
+        return np.pad(rows, ((0, inner), (0, 0)))
+
+    def eye(self, state: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Illuminance at the eye in the lit hours [L] [lx]; state: [H, G]."""
+        return eye_illuminance(self.light, self.states(state)).astype(np.float32)
 
 
 def room_light(

@@ -22,7 +22,13 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import FenestrationSystem, read_system, system_of_panes
 from scenes.fenestration.thermal_file import StateTable
 from scenes.fenestration.thermal_system import checked_system
-from scenes.room.operation_tables import PARTS, OperationTables, RoomsTable, operated_tables
+from scenes.room.operation_tables import (
+    PARTS,
+    OperationTables,
+    RoomsTable,
+    ShadingRule,
+    operated_tables,
+)
 from scenes.room.schedules import WEEK, ScheduleTable, scheduled_fields
 from scenes.toml_file import TomlTable, read_table, validated
 from thermal.control import by_schedule
@@ -179,15 +185,17 @@ class OperationHours:
             flow=(table.ach or 0.0) * volume / 3600.0,
         )
 
-    def states(self, count: int) -> NDArray[np.int64]:
-        """Shading states of the rule "schedule" [H] for windows with `count` states."""
-        control = self.tables.control
-        if not isinstance(control.schedule, str):
-            return by_schedule(control.schedule, len(self.weather.times))
-        values = self._of("control", "schedule")
+    def states(self, rule: ShadingRule, place: str, count: int) -> NDArray[np.int64]:
+        """Shading states of the rule "schedule" [H] for windows with `count` states.
+
+        Args: place: path of the rule's table.
+        """
+        if not isinstance(rule.schedule, str):
+            return by_schedule(rule.schedule, len(self.weather.times))
+        values = self.value(rule, "schedule", place)
         if not np.isin(values, range(count)).all():  # of a CSV file
-            message = f"schedule {control.schedule!r}: a state outside 0 to {count - 1}"
-            raise DataError(message, field="control.schedule")
+            message = f"schedule {rule.schedule!r}: a state outside 0 to {count - 1}"
+            raise DataError(message, field=f"{place}.schedule")
         return values.astype(np.int64)
 
     def loads(self) -> IdealLoads:
@@ -332,7 +340,7 @@ def check_states(operation: Operation, states: int) -> None:
         if fault is None:
             continue
         field, message = fault
-        raise DataError(message, file=operation.file, field=f"control.{field}")
+        raise DataError(message, file=operation.file, field=field)
 
 
 def used_operation(operation: Operation | None, building: Building) -> Operation | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from bim.model import Building, Space
+from bim.to_tracer import COMPASS
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.heat_island import in_city
 from mitsuba_cfs.sky.weather import Weather
@@ -310,8 +311,11 @@ class EnvelopeTable(TomlTable):
     frame_psi: Annotated[float, plausible.PSI] = 0.0  # along the edges of the glass [W/(m K)]
 
 
-class ControlTable(TomlTable):
-    """Control of the shading state; states are numbered from 0 in the order of the file."""
+class ShadingRule(TomlTable):
+    """The rule by which a group of windows changes its state.
+
+    States are numbered from 0 in the order of the file.
+    """
 
     rule: Literal["always", "schedule", "irradiance", "glare", "cut-off"] = "always"
     state: Annotated[int, Field(ge=0)] = 0  # "always"; and the closed one of "irradiance"
@@ -319,26 +323,72 @@ class ControlTable(TomlTable):
     schedule: Annotated[tuple[int, ...] | str, OrSchedule(plausible.STATE, states_or_name)] = ()
     close_above: Annotated[Positive, plausible.SUN] = 200.0  # "irradiance" on the windows [W/m2]
     open_below: Annotated[float, plausible.SUN] | None = None
+    # "irradiance" and "cut-off": sun and sky that reach the windows, or those of a weather station
+    # on the roof, without surroundings
+    sensor: Literal["window", "roof"] = "window"
     limit_lx: Annotated[Positive, plausible.EYE] = (
         3473.0  # "glare": vertical illuminance of the eye; sDGP 0.40
     )
     limit_dgp: Share | None = None  # "glare": DGP of every hour's picture in place of Ev
+    seat: tuple[float, float, float] | None = None  # "glare": the eye [m]; default: the room's view
+    looks_deg: float | None = None  # "glare": azimuth of the line of sight from north by east
     slat_tilts_deg: tuple[float, ...] = ()  # "cut-off": of each state
     slat_width: Annotated[Positive, plausible.SLAT] = 0.08  # [m]
     slat_spacing: Annotated[Positive, plausible.SLAT] = 0.072  # [m]
 
-    def fault(self, states: int) -> tuple[str, str] | None:
+    def fault(self, states: int, schedules: Mapping[str, ScheduleTable]) -> tuple[str, str] | None:
         """The key that does not fit windows with `states` states, and the fault."""
-        if isinstance(self.schedule, str):
-            return None  # its states are checked with the weather
+        used = self.schedule if self.rule == "schedule" else (self.state,)
+        if self.rule == "schedule" and isinstance(self.schedule, str):
+            wrong = sorted(set(schedules[self.schedule].stated) - set(range(states)))
+            if wrong:
+                message = f"has state {wrong[0]:g}: the windows have {states}, from 0"
+                return "schedule", f"{self.schedule!r} {message}"
+            return None
         if self.rule == "schedule" and len(self.schedule) != CLOCK:
             return "schedule", f"expected {CLOCK} states, got {len(self.schedule)}"
-        used = self.schedule if self.rule == "schedule" else (self.state,)
         if any(not 0 <= state < states for state in used):
             return "state", f"a state outside 0 to {states - 1}: the windows have {states}"
         if self.rule == "cut-off" and len(self.slat_tilts_deg) != states:
             return "slat_tilts_deg", f"expected one for each of {states} states"
         return None
+
+
+class GroupTable(ShadingRule):
+    """Windows that move together by a rule; keys that it lacks are those of `control`."""
+
+    name: str = ""  # in results; default: its first window or facade
+    windows: tuple[str, ...] = ()  # names or GUIDs
+    facades: tuple[Literal[(*COMPASS, "roof")], ...] = ()
+
+    @model_validator(mode="after")
+    def _names_some(self) -> GroupTable:
+        if not self.windows and not self.facades:
+            raise ValueError("name `windows` or `facades`")
+        return self
+
+
+class ControlTable(ShadingRule):
+    """Control of the shading states: which windows move together, and by which rule."""
+
+    # windows that no entry of `group` names move together by facade (orientation), one by one, or
+    # all of a room
+    groups: Literal["facade", "window", "room"] = "facade"
+    group: tuple[GroupTable, ...] = ()  # the first entry that names a window applies to it
+
+    def rule_of(self, group: GroupTable | None) -> ShadingRule:
+        """The rule of an entry of `group`; None: of the windows that no entry names."""
+        stated = {key: getattr(self, key) for key in ShadingRule.model_fields}
+        if group is not None:
+            keys = group.model_fields_set & ShadingRule.model_fields.keys()
+            stated |= {key: getattr(group, key) for key in keys}
+        return ShadingRule.model_construct(**stated)
+
+    @property
+    def rules(self) -> tuple[tuple[str, ShadingRule], ...]:
+        """Every rule, with the path of its table."""
+        others = ((f"control.group.{n}", self.rule_of(one)) for n, one in enumerate(self.group))
+        return ("control", self.rule_of(None)), *others
 
 
 class GainsTable(TomlTable):
@@ -425,13 +475,11 @@ class OperationTables(TomlTable):
         return self
 
     def control_fault(self, states: int) -> tuple[str, str] | None:
-        """The key of `control` that does not fit windows with `states` states, and the fault."""
-        name = self.control.schedule
-        if self.control.rule != "schedule" or not isinstance(name, str):
-            return self.control.fault(states)
-        wrong = sorted(set(self.schedules[name].stated) - set(range(states)))
-        if wrong:
-            return "schedule", f"{name!r} has state {wrong[0]:g}: the windows have {states}, from 0"
+        """The path of the key that does not fit windows with `states` states, and the fault."""
+        for place, rule in self.control.rules:
+            fault = rule.fault(states, self.schedules)
+            if fault is not None:
+                return f"{place}.{fault[0]}", fault[1]
         return None
 
     def with_rooms(self, rooms: RoomsTable) -> OperationTables:
@@ -451,10 +499,20 @@ class OperationTables(TomlTable):
     def of_room(self, building: Building, space: Space) -> OperationTables:
         """The tables of one room.
 
-        Raises: `DataError` for a room or a type that the building does not have.
+        Raises: `DataError` for a room, a type or a window that the building does not have.
         """
         chosen = self.entry_of(building, space)
-        return self if chosen is None else self.with_rooms(chosen)
+        tables = self if chosen is None else self.with_rooms(chosen)
+        windows = {
+            name for one in building.spaces for w in one.windows for name in (w.guid, w.name)
+        }
+        for number, group in enumerate(tables.control.group):
+            for name in group.windows:
+                if name not in windows:
+                    message = f"no room has a window {name!r}"
+                    field = f"control.group.{number}.windows"
+                    raise DataError(message, file=building.file, field=field)
+        return tables
 
     def entry_of(self, building: Building, space: Space) -> RoomsTable | None:
         """The first entry of `rooms` that names a room; None without one.

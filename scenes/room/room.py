@@ -2,7 +2,7 @@
 
     inputs     RoomInputs        building, windows with their systems, weather, skies, operation
     light      RoomLight         matrices and the light of every lit hour in every shading state
-    state      [H]               the shading state of every hour
+    states     [H, G]            the shading state of each window group in every hour
     daylight   DaylightResult    illuminance of the sensors, metrics
     glare      GlareResults      every hour, pictures, colour
     zone       RoomZone          surfaces, solar gains, operation
@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 
 from bim.model import Building, Space
 from mitsuba_cfs import variants
-from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.light import eye_illuminance, illuminance, with_pictures, with_view
@@ -39,7 +38,6 @@ from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.picture_year.year import picture_year
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
-from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.trace.kernels.scattering import through_beams
 from scenes.fenestration.systems import States
@@ -48,7 +46,6 @@ from scenes.room.daylight import room_daylight
 from scenes.room.glare import (
     annual_glare,
     coloured,
-    glare_by_state,
     rated_hours,
     rating_of,
     room_glare,
@@ -58,13 +55,12 @@ from scenes.room.inner_glass import borrowed_share
 from scenes.room.inputs import FileSensors, RoomInputs, room_inputs
 from scenes.room.leaks import leak_issues
 from scenes.room.light import RoomLight, room_light
-from scenes.room.operation import Operation, OperationHours
-from scenes.room.operation_tables import ControlTable, OperationTables
+from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
-from scenes.room.solar import SeasonalOutdoors, seasonal_outdoors, window_irradiance
+from scenes.room.shading import control_signals, shading_states
+from scenes.room.solar import seasonal_outdoors
 from scenes.room.zone import RoomZone, reads_work_plane, room_zone, zone_surfaces
-from thermal.control import always, by_cut_off, by_glare, by_irradiance
 
 
 class RoomChoices(TypedDict, total=False):
@@ -179,9 +175,9 @@ def lit_room(
     with times.stage("daylight"):
         needs = light_needs(room, annual_glare=options.outputs.annual_glare)
         light = room_light(room, needs=needs, progress=progress)
-        if control_signal(room) == "irradiance":
+        if "irradiance" in control_signals(room):
             outdoors = seasonal_outdoors(room, light, progress=progress)
-        state = shading_state(room, light, outdoors, progress=progress)
+        state = shading_states(room, light, outdoors, progress=progress)
         daylight = room_daylight(room, light, state, progress=progress)
     with times.stage("leaks"):
         leaks = leak_issues(space, light.scene, seed=options.sampling.seed, cache=cache)
@@ -216,7 +212,7 @@ def lit_room(
 
 def light_needs(room: RoomInputs, *, annual_glare: bool = False) -> tuple[str, ...]:
     """The metrics that a room's stages ask its light for, in every hour."""
-    if annual_glare or control_signal(room) == "dgp":
+    if annual_glare or "dgp" in control_signals(room):
         return ("illuminance", "DGP")
     return ("illuminance",)
 
@@ -231,88 +227,10 @@ def operated_zone(room: RoomInputs, *, progress: Progress = silent) -> RoomZone:
     if reads_work_plane(room):
         light = room_light(room, needs=light_needs(room), progress=progress)
     outdoors = seasonal_outdoors(room, light, progress=progress)
-    state = shading_state(room, light, outdoors, progress=progress)
+    state = shading_states(room, light, outdoors, progress=progress)
     if light is not None:
         daylight = room_daylight(room, light, state, progress=progress)
     return room_zone(room, surfaces, outdoors, state, daylight, progress=progress)
-
-
-FloatArray = NDArray[np.float64]
-
-
-def control_signal(room: RoomInputs) -> str:
-    """The computed quantity that the shading rule of a room reads; "": none.
-
-    "irradiance" of the windows, "eye": illuminance at the eye, "dgp" of every hour.
-    """
-    if room.operation is None or not room.space.windows:
-        return ""
-    return signal_of(room.operation.control)
-
-
-def signal_of(control: ControlTable) -> str:
-    """The computed quantity that a rule reads; "": none."""
-    if control.rule == "irradiance":
-        return "irradiance"
-    if control.rule == "glare":
-        return "eye" if control.limit_dgp is None else "dgp"
-    return ""
-
-
-def shading_state(
-    room: RoomInputs,
-    light: RoomLight | None = None,
-    outdoors: SeasonalOutdoors | None = None,
-    *,
-    progress: Progress = silent,
-) -> NDArray[np.int64]:
-    """The shading state of every hour [H], the same in all windows of the room.
-
-    Args: light: for the signals "eye" and "dgp"; outdoors: for the signal "irradiance".
-    """
-    if room.operation is None or not room.space.windows:
-        return np.zeros(room.skies.hours, dtype=np.int64)
-    signal, values = control_signal(room), None
-    if signal == "irradiance":
-        values = window_irradiance(outdoors, room.skies)
-    elif signal == "eye":
-        values = room.skies.whole_year(light.eye())
-    elif signal == "dgp":
-        values = glare_by_state(light.light, rating_of(room.options.outputs), progress)
-    return states_by_rule(room.operation, room.space, room.weather, room.windows.states, values)
-
-
-def states_by_rule(
-    operation: OperationTables,
-    space: Space,
-    weather: Weather,
-    states: int,
-    signal: FloatArray | None = None,
-) -> NDArray[np.int64]:
-    """The state of every hour [H] by the rule of an operation.
-
-    Args:
-        states: number of states, from open to closed.
-        signal: `signal_of` the rule: irradiance of the window groups [H, G] [W/m2] (the brightest
-            counts), illuminance at the eye [J, H] [lx] or DGP [J, H] in each state.
-    """
-    control = operation.control
-    if control.rule == "schedule":
-        return OperationHours(operation, weather).states(states)
-    if control.rule == "irradiance":
-        closed = control.state or states - 1
-        brightest = signal.max(axis=1)
-        return by_irradiance(brightest, control.close_above, control.open_below, closed=closed)
-    if control.rule == "glare":
-        limit = control.limit_lx if control.limit_dgp is None else control.limit_dgp
-        return by_glare(signal, limit)
-    if control.rule == "cut-off":
-        window = space.windows[0]
-        local = sun_directions(weather) @ window_frame(window.normal, window.up).T
-        beam = weather.direct_normal * np.maximum(local[:, 2], 0.0)
-        tilts = np.radians(control.slat_tilts_deg)
-        return by_cut_off(local, beam, tilts, control.slat_width, control.slat_spacing)
-    return always(control.state, len(weather.times))
 
 
 LARGEST = 400  # pixels of a side of its pictures
@@ -326,40 +244,75 @@ def explored_room(
     sensors: int,
     progress: Progress = silent,
 ) -> ExploredRoom:
-    """Pictures, illuminances and the sun's beam of all lit hours in all states.
+    """Pictures, illuminances and the sun's beam of all lit hours in combinations of states.
 
     The outdoors must be the same all year.
 
     Args:
-        state: [H] of the shading in each hour.
+        state: [H, G] of the window groups in each hour.
         sensors: number of sensors of the work plane, the first of the scene's.
     """
     light, scene, sky = room_light.light, room_light.scene, room.skies
     progress = part(progress, 0.0, 1.0, "explorer")
-    names = [system.name for system in max(room.windows.systems, key=len)]
-    L, J = len(sky.lit), light.states
-    small, pictures, through = _small(light, progress), [], []
-    hours, ones = np.arange(L), np.ones(L, dtype=np.int64)
-    for j in range(J):
-        of_groups = [min(j, len(states) - 1) for states in light.systems]
+    combinations, operated = explored_combinations(room, light.states, state)
+    L, J = len(sky.lit), len(combinations)
+    small, pictures, through, lit, eyes = _small(light, progress), [], [], [], []
+    hours = np.arange(L)
+    for j, combination in enumerate(combinations):
+        rows = room_light.states(np.tile(combination, (room.skies.hours, 1)))
+        of_groups = [
+            min(k, len(of) - 1) for of, k in zip(light.systems, rows[:, 0].tolist(), strict=True)
+        ]
         steps = part(progress, j / J, (j + 1) / J)
         made = pictures_in_state(small, hours, of_groups)
         pictures.append(picture_year(made, seed=light.sampling.seed, progress=steps))
-        optics = [states[k] for states, k in zip(light.systems, of_groups, strict=True)]
+        optics = [of[k] for of, k in zip(light.systems, of_groups, strict=True)]
         scattering = [optic.scattering for optic in optics]
         through.append(through_beams(scene.groups, scattering, sky.direction))
+        lit.append(illuminance(light, rows)[:sensors].astype(np.float32))
+        eyes.append(eye_illuminance(light, rows))
     triangles = [np.concatenate([w.triangles for w in g.windows]) for g in scene.groups]
     return ExploredRoom(
-        tuple(names[:J]),
-        state,
+        tuple(_state_names(room, light.states, combinations)),
+        operated,
         sky.lit,
         tuple(pictures),
-        tuple(illuminance(light, j * ones)[:sensors].astype(np.float32) for j in range(J)),
-        np.stack([eye_illuminance(light, j * ones) for j in range(J)]).astype(np.float32),
+        tuple(lit),
+        np.stack(eyes).astype(np.float32),
         np.stack(through).astype(np.float32),
         np.maximum(sky.illuminance, 0).astype(np.float32),
         tuple(triangles),
     )
+
+
+def explored_combinations(
+    room: RoomInputs, states: int, state: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The combinations of states [J, G] that the explorer shows, and that of each hour [H].
+
+    All windows in each of the `states`, then those of the lit hours with different states.
+
+    Args: state: [H, G] of the window groups in each hour.
+    """
+    most = np.array([len(of) - 1 for of in room.windows.systems], dtype=np.int64)
+    state = np.minimum(state, most)
+    equal = np.minimum(np.arange(states)[:, None], most)
+    kinds = np.unique(state[room.skies.lit], axis=0)
+    mixed = kinds[~(kinds[:, None] == equal).all(axis=2).any(axis=1)]
+    combinations = np.concatenate([equal, mixed])
+    operated = np.zeros(len(state), dtype=np.int64)  # in the dark nothing is shown
+    for j, combination in enumerate(combinations):
+        operated[(state == combination).all(axis=1)] = j
+    return combinations, operated
+
+
+def _state_names(room: RoomInputs, states: int, combinations: NDArray[np.int64]) -> Iterator[str]:
+    """Names of combinations: of the state, then of the state of each control group."""
+    names = [system.name for system in max(room.windows.systems, key=len)]
+    yield from names[:states]
+    for of_groups in room.shading(combinations[states:]).states:
+        pairs = zip(room.control.names, of_groups, strict=True)
+        yield ", ".join(f"{group}: {names[j]}" for group, j in pairs)
 
 
 def _small(light: PhaseLight, progress: Progress) -> PhaseLight:

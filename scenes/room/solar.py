@@ -149,7 +149,10 @@ def solar_gains(
     thermals: Sequence[Sequence[ThermalSystem]],
     progress: Progress = silent,
 ) -> tuple[Solar, Gains]:
-    """Solar radiation absorbed in the shading state of every hour [H], and its sums.
+    """Solar radiation absorbed in the shading states of every hour [H, G], and its sums.
+
+    Each combination of states that occurs is balanced by itself: what a window's blind reflects
+    indoors reaches the other windows.
 
     Args:
         outer: points in front of the outer faces of the zone's surfaces.
@@ -170,8 +173,9 @@ def solar_gains(
     )
     absorption: dict[bytes, FloatArray] = {}  # states with equal back reflectances share it
     suns = []
-    for j in range(room.windows.states):
-        heats = _in_state(thermals, j)
+    kinds, kind = combinations_of(state)
+    for combination in kinds:
+        heats = _in_states(thermals, combination)
         back = np.array([heat.back_reflectance for heat in heats])
         if heats and back.tobytes() not in absorption:
             absorption[back.tobytes()] = absorption_matrix(
@@ -182,12 +186,21 @@ def solar_gains(
                 **_sampled(outdoors.first),
             ).values
         absorbed = absorption.get(back.tobytes())
-        suns.append(_gains_in_state(in_sun, j, outdoors, room.skies, absorbed))
+        suns.append(_gains_in_states(in_sun, combination, outdoors, room.skies, absorbed))
     gains = {
-        name: np.stack([sums[name] for _, sums in suns])[state, np.arange(len(state))]
+        name: np.stack([sums[name] for _, sums in suns])[kind, np.arange(len(kind))]
         for name in suns[0][1]
     }
-    return switched([solar for solar, _ in suns], state), gains
+    of_windows = state[:, room.windows.group]
+    return switched([solar for solar, _ in suns], kind, of_windows), gains
+
+
+def combinations_of(state: NDArray[np.int64]) -> tuple[list[tuple[int, ...]], NDArray[np.int64]]:
+    """The combinations of states [G] that occur in some hours [H, G], and that of each hour [H]."""
+    if not state.shape[1]:
+        return [()], np.zeros(len(state), dtype=np.int64)
+    kinds, kind = np.unique(state, axis=0, return_inverse=True)
+    return [tuple(row) for row in kinds.tolist()], kind.ravel()
 
 
 def facade_irradiance(
@@ -224,9 +237,11 @@ def _sampled(scene: PhaseMatrices) -> dict:
     }
 
 
-def _in_state(thermals: Sequence[Sequence[ThermalSystem]], state: int) -> list[ThermalSystem]:
-    """The thermal data of each group in a state; a group with fewer states is in its last."""
-    return [states[min(state, len(states) - 1)] for states in thermals]
+def _in_states(
+    thermals: Sequence[Sequence[ThermalSystem]], state: Sequence[int]
+) -> list[ThermalSystem]:
+    """The thermal data of each group in its state; a group with fewer states is in its last."""
+    return [of[min(j, len(of) - 1)] for of, j in zip(thermals, state, strict=True)]
 
 
 def _zone_gloss(interior: Surfaces, numbers: NDArray[np.int64]) -> tuple[Gloss | None, ...]:
@@ -240,26 +255,28 @@ def _zone_gloss(interior: Surfaces, numbers: NDArray[np.int64]) -> tuple[Gloss |
     return tuple(uniform.get(number) for number in range(int(numbers.max()) + 1))
 
 
-def _gains_in_state(
+def _gains_in_states(
     zone: ZoneInSun,
-    state: int,
+    state: Sequence[int],
     outdoors: SeasonalOutdoors,
     skies: AnnualSky,
     absorption: FloatArray | None,
 ) -> tuple[Solar, Gains]:
-    """Solar radiation absorbed by window layers, surfaces and facades in one state, and its sums.
+    """Solar radiation absorbed by window layers, surfaces and facades, and its sums.
 
-    Args: absorption: [G, K, F + G] share of the flux of each window patch that each surface and
-        window absorbs; None for a room without windows.
+    Args:
+        state: [G] of the window groups.
+        absorption: [G, K, F + G] share of the flux of each window patch that each surface and
+            window absorbs; None for a room without windows.
     """
     group, facade = zone.windows.group, zone.facade
     F = facade.shape[1]
     if absorption is None:
         dark = np.zeros((skies.hours, 0))
         return Solar(dark, dark, np.zeros_like(facade), facade), {}
-    heats = _in_state(zone.thermals, state)
+    heats = _in_states(zone.thermals, state)
     area = np.array([g.area for g in zone.windows.groups])
-    T = np.stack([s.solar.transmission_matrix() for s in zone.windows.in_state(state)])
+    T = np.stack([s.solar.transmission_matrix() for s in zone.windows.in_states(state)])
     shares = absorbed_shares(heats, T, area, absorption)
     sums = np.split(
         directional_sums(outdoors, skies, np.concatenate(shares)),

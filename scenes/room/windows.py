@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from bim.report.issue import issue_text
 from bim.to_tracer import window_groups
 from mitsuba_cfs.surfaces import WindowGroup
 from scenes.fenestration.systems import FenestrationSystem, States
+from scenes.room.control_groups import ControlGroups, control_groups
 
 if TYPE_CHECKING:
     from mitsuba_cfs.methods.optics import BsdfOptics
@@ -28,6 +29,7 @@ class RoomWindows:
     groups: list[WindowGroup]
     systems: tuple[States, ...]  # [G]
     group: NDArray[np.int64]  # [W] group of each window of the space
+    control: NDArray[np.int64]  # [G] control group of each, whose windows move together
 
     @property
     def states(self) -> int:
@@ -47,31 +49,63 @@ class RoomWindows:
 
     def in_state(self, state: int) -> list[FenestrationSystem]:
         """The system of each group [G] in a state; a group with fewer states is in its last."""
-        return [states[min(state, len(states) - 1)] for states in self.systems]
+        return self.in_states([state] * len(self.groups))
+
+    def in_states(self, state: Sequence[int]) -> list[FenestrationSystem]:
+        """The same with each group in its own state [G]."""
+        return [of[min(j, len(of) - 1)] for of, j in zip(self.systems, state, strict=True)]
 
 
-def room_windows(space: Space, systems: Mapping[str, States]) -> RoomWindows:
-    """The windows of a room in groups of one orientation and one system.
+def room_windows(
+    space: Space, systems: Mapping[str, States], control: ControlGroups | None = None
+) -> RoomWindows:
+    """The windows of a room in groups of one orientation, one system and one control group.
 
-    Args: systems: of each window, by its GUID.
+    Args: systems: of each window, by its GUID; control: by default a group for each orientation.
 
     Raises: `ValueError` for a window without a system.
     """
     missing = [w.name or w.guid for w in space.windows if w.guid not in systems]
     if missing:
         raise ValueError(f"no fenestration system for window {', '.join(missing)}")
+    control = control or control_groups(space)
+    number = {
+        id(window.triangles): c
+        for window, c in zip(space.windows, control.number.tolist(), strict=True)
+    }
     members: dict[tuple[int, ...], list] = {}
     for window in space.windows:
         key = tuple(id(system) for system in systems[window.guid])
         members.setdefault(key, []).append(window)
-    grouped: list[tuple[WindowGroup, States]] = []
+    grouped: list[tuple[WindowGroup, States, int]] = []
     for windows in members.values():
         states = systems[windows[0].guid]
         for group in window_groups(replace(space, windows=tuple(windows))):
             name = group.name if len(members) == 1 else f"{group.name}, {states[0].name}"
-            grouped.append((replace(group, name=name), states))
-    groups = [group for group, _ in grouped]
-    return RoomWindows(groups, tuple(states for _, states in grouped), _groups(space, groups))
+            parts = _by_control(group, number)
+            for part, c in parts:
+                label = name if len(parts) == 1 else f"{name}, {control.names[c]}"
+                grouped.append((replace(part, name=label), states, c))
+    groups = [group for group, _, _ in grouped]
+    return RoomWindows(
+        groups,
+        tuple(states for _, states, _ in grouped),
+        _groups(space, groups),
+        np.array([c for _, _, c in grouped], dtype=np.int64),
+    )
+
+
+def _by_control(group: WindowGroup, number: Mapping[int, int]) -> list[tuple[WindowGroup, int]]:
+    """The parts of a window group by control group, with its number.
+
+    Args: number: of the control group, by the identity of the windows' triangles.
+    """
+    numbers = [number[id(window.triangles)] for window in group.windows]
+    return [
+        (replace(group, windows=tuple(w for w, n in zip(group.windows, numbers, strict=True)
+                                      if n == c)), c)
+        for c in sorted(set(numbers))
+    ]  # fmt: skip
 
 
 def in_all_windows(space: Space, *states: FenestrationSystem) -> dict[str, States]:

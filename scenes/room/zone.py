@@ -28,7 +28,7 @@ from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import cache_entry
 from mitsuba_cfs.trace.matrices.view_factors import sky_shares
 from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
-from scenes.results import DaylightResult
+from scenes.results import DaylightResult, ShadingYear
 from scenes.room.inputs import RoomInputs
 from scenes.room.operation import OperationHours
 from scenes.room.operation_tables import GroundTable, NeighbourTable, OperationTables
@@ -258,7 +258,7 @@ class RoomZone:
     room: ThermalRoom  # its zone with the windows' states, gains, air and set points
     solar: Solar
     gains: dict[str, FloatArray]  # [H] sums of solar radiation by name [W]
-    state: NDArray[np.int64]  # [H] shading state
+    shading: ShadingYear
     lamps: FloatArray  # [H] power [W]
     occupied: NDArray[np.bool_]  # [H]
     daylight: FloatArray | None  # [H] mean on the work plane [lx]; None: no control reads it
@@ -372,7 +372,7 @@ def reads_work_plane(room: RoomInputs) -> bool:
     if tables is None or not room.space.windows:
         return False
     dimmed = tables.gains.lighting_w_m2 and tables.gains.lighting_dimmed
-    return tables.control.rule == "glare" or bool(dimmed)
+    return any(rule.rule == "glare" for rule in room.control.rules) or bool(dimmed)
 
 
 def room_zone(
@@ -384,7 +384,7 @@ def room_zone(
     *,
     progress: Progress = silent,
 ) -> RoomZone:
-    """The zone of a room in the shading state of every hour [H].
+    """The zone of a room in the shading states of every hour [H, G].
 
     Args: daylight: dims the lamps; needed where `reads_work_plane`.
     """
@@ -418,7 +418,7 @@ def room_zone(
         thermals=surfaces.thermals, progress=progress,
     )  # fmt: skip
     return RoomZone(
-        room.space, zone, solar, gains, state, lamps, room.occupied, plane, services,
+        room.space, zone, solar, gains, room.shading(state), lamps, room.occupied, plane, services,
         fenestration=tuple(fenestration_table(room.windows, surfaces.thermals)),
         states=tuple(system.name for system in max(room.windows.systems, key=len, default=())),
         operation=room.operation,

@@ -123,9 +123,9 @@ def _interchangeable(inputs: Inputs, options: JobOptions, one: Space, other: Spa
     if any(model_grids(building, room) for room in rooms):
         return False
     if operation is not None:
-        tables = operation.tables
-        if tables.of_room(building, one) != tables.of_room(building, other):
-            return False
+        tables = [operation.tables.of_room(building, room) for room in rooms]
+        if tables[0] != tables[1] or any(group.windows for group in tables[0].control.group):
+            return False  # other values, or a rule for windows of one of them
     if options.colour and not same_hues(one, other):
         return False
     return not balanced_together(inputs, options) or same_surfaces(one, other)
@@ -332,6 +332,7 @@ def run_inputs(
         manifest,
         tuple(dict.fromkeys(notes)),
         room.method,
+        head,
     )
 
 

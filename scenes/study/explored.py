@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -13,7 +12,7 @@ from typing import Any
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import write_bytes
+from mitsuba_cfs.files import scratch_folder, write_bytes
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import sun_directions
@@ -49,13 +48,12 @@ def compute_explorer(case: Case, progress: Progress = silent) -> ExploredCase:
 
     Raises: as `scenes.study.one_case.compute_case`.
     """
-    with ALONE, tempfile.TemporaryDirectory() as name:
+    with ALONE, scratch_folder() as folder:
         variants.activate()
-        inputs, folder = case_inputs(case), Path(name)
+        inputs = case_inputs(case)
         room, weather = case_year(inputs, case, explore=True, progress=progress), inputs.weather
-        run = RunResult(
-            inputs.building, weather.midpoints, sun_directions(weather), (room,), (), {}
-        )
+        sun = sun_directions(weather)
+        run = RunResult(inputs.building, weather.midpoints, sun, (room,), (), {}, head=inputs.head)
         write_rooms(run, folder)
         result = (one for one in folder.rglob("*") if one.is_file())
         files = {one.relative_to(folder).as_posix(): one.read_bytes() for one in result}

@@ -138,9 +138,9 @@ def _computed(case: Case, progress: Progress) -> CaseResult:
 
 def _straight_view(room: RoomYear, systems: dict[str, States], hours: NDArray[np.int64]) -> float:
     """The view through the windows, in the shading state of each of the hours [h]."""
-    state = np.zeros(len(hours), dtype=np.int64)
+    state = np.zeros((len(hours), len(room.space.windows)), dtype=np.int64)
     if room.operation is not None:
-        state = room.operation.hours["shading_state"].to_numpy(np.int64)[hours]
+        state = room.operation.shading.of_windows[hours]
     return straight_view(room.space.windows, systems, state)
 
 
@@ -278,14 +278,13 @@ def straight_view(
 
     Args:
         systems: by state of each window, by its GUID; the last state stands for those beyond.
-        state: [h] the room's shading state in the hours that count.
+        state: [h, W] of each window in the hours that count.
     """
     beams: dict[int, float] = {}
-    hours = np.bincount(state)
     seen = area = 0.0
-    for window in windows:
+    for window, of_window in zip(windows, state.T, strict=True):
         states = systems[window.guid]
-        for number, count in enumerate(hours):
+        for number, count in enumerate(np.bincount(of_window)):
             system = states[min(number, len(states) - 1)]
             if id(system) not in beams:
                 beams[id(system)] = _normal_beam(system)

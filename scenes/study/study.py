@@ -16,7 +16,7 @@ from bim.model import Space
 from bim.report.issue import Issue
 from mitsuba_cfs.progress import Progress, Stage, silent
 from scenes.calibration.durations import spoken_time
-from scenes.head import Head
+from scenes.head import NO_HEAD, Head
 from scenes.report.glare_figures import compass
 from scenes.study.automatic import settled
 from scenes.study.explored import ExploredCase, explorer_key, explorers
@@ -37,6 +37,7 @@ class StudyResult:
     seconds: float
     quick: bool = False
     explored: dict[int, ExploredCase] = field(default_factory=dict)  # by number from 1
+    head: Head = NO_HEAD  # what was left out of the buildings, what was assumed in the cases
 
     @property
     def failed(self) -> int:
@@ -66,11 +67,6 @@ class StudyResult:
         """The faults of all building models, each once."""
         buildings = (building for building, _ in self.plan.rooms.values())
         return tuple(dict.fromkeys(issue for one in buildings for issue in one.issues))
-
-    @property
-    def head(self) -> Head:
-        """What was left out of the buildings, and what was assumed in the cases."""
-        return plan_head(self.plan)
 
     @property
     def table(self) -> pd.DataFrame:
@@ -103,6 +99,7 @@ def run_study(
     compute: Compute = compute_case,
     progress: Progress = silent,
     on_case: Callable[[Case, CaseResult, int, int], None] | None = None,
+    on_head: Callable[[Head], None] = lambda head: None,
 ) -> StudyResult:
     """Compute what the folder does not have yet; `write_study` writes what comes of it.
 
@@ -113,9 +110,12 @@ def run_study(
         plan: of the study, with the methods that `auto` chose; made here by default.
         processes, scheduler: see `scenes.study.store.computed`.
         on_case: called with each case that is ready, how many are, and of how many.
+        on_head: called with what was left out and assumed, before anything is computed.
     """
     start = time.monotonic()
     plan = plan or settled(study, plan_of(study))
+    head = plan_head(plan)
+    on_head(head)
     if not isinstance(store, Store):
         store = Store(Path(store), inputs=study.files)
     store.open()
@@ -141,7 +141,7 @@ def run_study(
                 on_case(cases[result.key], result, len(found), total)
     results = tuple(found[case.key] for case in plan.cases)
     seconds = round(time.monotonic() - start, 3)
-    return StudyResult(study.title, plan, results, reused, seconds, study.quick)
+    return StudyResult(study.title, plan, results, reused, seconds, study.quick, head=head)
 
 
 def with_explorers(
@@ -193,7 +193,7 @@ def write_study(
     explorer: Callable[[Path], object] | None = None,
 ) -> None:
     """Write table, manifest, report and explorer of a study in the place of earlier ones."""
-    store.write(result.rows(), manifest(study, result.plan), report, explorer)
+    store.write(result.rows(), manifest(study, result), report, explorer)
 
 
 def described(case: Case, space: Space) -> dict:
@@ -231,8 +231,9 @@ def _status(result: CaseResult) -> str:
     return "failed" if result.error else "done"
 
 
-def manifest(study: Study, plan: StudyPlan) -> dict:
+def manifest(study: Study, result: StudyResult) -> dict:
     """What makes the same table again: the study, and the hashes of its files."""
+    plan = result.plan
     files = {str(file.path): file.sha256 for case in plan.cases for file in case.files}
     return {
         "quick": study.quick,
@@ -240,5 +241,5 @@ def manifest(study: Study, plan: StudyPlan) -> dict:
         "sha256": files,
         "fenestration": {case.system: source_of(case) for case in plan.cases},
         "cases": [case.key for case in plan.cases],
-        "head": plan_head(plan).record,
+        "head": result.head.record,
     }

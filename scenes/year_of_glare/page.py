@@ -24,7 +24,7 @@ from scenes.quick import NOTE
 from scenes.report.headline import LEVEL_WORDS
 from scenes.report.method import METHODS
 from scenes.report.page import FILES as SHARED
-from scenes.report.page import environment
+from scenes.report.page import environment, head_lines
 from scenes.report.page_files import page_files
 from scenes.report.tables import Column, Table
 from scenes.year_of_glare.year import GlareYear, rating_of
@@ -49,7 +49,7 @@ def write_page(
                 year=year,
                 page=page,
                 title=page.title or year.room,
-                notes=[translated(note) for note in (*year.head.lines, *year.notes)],
+                head=head_lines(year.head, year.notes),
                 facts=(*_facts(year, table), *page.facts),
                 plan=_plan(year, table),
                 limits=[rounded(limit, 2) for limit in LIMITS],
@@ -84,11 +84,12 @@ def _facts(year: GlareYear, table: pd.DataFrame) -> list[tuple[str, str]]:
         ),
         (
             gettext("Hours of use"),
-            gettext(
-                "{start} to {end} o'clock, {hours} hours",
+            ngettext(
+                "{start} to {end} o'clock, {count} hour",
+                "{start} to {end} o'clock, {count} hours",
+                int(table["hours_of_use"].iloc[0]),
                 start=start,
                 end=end,
-                hours=rounded(int(table["hours_of_use"].iloc[0]), 0),
             ),
         ),
         (

@@ -71,7 +71,7 @@ def test_sound_room_is_usable_and_all_its_glass_used(tmp_path):
     assert (found.verdict, found.rooms, found.spaces) == (USABLE, 1, 1)
     used_and_out = (found.glass_used, found.glass_out)
     assert used_and_out == pytest.approx((GLASS_AREA, GLASS_AREA), rel=1e-4)
-    assert "1 of 1 windows" in found.lines[2]
+    assert "1 of 1 window)" in found.lines[2]
 
 
 def test_a_file_without_rooms_claims_no_share_of_glass():

@@ -58,7 +58,7 @@ def room(states: int = 1) -> tuple[Building, TwinRoom]:
     painted = replace(one, absorptance_out=0.31, roughness="smooth")
     found = replace(found, zone=replace(found.zone, surfaces=(painted, *found.zone.surfaces[1:])))
     state = np.minimum(PRESENT.astype(int), states - 1)
-    return building, TwinRoom(space, found, {space.windows[0].guid: systems}, state)
+    return building, TwinRoom(space, found, {space.windows[0].guid: systems}, state[:, None])
 
 
 def twin(states: int = 1) -> tuple[EnergyPlusTwin, TwinRoom]:
@@ -208,7 +208,7 @@ def test_shading_states_follow_their_hours():
     assert len(found.model["Construction:ComplexFenestrationState"]) == 2
     (sensor,) = found.model["EnergyManagementSystem:Sensor"].values()
     schedule = sensor["output_variable_or_output_meter_index_key_name"]
-    assert np.array_equal(found.schedules.columns[schedule], one.state)
+    assert np.array_equal(found.schedules.columns[schedule], one.state[:, 0])
 
 
 def coupled() -> EnergyPlusTwin:

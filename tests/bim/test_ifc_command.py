@@ -26,7 +26,7 @@ def test_check_shows_rooms_and_issues(path, tmp_path):
     assert result.exit_code == 0
     assert "R1 Room" in result.output and "24.00" in result.output and "72.00" in result.output
     assert "is drawn where" in result.output
-    assert "1 rooms, 1 with windows, 1 windows, 3.6 m2 of glass" in result.output
+    assert "rooms: 1 (with windows: 1), windows: 1 (3.6 m2 of glass)" in result.output
     lines = table.read_text().splitlines()
     assert lines[0] == "where,what,consequence,code,severity"
     assert any("is drawn where" in line for line in lines)

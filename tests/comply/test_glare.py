@@ -20,7 +20,7 @@ from scenes.room.glare import annual_glare
 from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.light import room_light
 from scenes.room.options import RoomOptions
-from scenes.room.room import shading_state
+from scenes.room.shading import shading_states
 from scenes.room_views import eyes_of
 
 EVERY = 211  # hour with the sun up
@@ -58,7 +58,7 @@ def test_seats_and_blinds(variant):
     chosen = {"directions": 1, "eye_height": 1.2}
     one = seat_glare(room, light, None, grid=None, **chosen)
     used = working_hours(weather, *options.occupancy.hours)
-    run = annual_glare(room, light, shading_state(room))["dgp"].fillna(0.0).to_numpy()[used]
+    run = annual_glare(room, light, shading_states(room))["dgp"].fillna(0.0).to_numpy()[used]
     np.testing.assert_allclose(one.dgp[0], run, atol=1e-9)
     assert not one.operated and one.exceeded(0.35) == np.mean(run > 0.35)
     closed = np.ones((len(room.windows.groups), len(skies.lit)), dtype=np.int64)

@@ -10,8 +10,17 @@ from pathlib import Path
 import pytest
 from babel.messages.pofile import read_po
 
+from mitsuba_cfs.notes import Note
 from scenes.language import catalogue
-from scenes.language.catalogue import TRANSLATED, decimal, gettext, in_language, messages, ngettext
+from scenes.language.catalogue import (
+    TRANSLATED,
+    decimal,
+    gettext,
+    in_language,
+    messages,
+    ngettext,
+    translated,
+)
 from scenes.language.extraction import ARGUMENTS, PACKAGES, extracted, write
 from scenes.language.numbers import colon, day_and_month, month_name, rounded, short_month
 from tests.modules import MODULES
@@ -19,6 +28,14 @@ from tests.modules import MODULES
 # A French text has a narrow space before ; ! ? and a space that does not break before a colon,
 # unless it is part of a time, an address or an option
 TIGHT = re.compile(r"[^\s;!?:\u00a0\u202f](?:[;!?](?=\s|$)|:(?=\s|$))|[ ][;!?:](?=\s|$)")
+
+
+# A number before the noun that it counts; in "1 of 3" and "1 more" no noun follows
+COUNTED = re.compile(r"\{count\} (?!of|more|computed|found)[a-z]")
+SEVERAL = (  # beginnings of messages that one of a thing never has
+    "The GlobalId is used {count} times", "{count} times: ", "{count} small elements are too many",
+    "The heat of the {count} rooms", "The file has {count} second-level space boundaries",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -70,9 +87,9 @@ def test_french_has_its_spaces() -> None:
 @pytest.mark.parametrize("language", TRANSLATED)
 def test_numbers_in_a_translation_have_a_comma(language) -> None:
     """Clauses of standards and versions keep their points."""
-    for text, translated in pairs(language):
-        for number in re.findall(r"(?<![\d.])0\.\d+", translated):
-            assert number not in text, translated
+    for text, translation in pairs(language):
+        for number in re.findall(r"(?<![\d.])0\.\d+", translation):
+            assert number not in text, translation
 
 
 def test_messages_are_literal() -> None:
@@ -136,3 +153,32 @@ def test_a_date_has_the_order_of_its_language(language, words) -> None:
 
     with in_language(language):
         assert day_and_month(pd.Timestamp(2023, 3, 21)) == words
+
+
+def test_what_counts_a_noun_has_a_singular(program) -> None:
+    plain = [one.id for one in program if isinstance(one.id, str) and COUNTED.search(one.id)]
+    assert [text for text in plain if not text.startswith(SEVERAL)] == []
+    assert all(any(text.startswith(start) for text in plain) for start in SEVERAL)
+
+
+@pytest.mark.parametrize("language", ["en", *TRANSLATED])
+def test_every_text_is_written_for_one_and_for_two(program, language) -> None:
+    counted = [one.id for one in program if one.pluralizable]
+    assert len(counted) > 60
+    with in_language(language):
+        for singular, plural in counted:
+            values = {name: AnyNumber() for name in fields(plural) - {"count"}}
+            one, two = (ngettext(singular, plural, count, **values) for count in (1, 2))
+            assert gettext(plural, singular, count=1, **values) == one
+            assert "{" not in one + two and ("{count}" not in plural or "2" in two), plural
+            if language == "en":
+                assert one.replace("1", "2") != two, plural
+                note = Note(plural, singular, count=1, **values)
+                assert str(note) == translated(note) == one
+
+
+class AnyNumber(float):
+    """A number that any format writes as a letter."""
+
+    def __format__(self, spec: str) -> str:
+        return "n"

@@ -64,15 +64,21 @@ def english(page: str) -> list[str]:
 
 
 def every_issue() -> tuple[Issue, ...]:
-    """One issue of each code, and one with each phrase as a value."""
-    issues = [
-        Issue(code, "W1", {name: 1.5 if spec else "X1" for name, spec in fields(*template[1:5])})
-        for code, template in catalogue().items()
-    ]
-    for key, text in phrases().items():
-        values = {name: 1.5 if spec else "X1" for name, spec in fields(text)}
-        issues.append(Issue("space-repaired", "S1", {"room": "R1", "repair": Phrase(key, values)}))
+    """Issues of each code and with each phrase as a value, for one of a thing and for two."""
+    issues = []
+    for count in (1, 2):
+        for code, template in catalogue().items():
+            issues.append(Issue(code, f"W{count}", values_of(count, *template[1:5])))
+        for key, text in phrases().items():
+            repair = Phrase(key, values_of(count, text))
+            issues.append(Issue("space-repaired", f"S{count}", {"room": "R1", "repair": repair}))
     return tuple(issues)
+
+
+def values_of(count: int, *templates: str) -> dict[str, int | float | str]:
+    """A value of each field."""
+    values = {name: 1.5 if spec else "X1" for name, spec in fields(*templates)}
+    return values | ({"count": count} if "count" in values else {})
 
 
 def fields(*templates: str) -> set[tuple[str, str]]:
@@ -154,7 +160,7 @@ def test_a_glare_page(language, tmp_path) -> None:
 @pytest.mark.parametrize("language", TRANSLATED)
 def test_an_explorer(language, tmp_path) -> None:
     with in_language(language):
-        write_explorer_page(tmp_path)
+        write_explorer_page(tmp_path, ())
     page = (tmp_path / "index.html").read_text("utf-8")
     assert f'<html lang="{language}">' in page and english(page) == []
     words = re.search(r'id="words">(.*?)</script>', page, re.DOTALL)[1]

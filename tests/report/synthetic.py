@@ -22,6 +22,7 @@ from scenes.results import (
     OperationResult,
     RoomYear,
     RunResult,
+    ShadingYear,
     ThermalResult,
 )
 
@@ -122,7 +123,9 @@ def operation_result(times, beam, daylight) -> OperationResult:
     )  # fmt: skip
     summary = {f"{n}_kwh": float(hours[f"{n}_w"].sum() / 1e3) for n in ("heating", "cooling")}
     summary |= {"lighting_kwh": float(lamps.sum() / 1e3), "peak_heating_w": 900.0}
-    return OperationResult(("open", "slats 40°", "closed <70°>"), hours, summary, "irradiance")
+    states = hours["shading_state"].to_numpy()[:, None]
+    shading = ShadingYear(("S",), ("irradiance",), states, np.zeros(1, dtype=np.int64))
+    return OperationResult(("open", "slats 40°", "closed <70°>"), hours, summary, shading)
 
 
 def annual_glare(times, sun, beam) -> pd.DataFrame:

@@ -69,7 +69,7 @@ def test_the_view_is_what_passes_straight_on() -> None:
     wide, small = WindowRectangle(0.5, 1.0, 2.0, 1.5), WindowRectangle(3.0, 1.0, 1.0, 1.0)
     windows = shoebox(5.0, 4.0, 3.0, windows=(wide, small)).spaces[0].windows
     both = {windows[0].guid: (clear, sheet), windows[1].guid: (clear,)}
-    state = np.array([0, 0, 0, 1])
+    state = np.array([[0, 0], [0, 0], [0, 0], [1, 1]])
     assert straight_view(windows, both, state) == pytest.approx(
         60 * (0.75 * windows[0].area + windows[1].area) / (windows[0].area + windows[1].area)
     )

@@ -19,5 +19,5 @@ def test_a_head_begins_with_the_account_of_a_model_that_will_not_do(tmp_path, ca
     # the glass reaches from 1.0 to 2.3 m, the room to 1.2 m
     verdict = "Model: not usable: only 15 % of the exterior glass is used"
     assert printed.splitlines()[0].startswith(verdict)
-    assert "Rooms read: 1 of 1 spaces" in printed and "Glass: " in printed
+    assert "Rooms read: 1 of 1 space " in printed and "Glass: " in printed
     assert head.notes[0].startswith(verdict)

@@ -16,7 +16,7 @@ import pytest
 from mitsuba_cfs.errors import DataError, VariantError
 from scenes import cli
 from scenes.commands.progress_bar import ProgressBar
-from tests.conftest import default_signals
+from tests.conftest import REPOSITORY, default_signals
 from thermal.errors import ThermalInputError
 
 
@@ -219,7 +219,7 @@ def test_no_signal_ends_a_call_of_a_library(name, number, raised):
     function = "__del__" if name == "__del__" else "call"
     space = {"__name__": f"{name}.fake", "signal": signal, "ended": []}
     exec(f"def {function}(n):\n    signal.raise_signal(n)\n    ended.append(n)\n", space)
-    before = signal.signal(number, cli.stop)
+    before = signal.signal(number, cli.Stop())
     try:
         with pytest.raises(raised):
             space[function](number)
@@ -228,3 +228,30 @@ def test_no_signal_ends_a_call_of_a_library(name, number, raised):
     finally:
         signal.signal(number, before)
     assert space["ended"] == [number]
+
+
+def test_a_second_signal_does_not_end_the_cleaning_up():
+    """Nor the exit: Python has its own handlers by then."""
+    program = (
+        "import signal, time\n"
+        "from scenes import cli\n"
+        "def work(arguments):\n"
+        "    try:\n"
+        "        signal.raise_signal(signal.SIGINT)\n"
+        "        time.sleep(5)\n"
+        "    except KeyboardInterrupt:\n"
+        "        signal.raise_signal(signal.SIGINT)\n"
+        "        print('cleaned up', flush=True)\n"
+        "        return 130\n"
+        "class Late:\n"
+        "    def __del__(self):\n"
+        "        signal.raise_signal(signal.SIGINT)\n"
+        "late = Late()\n"
+        "cli.run = work\n"
+        "cli.main([])\n"
+    )
+    process = subprocess.run(
+        [sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True,
+        check=False, preexec_fn=default_signals,
+    )  # fmt: skip
+    assert (process.returncode, process.stdout, process.stderr) == (130, "cleaned up\n", "")

@@ -16,13 +16,20 @@ import time
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 
-from mitsuba_cfs.files import TEMPORARY
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import TEMPORARY, scratch_folder
+from mitsuba_cfs.progress import silent
 from scenes import cli
 from scenes.result_folder import MARK
+from scenes.study.store import CaseResult
+from scenes.study.study import run_study
+from scenes.study.study_file import read_study
 from tests.conftest import REPOSITORY, default_signals
 from tests.scenes.quick_work import STOP
+from tests.scenes.study_files import study_file
 from tests.scenes.writing_jobs import JOBS, Job, Place, heavy_ones_slow, refused
 
 pytestmark = pytest.mark.early
@@ -191,3 +198,75 @@ def test_closed_pipes_do_not_stop_the_work(name, place):
         assert process.returncode == 0, process.stderr
         assert "NoneType" not in process.stderr and "Traceback" not in process.stderr
         assert not here.temporaries()
+
+
+@pytest.mark.parametrize("name", ["thermal", pytest.param("study", marks=pytest.mark.slow)])
+def test_the_second_of_two_runs_into_a_folder_is_refused_before_its_work(
+    name, place, tmp_path, capsys, monkeypatch
+):
+    here, announce = place(name), tmp_path / "stopped"
+    process = start(here, env={**os.environ, STOP: str(announce)})
+    end = time.monotonic() + 120
+    while not announce.exists():
+        assert process.poll() is None and time.monotonic() < end, process.communicate()
+        time.sleep(0.01)
+    module = {"thermal": "scenes.heat.study.run_study", "study": "scenes.study.study.run_study"}
+    begun = []
+    with monkeypatch.context() as patch:
+        patch.setattr(module[name], lambda *_a, **_k: begun.append(1))
+        capsys.readouterr()
+        assert cli.run(here.words) == 1
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert line.endswith("another run of cfs is writing there: wait for it, or name another folder")
+    assert f"{here.out}: --out" in line and not begun
+    process.kill()
+    process.communicate()
+    assert cli.run(here.words) == 0 and not here.temporaries()
+
+
+def test_a_kill_leaves_no_folder_that_the_next_run_does_not_remove(tmp_path, monkeypatch):
+    """kill -9 of a process with a folder in TMPDIR; one that is in use stays."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    program = (
+        "import time\n"
+        "from mitsuba_cfs.files import scratch_folder, taken\n"
+        "release = taken('anywhere')\n"
+        "with scratch_folder() as folder:\n"
+        "    (folder / 'large').touch()\n"
+        "    print(folder, flush=True)\n"
+        "    time.sleep(60)\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", program], cwd=REPOSITORY, text=True, stdout=subprocess.PIPE,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+    )  # fmt: skip
+    folder = Path(process.stdout.readline().strip())
+    assert folder.parent == tmp_path and folder.stat().st_mode & 0o077 == 0
+    with scratch_folder():
+        assert len(list(tmp_path.iterdir())) == 3
+    process.kill()
+    process.communicate()
+    with scratch_folder() as mine:
+        assert list(tmp_path.iterdir()) == [mine]
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_disk_that_fills_up_under_a_study_loses_no_finished_case(small_disk, tmp_path):
+    study = read_study(study_file(tmp_path, "orientations_deg = [0, 10, 20, 30]\n"))
+    out = small_disk / "results"
+
+    def with_arrays(case, *, progress=silent):
+        values = np.random.default_rng(int(case.orientation_deg)).random(10_000)
+        return CaseResult(case.key, {"angle": case.orientation_deg}, {"values": values})
+
+    def fill_after_two(case, result, ready, total):
+        if ready == 2:
+            fill(small_disk)
+
+    with pytest.raises(DataError, match=r"results/cases/.*cannot be written: the disk is full"):
+        run_study(study, out, compute=with_arrays, on_case=fill_after_two)
+    assert len(list((out / "cases").glob("*.npz"))) == 2
+    assert not [one for one in out.rglob("*") if TEMPORARY.fullmatch(one.name)]
+    (small_disk / "filler").unlink()
+    result = run_study(study, out, compute=with_arrays)
+    assert result.reused == 2 and not result.failed

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
+from html import unescape
 from pathlib import Path
 
 import pytest
@@ -14,15 +16,20 @@ from bim.report.issue import issue_text
 from mitsuba_cfs.errors import DataError
 from scenes import cli
 from scenes.demo import VENETIAN_BLIND, WEATHER
-from scenes.explore.folder import write_explorer
+from scenes.explore.folder import copy_explorer, write_explorer
 from scenes.head import Head, head_of, joined
 from scenes.input_files import read_files
 from scenes.input_options import InputOptions
 from scenes.inputs import read_inputs
+from scenes.language.catalogue import in_language
+from scenes.page_options import PageOptions
+from scenes.report.page import head_lines, prose, report_html
+from scenes.study_report.page import study_report_html
 from tests.bim.honeybee_models import two_rooms, write
 from tests.bim.small_ifc import box_model
 from tests.conftest import REPOSITORY
 from tests.explore.synthetic import explored_run
+from tests.report.test_study_report import study as study_result
 
 STOP = "stopped before anything is traced"
 RAD = REPOSITORY / "docs/tutorials/office.rad"
@@ -219,3 +226,24 @@ def test_the_explorer_shows_the_head_of_its_run(
     output = capsys.readouterr().out
     assert all(line in output for line in head.model)
     assert "left out: IfcWindow W above has no room behind it" in output
+
+
+@pytest.mark.parametrize("language", ["en", "de", "fr"])
+def test_the_pages_show_the_head_in_their_language(tmp_path: Path, language: str) -> None:
+    head = head_of(read_building_file(ifc(tmp_path)), notes=("a <note>",))
+    page, run = PageOptions(language=language), replace(explored_run(), head=head)
+    write_explorer(run, tmp_path / "run", page)
+    study = replace(study_result(), head=head)
+    pages = [
+        report_html(run, page),
+        study_report_html(study, page),
+        (tmp_path / "run/index.html").read_text(encoding="utf-8"),
+    ]
+    copy_explorer(tmp_path / "run", tmp_path / "copy")
+    pages.append((tmp_path / "copy/index.html").read_text(encoding="utf-8"))
+    with in_language(language):
+        lines = [prose(line) for line in head_lines(head)]
+    assert len(lines) > 3 and (language == "en") == (lines[0] == prose(head.lines[0]))
+    for text in pages:
+        aside = unescape(text.partition('<aside class="notes"')[2].partition("</aside>")[0])
+        assert [line for line in lines if f"<li>{line}</li>" not in aside] == []

@@ -48,7 +48,7 @@ def coloured(room: Space, weather, states, hour: int = 4116, state: int = 0) -> 
     building = replace(BOX, spaces=(room,))
     return with_colour(
         pictures(), band_scenes(building, room, windows.groups, VIEW), windows.optics(),
-        annual_sky(weather, 1, hours=[hour]), state=state,
+        annual_sky(weather, 1, hours=[hour]), state=[state] * len(windows.groups),
         sampling=SMALL.sampling, progress=lambda *_: None,
     )  # fmt: skip
 

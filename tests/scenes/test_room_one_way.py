@@ -184,7 +184,7 @@ def test_a_room_without_windows_has_a_zone_in_the_dark(variant, weather) -> None
     blind = replace(box, spaces=(replace(box.spaces[0], windows=()),))
     tables = OperationTables.model_validate({"control": {"rule": "glare"}})
     zone = operated_zone(office(blind, weather, RoomOptions.of(**SAMPLING), tables))
-    assert not zone.solar.inside.any() and zone.daylight is None and not zone.state.any()
+    assert not zone.solar.inside.any() and zone.daylight is None and not zone.shading.states.any()
     assert zone.solar.facade.max() > 100  # the sun still warms its walls
 
 

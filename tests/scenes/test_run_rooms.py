@@ -18,7 +18,8 @@ from scenes.demo import VENETIAN_BLIND
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.room.glare import worst_hours
 from scenes.room.operation import check_states, read_operation
-from scenes.room.room import compute_room, signal_of, states_by_rule
+from scenes.room.room import compute_room
+from scenes.room.shading import signal_of
 from scenes.room.windows import in_all_windows, room_windows
 from tests.scenes.small_box import BOX, HOURS, ROOM, SMALL, clear
 
@@ -213,30 +214,18 @@ def test_states_that_windows_lack_are_named(tmp_path) -> None:
             check_states(operation, 2)
 
 
-def test_rules_of_the_control(tmp_path, weather) -> None:
-    """Irradiance of the brightest window; the eye; DGP only where a limit of it is given."""
-    hours, H = weather.times, len(weather.times)
-    bright = np.zeros((H, 2))
-    bright[100, 1] = 500.0
-    eye = np.zeros((3, H))
-    eye[0, 200], eye[1, 200] = 9000.0, 5000.0
-
-    picture = np.full((3, H), 0.2)
-    picture[0, 300] = 0.5
-    signals = {"irradiance": bright, "eye": eye, "dgp": picture}
-
-    def states(text: str, signal: str):
-        tables = read_operation(operation_file(tmp_path, text)).tables
-        assert signal_of(tables.control) == signal  # nothing else is computed
-        return states_by_rule(tables, ROOM, weather, 3, signals[signal])
-
-    by_sun = states('[control]\nrule = "irradiance"\nclose_above = 300', "irradiance")
-    assert np.flatnonzero(by_sun).tolist() == [100] and by_sun[100] == 2
-    by_eye = states('[control]\nrule = "glare"\nlimit_lx = 3000', "eye")
-    assert np.flatnonzero(by_eye).tolist() == [200] and by_eye[200] == 2
-    by_dgp = states('[control]\nrule = "glare"\nlimit_dgp = 0.4', "dgp")
-    assert np.flatnonzero(by_dgp).tolist() == [300] and by_dgp[300] == 1
-    assert len(by_dgp) == len(hours)
+def test_quantities_that_rules_read(tmp_path) -> None:
+    """Nothing else is computed; DGP only where a limit of it is given."""
+    for rule, signal in (
+        ('"irradiance"', "irradiance"),
+        ('"irradiance"\nsensor = "roof"', ""),
+        ('"cut-off"', "sun"),
+        ('"glare"', "eye"),
+        ('"glare"\nlimit_dgp = 0.4', "dgp"),
+        ('"schedule"', ""),
+    ):
+        tables = read_operation(operation_file(tmp_path, f"[control]\nrule = {rule}")).tables
+        assert signal_of(tables.control.rule_of(None)) == signal
 
 
 def test_glare_of_the_year_is_that_of_the_pictures(variant, weather, skies, glass) -> None:

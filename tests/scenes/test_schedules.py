@@ -147,15 +147,15 @@ def test_states_follow_a_schedule_and_must_be_there(weather) -> None:
             "schedules": {"blind": {"weekday": WORK, "weekend": 2}},
         }
     )
-    states = OperationHours(tables, weather).states(3).reshape(365, 24)
+    states = OperationHours(tables, weather).states(tables.control, "control", 3).reshape(365, 24)
     assert set(states[0]) == {2} and np.flatnonzero(states[1]).tolist() == list(range(8, 18))
     assert tables.control_fault(3) is None
     assert tables.control_fault(2) == (
-        "schedule",
+        "control.schedule",
         "'blind' has state 2: the windows have 2, from 0",
     )
     with pytest.raises(DataError, match=r"control.schedule: schedule 'blind': a state outside 0"):
-        OperationHours(tables, weather).states(2)
+        OperationHours(tables, weather).states(tables.control, "control", 2)
     half = tables.model_copy(update={"schedules": {"blind": tables.schedules["blind"].model_copy(
         update={"peak": 0.5})}})  # fmt: skip
     assert half.control_fault(3)[1].startswith("'blind' has state 0.5")

@@ -24,7 +24,8 @@ from scenes.room.daylight import room_daylight
 from scenes.room.glare import annual_glare, room_glare
 from scenes.room.inputs import RoomInputs, room_inputs, skies_for
 from scenes.room.light import room_light
-from scenes.room.room import lit_room, operated_zone, shading_state
+from scenes.room.room import lit_room, operated_zone
+from scenes.room.shading import shading_states
 from scenes.room.solar import facade_irradiance, seasonal_outdoors, window_irradiance
 from scenes.room.windows import in_all_windows
 from scenes.room.zone import zone_surfaces
@@ -58,7 +59,7 @@ def room_of(building, system, weather, skies, options=SMALL, **more) -> RoomInpu
 
 def illuminance(room: RoomInputs) -> np.ndarray:
     """Illuminance of the work plane in `HOURS` [hours, S] [lx]."""
-    return room_daylight(room, room_light(room), shading_state(room)).illuminance[list(HOURS)]
+    return room_daylight(room, room_light(room), shading_states(room)).illuminance[list(HOURS)]
 
 
 def sun_of(room: RoomInputs) -> tuple[np.ndarray, np.ndarray]:
@@ -92,7 +93,7 @@ def test_light_of_an_hour_is_that_of_its_month(method, variant, behind, weather,
 def test_heat_and_glare_of_an_hour_are_those_of_its_month(variant, behind, weather, skies, glass):
     room = room_of(behind, glass, weather, skies)
     lit = np.array(HOURS)
-    light, state = room_light(room), shading_state(room)
+    light, state = room_light(room), shading_states(room)
     (irradiance, facade), year = sun_of(room), annual_glare(room, light, state)
     sun, facade = irradiance[lit].T, facade[lit]
     shown = room_glare(room, light, state, list(HOURS))

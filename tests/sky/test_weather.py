@@ -153,12 +153,12 @@ def test_gaps_of_six_hours_are_interpolated_and_noted(tmp_path, year):
 @pytest.mark.parametrize(
     ("column", "text", "words"),
     [
-        (DRY, "70", "dry bulb temperature: 1 implausible values, the first in line 109: 70"),
-        (DRY, "40", "dry bulb temperature: 1 implausible values, the first in line 109: 40"),
-        (DRY, "-20", "dry bulb temperature: 1 implausible values, the first in line 109: -20"),
-        (DEW, "30", "dew point temperature: 1 implausible values, the first in line 109: 30"),
-        (HUMIDITY, "0", "relative humidity: 1 implausible values, the first in line 109: 0"),
-        (WIND, "75", "wind speed: 1 implausible values, the first in line 109: 75"),
+        (DRY, "70", "dry bulb temperature: 1 implausible value, in line 109: 70"),
+        (DRY, "40", "dry bulb temperature: 1 implausible value, in line 109: 40"),
+        (DRY, "-20", "dry bulb temperature: 1 implausible value, in line 109: -20"),
+        (DEW, "30", "dew point temperature: 1 implausible value, in line 109: 30"),
+        (HUMIDITY, "0", "relative humidity: 1 implausible value, in line 109: 0"),
+        (WIND, "75", "wind speed: 1 implausible value, in line 109: 75"),
     ],
 )
 def test_values_that_no_weather_has_are_named(tmp_path, year, column, text, words):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from tests.thermal.rooms import box, climate, sun
 from thermal.balance import simulate
@@ -34,9 +35,31 @@ def test_schedule_and_always():
     assert np.all(always(2, 5) == 2)
 
 
+def rated(values: NDArray, limit: float, calls: list[int]):
+    """The excess of DGP [M, H] over a limit, as `by_glare` asks for it; notes how many hours."""
+
+    def excess(number: int, hours: NDArray) -> NDArray:
+        calls.append(len(hours))
+        return values[number, hours] - limit
+
+    return excess
+
+
 def test_glare_takes_the_most_open_state_that_is_good_enough():
     dgp = np.array([[0.30, 0.50, 0.60, 0.60], [0.25, 0.34, 0.40, 0.55], [0.2, 0.2, 0.34, 0.45]])
-    assert by_glare(dgp, 0.35).tolist() == [0, 1, 2, 2]
+    calls: list[int] = []
+    assert by_glare([0, 0.5, 1], rated(dgp, 0.35, calls), 4).tolist() == [0, 1, 2, 2]
+    assert calls == [4, 3, 2], "only hours in which more open states have glare"
+
+
+def test_glare_closes_the_window_that_causes_it():
+    """Two windows of equal size, open or closed: of equally open ones the one with least glare."""
+    # both open, the first closed, the second closed, both closed
+    dgp = np.array([[0.2, 0.6, 0.6, 0.9], [0.1, 0.3, 0.5, 0.8], [0.1, 0.5, 0.2, 0.7], [0.1] * 4])
+    assert by_glare([0, 0.5, 0.5, 1], rated(dgp, 0.35, []), 4).tolist() == [0, 1, 2, 3]
+    # the large window stays open where closing the small one is enough
+    dgp[1:3, 1] = 0.3, 0.1
+    assert by_glare([0, 0.2, 0.8, 1], rated(dgp, 0.35, []), 4)[1] == 1
 
 
 def test_cut_off_of_the_reference_blind():

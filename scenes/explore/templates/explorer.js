@@ -1,7 +1,7 @@
 // The page: one hour for all that is shown, one or two variants, and their difference.
 (() => {
   "use strict";
-  const { gettext, fixed } = cfs;
+  const { gettext, ngettext, fixed } = cfs;
   const byId = (id) => document.getElementById(id);
   const PLAY = 200; // [ms] an hour at least
   const explorer = { rooms: [], variants: [], panels: [], playing: false };
@@ -141,7 +141,7 @@
     byId("time").textContent = lit ? gettext("Computing time: picture {picture} ms, glare {glare} ms, with decompression {whole} ms.", { picture: fixed(lit.milliseconds, 0), glare: fixed(lit.glareMilliseconds, 0), whole: fixed(lit.wholeMilliseconds, 0) }) : "";
     const check = found.room.facts.checks[found.state];
     const mean = check && (check.mean < 0.0001 ? `< ${fixed(0.0001, 4)}` : fixed(check.mean, 4));
-    byId("error").textContent = check ? gettext("In {count} random hours the DGP shown differs from that of the uncompressed pictures by at most {most}, on average {mean}.", { count: check.hours.length, most: fixed(check.largest, 4), mean }) : "";
+    byId("error").textContent = check ? ngettext("In {count} random hour the DGP shown differs from that of the uncompressed pictures by {most}.", "In {count} random hours the DGP shown differs from that of the uncompressed pictures by at most {most}, on average {mean}.", check.hours.length, { most: fixed(check.largest, 4), mean }) : "";
   }
 
   function paintCarpet(found, day, clock) {

@@ -1,0 +1,271 @@
+"""The shading state of each window group in every hour, by the rules of a room's control groups."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.to_tracer import exterior_surfaces
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.glare.evaluation import GlareOptions
+from mitsuba_cfs.images.view import View, fisheye
+from mitsuba_cfs.methods.glare import hourly_glare
+from mitsuba_cfs.methods.light import SeasonalLight, eye_illuminance, with_view
+from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.sky.sun import sun_directions
+from mitsuba_cfs.surfaces import Surfaces, even_numbers, points_on_triangles
+from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
+from mitsuba_cfs.trace.sun.shade import sunlit_shares
+from scenes.room.glare import rating_of
+from scenes.room.inputs import RoomInputs
+from scenes.room.light import RoomLight
+from scenes.room.operation import OperationHours
+from scenes.room.operation_tables import ShadingRule
+from scenes.room.solar import SeasonalOutdoors, window_irradiance
+from thermal.control import always, by_cut_off, by_glare, by_irradiance
+
+FloatArray = NDArray[np.float64]
+StateArray = NDArray[np.int64]
+SUN_POINTS = 64  # on each window group, for its sunlit share
+DISC_RAYS = 4  # from each of them
+MOST_COMBINATIONS = 1024  # of states of groups that avoid glare together
+
+
+def control_signals(room: RoomInputs) -> frozenset[str]:
+    """The computed quantities that the rules of a room's windows read.
+
+    "irradiance" of the windows, "sun" on them, "eye": illuminance at an eye, "dgp" of every hour.
+    """
+    if room.operation is None:
+        return frozenset()
+    return frozenset(map(signal_of, room.control.rules)) - {""}
+
+
+def signal_of(rule: ShadingRule) -> str:
+    """The computed quantity that a rule reads; "": none but the weather."""
+    if rule.rule == "glare":
+        return "eye" if rule.limit_dgp is None else "dgp"
+    if rule.sensor == "roof":
+        return ""
+    return {"irradiance": "irradiance", "cut-off": "sun"}.get(rule.rule, "")
+
+
+def shading_states(
+    room: RoomInputs,
+    light: RoomLight | None = None,
+    outdoors: SeasonalOutdoors | None = None,
+    *,
+    progress: Progress = silent,
+) -> StateArray:
+    """The shading state of each window group in every hour [H, G].
+
+    Args: light: for the signals "eye" and "dgp"; outdoors: for the signal "irradiance".
+    """
+    numbers, operation = room.windows.control, room.operation
+    states = np.zeros((room.skies.hours, len(room.control.names)), dtype=np.int64)
+    if operation is None or not room.space.windows:
+        return states[:, numbers]
+    rules, signals = room.control.rules, _Signals(room, outdoors)
+    for c, rule in enumerate(rules):
+        groups = np.flatnonzero(numbers == c)
+        if rule.rule == "schedule":
+            hours = OperationHours(operation, room.weather)
+            states[:, c] = hours.states(rule, room.control.places[c], room.windows.states)
+        elif rule.rule == "irradiance":
+            closed = rule.state or group_states(room, c) - 1
+            brightest = signals.irradiance(rule.sensor)[:, groups].max(axis=1)
+            states[:, c] = by_irradiance(
+                brightest, rule.close_above, rule.open_below, closed=closed
+            )
+        elif rule.rule == "cut-off":
+            states[:, c] = _by_cut_off(room, rule, groups, signals.beam(rule.sensor))
+        elif rule.rule == "always":
+            states[:, c] = always(rule.state, room.skies.hours)
+    glare = np.array([c for c, rule in enumerate(rules) if rule.rule == "glare"], dtype=np.int64)
+    if len(glare):
+        if light is None:
+            raise ValueError("the rule against glare needs the room's light")
+        _avoid_glare(room, light, states, glare, progress)
+    return states[:, numbers]
+
+
+class _Signals:
+    """What rules read of the window groups, computed once."""
+
+    def __init__(self, room: RoomInputs, outdoors: SeasonalOutdoors | None) -> None:
+        self._room, self._outdoors = room, outdoors
+        self._values: dict[tuple[str, str], FloatArray] = {}
+
+    def irradiance(self, sensor: str) -> FloatArray:
+        """Irradiance [H, G] [W/m2]."""
+        return self._once(("irradiance", sensor), self._irradiance)
+
+    def beam(self, sensor: str) -> FloatArray:
+        """The sun's direct irradiance [H, G] [W/m2]."""
+        return self._once(
+            ("beam", sensor), lambda at: window_beam(self._room, shaded=at == "window")
+        )
+
+    def _once(self, key: tuple[str, str], compute: Callable[[str], FloatArray]) -> FloatArray:
+        if key not in self._values:
+            self._values[key] = compute(key[1])
+        return self._values[key]
+
+    def _irradiance(self, sensor: str) -> FloatArray:
+        if sensor == "roof":
+            return roof_irradiance(self._room)
+        if self._outdoors is None:
+            raise ValueError("the rule by irradiance needs the room's outdoors")
+        return window_irradiance(self._outdoors, self._room.skies)
+
+
+def _by_cut_off(
+    room: RoomInputs, rule: ShadingRule, groups: NDArray[np.int64], beam: FloatArray
+) -> StateArray:
+    """The state that stops the sun on all of some window groups [H], each by its profile angle."""
+    sun, tilts = sun_directions(room.weather), np.radians(rule.slat_tilts_deg)
+    each = [
+        by_cut_off(
+            sun @ room.windows.groups[g].frame.T, beam[:, g], tilts, rule.slat_width,
+            rule.slat_spacing,
+        )
+        for g in groups
+    ]  # fmt: skip
+    states: StateArray = np.max(each, axis=0)
+    return states
+
+
+def group_states(room: RoomInputs, c: int) -> int:
+    """Number of states of a control group: of its window group with the most."""
+    windows = room.windows
+    return max(len(windows.systems[g]) for g in np.flatnonzero(windows.control == c))
+
+
+def window_beam(room: RoomInputs, *, shaded: bool) -> FloatArray:
+    """The sun's direct irradiance of each window group in every hour [H, G] [W/m2].
+
+    Args: shaded: by the surroundings; else as if there were none.
+    """
+    sun, groups = sun_directions(room.weather), room.windows.groups
+    normals = np.stack([group.frame[2] for group in groups])
+    beam: FloatArray = room.weather.direct_normal[:, None] * np.maximum(sun @ normals.T, 0.0)
+    if not shaded:
+        return beam
+    points = np.concatenate(
+        [
+            points_on_triangles(
+                np.concatenate([w.triangles for w in group.windows]), even_numbers(SUN_POINTS)
+            )[0]
+            for group in groups
+        ]
+    )
+    facing = np.repeat(normals, SUN_POINTS, axis=0)
+    for number, season in enumerate(room.seasons):
+        exterior = exterior_surfaces(season.building, room.space, "solar")
+        hours = np.flatnonzero((beam > 0).any(axis=1) & (room.season_of_year == number))
+        if len(hours) and len(exterior.triangles):
+            lit = sunlit_shares(
+                exterior, points, facing, sun[hours], samples=DISC_RAYS,
+                seed=room.options.sampling.seed,
+            )  # fmt: skip
+            beam[hours] *= lit.reshape(len(groups), SUN_POINTS, -1).mean(axis=1).T
+    return beam
+
+
+def roof_irradiance(room: RoomInputs) -> FloatArray:
+    """Irradiance of the window groups without surroundings [H, G] [W/m2]."""
+    sampling, groups = room.options.sampling, room.windows.groups
+    centres = [np.mean([w.triangles.mean(axis=(0, 1)) for w in g.windows], axis=0) for g in groups]
+    matrix = sky_irradiance_matrix(
+        Surfaces.none(), np.stack(centres), np.stack([g.frame[2] for g in groups]),
+        subdivision=sampling.subdivision, seed=sampling.seed, cache=room.cache,
+    ).values  # fmt: skip
+    lit: FloatArray = (matrix @ np.asarray(room.skies.solar)).astype(float)
+    return room.skies.whole_year(lit).T
+
+
+def _avoid_glare(
+    room: RoomInputs,
+    light: RoomLight,
+    states: StateArray,
+    glare: NDArray[np.int64],
+    progress: Progress,
+) -> None:
+    """Set the states [H, N] of control groups to the most open combination without glare.
+
+    At every seat that a rule of theirs names, with all other groups in their states.
+    """
+    counts = [group_states(room, c) for c in glare]
+    combinations = np.array(list(product(*map(range, counts))), dtype=np.int64)
+    if len(combinations) > MOST_COMBINATIONS:
+        message = f"{len(glare)} groups have {len(combinations)} combinations of states, at most "
+        message += f"{MOST_COMBINATIONS} are rated: let more windows move together"
+        raise DataError(message, element=room.space.label, field="control.groups")
+    windows, lit = room.windows, room.skies.lit
+    areas = np.array(
+        [sum(windows.groups[g].area for g in np.flatnonzero(windows.control == c)) for c in glare]
+    )
+    closure = combinations / np.maximum(np.array(counts) - 1, 1) @ (areas / areas.sum())
+    limits = _limits(room, light, [room.control.rules[c] for c in glare])
+
+    def excess(number: int, hours: NDArray[np.int64]) -> FloatArray:
+        chosen = states.copy()
+        chosen[:, glare] = combinations[number]
+        rows = light.states(chosen[:, windows.control])
+        steps = part(progress, number / len(combinations), (number + 1) / len(combinations),
+                     "glare control")  # fmt: skip
+        return np.max([limit(rows, hours, steps) for limit in limits], axis=0)
+
+    chosen = by_glare(closure, excess, len(lit))
+    states[np.ix_(lit, glare)] = combinations[chosen]
+
+
+Excess = Callable[[StateArray, NDArray[np.int64], Progress], FloatArray]
+
+
+def _limits(room: RoomInputs, light: RoomLight, rules: list[ShadingRule]) -> list[Excess]:
+    """For each seat and limit of rules: glare beyond it, relative to it, in some lit hours [h]."""
+    lights: dict[object, PhaseLight | SeasonalLight] = {}
+    limits: dict[object, Excess] = {}
+    for rule in rules:
+        seat = rule.seat, rule.looks_deg
+        if seat not in lights:
+            view = None if seat == (None, None) else _seat_view(room, rule, light.scene.eye)
+            lights[seat] = light.light if view is None else with_view(light.light, view)
+        limit = rule.limit_dgp
+        limits[seat, rule.limit_lx, limit] = (
+            _excess_illuminance(lights[seat], rule.limit_lx)
+            if limit is None
+            else _excess_dgp(lights[seat], limit, rating_of(room.options.outputs))
+        )
+    return list(limits.values())
+
+
+def _excess_illuminance(light: PhaseLight | SeasonalLight, limit: float) -> Excess:
+    def excess(rows: StateArray, hours: NDArray[np.int64], progress: Progress) -> FloatArray:
+        values = eye_illuminance(light, rows).astype(np.float32)[hours]
+        return (values.astype(float) - limit) / limit
+
+    return excess
+
+
+def _excess_dgp(light: PhaseLight | SeasonalLight, limit: float, rating: GlareOptions) -> Excess:
+    def excess(rows: StateArray, hours: NDArray[np.int64], progress: Progress) -> FloatArray:
+        rated = hourly_glare(light, "DGP", rows, hours=hours, options=rating, progress=progress)
+        return (rated.dgp - limit) / max(limit, 1e-9)
+
+    return excess
+
+
+def _seat_view(room: RoomInputs, rule: ShadingRule, view: View) -> View:
+    """The view of a seat; what the rule does not say is that of the room's view."""
+    direction = np.asarray(view.direction)
+    if rule.looks_deg is not None:
+        angle = np.radians(rule.looks_deg)
+        direction = np.array([np.sin(angle), np.cos(angle), 0.0])
+    position = view.position if rule.seat is None else rule.seat
+    return fisheye(position, direction, room.options.outputs.picture_size)

@@ -1,0 +1,269 @@
+"""Shading states by window group: order of windows, neighbours, cut-off, light and heat of each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bim.model import Building, Element
+from bim.shoebox import WindowRectangle, shoebox
+from mitsuba_cfs.directions import window_frame
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods.light import eye_illuminance, illuminance, with_view
+from mitsuba_cfs.sky.sun import sun_directions
+from scenes.room.inputs import RoomInputs, room_inputs, skies_for
+from scenes.room.light import room_light
+from scenes.room.operation import Operation
+from scenes.room.operation_tables import OperationTables
+from scenes.room.room import compute_room, explored_combinations
+from scenes.room.shading import control_signals, shading_states, window_beam
+from scenes.room.solar import seasonal_outdoors, solar_gains
+from scenes.room.windows import in_all_windows
+from scenes.room.zone import zone_surfaces
+from tests.scenes.small_box import HOURS, SMALL, clear
+
+FEW = SMALL.changed(
+    sensor_samples=256, patch_samples=256, sun_points=16, picture_size=32, picture_samples=2,
+    picture_count=1, heat_step_s=3600.0,
+)  # fmt: skip
+OPENING = {"x": 0.5, "sill": 0.9, "width": 2.0, "height": 1.5}
+TWO = shoebox(
+    3.0, 4.0, 2.8,
+    windows=(WindowRectangle(**OPENING), WindowRectangle(**OPENING, side="back")),
+    reflectance={"wall": 0.3, "floor": 0.1, "ceiling": 0.4},
+)  # fmt: skip
+BESIDE = shoebox(
+    6.0, 4.0, 2.8,
+    windows=(WindowRectangle(0.5, 0.9, 2.0, 1.5), WindowRectangle(3.5, 0.9, 2.0, 1.5)),
+    reflectance={"wall": 0.3, "floor": 0.1, "ceiling": 0.4},
+)  # fmt: skip
+TILTS = [0.0, 30.0, 60.0]
+CUT_OFF = {"rule": "cut-off", "slat_tilts_deg": TILTS, "slat_width": 0.08, "slat_spacing": 0.08}
+
+
+def turned_round(building: Building) -> Building:
+    """The building with the windows of its room in the opposite order."""
+    space = building.spaces[0]
+    return replace(building, spaces=(replace(space, windows=space.windows[::-1]),))
+
+
+@pytest.fixture(scope="module")
+def year(weather):
+    return skies_for(weather, FEW.method, FEW.sampling)
+
+
+@pytest.fixture
+def inputs(variant, glass, milk, blind, weather, year):
+    def of(control: dict, building: Building = TWO, skies=year, **tables: dict) -> RoomInputs:
+        space = building.spaces[0]
+        operation = OperationTables.model_validate({"control": control, **tables})
+        return room_inputs(
+            building, space, in_all_windows(space, glass, milk, blind), weather, FEW,
+            operation=operation, skies=skies, cache=MatrixCache.of_user(),
+        )  # fmt: skip
+
+    return of
+
+
+def by_group(room: RoomInputs) -> dict[str, np.ndarray]:
+    """States [H] of each control group, by the rules."""
+    signals = control_signals(room)
+    light = room_light(room) if signals & {"eye", "dgp"} else None
+    outdoors = seasonal_outdoors(room) if "irradiance" in signals else None
+    states = shading_states(room, light, outdoors)
+    shading = room.shading(states)
+    return dict(zip(shading.groups, shading.states.T, strict=True))
+
+
+@pytest.mark.parametrize(
+    "control",
+    [
+        {"rule": "irradiance", "close_above": 150.0},
+        CUT_OFF,
+        {"rule": "glare", "limit_lx": 1500.0},
+        {"rule": "irradiance", "close_above": 150.0, "groups": "window"},
+        CUT_OFF | {"groups": "room"},
+    ],
+    ids=["irradiance", "cut-off", "glare", "single windows", "whole room"],
+)
+def test_the_order_of_windows_changes_no_hour(inputs, control) -> None:
+    first, second = (by_group(inputs(control, one)) for one in (TWO, turned_round(TWO)))
+    assert first.keys() == second.keys() and any(states.any() for states in first.values())
+    for name, states in first.items():
+        assert np.count_nonzero(states != second[name]) == 0, name
+
+
+def test_each_facade_has_its_profile_angle(inputs, weather) -> None:
+    """The closed form: the shadow of a slat, (sin tilt + cos tilt tan phi) width, >= spacing."""
+    room = inputs(CUT_OFF)
+    found, sun = by_group(room), sun_directions(weather)
+    for name, towards in (("S", -1.0), ("N", 1.0)):
+        facing = towards * sun[:, 1]
+        shines = (facing > 0) & (weather.direct_normal > 0)
+        tangent = sun[:, 2] / np.where(shines, facing, 1.0)
+        expected = np.full(len(sun), len(TILTS) - 1)
+        for j in reversed(range(len(TILTS))):
+            tilt = np.radians(TILTS[j])
+            covers = np.sin(tilt) + np.cos(tilt) * tangent >= 1.0
+            expected[covers] = j
+        assert np.array_equal(found[name], np.where(shines, expected, 0)), name
+    assert np.count_nonzero(found["S"] != found["N"]) > 1000
+
+
+WALL = Element(
+    "w", "wall", "IfcWall",
+    np.array([[[-9, -0.1, -5], [3, -0.1, -5], [3, -0.1, 20]],
+              [[-9, -0.1, -5], [3, -0.1, 20], [-9, -0.1, 20]]], dtype=float), 0.2, 0.2,
+)  # fmt: skip
+
+
+def test_no_blind_tilts_for_a_sun_that_a_neighbour_shades(inputs) -> None:
+    """A wall right before one of two windows of a facade."""
+    shaded = replace(BESIDE, elements=(WALL,))
+    control = CUT_OFF | {"groups": "window"}
+    found = by_group(inputs(control, shaded))
+    hidden, free = (found[w.name] for w in BESIDE.spaces[0].windows)
+    as_on_the_roof = by_group(inputs(control | {"sensor": "roof"}, shaded))
+    alone = by_group(inputs(control, BESIDE))
+    assert not hidden[free == 0].any() and np.mean(hidden > 0) < 0.2 * np.mean(free > 0)
+    for name in found:
+        assert np.array_equal(as_on_the_roof[name], alone[name])
+        assert np.array_equal(as_on_the_roof[name], alone[BESIDE.spaces[0].windows[1].name])
+
+
+def test_irradiance_is_that_behind_the_neighbour_or_on_the_roof(inputs) -> None:
+    control = {"rule": "irradiance", "close_above": 150.0, "groups": "window"}
+    shaded = replace(BESIDE, elements=(WALL,))
+    hidden, free = by_group(inputs(control, shaded)).values()
+    assert np.mean(hidden > 0) < 0.2 * np.mean(free > 0)
+    on_roof = by_group(inputs(control | {"sensor": "roof"}, shaded)).values()
+    alone, _ = by_group(inputs(control, BESIDE)).values()
+    for states in on_roof:  # D is a mean over patches, the roof's sensor is traced by itself
+        assert np.mean(states != alone) < 0.01
+
+
+def test_direct_sun_of_a_half_shaded_window(inputs, weather) -> None:
+    """A wall far above and beside: its shadow on the window by similar triangles at noon."""
+    room = inputs(CUT_OFF, replace(BESIDE, elements=(WALL,)))
+    beam, bare = (window_beam(room, shaded=shaded)[:, 0] for shaded in (True, False))
+    assert np.all(beam <= bare + 1e-9)
+    share = beam[bare > 0] / bare[bare > 0]
+    assert 0.4 < np.median(share) < 0.6, "one of two equal windows is in the sun"
+
+
+def test_light_of_a_room_is_the_sum_over_its_groups(variant, glass, weather, skies) -> None:
+    """Panes that reflect the same: what one window reflects of the light of another is equal."""
+    space, L = TWO.spaces[0], len(skies.lit)
+    systems = in_all_windows(space, glass, clear("dark", 0.2))
+    light = room_light(room_inputs(TWO, space, systems, weather, FEW, skies=skies))
+
+    def lit(*states: int) -> np.ndarray:
+        return illuminance(light.light, np.repeat(np.array(states)[:, None], L, axis=1))
+
+    np.testing.assert_allclose(lit(0, 1) + lit(1, 0), lit(0, 0) + lit(1, 1), rtol=1e-4)
+    assert not np.allclose(lit(0, 1), lit(1, 0), rtol=0.1)
+
+
+def test_sun_of_a_room_is_the_sum_over_its_groups(inputs, skies) -> None:
+    room = inputs({}, skies=skies)
+    outdoors, surfaces = seasonal_outdoors(room), zone_surfaces(room)
+
+    def transmitted(*states: int) -> np.ndarray:
+        hours = np.tile(states, (skies.hours, 1))
+        solar, gains = solar_gains(
+            room, outdoors, surfaces.room, surfaces.outer, hours, thermals=surfaces.thermals
+        )
+        assert np.array_equal(solar.state, hours[:, room.windows.group])
+        return gains["transmitted_w"][list(HOURS)]
+
+    np.testing.assert_allclose(
+        transmitted(0, 2) + transmitted(2, 0), transmitted(0, 0) + transmitted(2, 2), rtol=1e-6
+    )
+    assert not np.allclose(transmitted(0, 2), transmitted(2, 0), rtol=0.1)
+
+
+def test_a_year_has_a_column_for_each_group(glass, blind, weather, skies, variant) -> None:
+    space = TWO.spaces[0]
+    control = {"rule": "always", "group": [{"facades": ["N"], "state": 1}]}
+    tables = OperationTables.model_validate(
+        {"control": control, "gains": {"lighting_w_m2": 8.0}, "loads": {"heating_c": 20.0}}
+    )
+    found = compute_room(
+        TWO, space, in_all_windows(space, glass, blind), weather, FEW,
+        operation=Operation(Path("o.toml"), tables, ()), skies=skies, explore=True,
+    )  # fmt: skip
+    hours = found.operation.hours
+    assert set(hours["shading_state_N"]) == {1} and set(hours["shading_state_S"]) == {0}
+    assert "shading_state" not in hours
+    assert found.operation.shading.of_windows[0].tolist() == [0, 1]
+    explored = found.explored
+    assert explored.states == ("clear", explored.states[1], f"N: {explored.states[1]}, S: clear")
+    assert set(explored.operated[list(HOURS)]) == {2}
+    as_run = explored.illuminance[2]
+    np.testing.assert_allclose(as_run, found.daylight.illuminance[list(HOURS)].T, rtol=1e-5)
+
+
+def test_combinations_that_the_explorer_shows(inputs, skies) -> None:
+    room = inputs({}, skies=skies)
+    state = np.zeros((skies.hours, 2), dtype=np.int64)
+    state[HOURS[0]], state[HOURS[1]], state[5] = (1, 1), (2, 0), (0, 2)  # hour 5 is dark
+    combinations, operated = explored_combinations(room, 3, state)
+    assert combinations.tolist() == [[0, 0], [1, 1], [2, 2], [2, 0]]
+    assert operated[list(HOURS)].tolist() == [1, 3, 0, 0]
+
+
+def test_groups_by_window_facade_and_rule(inputs, weather) -> None:
+    south, north = TWO.spaces[0].windows
+    control = CUT_OFF | {"group": [{"name": "door", "windows": [north.name], "rule": "always",
+                                    "state": 2}]}  # fmt: skip
+    room = inputs(control)
+    assert room.control.names == ("door", "S")
+    assert room.control.rules[0].slat_tilts_deg == tuple(TILTS), "other keys are those of control"
+    states = by_group(room)
+    assert set(states["door"]) == {2} and set(states["S"]) == {0, 1, 2}
+    frame = window_frame(south.normal, south.up)
+    assert not states["S"][(sun_directions(weather) @ frame.T)[:, 2] <= 0].any()
+    together = by_group(inputs({"groups": "room"} | CUT_OFF))
+    assert list(together) == ["all"]
+
+
+@pytest.mark.parametrize(
+    ("control", "words"),
+    [
+        ({"group": [{"windows": ["nowhere"]}]}, r"control.group.0.windows.*nowhere"),
+        ({"rule": "glare", "seat": [99.0, 0.0, 1.2]}, r"control.seat.*outside the room"),
+    ],
+)
+def test_what_a_control_cannot_name_is_refused(inputs, control, words) -> None:
+    with pytest.raises(DataError, match=words):
+        inputs(control)
+
+
+@pytest.mark.parametrize("looks_deg", [0.0, pytest.param(180.0, marks=pytest.mark.slow)])
+def test_glare_at_a_seat_takes_the_most_open_combination(inputs, skies, looks_deg) -> None:
+    """Of all nine combinations of three states of two equal windows, by the light at that seat."""
+    limit, seat = 1500.0, (1.5, 2.0, 1.2)
+    control = {"rule": "glare", "limit_lx": limit, "seat": seat, "looks_deg": looks_deg}
+    room = inputs(control, skies=skies)
+    angle = np.radians(looks_deg)
+    view = fisheye(seat, (np.sin(angle), np.cos(angle), 0.0), 32)
+    light = with_view(room_light(room).light, view)
+    eye = {
+        kind: eye_illuminance(light, np.repeat(np.array(kind)[:, None], len(HOURS), axis=1))
+        for kind in np.ndindex(3, 3)
+    }
+    found = shading_states(room, room_light(room))[list(HOURS)]
+    assert len(np.unique(found, axis=0)) > 1
+    for hour, chosen in enumerate(map(tuple, found.tolist())):
+        fine = {kind for kind in eye if eye[kind][hour] < limit}
+        if not fine:
+            assert chosen == (2, 2)
+            continue
+        openest = min(map(sum, fine))
+        best = min((k for k in fine if sum(k) == openest), key=lambda k: eye[k][hour])
+        assert chosen == best
