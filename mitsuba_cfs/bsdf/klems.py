@@ -222,13 +222,17 @@ class KlemsBsdf:
         for basis in (self.basis_out, self.basis_in):
             theta, phi = basis.centres()
             mirrored.append(basis.index(theta, np.pi - phi))
-        blocks = {
-            f"{kind}_{other}": None if block is None else block[np.ix_(*mirrored)]
-            for kind in ("transmission", "reflection")
-            for side, other in (("front", "back"), ("back", "front"))
-            for block in (getattr(self, f"{kind}_{side}"),)
-        }
-        return replace(self, **blocks)
+
+        def turned(block: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+            return None if block is None else block[np.ix_(*mirrored)]
+
+        return replace(
+            self,
+            transmission_front=turned(self.transmission_back),
+            transmission_back=turned(self.transmission_front),
+            reflection_front=turned(self.reflection_back),
+            reflection_back=turned(self.reflection_front),
+        )
 
     def transmission_matrix(self) -> NDArray[np.float64]:
         """T [K out, K in]: radiance into the room for radiance from the sky, L_o = T L_i.

@@ -219,13 +219,17 @@ class TensorTreeBsdf:
 
     def turned_round(self) -> TensorTreeBsdf:
         """The same system with its back outdoors, turned by pi about its up."""
-        blocks = {
-            f"{kind}_{other}": None if block is None else block.mirrored()
-            for kind in ("transmission", "reflection")
-            for side, other in (("front", "back"), ("back", "front"))
-            for block in (getattr(self, f"{kind}_{side}"),)
-        }
-        return replace(self, **blocks)
+
+        def turned(tree: TensorTree | None) -> TensorTree | None:
+            return None if tree is None else tree.mirrored()
+
+        return replace(
+            self,
+            transmission_front=turned(self.transmission_back),
+            transmission_back=turned(self.transmission_front),
+            reflection_front=turned(self.reflection_back),
+            reflection_back=turned(self.reflection_front),
+        )
 
     def direct_hemispherical(self, block: TensorTree) -> NDArray[np.float64]:
         """Share of each incident cell's light that `block` sends on [2^2D] or [2^(D-1)]."""
