@@ -42,6 +42,9 @@ class ElementRecord:
     stated: bool = False  # whether the thermal properties come from the file
     # of unit thickness, of the bodies that the element is made of, by their representation items
     of_items: Mapping[int, MaterialLayer] = field(default_factory=dict)
+    # listed without thicknesses, of a single body: layers whose thicknesses are shares of 1
+    shares: tuple[MaterialLayer, ...] = ()
+    named_mm: tuple[float, ...] = ()  # numbers in its name, which may be their thicknesses
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,6 +196,8 @@ def _layers(
         along = record.axis is not None and record.axis @ normal > 0
         # without an axis the first layer is the outer one, as the authoring tools write it
         return list(record.layers if along else record.layers[::-1])
+    if record.shares and length <= THICKEST_SPAN:
+        return _shared(record, length)[::-1]
     found: list[MaterialLayer] = []
     for part in span.parts:
         material = record.of_items.get(part.item, record.material)
@@ -204,6 +209,21 @@ def _layers(
             thickness += found.pop().thickness
         found.append(replace(material, thickness=max(thickness, 1e-3)))
     return found
+
+
+def _shared(record: ElementRecord, length: float) -> list[MaterialLayer]:
+    """The listed layers of one body of that thickness [m], in the order of the list.
+
+    Thicknesses are the numbers in the element's name where as many of them in a row as there are
+    layers add up to its own within 3 %, else its shares.
+    """
+    count = len(record.shares)
+    for start in range(len(record.named_mm) - count + 1):
+        some = record.named_mm[start : start + count]
+        if min(some) > 0 and abs(sum(some) / (1000 * length) - 1) < 0.03:
+            pairs = zip(record.shares, some, strict=True)
+            return [replace(one, thickness=length * mm / sum(some)) for one, mm in pairs]
+    return [replace(one, thickness=length * one.thickness) for one in record.shares]
 
 
 def _window(parts: Sequence[tuple[Piece, NDArray[np.float64]]]) -> Window:

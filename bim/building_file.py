@@ -27,11 +27,12 @@ class ReadOptions:
     """What is chosen of a building's file; each format says which of them it has."""
 
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
-    furniture: bool = False  # whether what stands in the rooms is in their light and views
+    furniture: bool = False  # whether furniture is in the light and the views of its room
     apertures: tuple[str, ...] = ()  # materials of the surfaces that are windows
-    surroundings: tuple[Path, ...] = ()  # files of what stands around, with any format
+    surroundings: tuple[Path, ...] = ()  # files of the surroundings, of any format
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     facade_panes: tuple[str, ...] = ()  # materials of panes before dark rooms: they mirror
+    linked: tuple[Path, ...] = ()  # further files of the same building: facade, structure, site
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +58,8 @@ def read_building_file(
     Raises: `DataError` for a file that cannot be used, or an option that its format has not.
     """
     options = options or ReadOptions()
-    path = Path(path)
+    path, *linked = building_files((path, *options.linked))
+    options = replace(options, linked=tuple(linked))
     refuse_unread_format(path)
     kind = _format(path)
     for field in FLAGS:
@@ -98,8 +100,9 @@ def read_elements(
             surroundings=beside.surroundings if reflectance is None else reflectance,
         )
         return read_outdoor_model(
-            path, select, corrections=corrections, selected_in=selected_in, progress=progress
-        )
+            path, select, linked=() if options is None else options.linked,
+            corrections=corrections, selected_in=selected_in, progress=progress,
+        )  # fmt: skip
     options = options or ReadOptions()
     if _format(path) is RADIANCE:
         from bim.radiance.building import read_radiance_elements
@@ -149,6 +152,26 @@ def refuse_unread_format(path: Path) -> None:
         raise DataError(reason, file=path)
 
 
+def building_files(paths: Iterable[str | PathLike[str]]) -> tuple[Path, ...]:
+    """The files of a building; a folder is the IFC files in it, the one with most spaces first.
+
+    Raises: `DataError` for a folder without any, and for a file that is no IFC beside others.
+    """
+    files: list[Path] = []
+    for path in map(Path, paths):
+        inside = [path]
+        if path.is_dir():
+            inside = sorted(one for one in path.iterdir() if one.suffix.lower() in IFC.suffixes[:2])
+            inside.sort(key=lambda one: -one.read_bytes().upper().count(b"IFCSPACE("))
+            if not inside:
+                raise DataError("expected IFC files in the folder, found none", file=path)
+        files += inside
+    for path in files if len(files) > 1 else ():
+        if not is_ifc(path):
+            raise DataError("of several files of a building each must be IFC", file=path)
+    return tuple(files)
+
+
 def is_ifc(path: str | PathLike[str]) -> bool:
     """Whether the file is read as IFC."""
     return _format(Path(path)) is IFC
@@ -158,11 +181,12 @@ def held_states(
     windows: Iterable[Window], path: str | PathLike[str]
 ) -> dict[str, tuple[ShadingState, ...]]:
     """The shading states that a building's file holds for its windows, by GUID."""
+    held: dict[str, tuple[ShadingState, ...]] = {}
     if is_ifc(path):
         from bim.ifc.fenestration_read import read_fenestration
 
-        return read_fenestration(path)
-    return {window.guid: window.states for window in windows if window.states}
+        held = read_fenestration(path)
+    return held | {window.guid: window.states for window in windows if window.states}
 
 
 def files_beside(path: str | PathLike[str]) -> tuple[Path, ...]:
@@ -186,7 +210,10 @@ def check_ifc(path: Path) -> None:
 def _read_ifc(path: Path, options: ReadOptions, progress: Progress) -> Building:
     from bim.ifc.building import read_ifc
 
-    return read_ifc(path, join=options.join, furniture=options.furniture, progress=progress)
+    return read_ifc(
+        path, linked=options.linked, join=options.join, furniture=options.furniture,
+        progress=progress,
+    )  # fmt: skip
 
 
 def _check_there(path: Path) -> None:
@@ -241,7 +268,7 @@ MARKS = (  # in the first bytes of a file of any suffix
     (b"#?RADIANCE\noconv", ".oct"), (b"<ifcXML", ".ifcxml"), (b":ifcXML", ".ifcxml"),
     (b"ISO_10303_28", ".ifcxml"), (b"dragonfly_version", ".dfjson"),
 )  # fmt: skip
-IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join",))
+IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join", "linked"))
 RADIANCE = BuildingFormat(
     "Radiance", (".rad",), _check_there, _read_radiance, ("apertures", "facade_panes")
 )

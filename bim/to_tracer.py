@@ -26,13 +26,13 @@ def furnished_surfaces(space: Space, band: str = "visible") -> Surfaces:
 
 
 def exterior_surfaces(building: Building, space: Space, band: str = "visible") -> Surfaces:
-    """What stands outdoors before a room's windows: every element but those windows themselves."""
+    """The surroundings of a room's windows: every element but those windows."""
     own = {window.guid for window in space.windows}
     return element_surfaces((e for e in building.elements if e.guid not in own), band)
 
 
 def element_surfaces(elements: Iterable[Element], band: str = "visible") -> Surfaces:
-    """What stands outdoors; surface i is element i."""
+    """The surroundings as surfaces; surface i is element i."""
     return _surfaces(elements, band)
 
 
@@ -55,28 +55,35 @@ def window_groups(space: Space) -> list[WindowGroup]:
 
     The order of windows inside the groups is that of `space.windows`.
     """
-    groups: list[list[Window]] = []
-    for window in space.windows:
-        frame = window_frame(window.normal, window.up)
-        for group in groups:
-            difference = np.abs(window_frame(group[0].normal, group[0].up) - frame).max()
-            if difference < SAME_ORIENTATION:
-                group.append(window)
-                break
-        else:
-            groups.append([window])
-    # groups of equal area in an order that does not depend on that of the windows
-    groups.sort(
-        key=lambda group: (
-            -round(sum(window.area for window in group), 6),
-            *np.round(group[0].normal, 3).tolist(),
-        )
-    )
+    groups = [[space.windows[w] for w in group] for group in orientation_groups(space)]
     names = numbered([orientation_name(group[0]) for group in groups])
     return [
         WindowGroup(name, tuple(WindowSurface(w.name, w.triangles, w.up) for w in group))
         for name, group in zip(names, groups, strict=True)
     ]
+
+
+def orientation_groups(space: Space) -> list[list[int]]:
+    """The numbers, in `space.windows`, of the windows of each of `window_groups`."""
+    windows = space.windows
+    groups: list[list[int]] = []
+    for number, window in enumerate(windows):
+        frame = window_frame(window.normal, window.up)
+        for group in groups:
+            first = windows[group[0]]
+            if np.abs(window_frame(first.normal, first.up) - frame).max() < SAME_ORIENTATION:
+                group.append(number)
+                break
+        else:
+            groups.append([number])
+    # groups of equal area in an order that does not depend on that of the windows
+    return sorted(
+        groups,
+        key=lambda group: (
+            -round(sum(windows[w].area for w in group), 6),
+            *np.round(windows[group[0]].normal, 3).tolist(),
+        ),
+    )
 
 
 def orientation_name(window: Window) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bim.model import Building, Space
-from bim.names import AmbiguousName, UnknownName
+from bim.names import AmbiguousName, UnknownName, listed
 from bim.report.issue import Issue, issue_text
 from mitsuba_cfs.errors import DataError
 
@@ -28,6 +28,8 @@ def chosen_spaces(
     """
     chosen = named_spaces(building, names, path)
     if names:
+        zoned = {space.guid for name in names for space in building.zone(name)}
+        chosen = [space for space in chosen if lit(space) or space.guid not in zoned]
         for space in chosen:
             if not lit(space):
                 about = [p for p in _lost(building, "window") if _names(p, space.name)]
@@ -48,25 +50,30 @@ def no_window(building: Building, path: Path) -> DataError:
 
 
 def named_spaces(building: Building, names: Sequence[str], path: Path) -> list[Space]:
-    """The spaces of those names or GUIDs, each once, or all spaces; with windows or without."""
+    """The spaces of those names or GUIDs, or of zones, each once, or all; with windows or not."""
     if not building.spaces:
         raise DataError(f"has no rooms (IfcSpace){_because(building, 'room')}", file=path)
     if not names:
         return list(building.spaces)
-    return list(
-        {space.guid: space for space in (_space(building, n, path) for n in names)}.values()
-    )
+    chosen = (space for name in names for space in _spaces(building, name, path))
+    return list({space.guid: space for space in chosen}.values())
 
 
-def _space(building: Building, name: str, path: Path) -> Space:
+def _spaces(building: Building, name: str, path: Path) -> Sequence[Space]:
+    """The space of a name, else those of the zone of that name."""
     try:
-        return building.space(name)
+        return (building.space(name),)
     except (UnknownName, AmbiguousName) as error:
+        zone = building.zone(name)
+        if zone and isinstance(error, UnknownName):
+            return zone
         lost = [p for p in _lost(building, "room") if p.where == name or _names(p, name)]
         if isinstance(error, UnknownName) and lost:
             message = f"space {name!r} was left out: {_quoted(lost)}"
         else:
             message = str(error.args[0])
+            if building.zones:
+                message += f"; zones: {listed(name, (zone.name for zone in building.zones))}"
         raise DataError(message, file=path, field="space") from error
 
 

@@ -11,7 +11,13 @@ from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 
-from bim.building_file import STAGES, ReadOptions, check_building_file, read_building_file
+from bim.building_file import (
+    STAGES,
+    ReadOptions,
+    building_files,
+    check_building_file,
+    read_building_file,
+)
 from bim.building_file import files_beside as building_files_beside
 from bim.model import Building
 from mitsuba_cfs.errors import DataError
@@ -94,6 +100,7 @@ def named_files(options: InputOptions, operation: Operation | None) -> dict[str,
     if options.building is not None:
         beside = building_files_beside(options.building)
         files |= dict(zip(("corrections",), beside, strict=False))
+        files |= {f"linked_{i}": path for i, path in enumerate(options.linked)}
     if options.system is not None:
         for i, path in enumerate(files_beside(options.system)):
             files[f"system_angular_{i}" if i else "system_thermal"] = path
@@ -109,8 +116,8 @@ def check_building(options: InputOptions) -> None:
     Raises: `DataError` for a file of no format that is read, or an empty name.
     """
     check_names(options.spaces)
-    if options.building is not None:
-        check_building_file(options.building)
+    for path in building_files(options.building_files):
+        check_building_file(path)
 
 
 def check_names(names: Sequence[str], field: str = "--space") -> None:
@@ -189,7 +196,7 @@ def peak_share(text: str) -> tuple[str, float]:
 
 
 def read_building(
-    path: str | PathLike[str],
+    path: str | PathLike[str] | Sequence[str | PathLike[str]],
     *,
     join: Sequence[str] = (),
     furniture: bool = False,
@@ -202,6 +209,7 @@ def read_building(
     """The building of an IFC file, with the corrections kept beside it, or of another format.
 
     Args:
+        path: a file, several IFC files of one building, or a folder of them.
         join: rooms to make one, as "Hall + Living".
         furniture: whether furniture is in the light and the views of its room.
         apertures: materials of a Radiance scene's surfaces that are windows.
@@ -212,11 +220,12 @@ def read_building(
     Raises: `DataError` for a file that cannot be used; faults of the model are the building's
         `problems`.
     """
+    first, *linked = building_files([path] if isinstance(path, str | PathLike) else path)
     read = ReadOptions(
         tuple(join), furniture, tuple(apertures), tuple(map(Path, surroundings)),
-        surroundings_offset, tuple(facade_panes),
+        surroundings_offset, tuple(facade_panes), tuple(linked),
     )  # fmt: skip
-    return read_building_file(path, read, summed(progress, "inputs", STAGES))
+    return read_building_file(first, read, summed(progress, "inputs", STAGES))
 
 
 def building_of(options: InputOptions, progress: Progress = silent) -> Building:

@@ -33,6 +33,7 @@ class InputOptions:
     visible_transmittance: float | None = None  # of windows without a BSDF, before the file's
     see_through: tuple[str, ...] = ()  # FILE=specular, lobe or a share, see `input_files`
     operation: Path | None = None  # shading control, gains, set points
+    linked: tuple[Path, ...] = ()  # further files of the same building: facade, structure, site
 
     @property
     def read(self) -> ReadOptions:
@@ -42,7 +43,13 @@ class InputOptions:
         return ReadOptions(
             tuple(self.join), self.furniture, tuple(self.apertures),
             tuple(map(Path, self.surroundings)), self.surroundings_offset, tuple(self.facade_panes),
+            tuple(map(Path, self.linked)),
         )  # fmt: skip
+
+    @property
+    def building_files(self) -> tuple[Path, ...]:
+        """The files of the building."""
+        return () if self.building is None else (self.building, *self.linked)
 
     def named(self) -> dict[str, Any]:
         """Every option by its name."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -15,11 +15,13 @@ import shapely
 from bim.bodies import Bodies
 from bim.boundaries import ElementRecord, Finishes, faces_and_windows, floor_area
 from bim.defaults import CLEAR_GLAZING
+from bim.fenestration import ShadingState
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.cut_rooms import cut_rooms, room_lids
 from bim.ifc.defects import DRAWN_TWICE, model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
+from bim.ifc.fenestration_read import read_fenestration
 from bim.ifc.furniture import furnished
 from bim.ifc.glass_of_rooms import apertures_in, glass_of_rooms, lost_glass
 from bim.ifc.joining import joined_rooms
@@ -34,6 +36,7 @@ from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
 from bim.ifc.space_boundaries import boundary_issues
 from bim.ifc.spaces import SpaceRecord, read_spaces
+from bim.ifc.zones import read_zones
 from bim.isolated_solids import RoomBoundary, room_boundaries
 from bim.mesh_simplification import simplified
 from bim.model import Building, Element, Space
@@ -52,6 +55,7 @@ SEARCH = 0.3  # share of the stage "rooms" in which they are found, where the fi
 def read_ifc(
     path: str | PathLike[str],
     *,
+    linked: Sequence[str | PathLike[str]] = (),
     corrections: Corrections | None = None,
     join: Sequence[str] = (),
     furniture: bool = False,
@@ -60,6 +64,7 @@ def read_ifc(
     """The building in an IFC2X3, IFC4 or IFC4X3 file (.ifc, .ifczip).
 
     Args:
+        linked: further files of the same building, see `bim.ifc.linked`; an .ifczip may hold all.
         corrections: what to leave out and repaint; by default those of the file
             `<model>.corrections.toml` beside the model, if there is one.
         join: rooms to make one besides, as "Hall + Living", where `corrections` are not given;
@@ -71,7 +76,7 @@ def read_ifc(
     """
     tell = progress or (lambda stage, fraction: None)
     corrections = corrections_beside(path, join) if corrections is None else corrections
-    source = read_source(path, corrections, tell)
+    source = read_source(path, corrections, tell, linked)
     tell("rooms", 0.0)
     mesh = mesh_of(source.walls)
     rooms, issues = _rooms(source, mesh, lambda part: tell("rooms", SEARCH * part))
@@ -105,6 +110,8 @@ def read_ifc(
     issues += guessed_walls(spaces)
     spaces, more = furnished(source, spaces, wanted=furniture)
     issues += more
+    if linked:
+        spaces = with_states(spaces, [read_fenestration(one) for one in linked])
     tell("surroundings", 0.0)
     outside, more = _outdoors(source, spaces)
     tell("surroundings", 1.0)
@@ -120,6 +127,7 @@ def read_ifc(
             north_is_corrected=source.corrections.north_deg is not None,
         ),
         source.placed.matrix(),
+        zones=read_zones(source.model, source.damage),
     )  # fmt: skip
 
 
@@ -147,7 +155,8 @@ def _rooms(
     read, more = open_spaces(records, mesh, by_guid, windows)
     issues += more
     covers = room_lids(source)
-    read, more = cut_rooms(read, covers)
+    fixed = source.corrections.heights_as_drawn(source.model)
+    read, more = cut_rooms(read, covers, fixed)
     issues += more
     apertures = open_apertures(source, read, mesh.triangles)
     records, ways, more = joined_rooms(source, read, apertures, mesh.triangles)
@@ -157,6 +166,22 @@ def _rooms(
         records = read
         issues += more
     return _Rooms(read, records, repeated, ways, covers), issues
+
+
+def with_states(
+    spaces: Sequence[Space], held: Sequence[Mapping[str, tuple[ShadingState, ...]]]
+) -> list[Space]:
+    """The rooms with what linked files hold for their windows, of the first that has any."""
+    states: dict[str, tuple[ShadingState, ...]] = {}
+    for one in held:
+        states = {**one, **states}
+    return [
+        replace(
+            space,
+            windows=tuple(replace(w, states=states.get(w.guid, w.states)) for w in space.windows),
+        )
+        for space in spaces
+    ]
 
 
 def guessed_walls(spaces: Sequence[Space]) -> list[Issue]:

@@ -11,6 +11,8 @@
     north = 30                  # direction of the model's +y axis, in degrees from north to east
     outdoors = ['IfcSpace, LongName="Loggia"']     # spaces that are no rooms
     indoors = ['IfcSpace, Name="A.12"']            # rooms, whatever their shape and name
+    as_drawn = ['IfcSpace, Name="A.13"']           # spaces whose drawn height holds
+    close_gaps = 0.3            # in a file without spaces: gaps between elements to close [m]
 
     [[reflectance]]
     select = 'IfcWall, material="Brick"'
@@ -50,7 +52,8 @@ if TYPE_CHECKING:
 
 LAYER = re.compile(r'(?:^|,)\s*layer\s*=\s*("[^"]*"|[^,+]+)')  # CAD layer: ours, not ifcopenshell's
 KEYS = ("leave_out", "only", "opaque", "keep", "join", "surroundings", "reflectance", "north",
-        "outdoors", "indoors", "material")  # fmt: skip
+        "outdoors", "indoors", "material", "close_gaps",
+        "as_drawn")  # fmt: skip
 OPEN = "open"  # asks for the rooms that are open to each other by more than a door
 PAINT_KEYS = ("select", "visible", "solar", "specular", "roughness")
 MATERIAL_KEYS = {  # of [[material]]: lowest and highest value
@@ -86,6 +89,8 @@ class Corrections:
     outdoors: tuple[str, ...] = ()  # spaces that are no rooms
     indoors: tuple[str, ...] = ()  # spaces that are rooms
     materials: tuple[MaterialCorrection, ...] = ()  # the first that matches counts
+    as_drawn: tuple[str, ...] = ()  # spaces that are neither cut nor raised
+    close_gaps: float | None = None  # between elements, where rooms are searched [m]
 
     def removed(self, model: ifcopenshell.file) -> set[int]:
         """STEP ids of the products that are not to be read."""
@@ -115,6 +120,10 @@ class Corrections:
             for query in queries:
                 result |= dict.fromkeys(chosen(model, query, self.file), outdoors)
         return result
+
+    def heights_as_drawn(self, model: ifcopenshell.file) -> set[int]:
+        """STEP ids of the spaces whose drawn height holds."""
+        return set().union(*(chosen(model, query, self.file) for query in self.as_drawn))
 
     def painted(self, model: ifcopenshell.file) -> dict[int, Paint]:
         """The paint by STEP id; later entries win."""
@@ -196,6 +205,10 @@ def read_corrections(path: str | PathLike[str]) -> Corrections:
         north_deg=_north(table, path), outdoors=_texts(table, "outdoors", path),
         indoors=_texts(table, "indoors", path),
         materials=tuple(_material(entry, path) for entry in _tables(table, "material", path)),
+        as_drawn=_texts(table, "as_drawn", path),
+        close_gaps=(
+            None if "close_gaps" not in table else _share(table["close_gaps"], path, "close_gaps")
+        ),
     )  # fmt: skip
 
 

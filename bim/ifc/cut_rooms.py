@@ -8,7 +8,7 @@ windows and do not count.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,13 +31,17 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def cut_rooms(
-    records: Sequence[SpaceRecord], lids: Sequence[Shape]
+    records: Sequence[SpaceRecord], lids: Sequence[Shape], fixed: Collection[int] = ()
 ) -> tuple[list[SpaceRecord], list[Issue]]:
     """The rooms, those cut that go through what covers them, each with an issue.
 
-    Args: lids: of `room_lids`.
+    Args: lids: of `room_lids`; fixed: STEP ids of spaces whose drawn height holds.
     """
-    through = [index for index, record in enumerate(records) if goes_through(record, lids)]
+    through = [
+        index
+        for index, record in enumerate(records)
+        if record.step_id not in fixed and goes_through(record, lids)
+    ]
     if not through:
         return list(records), []
     items = [(packed(records[i].solid.manifold), _near(records[i], lids)) for i in through]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
@@ -27,6 +28,8 @@ from bim.model import Element
 from bim.report.issue import Issue
 from mitsuba_cfs.gloss import Gloss
 
+BUILT_UP = ("IfcWall", "IfcSlab", "IfcRoof", "IfcCovering")  # of layers
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
 SITE = ("IfcSite", "IfcGeographicElement")
 
 
@@ -90,6 +93,8 @@ def _record(
     else:
         material, stated = layers.layers[0], layers.stated
     predefined = getattr(element, "PredefinedType", None)
+    is_built_up = element.is_a().startswith(BUILT_UP) and len(np.unique(shape.item)) == 1
+    shares = reader.shares_of(element) if layers is None and is_built_up else ()
     return ElementRecord(
         element.GlobalId,
         element.Name or element.is_a(),
@@ -100,6 +105,8 @@ def _record(
         element.is_a("IfcRoof") or predefined == "ROOF",
         stated and known,
         of_items,
+        shares,
+        tuple(map(float, NUMBER.findall(element.Name or ""))),
     )
 
 

@@ -39,7 +39,7 @@ from bim.ifc.fenestration_write import (
     TREE,
     U_MODEL,
 )
-from bim.ifc.project import definitions_of, open_ifc
+from bim.ifc.project import definitions_of, open_all
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
@@ -56,7 +56,10 @@ HOLDERS = ("IfcWindow", "IfcDoor", "IfcPlate", "IfcCurtainWall")  # whose sets a
 
 def read_fenestration(path: str | PathLike[str]) -> dict[str, tuple[ShadingState, ...]]:
     """Shading states that an IFC file holds for its windows, by GUID; see `read_states`."""
-    return read_states(open_ifc(path), Path(path).parent, file=path)
+    held: dict[str, tuple[ShadingState, ...]] = {}
+    for model in open_all([path]).values():
+        held = read_states(model, Path(path).parent, file=path) | held
+    return held
 
 
 def read_states(

@@ -16,15 +16,20 @@ SCHEMA = re.compile(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'")
 
 
 def check_head(path: str | Path) -> None:
-    """Raise `DataError` where a file is no IFC model (.ifc, or .ifczip with one) of our schemas."""
+    """Raise `DataError` where a file is no IFC model (.ifc, .ifczip) of our schemas."""
     path = Path(path)
     if not path.is_file():
         raise DataError("no such file", file=path)
     if path.suffix.lower() in ZIPPED:
-        start = _zipped_start(path)
+        starts = _zipped_starts(path)
     else:
         with path.open("rb") as stream:
-            start = stream.read(HEAD)
+            starts = [stream.read(HEAD)]
+    for start in starts:
+        _check_start(start, path)
+
+
+def _check_start(start: bytes, path: Path) -> None:
     if b"ISO-10303-21" not in start[:4096]:
         raise DataError("not an IFC file: 'ISO-10303-21' is missing at its start", file=path)
     stated = SCHEMA.search(start)
@@ -33,23 +38,28 @@ def check_head(path: str | Path) -> None:
         raise DataError(f"schema {schema}, expected one of {SCHEMAS}", file=path)
 
 
-def model_name(archive: zipfile.ZipFile, path: Path) -> str:
-    """The name of the one model in a zipped file; `DataError` where there is not one."""
-    names = [name for name in archive.namelist() if name.lower().endswith(".ifc")]
-    if len(names) != 1:
-        raise DataError(f"expected one .ifc inside, found {len(names)}", file=path)
-    size = archive.getinfo(names[0]).file_size  # zipfile unpacks no more than it says here
+def model_names(archive: zipfile.ZipFile, path: Path) -> list[str]:
+    """The names of the models in a zipped file, in order; `DataError` where there is none."""
+    names = sorted(name for name in archive.namelist() if name.lower().endswith(".ifc"))
+    if not names:
+        raise DataError("expected an .ifc inside, found none", file=path)
+    # zipfile unpacks no more than it says here
+    size = sum(archive.getinfo(name).file_size for name in names)
     if size > LARGEST:
         message = (
             f"unpacks to {size / 1e9:.1f} GB, more than {LARGEST / 1e9:.1f} GB: unzip it first"
         )
         raise DataError(message, file=path)
-    return names[0]
+    return names
 
 
-def _zipped_start(path: Path) -> bytes:
+def _zipped_starts(path: Path) -> list[bytes]:
     try:
-        with zipfile.ZipFile(path) as archive, archive.open(model_name(archive, path)) as stream:
-            return stream.read(HEAD)
+        with zipfile.ZipFile(path) as archive:
+            starts = []
+            for name in model_names(archive, path):
+                with archive.open(name) as stream:
+                    starts.append(stream.read(HEAD))
+            return starts
     except (zipfile.BadZipFile, NotImplementedError) as error:
         raise DataError(f"cannot be unzipped: {error}", file=path) from None

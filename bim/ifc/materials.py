@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import ifcopenshell
@@ -32,6 +32,8 @@ OPTICAL = {
 }
 
 SURFACES = 0.17  # resistances of both surfaces of an outer wall: EN ISO 6946:2017 [m2 K/W]
+USUAL_WALL = 0.3  # thickness of a wall whose layers are listed without theirs [m]
+INSULATING = ("insulation", "insulating")  # groups of materials
 DEEPEST = 20  # parts of parts of a whole
 
 
@@ -165,6 +167,27 @@ class MaterialReader:
             values = {"count": self._contradicting}
             self.issues["shape aspects"] = Issue("aspect-contradicts-style", "", values)
         return found, stated
+
+    def shares_of(self, element: ifcopenshell.entity_instance) -> tuple[MaterialLayer, ...]:
+        """Materials listed without thicknesses, if insulation is one: layers as shares of 1.
+
+        By IfcMaterialConstituent.Fraction where each has one, else in equal parts.  A list without
+        insulation is no build-up that matters: the first material holds.
+        """
+        material = _material_of(_with_material(element, self.damage), self.damage)
+        if material is None or len(self._constituents(element)) < 2:
+            return ()
+        parts = getattr(material, "MaterialConstituents", None) or material.Materials
+        fractions = [getattr(one, "Fraction", None) for one in parts]
+        if not all(fractions) or abs(sum(fractions) - 1) > 0.02:
+            fractions = [1 / len(parts)] * len(parts)
+        materials = [getattr(one, "Material", one) for one in parts]
+        if not any(named_material(one).group in INSULATING for one in materials):
+            return ()
+        layers = [
+            self.layer(one, USUAL_WALL * f)[0] for one, f in zip(materials, fractions, strict=True)
+        ]
+        return tuple(replace(one, thickness=f) for one, f in zip(layers, fractions, strict=True))
 
     def _constituents(self, element: ifcopenshell.entity_instance) -> dict:
         """Materials of an element without layers, by the names of constituents or their own."""

@@ -82,7 +82,7 @@ def north_rotation(
 
     Args: corrected_deg: direction of the model's +y axis, from north to east; None: the file's.
     """
-    true, issues = _true_north(model)
+    true, issues = true_north(model)
     grid = next((n for one in map_conversions(model) if (n := one.north) is not None), None)
     if corrected_deg is not None:
         angle = math.radians(corrected_deg)
@@ -108,7 +108,7 @@ def _azimuth(north: tuple[float, float]) -> float:
     return math.degrees(math.atan2(-north[0], north[1])) + 0.0
 
 
-def _true_north(model: ifcopenshell.file) -> tuple[tuple[float, float] | None, list[Issue]]:
+def true_north(model: ifcopenshell.file) -> tuple[tuple[float, float] | None, list[Issue]]:
     """TrueNorth in the model's plane, None without a usable one; and what is odd about it."""
     for context in model.by_type("IfcGeometricRepresentationContext", include_subtypes=False):
         direction = getattr(context, "TrueNorth", None)

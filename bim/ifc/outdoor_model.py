@@ -15,6 +15,7 @@ def read_outdoor_model(
     path: str | Path,
     select: Sequence[str] = (),
     *,
+    linked: Sequence[str | Path] = (),
     corrections: Corrections | None = None,
     selected_in: str | Path = "",
     progress: Progress | None = None,
@@ -24,11 +25,12 @@ def read_outdoor_model(
     Args:
         select: ifcopenshell selectors (GUID, type, material, name), as in `bim.ifc.corrections`.
         selected_in: the file that has the selectors, for messages.
+        linked: further files of the same building.
         corrections: by default those of `<model>.corrections.toml` beside the model.
     Raises: `DataError` where the file cannot be read or a selector is none.
     """
     corrections = corrections_beside(path) if corrections is None else corrections
-    source = read_source(path, corrections, progress or (lambda stage, fraction: None))
+    source = read_source(path, corrections, progress or (lambda stage, fraction: None), linked)
     elements = outdoor_elements(source.model, source.elements, reflectance=corrections.surroundings)
     selected = tuple(
         frozenset(source.model.by_id(i).GlobalId for i in chosen(source.model, query, selected_in))

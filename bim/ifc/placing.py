@@ -81,11 +81,21 @@ def _typical_height(shapes: dict[int, Shape]) -> float:
     return 0.0
 
 
+def _whole_height(shapes: dict[int, Shape]) -> float:
+    """Height of all shapes together [m]."""
+    z = [
+        (shape.triangles[..., 2].min(), shape.triangles[..., 2].max()) for shape in shapes.values()
+    ]
+    return float(max(top for _, top in z) - min(bottom for bottom, _ in z))
+
+
 def _unit_slip(shapes: dict[int, Shape]) -> float:
     """Factor that makes the building's height possible; 1 where it already is or nothing helps."""
     height = _typical_height(shapes)
     low, high = STOREY_HEIGHTS
     if height == 0.0 or 0.1 * low <= height <= high:
+        return 1.0
+    if height < low <= _whole_height(shapes):  # low spaces, such as beams of the wrong class
         return 1.0
     fits = [factor for factor in UNIT_SLIPS if low * 1.5 <= height * factor <= 0.1 * high]
     return fits[0] if fits else 1.0
@@ -119,18 +129,27 @@ def map_georeference(
 
     Args: north_is_corrected: the conversion's rotation is wrong then, and the map's north is north.
     """
+    stated = to_map(model)
+    if stated is None:
+        return None
+    crs, model_to_map = stated
+    to_world = placed.matrix()
+    if north_is_corrected:
+        to_world[:3, :3] = placed.scale * model_to_map[:3, :3]
+    return Georeference(crs, to_world @ np.linalg.inv(model_to_map))
+
+
+def to_map(model: ifcopenshell.file) -> tuple[str, NDArray[np.float64]] | None:
+    """The first map of a file, and the way [4, 4] from model to map [m]; None without one."""
     for one in map_conversions(model):
         if not one.crs or None in one.origin:
             continue
         x, y = one.x_axis or (1.0, 0.0)
         c, s = x / math.hypot(x, y), y / math.hypot(x, y)
-        back = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])  # from map to model axes
-        turn = placed.scale * (np.eye(3) if north_is_corrected else placed.rotation @ back)
-        to_world = np.eye(4)
-        to_world[:3, :3] = turn
-        origin = _metres(model, one.unit) * np.array(one.origin, dtype=float)
-        to_world[:3, 3] = -turn @ origin - placed.offset
-        return Georeference(crs_name(str(one.crs)), to_world)
+        way = np.eye(4)
+        way[:2, :2] = (c, -s), (s, c)
+        way[:3, 3] = _metres(model, one.unit) * np.array(one.origin, dtype=float)
+        return crs_name(str(one.crs)), way
     return None
 
 

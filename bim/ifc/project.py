@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import uuid
 import zipfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import ifcopenshell
@@ -13,7 +14,7 @@ import ifcopenshell.util.element
 import ifcopenshell.util.unit
 
 from bim.ifc.damage import Damage, entities, type_of
-from bim.ifc.head import SCHEMAS, ZIPPED, check_head, model_name
+from bim.ifc.head import SCHEMAS, ZIPPED, check_head, model_names
 from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import scratch_folder
@@ -22,21 +23,41 @@ END = 4096  # bytes in which the end of a STEP file is looked for
 
 
 def open_ifc(path: str | Path) -> ifcopenshell.file:
-    """The opened model (.ifc, or .ifczip with one model); `DataError` where it is none."""
-    path = Path(path)
-    check_head(path)
-    return _open_zipped(path) if path.suffix.lower() in ZIPPED else _open_step(path, path)
+    """The one model of a file (.ifc, .ifczip); `DataError` where it is none, or has several."""
+    models = open_all([path])
+    if len(models) > 1:
+        message = f"expected one .ifc inside, found {len(models)}: {', '.join(models)}"
+        raise DataError(message, file=path)
+    return next(iter(models.values()))
 
 
-def _open_zipped(path: Path) -> ifcopenshell.file:
+def open_all(paths: Sequence[str | Path]) -> dict[str, ifcopenshell.file]:
+    """The models of files by name, those of an .ifczip each, the one with most spaces first."""
+    models: dict[str, ifcopenshell.file] = {}
+    for path in map(Path, paths):
+        check_head(path)
+        if path.suffix.lower() in ZIPPED:
+            opened = _open_zipped(path)
+        else:
+            opened = {path.name: _open_step(path, path)}
+        for name, model in opened.items():
+            models[name if name not in models else str(path)] = model
+    return models
+
+
+def _open_zipped(path: Path) -> dict[str, ifcopenshell.file]:
+    models = {}
     try:
         with zipfile.ZipFile(path) as archive, scratch_folder() as folder:
             inner = folder / "model.ifc"
-            with archive.open(model_name(archive, path)) as packed, inner.open("wb") as unpacked:
-                shutil.copyfileobj(packed, unpacked)
-            return _open_step(inner, path)
+            names = model_names(archive, path)
+            for name in names:
+                with archive.open(name) as packed, inner.open("wb") as unpacked:
+                    shutil.copyfileobj(packed, unpacked)
+                models[name if len(names) > 1 else path.name] = _open_step(inner, path)
     except (zipfile.BadZipFile, NotImplementedError) as error:
         raise DataError(f"cannot be unzipped: {error}", file=path) from None
+    return dict(sorted(models.items(), key=lambda one: -len(one[1].by_type("IfcSpace"))))
 
 
 def _open_step(path: Path, shown: Path) -> ifcopenshell.file:
@@ -51,11 +72,11 @@ def _open_step(path: Path, shown: Path) -> ifcopenshell.file:
     if not model.by_type("IfcProject") and not model.by_type("IfcProduct"):
         raise DataError("holds no project and no products: damaged or cut off", file=shown)
     _mend_stars(model)
-    _mend_guids(model)
+    mend_guids(model)
     return model
 
 
-def _mend_guids(model: ifcopenshell.file) -> None:
+def mend_guids(model: ifcopenshell.file) -> None:
     """Give products without a GlobalId the one of their STEP number."""
     for product in model.by_type("IfcProduct"):
         if not product.GlobalId:
@@ -91,24 +112,28 @@ def _mend_stars(model: ifcopenshell.file) -> None:
 
 
 def ending_issues(path: str | Path) -> list[Issue]:
-    """An issue where a STEP file has lost its end."""
+    """An issue for each STEP file that has lost its end."""
     path = Path(path)
-    if b"END-ISO-10303-21" in _end(path):
-        return []
-    return [Issue("file-cut-off", path.name)]
+    return [
+        Issue("file-cut-off", name) for name, end in _ends(path) if b"END-ISO-10303-21" not in end
+    ]
 
 
-def _end(path: Path) -> bytes:
-    """The last bytes of a STEP file, or of the one in a zipped file."""
-    if path.suffix.lower() in ZIPPED:
-        end = b""
-        with zipfile.ZipFile(path) as archive, archive.open(model_name(archive, path)) as stream:
-            while block := stream.read(2**20):
-                end = (end + block)[-END:]
-        return end
-    with path.open("rb") as stream:
-        stream.seek(max(path.stat().st_size - END, 0))
-        return stream.read()
+def _ends(path: Path) -> Iterator[tuple[str, bytes]]:
+    """Name and last bytes of a STEP file, or of those in a zipped file."""
+    if path.suffix.lower() not in ZIPPED:
+        with path.open("rb") as stream:
+            stream.seek(max(path.stat().st_size - END, 0))
+            yield path.name, stream.read()
+        return
+    with zipfile.ZipFile(path) as archive:
+        names = model_names(archive, path)
+        for name in names:
+            end = b""
+            with archive.open(name) as stream:
+                while block := stream.read(2**20):
+                    end = (end + block)[-END:]
+            yield name if len(names) > 1 else path.name, end
 
 
 def length_issues(model: ifcopenshell.file) -> list[Issue]:

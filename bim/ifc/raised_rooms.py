@@ -57,10 +57,10 @@ def raised_rooms(
     low = {one.low.guid for one in glass.glass if one.low is not None}
     if not low:
         return list(records), []
-    lids = _lids(source)
+    lids, fixed = _lids(source), source.corrections.heights_as_drawn(source.model)
     result, issues = list(records), []
     for index, record in enumerate(records):
-        if record.guid not in low:
+        if record.guid not in low or record.step_id in fixed:
             continue
         area, reach = _glass_above(record, glass)
         if area < LEAST_GLASS:

@@ -7,7 +7,7 @@ from os import PathLike
 import ifcopenshell.util.classification
 import ifcopenshell.util.element
 
-from bim.ifc.project import open_ifc, psets_of
+from bim.ifc.project import open_all, psets_of
 
 # Property sets and properties that name a use, the most telling first
 PROPERTIES = (
@@ -18,11 +18,11 @@ PROPERTIES = (
 )
 
 
-def read_room_uses(path: str | PathLike[str]) -> dict[str, tuple[tuple[str, str], ...]]:
+def read_room_uses(*paths: str | PathLike[str]) -> dict[str, tuple[tuple[str, str], ...]]:
     """What each IfcSpace says of its use, by GUID: where it is said, and the text."""
-    model = open_ifc(path)
-    found = {}
-    for space in model.by_type("IfcSpace"):
+    found: dict[str, tuple[tuple[str, str], ...]] = {}
+    models = open_all(paths).values()
+    for space in (space for model in models for space in model.by_type("IfcSpace")):
         psets = psets_of(space)
         texts = [
             (f"{name}.{key}", str(psets[name][key]))
@@ -36,5 +36,5 @@ def read_room_uses(path: str | PathLike[str]) -> dict[str, tuple[tuple[str, str]
         if space.ObjectType:
             texts.append(("ObjectType", space.ObjectType))
         if texts:
-            found[space.GlobalId] = tuple(texts)
+            found.setdefault(space.GlobalId, tuple(texts))
     return found

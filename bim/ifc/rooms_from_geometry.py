@@ -19,6 +19,7 @@ from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.isolated_solids import solids_of
+from bim.leaks import leaks
 from bim.report.issue import Effect, Issue, Phrase
 from bim.rooms import room_solid
 from bim.solids import Solid
@@ -62,22 +63,45 @@ def rooms_from_geometry(source: Source, tell: Tell) -> tuple[list[SpaceRecord], 
     wall_low, wall_high = _box(upright or meshes)
     floor = _slab(low, high, wall_low[2] - CAP)
     roof = _slab(low, high, wall_high[2])
-    attempts = (
+    wider = source.corrections.close_gaps or WIDER
+    closed = Phrase("gaps-closed", {"gap_mm": 1000 * wider})
+    attempts = [
         ([], GAP, Phrase("joined-by-openings")),
-        ([], WIDER, Phrase("gaps-closed", {"gap_mm": 1000 * WIDER})),
+        ([], wider, closed),
         ([floor], GAP, Phrase("floor-added")),
         ([floor, roof], GAP, Phrase("floor-and-roof-added")),
-    )
+    ]
+    if source.corrections.close_gaps:
+        attempts.append(([floor, roof], wider, closed))
     number, rooms = search.rooms([(more, gap) for more, gap, _ in attempts])
     repair = attempts[number][2]
     if not rooms:
-        values = {"lack": lacks, "gap": WIDER}
+        values = {"lack": lacks, "gap": wider}
         issue = Issue("walls-enclose-nothing", where, values, Effect("room"))
-        return [], [*search.issues, issue]
+        ends = [_slab(low, high, z, beyond=0.0) for z in (wall_low[2] - CAP, wall_high[2])]
+        open_to_air = _leaks([(label, body) for _, label, body in bodies], ends)
+        return [], [*search.issues, issue, *open_to_air]
     levels = _storeys(source)
     records = [_record(source, number, room, levels) for number, room in enumerate(rooms, 1)]
     values = {"lack": lacks, "count": len(rooms), "repair": repair}
     return records, [*search.issues, Issue("rooms-from-geometry", where, values)]
+
+
+def _leaks(bodies: list[tuple[str, Body]], slabs: list[Body]) -> list[Issue]:
+    """Where would-be rooms are open to the outside, though floor and roof are added."""
+    found, size = leaks([*(body for _, body in bodies), *slabs])
+    boxes = np.array([(body.min((0, 1)), body.max((0, 1))) for _, body in bodies])
+    issues = []
+    for leak in found:
+        apart = np.maximum(boxes[:, 0] - leak.position, leak.position - boxes[:, 1])
+        nearest = np.linalg.norm(np.maximum(apart, 0.0), axis=1).argsort(kind="stable")[:2]
+        values = {
+            "width": max(leak.width, size), "size": size,
+            "elements": tuple(bodies[i][0].strip() for i in nearest),
+            **dict(zip("xyz", map(float, leak.position), strict=True)),
+        }  # fmt: skip
+        issues.append(Issue("room-leaks", " ".join(f"{v:.2f}" for v in leak.position), values))
+    return issues
 
 
 class _Search:
@@ -129,7 +153,7 @@ class _Search:
         for count, code in (
             (found.not_widened, "small-elements-not-widened"),
             (found.hulls, "flat-elements-as-hulls"),
-            (found.kept_small, "found-rooms-not-widened"),
+            (found.not_extended, "found-rooms-not-widened"),
         ):
             if count and found.rooms:
                 self.issues.append(Issue(code, "IfcSpace", {"count": count}))
@@ -161,9 +185,11 @@ def _box(bodies: list[Body]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return corners.min(axis=0), corners.max(axis=0)
 
 
-def _slab(low: NDArray[np.float64], high: NDArray[np.float64], bottom: float) -> Body:
-    """A slab over the whole building, `CAP` thick."""
-    x0, y0, x1, y1 = low[0] - 1, low[1] - 1, high[0] + 1, high[1] + 1
+def _slab(
+    low: NDArray[np.float64], high: NDArray[np.float64], bottom: float, *, beyond: float = 1.0
+) -> Body:
+    """A slab over the whole building and so far beyond it [m], `CAP` thick."""
+    (x0, y0), (x1, y1) = low[:2] - beyond, high[:2] + beyond
     c = np.array([[x, y, z] for z in (bottom, bottom + CAP) for x, y in
                   ((x0, y0), (x1, y0), (x1, y1), (x0, y1))])  # fmt: skip
     quads = [(3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -10,8 +10,9 @@ import ifcopenshell
 import numpy as np
 
 from bim.colours import GREY
-from bim.ifc.corrections import Corrections, Paint
+from bim.ifc.corrections import Corrections, Paint, corrections_file
 from bim.ifc.damage import Damage
+from bim.ifc.linked import one_model
 from bim.ifc.north import north_rotation
 from bim.ifc.placing import Placed, ground_level, in_world
 from bim.ifc.project import (
@@ -20,7 +21,7 @@ from bim.ifc.project import (
     guid_issues,
     length_issues,
     length_scale,
-    open_ifc,
+    open_all,
     site_location,
 )
 from bim.ifc.quantities import QuantityScales
@@ -86,11 +87,29 @@ class Source:
         )
 
 
-def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> Source:
-    """The opened model, its shapes meshed, corrected and placed."""
+def read_source(
+    path: str | Path,
+    corrections: Corrections,
+    tell: Progress,
+    linked: Sequence[str | Path] = (),
+) -> Source:
+    """The opened model, its shapes meshed, corrected and placed.
+
+    Args: linked: files of the same building, whose elements are added.
+    """
     tell("opening", 0.0)
-    model, damage = open_ifc(path), Damage()
-    issues = ending_issues(path) + length_issues(model) + guid_issues(model)
+    files = [path, *linked]
+    models, damage = open_all(files), Damage()
+    lengths = [issue for one in models.values() for issue in length_issues(one)]
+    model, issues = one_model(models)
+    endings = [issue for file in files for issue in ending_issues(file)]
+    names = {"first": Path(path).name}
+    endings += [
+        Issue("file-corrections-unused", Path(one).name, {"file": Path(one).name, **names})
+        for one in linked
+        if corrections_file(one).is_file()
+    ]
+    issues = endings + lengths + guid_issues(model) + issues
     rotation, more = north_rotation(model, corrections.north_deg)
     latitude, longitude, elevation, site = site_location(model)
     check_materials(model, corrections)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mitsuba_cfs.files import check_file, write_table
-from scenes.commands.room_options import input_options
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import check_file, write_table, write_text
+from scenes.commands.room_options import check_is_ifc, input_options
 from scenes.input_options import InputOptions
 
 if TYPE_CHECKING:
@@ -28,16 +29,35 @@ UNCUT = 100_000  # columns of a table that nobody sees
     type=click.Path(path_type=Path),
     help="Also write the problems to a CSV file.",
 )
-def command(issues: Path | None, **chosen) -> None:
+@click.option(
+    "--fix",
+    type=click.Path(path_type=Path, dir_okay=False, allow_dash=True),
+    is_flag=False,
+    flag_value="-",
+    metavar="[FILE]",
+    help="Also write a corrections file with every doubt of the model, its default and "
+    "alternatives as comments; default: MODEL.corrections.toml beside the model, where it is used.",
+)
+def command(issues: Path | None, fix: Path | None, **chosen) -> None:
     """List rooms, windows and problems of a building model as the simulation reads them.
 
-    BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
+    BUILDING is a honeybee model (.hbjson), gbXML, a Radiance scene (.rad) or IFC: one file or
+    several of one building (architecture, facade, site), a folder or an .ifczip of them.
     """
     options = InputOptions(**chosen, weather=None)
     if issues is not None:
-        check_file(issues, field="--csv", inputs=[options.building])
+        check_file(issues, field="--csv", inputs=options.building_files)
+    if fix is not None:
+        from bim.ifc.corrections import corrections_file
+
+        check_is_ifc(options.building, "--fix")
+        fix = corrections_file(options.building) if fix == Path("-") else fix
+        check_file(fix, field="--fix", inputs=options.building_files)
+        if fix.exists():
+            raise DataError("exists; give another name", file=fix, field="--fix")
     from rich.console import Console
 
+    from scenes.chosen_rooms import named_spaces
     from scenes.commands.progress_bar import ProgressBar
     from scenes.fenestration_exports import known_fenestration
     from scenes.head import head_of
@@ -45,7 +65,7 @@ def command(issues: Path | None, **chosen) -> None:
 
     with ProgressBar() as progress:
         read = building_of(options, progress)
-    spaces = [read.space(name) for name in options.spaces] or list(read.spaces)
+    spaces = named_spaces(read, options.spaces, options.building) if options.spaces else read.spaces
     known = known_fenestration(spaces, options.building)
     # a file or a program that reads on gets every line whole, however long
     console = Console(width=None if Console().is_terminal else UNCUT)
@@ -62,6 +82,11 @@ def command(issues: Path | None, **chosen) -> None:
         f"windows: {len(read.windows)} ({sum(w.area for w in read.windows):.1f} m2 of glass), "
         f"problems: {len(read.issues)}"
     )
+    if fix is not None:
+        from bim.ifc.corrections_draft import corrections_draft
+
+        write_text(fix, corrections_draft(read))
+        console.print(f"corrections: {fix}", markup=False, highlight=False)
     if issues is not None:
         import pandas as pd
 

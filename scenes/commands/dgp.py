@@ -87,7 +87,13 @@ def command(out: Path, page: Path | None, **chosen) -> None:
         chosen |= quick.picks(quick.VIEWS, stated_options())
     page_options = read_page(page, GlareSection, chosen_language())
     named = (chosen["building"], chosen["weather"], chosen["system"])
-    files = (*named, *map(Path, chosen["views"]), *chosen["surroundings"], *page_options.inputs)
+    files = (
+        *named,
+        *map(Path, chosen["views"]),
+        *chosen["linked"],
+        *chosen["surroundings"],
+        *page_options.inputs,
+    )
     options = YearOptions(**with_demo(chosen))
     folder = ResultFolder(out, "dgp", inputs=files)
     read = read_files(options)  # before anything heavy is loaded

@@ -41,9 +41,11 @@ if TYPE_CHECKING:
 def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
     """Irradiance and yield of the photovoltaic modules of a building.
 
-    BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).  Modules
-    are selected by material, type, name or GUID.  Shading and reflections by all surfaces of the
-    model are traced, with the true disc of the sun.
+    BUILDING is a honeybee model (.hbjson), gbXML, a Radiance scene (.rad) or IFC: one file or
+    several of one building (architecture, facade, site), a folder or an .ifczip of them.
+
+    Modules are selected by material, type, name or GUID.  Shading and reflections by all surfaces
+    of the model are traced, with the true disc of the sun.
     """
     from scenes.input_files import read_files
     from scenes.photovoltaics.study_file import read_pv_study
@@ -53,7 +55,7 @@ def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
     options = InputOptions(**chosen)
     building, weather, quick = options.building, options.weather, options.quick
     files = read_files(options, hourly=False)
-    folder = ResultFolder(out, "pv", inputs=(building, weather, study_file))
+    folder = ResultFolder(out, "pv", inputs=(building, *options.linked, weather, study_file))
     # all that is small is read: what is heavy is loaded now
     from mitsuba_cfs import variants
     from mitsuba_cfs.matrices.cache import MatrixCache

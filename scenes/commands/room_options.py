@@ -53,8 +53,22 @@ class BuildingFile(click.Path):
         from bim.building_file import check_building_file
 
         path = super().convert(value, param, ctx)
-        check_building_file(path)
+        if not path.is_dir():
+            check_building_file(path)
         return path
+
+
+def _first_and_linked(
+    context: click.Context, _: click.Parameter, value: tuple[Path, ...]
+) -> Path | None:
+    """The first file of a building; further ones, and those of folders, are `linked`."""
+    from bim.building_file import building_files, check_building_file
+
+    files = building_files(value)
+    for path in files:
+        check_building_file(path)
+    context.params["linked"] = tuple(files[1:])
+    return files[0] if files else None
 
 
 def check_is_ifc(path: Path, field: str) -> None:
@@ -67,7 +81,7 @@ def check_is_ifc(path: Path, field: str) -> None:
 
 
 FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
-BUILDING_FILE = BuildingFile(exists=True, dir_okay=False, readable=True, path_type=Path)
+BUILDING_FILE = BuildingFile(exists=True, readable=True, path_type=Path)
 IFC_FILE = IfcFile(exists=True, dir_okay=False, readable=True, path_type=Path)
 
 
@@ -315,8 +329,8 @@ def input_options(
     weathers = {"needed": [needed_weather_option], "demo": [weather_option], "": []}
     return _all_of(
         click.argument(
-            "building", type=BUILDING_FILE, required=not demo,
-            metavar="[BUILDING]" if demo else "BUILDING",
+            "building", type=BUILDING_FILE, required=not demo, nargs=-1,
+            callback=_first_and_linked, metavar="[BUILDING...]" if demo else "BUILDING...",
         ),
         *weathers[weather],
         *([albedo_option] if weather else []),

@@ -90,7 +90,8 @@ def command(
 ) -> None:
     """Compute daylight, glare, temperatures and comfort of a building's rooms.
 
-    BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
+    BUILDING is a honeybee model (.hbjson), gbXML, a Radiance scene (.rad) or IFC: one file or
+    several of one building (architecture, facade, site), a folder or an .ifczip of them.
     """
     phases = chosen["method"] != "point-in-time"
     for name, flag in NEED_PHASES.items():
@@ -127,7 +128,7 @@ def run_to_folder(
         check_dask()
     page_options = read_page(page, RunSection, chosen_language())
     inputs = (options.building, options.weather, options.system, options.operation)
-    inputs += (*options.surroundings, *page_options.inputs)
+    inputs += (*options.linked, *options.surroundings, *page_options.inputs)
     folder = ResultFolder(out, "run", inputs=inputs)
     if options.cache:
         default_folder()  # or one line that it cannot be one

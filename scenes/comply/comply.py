@@ -25,7 +25,7 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from scenes.chosen_rooms import no_window
 from scenes.comply.assess import asked_of, assess_room, values_of
 from scenes.comply.blinds import open_and_closed
-from scenes.comply.dwellings import dwelling_words, judged
+from scenes.comply.dwellings import dwelling_words, dwellings_of, judged
 from scenes.comply.files import ComplyFiles, read_files
 from scenes.comply.findings import Findings, GridLight, RoomHeat, calendar_of
 from scenes.comply.glare import seat_glare
@@ -181,10 +181,19 @@ class Check:
         if self.building.file is not None and is_ifc(self.building.file):
             from bim.ifc.room_uses import read_room_uses  # reads IFC: only where there is a file
 
-            texts = read_room_uses(self.building.file)
+            texts = read_room_uses(self.building.file, *self.options.linked)
         found = {}
+        homes = dwellings_of(self.building)
         for space in spaces:
             use = self.files.uses.of(space, texts.get(space.guid, ()))
+            if not use.dwelling and not self.files.uses.dwellings:
+                use = replace(use, dwelling=homes.get(space.guid, ""))
+            if use.key == UNKNOWN and use.dwelling and space.windows:
+                source = Note(
+                    "in {dwelling}, no information on its use, taken as a habitable room",
+                    dwelling=use.dwelling,
+                )
+                use = replace(use, key="living", source=source, assumed=True)
             if use.key == UNKNOWN and not space.windows:
                 use = replace(
                     use, occupied=False, source=Note("no window and no use, not occupied")
@@ -313,14 +322,14 @@ class Check:
         groups = tuple(g.name for g in room.windows.groups)
         return RoomLights(space, by_rule, values, groups, glare)
 
-    def _setup_words(self) -> Iterator[str]:
-        """What rules of heat compute and leave out; those whose weather is another."""
+    def _rule_words(self) -> Iterator[str]:
+        """Included and omitted parts of each rule's standard; rules that ask for other weather."""
         weather = self.files.weather
         for rule in self.files.rules.values():
             if not rule.fits(weather):
                 yield Note(
                     "{rule}: no verdict. It asks for the weather of {sites}; {file} is not that.",
-                    rule=Note(rule.title), sites=", ".join(rule.weather),
+                    rule=Note(rule.title), sites=", ".join(rule.sites),
                     file=weather.site if weather.file is None else weather.file.name,
                 )  # fmt: skip
             for sentence in rule.included:
@@ -371,7 +380,7 @@ class Check:
 
     def assumptions(self, rooms: list[CheckedRoom], left: list[Space]) -> list[str]:
         """What was assumed, in sentences; `left` are rooms without a rule."""
-        found = [*self._ray_words(), *self._light_words()]
+        found = [*self._rule_words(), *self._ray_words(), *self._light_words()]
         found += dwelling_words(rooms)
         if left:
             names = ", ".join(space.label for space in left)
@@ -434,7 +443,6 @@ class Check:
             )
             if any("heat" in r.parts and not r.setup for r in self.files.rules.values()):
                 yield Note(template, air_changes=room.infiltration_ach)
-            yield from self._setup_words()
         if "open" in self.parts and self.calendar.median_diffuse is None:
             yield Note(
                 "The daylight factor method is not available: the weather file has no diffuse "

@@ -2,15 +2,41 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from bim.model import Building
+from bim.names import plain_text
 from mitsuba_cfs.notes import Note
 from scenes.comply.assess import NOT_COMPUTED, BuildingVerdict, RoomVerdict, assess_building
 from scenes.comply.results import CheckedRoom
 from scenes.comply.rules import NOT_MET
 
+HOME = re.compile(  # words for a dwelling, without accents
+    r"dwelling|\bflats?\b|apartment|residential unit|wohnung|\bwhg\b|wohneinheit|logement"
+    r"|appartement|vivienda|\bpisos?\b|apartamento|appartament|alloggio|unita abitativa|fracao"
+    r"|woning|appartemang|lagenhet|leilighet|\bbolig|lejlighed|huoneisto|asunto|mieszkan|\bbyt\b"
+    r"|lakas|квартир|住戸|住宅|户型"
+)
+TECHNICAL = re.compile(
+    r"hvac|therm|heat|heiz|kuhl|cool|chauff|luft|vent|air|klima|clima|fire|brand|incend|feu\b|smoke"
+    r"|light|licht|acoust|akust|security|access|rent|miet|floor|storey|geschoss|etage|planta|piano"
+)
 OF_DWELLING = "room of each dwelling"
+
+
+def dwellings_of(building: Building) -> dict[str, str]:
+    """Name of the dwelling of each room that is in one, by GUID, from the building's zones.
+
+    Zones are dwellings whose name or kind says so; where none does, all whose texts name no
+    technical purpose.  A room of several is in that with the fewest rooms.
+    """
+    texts = {zone: plain_text(f"{zone.name} {zone.kind}") for zone in building.zones}
+    homes = [zone for zone, text in texts.items() if HOME.search(text)]
+    homes = homes or [zone for zone, text in texts.items() if not TECHNICAL.search(text)]
+    homes.sort(key=lambda zone: -len(zone.rooms))
+    return {guid: zone.name for zone in homes for guid in zone.rooms}
 
 
 def judged(rooms: Sequence[CheckedRoom]) -> tuple[list[CheckedRoom], list[BuildingVerdict]]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bim.model import Space, Window
 from bim.names import numbered
 from bim.sensors import in_room
-from bim.to_tracer import orientation_name, window_groups
+from bim.to_tracer import orientation_groups, orientation_name
 from mitsuba_cfs.errors import DataError
 from scenes.room.operation_tables import ControlTable, GroupTable, ShadingRule
 
@@ -62,11 +62,8 @@ def control_groups(space: Space, control: ControlTable | None = None) -> Control
 
 def _facades(space: Space) -> list[int]:
     """The number of the orientation of each window [W], that of the largest area first."""
-    groups = [{id(w.triangles) for w in group.windows} for group in window_groups(space)]
-    return [
-        next(f for f, members in enumerate(groups) if id(window.triangles) in members)
-        for window in space.windows
-    ]
+    number = {w: f for f, group in enumerate(orientation_groups(space)) for w in group}
+    return [number[w] for w in range(len(space.windows))]
 
 
 def _names(table: GroupTable, window: Window) -> bool:

@@ -395,6 +395,7 @@ class GainsTable(TomlTable):
     """Internal gains during the occupied hours."""
 
     equipment_w_m2: Annotated[float | str, OrSchedule(plausible.GAIN)] = 8.0
+    equipment_w: Annotated[float | str, OrSchedule(plausible.POWER)] = 0.0  # of the room, besides
     persons: Annotated[float | str, OrSchedule(plausible.PERSONS)] = 1.0
     person_w: Annotated[float, plausible.PERSON] = 75.0  # dry
     person_vapour_g_h: Annotated[float, plausible.VAPOUR] = 50.0

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bim.drawn_shades import without_drawn_shades
 from bim.model import Building, Space
 from bim.report.issue import issue_text
-from bim.to_tracer import window_groups
+from bim.to_tracer import orientation_groups, window_groups
 from mitsuba_cfs.surfaces import WindowGroup
 from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.room.control_groups import ControlGroups, control_groups
@@ -69,20 +69,20 @@ def room_windows(
     if missing:
         raise ValueError(f"no fenestration system for window {', '.join(missing)}")
     control = control or control_groups(space)
-    number = {
-        id(window.triangles): c
-        for window, c in zip(space.windows, control.number.tolist(), strict=True)
-    }
-    members: dict[tuple[int, ...], list] = {}
-    for window in space.windows:
+    members: dict[tuple[int, ...], list[int]] = {}
+    for number, window in enumerate(space.windows):
         key = tuple(id(system) for system in systems[window.guid])
-        members.setdefault(key, []).append(window)
+        members.setdefault(key, []).append(number)
     grouped: list[tuple[WindowGroup, States, int]] = []
-    for windows in members.values():
+    for numbers in members.values():
+        windows = tuple(space.windows[w] for w in numbers)
         states = systems[windows[0].guid]
-        for group in window_groups(replace(space, windows=tuple(windows))):
+        part_of_space = replace(space, windows=windows)
+        for group, order in zip(
+            window_groups(part_of_space), orientation_groups(part_of_space), strict=True
+        ):
             name = group.name if len(members) == 1 else f"{group.name}, {states[0].name}"
-            parts = _by_control(group, number)
+            parts = _by_control(group, control.number[np.array(numbers)[order]].tolist())
             for part, c in parts:
                 label = name if len(parts) == 1 else f"{name}, {control.names[c]}"
                 grouped.append((replace(part, name=label), states, c))
@@ -95,12 +95,11 @@ def room_windows(
     )
 
 
-def _by_control(group: WindowGroup, number: Mapping[int, int]) -> list[tuple[WindowGroup, int]]:
+def _by_control(group: WindowGroup, numbers: list[int]) -> list[tuple[WindowGroup, int]]:
     """The parts of a window group by control group, with its number.
 
-    Args: number: of the control group, by the identity of the windows' triangles.
+    Args: numbers: of the control group of each window of the group.
     """
-    numbers = [number[id(window.triangles)] for window in group.windows]
     return [
         (replace(group, windows=tuple(w for w, n in zip(group.windows, numbers, strict=True)
                                       if n == c)), c)

@@ -358,7 +358,7 @@ def _manifest(
             key: str(value)
             if isinstance(value, Path)
             else [str(file) for file in value]
-            if key == "surroundings"
+            if key in ("surroundings", "linked")
             else value
             for key, value in options.named().items()
         },

@@ -120,7 +120,7 @@ def read_year(
     chosen += [options.surroundings_offset, options.facade_panes, options.albedo]
     # corrections change rooms and surroundings, as --join does, under the same GUID
     files_read = (options.building, options.weather, *files_beside(options.building))
-    files_read += options.surroundings
+    files_read += (*options.linked, *options.surroundings)
     hashes = [sha256(path) for path in files_read]
     # not of files: the model may name others, which change by themselves
     hashes.append(content_digest(*([s.visible, s.fine, s.angular] for s in inputs.used_systems)))

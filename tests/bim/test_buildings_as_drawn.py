@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ifcopenshell
+import ifcopenshell.guid
 import numpy as np
 import pytest
 
@@ -135,3 +137,49 @@ def test_north_is_corrected(tmp_path):
     assert _angle(_north(0.0, 1.0), 30.0) == (pytest.approx(30.0), ["north-corrected"])
     building = _read(box_model()[0], tmp_path, "north = 90")
     np.testing.assert_allclose(building.windows[0].normal, (-1, 0, 0), atol=1e-9)
+
+
+LIST = ("Brick, Common", "Fiberglass Batt", "Plaster")  # outermost first
+
+
+def _with_list(tmp_path, name: str, kind: str, fractions=(None,) * 3):
+    """The layers of the south wall, whose materials are a list or constituents."""
+    small, walls = box_model()
+    create = small.model.create_entity
+    materials = [create("IfcMaterial", one) for one in LIST]
+    if kind == "list":
+        some = create("IfcMaterialList", materials)
+    else:
+        parts = [
+            create("IfcMaterialConstituent", one.Name, None, one, fraction)
+            for one, fraction in zip(materials, fractions, strict=True)
+        ]
+        some = create("IfcMaterialConstituentSet", None, None, parts)
+    walls["south"].Name = name
+    create("IfcRelAssociatesMaterial", ifcopenshell.guid.new(), None, None, None,
+           [walls["south"]], some)  # fmt: skip
+    (space,) = _read(small, tmp_path).spaces
+    face = next(f for f in space.faces if f.kind == "wall" and f.element == walls["south"].GlobalId)
+    return [(one.name, round(one.thickness, 4)) for one in face.construction.layers]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "fractions", "expected"),
+    [
+        ("Wall 102Bwk-183Ins-15P:285330", "list", (None,) * 3, (0.102, 0.183, 0.015)),
+        ("Outer wall", "list", (None,) * 3, (0.1, 0.1, 0.1)),
+        ("Outer wall 300", "set", (0.5, 0.4, 0.1), (0.15, 0.12, 0.03)),
+    ],
+)
+def test_listed_materials_with_insulation_are_layers(tmp_path, name, kind, fractions, expected):
+    layers = _with_list(tmp_path, name, kind, fractions)
+    assert [one for one, _ in layers] == list(LIST)
+    assert [d for _, d in layers] == pytest.approx(expected, abs=2e-4)
+
+
+def test_a_beam_that_is_a_space_is_no_wrong_unit(tmp_path):
+    """A space 0.1 m tall in a house of usual height: the file's unit is right."""
+    small, _ = box_model(space=False)
+    small.box("IfcSpace", "SHS beam", (0.0, 0.0, 2.5), (WIDTH, 0.1, 0.1))
+    building = _read(small, tmp_path)
+    assert not of_code(building, "length-unit-wrong")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import ifcopenshell
 import ifcopenshell.api.material
 import ifcopenshell.api.pset
@@ -13,11 +15,12 @@ from click.testing import CliRunner
 
 from bim.ifc.building import read_ifc
 from bim.ifc.corrections import Corrections, Paint, read_corrections
+from bim.ifc.corrections_draft import corrections_draft
 from bim.ifc.query import query
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
 from scenes.commands.ifc import command
-from tests.bim.small_ifc import DEPTH, HEIGHT, WALLS, WIDTH, box_model, box_room
+from tests.bim.small_ifc import DEPTH, HEIGHT, WALLS, WIDTH, add_material, box_model, box_room
 from tests.issues import of_code
 
 
@@ -112,7 +115,7 @@ def test_query_lists_what_a_selector_chooses(path):
     say = CliRunner().invoke(command, ["query", str(path), "IfcWall, Name=/south.*/"])
     assert say.exit_code == 0, say.output
     assert "south again" in say.output and "north" not in say.output
-    assert say.output.splitlines()[-1] == "2 elements"
+    assert say.output.splitlines()[-1] == "elements: 2"
     wall = next(w for w in ifcopenshell.open(str(path)).by_type("IfcWall") if w.Name == "east")
     assert [one.name for one in query(path, wall.GlobalId)] == ["east"]
     wrong = CliRunner().invoke(command, ["query", str(path), "IfcWall,,,="])
@@ -151,3 +154,31 @@ def test_every_kind_of_selector_leaves_out_the_one_wall(tmp_path, schema, select
     ifcopenshell.api.pset.edit_pset(model, pset=pset, properties={"Reference": "E1"})
     removed = Corrections(leave_out=(select.format(guid=wall.GlobalId),)).removed(model)
     assert removed == {wall.id()}
+
+
+def test_the_draft_has_every_doubt_and_reads_back_as_no_correction(tmp_path) -> None:
+    """Uncommented, its lines are the corrections that they say."""
+    small, walls = box_model(space_height=HEIGHT + 1.0, true_north=None)
+    add_material(small.model, walls["south"], 'Zeug "7"')
+    path = tmp_path / "m.ifc"
+    small.model.write(str(path))
+    building = read_ifc(path)
+    draft = tmp_path / "m.corrections.toml"
+    draft.write_text(corrections_draft(building), encoding="utf-8")
+    assert replace(read_corrections(draft), file="") == Corrections()
+    again = read_ifc(path)
+    assert [s.volume for s in again.spaces] == [s.volume for s in building.spaces]
+    lines = []
+    for line in draft.read_text("utf-8").splitlines():
+        bare = line.strip().removeprefix("# ")
+        starts = ("north =", "[[material]]", "name =", "conductivity =", "density =")
+        is_entry = line.startswith("    # ") and '"' in bare
+        lines.append(bare if bare.startswith(starts) or is_entry else line)
+    draft.write_text(
+        "\n".join(lines).replace(f'"{building.spaces[0].guid}",  # R1', "# R1"), "utf-8"
+    )
+    chosen = read_corrections(draft)
+    assert chosen.north_deg == 0.0 and chosen.as_drawn == (building.spaces[0].guid,)
+    assert [one.name for one in chosen.materials if "Zeug" in one.name] == ['Zeug "7"']
+    (space,) = read_ifc(path).spaces
+    assert space.room_volume == pytest.approx(space.drawn_volume) and space.cut == 0.0

@@ -113,3 +113,19 @@ def test_file_without_spaces_gets_its_room_and_window(tmp_path, schema):
     (found,) = of_code(building, "rooms-from-geometry")
     assert found.values["lack"] == Phrase("no-spaces")
     assert space.guid == read_ifc(path).spaces[0].guid  # the same in every run
+
+
+def test_a_house_that_leaks_says_where_and_a_wider_tolerance_closes_it(tmp_path) -> None:
+    """A slit of 0.3 m between the south and the east wall, from floor to roof."""
+    path = tmp_path / "m.ifc"
+    box_room(space=False, window=False, gap=0.3).write(str(path))
+    building = read_ifc(path)
+    assert not building.spaces
+    (issue,) = [one for one in building.issues if one.code == "room-leaks"]
+    x, y, z = (issue.values[key] for key in "xyz")
+    assert WIDTH - 0.3 < x < WIDTH + WALL and 0 < y < 0.3 and 0 < z < HEIGHT
+    assert issue.values["width"] == pytest.approx(0.3, abs=1.5 * issue.values["size"])
+    assert any("east" in name for name in issue.values["elements"])
+    path.with_name("m.corrections.toml").write_text("close_gaps = 0.4")
+    (space,) = read_ifc(path).spaces
+    assert space.volume == pytest.approx(WIDTH * DEPTH * HEIGHT, rel=0.02)

@@ -7,10 +7,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from bim.model import Building, SpaceGroup
 from bim.shoebox import shoebox
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.comply.assess import NOT_FOR_IT, assess_room, values_of
-from scenes.comply.dwellings import dwelling_words, judged
+from scenes.comply.dwellings import dwelling_words, dwellings_of, judged
 from scenes.comply.findings import Findings, calendar_of
 from scenes.comply.results import CheckedRoom
 from scenes.comply.rules import NOT_MET, read_rule
@@ -96,3 +97,18 @@ def test_offices_have_hours_and_miss_nothing_wards_are_asked_each(calendar):
     titles = [row[0] for row in table.rows if "sunlight" in row[0]]
     assert titles == ["Exposure to sunlight, patient rooms and playrooms"]
     assert not list(dwelling_words(rooms))
+
+
+def _zoned(*zones: SpaceGroup) -> Building:
+    return Building("house", (), zones=zones)
+
+
+def test_zones_of_the_model_are_dwellings():
+    named = _zoned(
+        SpaceGroup("Wohnung 2", "", ("a", "b")), SpaceGroup("Heizkreis", "", ("a", "b", "c"))
+    )
+    assert dwellings_of(named) == {"a": "Wohnung 2", "b": "Wohnung 2"}
+    plain = _zoned(SpaceGroup("Top 1", "", ("a",)), SpaceGroup("HVAC 1", "", ("a", "b")))
+    assert dwellings_of(plain) == {"a": "Top 1"}
+    by_kind = _zoned(SpaceGroup("WE 01", "Apartment", ("a",)), SpaceGroup("Block", "", ("a", "b")))
+    assert dwellings_of(by_kind) == {"a": "WE 01"}

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -23,12 +24,12 @@ pytestmark = pytest.mark.early
 
 # Loaded by nothing before the small files are read: the tracer, the readers of IFC, what draws
 HEAVY = ("mitsuba", "drjit", "ifcopenshell", "trimesh", "manifold3d", "matplotlib", "colour")
-# Modules that take `open_ifc` by its name
+# Modules that take `open_ifc` or `open_all` by its name
 OPENING = sorted(
     ".".join(path.relative_to(ROOT).with_suffix("").parts)
     for package in ("bim", "scenes")
     for path in (ROOT / package).rglob("*.py")
-    if "open_ifc" in path.read_text(encoding="utf-8")
+    if re.search("open_(ifc|all)", path.read_text(encoding="utf-8"))
 )
 # Loaded by no --help: these too
 NOT_FOR_HELP = (*HEAVY, "pandas", "scipy", "pvlib", "numba", "shapely", "pydantic", "rich")
@@ -268,11 +269,12 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Place:
     def opened(path: object) -> None:
         raise AssertionError(f"the building {path} was read before the mistake was named")
 
-    real = bim.ifc.project.open_ifc  # which the loop replaces too, at its turn
-    for module in list(sys.modules.values()):  # wherever it has been imported to
-        if getattr(module, "open_ifc", None) is real:
-            monkeypatch.setattr(module, "open_ifc", opened)
-    monkeypatch.setattr(bim.ifc.project, "open_ifc", opened)
+    for name in ("open_ifc", "open_all"):
+        real = getattr(bim.ifc.project, name)  # which the loop replaces too, at its turn
+        for module in list(sys.modules.values()):  # wherever it has been imported to
+            if getattr(module, name, None) is real:
+                monkeypatch.setattr(module, name, opened)
+        monkeypatch.setattr(bim.ifc.project, name, opened)
     monkeypatch.setattr(bim.ifc.project.ifcopenshell, "open", opened)
     monkeypatch.chdir(tmp_path)
     return Place(tmp_path)

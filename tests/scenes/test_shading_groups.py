@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.light import eye_illuminance, illuminance, with_view
 from mitsuba_cfs.sky.sun import sun_directions
+from scenes.room.control_groups import control_groups
 from scenes.room.inputs import RoomInputs, room_inputs, skies_for
 from scenes.room.light import room_light
 from scenes.room.operation import Operation
@@ -23,7 +26,7 @@ from scenes.room.operation_tables import OperationTables
 from scenes.room.room import compute_room, explored_combinations
 from scenes.room.shading import control_signals, shading_states, window_beam
 from scenes.room.solar import seasonal_outdoors, solar_gains
-from scenes.room.windows import in_all_windows
+from scenes.room.windows import in_all_windows, room_windows
 from scenes.room.zone import zone_surfaces
 from tests.scenes.small_box import HOURS, SMALL, clear
 
@@ -267,3 +270,13 @@ def test_glare_at_a_seat_takes_the_most_open_combination(inputs, skies, looks_de
         openest = min(map(sum, fine))
         best = min((k for k in fine if sum(k) == openest), key=lambda k: eye[k][hour])
         assert chosen == best
+
+
+def test_a_room_that_was_sent_to_another_process_has_the_same_groups():
+    """Its arrays are copies: windows are known by their number, not by these."""
+    for space in (TWO.spaces[0], BESIDE.spaces[0]):
+        sent = pickle.loads(pickle.dumps(space))
+        assert control_groups(sent).number.tolist() == control_groups(space).number.tolist()
+        systems = {window.guid: (SimpleNamespace(name="clear"),) for window in space.windows}
+        one, other = room_windows(space, systems), room_windows(sent, systems)
+        assert [group.name for group in one.groups] == [group.name for group in other.groups]

@@ -87,7 +87,7 @@ def north(building: Building) -> float:
     if building.from_model is None:
         return 0.0
     east, north = building.from_model[:2, 1]
-    return float(np.degrees(np.arctan2(east, north))) + 0.0
+    return float(np.round(np.degrees(np.arctan2(east, north)), 6)) + 0.0
 
 
 if __name__ == "__main__":

@@ -100,7 +100,7 @@ def point_in_time_picture(
     Args:
         samples: rays and paths for each pixel, spread over it.
         tile: pixels across of the squares that share slowly varying light, by default 0.9 degrees
-            (2 pixels at least); 1: every pixel for itself, without smoothing, for a picture free
+            (2 pixels at least); 1: each pixel alone, without smoothing, for a picture free
             of any assumption.
         pixels: [n] row * width + column of those to trace, by default all that show something.
         disc: the sun's disc and its images in mirrors too; without them, they are to be rated apart
