@@ -1,4 +1,4 @@
-"""What of a model came through to rooms and glass, how much did not, and whether that will do."""
+"""Import report of a model: rooms and glass that were read, what is missing, and a verdict."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from mitsuba_cfs.notes import Note
 
 USABLE, CARE, NOT_USABLE = Note("usable"), Note("usable with care"), Note("not usable")
-# the rules of the verdict, stated in docs/bim.md: shares of the glass that looks out
+# the rules of the verdict, stated in docs/bim.md: shares of the exterior glass
 WHOLE = 0.98  # used from this on: nothing to say
 HALF = 0.5  # used below this: not usable
 MUCH_ASSUMED = 0.1  # of the used glass
@@ -23,16 +23,16 @@ class StoreyAccount:
     name: str
     rooms: int  # spaces that became rooms or parts of one
     spaces: int  # IfcSpace in the file, whatever became of them
-    glass_out: float  # that looks out [m2]
+    glass_out: float  # exterior glass [m2]
     glass_used: float  # of it: before a room [m2]
 
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """Rooms by storey, glass that looks out and what became of it, and spaces that fit badly."""
+    """Rooms by storey, exterior glass and its used part, and spaces that fit badly."""
 
     storeys: tuple[StoreyAccount, ...]
-    windows_out: int  # windows, glazed doors and panels that look out
+    windows_out: int  # exterior windows, glazed doors and panels
     windows_used: int
     glass_assumed: float  # of the used glass: its outline is not drawn in the file [m2]
     glass_low: float  # above rooms that are lower than their windows [m2]
@@ -43,15 +43,15 @@ class Account:
     low: tuple[str, ...] = ()  # rooms that end below the glass before them
     missing: tuple[str, ...] = ()  # spaces that are no rooms
     leaking: tuple[str, ...] = ()  # rooms with an open edge
-    found: bool = False  # rooms found from geometry: the file has none
+    from_geometry: bool = False  # rooms found from geometry: the file has none
     cut_off: bool = False  # the file has lost its end
     raised: tuple[str, ...] = ()  # rooms that end at the roof in place of the top of their space
-    shut_in: float = 0.0  # of the used glass: what stands before it leaves nothing open [m2]
+    shut_in: float = 0.0  # of the used glass: obstructions outdoors leave nothing open [m2]
     inner_only: tuple[str, ...] = ()  # rooms whose glass is all between them and other rooms
 
     @property
     def glass_out(self) -> float:
-        """Area of all glass that looks out [m2]."""
+        """Area of the exterior glass [m2]."""
         return sum(storey.glass_out for storey in self.storeys)
 
     @property
@@ -61,7 +61,7 @@ class Account:
 
     @property
     def share_used(self) -> float:
-        """Glass used of all that looks out, 0 to 1; 1 without any."""
+        """Share of the exterior glass that is used, 0 to 1; 1 without any."""
         return self.glass_used / self.glass_out if self.glass_out > 0 else 1.0
 
     @property
@@ -145,7 +145,7 @@ class Account:
             Note("{area:.1f} m2 of glass without sky or ground in view", area=self.shut_in),
         )
         found += [note for note in losses if note.values["area"] > NOTABLE * self.glass_out]
-        if self.found:
+        if self.from_geometry:
             found.append(Note("rooms found from geometry"))
         elif self.rooms < self.spaces:
             lost = self.spaces - self.rooms
@@ -170,14 +170,14 @@ class Account:
             return Note("none: the file has no spaces, and no room was found between its walls")
         storeys = [
             Note("{storey} {count}", storey=_storey(s.name), count=s.rooms)
-            if self.found
+            if self.from_geometry
             else Note(
                 "{storey} {count} of {all}", storey=_storey(s.name), count=s.rooms, all=s.spaces
             )
             for s in self.storeys
         ]
         listed = _joined(storeys, ", ")
-        if self.found:
+        if self.from_geometry:
             return Note("{count} found from geometry ({storeys})", count=self.rooms, storeys=listed)
         return Note(
             "{rooms} of {count} spaces ({storeys})",

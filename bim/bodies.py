@@ -51,7 +51,7 @@ class Span:
         )
 
     def since(self, start: float) -> Span:
-        """What of it lies from a place on [m]."""
+        """The part from a distance on [m]."""
         parts = (replace(p, start=max(p.start, start)) for p in self.parts if p.stop > start)
         return replace(self, start=start, parts=tuple(parts))
 

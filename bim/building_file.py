@@ -27,9 +27,9 @@ class ReadOptions:
     """What is chosen of a building's file; each format says which of them it has."""
 
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
-    furniture: bool = False  # whether what stands in the rooms is in their light and views
+    furniture: bool = False  # whether furniture is in the light and the views of its room
     apertures: tuple[str, ...] = ()  # materials of the surfaces that are windows
-    surroundings: tuple[Path, ...] = ()  # files of what stands around, with any format
+    surroundings: tuple[Path, ...] = ()  # files of the surroundings, of any format
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     facade_panes: tuple[str, ...] = ()  # materials of panes before dark rooms: they mirror
     linked: tuple[Path, ...] = ()  # further files of the same building: facade, structure, site

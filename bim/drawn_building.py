@@ -11,7 +11,7 @@ from bim.account import Account, StoreyAccount
 from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE
 from bim.mesh_simplification import simplified
 from bim.model import Building, Element, Space
-from bim.names import JOINT, AmbiguousName, UnknownName, found_by_name, label_of
+from bim.names import JOINT, AmbiguousName, UnknownName, item_named, label_of
 from bim.outdoors import shut_in_area, unblinded
 from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, space_of
 from bim.report.issue import Effect, Issue
@@ -37,11 +37,11 @@ class DrawnModel:
 def drawn_building(
     model: DrawnModel, *, join: Sequence[str] = (), furniture: bool = False
 ) -> Building:
-    """The building with rooms that are closed, and what came through.
+    """The building with closed rooms, and the account of its import.
 
     Args:
         join: rooms to make one, as "Hall + Living".
-        furniture: whether what stands in the rooms is in their light and views.
+        furniture: whether furniture is in the light and the views of its room.
     """
     rooms = list(model.rooms)
     for text in join:
@@ -79,7 +79,7 @@ def _joined(rooms: Sequence[DrawnRoom], text: str, path: Path) -> list[DrawnRoom
         message = f"expected rooms with a plus between them, as 'Hall + Living', got {text!r}"
         raise DataError(message, field="join")
     try:
-        own = [found_by_name([_Labelled(room) for room in rooms], name, "room") for name in names]
+        own = [item_named([_Labelled(room) for room in rooms], name, "room") for name in names]
     except (UnknownName, AmbiguousName) as error:
         raise DataError(str(error.args[0]), file=path, field="join") from None
     chosen = {one.guid: one.room for one in own}
@@ -147,7 +147,7 @@ def _furnished(
 
 
 def _envelope(rooms: Sequence[DrawnRoom], spaces: Sequence[Space]) -> list[Element]:
-    """The building's own skin as it shades and reflects outdoors: faces and glass that look out."""
+    """The building's own skin as it shades and reflects outdoors: exterior faces and glass."""
     drawn = {face.guid: face for room in rooms for face in room.faces}
     finishes = {one.guid: one.finish for face in drawn.values() for one in (face, *face.openings)}
     found = []
@@ -166,7 +166,7 @@ def _envelope(rooms: Sequence[DrawnRoom], spaces: Sequence[Space]) -> list[Eleme
 
 
 def _glazed(room: DrawnRoom) -> list[tuple[DrawnFace, DrawnOpening]]:
-    """The openings of a room with glass that looks out, with their faces."""
+    """The openings of a room with exterior glass, with their faces."""
     return [
         (face, opening)
         for face in room.faces
@@ -176,7 +176,7 @@ def _glazed(room: DrawnRoom) -> list[tuple[DrawnFace, DrawnOpening]]:
 
 
 def _glass(room: DrawnRoom) -> float:
-    """Area of a room's glass that looks out, as drawn [m2]."""
+    """Area of a room's exterior glass, as drawn [m2]."""
     return sum(opening.area for _, opening in _glazed(room))
 
 
@@ -186,7 +186,7 @@ def _account(
     spaces: Sequence[Space],
     issues: Sequence[Issue],
 ) -> Account:
-    """What of the file's rooms and glass came through."""
+    """The account of the file's rooms and glass."""
     failed = {issue.where for issue in issues if issue.effect.lost == "room"}
     drawn = Counter(room.storey for room in model.rooms)
     # a joined room is as many rooms as the file had of it

@@ -1,4 +1,4 @@
-"""Shades that are drawn before or behind a window whose BSDF holds them already.
+"""Shades drawn outside or inside a window whose BSDF contains them already.
 
 An IfcShadingDevice, or a proxy or covering that its name calls a curtain or a blind, counts as the
 drawn shade of a window where it hangs in the window's plane and
@@ -91,7 +91,7 @@ def _outline(triangles: NDArray[np.float64], window: Window) -> shapely.Geometry
     if np.abs(local[..., 2]).max() > REACH:
         return shapely.Polygon()
     glass = shapely.union_all(_flat(plane.to_plane(window.triangles)))
-    # a slat that lies flat is a line seen from before the window: its hull, widened, is none
+    # a slat that lies flat is a line seen along the window's normal: its hull, widened, is none
     wide = shapely.union_all(shapely.buffer(_flat(local), GAP / 2, cap_style="square"))
     outline = shapely.buffer(wide, -GAP / 2, join_style="mitre")
     covered = outline.intersection(glass).area >= COVERS * glass.area

@@ -41,7 +41,7 @@ class Enclosed:
 
     rooms: tuple[NDArray[np.float64], ...]  # triangles [N, 3, 3] of each, biggest first
     not_widened: int = 0  # elements united as they are: gaps beside them stay open
-    kept_small: int = 0  # rooms that end half a gap before their walls
+    not_extended: int = 0  # rooms that end half a gap before their walls
     hulls: int = 0  # flat elements without a closed body: their convex hulls
 
 
@@ -50,10 +50,10 @@ def rooms_enclosed_by(
 ) -> Enclosed:
     """Rooms between building elements, each of triangles [N, 3, 3].
 
-    Every element is widened by half the gap; the voids that are left are widened back, less the
+    Every element is widened by half the gap; the remaining voids are widened again, less the
     elements as they are, so that the rooms end at the elements' own faces.
 
-    Args: tell: is told "number of the element in work, number of all", the last one for the union.
+    Args: tell: called with "number of the element, number of all", the last one for the union.
     """
     tell = tell or (lambda text: None)
     turn = main_wall_direction(np.concatenate(elements)) if len(elements) else np.eye(3)
@@ -77,7 +77,7 @@ def rooms_enclosed_by(
         return Enclosed(())
     original = union([turned[index] for index in sorted(turned)])
     united = union([wide[index] for index in sorted(wide)])
-    rooms, kept_small = [], 0
+    rooms, not_extended = [], 0
     for part in interior_parts(triangles_of(united)[0]):
         void = solid_of(part[:, ::-1])
         if void is None:
@@ -87,12 +87,12 @@ def rooms_enclosed_by(
             # one widening gives back what the elements' own widening took
             room = room.minkowski_sum(cube)
         else:
-            kept_small += 1
+            not_extended += 1
         room = (room - original).simplify(FINEST)
         rooms += [piece for piece in room.decompose() if _is_room(piece)]
     rooms.sort(key=lambda room: -room.volume())
     found = (triangles_of(_turned(room, back).as_original())[0] for room in rooms)
-    return Enclosed(tuple(found), not_widened, kept_small, hulls)
+    return Enclosed(tuple(found), not_widened, not_extended, hulls)
 
 
 def first_rooms_enclosed(

@@ -1,7 +1,7 @@
 """The rooms of a study as EnergyPlus computes them: the whole model, zone by zone.
 
-Coupled zones, what lies behind every face, both faces' absorptances, gains, air and set points of
-every hour, the ground's temperatures, windows by their BSDF and what stands before them.  The sun
+Coupled zones, the space behind every face, both faces' absorptances, gains, air and set points of
+every hour, the ground's temperatures, windows by their BSDF, and obstructions outside.  The sun
 and what becomes of it indoors are EnergyPlus' own.
 """
 
@@ -52,7 +52,7 @@ from thermal.climate import Climate
 from thermal.ventilation import AirTransfer
 from thermal.zone import OpaqueSurface, Zone
 
-LEAST_SHADE = 0.05  # [m2] smaller plane parts of what stands outdoors shade nothing
+LEAST_SHADE = 0.05  # [m2] smaller plane parts of the surroundings shade nothing
 LOOKOUTS = 8  # of so many places before an outer wall one is looked from
 RAYS = 400  # from each point, to what may shade it
 TERRAINS = {"suburbs": "Suburbs", "country": "Country", "city": "City"}
@@ -125,7 +125,7 @@ class EnergyPlusTwin:
             others = [element for element in others if element.layer != TREE_LAYER]
         shades(self.model, others, *_lookouts(rooms, outer))
         if others:
-            self.notes["what stands outdoors shades, but reflects nothing"] = None
+            self.notes["the surroundings shade, but reflect nothing"] = None
 
     def write(self, folder: Path) -> tuple[Path, ...]:
         """Write the model and its schedules into a folder; the files."""
@@ -269,7 +269,7 @@ class EnergyPlusTwin:
 def shades(model: Model, elements: Sequence[Element], points: Ring, normals: Ring) -> None:
     """What is seen of the elements outdoors, in plane parts that reflect nothing.
 
-    Args: points, normals: [N, 3] before the windows and the outer walls.
+    Args: points, normals: [N, 3] just outside the windows and the outer walls.
     """
     facets = [
         (number, facet)

@@ -47,7 +47,7 @@ class WindowOptics:
         return None if shaded or one is None or len(one.layers) != 2 else one
 
     def simplified(self, *, panes: bool) -> tuple[str, ...]:
-        """What of it EnergyPlus is not told; panes: see `complex_state`."""
+        """Its properties that the EnergyPlus model does not have; panes: see `complex_state`."""
         found = []
         one = self.fenestration
         known = panes and self.panes is not None

@@ -46,6 +46,18 @@ class PlainGlass:
         return float(self.table.transmittance[0])
 
 
+def pane_transmissivity(transmittance: float, index: float = 1.52) -> float:
+    """Transmissivity of an uncoated pane with that transmittance at normal incidence, at most 1.
+
+    Inverse of T = (1 - F)^2 t / (1 - F^2 t^2), F the reflectance of a face (Fresnel).
+    """
+    face = ((index - 1) / (index + 1)) ** 2
+    passed = (1 - face) ** 2
+    root = np.sqrt(passed**2 + 4 * (face * transmittance) ** 2)
+    # the smaller root without cancellation
+    return min(float(2 * transmittance / (passed + root)), 1.0)
+
+
 @dataclass(frozen=True, slots=True)
 class ShadingState:
     """A window's optics and heat in one state of its shade."""

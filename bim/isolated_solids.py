@@ -78,12 +78,12 @@ def largest_parts(
     return each_apart(_largest_part, [(one, list(by)) for one, by in items], limit_s=LIMIT_S)
 
 
-def united(solids: Sequence[PackedSolid], ways: Sequence[Outline]) -> PackedSolid | None:
+def united(solids: Sequence[PackedSolid], outlines: Sequence[Outline]) -> PackedSolid | None:
     """Solids and the prisms between them as one; None where they stay apart.
 
     Raises: `RoomError` where their union ends its process.
     """
-    (found,) = each_apart(_united, [(list(solids), list(ways))], limit_s=LIMIT_S)
+    (found,) = each_apart(_united, [(list(solids), list(outlines))], limit_s=LIMIT_S)
     if isinstance(found, ProcessEnded):
         raise RoomError(str(found))
     return found
@@ -132,8 +132,8 @@ def _shared(item: tuple[PackedSolid, list[PackedSolid]]) -> list[float]:
 
 
 def _united(item: tuple[list[PackedSolid], list[Outline]]) -> PackedSolid | None:
-    solids, ways = item
-    prisms = [prism(*way) for way in ways]
+    solids, outlines = item
+    prisms = [prism(*outline) for outline in outlines]
     body = union([*map(unpacked, solids), *(way for way in prisms if way is not None)])
     parts = body.decompose()  # what is hollow inside is a part of negative volume
     bodies = [part for part in parts if part.volume() > 0]

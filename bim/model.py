@@ -19,10 +19,10 @@ from bim.colours import GREY, Colour
 from bim.fenestration import PlainGlass, ShadingState
 from bim.georeference import Georeference
 from bim.held_sensors import ModelGrid, ModelView
-from bim.names import AmbiguousName, UnknownName, found_by_name, label_of
+from bim.names import AmbiguousName, UnknownName, item_named, label_of
 from bim.report.issue import Issue
 from bim.use import StatedUse
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.errors import DataError, check_number
 from mitsuba_cfs.gloss import Gloss
 
 FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "reveal")
@@ -45,8 +45,7 @@ class MaterialLayer:
 
     def __post_init__(self) -> None:
         for name in ("thickness", "conductivity", "density", "heat_capacity"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"layer {self.name}: {name} must be positive")
+            check_number(f"layer {self.name}: {name}", getattr(self, name), 1e-9)
 
     @property
     def resistance(self) -> float:
@@ -249,7 +248,7 @@ class SpaceGroup:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Building:
-    """Rooms, what stands around them, and the faults found on the way."""
+    """Rooms, their surroundings, and the issues of the model."""
 
     name: str
     spaces: tuple[Space, ...]
@@ -259,8 +258,8 @@ class Building:
     longitude_deg: float | None = None  # east positive
     elevation: float = 0.0  # above the sea [m]
     file: Path | None = None  # that it was read from
-    account: Account | None = None  # what of the file came through; None where there is no file
-    georeference: Georeference | None = None  # where it lies on a map, as its file states it
+    account: Account | None = None  # of the import; None where there is no file
+    georeference: Georeference | None = None  # position on a map, as its file states it
     from_model: NDArray[np.float64] | None = None  # [4, 4] of its file's own axes [m] to these
     uses: Mapping[str, StatedUse] = field(default_factory=dict)  # of rooms, by the space's GUID
     grids: tuple[ModelGrid, ...] = ()  # sensors that the file holds
@@ -273,8 +272,8 @@ class Building:
         return tuple(window for space in self.spaces for window in space.windows)
 
     def space(self, name_or_guid: str) -> Space:
-        """The space of that GUID, number, name or both; see `bim.names.found_by_name`."""
-        return found_by_name(self.spaces, name_or_guid, "space")
+        """The space of that GUID, number, name or both; see `bim.names.item_named`."""
+        return item_named(self.spaces, name_or_guid, "space")
 
     def zone(self, name: str) -> tuple[Space, ...]:
         """The spaces of the zones of that name; none where there is none."""

@@ -85,7 +85,7 @@ class AmbiguousName(ValueError):
     """Several items have the name."""
 
 
-def found_by_name(items: Sequence[T], wanted: str, kind: str) -> T:
+def item_named(items: Sequence[T], wanted: str, kind: str) -> T:
     """The one item of that GUID, name, long name, or name and long name; else of such a part.
 
     Capitals and runs of spaces count only where they make the difference between two.  Parts are

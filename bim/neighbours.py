@@ -18,7 +18,7 @@ from bim.rooms import Piece, RoomSolid, cut
 T = TypeVar("T", bound=Hashable)
 
 DEEPEST_WALL = 1.5  # beyond this nothing belongs to the wall any more [m]
-DEEPEST_IN_ROOM = 0.5  # nor what stands further into the room
+DEEPEST_IN_ROOM = 0.5  # nor objects further into the room
 THICKEST_SPAN = 1.0  # a ray that is longer in one element runs along it, not through [m]
 WIDEST_GAP = 0.6  # air between the parts of one wall or ceiling [m]
 PARALLEL = 0.9  # least |cosine| to a wall's normal of what lies behind its first element: no eaves
@@ -224,10 +224,10 @@ def _at_the_face(
     limit: float,
     back: float,
 ) -> list[Span]:
-    """What begins, ends or goes on where a ray leaves the room, and before the next one [m].
+    """Elements that a ray passes between leaving the room and entering the next one [m].
 
     Rooms are drawn to the middles of walls, to the slab under the flooring or through their ceiling
-    up to its top: all of that belongs to the wall.  What stands deeper in the room does not, but
+    up to its top: all of that belongs to the wall.  Objects deeper in the room do not, but
     for its part beyond the face.
     """
     found: list[Span] = []

@@ -1,4 +1,4 @@
-"""What stands outdoors before the windows, and the check that nothing blinds them."""
+"""Surroundings outside the windows, and the check that nothing covers the glass."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from bim.report.issue import Effect, Issue
 from mitsuba_cfs.processes import ProcessEnded
 
 COVERED = 0.9  # share of rays stopped at once that makes a window blind
-AT_ONCE = 0.35  # what stops rays this near before the glass lies on the window [m]
-CUT_DEPTH = 0.6  # how far a wall before the glass is cut open [m]
+AT_ONCE = 0.35  # an obstruction this near to the glass is on the window [m]
+CUT_DEPTH = 0.6  # how far from the glass a wall is cut open [m]
 SITE_CLASSES = ("IfcSite", "IfcGeographicElement")
 RAYS = 36
 FACE = 0.99  # cosine to the biggest part of a pane from which another is of its faces
@@ -27,7 +27,7 @@ BEFORE_GLASS = 0.5  # what is nearer to a window's plane is of its own facade [m
 FARTHEST = 50e3  # from the rooms, of what counts as their surroundings [m]
 SHUT_IN = "window-shut-in"  # code of the issue
 LEAST_OPEN = 0.02  # share of the half space before glass, by cosine: less is as good as nothing
-WINDOWS_AT_ONCE = 256  # that the faces of a pane are held against
+WINDOWS_AT_ONCE = 256  # whose panes are compared with a face at once
 NOTHING = np.empty((0, 3, 3))
 GRAZING = 0.3  # cosine: flatter rays meet the reveals of every window
 NEAR = AT_ONCE / GRAZING  # the longest of rays that end at once [m]
@@ -124,7 +124,7 @@ def _shut_in(elements: Sequence[Element], spaces: Sequence[Space]) -> list[Issue
 
 
 def before_windows(elements: Sequence[Element], windows: Sequence[Window]) -> NDArray[np.float64]:
-    """Triangles [T, 3, 3] of what stands outdoors, without what lies behind every window's plane.
+    """Triangles [T, 3, 3] of the surroundings, without those behind every window's plane.
 
     A ray from a window to the sun meets these alone; stairs and slabs that reach into the room,
     which the elements hold too, are behind.
@@ -141,7 +141,7 @@ def before_windows(elements: Sequence[Element], windows: Sequence[Window]) -> ND
 def beyond(
     triangles: NDArray[np.float64], normal: NDArray[np.float64], origin: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """What of the triangles lies on the side of a plane that its normal points to."""
+    """The parts of triangles on the side of a plane that its normal points to."""
     if not len(triangles):
         return NOTHING
     faces = np.arange(3 * len(triangles)).reshape(-1, 3)
@@ -236,7 +236,7 @@ class _Near:
         return {int(i) for i, n in zip(found, counts, strict=True) if n > 0.2 * len(cover)}
 
     def open_share(self, window: Window, own: set[str]) -> float:
-        """Share of the half space before a window, by cosine, in which nothing stands."""
+        """Cosine-weighted share of the half space outside a window that is free."""
         origins, directions = _rays(window, 0.0)
         mine, free = np.isin(self._guids, list(own)), np.ones(len(origins), dtype=bool)
         for part in self._parts:
@@ -281,7 +281,7 @@ def _first_of_others(
 def _opened(
     covering: Sequence[tuple[Element, Sequence[Window]]],
 ) -> list[NDArray[np.float64] | ProcessEnded | None]:
-    """Each body with a hole before its windows; None for thin or open ones, which are left out."""
+    """Each body with a hole at its windows; None for thin or open ones, which are left out."""
     walls = ("IfcWall", "IfcRoof", "IfcSlab", "IfcCovering", *SITE_CLASSES)
     return opened([
         (element.triangles if element.ifc_class.startswith(walls) else NOTHING, _holes(windows))

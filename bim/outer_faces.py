@@ -23,13 +23,13 @@ PLACES = 64  # on each surface, a power of two
 
 @dataclass(frozen=True, slots=True)
 class OuterFaces:
-    """Places just before the outer faces of what of a room faces outdoors."""
+    """Points just outside the outer faces of a room's exterior surfaces."""
 
     surfaces: NDArray[np.int64]  # [N] of the zone
     points: NDArray[np.float64]  # [N, PLACES, 3] spread evenly over each surface [m]
     normals: NDArray[np.float64]  # [N, 3]
     depth: NDArray[np.float64]  # [N] of the outer face behind that in the room, in the middle [m]
-    windows: NDArray[np.float64]  # [W, PLACES, 3] before the glass [m]
+    windows: NDArray[np.float64]  # [W, PLACES, 3] outside the glass [m]
     window_normals: NDArray[np.float64]  # [W, 3]
 
 
@@ -73,7 +73,7 @@ def _places(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArra
 
 
 class _NearElements:
-    """What stands about a room, to follow rays through."""
+    """The elements around a room, for tracing rays."""
 
     def __init__(self, elements: Sequence[Element], space: Space) -> None:
         corners = space.shell.reshape(-1, 3)

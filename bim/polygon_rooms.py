@@ -77,6 +77,7 @@ class DrawnOpening:
     glazing: GlazingValues | None = None  # None: an opaque door
     states: tuple[ShadingState, ...] = ()  # BSDFs that the file holds for it
     holes: tuple[NDArray[np.float64], ...] = ()  # each [N, 3] [m]: there is wall
+    up: NDArray[np.float64] | None = None  # [3] of its BSDFs
 
     @property
     def area(self) -> float:
@@ -251,7 +252,7 @@ def _wound(
 def _faces_and_windows(
     parts: Sequence[_Part], meshes: Sequence[NDArray[np.float64]]
 ) -> tuple[list[Face], list[Window]]:
-    """Faces in the file's order; windows that look out, all panes of one opening as one."""
+    """Faces in the file's order; exterior windows, all panes of one opening as one."""
     faces: list[Face] = []
     panes: dict[str, list[tuple[_Part, NDArray[np.float64]]]] = {}
     count: Counter[str] = Counter()
@@ -305,7 +306,7 @@ def _window(parts: Sequence[tuple[_Part, NDArray[np.float64]]]) -> Window:
         opening.guid, opening.name, triangles, part.face.guid,
         float(sum(one.facet.polygon.area for one, _ in parts)),
         values.u_value, values.g_value, values.visible, values.name, values.solar, values.panes,
-        opening.states, glass=values.glass,
+        opening.states, glass=values.glass, up=opening.up,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""What stands outdoors by month: trees with and without leaves."""
+"""Surroundings by month: trees with and without leaves."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Season:
     """Months in which the same stands outdoors."""
 
     months: tuple[int, ...]  # 1 to 12
-    building: Building  # with what stands there then
+    building: Building  # with the surroundings of these months
 
 
 def seasons(building: Building) -> tuple[Season, ...]:
@@ -33,17 +33,17 @@ def seasons(building: Building) -> tuple[Season, ...]:
 
 
 def in_month(building: Building, month: int) -> Building:
-    """The building with what stands outdoors in a month, 1 to 12, as if it did all year."""
+    """The building with the surroundings of a month, 1 to 12, as if they were there all year."""
     if not any(element.months for element in building.elements):
         return building
     kept = (e for e in building.elements if not e.months or month in e.months)
     return replace(building, elements=tuple(replace(e, months=()) for e in kept))
 
 
-def season_of(found: tuple[Season, ...], month: NDArray[np.integer]) -> NDArray[np.int64]:
+def season_of(seasons: tuple[Season, ...], month: NDArray[np.integer]) -> NDArray[np.int64]:
     """The number of the season [n] of each month [n]."""
     of_month = np.zeros(13, dtype=np.int64)
-    for number, season in enumerate(found):
+    for number, season in enumerate(seasons):
         of_month[list(season.months)] = number
     return of_month[np.asarray(month)]
 

@@ -85,7 +85,7 @@ def shoebox(
         reflectance: visible diffuse reflectances; `reflectance_solar`: solar ones, else the same.
         gloss: what parts reflect like a mirror besides, `mitsuba_cfs.gloss`.
         adjacency: what lies beyond a side, one of `bim.model.ADJACENCIES`.
-        plates, elements: what stands outdoors.
+        plates, elements: of the surroundings.
     """
     if min(width, depth, height) <= 0 or recess < 0:
         raise RoomError("width, depth and height must be positive, the recess not negative")
@@ -143,7 +143,7 @@ def _plate(
 
 @dataclass(frozen=True, slots=True)
 class _Stated:
-    """What is said of a box's parts, by side or kind."""
+    """Properties of a box's parts, by side or kind."""
 
     reflectance: Mapping[str, float] | None
     reflectance_solar: Mapping[str, float] | None

@@ -20,7 +20,7 @@ def template_rooms(spaces: Sequence[Space]) -> list[tuple[Space, ...]]:
 
     Alike means: one comes from the other by a shift; a turn would change what sun the room gets.
     The first of each group is its template.  View matrices and heat capacities are the same for a
-    group; daylight matrices only where what stands outdoors is the same too.
+    group; daylight matrices only where the surroundings are the same too.
     """
     groups: list[list[Space]] = []
     features: list[NDArray[np.float64]] = []

@@ -7,9 +7,11 @@ which stands for the frame.  Faces towards other rooms are adiabatic: a room can
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from os import PathLike
+
+import numpy as np
 
 from bim.defaults import WINDOW_FRAME
 from bim.energyplus_parts import (
@@ -27,13 +29,18 @@ from bim.energyplus_parts import (
 )
 from bim.energyplus_windows import complex_state
 from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of
-from bim.model import Building, Construction, Face, Space
+from bim.model import Building, Construction, Face, Space, Window
+from bim.planes import newell_normal
 from bim.to_thermal import layers_of
+from mitsuba_cfs.directions import window_frame
+from mitsuba_cfs.errors import check_number
 from mitsuba_cfs.files import json_text, write_text
 from thermal.zone import OUTSIDE_ABSORPTANCE
 
 BOUNDARY = {"outside": "Outdoors", "ground": "Ground"}  # all others: adiabatic
 SURFACE_TYPE = {"floor": "Floor", "ceiling": "Ceiling", "roof": "Roof"}
+TURNED = 0.02  # difference of the axes from which a BSDF is turned in its window
+DEFAULT_GROUND_C = 18.0  # of EnergyPlus
 DEFAULT_U, DEFAULT_G = 1.3, 0.6  # double glazing with low emissivity [W/(m2 K)], [-]
 MONTHS = (
     "january", "february", "march", "april", "may", "june",
@@ -51,8 +58,8 @@ def write_epjson(
     glazing: Glazings | None = None,
     ground_c: Sequence[float] | None = None,
     air_changes: float = 0.5,
-) -> None:
-    """Write the rooms (by default all) as free-floating zones with hourly air temperatures.
+) -> tuple[str, ...]:
+    """Write the rooms (by default all) as free-floating zones; what EnergyPlus is not told.
 
     Args:
         u_value, g_value: of every window; by default those that are known or the file states.
@@ -60,7 +67,13 @@ def write_epjson(
             written as `Construction:ComplexFenestrationState` unless u_value or g_value is given.
         ground_c: [12] monthly temperature below floors and outside walls in the ground [degC];
             without it EnergyPlus takes 18 degC.
+
+    Returns: a sentence on each thing that is left out or assumed.
     """
+    for name, value in (("u_value", u_value), ("g_value", g_value)):
+        if value is not None:
+            check_number(name, value, 1e-3, 1.0 if name == "g_value" else 100.0)
+    check_number("air_changes", air_changes, 0.0)
     model = model_frame(building.name)
     if ground_c is not None:
         if len(ground_c) != len(MONTHS):
@@ -72,12 +85,34 @@ def write_epjson(
             }
         }
     windows = _Windows(model, (u_value, g_value), glazing or {})
-    for number, space in enumerate(building.spaces if spaces is None else spaces):
-        _zone(model, f"Z{number} {object_name(space.label)}", space, windows, air_changes)
+    chosen = building.spaces if spaces is None else spaces
+    dropped: list[float] = []
+    for number, space in enumerate(chosen):
+        name = f"Z{number} {object_name(space.label)}"
+        dropped += _zone(model, name, space, windows, air_changes)
     write_text(path, json_text(model, indent=1))
+    return (*_losses(chosen, dropped, ground=ground_c is None), *windows.notes)
 
 
-def _zone(model: Model, zone: str, space: Space, windows: _Windows, air_changes: float) -> None:
+def _losses(spaces: Sequence[Space], dropped: Sequence[float], *, ground: bool) -> Iterator[str]:
+    """Sentences on surfaces that are left out, and on the ground where it has no temperature."""
+    if dropped:
+        yield (
+            f"EnergyPlus: {len(dropped)} surfaces of {sum(dropped):.2g} m2 in all are left out: it "
+            "merges corners within a centimetre"
+        )
+    area = sum(f.area for s in spaces for f in s.faces if f.adjacency == "ground")
+    if ground and area:
+        yield (
+            f"EnergyPlus: no temperature is given of the ground below {area:.0f} m2: it takes "
+            f"{DEFAULT_GROUND_C:g} C all year"
+        )
+
+
+def _zone(
+    model: Model, zone: str, space: Space, windows: _Windows, air_changes: float
+) -> list[float]:
+    """Write a room; the areas of surfaces that are too narrow for EnergyPlus [m2]."""
     model["Zone"][zone] = {"volume": space.volume, "floor_area": max(space.floor_area, 0.01)}
     model["ZoneInfiltration:DesignFlowRate"][f"{zone} air"] = {
         "zone_or_zonelist_or_space_or_spacelist_name": zone,
@@ -85,11 +120,14 @@ def _zone(model: Model, zone: str, space: Space, windows: _Windows, air_changes:
         "design_flow_rate_calculation_method": "AirChanges/Hour",
         "air_changes_per_hour": air_changes,
     }
+    dropped: list[float] = []
     for index, face in enumerate(space.faces):
         if face.kind == "window frame":
             continue
-        rings = [ring for ring in outlines(face, gap=NEAR, convex=True) if is_drawable(ring)]
-        for part, ring in enumerate(rings):
+        for part, ring in enumerate(outlines(face, gap=NEAR, convex=True)):
+            if not is_drawable(ring):
+                dropped.append(float(np.linalg.norm(newell_normal(ring))))
+                continue
             kind = SURFACE_TYPE.get(face.kind, "Wall")
             outside = BOUNDARY.get(face.adjacency, "Adiabatic")
             if kind == "Ceiling" and outside == "Outdoors":
@@ -99,8 +137,9 @@ def _zone(model: Model, zone: str, space: Space, windows: _Windows, air_changes:
             )
     for index, window in enumerate(space.windows):
         frame = _construction(model, WINDOW_FRAME, None)
-        construction = windows.construction(glazing_of(window, windows.glazing))
+        construction = windows.construction(window)
         write_window(model, f"{zone} W{index}", zone, window, frame=frame, glazing=construction)
+    return dropped
 
 
 class _Windows:
@@ -111,11 +150,17 @@ class _Windows:
     ) -> None:
         self._model, self._overrides, self.glazing = model, overrides, glazing
         self._complex: dict[int, str] = {}  # by the id of the optics
+        self.notes: dict[str, None] = {}
 
-    def construction(self, known: ExportedGlazing) -> str:
+    def construction(self, window: Window) -> str:
         """Name of the construction: by its BSDF, else a simple glazing."""
+        known = glazing_of(window, self.glazing)
         if known.optics is None or any(value is not None for value in self._overrides):
             return self._simple(known)
+        frames = window_frame(window.normal), window_frame(window.normal, window.up)
+        if np.abs(frames[0] - frames[1]).max() > TURNED:
+            note = "EnergyPlus: the BSDF is written upright; its up vector turns it"
+            self.notes[f"{window.name or window.guid}: {note}"] = None
         key = id(known.optics)
         if key not in self._complex:
             self._complex[key] = f"System {len(self._complex)}"

@@ -1,4 +1,4 @@
-"""A building as one glTF file for viewing: rooms, glass, what stands outdoors."""
+"""A building as one glTF file for viewing: rooms, glass, surroundings."""
 
 from __future__ import annotations
 

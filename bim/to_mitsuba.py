@@ -37,7 +37,7 @@ def write_mitsuba(
     """Write `scene.xml` and its meshes into a folder; the path of the XML.
 
     The room's faces by kind, reflectance and gloss, its windows (shape `glass_*`) with their BSDF
-    or, where none is known, as plain panes, what stands outdoors, a sky of radiance 1 all round,
+    or, where none is known, as plain panes, the surroundings, a sky of radiance 1 all round,
     and a camera in the middle of the room that looks at its biggest window.
 
     Args:

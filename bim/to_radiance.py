@@ -71,8 +71,8 @@ class RadianceFiles:
     materials: Path  # of both scenes, in their colours
     grey: Path  # the same without colours
     room: Path  # opaque boundary of the room
-    outdoors: Path  # what stands outdoors
-    shades: Path  # what of it stands before the windows, black
+    outdoors: Path  # the surroundings
+    shades: Path  # the part of them outside the windows, black
     windows: dict[str, Path]  # group name -> glass with its rfluxmtx comment, normals into the room
     bsdfs: dict[str, Path]  # group name -> BSDF XML, the T of `dctimestep`, where it is known
     systems: Path  # the groups' materials for the sun, with their BSDFs
@@ -95,7 +95,7 @@ def write_radiance(
     margin: float = 0.5,
     filled: Sequence[FilledGroup] | None = None,
 ) -> RadianceFiles:
-    """Write the room, what stands outdoors, its window groups, sensors and a view into a folder.
+    """Write the room, its surroundings, window groups, sensors and a view into a folder.
 
     `run.sh` there computes the sensors' illuminance with Radiance alone, by three or five phases;
     `make` runs it again where a file is newer than its results.  A room without windows has none.

@@ -26,13 +26,13 @@ def furnished_surfaces(space: Space, band: str = "visible") -> Surfaces:
 
 
 def exterior_surfaces(building: Building, space: Space, band: str = "visible") -> Surfaces:
-    """What stands outdoors before a room's windows: every element but those windows themselves."""
+    """The surroundings of a room's windows: every element but those windows."""
     own = {window.guid for window in space.windows}
     return element_surfaces((e for e in building.elements if e.guid not in own), band)
 
 
 def element_surfaces(elements: Iterable[Element], band: str = "visible") -> Surfaces:
-    """What stands outdoors; surface i is element i."""
+    """The surroundings as surfaces; surface i is element i."""
     return _surfaces(elements, band)
 
 

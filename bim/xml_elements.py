@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason
+from mitsuba_cfs.files import reason, wrong_encoding
 
 DEEPEST = 100  # elements within each other
 CHUNK = 1 << 20  # bytes parsed at once
@@ -42,7 +42,8 @@ def xml_elements(
     except (expat.ExpatError, LookupError, ValueError) as error:
         if isinstance(error, DataError):
             raise
-        raise DataError(f"is no XML: {error}", file=path) from None
+        message = wrong_encoding(path.read_bytes()) or f"is no XML: {error}"
+        raise DataError(message, file=path) from None
 
 
 class _Reader:

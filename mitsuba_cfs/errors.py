@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+import numbers
 from collections.abc import Iterable
 from difflib import get_close_matches
 from os import PathLike
+from typing import Any
 
 
 class CfsError(Exception):
@@ -33,6 +36,22 @@ class RoomError(CfsError, ValueError):
 
 class VariantError(CfsError, RuntimeError):
     """No usable Mitsuba variant or LLVM library: says what to install."""
+
+
+def check_number(
+    name: str, value: Any, low: float, high: float = math.inf, *, whole: bool = False
+) -> None:
+    """Raise `ValueError` that names an argument unless it is a finite number from low to high.
+
+    Args: whole: whether it must be a whole number.
+    """
+    kinds = numbers.Integral if whole else numbers.Real
+    is_number = isinstance(value, kinds) and not isinstance(value, bool)
+    if is_number and math.isfinite(value) and low <= value <= high:
+        return
+    noun = "a whole number" if whole else "a number"
+    limits = f"of {low:g} or more" if high == math.inf else f"from {low:g} to {high:g}"
+    raise ValueError(f"{name}: expected {noun} {limits}, got {value!r:.60}")
 
 
 def no_such_key(key: str, known: Iterable[str]) -> str:

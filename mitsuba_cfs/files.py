@@ -49,6 +49,19 @@ def reason(error: Exception) -> str:
     return REASONS.get(error.errno or 0) or error.strerror or words
 
 
+def wrong_encoding(content: bytes) -> str | None:
+    """Why a text is not UTF-8, with line and remedy; None where it is, or states another."""
+    if b"encoding" in content[:200] and b"utf-8" not in content[:200].lower():
+        return None
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        byte = content[error.start]
+        return f"line {line}: byte {byte:#04x} is not UTF-8; save the file with encoding UTF-8"
+    return None
+
+
 @contextmanager
 def replacing(path: str | PathLike[str], *, field: str | None = None) -> Iterator[Path]:
     """A temporary file beside `path`, renamed to it at the end or deleted after an error.

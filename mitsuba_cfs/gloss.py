@@ -17,6 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.errors import check_number
+
 STEPS = 129  # of a reflectance that rises with the angle, even in its cosine
 ROUGHEST = 0.5  # alpha; beyond it the lobe is no gloss any more
 # Radiance's estimate of Fresnel's equations, for smooth surfaces that reflect as much at least
@@ -68,6 +70,9 @@ def pane(index: float = 1.52, transmissivity: float = 0.9, panes: int = 1) -> Gl
     Args: transmissivity: of a pane without its faces at normal incidence; panes: that are alike,
         one behind the other.
     """
+    check_number("index", index, 1.0)
+    check_number("transmissivity", transmissivity, 0.0, 1.0)
+    check_number("panes", panes, 1, whole=True)
     tau, rho = polarised_shares(_cosines(), index, transmissivity)
     whole = rho
     for _ in range(panes - 1):

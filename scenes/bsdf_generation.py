@@ -10,6 +10,7 @@ import click
 import numpy as np
 import pandas as pd
 
+from bim.radiance.cell import read_radiance_layer
 from mitsuba_cfs.bsdf import klems
 from mitsuba_cfs.bsdf.blinds import venetian_blind, vertical_louvre
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
@@ -17,7 +18,6 @@ from mitsuba_cfs.bsdf.fabric import fabric_klems
 from mitsuba_cfs.bsdf.fabric_table import FabricShade, named_fabric, read_fabric_table
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial, plastic
-from mitsuba_cfs.bsdf.radiance_geometry import read_radiance_layer
 from mitsuba_cfs.bsdf.resample import klems_of
 from mitsuba_cfs.bsdf.screens import (
     perforated_screen,
@@ -59,8 +59,9 @@ def generated_file(
         raise click.UsageError("--product belongs to --shape product")
     from mitsuba_cfs.bsdf.generate import generate_klems, generate_tensor_tree
 
+    notes: list[str] = []
     try:
-        layer = described_layer(**options)
+        layer = described_layer(notes=notes, **options)
     except DataError:
         raise
     except ValueError as error:  # sizes that do not go together
@@ -87,6 +88,7 @@ def generated_file(
         leaves = sum(len(tree.values) for tree in systems[0].blocks().values())
         merged = f"{100 * bound:.0f} % and three" if bound else "three"
         exact = f"{leaves} leaves, merged within {merged} standard errors of a cell's value"
+    exact += "".join(f"\nnote: {note}" for note in notes)
     bands = dict(zip(("Visible", "Solar"), systems, strict=True))
     file = BsdfFile(bands, name=name or options["shape"], thickness=layer.thickness)
     if product is not None:
@@ -168,15 +170,20 @@ def described_layer(
     solar: float | None,
     specular: float,
     roughness: float,
+    notes: list[str],
 ) -> PeriodicLayer:
-    """The layer that the options of the command line describe, in two channels."""
+    """The layer that the options of the command line describe, in two channels.
+
+    Args: notes: takes what the user should know of the layer.
+    """
     if shape == "product":
         _needed(shape, product=product)
         return read_shade_file(product).layer()
     if shape == "radiance":
         _needed(shape, geometry=geometry, period_mm=period_mm)
-        layer = read_radiance_layer(geometry, (period_mm[0] / 1000, period_mm[1] / 1000))
-        return replace(layer, materials=tuple(_grey_twice(sheet) for sheet in layer.materials))
+        layer, remarks = read_radiance_layer(geometry, (period_mm[0] / 1000, period_mm[1] / 1000))
+        notes += remarks
+        return replace(layer, materials=tuple(_twice(sheet) for sheet in layer.materials))
     if shape == "prism":
         _needed(shape, spacing_mm=spacing_mm, index=index)
         return prism_panel(
@@ -214,14 +221,12 @@ def _needed(shape: str, **values: object) -> None:
             raise click.UsageError(f"--shape {shape} needs --{name.replace('_', '-')}")
 
 
-def _grey_twice(sheet: SlatMaterial) -> SlatMaterial:
-    """Visible and solar of a Radiance colour: both its luminance."""
-    weights = (0.265, 0.670, 0.065)  # of Radiance's red, green and blue
-    front, back = (
-        (float(np.dot(weights, colour)),) * 2
-        for colour in (sheet.reflectance_front, sheet.reflectance_back)
-    )
-    return replace(sheet, reflectance_front=front, reflectance_back=back)
+def _twice(sheet: SlatMaterial) -> SlatMaterial:
+    """Visible and solar of a Radiance material: both its luminance."""
+    return replace(
+        sheet, reflectance_front=2 * sheet.reflectance_front,
+        reflectance_back=2 * sheet.reflectance_back, transmittance=2 * sheet.transmittance,
+    )  # fmt: skip
 
 
 def combined_file(paths: Sequence[Path], name: str = "") -> tuple[BsdfFile, pd.DataFrame]:

@@ -68,6 +68,7 @@ HEAT_CAPACITY = Limits(50.0, 10000.0, "J/(kg K)", "lead has 129, water 4186: no 
 GAIN = Limits(0.0, 3000.0, "W/m2", "a hall of computers")
 LAMPS = Limits(0.0, 500.0, "W/m2", "a greenhouse")
 SHARE = Limits(0.0, 1.0, "", "a share")
+HOURS = Limits(0.0, 24.0, "h", "a day")
 STATE = Limits(0.0, 100.0, "", "the number of a state")
 PERSON = Limits(0.0, 1000.0, "W", "hard work; 75 at a desk")
 PERSONS = Limits(0.0, 10000.0, "persons in a room", "a big hall")

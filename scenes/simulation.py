@@ -23,7 +23,7 @@ from scenes.report import write_report
 from scenes.report.headline import cards
 from scenes.result_folder import ResultFolder
 from scenes.results import RoomYear, RunResult
-from scenes.room.operation import Operation
+from scenes.room.operation import Operation, read_operation
 from scenes.room.options import RoomOptions
 from scenes.run.netcdf import year_dataset
 from scenes.run.options import JobOptions
@@ -93,7 +93,7 @@ def simulate(
     system: FenestrationSystem | None,
     weather: Weather,
     *,
-    operation: Operation | None = None,
+    operation: Operation | str | PathLike[str] | None = None,
     quick: bool = False,
     cache: bool = True,
     progress: Progress = silent,
@@ -107,8 +107,8 @@ def simulate(
         room: of a building, `read_building("house.ifc").room("Office")`.
         system: in all windows; None: what the building's file holds for each.
         weather: of the year, `read_weather("city.epw")`.
-        operation: shading control, gains, set points, `read_operation("office.toml")`; without it
-            the first state holds all year and the room floats freely.
+        operation: shading control, gains, set points: a file, or `read_operation("office.toml")`;
+            without it the first state holds all year and the room floats freely.
         quick: few rays and one small picture, for a first look, as `--quick`.
         cache: keep traced matrices in the user's cache and find them again.
         progress: called with each stage and how much of it is done.
@@ -117,6 +117,8 @@ def simulate(
     Raises: `DataError` for a room that cannot be computed, a window without a system.
     """
     building = room.building
+    if isinstance(operation, str | PathLike):
+        operation = read_operation(operation)
     if system is None and building.file is None:
         raise DataError("a building that is not from a file needs a system", element="simulate")
     if system is not None:

@@ -25,7 +25,10 @@ NO_EVIDENCE = {
     "thermal.md": {
         "| to | read |", "| closure | absorptances from | layer resistance | film resistances |",
     },
-    "comply.md": {"| in the folder of results | what |", "| option | what |"},
+    "comply.md": {
+        "| in the folder of results | what |", "| option | what |",
+        "| rule | quantity | set-up | weather that it asks for |",
+    },
     "studies.md": {"| in the folder | what |", "| event | what is done |"},
     "pv.md": {"| key | meaning |"},
 }  # fmt: skip

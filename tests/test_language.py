@@ -65,10 +65,8 @@ ALLOWED = {"given_sky"}  # public names that stay until the next breaking versio
 
 # Parts of the code that still have such phrases or names: the list shrinks, and none enters it
 NOT_CLEAN: set[str] = {
-    "bim",
     "bim/ifc",
     "bim/radiance",
-    "mitsuba_cfs/trace",
 }
 
 PHRASE = re.compile("|".join(f"(?:{pattern})" for pattern in PHRASES), re.IGNORECASE)

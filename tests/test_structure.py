@@ -16,8 +16,9 @@ from tests.modules import MODULES, dotted, file_name, imports
 # what it imports.  What shares a rank knows nothing of the others there.
 RANKS = {
     "mitsuba_cfs": (
-        {"directions", "errors", "gloss", "interpreter", "llvm", "notes", "phases", "processes",
+        {"directions", "errors", "interpreter", "llvm", "notes", "phases", "processes",
          "progress", "source_code"},
+        {"gloss"},
         {"compiled", "files", "surfaces", "variants"},
         {"bsdf", "images", "sky", "stored_arrays", "window_parts"},
         {"glare", "matrices", "metrics"},

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from thermal import kernel, records
 from thermal.climate import Climate, Solar, to_steps
 from thermal.conduction import CELL
+from thermal.convection import TERRAIN
 from thermal.drive import drive_of, stretches
-from thermal.errors import require
+from thermal.errors import require, require_range
 from thermal.network import Network, network
 from thermal.ventilation import AirTransfer
 from thermal.zone import Zone
@@ -42,7 +43,13 @@ class BalanceOptions:
         _choice("inside convection", self.inside_convection, _INSIDE)
         _choice("outside convection", self.outside_convection, _OUTSIDE)
         require(self.iterations >= 1, "iterations", "expected at least 1")
-        require(self.cell > 0, "cell", "expected a positive width [m]")
+        require_range(self.cell, 1e-5, 1.0, "cell", "m")
+        _choice("terrain", self.terrain, tuple(TERRAIN))
+        require_range(self.outside_film, 0.1, 1000.0, "outside_film", "W/(m2 K)")
+        require_range(self.start_c, -90.0, 90.0, "start_c", "C")
+        for name in ("tolerance", "warm_tolerance"):
+            require_range(getattr(self, name), 1e-9, 100.0, name, "K")
+        require_range(self.warm_days, 0, 100_000, "warm_days")
 
 
 _INSIDE = ("tarp", "constant")

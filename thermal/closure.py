@@ -1,11 +1,11 @@
 """Closure of the Blackbox model: layer resistance and film resistances.
 
-The best that the data allow, each named in the result with the error that it had in 128 cases
-against EnergyPlus (docs/thermal.md):
+Each is named in the result with the error that it had against EnergyPlus (docs/thermal.md):
 
     layers     ISO 15099 layer by layer: R(T_m, dT), the films that the faces really have, g
+    gap        the same for typical layers with the stated gas gap
+    typical    the same for typical layers alone: the default
     surface    R(T_m, dT) stated as six coefficients
-    gap        R(T_m, dT) of the gas gap of a double glazing
     linear     U linear in the mean temperature
     constant   plain Kuhn
 """
@@ -22,47 +22,60 @@ from thermal.blackbox import (
     with_realised_films,
 )
 from thermal.errors import require, require_range
-from thermal.glazing import Gap, gap_resistance
+from thermal.glazing import Gap
 from thermal.glazing_unit import GlazingUnit
 from thermal.iso15099 import Iso15099Data, iso15099_data
 from thermal.notes import ThermalNote
 
-U_MODELS = ("constant", "linear", "gap", "surface", "layers")
-# Films that a shade's face realises at 0 and 20 degC [m2 K/W], R_i inside and R_e outside: of a
-# grey shade 50 mm behind and 100 mm before a low-e argon double glazing 6/16/6
-TYPICAL_FILMS = {"internal": (0.0715, None), "external": (None, 0.0236)}
-# RMSE [K] of air and of the window's inner face in the 128 cases (docs/thermal.md), by place and U
-# model, "+" with the films that the shade realises; outside: the larger of a blind's and a shade's;
-# "constant" and "gap": the larger of g by direction and of g at normal incidence, that in 64 cases
+U_MODELS = ("typical", "constant", "linear", "gap", "surface", "layers")
+BY_LAYERS = ("typical", "gap", "layers")  # R, films and emissivities are those of `Closure.unit`
+CASES = 128
+BY_DIRECTION = ", g by direction"  # of a key of `ERRORS`
+# RMSE [K] of air and of the window's inner face in CASES, by position of the shade and model; U, g
+# at normal incidence and BSDF of low-e double glazing, position stated (docs/thermal.md).  Outside:
+# the larger of a blind's and a shade's
 ERRORS: dict[str, dict[str, tuple[float, float]]] = {
     "none": {
-        "constant": (0.38, 0.55), "linear": (0.61, 0.84), "gap": (0.13, 0.17),
-        "surface": (0.13, 0.16), "layers": (0.17, 0.21),
+        "typical": (0.14, 0.17), "typical" + BY_DIRECTION: (0.13, 0.17),
+        "gap": (0.14, 0.18), "constant": (0.29, 0.41),
+        "linear": (0.61, 0.85), "layers": (0.17, 0.21),
     },
     "external": {
-        "constant": (0.92, 1.54), "constant+": (0.22, 0.32), "linear": (0.45, 0.82),
-        "gap": (0.52, 0.85), "gap+": (0.18, 0.28), "surface+": (0.23, 0.34),
-        "layers+": (0.17, 0.29),
+        "typical": (0.17, 0.25), "typical" + BY_DIRECTION: (0.27, 0.39),
+        "gap": (0.16, 0.23), "constant": (0.17, 0.27),
+        "linear": (0.35, 0.52), "layers": (0.17, 0.29),
     },
     "internal": {
-        "constant": (1.28, 3.50), "constant+": (0.75, 0.84), "linear": (0.37, 2.45),
-        "gap": (0.49, 2.63), "gap+": (0.31, 0.57), "surface+": (0.47, 0.61),
-        "layers+": (0.44, 0.25),
+        "typical": (0.43, 0.25), "typical" + BY_DIRECTION: (0.58, 0.32),
+        "gap": (0.40, 0.25), "constant": (0.49, 0.34),
+        "linear": (0.55, 1.03), "layers": (0.44, 0.25),
     },
 }  # fmt: skip
+
+
+# The inputs with which `ERRORS` were measured
+PLAIN = ThermalNote("from U, g at normal incidence, BSDF and the shade's position")
+INPUTS = {
+    "typical" + BY_DIRECTION: ThermalNote("from U, g by direction, BSDF and the shade's position"),
+    "layers": ThermalNote("from the layers and the BSDF"),
+    "gap": ThermalNote("from U, g at normal incidence, BSDF, the shade's position and the gas gap"),
+}
+# Realised film that a shade has: field of `Closure`, and of `Iso15099Data`
+FACES = {"internal": "realised_inner_resistance", "external": "realised_outer_resistance"}
+OF_DATA = {"internal": "r_inner", "external": "r_outer"}
 
 
 @dataclass(frozen=True, slots=True)
 class Closure:
     """Thermal data of a system besides U and g."""
 
-    u_model: str = "constant"  # one of U_MODELS
+    u_model: str = "typical"  # one of U_MODELS
     gap: Gap | None = None  # for "gap"
     realised_inner_resistance: float | None = None  # [m2 K/W], see `with_realised_films`
     realised_outer_resistance: float | None = None
     slope: float = SLOPE  # of U for "linear" [1/K]
     surface: tuple[float, ...] | None = None  # six coefficients of 1/R, for "surface"
-    unit: GlazingUnit | None = None  # for "layers"
+    unit: GlazingUnit | None = None  # for "layers"; for "typical" and "gap" by `with_typical`
 
     def __post_init__(self) -> None:
         known = ", ".join(U_MODELS)
@@ -70,10 +83,12 @@ class Closure:
         for model, value, what in (
             ("gap", self.gap, "the data of a gap"),
             ("surface", self.surface, "the coefficients of a surface"),
-            ("layers", self.unit, "layers"),
         ):
             fits = (self.u_model == model) == (value is not None)
             require(fits, "u_model", f'"{model}" and {what} belong together')
+        fits = self.unit is not None if self.u_model == "layers" else True
+        fits &= self.unit is None or self.u_model in BY_LAYERS
+        require(fits, "u_model", '"layers" and layers belong together')
         for film in (self.realised_inner_resistance, self.realised_outer_resistance):
             if film is not None:
                 require_range(film, 1e-3, 1.0, "realised resistance", "m2 K/W")
@@ -86,12 +101,21 @@ class Closure:
             self.realised_inner_resistance is None and self.realised_outer_resistance is None
         )
 
-    def for_place(self, place: str) -> Closure:
-        """Closure with the typical film resistances of a shade in that position, unless stated."""
-        if self.unit is not None or self.states_films or place not in TYPICAL_FILMS:
+    def with_typical(self, unit: GlazingUnit | None, u_value: float) -> Closure:
+        """Closure with what typical layers add: all of it, or the films of their shade.
+
+        Args: unit: of `typical_unit`; None: there is none with this U, and R is constant.
+        """
+        if unit is None:
+            return self if self.u_model not in BY_LAYERS else replace(
+                self, u_model="constant", gap=None
+            )  # fmt: skip
+        if self.u_model in BY_LAYERS:
+            return replace(self, unit=unit)
+        if self.states_films or unit.shade_place not in FACES:
             return self
-        inner, outer = TYPICAL_FILMS[place]
-        return replace(self, realised_inner_resistance=inner, realised_outer_resistance=outer)
+        data = iso15099_data(unit, u_value)
+        return replace(self, **{FACES[unit.shade_place]: getattr(data, OF_DATA[unit.shade_place])})
 
     def layers(self, u_value: float | None) -> Iso15099Data | None:
         """ISO 15099 data of the layers, shifted to a given U; None without layers."""
@@ -103,9 +127,6 @@ class Closure:
         data = self.layers(plain.u_value)
         if self.u_model == "linear":
             closed = replace(closed, resistance=linear_u(closed.u_value, slope=self.slope))
-        if self.gap is not None:
-            resistance = gap_resistance(closed.u_value, self.gap, item=closed.name)
-            closed = replace(closed, resistance=resistance)
         if self.surface is not None:
             closed = replace(closed, resistance=LayerResistance("surface", self.surface))
         if data is not None and self.unit is not None:
@@ -117,33 +138,41 @@ class Closure:
                 emissivity_in=ends[1].emissivity[1] + ends[1].infrared_transmittance,
             )
             films = (
-                data.r_inner if place == "internal" else films[0],
-                data.r_outer if place == "external" else films[1],
+                data.r_inner if place == "internal" and films[0] is None else films[0],
+                data.r_outer if place == "external" and films[1] is None else films[1],
             )
         if films == (None, None):
             return closed
         return with_realised_films(closed, r_inner_realised=films[0], r_outer_realised=films[1])
 
-    def described(self, place: str) -> ThermalNote:
-        """The closure in words, and the error to expect."""
+    def described(self, place: str, *, g_by_direction: bool = False) -> ThermalNote:
+        """The closure in words, and the error to expect.
+
+        Args: g_by_direction: g is stated by direction, not at normal incidence alone.
+        """
         words = {
+            "typical": ThermalNote("ISO 15099 with typical layers"),
             "constant": ThermalNote("Kuhn's Blackbox model with constant resistance"),
             "linear": ThermalNote(
                 "U-value linear in temperature, {slope:.3g} %/K", {"slope": 100 * self.slope}
             ),
-            "gap": ThermalNote("resistance of the gas gap by temperature, R(T_m, dT)"),
+            "gap": ThermalNote("ISO 15099 with typical panes and the stated gas gap"),
             "surface": ThermalNote("resistance by temperature as stated, R(T_m, dT)"),
             "layers": ThermalNote("ISO 15099, layer by layer"),
         }[self.u_model]
-        shaded = self.unit is not None and place in TYPICAL_FILMS
-        films = self.states_films or shaded
-        if films:
+        if self.states_films or (self.unit is not None and place in FACES):
             words = ThermalNote("{model}, with films of the shade", {"model": words})
-        known = ERRORS.get(place, {}).get(self.u_model + ("+" if films else ""))
+        key = self.u_model
+        if g_by_direction and key != "layers":
+            key += BY_DIRECTION
+        known = ERRORS.get(place, {}).get(key)
         if known is None:
             return ThermalNote("{model}; error unknown", {"model": words})
         return ThermalNote(
-            "{model}; RMS error against EnergyPlus over 128 cases: air {air:.2f} K, glass "
-            "{glass:.2f} K",
-            {"model": words, "air": known[0], "glass": known[1]},
-        )
+            "{model}; RMS error against EnergyPlus in {cases} cases of low-e double glazing, "
+            "{inputs}: air {air:.2f} K, glass {glass:.2f} K",
+            {
+                "model": words, "cases": CASES, "inputs": INPUTS.get(key, PLAIN),
+                "air": known[0], "glass": known[1],
+            },
+        )  # fmt: skip

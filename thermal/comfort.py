@@ -77,6 +77,13 @@ def running_mean_en16798(outdoor_c: ArrayLike, *, per_day: int = 24) -> NDArray[
     return _days_before(_daily_means(outdoor_c, per_day), weights / 3.8, per_day)
 
 
+def rolling_mean(outdoor_c: ArrayLike, steps: int) -> NDArray[np.float64]:
+    """Mean [H] [degC] of the last so many steps, the present one included; the year is cyclic."""
+    outdoor = np.asarray(outdoor_c, dtype=float)
+    total = np.cumsum(np.concatenate([outdoor[-steps:], outdoor]))
+    return (total[steps:] - total[:-steps]) / steps
+
+
 def _daily_means(outdoor_c: ArrayLike, per_day: int) -> NDArray[np.float64]:
     outdoor = np.asarray(outdoor_c, dtype=float)
     whole = f"expected whole days of {per_day} values"
@@ -135,8 +142,8 @@ def comfort_by_outdoors(
     return adaptive_comfort(operative_c, mean(outdoor_c, per_day=per_day), band)
 
 
-def degree_hours(operative_c: ArrayLike, above_c: float, *, step_h: float) -> float:
-    """Kelvin above a limit times hours, of operative temperatures [H]."""
+def degree_hours(operative_c: ArrayLike, above_c: ArrayLike, *, step_h: float) -> float:
+    """Kelvin above a limit (one, or one each [H]) times hours, of operative temperatures [H]."""
     return float(np.maximum(np.asarray(operative_c) - above_c, 0.0).sum() * step_h)
 
 

@@ -109,6 +109,29 @@ def by_cut_off(
     return np.where(np.asarray(beam, dtype=float) > 0, state, 0).astype(np.int64)
 
 
+def delayed(states: StateArray, rows: int) -> StateArray:
+    """States [H] that open only after a more open one has been asked for in `rows` rows before.
+
+    The most closed state of these rows and the row itself; closing is not delayed.
+    """
+    result = states.copy()
+    for row in range(1, rows + 1):
+        result[row:] = np.maximum(result[row:], states[:-row])
+    return result
+
+
+def held(states: StateArray, rows: int) -> StateArray:
+    """States [H] of which each holds for at least `rows` rows."""
+    if rows <= 1 or not len(states):
+        return states
+    result, moved = states.copy(), -rows  # the first state may end at once
+    for row in range(1, len(states)):
+        result[row] = result[row - 1]
+        if states[row] != result[row] and row - moved >= rows:
+            result[row], moved = states[row], row
+    return result
+
+
 def switched(suns: Sequence[Solar], chosen: ArrayLike, states: ArrayLike | None = None) -> Solar:
     """The sun of the chosen combination of states in every hour.
 

@@ -31,6 +31,8 @@ class IdealLoads:
             > _same_length(self.cooling_c, self.heating_c)
         )
         require(not crossed, "set points", "the heating set point lies above the cooling one")
+        for name in ("heating_c", "cooling_c", "heating_limit", "cooling_limit"):
+            require(not np.any(np.isnan(getattr(self, name))), name, "is not a number")
         limits = min(self.heating_limit, self.cooling_limit)
         require(limits >= 0, "set points", f"a heating or cooling limit is negative: {limits} W")
         for share in (self.heating_radiant, self.cooling_radiant):

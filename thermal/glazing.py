@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal.blackbox import R_INNER, R_OUTER, LayerResistance, fit_conductance_surface
+from thermal.blackbox import LayerResistance, fit_conductance_surface
 from thermal.errors import require, require_range
 
 SIGMA = 5.67e-8  # [W/(m2 K4)]
@@ -128,43 +128,6 @@ def double_glazing_resistance(
         for m, d in zip(mean, difference, strict=True)
     ]
     return fit_conductance_surface(mean, difference, np.array(resistance))
-
-
-def gap_resistance(
-    u_value: float,
-    gap: Gap,
-    *,
-    r_outer: float = R_OUTER,
-    r_inner: float = R_INNER,
-    item: str = "fenestration",
-) -> LayerResistance:
-    """R(T_m, dT) of a system with one gas gap, at the level of its U-value.
-
-    R = R_gap(T_m, dT_gap) + R_rest: what U leaves beside the gap at EN 673's condition (panes, the
-    air layer of a shade) stays constant, and takes its part of the temperature difference.  At
-    EN 673's condition (283 K, 15 K) U comes back exactly.
-
-    Raises: `ThermalInputError` where U is higher than the gap alone would let it be.
-    """
-    whole = 1.0 / u_value - r_outer - r_inner
-    rest = whole - 1.0 / gap.conductance(TOTAL_DIFFERENCE)
-    alone = 1.0 / (r_outer + r_inner + 1.0 / gap.conductance(TOTAL_DIFFERENCE))
-    message = f"{u_value:g} W/(m2 K) is above {alone:.2f}, what its gas gap alone would give"
-    require(rest > -0.1 * max(whole, 0.0), f"{item}: U", message)
-    mean, difference = (
-        a.ravel() for a in np.meshgrid(np.linspace(-15.0, 50.0, 14), np.linspace(1.0, 30.0, 12))
-    )
-    resistance = np.full_like(mean, whole)
-    for _ in range(20):
-        across = difference * (resistance - rest) / resistance
-        inside = [
-            1.0 / gap.conductance(d, mean_temperature=m + 273.15)
-            for m, d in zip(mean, np.maximum(across, 0.1), strict=True)
-        ]
-        resistance = np.array(inside) + rest
-    fitted = fit_conductance_surface(mean, difference, resistance)
-    level = float(fitted.at(MEAN_TEMPERATURE - 273.15, TOTAL_DIFFERENCE)) / whole
-    return LayerResistance(fitted.kind, tuple(level * c for c in fitted.coefficients))
 
 
 def en410_g_value(

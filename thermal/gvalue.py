@@ -56,20 +56,18 @@ def thermal_data(
     g_normal: float | None = None,
     normal: int = 0,
     shading_position: str = "none",
-    incidence: ArrayLike | None = None,
     item: str = "fenestration",
 ) -> ThermalData:
     """U and g by direction from a BSDF and further thermal data.
 
-    g follows from g at one direction: with a shade outside or inside by `shaded_g`, otherwise with
-    a constant inward share N of the absorption, g = tau + N alpha, N = (g_n - tau_n)/alpha_n.
-    Without g, N and U are those of a typical system
-    with its shade "none", "external", "internal" or "integrated"; the assumptions say so.
+    g follows from g at one direction with a constant inward share N of the absorption, g = tau + N
+    alpha, N = (g_n - tau_n)/alpha_n; by direction N differs, see `layered.layered_thermal_data`
+    with `typical_unit.typical_unit`.  Without g, N and U are those of a typical system with its
+    shade "none", "external", "internal" or "integrated"; the assumptions say so.
 
     Args:
         transmittance, reflectance: [K] solar, direction to hemisphere.
         g_normal: g at the direction with index `normal` (Klems: 0).
-        incidence: [K] angles [rad], for `shaded_g`; None: a constant share.
         item: what errors name.
     """
     known = ", ".join(TYPICAL_SYSTEMS)
@@ -98,10 +96,6 @@ def thermal_data(
         )
     else:
         share = inward_share(float(tau.flat[normal]), float(rho.flat[normal]), g_normal, item=item)
-        if incidence is not None and shading_position in ("external", "internal"):
-            angles = np.asarray(incidence, dtype=float)
-            g = shaded_g(tau, rho, angles, share, shading_position, normal=normal)
-            return ThermalData(u_value, g, tuple(notes))
     return ThermalData(u_value, g_from_inward_share(tau, rho, share), tuple(notes))
 
 
@@ -132,14 +126,6 @@ def g_from_inward_share(
     return tau + share * np.maximum(1.0 - tau - rho, 0.0)
 
 
-# The low-e argon double glazing 6/16/6 of `TYPICAL_SYSTEMS`, by WINDOW's engine: transmittance,
-# reflectance and share of the absorbed radiation that goes inwards, at normal incidence and diffuse
-GLAZING_NORMAL, GLAZING_DIFFUSE = (0.472, 0.205, 0.401), (0.388, 0.254, 0.379)
-# Its transmittance at 0, 10, ... 90 degrees over that at normal incidence
-GLAZING_BY_ANGLE = (1.0, 1.0, 0.988, 0.966, 0.935, 0.880, 0.765, 0.552, 0.247, 0.0)
-LEAST_OUTER_SHARE = 0.03  # of what a shade outside absorbs, that goes inwards
-
-
 def position_of_share(share: float) -> str:
     """Likely position of a shade from the inward share of the absorbed radiation.
 
@@ -148,49 +134,6 @@ def position_of_share(share: float) -> str:
     if share < 0.2:
         return "external"
     return "internal" if share > 0.45 else "integrated"
-
-
-def shaded_g(
-    tau: NDArray[np.float64],
-    rho: NDArray[np.float64],
-    incidence: NDArray[np.float64],
-    share: float,
-    position: str,
-    *,
-    normal: int = 0,
-) -> NDArray[np.float64]:
-    """g [K] of a glazing with a shade, from the inward share at normal incidence.
-
-    The absorbed radiation alpha is that of the shade and that of a typical low-e double glazing,
-    with inward shares N_s and N_g; N_s follows from the share at normal incidence.  A shade outside
-    scatters: what the glazing absorbs is in proportion to what it transmits, alpha_g = r tau,
-    r = alpha_g,dif/tau_g,dif.  A shade inside absorbs in proportion to the glazing's transmittance:
-    alpha_s = alpha_s,n tau_g(theta)/tau_g,n.
-
-    Args: tau, rho: [K] solar, direction to hemisphere; incidence: [K] [rad].
-    """
-    alpha = np.maximum(1.0 - tau - rho, 0.0)
-    tau_g, rho_g, inward = GLAZING_DIFFUSE if position == "external" else GLAZING_NORMAL
-    if position == "external":
-        of_glazing = np.minimum((1.0 - tau_g - rho_g) / tau_g * tau, alpha)
-        of_shade = alpha - of_glazing
-    else:
-        angle = np.degrees(incidence)
-        by_angle = np.interp(angle, 10.0 * np.arange(len(GLAZING_BY_ANGLE)), GLAZING_BY_ANGLE)
-        first = max(alpha.flat[normal] - (1.0 - tau_g - rho_g), 0.0)
-        of_shade = np.minimum(first * by_angle, alpha)
-        of_glazing = alpha - of_shade
-        inward = GLAZING_DIFFUSE[2]
-    gain, shade, glazing = (
-        share * alpha.flat[normal], of_shade.flat[normal], of_glazing.flat[normal]
-    )  # fmt: skip
-    if shade < LEAST_OUTER_SHARE:
-        return g_from_inward_share(tau, rho, share)
-    of_shade_inward = min(max((gain - inward * glazing) / shade, 0.0), 1.0)
-    known = of_shade_inward * shade + inward * glazing
-    # where typical glazing alone exceeds the stated gain, both are scaled to it
-    scale = gain / known if known > 0 else 0.0
-    return tau + scale * (of_shade_inward * of_shade + inward * of_glazing)
 
 
 def external_shade_g(

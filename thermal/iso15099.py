@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermal.blackbox import LayerResistance, fit_conductance_surface
-from thermal.errors import require
+from thermal.errors import ThermalInputError, require
 from thermal.glazing_unit import Environment, GlazingUnit
 from thermal.layer_balance import INDOORS, UnitArrays, UnitState, settle
 
@@ -23,6 +23,7 @@ U_STATE_C = (0.0, 20.0)  # outdoors and indoors
 # Outdoors and indoors [degC], sun [W/m2]: the reference and the summer state of ISO 52022-3.  The
 # g of a shade depends on the state through its air flow: a year uses the mean of both
 G_STATES = ((5.0, 20.0, 300.0), (25.0, 25.0, 500.0))
+STATED_G = G_STATES[1]  # the state of a g that is stated: sunny and warm, as where g is measured
 OUTDOOR_C = (-25.0, -15.0, -5.0, 5.0, 15.0, 25.0, 35.0, 45.0)  # grid of R(T_m, dT)
 INDOOR_C = (5.0, 15.0, 25.0, 35.0, 45.0)
 UNSETTLED = 1e-3  # [K] change of the last round beyond which a state has no meaning
@@ -166,7 +167,9 @@ def iso15099_data(unit: GlazingUnit, u_value: float | None = None) -> Iso15099Da
     Args: u_value: measured [W/(m2 K)]; R is shifted by the difference to the computed one.
     """
     found, r_outer, _, r_inner, _ = _dark_state(unit, *U_STATE_C)
-    states = [_dark_state(unit, e, i) for e in OUTDOOR_C for i in INDOOR_C if abs(i - e) > 5.0]
+    apart = [(e, i) for e in OUTDOOR_C for i in INDOOR_C if abs(i - e) > 5.0]
+    states = [state for at in apart if (state := _settled_state(unit, *at)) is not None]
+    require(2 * len(states) > len(apart), "glazing", "most dark states have no balance")
     mean, difference, resistance = (
         np.array(column) for column in zip(*(_middle(state) for state in states), strict=True)
     )
@@ -189,6 +192,14 @@ def _dark_state(unit: GlazingUnit, outdoor: float, indoor: float) -> DarkState:
     outer, inner = float(balance.faces_c[0]), float(balance.faces_c[-1])
     resistances = ((outer - outdoor) / heat, (inner - outer) / heat, (indoor - inner) / heat)
     return heat / (indoor - outdoor), *resistances, (outer, inner)
+
+
+def _settled_state(unit: GlazingUnit, outdoor: float, indoor: float) -> DarkState | None:
+    """`_dark_state`; None where a step of a gap's correlation leaves no steady state."""
+    try:
+        return _dark_state(unit, outdoor, indoor)
+    except ThermalInputError:
+        return None
 
 
 def _middle(state: DarkState) -> tuple[float, float, float]:

@@ -7,7 +7,13 @@ from numpy.typing import ArrayLike
 
 from thermal.glazing_unit import GlazingUnit
 from thermal.gvalue import ThermalData, inward_share
-from thermal.iso15099 import iso15099_data, yearly_g_values
+from thermal.iso15099 import (
+    STATED_G,
+    iso15099_data,
+    iso15099_g_values,
+    prescribed,
+    yearly_g_values,
+)
 from thermal.notes import ThermalNote
 
 
@@ -27,7 +33,9 @@ def layered_thermal_data(
         transmittance, reflectance: [K] of the whole system, direction to hemisphere, solar.
         absorbed: [K, N] solar absorptance of every layer.
 
-    A g that is given at normal incidence (the first direction) scales what goes inwards.
+    A g that is stated at normal incidence (the first direction) scales the secondary heat gain in
+    all directions.  With a shade, whose air flow depends on the state, it is that of `STATED_G`,
+    and that of the year differs; panes alone keep it.
     """
     tau = np.asarray(transmittance, dtype=float)
     notes = []
@@ -48,9 +56,11 @@ def layered_thermal_data(
             )
         )
         return ThermalData(u_value, g, tuple(notes))
-    rho = np.asarray(reflectance, dtype=float)
+    rho, alpha = np.asarray(reflectance, dtype=float), np.asarray(absorbed, dtype=float)
     share = inward_share(float(tau[0]), float(rho[0]), g_normal, item=item)
     total = np.maximum(1.0 - tau - rho, 0.0)
-    computed = (g[0] - tau[0]) / max(float(total[0]), 1e-9)
-    scaled = np.minimum((g - tau) * share / max(computed, 1e-9), total)
-    return ThermalData(u_value, tau + scaled, tuple(notes))
+    stated_state = g[:1]
+    if unit.shade_place != "none":
+        stated_state = iso15099_g_values(unit, prescribed(*STATED_G), tau[:1], alpha[:1])
+    ratio = share * total[0] / max(float(stated_state[0] - tau[0]), 1e-9)
+    return ThermalData(u_value, tau + np.minimum((g - tau) * ratio, total), tuple(notes))

@@ -10,6 +10,7 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 
@@ -45,6 +46,7 @@ KINDS = {  # of a surface: kind of the face of its first room, and what lies bey
 OUTDOORS = ("Shade", "FreestandingColumn")
 LEVEL = 0.7  # a surface whose normal is so near to the vertical is no wall, whatever its type says
 REVEAL = 1.0  # but for strips narrower than this [m]: sill and head of a window's recess
+DOORS = ("NonSlidingDoor", "Air")
 GLAZED = ("FixedWindow", "OperableWindow", "FixedSkylight", "OperableSkylight", "SlidingDoor")
 
 
@@ -111,29 +113,31 @@ class _Reader:
             Issue("walls-level", document.file.name, {"count": n, "type": k})
             for k, n in self.level.items()
         ]
-        storeys = {
-            s.get("id", ""): _name(s) for s in document.all("Campus/Building/BuildingStorey")
-        }
+        path = "Campus/Building/BuildingStorey"
+        storeys = {guid: _name(one) for guid, one in document.by_id((path,))[path].items()}
         rooms = tuple(
             self._room(one, faces[guid], storeys)
             for guid, one in spaces.items()
             if faces[guid] or not self._is_empty(one)
         )
+        places = (("Latitude", 90.0), ("Longitude", 180.0), ("Elevation", 1e5))
+        latitude, longitude, elevation = (self._location(*place) for place in places)
         campus = root.find("Campus")
         name = "" if campus is None else _name(campus)
         return DrawnModel(
             document.file, name or document.file.stem, rooms, tuple(elements),
             issues=(*self.issues, *self.constructions.issues),
-            latitude_deg=self._location("Latitude", 90.0),
-            longitude_deg=self._location("Longitude", 180.0),
-            elevation=(self._location("Elevation", 1e5) or 0.0) * document.length,
+            latitude_deg=latitude, longitude_deg=longitude,
+            elevation=(elevation or 0.0) * document.length,
         )  # fmt: skip
 
     def _location(self, field: str, most: float) -> float | None:
         found = self.document.root.find(f"Campus/Location/{field}")
         if found is None or not (found.text or "").strip():
             return None
-        return self.document.number(found, least=-most, most=most)
+        return self.document.optional(
+            lambda: self.document.number(found, least=-most, most=most), self.issues
+        )
 
     def _turn(self) -> NDArray[np.float64]:
         """Rotation [3, 3] from the model's axes to the world's, by CADModelAzimuth."""
@@ -193,16 +197,16 @@ class _Reader:
             beside[1 - number] if between else None, finish,
             tuple(
                 one
-                for opening in surface.iterfind("Opening")
-                if (one := self._opening(opening, number)) is not None
+                for k, opening in enumerate(surface.iterfind("Opening"))
+                if (one := self._opening(opening, f"{surface.get('id')}-opening-{k}", number))
             ),
             kind == "Air",
         )  # fmt: skip
 
-    def _opening(self, opening: ElementTree.Element, number: int) -> DrawnOpening | None:
-        ring, guid = self.document.ring(opening), opening.get("id", "")
-        if not guid:
-            raise self.document.fault("has no id", opening, "id")
+    def _opening(
+        self, opening: ElementTree.Element, without_id: str, number: int
+    ) -> DrawnOpening | None:
+        ring, guid = self.document.ring(opening), opening.get("id") or without_id
         kind = opening.get("openingType", "")
         if ring is None or kind == "Air":
             if not number:
@@ -211,7 +215,11 @@ class _Reader:
             return None
         guid = f"{guid}-2" if number else guid
         ring = ring @ self.turn.T
-        if kind in GLAZED:
+        if kind not in (*GLAZED, *DOORS) and not number:
+            reason = f"{kind[:40]!r}, expected of {', '.join((*GLAZED, *DOORS))}"
+            values = {"field": "openingType", "reason": reason}
+            self.issues.append(Issue("value-not-read", opening.get("id") or without_id, values))
+        if kind in GLAZED or (kind not in DOORS and opening.get("windowTypeIdRef")):
             values = self.constructions.window(opening)
             return DrawnOpening(guid, _name(opening), ring, glazing=values)
         finish = self.constructions.finish(opening.get("constructionIdRef"))
@@ -238,10 +246,8 @@ class _Reader:
         self, space: ElementTree.Element, faces: Sequence[DrawnFace], storeys: dict[str, str]
     ) -> DrawnRoom:
         area, volume = (
-            None
-            if (found := space.find(field)) is None
-            else factor * self.document.number(found, least=0.0)
-            for field, factor in (("Area", self.document.area), ("Volume", self.document.volume))
+            self.document.optional(partial(self.document.size, space, field), self.issues)
+            for field in ("Area", "Volume")
         )
         return DrawnRoom(
             space.get("id", ""), _name(space), tuple(faces),

@@ -12,6 +12,8 @@ from bim.model import Construction, MaterialLayer
 from bim.polygon_rooms import GlazingValues, SurfaceFinish
 from bim.report.issue import Issue
 
+PARTS = ("Glaze", "Gap", "Frame", "Blind")  # of a window type: its values are used, not these
+
 
 class Constructions:
     """What the surfaces and openings of a document refer to, read when they do."""
@@ -28,16 +30,26 @@ class Constructions:
 
     def finish(self, name: str | None) -> SurfaceFinish:
         """Layers and reflectances of a construction; what it does not state is None."""
-        if name is None or name not in self._by_id["Construction"]:
+        if name is None:
             return SurfaceFinish()
         if name not in self._finishes:
-            self._finishes[name] = self._finish(self._by_id["Construction"][name])
+            one = self._by_id["Construction"].get(name)
+            if one is None:
+                self._missing("constructionIdRef", f"no Construction {name!r:.60}", name)
+            self._finishes[name] = SurfaceFinish() if one is None else self._finish(one)
         return self._finishes[name]
 
+    def _missing(self, field: str, reason: str, where: str) -> None:
+        issue = Issue("value-not-read", where, {"field": field, "reason": reason})
+        if issue not in self.issues:
+            self.issues.append(issue)
+
     def _finish(self, one: ElementTree.Element) -> SurfaceFinish:
-        layers = tuple(self._layers(one))
+        layers = self.document.optional(lambda: self._layers(one), self.issues) or []
         name = _name(one)
-        construction = Construction(name, layers, self.document.file.name) if layers else None
+        construction = (
+            Construction(name, tuple(layers), self.document.file.name) if layers else None
+        )
         visible, solar = (
             self._share(one, "Reflectance", kind) for kind in ("IntVisible", "IntSolar")
         )
@@ -90,6 +102,9 @@ class Constructions:
         if known is None:
             known = self._by_id["Construction"].get(name)
         if known is None:
+            if name:
+                guid = opening.get("id", "")
+                self._missing("windowTypeIdRef", f"no WindowType {name!r:.60}", guid)
             return GlazingValues(name=name)
         if name not in self._windows:
             self._windows[name] = self._values(known)
@@ -100,7 +115,7 @@ class Constructions:
         name, panes = _name(known), len(known.findall("Glaze")) or None
         g_text = known.find("SolarHeatGainCoeff")
         g_value = None if g_text is None else self.document.optional(
-            lambda: self.document.number(g_text, least=0.0, most=1.0), self.issues
+            lambda: self._fraction(known, g_text), self.issues
         )  # fmt: skip
         u_value = self._quantity(known, "U-value") or None
         if u_value is None and g_value == 0:
@@ -108,6 +123,12 @@ class Constructions:
             self.issues.append(Issue("window-type-of-zeros", known.get("id", ""), values))
             return GlazingValues(panes=panes, name=name)
         visible, solar = (self._share(known, "Transmittance", k) for k in ("Visible", "Solar"))
+        unread = {one.tag for one in known if one.tag in PARTS}
+        if None not in (u_value, g_value, visible):  # those of panes and gaps are not needed
+            unread -= {"Glaze", "Gap"}
+        for part in sorted(unread):
+            values = {"element": name, "part": part, "glazing": known.get("id", "")}
+            self.issues.append(Issue("glazing-part-not-read", known.get("id", ""), values))
         return GlazingValues(u_value, g_value, visible, solar, panes, name)
 
     def _quantity(self, owner: ElementTree.Element, name: str) -> float | None:
@@ -122,12 +143,20 @@ class Constructions:
         kinds = (kind, kind.replace("Visible", "Vis"))  # the schema's word, and earlier exports'
         for one in owner.iterfind(what):
             if one.get("type") in kinds and one.get("incidentAngle", "0") in ("0", "0.0", ""):
-                value = self.document.number(one, least=0.0, most=100.0)
-                value = value / 100.0 if one.get("unit") == "Percent" else value
-                if value > 1:
-                    raise self.document.fault(f"expected 0 to 1, got {value:g}", owner, what)
-                return value
+                return self._fraction(owner, one)
         return None
+
+    def _fraction(self, owner: ElementTree.Element, one: ElementTree.Element) -> float:
+        """A number from 0 to 1, or in per cent."""
+        value = self.document.number(one, least=0.0, most=100.0)
+        unit = one.get("unit", "Fraction")
+        if unit not in ("Fraction", "Percent"):
+            message = f"unit {unit[:40]!r}, expected Fraction or Percent"
+            raise self.document.fault(message, owner, one.tag)
+        value = value / 100.0 if unit == "Percent" else value
+        if value > 1:
+            raise self.document.fault(f"expected 0 to 1, got {value:g}", owner, one.tag)
+        return value
 
 
 def _name(element: ElementTree.Element) -> str:

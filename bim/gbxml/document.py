@@ -35,6 +35,7 @@ CUBIC_METRES = {
     "CubicMiles": 1609.344**3, "CubicYards": 0.9144**3, "CubicFeet": 0.3048**3,
     "CubicInches": 0.0254**3,
 }  # fmt: skip
+SIZES = {"Area": ("areaUnit", SQUARE_METRES), "Volume": ("volumeUnit", CUBIC_METRES)}
 # units of a quantity's own attribute, as factors to SI
 BTU_PER_HOUR, CFM, SQUARE_FOOT = 0.29307107, 4.71947443e-4, 0.3048**2
 WATT_PER_AREA = {"WattPerSquareMeter": 1.0, "WattPerSquareFoot": 1 / SQUARE_FOOT}
@@ -60,13 +61,11 @@ SI = {
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """The root element and the factors to metres."""
+    """The root element and the factor of its lengths to metres."""
 
     file: Path
     root: ElementTree.Element
     length: float
-    area: float
-    volume: float
 
     def fault(self, message: str, element: ElementTree.Element, field: str | None = None):
         """An error that names the file, the element by its id, and the field."""
@@ -81,8 +80,11 @@ class Document:
             yield element
 
     def by_id(self, kinds: Sequence[str]) -> dict[str, dict[str, ElementTree.Element]]:
-        """The elements of some paths by their id."""
-        return {kind: {one.get("id", ""): one for one in self.all(kind)} for kind in kinds}
+        """The elements of some paths by their id; nothing refers to those without one."""
+        return {
+            kind: {one.get("id", ""): one for one in self.root.iterfind(kind) if one.get("id")}
+            for kind in kinds
+        }
 
     def referred(
         self, owner: ElementTree.Element, kind: str, name: str | None,
@@ -126,6 +128,21 @@ class Document:
             unit = self._length_unit if units is METRES else next(iter(units))
         if unit not in units:
             raise self.fault(f"unit {unit[:40]!r}, expected of {', '.join(units)}", owner, name)
+        try:
+            return units[unit] * self.number(found, least=0.0)
+        except DataError as error:
+            raise self.fault(error.message, owner, name) from None
+
+    def size(self, owner: ElementTree.Element, name: str) -> float | None:
+        """Area [m2] or Volume [m3] of an element by the file's unit; None where it has none."""
+        found = owner.find(name)
+        if found is None or not (found.text or "").strip():
+            return None
+        field, units = SIZES[name]
+        unit = self.root.get(field, "SquareMeters" if name == "Area" else "CubicMeters")
+        if unit not in units:
+            message = f"{unit[:40]!r}, expected of {', '.join(units)}"
+            raise self.fault(message, self.root, field)
         try:
             return units[unit] * self.number(found, least=0.0)
         except DataError as error:
@@ -175,15 +192,8 @@ def read_document(path: Path) -> Document:
     """
     ((root, _),) = xml_elements(path, "gbXML", depth=1, most_bytes=MOST_BYTES)
 
-    def factor(field: str, units: dict[str, float], default: str) -> float:
-        unit = root.get(field, default)
-        if unit not in units:
-            message = f"{unit[:40]!r}, expected of {', '.join(units)}"
-            raise DataError(message, file=path, element="gbXML", field=field)
-        return units[unit]
-
-    return Document(
-        path, root, factor("lengthUnit", METRES, "Meters"),
-        factor("areaUnit", SQUARE_METRES, "SquareMeters"),
-        factor("volumeUnit", CUBIC_METRES, "CubicMeters"),
-    )  # fmt: skip
+    unit = root.get("lengthUnit", "Meters")
+    if unit not in METRES:
+        message = f"{unit[:40]!r}, expected of {', '.join(METRES)}"
+        raise DataError(message, file=path, element="gbXML", field="lengthUnit")
+    return Document(path, root, METRES[unit])

@@ -62,7 +62,8 @@ class UseReader:
         element = self._by_id["Campus/Building/Space"].get(space.guid)
         if element is None:
             return None
-        zone = self._by_id["Zone"].get(element.get("zoneIdRef", ""))
+        name = element.get("zoneIdRef")
+        zone = self._optional(lambda: self._referred(element, "Zone", name)) if name else None
         stated = self._optional(lambda: dict(self._people(element, space))) or {}
         stated |= dict(self._gains(element, space))
         stated |= dict(self._air(element, zone, stated.get("persons"), space))

@@ -47,6 +47,8 @@ from mitsuba_cfs.errors import DataError
 
 ADJACENCY = {"Outdoors": "outside", "Ground": "ground", "Surface": "space"}
 KINDS = {"Wall": "wall", "Floor": "floor"}  # the others by their slope
+ALIKE = 1e-3  # difference of unit up vectors that are taken as one
+PARALLEL = 1e-3  # sine of the angle between up vector and normal
 
 
 def read_honeybee(
@@ -192,13 +194,18 @@ class _Reader:
         if name is not None and self.energy.has_shade(name):
             known = {"element": one.label, "construction": name}
             self.issues.append(Issue("construction-shade-not-read", one.identifier, known))
+        if name is not None and self.energy.has_frame(name):
+            known = {"element": one.label, "part": "EnergyWindowFrame", "glazing": name}
+            self.issues.append(Issue("glazing-part-not-read", one.identifier, known))
         field = f"{fields}_modifier"
         modifier = self.light.objects.name(own.radiance, of_room.radiance, part, field)
         glazing = self._by_modifier(one, values or GlazingValues(name=name or ""), modifier)
         states = self._states(one, modifier, glazing)
+        up = self._up(one, modifier, rings[0]) if states else None
         return DrawnOpening(
-            one.identifier, one.label, rings[0], glazing=glazing, states=states, holes=rings[1:]
-        )
+            one.identifier, one.label, rings[0], glazing=glazing, states=states,
+            holes=rings[1:], up=up,
+        )  # fmt: skip
 
     def _by_modifier(
         self, one: HoneybeeAperture, values: GlazingValues, modifier: str | None
@@ -220,8 +227,7 @@ class _Reader:
         self, one: HoneybeeAperture, modifier: str | None, values: GlazingValues
     ) -> tuple[ShadingState, ...]:
         """The optics of an aperture by state: BSDFs; of a dynamic group also its panes of glass."""
-        held = one.properties.radiance.get("states") or []
-        held = [s for s in held if isinstance(s, dict)] if isinstance(held, list) else []
+        held = _held(one)
         names = [modifier, *(s.get("modifier") for s in held[1:])]
         found, missing = [], 0
         for number, name in enumerate(names):
@@ -242,6 +248,32 @@ class _Reader:
         if any(state.get("shades") for state in held):
             self.issues.append(Issue("states-with-shades", one.identifier, {"element": one.label}))
         return tuple(found) if found and found[0].name == "" else ()
+
+    def _up(
+        self, one: HoneybeeAperture, modifier: str | None, ring: np.ndarray
+    ) -> np.ndarray | None:
+        """The up vector [3] that the BSDFs of an aperture's states share; None without a BSDF.
+
+        Raises: `DataError` where they differ, or where it is the aperture's normal.
+        """
+        names = [modifier, *(state.get("modifier") for state in _held(one)[1:])]
+        ups = [
+            (name, up)
+            for name in names
+            if isinstance(name, str) and (up := self.light.up_vector(name)) is not None
+        ]
+        if not ups:
+            return None
+        first, up = ups[0]
+        for name, other in ups[1:]:
+            if np.abs(other - up).max() > ALIKE:
+                message = f"BSDF {name} has another up_orientation than {first}: give both the same"
+                raise DataError(message, file=self.path, element=one.label, field="states")
+        normal = newell_normal(ring)
+        if np.linalg.norm(np.cross(up, normal)) < PARALLEL * np.linalg.norm(normal):
+            message = f"the up_orientation of BSDF {first} is the normal of this aperture"
+            raise DataError(message, file=self.path, element=one.label, field="up_orientation")
+        return up
 
     def _group_issues(self) -> None:
         if len(self.groups) > 1:
@@ -289,6 +321,12 @@ class _Reader:
             value, gloss = material.diffuse, material.gloss
         if len(triangles):
             yield Element(guid, name, kind, triangles, value, value, gloss=gloss)
+
+
+def _held(one: HoneybeeAperture) -> list[dict]:
+    """The states of an aperture of a dynamic group."""
+    states = one.properties.radiance.get("states") or []
+    return [s for s in states if isinstance(s, dict)] if isinstance(states, list) else []
 
 
 def _by_construction(opaque: OpaqueValues | None) -> SurfaceFinish:

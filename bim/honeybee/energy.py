@@ -129,6 +129,12 @@ class EnergyLibrary:
             str(m.get("type", "")).endswith(("Shade", "Blind")) for m in self._layers(one)
         )
 
+    def has_frame(self, name: str) -> bool:
+        """Whether a window's construction has a frame."""
+        one = self._construction(name)
+        inner = one.get("window_construction")
+        return any(isinstance(c, dict) and c.get("frame") for c in (one, inner))
+
     def _glazing(self, name: str, layers: Sequence[dict], height: float) -> GlazingValues | None:
         kinds = [str(one.get("type", "")) for one in layers]
         simple = [
@@ -142,6 +148,9 @@ class EnergyLibrary:
                 self.objects.number(one, "vt", 0.54, least=1e-6, most=1.0),
                 name=name,
             )
+        if "EnergyWindowMaterialGasCustom" in kinds:
+            message = f"a gas of its own is not computed: give one of {', '.join(GASES)}"
+            raise DataError(message, file=self.file, element=name, field="materials")
         panes = [
             m for m, k in zip(layers, kinds, strict=True) if k == "EnergyWindowMaterialGlazing"
         ]

@@ -12,11 +12,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bim.fenestration import ShadingState
 from bim.honeybee.library import NamedObjects
 from bim.polygon_rooms import GlazingValues
 from bim.radiance.materials import RadianceMaterial, material_of
 from bim.radiance.primitives import VOID, Primitive
+from bim.radiance.xform import read_xform
 from mitsuba_cfs.bsdf.angular import glass_table, specular_matrices
 from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
@@ -25,6 +29,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import scratch_folder
 
 COLOURS = ("r", "g", "b")
+UP = (0.01, 0.01, 1.0)  # up vector of a BSDF where the file states none: honeybee-schema's default
 OPAQUE_FIELDS = {
     "plastic": ("specularity", "roughness"),
     "metal": ("specularity", "roughness"),
@@ -80,6 +85,33 @@ class ModifierLibrary:
             self._states[name] = self._bsdf(modifier)
         held = self._states[name]
         return ShadingState(name=label, bands=held.bands, angular=held.angular)
+
+    def up_vector(self, name: str) -> NDArray[np.float64] | None:
+        """The up vector [3] of a modifier's BSDF, as Radiance takes it; None where it is none.
+
+        Raises: `DataError` for one that is no vector, or that a function file gives.
+        """
+        modifier = self.objects.find("modifiers", name) or {}
+        if _kind(modifier) != "BSDF":
+            return None
+        stated = modifier.get("up_orientation")
+        try:
+            up = np.array(UP if stated is None else stated, dtype=float)
+        except (TypeError, ValueError):
+            up = np.zeros(0)
+        if up.shape != (3,) or not 0 < np.linalg.norm(up) < np.inf:
+            message = f"expected a vector of three numbers, got {stated!r:.60}"
+            raise self.objects.fault(message, modifier, "up_orientation")
+        if modifier.get("function_file") not in (None, "", "."):
+            message = "function files of a BSDF are not read: state its up_orientation in numbers"
+            raise self.objects.fault(message, modifier, "function_file")
+        transform = modifier.get("transform")
+        if transform:
+            try:
+                up = read_xform(("xform", *str(transform).split())).copies[0][:3, :3] @ up
+            except ValueError as error:
+                raise self.objects.fault(str(error), modifier, "transform") from None
+        return up / np.linalg.norm(up)
 
     def pane_state(self, name: str, label: str, values: GlazingValues) -> ShadingState | None:
         """A modifier of glass as a shading state; None where it is none.

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason
+from mitsuba_cfs.files import reason, wrong_encoding
 
 MOST_BYTES = 256 << 20  # of a file: memory is ten times as much
 METRES = {"Meters": 1.0, "Millimeters": 1e-3, "Centimeters": 0.01, "Feet": 0.3048, "Inches": 0.0254}
@@ -167,7 +167,8 @@ def read_json(path: Path) -> dict[str, Any]:
     except RecursionError:
         raise DataError("is no JSON: nested too deeply", file=path) from None
     except ValueError as error:  # of JSON, of its text, of a number with too many digits
-        raise DataError(f"is no JSON: {error}", file=path) from None
+        message = wrong_encoding(path.read_bytes()) or f"is no JSON: {error}"
+        raise DataError(message, file=path) from None
     if not isinstance(content, dict):
         raise DataError("expected a JSON object", file=path)
     return content
@@ -182,6 +183,9 @@ def read_model(path: Path) -> HoneybeeModel:
     if content.get("type") != "Model":
         found = content.get("type")
         raise DataError(f"expected a honeybee Model, got {found!r:.60}", file=path, field="type")
+    if isinstance(content.get("buildings"), list):
+        message = "is a dragonfly model; write honeybee's HBJSON of it (Model.to_honeybee)"
+        raise DataError(message, file=path)
     try:
         return HoneybeeModel.model_validate(content)
     except ValidationError as error:

@@ -17,17 +17,20 @@ import shapely
 
 from bim.doorways import Key, touching
 from bim.energyplus_parts import at_most_layers
-from bim.exported_glazing import Glazings, glazing_of
+from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of
+from bim.fenestration import pane_transmissivity
 from bim.hosted_windows import HostedPolygon, hosted_polygons
 from bim.model import Building, Construction, Element, Face, Space, Window
 from bim.planes import Plane, rings_of
 from bim.to_radiance import identifier
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.xml import bsdf_xml
+from mitsuba_cfs.directions import default_up
 from mitsuba_cfs.files import json_text, write_text
 
 TYPES = {"floor": "Floor", "ceiling": "RoofCeiling", "roof": "RoofCeiling"}
 LEAST_CAPACITY = 100.0  # [J/(kg K)] that honeybee takes
+GLASS_INDEX = 1.52  # refractive index of a pane
 
 
 def write_honeybee(
@@ -36,8 +39,8 @@ def write_honeybee(
     """Write rooms, windows, constructions, reflectances and obstructions as HBJSON.
 
     A window with U and g gets a construction (its visible transmittance is that of the BSDF where
-    none is stated), a window with a BSDF that as its modifier. Not written: further shading states,
-    gloss, furniture. A window without U or g gets no construction, so honeybee's default.
+    none is stated); its modifier is its BSDF, or one pane of glass with its transmittance. Not
+    written: further shading states, gloss, furniture. What is not known is honeybee's default.
 
     Args: glazing: of windows by GUID, in place of what the building states.
     """
@@ -85,7 +88,7 @@ class _Library:
         self._materials: dict[str, dict] = {}
         self._constructions: dict[str, dict] = {}
         self._modifiers: dict[str, dict] = {}
-        self._bsdfs: dict[int, str] = {}  # modifier of each BSDF
+        self._bsdfs: dict[tuple, str] = {}  # modifier by BSDF and up vector
 
     def construction(self, one: Construction, solar: float, visible: float) -> str:
         """Name of layers whose room side reflects so much."""
@@ -140,22 +143,40 @@ class _Library:
         }
         return key
 
-    def bsdf(self, window: Window) -> str | None:
-        """Name of the modifier with the window's visible BSDF; None without one."""
-        file = glazing_of(window, self._glazing).bsdf
+    def optics(self, window: Window) -> str | None:
+        """Name of the modifier with the window's visible BSDF, or of glass that passes as much.
+
+        None where neither is known.
+        """
+        known = glazing_of(window, self._glazing)
+        file = known.bsdf
         visible = None if file is None else file.bands.get("Visible") or file.bands.get("Solar")
         if file is None or visible is None:
-            return None
-        if id(visible) not in self._bsdfs:
+            return None if known.visible_transmittance is None else self._glass(window, known)
+        up = default_up(window.normal) if window.up is None else window.up
+        key = (id(visible), *np.round(up, 6).tolist())
+        if key not in self._bsdfs:
             name = f"bsdf_{len(self._bsdfs)}_{identifier(file.name)[:50]}"
-            self._bsdfs[id(visible)] = name
+            self._bsdfs[key] = name
             self._modifiers[name] = {
                 "type": "BSDF", "identifier": name, "display_name": file.name or name,
-                "modifier": None, "dependencies": [], "up_orientation": [0.0, 0.01, 1.0],
+                "modifier": None, "dependencies": [], "up_orientation": list(key[1:]),
                 "thickness": 0.0, "function_file": ".", "transform": None,
                 "bsdf_data": bsdf_xml(BsdfFile({"Visible": visible}, file.name)),
             }  # fmt: skip
-        return self._bsdfs[id(visible)]
+        return self._bsdfs[key]
+
+    def _glass(self, window: Window, known: ExportedGlazing) -> str:
+        """Name of one pane of glass with the visible transmittance of the window."""
+        panes = () if window.glass is None else window.glass.panes
+        index = panes[0][1] if len(panes) == 1 else GLASS_INDEX
+        passed = pane_transmissivity(float(known.visible_transmittance or 0.0), index)
+        name = f"glass_{passed:.6f}_{index:g}".replace(".", "_")
+        self._modifiers[name] = {
+            "type": "Glass", "identifier": name, "modifier": None, "dependencies": [],
+            "refraction_index": index, **{f"{c}_transmissivity": round(passed, 9) for c in "rgb"},
+        }  # fmt: skip
+        return name
 
     def modifier(self, reflectance: float) -> str:
         """Name of a grey diffuse plastic."""
@@ -261,7 +282,7 @@ def _aperture(
         "display_name": window.name or window.guid, "geometry": _geometry(plane, pane),
         "is_operable": False, "boundary_condition": {"type": "Outdoors"},
         "properties": _properties(
-            "Aperture", library.glazing(window), library.bsdf(window)
+            "Aperture", library.glazing(window), library.optics(window)
         ),
     }  # fmt: skip
 

@@ -15,7 +15,7 @@ from bim.ifc.passages import LARGEST_DOOR, Passage, passages
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.isolated_solids import united
-from bim.names import JOINT, AmbiguousName, UnknownName, found_by_name
+from bim.names import JOINT, AmbiguousName, UnknownName, item_named
 from bim.report.issue import Issue, Phrase
 from bim.rooms import room_solid
 from bim.solids import packed, unpacked
@@ -115,7 +115,7 @@ def _one_room(
 def _named(records: Sequence[SpaceRecord], name: str, source: Source) -> SpaceRecord:
     """The room of that name; `DataError` lists the nearest where there is none or several."""
     try:
-        return found_by_name(records, name, "room")
+        return item_named(records, name, "room")
     except (UnknownName, AmbiguousName) as error:
         file = source.corrections.file or source.path
         raise DataError(str(error.args[0]), file=file, field="join") from None
@@ -133,7 +133,7 @@ def _names_to_join(pair: Sequence[SpaceRecord], records: Sequence[SpaceRecord]) 
 
 def _is_unique(records: Sequence[SpaceRecord], name: str) -> bool:
     try:
-        return found_by_name(records, name, "room") is not None
+        return item_named(records, name, "room") is not None
     except (UnknownName, AmbiguousName):
         return False
 

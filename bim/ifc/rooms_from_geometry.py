@@ -153,7 +153,7 @@ class _Search:
         for count, code in (
             (found.not_widened, "small-elements-not-widened"),
             (found.hulls, "flat-elements-as-hulls"),
-            (found.kept_small, "found-rooms-not-widened"),
+            (found.not_extended, "found-rooms-not-widened"),
         ):
             if count and found.rooms:
                 self.issues.append(Issue(code, "IfcSpace", {"count": count}))

@@ -100,7 +100,7 @@ def _surveyed(path: Path) -> Surveyed:
         export_s,
         cpu_s,
         peak,
-        building.account.spaces if not building.account.found else 0,
+        building.account.spaces if not building.account.from_geometry else 0,
         building.account.glass_used,
         building.account.glass_out,
         building.account.verdict,

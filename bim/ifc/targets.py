@@ -13,7 +13,7 @@ import numpy as np
 from bim.ifc.building import read_ifc
 from bim.ifc.damage import type_of
 from bim.model import Building, Window
-from bim.names import AmbiguousName, UnknownName, found_by_name, listed
+from bim.names import AmbiguousName, UnknownName, item_named, listed
 from bim.to_tracer import orientation_name
 from mitsuba_cfs.errors import DataError
 
@@ -122,7 +122,7 @@ def _placed(model: ifcopenshell.file, path: str | Path, targets: Targets) -> lis
 
 def _room(building: Building, name: str, path: str | Path):
     try:
-        return found_by_name(building.spaces, name, "room")
+        return item_named(building.spaces, name, "room")
     except (UnknownName, AmbiguousName) as error:
         raise DataError(str(error.args[0]), file=path, field="space") from None
 

@@ -91,10 +91,15 @@ def layered_window(things: Sequence[RadianceObject], outwards: Sequence[bool]) -
     if len(things) == 1 and things[0].material.kind in SYSTEMS:
         thing = things[0]
         path = thing.primitive.file.parent / thing.material.bsdf
-        state = ShadingState(bands=dict(read_bsdf_xml(path).bands), file=path)
+        bands = dict(read_bsdf_xml(path).bands)
+        if outwards[0]:  # the front of its data is on the side that the normal leaves
+            bands = {name: band.turned_round() for name, band in bands.items()}
+        state = ShadingState(bands=bands, file=path)
         return LayeredWindow(state, up_vector(thing), tuple(issues))
     layers = [
-        _bsdf_layer(thing) if thing.material.kind in SYSTEMS else _layer(thing, outward, issues)
+        _bsdf_layer(thing, outward)
+        if thing.material.kind in SYSTEMS
+        else _layer(thing, outward, issues)
         for thing, outward in zip(things, outwards, strict=True)
     ]
     rough = [layer for layer in layers if isinstance(layer, TensorTreeBsdf)]
@@ -160,9 +165,10 @@ def _is_stated(path: Path, name: str, folder: Path) -> bool:
     return any(place.is_file() and place.samefile(path) for place in (Path(name), folder / name))
 
 
-def _bsdf_layer(thing: RadianceObject) -> KlemsBsdf:
+def _bsdf_layer(thing: RadianceObject, outward: bool) -> KlemsBsdf:
     file = read_bsdf_xml(thing.primitive.file.parent / thing.material.bsdf)
-    return klems_of(file.bands.get("Visible") or file.bands["Solar"]).filled()
+    bsdf = klems_of(file.bands.get("Visible") or file.bands["Solar"]).filled()
+    return bsdf.turned_round() if outward else bsdf
 
 
 def _layer(

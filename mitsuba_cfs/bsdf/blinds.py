@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial
+from mitsuba_cfs.errors import check_number
+
+LEAST_SIZE = 1e-6  # of a slat and of the distance of slats [m]
 
 
 def venetian_blind(
@@ -32,6 +35,11 @@ def venetian_blind(
         segments: number of flat strips that a curved slat is made of.
         width: width of the cell, along the slats; does not affect the result [m].
     """
+    for name, value in (("depth", depth), ("spacing", spacing)):
+        check_number(name, value, LEAST_SIZE)
+    check_number("thickness", thickness, 0.0)
+    check_number("tilt [rad]", tilt, -np.pi / 2, np.pi / 2)
+    check_number("segments", segments, 1, whole=True)
     profile = slat_profile(depth, radius, thickness, 1 if np.isinf(radius) else segments)
     c, s = np.cos(tilt), np.sin(tilt)
     turned = np.stack(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,8 @@ def check_energy(
     """
     notes = []
     for side in ("front", "back"):
-        blocks = {n: bsdf.direct_hemispherical(b) for n, b in bsdf.blocks().items()}
+        either: Any = bsdf  # whose blocks are of its kind
+        blocks = {n: either.direct_hemispherical(b) for n, b in bsdf.blocks().items()}
         shares = {n.replace("_", " "): share for n, share in blocks.items() if n.endswith(side)}
         if len(shares) == 2:
             shares[f"transmission and reflection {side}"] = bsdf.scattered(side)

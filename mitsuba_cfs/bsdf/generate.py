@@ -53,9 +53,14 @@ class TracedLayer:
         self.back = table([sheet.reflectance_back for sheet in sheets])
         self.through = table([sheet.diffuse_transmittance for sheet in sheets])
         self.specular = table([sheet.specular for sheet in sheets])
+        self.specular_back = table([sheet.specular * (not sheet.back_is_black) for sheet in sheets])
         self.roughness = table([sheet.roughness for sheet in sheets])
         self.index = table([sheet.index for sheet in sheets])
-        self.refracts = any(sheet.index for sheet in sheets)
+        self.straight = table([sheet.straight for sheet in sheets])
+        self.pane = table([sheet.pane for sheet in sheets])
+        self.refracts = any(sheet.index and not sheet.pane for sheet in sheets)
+        self.has_panes = any(sheet.pane for sheet in sheets)
+        self.passes = self.has_panes or any(sheet.straight for sheet in sheets)
         self.scene = mi.load_dict({"type": "scene", "layer": _mesh(triangles)})
 
 
@@ -151,7 +156,11 @@ def _scatter(layer: TracedLayer, triangle, d, random, active):
         for row in rows
     ]
     through = [gather(layer.through, row, active) for row in rows]
-    specular = gather(layer.specular, material, active)
+    specular = dr.select(
+        side > 0,
+        gather(layer.specular, material, active),
+        gather(layer.specular_back, material, active),
+    )
     alpha = gather(layer.roughness, material, active)
 
     # choose a lobe in proportion to the strongest channel
@@ -159,7 +168,15 @@ def _scatter(layer: TracedLayer, triangle, d, random, active):
     for channel in range(layer.channels):
         share_r = dr.maximum(share_r, reflected[channel])
         share_t = dr.maximum(share_t, through[channel])
-    total = share_r + share_t + specular
+    straight = mi.Float(0.0)
+    if layer.passes:
+        straight = gather(layer.straight, material, active)
+    if layer.has_panes:
+        pane = gather(layer.pane, material, active)
+        passed, mirrored = _pane(wi.z, gather(layer.index, material, active), pane)
+        straight = dr.select(pane > 0, passed, straight)
+        specular = dr.select(pane > 0, mirrored, specular)
+    total = share_r + share_t + specular + straight
     choice = random.next_float32() * total
     u = mi.Point2f(random.next_float32(), random.next_float32())
     is_diffuse = choice < share_r
@@ -168,18 +185,26 @@ def _scatter(layer: TracedLayer, triangle, d, random, active):
     diffuse = mi.warp.square_to_cosine_hemisphere(u)
     diffuse.z = dr.select(is_through, -diffuse.z, diffuse.z)
     glossy, gloss_factor = _ward(wi, alpha, u)
-    is_glossy = ~is_diffuse & ~is_through
+    is_straight = choice >= share_r + share_t + specular
+    is_glossy = ~is_diffuse & ~is_through & ~is_straight
     wo = dr.select(is_glossy, glossy, diffuse)
     crosses = mi.Mask(is_through)
+    if layer.passes:
+        is_straight &= straight > 0
+        wo, crosses = dr.select(is_straight, -wi, wo), crosses | is_straight
     if layer.refracts:
         index = gather(layer.index, material, active)
         clear = index > 0
+        if layer.has_panes:
+            clear &= pane == 0
         refracted, bent = _refract(wi, dr.select(side > 0, index, 1 / index), u.x)
         wo, crosses = dr.select(clear, refracted, wo), dr.select(clear, bent, crosses)
     factors = []
     for channel in range(layer.channels):
         share = dr.select(is_through, through[channel] / share_t, reflected[channel] / share_r)
         share = dr.select(is_glossy, gloss_factor, share)
+        if layer.passes:
+            share = dr.select(is_straight, 1.0, share)
         factor = dr.select(total > 0, share * total, 0.0)
         factors.append(dr.select(clear, 1.0, factor) if layer.refracts else factor)
     return frame.to_world(wo), factors, dr.select(crosses, -side, side)
@@ -193,6 +218,19 @@ def _refract(wi, eta, u):
     reflectance, cosine_t, _, eta_ti = mi.fresnel(wi.z, eta)
     crosses = u >= reflectance
     return dr.select(crosses, mi.refract(wi, cosine_t, eta_ti), mi.reflect(wi)), crosses
+
+
+def _pane(cosine, index, transmissivity):
+    """Transmittance and reflectance of a thin pane, all reflections, mean of both polarisations."""
+    inner = dr.sqrt(1.0 - (1.0 - cosine * cosine) / (index * index))
+    once = transmissivity ** (1.0 / inner)
+    passed, mirrored = mi.Float(0.0), mi.Float(0.0)
+    for a, b in ((cosine, index * inner), (index * cosine, inner)):
+        face = dr.square((a - b) / (a + b))
+        way = dr.square(1.0 - face) * once / (1.0 - dr.square(face * once))
+        passed += 0.5 * way
+        mirrored += 0.5 * face * (1.0 + once * way)
+    return passed, mirrored
 
 
 def _ward(wi, alpha, u):

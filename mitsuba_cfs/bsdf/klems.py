@@ -216,6 +216,24 @@ class KlemsBsdf:
         theta, phi = basis.centres()
         return other.index(theta, phi + np.pi)
 
+    def turned_round(self) -> KlemsBsdf:
+        """The same system with its back outdoors, turned by pi about its up."""
+        mirrored = []
+        for basis in (self.basis_out, self.basis_in):
+            theta, phi = basis.centres()
+            mirrored.append(basis.index(theta, np.pi - phi))
+
+        def turned(block: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+            return None if block is None else block[np.ix_(*mirrored)]
+
+        return replace(
+            self,
+            transmission_front=turned(self.transmission_back),
+            transmission_back=turned(self.transmission_front),
+            reflection_front=turned(self.reflection_back),
+            reflection_back=turned(self.reflection_front),
+        )
+
     def transmission_matrix(self) -> NDArray[np.float64]:
         """T [K out, K in]: radiance into the room for radiance from the sky, L_o = T L_i.
 

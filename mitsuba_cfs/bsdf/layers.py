@@ -15,7 +15,9 @@ systems II", ASHRAE Transactions 100.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +50,7 @@ def combine_layers(layers: list[KlemsBsdf]) -> LayeredSystem:
     front = _absorbed(power, _flows(power, identity, zero))
     back = _absorbed(power, _flows(power, zero, identity))
     area = basis.projected_solid_angles()[:, None]
-    blocks = {
+    blocks: dict[str, Any] = {
         "transmission_front": front[0],
         "reflection_front": front[1],
         "reflection_back": back[0],
@@ -58,9 +60,16 @@ def combine_layers(layers: list[KlemsBsdf]) -> LayeredSystem:
     return LayeredSystem(bsdf, front[2], back[2])
 
 
+Power = Sequence[
+    tuple[NDArray[np.float64], ...]
+]  # Tf, Tb, Rf, Rb of each layer, the outermost first
+Flows = list[NDArray[np.float64]]  # [K, K] in each gap
+
+
 def _power_blocks(layer: KlemsBsdf) -> tuple[NDArray[np.float64], ...]:
     """Tf, Tb, Rf, Rb as power by outgoing patch [K, K] for unit power in the incident one."""
-    full, area = layer.filled(), layer.basis_out.projected_solid_angles()[:, None]
+    full: Any = layer.filled()  # no block is None
+    area = layer.basis_out.projected_solid_angles()[:, None]
     return tuple(
         area * block
         for block in (
@@ -72,20 +81,21 @@ def _power_blocks(layer: KlemsBsdf) -> tuple[NDArray[np.float64], ...]:
     )
 
 
-def _flows(power, outside: NDArray, inside: NDArray) -> tuple[list, list]:
+def _flows(
+    power: Power, outside: NDArray[np.float64], inside: NDArray[np.float64]
+) -> tuple[Flows, Flows]:
     """Flows towards the room and back [N + 1] in the gaps, the outer ones given.
 
     From the room outwards each stack of layers is closed to (what it sends back) = S F + e; going
     inwards again gives the flows.
     """
-    back_share, back_own = [None] * (len(power) + 1), [None] * (len(power) + 1)
-    back_share[-1], back_own[-1] = np.zeros_like(outside), inside
-    bounce = [None] * len(power)
+    back_share, back_own = [np.zeros_like(outside)] * (len(power) + 1), [inside] * (len(power) + 1)
+    bounce = [outside] * len(power)
     for j in reversed(range(len(power))):
         tf, tb, rf, rb = power[j]
         # behind layer j: F = Tf F0 + Rb B and B = S F + e, so F = (1 - Rb S)^-1 (Tf F0 + Rb e)
         share, own = back_share[j + 1], back_own[j + 1]
-        bounce[j] = np.linalg.inv(np.eye(len(tf)) - rb @ share)
+        bounce[j] = np.linalg.inv(np.eye(len(tf)) - rb @ share).astype(np.float64, copy=False)
         back_share[j] = rf + tb @ share @ bounce[j] @ tf
         back_own[j] = tb @ (share @ bounce[j] @ rb @ own + own)
     forward = [outside]
@@ -95,7 +105,7 @@ def _flows(power, outside: NDArray, inside: NDArray) -> tuple[list, list]:
     return forward, backward
 
 
-def _absorbed(power, flows) -> tuple[NDArray, NDArray, NDArray]:
+def _absorbed(power: Power, flows: tuple[Flows, Flows]) -> tuple[NDArray[np.float64], ...]:
     """Power sent to the room, power sent outdoors [K, K], and absorbed by each layer [N, K]."""
     forward, backward = flows
     absorbed = []

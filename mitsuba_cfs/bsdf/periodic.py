@@ -13,6 +13,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.errors import check_number
 from mitsuba_cfs.files import replacing
 
 
@@ -31,20 +32,29 @@ class SlatMaterial:
     specular: float = 0.0  # glossy reflectance of both sides, the same in every channel
     roughness: float = 0.0  # root mean square slope of the facets
     index: float = 0.0  # clear body of this refractive index, its normals outwards; 0: a sheet
+    straight: float = 0.0  # passed without scattering, the same in every channel
+    back_is_black: bool = False  # the other side absorbs all, as that of Radiance's `mirror`
+    pane: float = 0.0  # transmissivity of a thin pane of glass of that index; 0: a body or a sheet
 
     def __post_init__(self) -> None:
         if len(self.reflectance_back) != self.channels:
             raise ValueError(f"material {self.name}: front and back have different channels")
         if self.transmittance and len(self.transmittance) != self.channels:
             raise ValueError(f"material {self.name}: one transmittance for each channel")
+        check_number("roughness", self.roughness, 0.0)
+        for name in ("specular", "straight", "pane"):
+            check_number(name, getattr(self, name), 0.0, 1.0)
+        for share in (*self.reflectance_front, *self.reflectance_back, *self.transmittance):
+            check_number(f"material {self.name}: a reflectance or transmittance", share, 0.0, 1.0)
         worst = (
             np.maximum(self.reflectance_front, self.reflectance_back) + self.diffuse_transmittance
         )
-        if min(*self.reflectance_front, *self.reflectance_back, self.specular) < 0:
-            raise ValueError(f"material {self.name}: a reflectance is negative")
-        if self.index and (self.index < 1 or np.max(worst) + self.specular > 0):
+        whole = np.max(worst) + self.specular + self.straight
+        if self.index and (self.index < 1 or whole > 0):
             raise ValueError(f"material {self.name}: a clear body has an index above 1, no colour")
-        if np.max(worst) + self.specular > 1 + 1e-9:
+        if self.pane and not self.index:
+            raise ValueError(f"material {self.name}: a pane needs an index")
+        if whole > 1 + 1e-9:
             raise ValueError(f"material {self.name}: reflects and transmits more than it gets")
 
     @property
@@ -176,7 +186,7 @@ def _radiance_lines(
 ) -> Iterator[str]:
     for index, sheet in enumerate(layer.materials):
         alike = sheet.reflectance_front == sheet.reflectance_back
-        if sheet.transmittance or sheet.index or not alike:
+        if sheet.transmittance or sheet.index or sheet.straight or sheet.back_is_black or not alike:
             raise ValueError(f"material {sheet.name}: only opaque sheets alike on both sides")
         colour = np.array(sheet.reflectance_front) / (1 - sheet.specular)
         red, green, blue = colour if len(colour) == 3 else (colour[0],) * 3

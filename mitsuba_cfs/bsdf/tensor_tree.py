@@ -16,7 +16,7 @@ real-world bidirectional scattering distribution functions" (the tree); format a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -130,6 +130,19 @@ class TensorTree:
         used = edges[(slice(0, cells),) * incident]
         return np.maximum(used if self.rank == 4 else used[: max(cells // 2, 1)], 0.0)
 
+    def mirrored(self) -> TensorTree:
+        """The tree of the system's image in the plane of its up and its normal.
+
+        The first axis of both squares is reversed; of rank 3, turned back by the incident azimuth,
+        the second one of the outgoing square.
+        """
+        cells, width = 1 << self.depth, np.left_shift(1, self.depth - self.depths)
+        corner = self.corners()
+        for axis in (2,) if self.rank == 3 else (0, 2):
+            corner[:, axis] = cells - width - corner[:, axis]
+        order = np.argsort(morton(corner, self.depth))
+        return TensorTree(self.rank, self.depths[order], self.values[order])
+
     def reversed(self) -> TensorTree:
         """The tree of the way back, f(i -> o) = f(o -> i).
 
@@ -203,6 +216,20 @@ class TensorTreeBsdf:
         """The trees that are there, by name."""
         names = ("transmission_front", "transmission_back", "reflection_front", "reflection_back")
         return {name: block for name in names if (block := getattr(self, name)) is not None}
+
+    def turned_round(self) -> TensorTreeBsdf:
+        """The same system with its back outdoors, turned by pi about its up."""
+
+        def turned(tree: TensorTree | None) -> TensorTree | None:
+            return None if tree is None else tree.mirrored()
+
+        return replace(
+            self,
+            transmission_front=turned(self.transmission_back),
+            transmission_back=turned(self.transmission_front),
+            reflection_front=turned(self.reflection_back),
+            reflection_back=turned(self.reflection_front),
+        )
 
     def direct_hemispherical(self, block: TensorTree) -> NDArray[np.float64]:
         """Share of each incident cell's light that `block` sends on [2^2D] or [2^(D-1)]."""

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
+from typing import Any, TypeVar
 from xml.parsers import expat
 from xml.sax.saxutils import escape
 
@@ -23,10 +24,11 @@ from mitsuba_cfs.bsdf.klems import STANDARD_BASES, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_text import format_tree
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason, replacing
+from mitsuba_cfs.files import reason, replacing, wrong_encoding
 
 __all__ = ["BsdfFile", "read_bsdf_xml", "write_bsdf_xml"]
 
+Block = TypeVar("Block", TensorTree, tuple[KlemsBasis, KlemsBasis, NDArray[np.float64]])
 MOST_BYTES = 128 << 20  # of a file: tens of times the biggest known; memory is 20 times as much
 MOST_LETTERS = 64  # of a number with its separator
 UNIT_METRES = {"meter": 1.0, "foot": 0.3048, "inch": 0.0254, "centimeter": 0.01, "millimeter": 1e-3}
@@ -90,7 +92,8 @@ def _optical_layer(path: str | PathLike[str], notes: list[str]) -> ElementTree.E
     try:
         root = ElementTree.fromstring(content[start:])
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise DataError(f"is not well-formed XML: {error}", file=path) from None
+        message = wrong_encoding(content) or f"is not well-formed XML: {error}"
+        raise DataError(message, file=path) from None
     for element in root.iter():
         if isinstance(element.tag, str):
             element.tag = element.tag.rpartition("}")[2]
@@ -145,10 +148,16 @@ def _angle_bases(layer: ElementTree.Element, path: str | PathLike[str]) -> dict[
         except ValueError as error:
             raise DataError(str(error), file=path, element="AngleBasis", field=name) from None
         known = bases.get(name.lower())
-        same = known is not None and known.phi_counts == basis.phi_counts
-        if not (same and np.allclose(known.theta_bounds, basis.theta_bounds, atol=1e-5)):
+        if (
+            known is None
+            or known.phi_counts != basis.phi_counts
+            or not np.allclose(known.theta_bounds, basis.theta_bounds, atol=1e-5)
+        ):
             bases[name.lower()] = basis
     return bases
+
+
+KlemsBlock = tuple[KlemsBasis, KlemsBasis, NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -158,7 +167,9 @@ class _KlemsReader:
     bases: dict[str, KlemsBasis]
     rows: bool
 
-    def block(self, element: ElementTree.Element, where: str, path: str | PathLike[str]):
+    def block(
+        self, element: ElementTree.Element, where: str, path: str | PathLike[str]
+    ) -> KlemsBlock:
         basis_in = self._basis(element, "ColumnAngleBasis", where, path)
         basis_out = self._basis(element, "RowAngleBasis", where, path)
         text = _text(_need(element, "ScatteringData", path))
@@ -178,13 +189,18 @@ class _KlemsReader:
             return basis_in, basis_out, values.reshape(basis_in.size, basis_out.size).T.copy()
         return basis_in, basis_out, values.reshape(basis_out.size, basis_in.size)
 
-    def band(self, blocks: dict, where: str, path: str | PathLike[str]) -> KlemsBsdf:
+    def band(
+        self, blocks: Mapping[str, KlemsBlock], where: str, path: str | PathLike[str]
+    ) -> KlemsBsdf:
         bases = {(basis_in, basis_out) for basis_in, basis_out, _ in blocks.values()}
         if len(bases) != 1:
             raise DataError("the blocks are on different angle bases", file=path, element=where)
-        return KlemsBsdf(*bases.pop(), **{name: block for name, (*_, block) in blocks.items()})
+        values: dict[str, Any] = {name: block for name, (*_, block) in blocks.items()}
+        return KlemsBsdf(*bases.pop(), **values)
 
-    def _basis(self, element, tag: str, where: str, path: str | PathLike[str]) -> KlemsBasis:
+    def _basis(
+        self, element: ElementTree.Element, tag: str, where: str, path: str | PathLike[str]
+    ) -> KlemsBasis:
         name = _text(_need(element, tag, path))
         if name.lower() not in self.bases:
             raise DataError(f"unknown angle basis {name!r}", file=path, element=where, field=tag)
@@ -197,7 +213,9 @@ class _TreeReader:
 
     rank: int
 
-    def block(self, element: ElementTree.Element, where: str, path: str | PathLike[str]):
+    def block(
+        self, element: ElementTree.Element, where: str, path: str | PathLike[str]
+    ) -> TensorTree:
         basis = _text(_need(element, "AngleBasis", path))
         if basis.lower() != "lbnl/shirley-chiu":
             raise DataError(
@@ -212,13 +230,20 @@ class _TreeReader:
         except ValueError as error:
             raise DataError(str(error), file=path, element=where, field="ScatteringData") from None
 
-    def band(self, blocks: dict, where: str, path: str | PathLike[str]) -> TensorTreeBsdf:
+    def band(
+        self, blocks: Mapping[str, Any], where: str, path: str | PathLike[str]
+    ) -> TensorTreeBsdf:
         return TensorTreeBsdf(**blocks)
 
 
-def _read_blocks(layer, path, notes: list[str], reader) -> dict[str, Bsdf]:
+def _read_blocks(
+    layer: ElementTree.Element,
+    path: str | PathLike[str],
+    notes: list[str],
+    reader: _KlemsReader | _TreeReader,
+) -> dict[str, Bsdf]:
     """BSDF of every band; `reader` interprets the blocks."""
-    blocks: dict[str, dict] = {}
+    blocks: dict[str, dict[str, Any]] = {}
     for data in layer.findall("WavelengthData"):
         band = _text(_need(data, "Wavelength", path))
         band = BAND_NAMES.get(band.lower(), band)
@@ -231,14 +256,14 @@ def _read_blocks(layer, path, notes: list[str], reader) -> dict[str, Bsdf]:
                 continue
             if name in blocks.get(band, {}):
                 notes.append(f"{where}: given twice, the last counts")
-            block = reader.block(element, where, path)
+            block: Any = reader.block(element, where, path)
             blocks.setdefault(band, {})[name] = _without_negatives(block, where, notes)
     if not blocks:
         raise DataError("no scattering data", file=path, element="WavelengthData")
     return {band: reader.band(result, band, path) for band, result in blocks.items()}
 
 
-def _without_negatives(block, where: str, notes: list[str]):
+def _without_negatives(block: Block, where: str, notes: list[str]) -> Block:
     """The block with its negative values set to zero, and a note where there were any."""
     values = block.values if isinstance(block, TensorTree) else block[-1]
     negative = values < 0
@@ -279,19 +304,19 @@ def _is_number(word: str) -> bool:
     return True
 
 
-def _material(layer: ElementTree.Element, path: str | PathLike[str]) -> dict:
+def _material(layer: ElementTree.Element, path: str | PathLike[str]) -> dict[str, Any]:
     """Fields of `BsdfFile` in the Material element."""
     material = layer.find("Material")
     if material is None:
         return {}
-    result = {
+    result: dict[str, Any] = {
         "name": _text(material.find("Name")),
         "manufacturer": _text(material.find("Manufacturer")),
         "device_type": _text(material.find("DeviceType")) or "Other",
     }
     for tag in ("Thickness", "Width", "Height"):
         element = material.find(tag)
-        if _text(element):
+        if element is not None and _text(element):
             unit = element.get("unit", "Meter")
             if unit.lower() not in UNIT_METRES:
                 raise DataError(f"unknown unit {unit!r}", file=path, element="Material", field=tag)
@@ -302,8 +327,9 @@ def _material(layer: ElementTree.Element, path: str | PathLike[str]) -> dict:
         ("TIR", "infrared_transmittance", 1.0),
         ("ThermalConductivity", "conductivity", math.inf),
     ):
-        if _text(material.find(tag)):
-            result[name] = _number(material.find(tag), path, 0.0, most)
+        element = material.find(tag)
+        if element is not None and _text(element):
+            result[name] = _number(element, path, 0.0, most)
     return result
 
 
@@ -435,7 +461,9 @@ def _angle_basis(basis: KlemsBasis) -> Iterator[str]:
     yield "\t</AngleBasis>\n"
 
 
-def _block(band: str, name: str, bsdf: Bsdf, block, digits: int) -> Iterator[str]:
+def _block(
+    band: str, name: str, bsdf: Bsdf, block: NDArray[np.float64] | TensorTree, digits: int
+) -> Iterator[str]:
     kind, side = name.split("_")
     source, detector = SPECTRA.get(band, SPECTRA["Visible"])
     yield (
@@ -444,7 +472,7 @@ def _block(band: str, name: str, bsdf: Bsdf, block, digits: int) -> Iterator[str
         f"\t<DetectorSpectrum>{detector}</DetectorSpectrum>\n\t<WavelengthDataBlock>\n"
         f"\t<WavelengthDataDirection>{kind.title()} {side.title()}</WavelengthDataDirection>\n"
     )
-    if isinstance(block, TensorTree):
+    if isinstance(bsdf, TensorTreeBsdf):
         yield "\t<AngleBasis>LBNL/Shirley-Chiu</AngleBasis>\n"
     else:
         yield f"\t<ColumnAngleBasis>{escape(bsdf.basis_in.name)}</ColumnAngleBasis>\n"

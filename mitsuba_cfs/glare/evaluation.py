@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.errors import check_number
 from mitsuba_cfs.glare import indices, passes
 from mitsuba_cfs.glare.areas import Zones, angles_to, split_by_zone
 from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order, seen
@@ -20,6 +21,8 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.notes import Note
 
 BACKGROUNDS = ("indirect", "average", "illuminance")
+FIELDS = ("all", "total", "both eyes")
+POSITION_MODELS = ("guth", "kim")
 GROUPINGS = {  # what a source is
     "evalglare": Note("groups of adjacent bright pixels (evalglare)"),
     "pixels": Note("each bright pixel (raytools)"),
@@ -64,10 +67,15 @@ class GlareOptions:
             raise ValueError("zones cut grouped sources: not with grouping 'pixels'")
         if self.sun not in ("source", "pixels"):
             raise ValueError(f"sun {self.sun!r}: expected 'source' or 'pixels'")
-        if not self.search_radius > 0:
-            raise ValueError(f"search radius {self.search_radius:g}: expected an angle above 0")
-        if self.illuminance is not None and not self.illuminance >= 0:
-            raise ValueError(f"illuminance {self.illuminance:g}: expected lx")
+        if self.field_of_view not in FIELDS:
+            raise ValueError(f"field_of_view {self.field_of_view!r}: expected one of {FIELDS}")
+        if self.position_model not in POSITION_MODELS:
+            message = f"position_model {self.position_model!r}: expected one of {POSITION_MODELS}"
+            raise ValueError(message)
+        check_number("search_radius [rad]", self.search_radius, 1e-6, np.pi)
+        for name in ("threshold", "peak", "illuminance", "age"):
+            if getattr(self, name) is not None:
+                check_number(name, getattr(self, name), 0.0)
 
     @property
     def rule(self) -> str:
@@ -204,7 +212,7 @@ def evaluate(
 
 
 def _placed(
-    picture: NDArray,
+    picture: NDArray[np.float64],
     geometry: GlareView,
     threshold: float,
     options: GlareOptions,
@@ -230,7 +238,7 @@ def _disc_illuminance(disc: SunDisc, geometry: GlareView) -> float:
 
 
 def _sources(
-    picture: NDArray, geometry: GlareView, threshold: float, options: GlareOptions
+    picture: NDArray[np.float64], geometry: GlareView, threshold: float, options: GlareOptions
 ) -> tuple[Sources, NDArray[np.int64]]:
     """The picture's sources, and the zone [n] of each."""
     if options.grouping == "pixels":
@@ -250,7 +258,10 @@ def _sources(
 
 
 def _positions(
-    options: GlareOptions, geometry: GlareView, pixel: tuple[NDArray, NDArray], direction: NDArray
+    options: GlareOptions,
+    geometry: GlareView,
+    pixel: tuple[NDArray[np.int64], NDArray[np.int64]],
+    direction: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Position index [n] of pixels in directions [n, 3]."""
     if options.position_model == "guth" and options.grouping == "pixels":
@@ -288,7 +299,7 @@ def prepare(
     return picture, Ev, flux / geometry.total_solid_angle, largest
 
 
-def task_luminance(picture: NDArray, geometry: GlareView, task: Task) -> float:
+def task_luminance(picture: NDArray[np.float64], geometry: GlareView, task: Task) -> float:
     """Average luminance [cd/m2] over solid angle of a task area; `picture` in scan order."""
     within = 2 * angles_to(task.x, task.y, geometry) <= task.angle
     weight = geometry.solid_angle[within]
@@ -305,7 +316,14 @@ def _threshold(options: GlareOptions, task: float) -> float:
     return factor if factor > 100 else factor * task
 
 
-def _background(options, geometry, sources: Sources, Ev, direct, mean) -> float:
+def _background(
+    options: GlareOptions,
+    geometry: GlareView,
+    sources: Sources,
+    Ev: float,
+    direct: float,
+    mean: float,
+) -> float:
     """Background luminance [cd/m2]."""
     if options.background == "indirect":
         return (Ev - direct) / np.pi

@@ -8,6 +8,7 @@ source above the peak luminance are taken out of it into sources of their own.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ def glare_sources(
     if smoothing and step >= 1.0:
         size, circle = sums[: count + 1], step / 1.75
         scan.smooth(labels, labels.copy(), size, luminance, omega, valid, float(np.float32(circle)))
-    if bright:
+    if peaks is not None and bright:
         _extract_peaks(labels, sums, count, peaks, search_radius / 2, fixed)
     return _collect(labels, sums, luminance, geometry)
 
@@ -105,7 +106,14 @@ def with_disc(sources: Sources, disc: SunDisc, illuminance: float, geometry: Gla
     return Sources(labels, *(np.append(a, b) for a, b in zip(values, own, strict=True)))
 
 
-def _extract_peaks(labels, sums, count, limit, radius, fixed) -> None:
+def _extract_peaks(
+    labels: NDArray[np.int32],
+    sums: NDArray[np.float64],
+    count: int,
+    limit: float,
+    radius: float,
+    fixed: tuple[Any, ...],
+) -> None:
     """Take the peaks out of each source in turn, and merge those that are near one another."""
     luminance, omega, valid, directions, _, _ = fixed
     last = count
@@ -121,7 +129,12 @@ def _extract_peaks(labels, sums, count, limit, radius, fixed) -> None:
             scan.merge_sources(labels, sums, *fixed, first, last, False)
 
 
-def _collect(labels, sums, luminance, geometry: GlareView) -> Sources:
+def _collect(
+    labels: NDArray[np.int32],
+    sums: NDArray[np.float64],
+    luminance: NDArray[np.floating],
+    geometry: GlareView,
+) -> Sources:
     """The sources that have pixels, numbered in the order in which they were made."""
     kept = np.flatnonzero(sums[:, scan.COUNT] > 0)
     numbers = np.zeros(len(sums), dtype=np.int32)

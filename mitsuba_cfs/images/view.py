@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.errors import check_number
+
 KINDS = {
     "v": "perspective",
     "l": "parallel",
@@ -107,6 +109,7 @@ def _unit(vector: ArrayLike, name: str) -> NDArray[np.float64]:
 
 def fisheye(position: ArrayLike, direction: ArrayLike, size: int = 800, **changes: Any) -> View:
     """Upright 180 degree angular fisheye (`-vta -vh 180 -vv 180`) for glare evaluation."""
+    check_number("size", size, 1, whole=True)
     eye, towards = _triple(position, "position"), _triple(direction, "direction")
     plain = View("angular", eye, towards, (0, 0, 1), 180, 180, size, size)
     return replace(plain, **changes)

@@ -80,7 +80,7 @@ def hourly_glare(
         raise UnknownMethodError(f"metric {metric!r}: expected one of {', '.join(METRICS[:3])}")
     _ = light.scene.eye
     chosen = np.arange(len(light.sky.lit)) if hours is None else np.asarray(hours, dtype=np.int64)
-    every = hourly_states(state, len(light.systems), len(light.sky.lit))
+    every = hourly_states(state, len(light.systems), light.sky)
     rows, options = every[:, chosen], options or GlareOptions()
     if isinstance(light, SeasonalLight):
         return _of_seasons(light, metric, chosen, rows, options, progress, checkpoint=checkpoint)
@@ -134,7 +134,7 @@ def pictures(
 ) -> list[Picture]:
     """Luminance pictures [ny, nx] [cd/m2] of some hours [n] of the light's sky."""
     hours = np.asarray(hours, dtype=np.int64)
-    rows = hourly_states(state, len(light.systems), len(light.sky.lit))[:, hours]
+    rows = hourly_states(state, len(light.systems), light.sky)[:, hours]
     shown: dict[int, Picture] = {}
     if isinstance(light, PathLight):
         rooms = rooms_by_state(light, rows)
@@ -161,7 +161,7 @@ def rated_pictures(
 ) -> list[tuple[Picture, GlareResult]]:
     """Luminance pictures of some hours as of `pictures`, and the glare of each."""
     hours, options = np.asarray(hours, dtype=np.int64), options or GlareOptions()
-    rows = hourly_states(state, len(light.systems), len(light.sky.lit))[:, hours]
+    rows = hourly_states(state, len(light.systems), light.sky)[:, hours]
     if isinstance(light, SeasonalLight):
         return _rated_in_seasons(light, hours, rows, options, progress)
     results: dict[int, tuple[Picture, GlareResult]] = {}

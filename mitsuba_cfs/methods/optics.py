@@ -14,6 +14,7 @@ from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.resample import klems_of
+from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.kernels.scattering import (
     AngularBeam,
     AngularScattering,
@@ -226,17 +227,24 @@ class MatrixOptics:
     outdoor_reflection: NDArray[np.float64] | None = None  # [K, K]
 
 
-def hourly_states(state: ArrayLike | None, groups: int, hours: int) -> NDArray[np.int64]:
-    """The state of each window group in each hour [G, L].
+def hourly_states(state: ArrayLike | None, groups: int, sky: AnnualSky) -> NDArray[np.int64]:
+    """The state of each window group in each hour of a sky [G, L].
 
-    Args: state: [G, L], or [L] of all groups; None: the first all the time.
+    Args: state: [G, L] or [L] of all groups, or of all hours of the year, [G, H] or [H]; None: the
+        first all the time.
 
-    Raises: `ValueError` for another shape.
+    Raises: `ValueError` for another shape, and for what is no number of a state.
     """
+    hours = len(sky.lit)
     rows = np.zeros(hours, dtype=np.int64) if state is None else np.asarray(state)
+    if not np.issubdtype(rows.dtype, np.integer):
+        raise ValueError(f"state: expected whole numbers, got an array of {rows.dtype}")
     rows = np.tile(rows, (groups, 1)) if rows.ndim == 1 else rows
+    if rows.shape == (groups, sky.hours):
+        rows = rows[:, sky.lit]
     if rows.shape != (groups, hours):
-        raise ValueError(f"state {rows.shape}: expected [{groups}, {hours}]")
+        year = f"[{groups}, {sky.hours}] of the year"
+        raise ValueError(f"state {rows.shape}: expected [{groups}, {hours}], or {year}")
     if rows.min(initial=0) < 0:
         raise ValueError(f"state {rows.min()}: expected 0 or more, the number of a system")
     return rows

@@ -291,7 +291,7 @@ def sun_beams(
 
 def states_of(light: PhaseLight, state: State | None) -> State:
     """The state of each group in each hour [G, L], as far as it has states."""
-    rows = hourly_states(state, len(light.systems), len(light.sky.lit))
+    rows = hourly_states(state, len(light.systems), light.sky)
     return np.minimum(rows, np.array([[len(states) - 1] for states in light.systems]))
 
 

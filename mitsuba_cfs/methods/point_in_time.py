@@ -50,7 +50,7 @@ class PathLight:
 
     def states_of(self, state: State | None) -> State:
         """The state of each group in each hour [G, L]."""
-        return hourly_states(state, len(self.systems), len(self.sky.lit))
+        return hourly_states(state, len(self.systems), self.sky)
 
 
 @dataclass(frozen=True)

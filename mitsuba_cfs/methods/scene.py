@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.errors import check_number
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 
@@ -93,10 +94,7 @@ class Sampling:
             "sensor_samples", "patch_samples", "sun_points", "view_samples", "outdoor_samples",
             "picture_samples", "hour_samples",
         ):  # fmt: skip
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} {getattr(self, name)}: expected at least 1")
-        if self.subdivision < 1:
-            raise ValueError(f"subdivision {self.subdivision}: expected Reinhart's MF, 1 or more")
+            check_number(name, getattr(self, name), 1, whole=True)
+        check_number("subdivision", self.subdivision, 1, whole=True)  # Reinhart's MF
         for name in ("window_parts", "memory", "seed"):
-            if getattr(self, name) < 0:
-                raise ValueError(f"{name} {getattr(self, name)}: expected 0 or more")
+            check_number(name, getattr(self, name), 0, whole=name != "memory")

@@ -17,21 +17,21 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class RoomMetrics:
-    """Daylight metrics of a room; shares from 0 to 1."""
+    """Daylight metrics of a room; shares of time and area in per cent."""
 
-    daylight_autonomy: FloatArray  # [S] 300 lx, LM-83's hours
-    continuous_daylight_autonomy: FloatArray  # [S] 300 lx, LM-83's hours
-    useful_daylight: FloatArray  # [4, S] below 100, 100 to 300, 300 to 3000, above 3000 lx
-    useful_daylight_2005: FloatArray  # [S] 100 to 2000 lx, the limits of 2005
+    daylight_autonomy: FloatArray  # [S] 300 lx, LM-83's hours [%]
+    continuous_daylight_autonomy: FloatArray  # [S] 300 lx, LM-83's hours [%]
+    useful_daylight: FloatArray  # [4, S] below 100, 100 to 300, 300 to 3000, above 3000 lx [%]
+    useful_daylight_2005: FloatArray  # [S] 100 to 2000 lx, the limits of 2005 [%]
     mean_illuminance: FloatArray  # [S] [lx] over EN 17037's daylight hours
     sunlit_hours: FloatArray | None  # [S] [h] above 1000 lx of direct sun, LM-83's hours
-    spatial_daylight_autonomy: float  # sDA300/50%
-    annual_sunlight_exposure: float | None  # ASE1000,250h; None without direct illuminance
+    spatial_daylight_autonomy: float  # sDA300/50% [%]
+    annual_sunlight_exposure: float | None  # ASE1000,250h [%]; None without direct light
     daylight_provision: DaylightProvision  # EN 17037
     areas: FloatArray  # [S] share of the room's area of each sensor
 
     def by_sensor(self) -> pd.DataFrame:
-        """One row per sensor S."""
+        """One row per sensor S; shares of time [%]."""
         below, supplementary, autonomous, exceeded = self.useful_daylight
         columns = {
             "daylight_autonomy": self.daylight_autonomy,
@@ -48,7 +48,7 @@ class RoomMetrics:
         return pd.DataFrame(columns).rename_axis("sensor")
 
     def of_room(self) -> dict[str, float | str | None]:
-        """The room's own figures; shares of time are means over its area."""
+        """The room's own figures; shares of time [%] are means over its area."""
         useful = self.useful_daylight @ self.areas
         return {
             "daylight_autonomy": float(self.daylight_autonomy @ self.areas),
@@ -88,20 +88,21 @@ def room_metrics(
     lit = ase = None
     if direct_illuminance is not None:
         lit = lm83.sunlit_hours(direct_illuminance, ten, step_h=weather.step_h)
-        ase = autonomy.area_share(lit > lm83.ASE_HOURS, areas)
+        ase = 100.0 * autonomy.area_share(lit > lm83.ASE_HOURS, areas)
     enough = autonomy.daylight_autonomy(illuminance, ten)
     useful = [
-        autonomy.useful_daylight_illuminance(illuminance, ten, limits)
+        100.0 * autonomy.useful_daylight_illuminance(illuminance, ten, limits)
         for limits in (autonomy.UDI_LIMITS, autonomy.UDI_LIMITS_2005)
     ]
     return RoomMetrics(
-        daylight_autonomy=enough,
-        continuous_daylight_autonomy=autonomy.continuous_daylight_autonomy(illuminance, ten),
+        daylight_autonomy=100.0 * enough,
+        continuous_daylight_autonomy=100.0
+        * autonomy.continuous_daylight_autonomy(illuminance, ten),
         useful_daylight=useful[0],
         useful_daylight_2005=useful[1][1:3].sum(axis=0),
         mean_illuminance=np.mean(autonomy.scheduled(illuminance, half), axis=0, dtype=float),
         sunlit_hours=lit,
-        spatial_daylight_autonomy=autonomy.area_share(enough >= lm83.SDA_TIME, areas),
+        spatial_daylight_autonomy=100.0 * autonomy.area_share(enough >= lm83.SDA_TIME, areas),
         annual_sunlight_exposure=ase,
         daylight_provision=en17037.daylight_provision(
             illuminance, half, areas=areas, horizontal_openings=horizontal_openings

@@ -148,7 +148,11 @@ def _description(data: BsdfFile) -> list[str]:
             kind = f"tensor tree of rank {next(iter(bsdf.blocks().values())).rank}"
         blocks = ", ".join(name.replace("_", " ") for name in bsdf.blocks())
         lines.append(f"{band}: {kind}: {blocks}")
-    return [*lines, *(f"note: {note}" for note in data.notes)]
+    notes = list(data.notes)
+    for band, other in (("Visible", "Solar"), ("Solar", "Visible")):
+        if band not in data.bands and other in data.bands:
+            notes.append(f"no {band} band: results use the {other} band instead")
+    return [*lines, *(f"note: {note}" for note in notes)]
 
 
 @command.command("eval")
@@ -494,8 +498,7 @@ def thermal(
     for line in printed(rows):
         click.echo(line)
     for note in dict.fromkeys(n for s in rated_states for n in s.notes):
-        if place is None:
-            click.echo(f"note: {note}")
+        click.echo(f"note: {note}")
     if out is not None and out.suffix == ".json":
         by_patch = {s.path.stem: [round(float(g), 5) for g in s.heat.g_value] for s in rated_states}
         record = {"rows": rows} if place else {"rows": rows, "g by patch": by_patch}

@@ -33,7 +33,28 @@ OF_RULES = (  # choices of a run that are the rules' own, or of what a check has
 DAYS = ((2, 1), (3, 21))  # between which EN 17037 has the day of the sunlight chosen
 
 
+def list_rules(context: click.Context, _: click.Parameter, value: bool) -> None:
+    """Print the included and omitted parts of each rule's standard, and end."""
+    if not value or context.resilient_parsing:
+        return
+    from scenes.comply.rules import read_rule, rule_names
+
+    for name in rule_names():
+        rule = read_rule(name)
+        click.echo(f"{name}: {rule.title} ({rule.edition})")
+        if rule.sites:
+            click.echo(f"  asks for the weather of: {', '.join(rule.sites)}")
+        for label, sentences in (("included", rule.included), ("left out", rule.left_out)):
+            for sentence in sentences:
+                click.echo(f"  {label}: {sentence}")
+    context.exit()
+
+
 @click.command()
+@click.option(
+    "--list", is_flag=True, is_eager=True, expose_value=False, callback=list_rules,
+    help="List the rule sets, with what of each standard is included and left out.",
+)  # fmt: skip
 @input_options("all")
 @room_options
 @click.option(
@@ -67,7 +88,7 @@ def command(
     settings: tuple[str, ...],
     **chosen,
 ) -> None:
-    """Check the rooms of a building against daylight rules; write a dossier and a table of values.
+    """Check the rooms of a building against rules of daylight and heat; write a dossier.
 
     BUILDING is a honeybee model (.hbjson), gbXML, a Radiance scene (.rad) or IFC: one file or
     several of one building (architecture, facade, site), a folder or an .ifczip of them.

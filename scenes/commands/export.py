@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatch
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ import click
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import check_file
 from scenes.commands.room_options import (
+    FILE,
     PrintedHead,
     height_option,
     input_options,
@@ -45,6 +47,10 @@ PATTERNS = {  # of the files that an export writes
     help="Folder for Mitsuba scenes, with a subfolder for each room with a window.",
 )  # fmt: skip
 @click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
+@click.option(
+    "--weather", "weather", type=FILE,
+    help="Hourly weather file (EPW); for the ground temperatures of --epjson.",
+)  # fmt: skip
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
 @click.option("--honeybee", type=click.Path(path_type=Path), help="Honeybee model (.hbjson).")
 @click.option("--gbxml", type=click.Path(path_type=Path), help="gbXML file (.gbxml).")
@@ -64,6 +70,7 @@ def command(
     honeybee: Path | None,
     gbxml: Path | None,
     band: str,
+    weather: Path | None,
     sensor_spacing: float,
     sensor_height: float,
     subdivision: str,
@@ -106,7 +113,9 @@ def command(
     )  # fmt: skip
     export_folders(read, spaces, writers, folders)
     exported = replace(read, spaces=tuple(spaces))
-    assumed = export_files(exported, known, epjson=epjson, honeybee=honeybee, gbxml=gbxml)
+    files = {"epjson": epjson, "honeybee": honeybee, "gbxml": gbxml}
+    ground = None if weather is None or epjson is None else ground_temperatures(weather)
+    assumed = export_files(exported, known, files, ground)
     if gltf is not None:
         from bim.to_gltf import write_gltf
 
@@ -163,22 +172,42 @@ def room_writers(known: KnownFenestration, band: str, **grid) -> dict[str, Calla
     return {"--radiance": radiance_room, "--mitsuba": mitsuba_room}
 
 
+def ground_temperatures(weather: Path) -> list[float]:
+    """Monthly temperature [12] of the ground at 0.5 m from a year of outdoor air [degC]."""
+    import pandas as pd
+
+    from scenes.input_files import read_weather
+    from thermal.climate import undisturbed_ground
+
+    year = read_weather(weather)
+    middles = year.times - pd.Timedelta(hours=0.5 * year.step_h)
+    values = pd.Series(undisturbed_ground(year.dry_bulb_c), index=middles)
+    return values.groupby(middles.month).mean().tolist()
+
+
 def export_files(
-    building: Building, known: KnownFenestration, **files: Path | None
+    building: Building,
+    known: KnownFenestration,
+    files: Mapping[str, Path | None],
+    ground_c: Sequence[float] | None = None,
 ) -> tuple[str, ...]:
-    """Write the models that state U and g of windows, by format; what of these is assumed."""
+    """Write the models that state U and g of windows, by format; what of these is assumed.
+
+    Args: files: by "honeybee", "gbxml", "epjson"; ground_c: [12] for EnergyPlus [degC].
+    """
     from bim.gbxml.write import write_gbxml
     from bim.honeybee.write import write_honeybee
     from bim.to_energyplus import write_epjson
 
     if not any(files.values()):
         return ()
-    writers = {"honeybee": write_honeybee, "gbxml": write_gbxml, "epjson": write_epjson}
+    epjson = partial(write_epjson, ground_c=ground_c)
+    writers = {"honeybee": write_honeybee, "gbxml": write_gbxml, "epjson": epjson}
     glazing, assumed = known.glazings()
     for name, write in writers.items():
-        path = files[name]
+        path = files.get(name)
         if path is not None:
-            write(building, path, glazing=glazing)
+            assumed += tuple(f"{note}." for note in write(building, path, glazing=glazing) or ())
             click.echo(path)
     return assumed
 

@@ -27,10 +27,11 @@ class RoomVerdict:
     asked: bool = True  # of this very room; else another one may have it, or none need have it
 
     def level_met(self, number: int) -> bool | None:
-        """Whether the needs of a level are all met; None where one was not computed."""
-        needs = self.criterion.level[number].needs
-        met = [need.met(v) for need, v in zip(needs, self.values[number], strict=True)]
-        return None if None in met else all(met)
+        """Whether enough needs of a level are met; None where one was not computed."""
+        level = self.criterion.level[number]
+        met = [need.met(v) for need, v in zip(level.needs, self.values[number], strict=True)]
+        least = len(met) if level.count is None else level.count
+        return None if None in met else sum(map(bool, met)) >= least
 
     @property
     def reached(self) -> str:

@@ -322,14 +322,16 @@ class Check:
         groups = tuple(g.name for g in room.windows.groups)
         return RoomLights(space, by_rule, values, groups, glare)
 
-    def _setup_words(self) -> Iterator[str]:
-        """What rules of heat compute and leave out; those whose weather is another."""
+    def _rule_words(self) -> Iterator[str]:
+        """Included and omitted parts of each rule of heat; rules that ask for other weather."""
         weather = self.files.weather
         for rule in self.files.rules.values():
+            if "heat" not in rule.parts:  # theirs are listed by --list and in docs/comply.md
+                continue
             if not rule.fits(weather):
                 yield Note(
                     "{rule}: no verdict. It asks for the weather of {sites}; {file} is not that.",
-                    rule=Note(rule.title), sites=", ".join(rule.weather),
+                    rule=Note(rule.title), sites=", ".join(rule.sites),
                     file=weather.site if weather.file is None else weather.file.name,
                 )  # fmt: skip
             for sentence in rule.included:
@@ -380,7 +382,7 @@ class Check:
 
     def assumptions(self, rooms: list[CheckedRoom], left: list[Space]) -> list[str]:
         """What was assumed, in sentences; `left` are rooms without a rule."""
-        found = [*self._ray_words(), *self._light_words()]
+        found = [*self._rule_words(), *self._ray_words(), *self._light_words()]
         found += dwelling_words(rooms)
         if left:
             names = ", ".join(space.label for space in left)
@@ -443,7 +445,6 @@ class Check:
             )
             if any("heat" in r.parts and not r.setup for r in self.files.rules.values()):
                 yield Note(template, air_changes=room.infiltration_ach)
-            yield from self._setup_words()
         if "open" in self.parts and self.calendar.median_diffuse is None:
             yield Note(
                 "The daylight factor method is not available: the weather file has no diffuse "

@@ -46,6 +46,7 @@ def read_files(options: ComplyOptions) -> ComplyFiles:
     if not rules:
         raise DataError("expected at least one rule", field="--standard")
     inputs = read_inputs(options, light_only=True)
+    rules = {name: rule.of_weather(inputs.weather) for name, rule in rules.items()}
     altitude, source = least_altitude(options, rules, inputs.weather)
     closed = None if options.closed is None else read_system(options.closed, by="--closed")
     uses = read_uses(options.uses)

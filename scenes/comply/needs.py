@@ -11,7 +11,13 @@ from mitsuba_cfs.metrics.autonomy import area_share, daylight_autonomy
 from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded, reached_on_area
 from mitsuba_cfs.metrics.lm83 import annual_sunlight_exposure
 from scenes.comply.findings import Findings
-from scenes.comply.heat_needs import ComfortShare, DegreeHours
+from scenes.comply.heat_needs import (
+    ComfortShare,
+    DayWeighted,
+    DegreeHours,
+    GreatestExcess,
+    HoursAbove,
+)
 from scenes.comply.need import Need
 from scenes.language.catalogue import decimal, gettext, ngettext
 from scenes.language.numbers import listed
@@ -390,6 +396,9 @@ AnyNeed = Annotated[
     | PointHours
     | LightingEnergy
     | DegreeHours
+    | HoursAbove
+    | DayWeighted
+    | GreatestExcess
     | ComfortShare,
     Field(discriminator="what"),
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Literal
@@ -38,6 +38,7 @@ class LevelTable(TomlTable):
 
     name: str
     needs: Annotated[tuple[AnyNeed, ...], Field(min_length=1)]
+    count: Annotated[int, Field(ge=1)] | None = None  # of the needs that must be met; None: all
     over: Over = "room"
     share: Share | None = None  # of the area whose rooms meet the needs, for "area of rooms"
 
@@ -58,6 +59,7 @@ class CriterionTable(TomlTable):
     occupied: bool = False  # of regularly occupied rooms alone
     uses: tuple[str, ...] = ()  # of rooms of these uses alone; none: of all
     other_than: tuple[str, ...] = ()  # not of rooms of these uses
+    weather: tuple[str, ...] = ()  # as of the rule: the criterion is for this weather alone
     level: Annotated[tuple[LevelTable, ...], Field(min_length=1)]
 
     @property
@@ -108,10 +110,18 @@ class RuleTable(TomlTable):
 
     def fits(self, weather: Weather) -> bool:
         """Whether the weather is one that the rule asks for."""
-        name = "" if weather.file is None else weather.file.name
-        texts = (weather.site.casefold(), name.casefold())
-        words = [word.casefold() for word in self.weather]
-        return not words or any(word in text for word in words for text in texts)
+        return not self.sites or _named(weather, self.sites)
+
+    @property
+    def sites(self) -> tuple[str, ...]:
+        """Words of the weather that the rule, or one of its criteria, asks for."""
+        words = [*self.weather, *(word for one in self.criterion for word in one.weather)]
+        return tuple(dict.fromkeys(words))
+
+    def of_weather(self, weather: Weather) -> RuleTable:
+        """The rule with the criteria for this weather; all of them where none is for it."""
+        fitting = [one for one in self.criterion if not one.weather or _named(weather, one.weather)]
+        return self.model_copy(update={"criterion": tuple(fitting) or self.criterion})
 
     @property
     def parts(self) -> frozenset[str]:
@@ -119,6 +129,13 @@ class RuleTable(TomlTable):
         return frozenset(
             part for one in self.criterion for need in one.needs for part in need.parts
         )
+
+
+def _named(weather: Weather, words: Iterable[str]) -> bool:
+    """Whether a weather's site or file name has one of the words."""
+    name = "" if weather.file is None else weather.file.name
+    texts = (weather.site.casefold(), name.casefold())
+    return any(word.casefold() in text for word in words for text in texts)
 
 
 def rule_names() -> tuple[str, ...]:

@@ -1,5 +1,7 @@
 """Write a building with photovoltaic facades in IFC4: `python -m scenes.demo.make_facade FILE`.
 
+The study of its modules, `facade_pv.toml`, is written beside it.
+
 Like the building of the dissertation's section 5.3: four storeys, its long side to the south-east,
 a neighbour close to its south-west side, a technical box beside the modules on the roof, two trees
 that do not exist.  216 modules in 12 subsystems of 18, all and only they of one material.
@@ -12,6 +14,7 @@ that do not exist.  216 modules in 12 subsystems of 18, all and only they of one
 
 from __future__ import annotations
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -29,6 +32,7 @@ from numpy.typing import NDArray
 
 LENGTH, DEPTH, HEIGHT = 21.0, 14.0, 13.5  # [m]
 WIDE, HIGH, THICK = 1.65, 0.99, 0.04  # of a module [m]
+STUDY = "facade_pv.toml"
 GAP = 0.03
 BEFORE_WALL = 0.10  # of a module's back [m]
 ALLEY = 4.0  # to the neighbour [m]
@@ -137,5 +141,11 @@ def _project(model: ifcopenshell.file) -> tuple[ifcopenshell.entity_instance, ..
     return storey, body
 
 
+def write_facade(path: Path) -> None:
+    """Write the building, and beside it the study of its modules."""
+    facade().write(str(path))
+    shutil.copyfile(Path(__file__).with_name(STUDY), path.with_name(STUDY))
+
+
 if __name__ == "__main__":
-    facade().write(str(Path(sys.argv[1] if len(sys.argv) > 1 else "facade.ifc")))
+    write_facade(Path(sys.argv[1] if len(sys.argv) > 1 else "facade.ifc"))

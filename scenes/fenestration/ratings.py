@@ -71,13 +71,17 @@ def rated_state(path: Path, *, place: str | None, glazing: str | None, kappa: fl
         known = REFERENCE_GLAZINGS[glazing]
         tau, rho = (float(np.clip(v[0], 0.0, 1.0)) for v in (heat.transmittance, heat.reflectance))
         return RatedState(
-            path, system, heat, tuple(shade_ratings(tau, rho, place, known, kappa=kappa))
+            path,
+            system,
+            heat,
+            tuple(shade_ratings(tau, rho, place, known, kappa=kappa)),
+            notes=tuple(map(str, system.notes)),
         )
     try:
         ratings = tuple(system_ratings(system, heat))
     except ThermalInputError as error:
         raise DataError(error.message, file=path.with_suffix(".toml")) from error
-    notes = (*heat.notes, heat.named_model)
+    notes = (*map(str, system.notes), *map(str, heat.notes), heat.named_model)
     if not system.panes:
         return RatedState(path, system, heat, ratings, notes=notes)
     try:

@@ -34,6 +34,11 @@ def state_to_attach(
     if file is not None:
         how = "copied from" if copy_bsdf else "read at every run from"
         notes.append(f"BSDF ({', '.join(file.bands)}) {how} {bsdf.name}")
+    else:
+        notes.append(
+            "no BSDF: light is computed if the window states VisibleLightTransmittance; else give "
+            "--tau or --glazing at every run"
+        )
     g = _given_g(g_value)
     table = g if isinstance(g, AngularGValue) else None
     number = g if isinstance(g, float) else None

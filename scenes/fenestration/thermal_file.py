@@ -305,7 +305,7 @@ def glazing_unit(
 
 
 class GapTable(TomlTable):
-    """The gas gap of a double glazing, for `u_model = "gap"`."""
+    """The gas gap between the panes, for `u_model = "gap"`; triple glazing has two."""
 
     width: Annotated[Positive, plausible.GAP]  # [m]
     gas: dict[Literal[tuple(GASES)], Share] = Field({"argon": 0.9, "air": 0.1})
@@ -315,7 +315,7 @@ class GapTable(TomlTable):
 class ClosureTable(TomlTable):
     """How a system's thermal model is closed: in a study, and beside a BSDF file."""
 
-    u_model: Literal[U_MODELS] | None = None  # None: what the other keys are of, else "constant"
+    u_model: Literal[U_MODELS] | None = None  # None: that of the other keys, else typical
     gap: GapTable | None = None
     u_slope: Annotated[float, Field(ge=-0.05, le=0.05)] | None = None  # of U for "linear" [1/K]
     # 1/R = c0 + c1 x + c2 d + c3 d2 + c4 x d + c5 x2, see thermal.blackbox.LayerResistance
@@ -360,9 +360,11 @@ class ClosureTable(TomlTable):
         if self.layers:
             unit = glazing_unit(self.layers, self.glazing_height, self.glazing_tilt_deg)
         stated = [OF_MODEL[key] for key in OF_MODEL if getattr(self, key)]
+        if self.realised_inner_resistance or self.realised_outer_resistance:
+            stated.append("constant")
         more = {} if self.u_slope is None else {"slope": self.u_slope}
         return Closure(
-            self.u_model or (stated or ["constant"])[0], gap, self.realised_inner_resistance,
+            self.u_model or [*stated, "typical"][0], gap, self.realised_inner_resistance,
             self.realised_outer_resistance, surface=self.surface, unit=unit, **more,
         )  # fmt: skip
 

@@ -24,6 +24,8 @@ RULES = {
     "irradiance": N_("by irradiance on the windows"),
     "glare": N_("most open state without glare at the view point"),
     "cut-off": N_("most open slats that block the direct sun (cut-off)"),
+    "any": N_("several rules, the most closed state"),
+    "all": N_("several rules, the most open state"),
 }
 
 

@@ -132,7 +132,7 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
     """
     names = [room.space.label for room in result.spaces]
     used = result.manifest.get("fenestration", ())
-    systems = list(dict.fromkeys(f"“{one['system']}”" for one in used))
+    systems = list(dict.fromkeys(gettext("“{name}”", name=one["system"]) for one in used))
     question = gettext(
         "Daylight, glare and temperatures in {rooms} of {building}; weather: {weather}; "
         "fenestration: {systems}; method: {method}.",

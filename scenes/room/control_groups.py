@@ -54,8 +54,9 @@ def control_groups(space: Space, control: ControlTable | None = None) -> Control
         names.append(_name(windows, table, control.groups))
         rules.append(control.rule_of(table))
         places.append("control" if table is None else f"control.group.{key[1]}")
-    for rule, place in zip(rules, places, strict=True):
-        if rule.seat is not None and not in_room(space, np.array([rule.seat]))[0]:
+    leaves = [(leaf, p) for rule, p in zip(rules, places, strict=True) for leaf in rule.leaves]
+    for leaf, place in leaves:
+        if leaf.seat is not None and not in_room(space, np.array([leaf.seat]))[0]:
             raise DataError("is outside the room", element=space.label, field=f"{place}.seat")
     return ControlGroups(tuple(numbered(names)), tuple(rules), tuple(places), number)
 

@@ -97,21 +97,19 @@ def illuminance_table(result: DaylightResult, times: pd.DatetimeIndex) -> pd.Dat
     return pd.DataFrame(result.illuminance, index=times, columns=columns).rename_axis("time")
 
 
-SENSOR_COLUMNS = {  # column of a run: (column of the library, factor)
-    "da300": ("daylight_autonomy", 100.0),
-    "cda300": ("continuous_daylight_autonomy", 100.0),
-    "udi_below_100": ("udi_below_100", 100.0),
-    "udi_100_300": ("udi_100_300", 100.0),
-    "udi_300_3000": ("udi_300_3000", 100.0),
-    "udi_above_3000": ("udi_above_3000", 100.0),
-    "udi_100_2000": ("udi_100_2000", 100.0),
-    "mean_illuminance_lx": ("mean_illuminance_lx", 1.0),
-}
+SENSOR_COLUMNS = {  # column of a run: column of the library
+    "da300": "daylight_autonomy",
+    "cda300": "continuous_daylight_autonomy",
+    **{name: name for name in (
+        "udi_below_100", "udi_100_300", "udi_300_3000", "udi_above_3000", "udi_100_2000",
+        "mean_illuminance_lx",
+    )},
+}  # fmt: skip
 ROOM_COLUMNS = {
     **SENSOR_COLUMNS,
-    "sda300_50": ("spatial_daylight_autonomy", 100.0),
-    "en17037_target_lx": ("en17037_target_lx", 1.0),
-    "en17037_minimum_lx": ("en17037_minimum_lx", 1.0),
+    "sda300_50": "spatial_daylight_autonomy",
+    "en17037_target_lx": "en17037_target_lx",
+    "en17037_minimum_lx": "en17037_minimum_lx",
 }
 
 
@@ -134,20 +132,20 @@ def daylight_metrics(
     metrics = room_metrics(illuminance, weather, direct_illuminance=direct)
     by_sensor = metrics.by_sensor()
     table = pd.DataFrame(points, columns=["x", "y", "z"]).rename_axis("sensor")
-    for column, (source, factor) in SENSOR_COLUMNS.items():
-        table[column] = factor * by_sensor[source].to_numpy()
+    for column, source in SENSOR_COLUMNS.items():
+        table[column] = by_sensor[source].to_numpy()
     autonomy_error = daylight_autonomy_error(illuminance, lm83_hours(weather), relative_error)
     table["da300_standard_error"] = 100.0 * autonomy_error
     if metrics.sunlit_hours is not None:
         table["sunlit_hours"] = metrics.sunlit_hours
     table["daylight_factor"] = 100.0 * daylight_factor
     of_room = metrics.of_room()
-    room = {column: factor * of_room[source] for column, (source, factor) in ROOM_COLUMNS.items()}
+    room = {column: of_room[source] for column, source in ROOM_COLUMNS.items()}
     room["sda300_50_standard_error"] = 100.0 * spatial_daylight_autonomy_error(
-        metrics.daylight_autonomy, autonomy_error, areas=metrics.areas
+        metrics.daylight_autonomy / 100.0, autonomy_error, areas=metrics.areas
     )
     if metrics.annual_sunlight_exposure is not None:
-        room["ase1000_250"] = 100.0 * metrics.annual_sunlight_exposure
+        room["ase1000_250"] = metrics.annual_sunlight_exposure
     room["daylight_factor"] = 100.0 * float(np.mean(daylight_factor))
     room["en17037_level"] = float(level_number(metrics.daylight_provision))
     return table, room

@@ -107,7 +107,8 @@ class OperationHours:
 
     def equipment(self, floor_area: float) -> FloatArray:
         """Power of equipment [H] [W]."""
-        return self._while_occupied("gains", "equipment_w_m2") * floor_area
+        by_area = self._while_occupied("gains", "equipment_w_m2") * floor_area
+        return by_area + self._while_occupied("gains", "equipment_w")
 
     def vapour(self) -> FloatArray:
         """Vapour of people and other sources [H] [kg/s]."""

@@ -317,7 +317,10 @@ class ShadingRule(TomlTable):
     States are numbered from 0 in the order of the file.
     """
 
-    rule: Literal["always", "schedule", "irradiance", "glare", "cut-off"] = "always"
+    rule: Literal["always", "schedule", "irradiance", "glare", "cut-off", "any", "all"] = "always"
+    parts: tuple[ShadingRule, ...] = ()  # of "any", the most closed state, and "all", the most open
+    open_delay_h: Annotated[float, plausible.HOURS] = 0.0  # opens after more light for so long [h]
+    hold_h: Annotated[float, plausible.HOURS] = 0.0  # least time between two moves [h]
     state: Annotated[int, Field(ge=0)] = 0  # "always"; and the closed one of "irradiance"
     # "schedule": 24 states, or the name of a schedule of states
     schedule: Annotated[tuple[int, ...] | str, OrSchedule(plausible.STATE, states_or_name)] = ()
@@ -338,6 +341,14 @@ class ShadingRule(TomlTable):
 
     def fault(self, states: int, schedules: Mapping[str, ScheduleTable]) -> tuple[str, str] | None:
         """The key that does not fit windows with `states` states, and the fault."""
+        if self.rule in ("any", "all"):
+            if not self.parts:
+                return "parts", f'the rule "{self.rule}" needs tables of rules'
+            for number, one in enumerate(self.parts):
+                fault = one.fault(states, schedules)
+                if fault is not None:
+                    return f"parts.{number}.{fault[0]}", fault[1]
+            return None
         used = self.schedule if self.rule == "schedule" else (self.state,)
         if self.rule == "schedule" and isinstance(self.schedule, str):
             wrong = sorted(set(schedules[self.schedule].stated) - set(range(states)))
@@ -352,6 +363,13 @@ class ShadingRule(TomlTable):
         if self.rule == "cut-off" and len(self.slat_tilts_deg) != states:
             return "slat_tilts_deg", f"expected one for each of {states} states"
         return None
+
+    @property
+    def leaves(self) -> tuple[ShadingRule, ...]:
+        """The rule itself, or the rules that it combines."""
+        if self.rule not in ("any", "all"):
+            return (self,)
+        return tuple(leaf for one in self.parts for leaf in one.leaves)
 
 
 class GroupTable(ShadingRule):
@@ -395,6 +413,7 @@ class GainsTable(TomlTable):
     """Internal gains during the occupied hours."""
 
     equipment_w_m2: Annotated[float | str, OrSchedule(plausible.GAIN)] = 8.0
+    equipment_w: Annotated[float | str, OrSchedule(plausible.POWER)] = 0.0  # of the room, besides
     persons: Annotated[float | str, OrSchedule(plausible.PERSONS)] = 1.0
     person_w: Annotated[float, plausible.PERSON] = 75.0  # dry
     person_vapour_g_h: Annotated[float, plausible.VAPOUR] = 50.0

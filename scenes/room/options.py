@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any, get_type_hints
 
+from mitsuba_cfs.errors import check_number
 from mitsuba_cfs.methods import METHODS
 from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.sky.options import GROUNDS, SUN_MODELS
@@ -70,6 +71,8 @@ class RoomOptions:
             value = getattr(getattr(self, part) if part else self, key)
             if value not in choices:
                 raise ValueError(f"{name}: expected one of {choices}, got {value!r}")
+        check_number("heat_step_s", self.heat_step_s, 1.0, 3600.0)
+        check_number("infiltration_ach", self.infiltration_ach, 0.0)
         if self.outputs.annual_glare and self.method == "point-in-time":
             raise ValueError("annual glare needs the three-phase or the five-phase method")
 

@@ -16,7 +16,7 @@ from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.light import SeasonalLight, eye_illuminance, with_view
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.progress import Progress, part, silent
-from mitsuba_cfs.sky.sun import sun_directions
+from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.surfaces import Surfaces, even_numbers, points_on_triangles
 from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
 from mitsuba_cfs.trace.sun.shade import sunlit_shares
@@ -26,7 +26,7 @@ from scenes.room.light import RoomLight
 from scenes.room.operation import OperationHours
 from scenes.room.operation_tables import ShadingRule
 from scenes.room.solar import SeasonalOutdoors, window_irradiance
-from thermal.control import always, by_cut_off, by_glare, by_irradiance
+from thermal.control import always, by_cut_off, by_glare, by_irradiance, delayed, held
 
 FloatArray = NDArray[np.float64]
 StateArray = NDArray[np.int64]
@@ -42,7 +42,8 @@ def control_signals(room: RoomInputs) -> frozenset[str]:
     """
     if room.operation is None:
         return frozenset()
-    return frozenset(map(signal_of, room.control.rules)) - {""}
+    leaves = (leaf for rule in room.control.rules for leaf in rule.leaves)
+    return frozenset(map(signal_of, leaves)) - {""}
 
 
 def signal_of(rule: ShadingRule) -> str:
@@ -70,27 +71,55 @@ def shading_states(
     if operation is None or not room.space.windows:
         return states[:, numbers]
     rules, signals = room.control.rules, _Signals(room, outdoors)
-    for c, rule in enumerate(rules):
-        groups = np.flatnonzero(numbers == c)
-        if rule.rule == "schedule":
-            hours = OperationHours(operation, room.weather)
-            states[:, c] = hours.states(rule, room.control.places[c], room.windows.states)
-        elif rule.rule == "irradiance":
-            closed = rule.state or group_states(room, c) - 1
-            brightest = signals.irradiance(rule.sensor)[:, groups].max(axis=1)
-            states[:, c] = by_irradiance(
-                brightest, rule.close_above, rule.open_below, closed=closed
-            )
-        elif rule.rule == "cut-off":
-            states[:, c] = _by_cut_off(room, rule, groups, signals.beam(rule.sensor))
-        elif rule.rule == "always":
-            states[:, c] = always(rule.state, room.skies.hours)
-    glare = np.array([c for c, rule in enumerate(rules) if rule.rule == "glare"], dtype=np.int64)
+    glare = np.array(
+        [c for c, rule in enumerate(rules) if any(leaf.rule == "glare" for leaf in rule.leaves)],
+        dtype=np.int64,
+    )
+    for c in range(len(rules)):
+        if c not in glare:
+            states[:, c] = _by_rule(room, c, signals, None)
     if len(glare):
         if light is None:
             raise ValueError("the rule against glare needs the room's light")
         _avoid_glare(room, light, states, glare, progress)
+    for c in glare:
+        states[:, c] = _by_rule(room, c, signals, states[:, c])
     return states[:, numbers]
+
+
+def _by_rule(
+    room: RoomInputs, c: int, signals: _Signals, without_glare: StateArray | None
+) -> StateArray:
+    """The states of a control group by its rule [H].
+
+    Args: without_glare: its states by its rules against glare [H].
+    """
+    groups, operation = np.flatnonzero(room.windows.control == c), room.operation
+
+    def plain(rule: ShadingRule, place: str) -> StateArray:
+        if rule.rule == "glare" and without_glare is not None:
+            return without_glare
+        if rule.rule == "schedule" and operation is not None:
+            hours = OperationHours(operation, room.weather)
+            return hours.states(rule, place, room.windows.states)
+        if rule.rule == "irradiance":
+            closed = rule.state or group_states(room, c) - 1
+            brightest = signals.irradiance(rule.sensor)[:, groups].max(axis=1)
+            return by_irradiance(brightest, rule.close_above, rule.open_below, closed=closed)
+        if rule.rule == "cut-off":
+            return _by_cut_off(room, rule, groups, signals.beam(rule.sensor))
+        return always(rule.state, room.skies.hours)
+
+    def of(rule: ShadingRule, place: str) -> StateArray:
+        if rule.rule in ("any", "all"):
+            parts = [of(one, f"{place}.parts.{n}") for n, one in enumerate(rule.parts)]
+            states = np.max(parts, axis=0) if rule.rule == "any" else np.min(parts, axis=0)
+        else:
+            states = plain(rule, place)
+        rows = [round(hours / room.weather.step_h) for hours in (rule.open_delay_h, rule.hold_h)]
+        return held(delayed(states, rows[0]), rows[1])
+
+    return of(room.control.rules[c], room.control.places[c])
 
 
 class _Signals:
@@ -152,7 +181,9 @@ def window_beam(room: RoomInputs, *, shaded: bool) -> FloatArray:
     """
     sun, groups = sun_directions(room.weather), room.windows.groups
     normals = np.stack([group.frame[2] for group in groups])
-    beam: FloatArray = room.weather.direct_normal[:, None] * np.maximum(sun @ normals.T, 0.0)
+    # an hour of sunset has a beam in the weather, although the sun has set in its middle
+    direct = np.where(is_up(sun), room.weather.direct_normal, 0.0)
+    beam: FloatArray = direct[:, None] * np.maximum(sun @ normals.T, 0.0)
     if not shaded:
         return beam
     points = np.concatenate(
@@ -210,7 +241,8 @@ def _avoid_glare(
         [sum(windows.groups[g].area for g in np.flatnonzero(windows.control == c)) for c in glare]
     )
     closure = combinations / np.maximum(np.array(counts) - 1, 1) @ (areas / areas.sum())
-    limits = _limits(room, light, [room.control.rules[c] for c in glare])
+    leaves = [leaf for c in glare for leaf in room.control.rules[c].leaves if leaf.rule == "glare"]
+    limits = _limits(room, light, leaves)
 
     def excess(number: int, hours: NDArray[np.int64]) -> FloatArray:
         chosen = states.copy()

@@ -372,7 +372,8 @@ def reads_work_plane(room: RoomInputs) -> bool:
     if tables is None or not room.space.windows:
         return False
     dimmed = tables.gains.lighting_w_m2 and tables.gains.lighting_dimmed
-    return any(rule.rule == "glare" for rule in room.control.rules) or bool(dimmed)
+    leaves = (leaf for rule in room.control.rules for leaf in rule.leaves)
+    return any(leaf.rule == "glare" for leaf in leaves) or bool(dimmed)
 
 
 def room_zone(

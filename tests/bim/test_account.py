@@ -56,7 +56,7 @@ def account(**changed) -> Account:
         ({"shut_in": 0.3}, CARE, "0.3 m2 of glass without sky or ground in view"),
         ({"overlapping": ("A and B",)}, CARE, "pairs of overlapping spaces: 1"),
         ({"leaking": ("A",)}, CARE, "rooms with open edges: 1"),
-        ({"found": True}, CARE, "rooms found from geometry"),
+        ({"from_geometry": True}, CARE, "rooms found from geometry"),
         ({"cut_off": True}, NOT_USABLE, "THE FILE IS CUT OFF"),
     ],
 )

@@ -106,3 +106,11 @@ def test_what_is_not_there_lists_what_is(tmp_path, capsys, option, name, message
     assert cli.run(call) == 1
     assert message in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_values_without_a_bsdf_name_what_light_needs(tmp_path, capsys):
+    path, out = small(tmp_path, (0.0, 1.0)), tmp_path / "out.ifc"
+    assert cli.run(["ifc", "attach", str(path), "--all", "--g", "0.5", "-o", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "no BSDF: light is computed if" in printed and "--tau or --glazing" in printed
+    assert "no U: a typical one" in printed

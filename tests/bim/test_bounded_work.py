@@ -268,7 +268,7 @@ def test_more_work_than_the_budget_is_left_undone_and_counted(monkeypatch):
     found = rooms_enclosed_by(bent)
     assert (found.not_widened, len(found.rooms)) == (1, 1)
     monkeypatch.setattr(bim.enclosure, "LARGEST_VOID", 11)
-    assert rooms_enclosed_by(bent).kept_small == 1
+    assert rooms_enclosed_by(bent).not_extended == 1
 
 
 def test_survey_goes_on_after_a_worker_that_died(tmp_path, monkeypatch):

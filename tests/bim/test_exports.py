@@ -248,3 +248,31 @@ def attached(folder: Path) -> Path:
     path = folder / "attached.ifc"
     attach(folder / "room.ifc", path, state, Targets(every_window=True))
     return path
+
+
+def test_an_epjson_names_what_energyplus_is_not_told(tmp_path):
+    """The ground's temperature, slivers that it merges away, and a BSDF that lies on its side."""
+    building = shoebox(4, 5, 3, windows=WINDOWS, adjacency={"floor": "ground"})
+    (space,) = building.spaces
+    assert not write_epjson(building, tmp_path / "a.epJSON", ground_c=[9.0] * 12)
+    (ground,) = write_epjson(building, tmp_path / "a.epJSON")
+    assert "ground below 20 m2: it takes 18 C" in ground
+    sliver = np.array([[[0, 0, 0], [4, 0, 0], [4, 0.004, 0]]], dtype=float)
+    narrow = replace(space, faces=(*space.faces, replace(space.faces[0], triangles=sliver)))
+    (lost,) = write_epjson(
+        replace(building, spaces=(narrow,)), tmp_path / "b.epJSON", ground_c=[9.0] * 12
+    )
+    assert "1 surfaces of 0.008 m2 in all are left out" in lost
+
+
+def test_an_export_takes_the_ground_of_the_weather(tmp_path):
+    from scenes.commands.export import ground_temperatures
+    from scenes.demo import FOLDER
+
+    weather = next(FOLDER.glob("*.epw"))
+    months = ground_temperatures(weather)
+    air = read_epw(weather).dry_bulb_c.reshape(365, 24).mean(axis=1)
+    assert np.mean(months) == pytest.approx(air.mean(), abs=0.2)
+    # at 0.5 m it is damped, and some weeks behind the air
+    assert air.min() < min(months) and max(months) < air.max()
+    assert months.index(max(months)) in (6, 7)

@@ -219,7 +219,6 @@ def test_air_between_rooms_is_joined(tmp_path):
         ("<Coordinate>0.9</Coordinate>", "<Coordinate>low</Coordinate>",
          "Opening window: Coordinate: expected a number, got 'low'"),
         ('spaceIdRef="Hall"', 'spaceIdRef="Attic"', ": AdjacentSpaceId: no Space 'Attic'"),
-        ('materialIdRef="wool"', 'materialIdRef="straw"', "Layer l1: no Material 'straw'"),
         ('lengthUnit="Meters"', 'lengthUnit="Ells"', "gbXML: lengthUnit: 'Ells'"),
         ("gbXML", "cityXML", "expected gbXML, got cityXML"),
         ("</Campus>", "", "is no XML: mismatched tag"),
@@ -239,6 +238,9 @@ def test_faults_are_one_line_with_element_and_field(tmp_path, old, new, said):
     ("old", "new", "where", "reason"),
     [
         ('unit="WPerMeterK"', 'unit="x"', "Material brick", "unit 'x'"),
+        ('materialIdRef="wool"', 'materialIdRef="straw"', "Layer l1", "no Material 'straw'"),
+        ('areaUnit="SquareMeters"', 'areaUnit="Acres"', "gbXML", "'Acres'"),
+        ("<Latitude>50", "<Latitude>north", "Latitude", "expected a number"),
         ('unit="WPerSquareMeterK">1.1', 'unit="y">1.1', "WindowType unit", "unit 'y'"),
         ('type="IntVis" unit="Fraction">0.6', 'type="IntVis" unit="Fraction">six',
          "Reflectance", "got 'six'"),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from bim.names import folder_names, found_by_name, label_of, nearest, numbered
+from bim.names import folder_names, item_named, label_of, nearest, numbered
 
 
 @dataclass(frozen=True)
@@ -39,15 +39,15 @@ ROOMS = (
     ],
 )  # fmt: skip
 def test_a_room_is_found_by_what_people_call_it(wanted, guid):
-    assert found_by_name(ROOMS, wanted, "space").guid == guid
+    assert item_named(ROOMS, wanted, "space").guid == guid
 
 
 def test_a_name_of_several_lists_them_so_that_one_can_be_chosen():
     with pytest.raises(ValueError, match="2 spaces are named 'bad': 02 Bad, 03 Bad"):
-        found_by_name(ROOMS, "bad", "space")
+        item_named(ROOMS, "bad", "space")
     twins = (Room("a", "1", "Bad"), Room("b", "1", "Bad"))
     with pytest.raises(ValueError, match=r"1 Bad \(a\), 1 Bad \(b\)"):
-        found_by_name(twins, "1 Bad", "space")
+        item_named(twins, "1 Bad", "space")
 
 
 @pytest.mark.parametrize(
@@ -65,17 +65,17 @@ def test_a_label_says_each_name_once(name, long_name, label):
 @pytest.mark.parametrize("wanted", ["Hall", "HALL", "2", "2 Living", "Living"])
 def test_a_joined_room_is_found_by_its_parts(wanted):
     rooms = (Room("a", "1 + 2", "Hall + Living"), Room("b", "3", "Bad"))
-    assert found_by_name(rooms, wanted, "space").guid == "a"
+    assert item_named(rooms, wanted, "space").guid == "a"
 
 
 def test_a_room_of_its_own_goes_before_a_part_of_a_joined_one():
     rooms = (Room("a", "1 + 2", "Hall + Living"), Room("b", "3", "Hall"))
-    assert found_by_name(rooms, "Hall", "space").guid == "b"
+    assert item_named(rooms, "Hall", "space").guid == "b"
 
 
 def test_an_unknown_name_lists_the_nearest_first():
     with pytest.raises(KeyError, match="no space 'Wonzimmer'; there are: 01 Wohnzimmer, "):
-        found_by_name(ROOMS, "Wonzimmer", "space")
+        item_named(ROOMS, "Wonzimmer", "space")
     assert nearest("Window B", ["Door", "Window A", "Window B2"])[0] == "Window B2"
 
 

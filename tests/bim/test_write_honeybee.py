@@ -47,3 +47,15 @@ def test_what_stands_outdoors_comes_back(tmp_path):
     found = [e for e in read_honeybee(tmp_path / "box.hbjson").elements if e.name == "a wall"]
     assert len(found) == 1 and found[0].reflectance_visible == pytest.approx(0.4)
     np.testing.assert_allclose(found[0].triangles.reshape(-1, 3).max(axis=0), [6, -5, 4])
+
+
+@pytest.mark.parametrize("transmittance", [0.05, 0.4, 0.7, 0.9])
+def test_glass_without_a_bsdf_is_a_pane_that_passes_as_much(tmp_path, transmittance):
+    """honeybee's Radiance would take its default pane of 0.64."""
+    box = shoebox(windows=[WindowRectangle(0.5, 0.9, 3.0, 1.5)])
+    data = {"room-window-0": ExportedGlazing(1.1, 0.5, transmittance)}
+    write_honeybee(box, tmp_path / "box.hbjson", glazing=data)
+    (window,) = read_honeybee(tmp_path / "box.hbjson").windows
+    assert window.glass is not None
+    assert window.glass.transmittance == pytest.approx(transmittance, abs=1e-6)
+    assert (window.u_value, window.g_value) == (1.1, 0.5)

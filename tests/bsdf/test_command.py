@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from bim.radiance.cell import read_radiance_layer
 from mitsuba_cfs.bsdf.blinds import venetian_blind
 from mitsuba_cfs.bsdf.generate import generate_klems
-from mitsuba_cfs.bsdf.klems import KLEMS_QUARTER, KlemsBsdf
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_QUARTER, KlemsBsdf
 from mitsuba_cfs.bsdf.periodic import plastic, write_radiance
-from mitsuba_cfs.bsdf.radiance_geometry import read_radiance_layer
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from scenes.commands.bsdf import command
 from tests.conftest import OWN_BLIND
+
+POLYGON = " a polygon p 0 0 9 0 0 0 1 0 0 0 1 0"
 
 
 def run(*arguments: object, text: str | None = None):
@@ -68,6 +70,21 @@ def test_info_lists_bands_and_angles(real_data):
     assert "LBNL/Klems Full, 145 x 145" in text and "thickness: 65.7 mm" in text
     normal = next(line for line in text.splitlines() if "normal" in line).split()
     assert normal[2:] == ["0.6477", "0.1225", "0.6623", "0.0980"]  # the file inventory's figures
+
+
+def test_a_missing_band_is_stated_wherever_its_values_are_printed(tmp_path, dummy_back):
+    """tau_e and g_tot of a file with a Visible band alone are those of light."""
+    assert (
+        "note: no Solar band: results use the Visible band instead"
+        in run("info", dummy_back).stdout
+    )
+    flat = np.full((145, 145), 0.3 / np.pi)
+    shade = tmp_path / "shade.xml"
+    write_bsdf_xml(BsdfFile({"Visible": KlemsBsdf(KLEMS_FULL, KLEMS_FULL, *4 * [flat])}), shade)
+    alone = run("thermal", shade, "--place", "external", "--glazing", "C").stdout
+    shade.with_suffix(".toml").write_text("u_value = 1.3\ng_value = 0.4\n")
+    for text in (alone, run("thermal", shade).stdout):
+        assert "tau_e" in text and "shade has no Solar band; its Visible band is used" in text
 
 
 def test_check_finds_what_is_planted(dummy_back):
@@ -176,13 +193,15 @@ def test_a_radiance_scene_is_traced_as_the_same_slats(variant, tmp_path):
 @pytest.mark.parametrize(
     "text, message",
     [
-        ("void plastic a 0 0 5 .5 .5 .5 0 0", "no polygon"),
-        ("a polygon p 0 0 9 0 0 0 1 0 0 0 1 0", "unknown modifier"),
-        ("void glass a 0 0 3 .5 .5 .5", "got glass"),
-        ("void plastic a 0 0 5 .5 .5 .5 0", "expected 5 numbers"),
-        ("void plastic a 0 0 5 2 2 2 0 0", "more than it gets"),
-        ("!genbox a b 1 1 1", "command"),
-        ("void", "word 0"),
+        ("void plastic a 0 0 5 .5 .5 .5 0 0", "has no surface"),
+        ("a polygon p 0 0 9 0 0 0 1 0 0 0 1 0", "rad:1: polygon p: its modifier a is not"),
+        ("void plastic a 0 0 5 .5 .5 .5 0", "rad:1: .*its numbers"),
+        ("void plastic a 0 0 5 2 2 2 0 0" + POLYGON, "rad:1: .*more than it gets"),
+        ("void trans a 0 0 7 .5 .5 .5 0 .1 .5 .5" + POLYGON, "rad:1: .*lobe of roughness 0.1"),
+        ("void dielectric a 0 0 5 .9 .9 .9 1.5 0" + POLYGON, "rad:1: .*only clear ones"),
+        ("void BSDF a 6 0 x.xml 0 0 1 . 0 0" + POLYGON, "rad:1: .*BSDF is not traced"),
+        ("!gensky 6 21 12", "rad:1: .*gensky"),
+        ("void", "rad:1: no Radiance scene"),
     ],
 )
 def test_radiance_scenes_that_do_not_fit_give_one_line(tmp_path, text, message):

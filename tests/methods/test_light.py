@@ -8,6 +8,7 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 
+from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods.glare import hourly_glare, pictures, rated_pictures
@@ -109,8 +110,23 @@ def test_a_state_below_zero_is_refused() -> None:
 
 
 def test_optics_go_to_another_process_after_their_use() -> None:
-    known = BsdfOptics(read_bsdf_xml(VENETIAN_BLIND).band("Visible")), glass()[0][0]
+    leaves = TensorTree(4, np.ones(16, dtype=np.int64), np.full(16, 0.1))
+    tree = BsdfOptics(TensorTreeBsdf(transmission_front=leaves, transmission_back=leaves))
+    known = BsdfOptics(read_bsdf_xml(VENETIAN_BLIND).band("Visible")), glass()[0][0], tree
     for optics in known:
         _ = optics.paths, optics.scattering
         again = pickle.loads(pickle.dumps(optics))
         np.testing.assert_array_equal(again.transmission, optics.transmission)
+
+
+def test_states_of_all_hours_are_those_of_the_lit_hours() -> None:
+    sky = replace(SKY, hours=8760, lit=np.array([4001]))
+    light = daylight(scene(), [[*glass()[0], AngularOptics([0.0, 0.1])]], sky, sampling=FEW)
+    year = np.arange(sky.hours) % 2
+    dim = illuminance(light, year)
+    np.testing.assert_array_equal(dim, illuminance(light, year[sky.lit]))
+    assert (dim < illuminance(light)).all()
+    with pytest.raises(ValueError, match="whole numbers"):
+        illuminance(light, np.full(len(sky.lit), np.nan))
+    with pytest.raises(ValueError, match="of the year"):
+        illuminance(light, np.zeros(sky.hours + 1, dtype=int))

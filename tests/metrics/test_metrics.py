@@ -237,22 +237,22 @@ def test_room_metrics_use_each_standards_schedule():
     light = np.where(ten[:, None], [500.0, 500.0, 5.0], 0.0)
     direct = np.where(ten[:, None], [2000.0, 0.0, 0.0], 0.0)
     found = room_metrics(light, weather, direct_illuminance=direct)
-    np.testing.assert_array_equal(found.daylight_autonomy, [1, 1, 0])
-    assert found.spatial_daylight_autonomy == pytest.approx(2 / 3)
-    assert found.annual_sunlight_exposure == pytest.approx(1 / 3)
+    np.testing.assert_array_equal(found.daylight_autonomy, [100, 100, 0])
+    assert found.spatial_daylight_autonomy == pytest.approx(200 / 3)
+    assert found.annual_sunlight_exposure == pytest.approx(100 / 3)
     assert found.sunlit_hours[0] == 3650
     half = schedules.daylight_hours(weather)
     assert found.mean_illuminance[0] == pytest.approx(500 * (ten & half).sum() / 4380)
     assert found.daylight_provision.target_illuminance == 500
     table, room = found.by_sensor(), found.of_room()
-    assert list(table["daylight_autonomy"]) == [1, 1, 0] and table.index.name == "sensor"
-    assert room["en17037_target_lx"] == 500 and room["udi_300_3000"] == pytest.approx(2 / 3)
+    assert list(table["daylight_autonomy"]) == [100, 100, 0] and table.index.name == "sensor"
+    assert room["en17037_target_lx"] == 500 and room["udi_300_3000"] == pytest.approx(200 / 3)
     assert room_metrics(light, weather).annual_sunlight_exposure is None
     # 2005's limits: 100 and 2000 lx are useful, 2500 is not, though it is by those of 2012
     bounds = np.where(ten[:, None], [100.0, 2000.0, 2500.0, 99.0], 0.0)
     other = room_metrics(bounds, weather)
-    np.testing.assert_array_equal(other.useful_daylight_2005, [1, 1, 0, 0])
-    assert other.of_room()["udi_100_2000"] == 0.5 and other.of_room()["udi_300_3000"] == 0.5
+    np.testing.assert_array_equal(other.useful_daylight_2005, [100, 100, 0, 0])
+    assert other.of_room()["udi_100_2000"] == 50 and other.of_room()["udi_300_3000"] == 50
 
 
 def test_room_level_counts_the_daylight_hours():
@@ -262,7 +262,7 @@ def test_room_level_counts_the_daylight_hours():
     lit[np.flatnonzero(schedules.lm83_hours(weather))[::2]] = True
     lit[np.flatnonzero(schedules.lm83_hours(weather) & ~lit)[:175]] = True
     found = room_metrics(np.where(lit[:, None], 800.0, 0.0), weather)
-    assert lit.sum() == 2000 and found.spatial_daylight_autonomy == 1
+    assert lit.sum() == 2000 and found.spatial_daylight_autonomy == 100
     assert found.daylight_provision == en17037.DaylightProvision(0.0, 0.0)
 
 

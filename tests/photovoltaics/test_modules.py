@@ -178,3 +178,12 @@ def test_command_from_ifc_to_yield(variant, tmp_path, capsys):
         assert cli.run([*run, "--study", str(study)]) == 1
         error = [line for line in capsys.readouterr().err.splitlines() if "error" in line]
         assert len(error) == 1 and said in error[0], error
+
+
+def test_the_facade_comes_with_its_study(tmp_path) -> None:
+    from scenes.demo.make_facade import write_facade
+    from scenes.photovoltaics.study_file import read_pv_study
+
+    write_facade(tmp_path / "facade.ifc")
+    assert read_pv_study(tmp_path / "facade_pv.toml").module.cells > 1
+    assert "IFC4" in (tmp_path / "facade.ifc").read_text(encoding="utf-8")

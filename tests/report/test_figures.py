@@ -25,8 +25,10 @@ from scenes.figures.scale import (
     round_limits,
     round_values,
 )
+from scenes.language.numbers import percent
 from scenes.report.glare_figures import luminance_scale, outline
 from scenes.report.model3d import building_box, model3d, outline_edges
+from scenes.report.operation_figures import state_carpets
 from scenes.results import LuminancePicture
 from tests.report.synthetic import run_result, slab
 
@@ -240,3 +242,22 @@ def test_scale_of_luminance_holds_a_small_bright_source_of_one_picture() -> None
     assert (scale.low, scale.high) == pytest.approx((100_000 / 3000, 100_000))
     dark = luminance_scale([LuminancePicture(0, np.zeros((9, 9)), {"dgp": 0.2})])
     assert (dark.low, dark.high) == (1.0, 1000.0)
+
+
+def test_each_group_of_windows_has_its_carpet_of_states() -> None:
+    result = run_result(picture_size=32, pictures=1)
+    room = next(one for one in result.spaces if one.operation is not None)
+    assert [chart.title for chart in state_carpets(result, room)] == ["Shading state"]
+    states = room.operation.shading.states
+    shading = replace(
+        room.operation.shading, groups=("S", "door"), rules=("irradiance", "any"),
+        states=np.column_stack([states, 2 - states]),
+    )  # fmt: skip
+    two = replace(room, operation=replace(room.operation, shading=shading))
+    south, door = state_carpets(result, two)
+    assert (south.title, door.title) == ("Shading state: S", "Shading state: door")
+    assert "irradiance" in south.explanation and "several rules" in door.explanation
+    lit = result.sun[:, 2] > 0
+    for chart, column in ((south, states), (door, 2 - states)):
+        share = 100 * np.mean(column[lit] == 2)
+        assert f"closed <70°>: {percent(share)} %" in str(chart)

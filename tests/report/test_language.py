@@ -159,7 +159,12 @@ def test_longer_words_fit(result, tmp_path, language, width) -> None:
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize(
     "account",
-    [EVERYTHING, BLIND, replace(EVERYTHING, found=True), replace(BLIND, storeys=(), found=True)],
+    [
+        EVERYTHING,
+        BLIND,
+        replace(EVERYTHING, from_geometry=True),
+        replace(BLIND, storeys=(), from_geometry=True),
+    ],
     ids=["all", "none", "found", "nothing"],
 )
 def test_the_account_of_the_model_is_in_the_pages_language(result, language, account) -> None:

@@ -17,7 +17,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.light import eye_illuminance, illuminance, with_view
-from mitsuba_cfs.sky.sun import sun_directions
+from mitsuba_cfs.sky.sun import is_up, sun_directions
 from scenes.room.control_groups import control_groups
 from scenes.room.inputs import RoomInputs, room_inputs, skies_for
 from scenes.room.light import room_light
@@ -107,7 +107,7 @@ def test_each_facade_has_its_profile_angle(inputs, weather) -> None:
     found, sun = by_group(room), sun_directions(weather)
     for name, towards in (("S", -1.0), ("N", 1.0)):
         facing = towards * sun[:, 1]
-        shines = (facing > 0) & (weather.direct_normal > 0)
+        shines = (facing > 0) & (weather.direct_normal > 0) & is_up(sun)
         tangent = sun[:, 2] / np.where(shines, facing, 1.0)
         expected = np.full(len(sun), len(TILTS) - 1)
         for j in reversed(range(len(TILTS))):
@@ -235,6 +235,37 @@ def test_groups_by_window_facade_and_rule(inputs, weather) -> None:
     assert list(together) == ["all"]
 
 
+def test_rules_are_combined(inputs) -> None:
+    """The sun on the windows, and only from 8 to 18 o'clock; the blind waits before it opens."""
+    sun = {"rule": "irradiance", "close_above": 150.0}
+    used = {"rule": "schedule", "schedule": [0] * 8 + [2] * 10 + [0] * 6}
+    cut_off = CUT_OFF | {"sensor": "roof"}
+    single = [by_group(inputs(one)) for one in (sun, used, cut_off)]
+    both = by_group(inputs({"rule": "all", "parts": [sun, used]}))
+    nested = {"rule": "any", "parts": [{"rule": "all", "parts": [sun, used]}, cut_off]}
+    either = by_group(inputs(nested))
+    waiting = by_group(inputs(sun | {"open_delay_h": 2.0}))
+    resting = by_group(inputs(sun | {"hold_h": 4.0}))
+    for name in ("S", "N"):
+        by_sun, by_clock, by_angle = (states[name] for states in single)
+        assert np.array_equal(both[name], np.minimum(by_sun, by_clock))
+        assert np.array_equal(either[name], np.maximum(both[name], by_angle))
+        opens = np.flatnonzero(np.diff(waiting[name]) < 0) + 1
+        assert all(not by_sun[row - 2 : row + 1].any() for row in opens)
+        assert np.all(waiting[name] >= by_sun)
+        moves = np.flatnonzero(np.diff(resting[name]))
+        assert len(moves) < np.count_nonzero(np.diff(by_sun)) and np.diff(moves).min() >= 4
+
+
+def test_a_rule_against_glare_is_combined_with_others(inputs, skies) -> None:
+    glare = {"rule": "glare", "limit_lx": 1500.0}
+    alone = by_group(inputs(glare, skies=skies))
+    always = {"rule": "always", "state": 1}
+    both = by_group(inputs({"rule": "any", "parts": [glare, always]}, skies=skies))
+    for name, states in alone.items():
+        assert np.array_equal(both[name], np.maximum(states, 1))
+
+
 @pytest.mark.parametrize(
     ("control", "words"),
     [
@@ -270,6 +301,14 @@ def test_glare_at_a_seat_takes_the_most_open_combination(inputs, skies, looks_de
         openest = min(map(sum, fine))
         best = min((k for k in fine if sum(k) == openest), key=lambda k: eye[k][hour])
         assert chosen == best
+
+
+def test_a_wrong_part_of_a_rule_is_named() -> None:
+    parts = {"rule": "any", "parts": [{"rule": "always"}, {"rule": "always", "state": 5}]}
+    tables = OperationTables.model_validate({"control": parts})
+    assert tables.control_fault(2)[0] == "control.parts.1.state"
+    empty = OperationTables.model_validate({"control": {"rule": "all"}})
+    assert empty.control_fault(2)[0] == "control.parts"
 
 
 def test_a_room_that_was_sent_to_another_process_has_the_same_groups():

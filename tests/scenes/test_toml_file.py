@@ -101,7 +101,8 @@ def places(annotation: Any, place: Place = ()) -> Iterator[tuple[Place, Any]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield place, annotation
         for name, field in annotation.model_fields.items():
-            yield from places(field.annotation, (*place, name))
+            if name not in place or name != "parts":  # rules that combine rules: one level of them
+                yield from places(field.annotation, (*place, name))
     elif get_origin(annotation) is dict:
         keys = keys_of(annotation)
         yield place, annotation

@@ -17,6 +17,8 @@ from thermal.control import (
     by_irradiance,
     by_schedule,
     cut_off_angle,
+    delayed,
+    held,
     profile_angle,
     switched,
 )
@@ -60,6 +62,18 @@ def test_glare_closes_the_window_that_causes_it():
     # the large window stays open where closing the small one is enough
     dgp[1:3, 1] = 0.3, 0.1
     assert by_glare([0, 0.2, 0.8, 1], rated(dgp, 0.35, []), 4)[1] == 1
+
+
+def test_a_delay_holds_back_openings_alone():
+    asked = np.array([0, 2, 0, 0, 0, 1, 0, 1, 0, 0, 0])
+    assert delayed(asked, 0).tolist() == asked.tolist()
+    assert delayed(asked, 2).tolist() == [0, 2, 2, 2, 0, 1, 1, 1, 1, 1, 0]
+
+
+def test_a_state_holds_for_its_least_time():
+    asked = np.array([0, 1, 0, 1, 0, 0, 0, 1, 1])
+    assert held(asked, 1).tolist() == asked.tolist()
+    assert held(asked, 3).tolist() == [0, 1, 1, 1, 0, 0, 0, 1, 1]
 
 
 def test_cut_off_of_the_reference_blind():

@@ -14,7 +14,6 @@ from thermal.glazing import (
     Gap,
     en410_g_value,
     en673_u_value,
-    gap_resistance,
 )
 from thermal.gvalue import (
     InternalShade,
@@ -102,50 +101,6 @@ def test_g_below_transmittance_is_refused():
         thermal_data([0.47], [0.2], u_value=1.2, g_normal=0.3)
     with pytest.raises(ThermalInputError, match="U"):
         thermal_data([0.47], [0.2], u_value=12.0)
-
-
-def test_gap_resistance_keeps_u_and_follows_its_gas():
-    gap = Gap(0.016, (("argon", 0.9), ("air", 0.1)), (0.837, 0.03))
-    u = en673_u_value([0.004, 0.004], [gap])
-    follows = gap_resistance(u, gap)
-    assert follows.at(9.85, 15.0) == pytest.approx(1 / u - 0.17, rel=1e-9)
-    for mean, difference in ((-5.0, 25.0), (10.0, 8.0), (30.0, 15.0), (40.0, 30.0)):
-        own = 1 / gap.conductance(difference, mean_temperature=mean + 273.15) + 0.008
-        # six coefficients over a kink at Nu = 1: 6 %
-        assert follows.at(mean, difference) == pytest.approx(own, rel=0.06)
-    # a shade's air layer dampens it: the rest stays constant
-    shaded = gap_resistance(0.88, gap)
-    assert shaded.at(9.85, 15.0) == pytest.approx(1 / 0.88 - 0.17, rel=1e-9)
-    change = [r.at(-5.0, 25.0) / r.at(30.0, 15.0) for r in (follows, shaded)]
-    assert abs(change[1] - 1) < abs(change[0] - 1)
-    with pytest.raises(ThermalInputError, match=r"blind: U: 2 W/\(m2 K\) is above 1.11"):
-        gap_resistance(2.0, gap, item="blind")
-
-
-def test_inward_share_of_a_blind_by_direction():
-    """WINDOW's engine, exterior blind at 45 degrees: from g at normal incidence alone, the inward
-    share of sky light falls to 0.05 and that of ground light rises to 0.18; a constant one is 0.10.
-    """
-    tau = np.array([0.134, 0.043, 0.256])  # normal, mean of the sky's and the ground's directions
-    rho = np.array([0.281, 0.368, 0.154])
-    found = thermal_data(
-        tau, rho, u_value=1.02, g_normal=0.191, shading_position="external",
-        incidence=np.radians([0.0, 40.0, 40.0]),
-    ).g_value  # fmt: skip
-    share = (found - tau) / (1 - tau - rho)
-    assert share[0] == pytest.approx((0.191 - 0.134) / (1 - 0.134 - 0.281))
-    assert share[1:] == pytest.approx([0.05, 0.185], abs=0.025)
-    np.testing.assert_allclose(found, [0.191, 0.073, 0.365], atol=0.02)
-
-
-def test_inward_share_of_a_fabric_inside_by_direction():
-    """The engine's interior shade: diffuse g 0.377 from 0.424 at normal; a constant share: 0.40."""
-    tau, rho = np.array([0.053, 0.044]), np.array([0.322, 0.359])
-    incidence = np.radians([0.0, 58.0])  # where the glazing transmits as for diffuse light
-    found = thermal_data(
-        tau, rho, u_value=1.1, g_normal=0.424, shading_position="internal", incidence=incidence
-    ).g_value
-    assert found == pytest.approx([0.424, 0.377], abs=0.01)
 
 
 def test_position_of_a_shade_from_its_inward_share():

@@ -85,7 +85,7 @@ cooling_c = 26.0
         ('u_model = "gap"\n' + TRACE, "belong together"),
         (
             'u_model = "gap"\nu_value = 3.0\n[system.gap]\nwidth = 0.016\n' + TRACE,
-            "is above 1.11, what its gas gap alone",
+            "U = 3 is more than the layers let through",
         ),
         ("[loads]\nheating_limit_w = -5\n", "loads.heating_limit_w"),
         ("building = 3\n[[", "is not TOML"),

@@ -4,7 +4,7 @@
 
 Climates outside the reference set are run by EnergyPlus here and now (peer program needed):
 `--climates Reykjavik Sydney Malaga Lyon --orientations S E N W --no-sensitivity`.  Other closures:
-`--closures kuhn gap "gap place"`, see `reference_systems`.
+`--closures kuhn typical gap`, see `reference_systems`.
 
 Writes `energyplus.json` (every figure), `cases.csv` (each case) and the figures.
 """

@@ -1,33 +1,46 @@
-"""The reference room by `cfs study` in climates of one's own, against EnergyPlus run here.
+"""The reference room by study files of `cfs thermal`, as users write them, against EnergyPlus.
 
     python -m tests.validation energyplus_by_study FOLDER --reference DIR \
-        --climates ESP_Malaga.084820_SWEC.epw [...]
+        --climates FRA_Strasbourg.071900_IWEC.epw [...]
 
-Writes into FOLDER the BSDF files of three systems, an operation file of each that lets the room
-float and one that keeps 20 to 26 degC, and `study.toml`; runs it as `cfs study` does, light too,
-sun and sky traced.  EnergyPlus 25.2 computes the same room with its own layers and sun.
+Writes into FOLDER a BSDF file of each system and a study file for each case: the window by its
+`layers`, or by BSDF, U and g at normal incidence ("plain"), with the position of its shade
+("position"), with position and gas gap ("gap").  Each room floats, and is kept at 20 to 26 degC.
+EnergyPlus 25.2 computes the same rooms with its own layers and sun.
+
+Systems: those of the reference set, and the clear double glazing of ASHRAE 140 alone and with the
+interior shade, whose layers the program does not assume.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import pandas as pd
 
-from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
+from mitsuba_cfs.bsdf.glazing import Pane
+from mitsuba_cfs.bsdf.pane_stack import HEMISPHERE, hemispherical_mean, pane_optics, stack
 from mitsuba_cfs.bsdf.xml import write_bsdf_xml
-from scenes.study.study import run_study
-from scenes.study.study_file import read_study
+from mitsuba_cfs.progress import silent
+from scenes.fenestration.thermal_system import sun_in_layers
+from scenes.heat.study import run_study
+from scenes.heat.study_file import read_study
+from tests.validation.ashrae140_sun import ANGLES, PANE
 from tests.validation.differences import rmse_and_bias
 from tests.validation.energyplus_program import room_model, run_energyplus
 from tests.validation.energyplus_reference import loads
-from tests.validation.energyplus_study import FIRST_HOUR, STUDY
+from tests.validation.energyplus_study import COLUMNS, FIRST_HOUR, GLAZING, STUDY
 from tests.validation.energyplus_traced import traced_system
-from tests.validation.reference_systems import read_optics
+from tests.validation.reference_room import ORIENTATIONS
+from tests.validation.reference_systems import PLACES, SYSTEMS, Optics, layers, read_optics
+from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
+from thermal.iso15099 import STATED_G, iso15099_data, iso15099_g_values, prescribed
 
 PANES = """[[system.layers]]
 thickness = 0.006
@@ -40,84 +53,117 @@ conductivity = 0.9
 emissivity = [0.05, 0.84]
 solar = [0.60, 0.22, 0.17]
 """
+CLEAR_PANES = GLAZING[GLAZING.index("[[system.layers]]") :].rstrip() + "\n"
 BLIND = """[[system.layers]]
 slats = { width = 0.08, spacing = 0.072, tilt_deg = 45.0, thickness = 0.00045 }
 edges = [0.1, 0.1, 0.1, 0.1]
 gap = { width = 0.1 }
 """
-SHADE = """gap = { width = 0.05 }
-[[system.layers]]
+SHEET = """[[system.layers]]
 openness = 0.0
 thickness = 0.0005
 conductivity = 0.15
-edges = [0.05, 0.05, 0.05, 0.05]
 """
-LAYERS = {"dgu": PANES, "ext_blind": BLIND + PANES, "int_shade": PANES + SHADE}
+OUTSIDE = f"{SHEET}edges = [0.1, 0.1, 0.1, 0.1]\ngap = {{ width = 0.1 }}\n"
+INSIDE = f"gap = {{ width = 0.05 }}\n{SHEET}edges = [0.05, 0.05, 0.05, 0.05]\n"
+LAYERS = {
+    "dgu": PANES, "ext_blind": BLIND + PANES, "ext_shade": OUTSIDE + PANES,
+    "int_shade": PANES + INSIDE, "clear": CLEAR_PANES, "clear int_shade": CLEAR_PANES + INSIDE,
+}  # fmt: skip
+PATCHES = {"clear": ("clear_double",), "clear int_shade": ("clear_double", "int_shade")}
+POSITIONS = PLACES | {"clear": "none", "clear int_shade": "internal"}
+LOW_E_GAP = "gap = { width = 0.016, gas = { argon = 0.9, air = 0.1 }, emissivity = [0.84, 0.05] }\n"
+AIR_GAP = "gap = { width = 0.012, gas = { air = 1.0 }, emissivity = [0.84, 0.84] }\n"
+INPUTS = ("layers", "plain", "position", "gap")
 KEPT = "[loads]\nheating_c = 20\ncooling_c = 26\n"
-HEAT = ("heating_kwh", "cooling_kwh")
+SHADE = (0.10, 0.55)  # solar transmittance and reflectance of the sheet
 
 
-def write_files(
-    folder: Path, reference: Path, climates: Sequence[Path], orientations: Sequence[float]
-) -> Path:
-    """The study with all that it names."""
-    folder.mkdir(parents=True, exist_ok=True)
+@dataclass(frozen=True, slots=True)
+class KnownWindow:
+    """What a user knows of a system: its BSDF file, U and g at normal incidence."""
+
+    bsdf: str
+    u_value: float
+    g_normal: float
+
+
+def known_window(folder: Path, reference: Path, name: str) -> KnownWindow:
+    """The data of a system, its BSDF written into the folder."""
+    if name in SYSTEMS:
+        optics = read_optics(reference, name)
+        data = json.loads((reference / f"blackbox_{name}.json").read_text())
+        u, g = data["U"][0]["U"], float(optics.g[np.argmin(optics.theta)])
+        system = traced_system(name, optics)
+    else:
+        optics, unit = clear_system(shaded=name != "clear")
+        absorbed = sun_in_layers(unit, optics.tau[:1], optics.rho[:1], optics.theta[:1])
+        u = iso15099_data(unit).u_value
+        g = float(iso15099_g_values(unit, prescribed(*STATED_G), optics.tau[:1], absorbed)[0])
+        like = "int_shade" if name != "clear" else "dgu"
+        system = replace(traced_system(like, optics), closure=None)
+    write_bsdf_xml(
+        BsdfFile({"Visible": system.visible, "Solar": system.solar}, name=name),
+        folder / f"{name}.xml",
+    )
+    return KnownWindow(f"{name}.xml", float(u), float(g))
+
+
+def clear_system(*, shaded: bool) -> tuple[Optics, GlazingUnit]:
+    """Clear double glazing, with a grey sheet inside: reflections between both counted."""
+    thickness, tau, rho = PANE
+    pane = Pane("clear", tau, rho, rho)
+    glass, even = (stack([pane_optics(pane, angles)] * 2) for angles in (ANGLES, HEMISPHERE))
+    through, behind = (float(hemispherical_mean(v, HEMISPHERE)) for v in (even.tau, even.rho_back))
+    layer = GlazingLayer(thickness, 1.0, solar=(tau, rho, rho))
+    panes, gap = (layer, layer), GasGap(0.012)
+    if not shaded:
+        back = {"tau_back": through, "rho_back": behind}
+        return _optics(glass.tau, glass.rho_front, back), GlazingUnit(panes, (gap,))
+    passed, thrown = SHADE
+    bounce = 1.0 / (1.0 - thrown * behind)
+    back = {
+        "tau_back": passed * bounce * through,
+        "rho_back": thrown + passed**2 * behind * bounce,
+    }
+    optics = _optics(
+        glass.tau * passed * bounce, glass.rho_front + glass.tau * thrown * bounce * through, back
+    )
+    shade = layers("int_shade").layers[-1]
+    return optics, GlazingUnit((*panes, shade), (gap, GasGap(0.05)))
+
+
+def _optics(tau: np.ndarray, rho: np.ndarray, back: dict[str, float]) -> Optics:
+    none = np.zeros_like(ANGLES)
+    return Optics(ANGLES, None, tau, rho, none, np.zeros((2, 3)), None, back)
+
+
+def window_text(window: KnownWindow, name: str, inputs: str) -> str:
+    """The tables of the window in a study file."""
+    head = f'[[system]]\nbsdf = "{window.bsdf}"\n'
+    if inputs == "layers":
+        return f"{head}glazing_height = 1.5\n{LAYERS[name]}\n"
+    text = f"{head}u_value = {window.u_value:.4g}\ng_value = {window.g_normal:.4g}\n"
+    if inputs == "plain":
+        return text
+    text += f'shading_position = "{POSITIONS[name]}"\n'
+    return text if inputs == "position" else text + (AIR_GAP if "clear" in name else LOW_E_GAP)
+
+
+def study_text(epw: Path, orientation: str, window: str, more: str) -> str:
+    """The whole study file: the room of docs/tutorials/energyplus_room.toml."""
     room = STUDY.read_text(encoding="utf-8")
-    box = room[room.index("[box]") : room.index("[[system]]")].replace("[box", "[room.box")
-    use = room[room.index("[envelope]") : room.index("[trace]")]
-    head = [
-        f"orientations_deg = {list(orientations)}", 'methods = ["three-phase"]', 'glare = "none"',
-        "[options]", "sensor_spacing = 1.5", "[[room]]", 'name = "room"', box,
-    ]  # fmt: skip
-    for name, layers in LAYERS.items():
-        system = traced_system(name, read_optics(reference, name))
-        bands = {"Visible": system.visible, "Solar": system.solar}
-        write_bsdf_xml(BsdfFile(bands, name=name), folder / f"{name}.xml")
-        state = f'[[system]]\nbsdf = "{name}.xml"\nglazing_height = 1.5\n{layers}\n{use}'
-        for held, more in (("floating", ""), ("kept", KEPT)):
-            (folder / f"{name}_{held}.toml").write_text(state + more, encoding="utf-8")
-            head += ["[[system]]", f'name = "{name} {held}"', f'operation = "{name}_{held}.toml"']
-    for epw in climates:
-        head += ["[[climate]]", f'name = "{epw.stem}"', f'weather = "{epw.resolve().as_posix()}"']
-    study = folder / "study.toml"
-    study.write_text("\n".join(head) + "\n", encoding="utf-8")
-    return study
+    box = room[room.index("terrain") : room.index("[[system]]")]
+    use = room[room.index("[envelope]") :]
+    facing = f"facing_deg = {ORIENTATIONS[orientation]:.1f}"
+    box = box.replace("facing_deg = 180.0", facing)
+    return f'weather = "{epw.resolve().as_posix()}"\n{box}{window}{use}{more}'
 
 
-def ours(study: Path) -> dict[tuple[str, float, str], tuple[dict, np.ndarray]]:
-    """Figures and air [degC] of every case, by climate, orientation and name of the system."""
-    result = run_study(read_study(study), study.parent / "results")
-    if result.failed:
-        raise RuntimeError(result.first_error)
-    return {
-        (case.climate, case.orientation_deg, case.system):
-        (found.figures, found.arrays["temperature/air_c"])
-        for case, found in zip(result.plan.cases, result.results, strict=True)
-    }  # fmt: skip
-
-
-def compared(
-    folder: Path, reference: Path, climates: Sequence[Path], orientations: Sequence[str]
-) -> pd.DataFrame:
-    """A row for each climate, orientation and system."""
-    turns = {"S": 0.0, "W": 90.0, "N": 180.0, "E": 270.0}
-    found = ours(write_files(folder, reference, climates, [turns[one] for one in orientations]))
-    rows = []
-    for epw in climates:
-        for orientation in orientations:
-            for name in LAYERS:
-                key = epw.stem, turns[orientation]
-                _, air = found[(*key, f"{name} floating")]
-                kept, _ = found[(*key, f"{name} kept")]
-                theirs = run_energyplus(room_model(orientation, name), epw)["T_air"].to_numpy()
-                needs = list(loads(name, orientation, epw).values())
-                rmse, bias = rmse_and_bias(air[FIRST_HOUR:], theirs[FIRST_HOUR:])
-                row = {"climate": epw.stem, "facing": orientation, "system": name,
-                       "air RMSE": rmse, "bias": bias}  # fmt: skip
-                for what, other in zip(HEAT, needs, strict=True):
-                    row |= {what: kept[what], f"{what} E+": other}
-                rows.append(row)
-    return pd.DataFrame(rows)
+def our_year(study: Path) -> pd.DataFrame:
+    """The hours of a study's room, as `cfs thermal` writes them."""
+    (year,), _ = run_study(read_study(study), silent)
+    return year.hours
 
 
 def main(
@@ -126,7 +172,60 @@ def main(
     reference: Path,
     climates: Sequence[Path],
     orientations: Annotated[Sequence[str], ("S", "W", "N", "E")] = ("S", "W"),
-) -> pd.DataFrame:
-    """A row for each climate, orientation and system."""
-    variants.activate()
-    return compared(folder, reference, climates, orientations)
+    systems: Annotated[Sequence[str], tuple(LAYERS)] = tuple(LAYERS),
+    inputs: Annotated[Sequence[str], INPUTS] = INPUTS,
+) -> dict[str, pd.DataFrame]:
+    """Every case, and the root mean squares by system and inputs."""
+    folder.mkdir(parents=True, exist_ok=True)
+    known = {name: known_window(folder, reference, name) for name in systems}
+    rows = []
+    for epw in climates:
+        for orientation in orientations:
+            for name in systems:
+                patches = PATCHES.get(name, (name,))
+                theirs = run_energyplus(room_model(orientation, *patches), epw)
+                needs = list(loads(patches, orientation, epw).values())
+                for kind in inputs:
+                    row: dict[str, object] = {
+                        "climate": epw.stem, "facing": orientation, "system": name, "inputs": kind,
+                    }  # fmt: skip
+                    window = window_text(known[name], name, kind)
+                    for held, more in (("floating", ""), ("kept", KEPT)):
+                        study = folder / f"{epw.stem} {orientation} {name} {kind} {held}.toml"
+                        study.write_text(study_text(epw, orientation, window, more), "utf-8")
+                        hours = our_year(study)
+                        if held == "floating":
+                            row |= _apart(hours, theirs)
+                        else:
+                            row |= _loads(hours, needs)
+                    rows.append(row)
+    table = pd.DataFrame(rows)
+    return {"Cases": table, "By system": _by_system(table)}
+
+
+def _apart(hours: pd.DataFrame, theirs: pd.DataFrame) -> dict[str, float]:
+    row: dict[str, float] = {}
+    for name, (our_column, column) in COLUMNS.items():
+        values = hours[our_column].to_numpy()[FIRST_HOUR:], theirs[column].to_numpy()[FIRST_HOUR:]
+        row[name], row[f"{name} bias"] = rmse_and_bias(*values)
+    return row
+
+
+def _loads(hours: pd.DataFrame, theirs: Sequence[float]) -> dict[str, float]:
+    row: dict[str, float] = {}
+    for column, other in zip(("heating_w", "cooling_w"), theirs, strict=True):
+        what = column.removesuffix("_w")
+        row[what], row[f"{what} E+"] = float(hours[column].sum()) / 1e3, other
+    return row
+
+
+def _by_system(table: pd.DataFrame) -> pd.DataFrame:
+    """RMS of air and window [K], and the sums of heating and cooling over EnergyPlus'."""
+    rows = []
+    for (system, kind), cases in table.groupby(["system", "inputs"], sort=False):
+        row: dict[str, object] = {"system": system, "inputs": kind}
+        row |= {name: float(np.sqrt((cases[name] ** 2).mean())) for name in COLUMNS}
+        row |= {what: cases[what].sum() for what in ("heating", "heating E+")}
+        row |= {what: cases[what].sum() for what in ("cooling", "cooling E+")}
+        rows.append(row)
+    return pd.DataFrame(rows)

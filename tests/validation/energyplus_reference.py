@@ -55,9 +55,9 @@ def hours(system: str, orientation: str, epw: Path) -> pd.DataFrame:
     return table
 
 
-def loads(system: str, orientation: str, epw: Path) -> dict[str, float]:
-    """Heating and cooling of one case's year [kWh]."""
-    model = room_model(orientation, system, "ideal_loads_20_26", outputs=LOADS)
+def loads(patches: Sequence[str], orientation: str, epw: Path) -> dict[str, float]:
+    """Heating and cooling of one case's year [kWh]; patches: of its window, see `room_model`."""
+    model = room_model(orientation, *patches, "ideal_loads_20_26", outputs=LOADS)
     table = run_energyplus(model, epw, outputs=LOADS)
     return {name: float(table[name].sum()) / JOULES for name in LOADS.values()}
 
@@ -70,7 +70,7 @@ def write_climate(
     table = pd.concat([hours(*case, epw) for case in cases], ignore_index=True)
     table = table.astype({"cfs": "category", "ori": "category"})
     rows = [
-        {"climate": name, "cfs": system, "ori": orientation} | loads(system, orientation, epw)
+        {"climate": name, "cfs": system, "ori": orientation} | loads((system,), orientation, epw)
         for system, orientation in cases
     ]
     out.mkdir(parents=True, exist_ok=True)

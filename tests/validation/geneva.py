@@ -7,7 +7,9 @@ FOLDER holds `validations/base1compdv` of stephanwaz/raytraverse: scene, views, 
 the brute-force reference of 2,022 hours.  By functions: the five-phase method of `import
 mitsuba_cfs` under the reference's own skies, rated as raytools sums (pixel by pixel) and as
 evalglare groups; fabric and panes are described in `geneva_scene`.  By command: `cfs dgp FILE.rad
---weather EPW`, every hour of the year, the scene's files as they are.  Errors as raytraverse
+--weather EPW`, every hour of the year, the scene's files as they are.  The irradiances of the EPW
+are those of the reference's sky; its dew point is not, which `gendaylit -ang` takes as 11 degC for
+the luminous efficacies (`--dew-point gendaylit` writes it into the EPW).  Errors as raytraverse
 publishes them: over the hours whose reference DGP is 0.25 to 0.75, the mean absolute difference of
 DGP, and of Ev as a share of it.
 """
@@ -30,11 +32,13 @@ import bim
 import mitsuba_cfs as cfs
 from mitsuba_cfs.images.view import format_view
 from mitsuba_cfs.methods.phase_matrices import with_eye, with_needs
+from mitsuba_cfs.sky.matrix import DEFAULT_DEW_POINT_C
 from tests.validation import geneva_scene as geneva
 from tests.validation.differences import mean_absolute
 
 FOLDER = Path(__file__).parents[3] / "shared" / "reference" / "geneva_office"
 RANGE = (0.25, 0.75)  # of the reference's DGP
+EPW_HEAD, EPW_DEW_POINT = 8, 7  # lines of an EPW before its hours; column
 
 
 def by_functions(
@@ -61,7 +65,9 @@ def by_functions(
         yield pd.DataFrame(columns, index=hours).assign(core_s=seconds)
 
 
-def by_command(folder: Path, case: str, views: Sequence[int], size: int) -> Iterator[pd.DataFrame]:
+def by_command(
+    folder: Path, case: str, views: Sequence[int], size: int, dew_point: str
+) -> Iterator[pd.DataFrame]:
     """The same by `cfs dgp`, with the sun and the ground of the reference's sky."""
     for number in views:
         with tempfile.TemporaryDirectory() as temporary:
@@ -69,10 +75,13 @@ def by_command(folder: Path, case: str, views: Sequence[int], size: int) -> Iter
             for part in ("options", "RAD"):
                 shutil.copytree(folder / part, scene.with_name(part))
             shutil.copy(folder / "roos_fabric.cal", scene.parent)
+            weather = folder / "refs" / "geneva.epw"
+            if dew_point == "gendaylit":
+                weather = with_dew_point(weather, scene.parent, DEFAULT_DEW_POINT_C)
             files = f"options/{geneva.CASES[case]}.rad", "RAD/office.rad"
             scene.write_text("".join(f"!xform {file}\n" for file in files))
             words = [
-                "dgp", scene, "--weather", folder / "refs" / "geneva.epw", "--out", out,
+                "dgp", scene, "--weather", weather, "--out", out,
                 "--view", format_view(geneva.view(folder, number, size)), "--size", size,
                 "--sun-model", "radiance", "--sky-ground", "gendaylit", "--worst", 0,
             ]  # fmt: skip
@@ -89,6 +98,18 @@ def by_command(folder: Path, case: str, views: Sequence[int], size: int) -> Iter
         time = pd.DatetimeIndex(table.index)
         table.index = (time.dayofyear - 1) * 24 + time.hour
         yield table
+
+
+def with_dew_point(epw: Path, folder: Path, dew_point_c: float) -> Path:
+    """A copy of an EPW whose dew point is the same all year."""
+    lines = epw.read_text().splitlines()
+    for i, line in enumerate(lines[EPW_HEAD:], EPW_HEAD):
+        cells = line.split(",")
+        cells[EPW_DEW_POINT] = f"{dew_point_c:g}"
+        lines[i] = ",".join(cells)
+    copy = folder / epw.name
+    copy.write_text("\n".join(lines) + "\n")
+    return copy
 
 
 def error_row(table: pd.DataFrame, folder: Path, case: str, number: int) -> dict[str, object]:
@@ -114,12 +135,13 @@ def main(
     views: Annotated[Sequence[int], geneva.VIEWS] = geneva.VIEWS,
     every: Annotated[int, "of the 2,022 hours; by functions"] = 20,
     size: Annotated[int, "[px]"] = 300,
+    dew_point: Annotated[str, ("epw", "gendaylit")] = "epw",
 ) -> pd.DataFrame:
     """A row for each case and view."""
     rows = []
     for case in cases:
         if by == "command":
-            tables = by_command(folder, case, views, size)
+            tables = by_command(folder, case, views, size, dew_point)
         else:
             tables = by_functions(folder, case, views, every, size)
         rows += [error_row(t, folder, case, v) for v, t in zip(views, tables, strict=True)]

@@ -4,16 +4,15 @@ A closure turns the same measurable data into the two-layer model:
 
     kuhn      plain Kuhn: nominal films 0.04 and 0.13, R constant from U
     linear    the same with U linear in temperature (Fener)
-    gap       the same with R following the gas gap by EN 673, at the level of U
     surface   R(T_m, dT) in place of a constant
     films     R(T_m, dT), and the resistances that the system's faces really have
-    place     plain Kuhn with the films that a shade in its place typically has
-    gap place `gap` with those films
-    normal    `place`, with g at normal incidence alone: g by direction as a study has it
-    constant  the same with one inward share for all directions, and nominal films
     layers    our own ISO 15099: U, g, R(T_m, dT) and films from the layers; the set's tau and rho
+    typical   U and g at normal incidence, tau and rho, position of the shade: as a study has them
+    gap       the same and the gas gap
+    by direction   the same as typical, with g by direction
+    constant, linear U   the same as typical, with R constant and U linear as stated models
 
-All but `place`, `gap place` and `layers` take U, g and films of WINDOW's engine.
+All but `layers` take U and g of WINDOW's engine, `kuhn` to `films` g by direction.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.pane_stack import hemispherical_mean
 from mitsuba_cfs.directions import incident_azimuth
-from scenes.fenestration.thermal_system import sun_in_layers
+from scenes.fenestration.thermal_system import sun_in_layers, window_model
 from tests.validation.ashrae140_sun import ANGLES, glass
 from thermal.blackbox import (
     R_INNER,
@@ -40,16 +39,15 @@ from thermal.blackbox import (
     with_realised_films,
 )
 from thermal.closure import Closure
-from thermal.glazing import Gap, gap_resistance
+from thermal.glazing import Gap
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
-from thermal.gvalue import thermal_data
 from thermal.iso15099 import iso15099_data, yearly_g_values
 from thermal.shade_layers import sheet_layer, venetian_layer
 
 FloatArray = NDArray[np.float64]
 SYSTEMS = ("dgu", "ext_blind", "ext_shade", "int_shade")
-CLOSURES = ("kuhn", "linear", "gap", "surface", "films", "place", "gap place", "layers",
-            "normal", "normal gap", "constant")  # fmt: skip
+STATED = ("typical", "gap", "by direction", "constant", "linear U")  # from g at normal incidence
+CLOSURES = ("kuhn", "linear", "surface", "films", "layers", *STATED)
 GAP = Gap(0.016, (("argon", 0.9), ("air", 0.1)), (0.84, 0.05))  # of the set's glazing
 REALISED_STATE = 0  # of the U list: 0/20 degC
 PLACES = {"dgu": "none", "int_shade": "internal", "ext_blind": "external", "ext_shade": "external"}
@@ -179,23 +177,30 @@ def _of_layers(folder: Path, name: str, optics: Optics) -> tuple[Closure, float,
         absorbed = sun_in_layers(unit, tau, rho, theta)
         return yearly_g_values(unit, tau, absorbed)
 
-    found = g(optics.tau, optics.rho, optics.theta)
-    diffuse = optics.diffuse.copy()
-    if optics.phi is None:
-        diffuse[:, 2] = hemispherical_mean(found, optics.theta)
-    else:
-        diffuse[:, 2] = _halves(folder, optics.phi, found[None])[:, 0]
-    found = replace(optics, g=found, diffuse=diffuse)
+    found = _with_g(folder, optics, g(optics.tau, optics.rho, optics.theta))
     return Closure("layers", unit=unit), iso15099_data(unit).u_value, found
 
 
-def _normal_g(folder: Path, optics: Optics, position: str) -> Optics:
-    """Optics whose g by direction follows from that at normal incidence alone."""
-    first = int(np.argmin(optics.theta))
-    g = thermal_data(
-        optics.tau, optics.rho, u_value=1.0, g_normal=float(optics.g[first]), normal=first,
-        shading_position=position, incidence=optics.theta,
-    ).g_value  # fmt: skip
+def _of_stated(
+    folder: Path, name: str, optics: Optics, u_value: float, closure: str
+) -> tuple[Closure, Optics]:
+    """Closure and optics with g by direction, from U and g at normal incidence alone."""
+    order = np.argsort(optics.theta, kind="stable")  # the first direction is the normal
+    model = {"by direction": "typical", "linear U": "linear"}.get(closure, closure)
+    window = window_model(
+        optics.tau[order], optics.rho[order], optics.theta[order], PLACES[name],
+        Closure(model, gap=GAP if model == "gap" else None),
+        u_value=u_value, g_normal=float(optics.g[order[0]]), item=name,
+    )  # fmt: skip
+    if closure == "by direction":
+        return window.closure, optics
+    g = np.empty_like(optics.g)
+    g[order] = window.data.g_value
+    return window.closure, _with_g(folder, optics, g)
+
+
+def _with_g(folder: Path, optics: Optics, g: FloatArray) -> Optics:
+    """Optics with g [K] by direction, and its means over the light of sky and ground."""
     diffuse = optics.diffuse.copy()
     if optics.phi is None:
         diffuse[:, 2] = hemispherical_mean(g, optics.theta)
@@ -222,23 +227,14 @@ def system(
     u = state["U"] if u_value is None else u_value
     emissivity = 0.84 if name in ("dgu", "ext_blind", "ext_shade") else 0.9
     outside = 0.9 if name.startswith("ext") else 0.84
-    if closure == "gap":
-        resistance: LayerResistance | None = gap_resistance(u, GAP, item=name)
-    else:
-        resistance = {"kuhn": None, "linear": linear_u(u)}.get(
-            closure, LayerResistance("surface", tuple(fit))
-        )
+    resistance = {"kuhn": None, "linear": linear_u(u)}.get(
+        closure, LayerResistance("surface", tuple(fit))
+    )
     plain = Fenestration(
         name, u, R_OUTER, R_INNER, resistance, emissivity_in=emissivity, emissivity_out=outside
     )
-    if closure in ("normal", "normal gap", "constant"):
-        position = "none" if closure == "constant" else PLACES[name]
-        optics = _normal_g(folder, optics, position)
-    if closure == "constant":
-        plain = replace(plain, resistance=None)
-    if closure in ("place", "gap place", "normal", "normal gap"):
-        u_model = "gap" if "gap" in closure else "constant"
-        known = Closure(u_model, gap=GAP if u_model == "gap" else None).for_place(PLACES[name])
+    if closure in STATED:
+        known, optics = _of_stated(folder, name, optics, u, closure)
         plain = known.close(replace(plain, resistance=None))
     if closure == "layers":
         known, u, optics = _of_layers(folder, name, optics)

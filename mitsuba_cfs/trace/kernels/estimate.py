@@ -11,6 +11,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.errors import check_number
 from mitsuba_cfs.matrices.cache import BatchMean, CacheEntry, MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 
@@ -65,10 +66,11 @@ class Stopping:
     max_batches: int = 100_000
 
     def __post_init__(self) -> None:
-        if self.batches < 2:
-            raise ValueError(
-                f"batches: at least 2 are needed for a standard error, got {self.batches}"
-            )
+        check_number("batches", self.batches, 2, whole=True)  # for a standard error
+        check_number("max_batches", self.max_batches, 1, whole=True)
+        for name in ("target_error", "time_limit"):
+            if getattr(self, name) is not None:
+                check_number(name, getattr(self, name), 0.0)
 
 
 def joined(estimates: Sequence[Estimate]) -> Estimate:

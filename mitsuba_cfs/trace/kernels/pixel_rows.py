@@ -157,15 +157,15 @@ class SharedLight:
         self._total = np.bincount(place, total, minlength=len(self._key))
         self._count = np.bincount(place, count, minlength=len(self._key))
 
-    def smoothed(self, step: int, mine: NDArray[np.bool_] | None = None) -> SharedLight:
+    def smoothed(self, step: int, chosen: NDArray[np.bool_] | None = None) -> SharedLight:
         """Weighted 1 2 1 with the tiles `step` away in both directions, on the same face.
 
-        Args: mine: which tiles [n] (in the order of `faces`) to smooth, all by default.
+        Args: chosen: which tiles [n] (in the order of `faces`) to smooth, all by default.
         """
         near = neighbours(self.tiles, self._key, step)
-        if mine is not None:
-            own = sparse.diags_array(np.where(mine, 0.0, 4.0))
-            near = sparse.diags_array(mine.astype(float)) @ near + own
+        if chosen is not None:
+            others = sparse.diags_array(np.where(chosen, 0.0, 4.0))
+            near = sparse.diags_array(chosen.astype(float)) @ near + others
         return SharedLight(self.tiles, self._key, near @ self._total, near @ self._count)
 
     @property

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup, even_numbers, points_on_triangles
 from mitsuba_cfs.trace.kernels.bins import SkyBins
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
@@ -32,6 +32,9 @@ from mitsuba_cfs.trace.kernels.sampling import (
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import SceneCache, TracedScene
 from mitsuba_cfs.trace.matrices.daylight import add_daylight_paths
+
+FAR = 0.5  # of the root of a group's area, from which all rays are drawn to its area
+POINTS = 64  # of a window, for its distance
 
 
 def straight_view_matrix(
@@ -113,6 +116,10 @@ def straight_rays(
 ) -> tuple[mi.UInt32, mi.Point3f, mi.Vector3f, mi.Float]:
     """Rays of sensors [S * samples] straight through a window group.
 
+    Some are drawn to points of the group's area, others by the sensor's cosine: the former alone
+    are as noisy as the inverse square of the distance near the glass (balance heuristic of Veach,
+    Guibas 1995, with `hemisphere_shares`).
+
     Args: sensors: positions and normals [S, 3].
 
     Returns: sensor, start just outdoors, direction; the weight [sr, projected] of a
@@ -123,17 +130,46 @@ def straight_rays(
     lane = dr.arange(mi.UInt32, len(place) * samples)
     sensor = lane // count
     stream = mi.sample_tea_32(sensor, key)[0]
-    target = inside.sample_group(group, lattice_2d(lane - sensor * count, stream, 0))
+    number = lane - sensor * count
+    u = lattice_2d(number, stream, 0)
     start = dr.gather(mi.Point3f, vectors(place - inside.centre, mi.Point3f), sensor)
-    to_target = target - start
-    distance = dr.norm(to_target)
-    omega = mi.Vector3f(to_target / distance)
+    away = dr.gather(mi.Vector3f, vectors(normal), sensor)
+    by_area = mi.Float(hemisphere_shares(inside.groups[group], place).astype(np.float32))
+    share = dr.gather(mi.Float, by_area, sensor)
+    by_cosine = mi.Float(number) < share * mi.Float(count)
+    to_target = inside.sample_group(group, u) - start
+    turned = mi.Frame3f(away).to_world(mi.warp.square_to_cosine_hemisphere(u))
+    omega = mi.Vector3f(dr.select(by_cosine, turned, dr.normalize(to_target)))
+    reach = dr.select(by_cosine, dr.largest(mi.Float), dr.norm(to_target) * (1 - 1e-4))
+    ray = mi.Ray3f(start, omega, reach, 0.0, [])
+    hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=True)
+    is_window = dr.gather(mi.Int32, inside.group, hit.prim_index, hit.is_valid()) == opaque(
+        group, mi.Int32
+    )
+    distance = dr.select(by_cosine, hit.t, dr.norm(to_target))
     local = inside.to_group(group, omega)
-    cosine = dr.dot(dr.gather(mi.Vector3f, vectors(normal), sensor), omega)
+    cosine = dr.dot(away, omega)
     seen = (cosine > 0) & (local.z > 1e-4)
-    shadow = mi.Ray3f(start, omega, distance * (1 - 1e-4), 0.0, [])
-    seen &= ~inside.scene.ray_test(shadow, coherent=False, active=seen)
-    weight = cosine * local.z / dr.square(distance) * way.through(local)
-    weight *= opaque(inside.groups[group].area)
+    seen &= dr.select(by_cosine, hit.is_valid() & is_window, ~hit.is_valid())
+    area = opaque(inside.groups[group].area)
+    density = (1 - share) * dr.square(distance) / (area * local.z) + share * cosine * dr.inv_pi
+    weight = cosine * way.through(local) / density
+    target = start + omega * dr.select(seen, distance, 0)
     beyond = mi.Point3f(target + inside.outward(opaque(group, mi.Int32), mi.Bool(True)))
     return sensor, beyond, omega, dr.select(seen, weight, 0.0)
+
+
+def hemisphere_shares(group: WindowGroup, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share [S] of a sensor's rays that are drawn by its cosine: 1/2 at the glass, 0 far from it.
+
+    Far is half the root of the group's area.
+    """
+    reach = FAR * np.sqrt(group.area)
+    nearest = np.full(len(places), np.inf)
+    for window in group.windows:
+        points = points_on_triangles(window.triangles, even_numbers(POINTS))[0]
+        apart = places[:, None] - points
+        across = np.linalg.norm(apart, axis=2).min(axis=1)
+        normal = np.abs(apart @ window.normal).min(axis=1)
+        nearest = np.minimum(nearest, np.where(across < reach, normal, across))
+    return np.asarray(0.5 * np.clip(1.0 - nearest / reach, 0.0, 1.0))

@@ -30,6 +30,7 @@ CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that pa
 # Shares of a room path's directions that aim at windows and near the sun; the rest follows the
 # cosine.  After a reflection they must be few: weights grow by 1 / rest each time, and their mean
 # square stays finite only where rest > reflectance^2
+NEAR = 1e-3  # of its distance, within which a path has met the point that it aims at
 TO_WINDOW, TO_SUN = (0.5, 0.2), (0.15, 0.05)  # (first, later)
 
 
@@ -54,22 +55,23 @@ def leave(
     active: mi.Bool,
     *,
     later: bool = False,
-) -> tuple[mi.Vector3f, mi.Bool]:
-    """A direction from a diffuse vertex, and whether it aims at a window.
+) -> tuple[mi.Vector3f, mi.Float]:
+    """A direction from a diffuse vertex, and the distance of the window point that it aims at.
 
-    Cosine-distributed; in the room some directions aim at the windows and some near the sun, fewer
-    from `later` vertices of a path.
+    The distance is 0 where it aims at none.  Cosine-distributed; in the room some directions aim at
+    the windows and some near the sun, fewer from `later` vertices of a path.
     """
     window_share, sun_share = TO_WINDOW[later], TO_SUN[later]
     choice = dr.select(vertex.outdoors, 1.0, choice)
     cosine = mi.Frame3f(vertex.normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
     point, _ = room.inside.sample_window(u, active & ~vertex.outdoors)
-    to_window = dr.normalize(mi.Vector3f(point - vertex.position))
+    to_window = mi.Vector3f(point - vertex.position)
+    distance = dr.norm(to_window)
     to_sun = mi.Frame3f(sky.sun).to_world(mi.warp.square_to_uniform_cone(u, CONE_COSINE))
     aimed = choice < window_share
-    direction = dr.select(aimed, to_window, cosine)
+    direction = dr.select(aimed, to_window / distance, cosine)
     near_sun = ~aimed & (choice < window_share + sun_share)
-    return dr.select(near_sun, to_sun, direction), aimed
+    return dr.select(near_sun, to_sun, direction), dr.select(aimed, distance, 0.0)
 
 
 def _density(
@@ -84,8 +86,8 @@ def _density(
 ) -> mi.Float:
     """Density [1/sr] of the directions of `leave` in the room.
 
-    A path that aims at a window and meets something else first is dropped, so only directions that
-    meet a window have that part of the density.
+    A path that aims at a window and meets something else first, such as a fabric behind it, is
+    dropped, so only directions that meet a window have that part of the density, for that window.
     """
     window = dr.select(
         glass_cosine > 1e-4,
@@ -206,7 +208,7 @@ def add_paths(
     *,
     cosine: mi.Float,  # at the diffuse vertex in the room that the path starts on; 0 for none
     came: mi.Float,  # cosine over pi at a diffuse vertex anywhere; 0 for none
-    aimed: mi.Bool,  # whether the first direction aims at a window
+    aimed: mi.Float,  # distance of the point of a window that the first direction aims at, or 0
     beta: mi.Float,  # initial weight of the path
     outdoors: mi.Bool,  # where the path starts
 ) -> None:
@@ -224,7 +226,8 @@ def add_paths(
         within = active & ~outdoors
         hit_in = room.inside.scene.ray_intersect_preliminary(ray, coherent=False, active=within)
         beyond = active & outdoors
-        hit_out = room.outside.scene.ray_intersect_preliminary(ray, coherent=False, active=beyond)
+        hit_out, before_hit = room.outside.met_outdoors(origin, direction, beyond)
+        origin = dr.select(beyond, before_hit, origin)
         to_sky = beyond & ~hit_out.is_valid()
         sky.add(result, row, direction, beta, to_sky)
         active &= dr.select(outdoors, hit_out.is_valid(), hit_in.is_valid())
@@ -234,7 +237,8 @@ def add_paths(
         group_out = dr.gather(mi.Int32, room.outside.group, hit_out.prim_index, active & outdoors)
         group = dr.select(outdoors, group_out, group_in)
         glazed = active & (group != OPAQUE)
-        active &= glazed | ~(aimed & diffuse)
+        there = glazed & (dr.abs(t - aimed) < NEAR * aimed)
+        active &= there | ~((aimed > 0) & diffuse)
         local = room.inside.to_local(group, direction, glazed)
         facing = dr.select(outdoors, -local.z, local.z) > 1e-4  # windows are one-sided
         active &= ~glazed | facing
@@ -255,7 +259,7 @@ def add_paths(
         sunlit = glazed & (scattered > 0) & (sky.sun_radiance > 0)
         before = mi.Point3f(point + room.inside.outward(group, glazed))
         sun_ray = mi.Ray3f(before, towards)
-        sunlit &= ~room.outside.scene.ray_test(sun_ray, coherent=False, active=sunlit)
+        sunlit &= ~room.outside.hides(sun_ray, sunlit)
         from_sun = scattered * float(SUN_SOLID_ANGLE) * sky.sun_radiance
         dr.scatter_add(result, mi.Float64(beta * from_sun), row, sunlit)
         if dr.hint(room.glossy, mode="scalar"):
@@ -289,7 +293,7 @@ def add_paths(
                 room, vertex, prim, direction, rho=rho, generator=generator, active=opaque
             )
             away, beta_face = dr.select(glossy, mirrored, away), beta * weight
-            aimed &= ~glossy
+            aimed = dr.select(glossy, 0.0, aimed)
         cosine = dr.select(opaque, dr.dot(away, face), 0.0)
         came = dr.select(opaque & ~glossy, cosine * dr.inv_pi, dr.select(straight, came, 0.0))
         # outdoors the cosine of a diffuse vertex cancels at once

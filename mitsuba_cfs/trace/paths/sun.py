@@ -88,7 +88,7 @@ def straight_to_sky(
     else:
         active &= outdoors
     ray = mi.Ray3f(start, towards)
-    free = active & ~room.outside.scene.ray_test(ray, coherent=False, active=active)
+    free = active & ~room.outside.hides(ray, active)
     return dr.select(free, tau, 0.0)
 
 

@@ -49,7 +49,7 @@ LEAST_PATHS = 64  # of a face in a tile: slivers have few rays
 
 @dataclass(frozen=True, slots=True)
 class RoomShown:
-    """A room behind glass and the outdoors behind its windows, in the n pixels of a view.
+    """An adjacent room and the outdoors seen through its windows, in the n pixels of a view.
 
     L = seen (T D - diag(tau) D) s + faces irradiance T D s + (sky + outdoor_faces reflected) s
     """
@@ -60,7 +60,7 @@ class RoomShown:
     irradiance: NDArray[np.float32]  # [C, N] of these per unit luminance of the windows
     luminance: NDArray[np.float32]  # [N, P] of the windows towards the room, T D
     sky: sparse.csr_array  # [n, P] share of sky and ground
-    outdoor_faces: sparse.csr_array  # [n, C] as `faces`, of what stands outdoors
+    outdoor_faces: sparse.csr_array  # [n, C] as `faces`, of the surroundings
     reflected: sparse.csr_array  # [C, P] irradiance of these
 
     def add_to(self, values: NDArray[np.float32], sky: NDArray[np.floating]) -> None:
@@ -89,7 +89,7 @@ def adjacent_picture(
 
     Args:
         interior, groups: of the eye's room.
-        behind: the rooms behind its glass.
+        behind: the rooms that are seen through its glass.
         subdivision: Reinhart's MF of the sky.
         samples: rays of each pixel.
         tile: pixels across of the squares that share reflected light, by default `tile_size`.
@@ -149,7 +149,7 @@ def _panes(beams: NDArray[np.float64]) -> list[KlemsScattering]:
 
 
 class _MetInRoom:
-    """Accumulates hits of rays in a room and behind its windows: patches, points on surfaces."""
+    """Accumulates hits of rays in a room and outside its windows: patches, points on surfaces."""
 
     def __init__(
         self,

@@ -75,7 +75,7 @@ def _sharp_light(
         )  # fmt: skip
         add_paths(
             room, sky, seen, starts,
-            cosine=mi.Float(0), came=mi.Float(0), aimed=mi.Bool(False),
+            cosine=mi.Float(0), came=mi.Float(0), aimed=mi.Float(0),
             beta=dr.select(glossy, weight, 0.0), outdoors=mi.Bool(vertex.outdoors),
         )  # fmt: skip
         sharp += seen
@@ -100,7 +100,7 @@ def point_in_time_picture(
     Args:
         samples: rays and paths for each pixel, spread over it.
         tile: pixels across of the squares that share slowly varying light, by default 0.9 degrees
-            (2 pixels at least); 1: every pixel for itself, without smoothing, for a picture free
+            (2 pixels at least); 1: each pixel alone, without smoothing, for a picture free
             of any assumption.
         pixels: [n] row * width + column of those to trace, by default all that show something.
         disc: the sun's disc and its images in mirrors too; without them, they are to be rated apart
@@ -331,7 +331,7 @@ class _Kernel:
         )  # fmt: skip
         add_paths(
             room, sky, found, starts,
-            cosine=cosine, came=cosine * dr.inv_pi, aimed=aimed & opaque,
+            cosine=cosine, came=cosine * dr.inv_pi, aimed=dr.select(opaque, aimed, 0.0),
             beta=dr.select(opaque, 1.0, rest), outdoors=outward,
         )  # fmt: skip
         face = self._faces.inside(hit.prim_index, behind, opaque)
@@ -352,7 +352,7 @@ class _Kernel:
             )
             add_paths(
                 room, sky, seen, starts,
-                cosine=mi.Float(0), came=mi.Float(0), aimed=mi.Bool(False), beta=mirrored,
+                cosine=mi.Float(0), came=mi.Float(0), aimed=mi.Float(0), beta=mirrored,
                 outdoors=mi.Bool(False),
             )  # fmt: skip
             sharp += seen
@@ -409,7 +409,7 @@ class _Kernel:
         add_paths(
             room, sky, found, starts,
             cosine=mi.Float(0), came=dr.select(opaque, dr.dot(away, normal) * dr.inv_pi, 0.0),
-            aimed=mi.Bool(False), beta=dr.select(opaque, dr.pi, 1.0), outdoors=outdoors,
+            aimed=mi.Float(0), beta=dr.select(opaque, dr.pi, 1.0), outdoors=outdoors,
         )  # fmt: skip
         face = self._faces.outside(hit.prim_index, behind, opaque)
         face = dr.select(opaque, face, mi.UInt32(self._faces.windows - 1))

@@ -114,7 +114,7 @@ class SunDiscs:
             row = lane // EDGE_RAYS
             sensor, sun = self._pair(dr.gather(mi.UInt32, column(crossed, mi.UInt32), row))
             centre = dr.gather(mi.Vector3f, self._around.towards, sun)
-            # the sensor's alone: an hour's light does not hang on those computed with it
+            # the sensor's alone: an hour's light does not depend on those computed with it
             stream = mi.sample_tea_32(sensor, key)[0]
             way = disc_direction(centre, _spiral(lane - row * EDGE_RAYS, EDGE_RAYS, stream))
             for part, values in zip(found, self._rays(sensor, way)[0], strict=True):

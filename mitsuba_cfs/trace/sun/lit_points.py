@@ -152,7 +152,7 @@ def hit_points(
     origin: mi.Point3f,
     way: mi.Vector3f,
     hit: mi.PreliminaryIntersection3f,
-    found: mi.Bool,
+    valid: mi.Bool,
     *others: Any,
 ) -> tuple[Any, ...]:
     """Points where rays meet surfaces, on the side that they come from.
@@ -161,7 +161,7 @@ def hit_points(
 
     Returns: the `SurfacePoints`, then the others as arrays.
     """
-    point, face, *others = tables(*hit_faces(tracer, origin, way, hit, found), *others)
+    point, face, *others = tables(*hit_faces(tracer, origin, way, hit, valid), *others)
     return SurfacePoints(point, face), *others
 
 
@@ -170,10 +170,10 @@ def hit_faces(
     origin: mi.Point3f,
     way: mi.Vector3f,
     hit: mi.PreliminaryIntersection3f,
-    found: mi.Bool,
+    valid: mi.Bool,
 ) -> tuple[mi.Point3f, mi.Vector3f]:
     """Points and normals where rays meet surfaces, offset to the side that they come from."""
-    face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, found)
+    face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, valid)
     face = dr.mulsign(face, -dr.dot(face, way))
     return mi.Point3f(origin + way * hit.t + face * tracer.epsilon), face
 

@@ -99,7 +99,7 @@ def beam_light(
     shape = 2 * len(rows.keys), bins[1].size + len(groups) * basis.size
     look = _Look(inside, outside, scattering, bins, view, samples)
     found, seen, carrying = look.rows(rows, np.arange(len(rows.pixels)), shape, seed)
-    # a slit of sky beside or below what stands outdoors may carry most of a row's light, and a
+    # a slit of sky beside or below obstructions may carry most of a row's light, and a
     # sliver of a face has the rays of one pixel
     lit = np.diff(found.indptr).reshape(-1, 2).any(axis=1)
     sliver = np.bincount(rows.row, minlength=len(rows.keys)) * samples < SAMPLES / 2

@@ -166,7 +166,7 @@ def on_disc(centre: mi.Vector3f, sample: mi.UInt32, stream: mi.UInt32) -> mi.Vec
 
 def disc_direction(centre: mi.Vector3f, u: mi.Point2f) -> mi.Vector3f:
     """The direction on the sun's disc at shares of its area (from the centre) and of the turn."""
-    height = u.x * float(1 - np.cos(SUN_RADIUS))  # 1 - cos, which single precision has no more
+    height = u.x * float(1 - np.cos(SUN_RADIUS))  # 1 - cos, which single precision has lost
     cosine, sine = 1 - height, dr.sqrt(height * (2 - height))
     phi = dr.two_pi * u.y
     frame = mi.Frame3f(centre)

@@ -196,7 +196,7 @@ class Beam:
         lane = dr.arange(mi.UInt32, points * len(suns))
         hour = lane // dr.opaque(mi.UInt32, points)
         point = lane - hour * dr.opaque(mi.UInt32, points)
-        # the same points in all hours: an hour's light does not hang on those computed with it
+        # the same points in all hours: an hour's light does not depend on those computed with it
         key = dr.opaque(mi.UInt32, self.seed & 0xFFFFFFFF)
         stream = mi.sample_tea_32(opaque(self.group, mi.UInt32), key)[0]
         position = inside.sample_group(self.group, lattice_2d(point, stream, 0))

@@ -1,0 +1,242 @@
+"""Every element of HBJSON, gbXML and IFC that describes glazing: its status is the docs table's."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import ifcopenshell
+import ifcopenshell.api.pset
+import pytest
+
+from bim.building_file import held_states, read_building_file
+from bim.model import Building, Window
+from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
+from mitsuba_cfs.bsdf.fabric import FabricBand, fabric_klems
+from mitsuba_cfs.bsdf.xml import bsdf_xml
+from mitsuba_cfs.errors import DataError
+from tests.bim.honeybee_models import two_rooms, write
+from tests.bim.small_ifc import box_model
+from tests.bim.test_read_gbxml import two_rooms as gbxml
+
+DOCS = Path(__file__).parents[2] / "docs/formats.md"
+KLEMS = fabric_klems(FabricBand(0.2, 0.1, 0.3, 0.3))
+BSDF = bsdf_xml(BsdfFile({"Visible": KLEMS, "Solar": KLEMS}, "fabric"))
+PANE = {"type": "EnergyWindowMaterialGlazing", "identifier": "pane", "thickness": 0.006}
+SIMPLE = {"type": "EnergyWindowMaterialSimpleGlazSys", "u_factor": 1.3, "shgc": 0.4, "vt": 0.6}
+GREY = {f"{c}_reflectance": 0.5 for c in "rgb"}
+CLEAR = {f"{c}_transmissivity": 0.6 for c in "rgb"}
+
+
+def construction(*materials: dict, **more: Any) -> Callable:
+    """The window's construction of these materials, outermost first."""
+
+    def build(folder: Path) -> Building:
+        model = two_rooms()
+        default = model["properties"]["energy"]["global_construction_set"]
+        named = [one | {"identifier": f"m{k}"} for k, one in enumerate(materials)]
+        default["materials"] += named
+        default["constructions"][2] |= {"materials": [one["identifier"] for one in named]} | more
+        return read_building_file(write(model, folder))
+
+    return build
+
+
+def shaded(kind: str, **more: Any) -> Callable:
+    """The window's construction with a shade or with states."""
+
+    def build(folder: Path) -> Building:
+        model = two_rooms()
+        default = model["properties"]["energy"]["global_construction_set"]
+        glazing = {"type": "WindowConstructionAbridged", "identifier": "inner",
+                   "materials": ["Unit"]}  # fmt: skip
+        default["constructions"][2] = {"type": kind, "identifier": "Glazing",
+                                       "window_construction": glazing,
+                                       "constructions": [glazing, glazing]} | more  # fmt: skip
+        return read_building_file(write(model, folder))
+
+    return build
+
+
+def modifier(states: list | None = None, **one: Any) -> Callable:
+    """The window's modifier, and those of its states."""
+
+    def build(folder: Path) -> Building:
+        model = two_rooms()
+        model["properties"]["radiance"]["modifiers"] += [
+            {"identifier": "subject"} | one,
+            {"type": "Glass", "identifier": "other"} | CLEAR,
+        ]
+        window = model["rooms"][0]["faces"][0]["apertures"][0]
+        window["properties"]["radiance"] = {"modifier": "subject"}
+        if states is not None:
+            window["properties"]["radiance"] |= {"dynamic_group_identifier": "south",
+                                                 "states": states}  # fmt: skip
+        return read_building_file(write(model, folder))
+
+    return build
+
+
+def window_type(inner: str) -> Callable:
+    """A gbXML whose window type has these children."""
+
+    def build(folder: Path) -> Building:
+        text = gbxml()
+        start, end = text.index("<U-value"), text.index("</WindowType>")
+        path = folder / "two.gbxml"
+        path.write_text(text[:start] + inner + text[end:])
+        return read_building_file(path)
+
+    return build
+
+
+def opening(kind: str) -> Callable:
+    """A gbXML whose window is of that type of opening."""
+
+    def build(folder: Path) -> Building:
+        path = folder / "two.gbxml"
+        path.write_text(gbxml().replace('"FixedWindow"', f'"{kind}"'))
+        return read_building_file(path)
+
+    return build
+
+
+def property_set(name: str, **properties: Any) -> Callable:
+    """An IFC whose window has a property set."""
+
+    def build(folder: Path) -> Building:
+        model = box_model()[0].model
+        window = model.by_type("IfcWindow")[0]
+        one = ifcopenshell.api.pset.add_pset(model, product=window, name=name)
+        ifcopenshell.api.pset.edit_pset(model, pset=one, properties=properties)
+        model.write(str(folder / "small.ifc"))
+        return read_building_file(folder / "small.ifc")
+
+    return build
+
+
+def attached(*options: str) -> Callable:
+    """An IFC with data attached by the command."""
+
+    def build(folder: Path) -> Building:
+        from scenes.cli import run
+
+        box_model()[0].model.write(str(folder / "small.ifc"))
+        (folder / "fabric.xml").write_text(BSDF)
+        (folder / "g.csv").write_text("polar_deg,g\n0,0.4\n90,0\n")
+        words = [word.format(folder=folder) for word in options]
+        out = str(folder / "attached.ifc")
+        assert run(["ifc", "attach", str(folder / "small.ifc"), "--all", *words, "-o", out]) == 0
+        return read_building_file(Path(out))
+
+    return build
+
+
+GAS = {"type": "EnergyWindowMaterialGas", "thickness": 0.012}
+MIXTURE = {"type": "EnergyWindowMaterialGasMixture", "thickness": 0.012,
+           "gas_types": ["Argon", "Air"], "gas_fractions": [0.9, 0.1]}  # fmt: skip
+CUSTOM = {"type": "EnergyWindowMaterialGasCustom", "thickness": 0.012}
+SHADE = {"type": "EnergyWindowMaterialShade"}
+BLIND = {"type": "EnergyWindowMaterialBlind"}
+FRAME = {"type": "EnergyWindowFrame", "identifier": "frame", "width": 0.05, "conductance": 2.0}
+U, G = (
+    '<U-value unit="WPerSquareMeterK">1.1</U-value>',
+    "<SolarHeatGainCoeff>.5</SolarHeatGainCoeff>",
+)
+VISIBLE = '<Transmittance type="Visible" unit="Fraction">0.7</Transmittance>'
+PANES = '<Glaze id="g"/><Gap id="a"/><Glaze id="h"/>'
+CASES: dict[str, Callable] = {
+    "EnergyWindowMaterialSimpleGlazSys": construction(SIMPLE),
+    "EnergyWindowMaterialGlazing": construction(PANE),
+    "EnergyWindowMaterialGas": construction(PANE, GAS, PANE),
+    "EnergyWindowMaterialGasMixture": construction(PANE, MIXTURE, PANE),
+    "EnergyWindowMaterialGasCustom": construction(PANE, CUSTOM, PANE),
+    "EnergyWindowMaterialShade": construction(PANE, SHADE),
+    "EnergyWindowMaterialBlind": construction(PANE, BLIND),
+    "EnergyWindowFrame": construction(SIMPLE, frame=FRAME),
+    "WindowConstructionShadeAbridged": shaded("WindowConstructionShadeAbridged"),
+    "WindowConstructionDynamicAbridged": shaded("WindowConstructionDynamicAbridged"),
+    "Glass": modifier(type="Glass", **CLEAR),
+    "BSDF": modifier(type="BSDF", bsdf_data=BSDF),
+    "Trans": modifier(type="Trans", **GREY),
+    "Plastic": modifier(type="Plastic", **GREY),
+    "Metal": modifier(type="Metal", **GREY),
+    "Mirror": modifier(type="Mirror", **GREY),
+    "states: Glass": modifier([{}, {"modifier": "other"}], type="Glass", **CLEAR),
+    "states: Plastic": modifier([{}, {"modifier": "paint"}], type="Glass", **CLEAR),
+    "states: shades": modifier([{}, {"modifier": "other", "shades": [{"x": 1}]}], type="Glass",
+                               **CLEAR),
+    "U-value": window_type(U + G + VISIBLE),
+    "Transmittance": window_type(U + G + VISIBLE),
+    "Glaze with values": window_type(U + G + VISIBLE + PANES),
+    "Glaze alone": window_type(PANES),
+    "Frame": window_type(U + G + VISIBLE + '<Frame id="f"/>'),
+    "Blind": window_type(U + G + VISIBLE + '<Blind id="b"/>'),
+    **{kind: opening(kind) for kind in ("FixedWindow", "OperableWindow", "FixedSkylight",
+                                        "OperableSkylight", "SlidingDoor")},
+    "NonSlidingDoor": opening("NonSlidingDoor"),
+    "Air": opening("Air"),
+    "Pset_WindowCommon": property_set("Pset_WindowCommon", ThermalTransmittance=1.1),
+    "Pset_DoorWindowGlazingType": property_set(
+        "Pset_DoorWindowGlazingType", GlassLayers=2, VisibleLightTransmittance=0.7,
+        SolarTransmittance=0.4, SolarHeatGainTransmittance=0.5,
+    ),
+    "attached BSDF": attached("--bsdf", "{folder}/fabric.xml"),
+    "attached BSDF by reference": attached("--bsdf", "{folder}/fabric.xml", "--reference"),
+    "attached U and g": attached("--u", "1.1", "--g", "0.4"),
+    "attached g by direction": attached("--g", "{folder}/g.csv"),
+}  # fmt: skip
+
+
+def rows() -> list[tuple[str, str]]:
+    text = DOCS.read_text().partition("## Glazing by element")[2].partition("\n## ")[0]
+    found = []
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in line.split("|")[1:-1]]
+        if len(cells) == 4 and cells[1].startswith("`"):
+            found += [(name, cells[2]) for name in re.findall(r"`([^`]+)`", cells[1])]
+    return found
+
+
+@pytest.mark.parametrize(("name", "status"), rows())
+def test_an_element_has_the_status_of_the_table(tmp_path, name, status):
+    if status == "refused":
+        with pytest.raises(DataError):
+            CASES[name](tmp_path)
+        return
+    building = CASES[name](tmp_path)
+    others = usual(tmp_path, name)
+    issues = [issue for issue in building.issues if issue.code not in others]
+    if status == "computed":
+        assert not issues
+        held = held_states(building.windows, building.file)
+        assert any(known(window) or held.get(window.guid) for window in building.windows)
+    elif status == "opaque":
+        assert not issues and not building.windows
+    else:
+        assert issues and {issue.severity for issue in issues} <= {"assumption", "loss", "unused"}
+
+
+def known(window: Window) -> bool:
+    """Whether the file holds something of the glazing that a run uses."""
+    values = (window.u_value, window.g_value, window.visible_transmittance, window.glass)
+    return bool(window.states) or any(value is not None for value in values)
+
+
+def usual(folder: Path, name: str) -> set[str]:
+    """Codes of the issues that the models have without the element."""
+    base = folder / "usual"
+    base.mkdir()
+    keys = list(CASES)
+    if keys.index(name) < keys.index("U-value"):
+        return {issue.code for issue in read_building_file(write(two_rooms(), base)).issues}
+    if keys.index(name) < keys.index("Pset_WindowCommon"):
+        return {issue.code for issue in opening("FixedWindow")(base).issues}
+    box_model()[0].model.write(str(base / "small.ifc"))
+    return {issue.code for issue in read_building_file(base / "small.ifc").issues}
+
+
+def test_the_table_has_every_case():
+    assert {name for name, _ in rows()} == set(CASES)

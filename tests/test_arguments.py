@@ -1,0 +1,105 @@
+"""Numbers that cannot be meant are refused by a `ValueError` that names the argument."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bim
+import mitsuba_cfs as cfs
+import scenes
+import thermal
+from mitsuba_cfs.bsdf.blinds import vertical_louvre
+from mitsuba_cfs.bsdf.periodic import plastic
+
+NONE = (math.nan, math.inf, -math.inf, "x", None)  # of any number
+NEGATIVE = (*NONE, -1)
+COUNT = (*NEGATIVE, 0, 2.5)  # of whole numbers from 1
+SHARE = (*NEGATIVE, 1.5)
+OPTIONAL = (math.nan, math.inf, "x", -1)
+RADIANS = (*NONE, 45.0, -60.0)
+SLATS = {"depth": 0.08, "spacing": 0.06, "tilt": 0.2, "thickness": 0.001}
+GREY = plastic("grey", 0.5)
+
+
+def _slats(make: Callable) -> Callable:
+    return lambda **values: make(GREY, **{**SLATS, **values})
+
+
+def _sheet(**values: Any) -> cfs.SlatMaterial:
+    return cfs.SlatMaterial("sheet", (0.5,), (0.5,), **values)
+
+
+def _box(**values: Any) -> None:
+    bim.write_epjson(bim.shoebox(), "never.epJSON", **values)
+
+
+CASES: list[tuple[str, Callable, str, tuple]] = [
+    *(
+        (make.__name__, _slats(make), name, bad)
+        for make in (cfs.venetian_blind, vertical_louvre)
+        for name, bad in (
+            ("depth", (*NEGATIVE, 0)), ("spacing", (*NEGATIVE, 0)), ("thickness", NEGATIVE),
+            ("tilt", RADIANS),
+        )
+    ),
+    ("SlatMaterial", _sheet, "roughness", NEGATIVE),
+    *(("SlatMaterial", _sheet, name, SHARE) for name in ("specular", "straight", "pane")),
+    *(
+        ("Sampling", cfs.Sampling, name, COUNT)
+        for name in ("sensor_samples", "patch_samples", "sun_points", "view_samples",
+                     "outdoor_samples", "picture_samples", "hour_samples", "subdivision")
+    ),
+    *(("Sampling", cfs.Sampling, name, NEGATIVE) for name in ("window_parts", "memory", "seed")),
+    ("Stopping", cfs.Stopping, "batches", (*COUNT, 1)),
+    ("Stopping", cfs.Stopping, "max_batches", COUNT),
+    *(("Stopping", cfs.Stopping, name, OPTIONAL) for name in ("target_error", "time_limit")),
+    *(
+        ("GlareOptions", cfs.GlareOptions, name, OPTIONAL)
+        for name in ("threshold", "peak", "illuminance", "age")
+    ),
+    ("GlareOptions", cfs.GlareOptions, "search_radius", (*NEGATIVE, 0, 12.0)),
+    *(
+        ("GlareOptions", cfs.GlareOptions, name, ("x", None, 3))
+        for name in ("background", "grouping", "sun", "field_of_view", "position_model")
+    ),
+    ("pane", cfs.pane, "index", (*NEGATIVE, 0.5)), ("pane", cfs.pane, "transmissivity", SHARE),
+    ("pane", cfs.pane, "panes", COUNT),
+    ("fisheye", lambda **v: cfs.fisheye((0, 0, 1), (0, 1, 0), **v), "size", COUNT),
+    *(
+        ("MaterialLayer", lambda **v: bim.MaterialLayer(
+            **{"name": "a", "thickness": 0.1, "conductivity": 1.0, "density": 1e3,
+               "heat_capacity": 1e3, **v}), name, (*NEGATIVE, 0))
+        for name in ("thickness", "conductivity", "density", "heat_capacity")
+    ),
+    ("write_epjson", _box, "u_value", OPTIONAL), ("write_epjson", _box, "g_value", OPTIONAL),
+    ("write_epjson", _box, "air_changes", NEGATIVE),
+    *(
+        ("BalanceOptions", thermal.BalanceOptions, name, (math.nan, math.inf, -100.0))
+        for name in ("outside_film", "cell", "tolerance", "warm_tolerance", "start_c", "warm_days")
+    ),
+    ("BalanceOptions", thermal.BalanceOptions, "terrain", ("x", None)),
+    ("RoomOptions", scenes.RoomOptions, "heat_step_s", (*NEGATIVE, 0, 7200)),
+    ("RoomOptions", scenes.RoomOptions, "infiltration_ach", NEGATIVE),
+    *(
+        ("IdealLoads", thermal.IdealLoads, name, (math.nan, np.array([20.0, math.nan])))
+        for name in ("heating_c", "cooling_c")
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "value"),
+    [
+        pytest.param(make, name, value, id=f"{label}.{name}={value}")
+        for label, make, name, bad in CASES
+        for value in bad
+    ],
+)
+def test_an_impossible_value_is_refused_by_its_name(make, name, value):
+    with pytest.raises(ValueError, match=name):
+        make(**{name: value})

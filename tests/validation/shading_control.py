@@ -1,0 +1,221 @@
+"""Shading states of windows on two facades against EnergyPlus' own shading control.
+
+    python -m tests.validation shading_control
+
+A room in Chicago with equal windows to the south and to the north, open and below an overhang with
+a fin.  EnergyPlus runs here and now with a `WindowShadingControl` for each window:
+`OnIfHighSolarOnWindow`, and the slat angles of `BlockBeamSolar`.  Ours is the study's: `run_study`.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from scenes.demo import VENETIAN_BLIND, WEATHER
+from scenes.heat.study import run_study
+from scenes.heat.study_file import read_study
+from tests.validation.energyplus_program import Model, merged, room_model, run_energyplus
+from thermal.control import by_cut_off
+
+WINDOWS = {"S": "WINDOW", "N": "NORTH"}  # EnergyPlus' names of ours
+LIMITS = (100.0, 200.0, 400.0)  # [W/m2]
+TILTS = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)  # [deg]
+WIDTH, SPACING = 0.08, 0.072  # of the slats [m]
+FIN = 1.5  # depth of overhang and fin [m]
+GLAZING = Path(VENETIAN_BLIND).with_name("glazing.xml")
+STUDY = """
+weather = "{weather}"
+[box]
+width = 4.0
+depth = 5.0
+height = 3.0
+window = [{{ x = 0.5, sill = 1.0, width = 3.0, height = 1.5 }},
+          {{ x = 0.5, sill = 1.0, width = 3.0, height = 1.5, side = "back" }}]
+{plates}
+{systems}
+[control]
+{control}
+[trace]
+sky_subdivision = 4
+view_factors = false
+"""
+PLATES = "".join(
+    f"[[box.plate]]\nstart = {start}\nend = {end}\ndepth = {FIN}\nside = '{side}'\n"
+    "reflectance = 0.0\n"
+    for side in ("front", "back")
+    for start, end in (([0.0, 2.6], [4.0, 2.6]), ([3.6, 0.0], [3.6, 3.0]))
+)
+
+
+def our_states(control: str, states: int, *, shaded: bool) -> pd.DataFrame:
+    """Our state of both windows by hour [H], columns S and N."""
+    bsdf = (GLAZING, *[VENETIAN_BLIND] * (states - 1))
+    systems = "".join(f'[[system]]\nbsdf = "{path}"\n' for path in bsdf)
+    plates = PLATES if shaded else ""
+    text = STUDY.format(weather=WEATHER, plates=plates, systems=systems, control=control)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "study.toml"
+        file.write_text(text)
+        (year,), _ = run_study(read_study(file), lambda *_: None)
+    return pd.DataFrame({name: year.hours[f"shading_state_{name}"].to_numpy() for name in WINDOWS})
+
+
+def energyplus_model(control: dict[str, Any], *, shaded: bool) -> Model:
+    """Table 15's room with a window to the north too, a time step of an hour.
+
+    With one step an hour EnergyPlus takes the sun in the middle of the hour, as we do.
+    """
+    model = room_model("S", "clear_double", "ext_blind", outputs=OUTPUTS, steps=1)
+    model["ShadowCalculation"]["main"]["shading_calculation_update_frequency_method"] = "Timestep"
+    back = {
+        "outside_boundary_condition": "Outdoors", "sun_exposure": "SunExposed",
+        "wind_exposure": "WindExposed", "construction_name": "FACADE",
+    }  # fmt: skip
+    corners = [(3.5, 5.0, 2.5), (3.5, 5.0, 1.0), (0.5, 5.0, 1.0), (0.5, 5.0, 2.5)]
+    north = dict(model["FenestrationSurface:Detailed"]["WINDOW"])
+    north |= {"building_surface_name": "BACK"}
+    for number, corner in enumerate(corners, 1):
+        for axis, value in zip("xyz", corner, strict=True):
+            north[f"vertex_{number}_{axis}_coordinate"] = value
+    model = merged(
+        model,
+        {
+            "BuildingSurface:Detailed": {"BACK": back},
+            "FenestrationSurface:Detailed": {"NORTH": north},
+            "WindowMaterial:Blind": {"DEVICE": {"slat_width": WIDTH, "slat_separation": SPACING}},
+        },
+    )
+    plain = model["WindowShadingControl"].pop("CONTROL")
+    for window in WINDOWS.values():
+        surfaces = [{"fenestration_surface_name": window}]
+        model["WindowShadingControl"][window] = (
+            plain | {"fenestration_surfaces": surfaces} | control
+        )
+    if shaded:
+        model["Shading:Building:Detailed"] = dict(_plates())
+    return model
+
+
+def _plates() -> list[tuple[str, dict[str, Any]]]:
+    """The overhang and the fin of each facade, as those of the study."""
+    rings = {
+        "overhang S": [(0, 0, 2.6), (0, -FIN, 2.6), (4, -FIN, 2.6), (4, 0, 2.6)],
+        "overhang N": [(4, 5, 2.6), (4, 5 + FIN, 2.6), (0, 5 + FIN, 2.6), (0, 5, 2.6)],
+        "fin S": [(3.6, 0, 3), (3.6, 0, 0), (3.6, -FIN, 0), (3.6, -FIN, 3)],
+        "fin N": [(0.4, 5, 3), (0.4, 5, 0), (0.4, 5 + FIN, 0), (0.4, 5 + FIN, 3)],
+    }
+    names = ("vertex_x_coordinate", "vertex_y_coordinate", "vertex_z_coordinate")
+    return [
+        (name, {"vertices": [dict(zip(names, map(float, corner), strict=True)) for corner in ring]})
+        for name, ring in rings.items()
+    ]
+
+
+OUTPUTS = {
+    f"{window}:{variable}": f"{name} {short}"
+    for name, window in WINDOWS.items()
+    for variable, short in (
+        ("Surface Shading Device Is On Time Fraction", "on"),
+        ("Surface Window Blind Slat Angle", "angle"),
+        ("Surface Outside Face Incident Beam Solar Radiation Rate per Area", "beam"),
+        ("Surface Outside Face Incident Solar Radiation Rate per Area", "sun"),
+    )
+} | {
+    "Environment:Site Solar Altitude Angle": "altitude",
+    "Environment:Site Solar Azimuth Angle": "azimuth",
+}
+
+
+def energyplus_cut_off(table: pd.DataFrame, name: str) -> NDArray[np.int64]:
+    """The most open of TILTS that is at least as closed as EnergyPlus' slats [H].
+
+    EnergyPlus measures the angle between the normals of slats and glass: 90 degrees are level
+    slats, tilted by 90 degrees less that angle.
+    """
+    needed = 90.0 - table[f"{name} angle"].to_numpy()
+    fine = np.array(TILTS)[:, None] >= needed - 1e-3
+    state = np.where(fine.any(axis=0), fine.argmax(axis=0), len(TILTS) - 1)
+    return np.where(table[f"{name} beam"].to_numpy() > 0, state, 0)
+
+
+def cut_off_under(table: pd.DataFrame, name: str) -> NDArray[np.int64]:
+    """Our rule with the sun and the beam of EnergyPlus [H]."""
+    altitude, azimuth = (np.radians(table[key].to_numpy()) for key in ("altitude", "azimuth"))
+    level = np.cos(altitude)
+    facing = -level * np.cos(azimuth) if name == "S" else level * np.cos(azimuth)
+    local = np.stack([level * np.sin(azimuth), np.sin(altitude), facing], axis=1)
+    beam = table[f"{name} beam"].to_numpy()
+    return by_cut_off(local, beam, np.radians(TILTS), WIDTH, SPACING)
+
+
+def compare() -> pd.DataFrame:
+    """Hours of the year in which the states differ, by rule, surroundings and window."""
+    rows = []
+    for shaded in (False, True):
+        for limit in LIMITS:
+            control = {"shading_control_type": "OnIfHighSolarOnWindow", "setpoint": limit}
+            model = energyplus_model(control, shaded=shaded)
+            theirs = run_energyplus(model, WEATHER, outputs=OUTPUTS)
+            reflected = run_energyplus(with_reflections(model), WEATHER, outputs=OUTPUTS)
+            ours = our_states(f'rule = "irradiance"\nclose_above = {limit}', 2, shaded=shaded)
+            for name in WINDOWS:
+                on = theirs[f"{name} on"].to_numpy().round().astype(int)
+                row = _row(
+                    f"irradiance above {limit:.0f} W/m2", shaded, name, ours[name].to_numpy(), on
+                )
+                # its control does not read the reflections that its heat balance then has
+                other = (reflected[f"{name} sun"].to_numpy() > limit).astype(int)
+                rows.append(row | {"its two models differ h": int((other != on).sum())})
+        control = {
+            "shading_control_type": "OnIfHighSolarOnWindow", "setpoint": 0.1,
+            "type_of_slat_angle_control_for_blinds": "BlockBeamSolar",
+        }  # fmt: skip
+        theirs = run_energyplus(energyplus_model(control, shaded=shaded), WEATHER, outputs=OUTPUTS)
+        rule = (
+            f'rule = "cut-off"\nslat_tilts_deg = {list(TILTS)}\nslat_width = {WIDTH}\n'
+            f"slat_spacing = {SPACING}"
+        )
+        ours = our_states(rule, len(TILTS), shaded=shaded)
+        for name in WINDOWS:
+            slats = energyplus_cut_off(theirs, name)
+            rows.append(_row("cut-off", shaded, name, ours[name].to_numpy(), slats))
+            same_sun = cut_off_under(theirs, name)
+            rows.append(_row("cut-off, EnergyPlus' sun", shaded, name, same_sun, slats))
+    return pd.DataFrame(rows)
+
+
+def with_reflections(model: Model) -> Model:
+    """The model with EnergyPlus' other account of the ground: shaded and hidden by the plates."""
+    black = {
+        name: {
+            "shading_surface_name": name,
+            "diffuse_solar_reflectance_of_unglazed_part_of_shading_surface": 0.0,
+            "diffuse_visible_reflectance_of_unglazed_part_of_shading_surface": 0.0,
+        }
+        for name in model.get("Shading:Building:Detailed", {})
+    }
+    how = "FullInteriorAndExteriorWithReflections"
+    changes: Model = {"Building": {"main": {"solar_distribution": how}}}
+    return merged(model, changes | ({"ShadingProperty:Reflectance": black} if black else {}))
+
+
+def _row(
+    rule: str, shaded: bool, window: str, ours: NDArray[np.int64], theirs: NDArray[np.int64]
+) -> dict[str, Any]:
+    apart = ours != theirs
+    return {
+        "rule": rule, "surroundings": "overhang and fin" if shaded else "open", "window": window,
+        "closed h": int((ours > 0).sum()), "EnergyPlus h": int((theirs > 0).sum()),
+        "differ h": int(apart.sum()), "of the year %": round(100 * float(apart.mean()), 2),
+    }  # fmt: skip
+
+
+def main() -> pd.DataFrame:
+    """All rules, surroundings and windows."""
+    return compare()
