@@ -7,7 +7,6 @@ and what becomes of it indoors are EnergyPlus' own.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,7 +47,7 @@ from bim.planes import Facet, planar_facets, triangulated
 from bim.rays import hemisphere, ray_mesh
 from bim.to_thermal import ThermalRoom
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import write_text
+from mitsuba_cfs.files import json_text, write_text
 from thermal.climate import Climate
 from thermal.ventilation import AirTransfer
 from thermal.zone import OpaqueSurface, Zone
@@ -131,7 +130,7 @@ class EnergyPlusTwin:
     def write(self, folder: Path) -> tuple[Path, ...]:
         """Write the model and its schedules into a folder; the files."""
         model = folder / "model.epJSON"
-        write_text(model, json.dumps(self.model, indent=1))
+        write_text(model, json_text(self.model, indent=1))
         table = self.schedules.csv()
         if not table:
             return (model,)

@@ -7,7 +7,6 @@ which stands for the frame.  Faces towards other rooms are adiabatic: a room can
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from os import PathLike
@@ -35,7 +34,7 @@ from bim.planes import newell_normal
 from bim.to_thermal import layers_of
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.errors import check_number
-from mitsuba_cfs.files import write_text
+from mitsuba_cfs.files import json_text, write_text
 from thermal.zone import OUTSIDE_ABSORPTANCE
 
 BOUNDARY = {"outside": "Outdoors", "ground": "Ground"}  # all others: adiabatic
@@ -91,7 +90,7 @@ def write_epjson(
     for number, space in enumerate(chosen):
         name = f"Z{number} {object_name(space.label)}"
         dropped += _zone(model, name, space, windows, air_changes)
-    write_text(path, json.dumps(model, indent=1))
+    write_text(path, json_text(model, indent=1))
     return (*_losses(chosen, dropped, ground=ground_c is None), *windows.notes)
 
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import json
+import math
 import os
 import re
 import secrets
@@ -178,6 +180,25 @@ def write_text(path: str | PathLike[str], text: str, *, encoding: str = "utf-8")
         part.write_text(text, encoding=encoding)
 
 
+def json_text(value: object, **options: Any) -> str:
+    """A value as JSON: NaN, which is no value, is null; options of `json.dumps`.
+
+    Raises: `ValueError` for infinity, which no result has.
+    """
+    try:
+        return json.dumps(value, allow_nan=False, **options)
+    except ValueError:
+        return json.dumps(_without_nan(value), allow_nan=False, **options)
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_nan(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(one) for one in value]
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
 def write_bytes(path: str | PathLike[str], data: bytes) -> None:
     """Write a file atomically: it is the old one or the new one at any time."""
     with replacing(path) as part:
@@ -200,12 +221,25 @@ def write_table(table: pd.DataFrame, path: str | PathLike[str], **options: objec
     """Write a pandas table by the suffix, as `.parquet` or text; options of its writer.
 
     In text, entries of a file's words are no formulas of a spreadsheet (`without_formulas`).
+
+    Raises: `ValueError` for infinity, which no result has; NaN is an empty cell.
     """
+    check_finite(table)
     with replacing(path) as part:
         if part.suffix == ".parquet":
             table.to_parquet(part, **options)
         else:
             without_formulas(table).to_csv(part, **options)
+
+
+def check_finite(table: pd.DataFrame) -> None:
+    """Raise `ValueError` for a table of results with infinity; NaN is an empty cell."""
+    import numpy as np
+
+    numbers = table.select_dtypes("floating")
+    infinite = numbers.columns[np.isinf(numbers.to_numpy()).any(axis=0)]
+    if len(infinite):
+        raise ValueError(f"infinite results: {', '.join(map(str, infinite))}")
 
 
 def without_formulas(table: pd.DataFrame) -> pd.DataFrame:

@@ -18,6 +18,7 @@ from pathlib import Path, PurePosixPath
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import (
     TEMPORARY,
+    json_text,
     reason,
     remove_stale,
     stale,
@@ -58,7 +59,7 @@ class FolderMark:
             "program": PROGRAM, "format": FORMAT, "version": metadata.version(PROGRAM),
             "command": self.command, "files": sorted(self.files), "removed": sorted(self.removed),
         }  # fmt: skip
-        write_text(folder / MARK, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
+        write_text(folder / MARK, json_text(record, indent=1, ensure_ascii=False) + "\n")
 
 
 class ResultFolder:

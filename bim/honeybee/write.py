@@ -7,7 +7,6 @@ Open doorways are air boundaries: the way through the wall belongs to the first 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
@@ -27,7 +26,7 @@ from bim.to_radiance import identifier
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.xml import bsdf_xml
 from mitsuba_cfs.directions import default_up
-from mitsuba_cfs.files import write_text
+from mitsuba_cfs.files import json_text, write_text
 
 TYPES = {"floor": "Floor", "ceiling": "RoofCeiling", "roof": "RoofCeiling"}
 LEAST_CAPACITY = 100.0  # [J/(kg K)] that honeybee takes
@@ -60,7 +59,7 @@ def write_honeybee(
         "properties": {"type": "ModelProperties", "energy": library.energy(),
                        "radiance": library.radiance()},
     }  # fmt: skip
-    write_text(Path(path), json.dumps(model, indent=1) + "\n")
+    write_text(Path(path), json_text(model, indent=1) + "\n")
 
 
 class _Names:

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import write_text
+from mitsuba_cfs.files import json_text, write_text
 from mitsuba_cfs.matrices.cache import default_folder
 from scenes.cost.measure import Cost
 
@@ -75,7 +75,7 @@ class Calibration:
         """Keep it; the file is the old one or the new one at any time."""
         table = asdict(self)
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_text(path, json.dumps(table, indent=2) + "\n")
+        write_text(path, json_text(table, indent=2) + "\n")
 
     @classmethod
     def of(cls, table: dict) -> Calibration:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +17,7 @@ from mitsuba_cfs.bsdf.evaluate import bsdf_values, direct_hemispherical
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import check_file, replacing, write_table, write_text
+from mitsuba_cfs.files import check_file, json_text, replacing, write_table, write_text
 from scenes.commands.room_options import seed_option
 
 if TYPE_CHECKING:
@@ -503,7 +502,7 @@ def thermal(
     if out is not None and out.suffix == ".json":
         by_patch = {s.path.stem: [round(float(g), 5) for g in s.heat.g_value] for s in rated_states}
         record = {"rows": rows} if place else {"rows": rows, "g by patch": by_patch}
-        write_text(out, json.dumps(record, indent=2) + "\n")
+        write_text(out, json_text(record, indent=2) + "\n")
     elif out is not None:
         import pandas as pd
 

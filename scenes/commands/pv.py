@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -94,7 +93,7 @@ def _write(result, record: dict, results: ResultFolder) -> None:
     """Tables, hourly power, pictures."""
     import pandas as pd
 
-    from mitsuba_cfs.files import write_table, write_text
+    from mitsuba_cfs.files import json_text, write_table, write_text
     from scenes.photovoltaics.picture import view_directions, write_irradiation_picture
 
     times = result.weather.times[result.irradiance.steps]
@@ -110,4 +109,4 @@ def _write(result, record: dict, results: ResultFolder) -> None:
         write_table(table, folder / "problems.csv", index=False)
         for name, towards in view_directions(result):
             write_irradiation_picture(folder / f"irradiation_{name}.png", result, towards)
-        write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
+        write_text(folder / "run.json", json_text(record, indent=2) + "\n")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -115,7 +114,7 @@ def _write(
     """All files of a study."""
     import pandas as pd
 
-    from mitsuba_cfs.files import write_table, write_text
+    from mitsuba_cfs.files import json_text, write_table, write_text
 
     with results.replaced() as folder:
         for number, room in enumerate(rooms, 1):
@@ -139,4 +138,4 @@ def _write(
         write_table(energy.round(4), folder / "energy_by_month.csv")
         for twin in twins:
             twin.write(folder)
-        write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
+        write_text(folder / "run.json", json_text(record, indent=2) + "\n")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 import shutil
 import zlib
 from collections.abc import Sequence
@@ -19,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from bim.model import Building
 from bim.to_tracer import exterior_surfaces, furnished_surfaces
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import write_text
+from mitsuba_cfs.files import json_text, write_text
 from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.picture_year.year import PictureYear
 from scenes.explore.case_files import AFTER, BEFORE, CASE, case_files, read_case
@@ -48,7 +47,7 @@ def packed(array: ArrayLike, kind: str) -> dict[str, Any]:
 
 def write_data(path: Path, data: object) -> None:
     """Write data as a script, which a page that was opened as a file may load."""
-    write_text(path, BEFORE + json.dumps(data, separators=(",", ":")) + AFTER)
+    write_text(path, BEFORE + json_text(data, separators=(",", ":")) + AFTER)
 
 
 PAGE = "index.html"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 import re
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,7 +11,7 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from mitsuba_cfs.files import write_text
+from mitsuba_cfs.files import json_text, write_text
 from scenes.head import Head
 from scenes.language.catalogue import gettext, in_language, ngettext, translated
 from scenes.language.numbers import cell, day_and_month, rounded, semicolons
@@ -127,12 +126,12 @@ def prose(text: str) -> str:
 
 def script_json(value: object) -> Markup:
     """JSON that is safe inside a script element: no `<` can end it."""
-    return Markup(json.dumps(value, separators=(",", ":")).replace("<", "\\u003c"))
+    return Markup(json_text(value, separators=(",", ":")).replace("<", "\\u003c"))
 
 
 def packed_json(value: object) -> str:
     """JSON for a script to unpack when it is asked for: deflated without a header, base64."""
-    text = json.dumps(value, separators=(",", ":")).encode()
+    text = json_text(value, separators=(",", ":")).encode()
     packer = zlib.compressobj(9, wbits=-15)
     return base64.b64encode(packer.compress(text) + packer.flush()).decode("ascii")
 

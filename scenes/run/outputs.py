@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -16,7 +15,13 @@ import pandas as pd
 
 from bim.names import folder_names
 from bim.report.issue import COLUMNS, issue_rows
-from mitsuba_cfs.files import without_formulas, write_table, write_text
+from mitsuba_cfs.files import (
+    check_finite,
+    json_text,
+    without_formulas,
+    write_table,
+    write_text,
+)
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.progress import Progress, silent
 from scenes.pictures import write_falsecolour, write_tone_mapped
@@ -68,7 +73,7 @@ def write_results(
         guids = (room.space.guid for room in result.spaces)
         within = (name if several else "." for name in names)
         folders = dict(zip(guids, within, strict=True))  # of each room's tables
-        text = json.dumps(result.manifest | {"folders": folders}, indent=2, ensure_ascii=False)
+        text = json_text(result.manifest | {"folders": folders}, indent=2, ensure_ascii=False)
         write_text(temporary / "run.json", text + "\n")
     if faults:
         raise faults[0] if len(faults) == 1 else ExceptionGroup("no page was written", faults)
@@ -191,6 +196,7 @@ DIGITS = "%.6g"
 
 def csv_text(table: pd.DataFrame, *, index: bool = True) -> str:
     """What `table.to_csv(float_format="%.6g")` gives of a table `without_formulas`."""
+    check_finite(table)
     table = without_formulas(table)
     columns = [_entries(table.iloc[:, k]) for k in range(table.shape[1])]
     names = list(map(str, table.columns))

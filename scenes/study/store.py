@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.files import opened_arrays, write_bytes, write_table, write_text
+from mitsuba_cfs.files import json_text, opened_arrays, write_bytes, write_table, write_text
 from mitsuba_cfs.matrices.cache import UNREADABLE
 from mitsuba_cfs.progress import Progress, silent
 from scenes.result_folder import EXPLORER, ResultFolder
@@ -95,7 +95,7 @@ class Store:
         import pandas as pd
 
         table = pd.DataFrame(list(rows))
-        text = json.dumps(manifest, indent=2, ensure_ascii=False, default=str)
+        text = json_text(manifest, indent=2, ensure_ascii=False, default=str)
         with self._results.replaced() as place:
             write_table(table, place / "results.parquet", index=False)
             write_table(table, place / "results.csv", index=False, float_format="%.6g")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from importlib import metadata
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
-from mitsuba_cfs.files import replacing, write_table, write_text
+from mitsuba_cfs.files import json_text, replacing, write_table, write_text
 from mitsuba_cfs.glare.classes import (
     CLASSES,
     LIMITS,
@@ -130,7 +129,7 @@ def write_summary(year: GlareYear, rows: list[dict[str, object]], folder: Path) 
         "hours_with_sun": len(year.sky.lit),
         "version": metadata.version("mitsuba-cfs"),
     }
-    write_text(folder / "glare_year.json", json.dumps(manifest, indent=2) + "\n")
+    write_text(folder / "glare_year.json", json_text(manifest, indent=2) + "\n")
     return table
 
 

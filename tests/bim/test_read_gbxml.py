@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bim.building_file import read_building_file
+from bim.gbxml import document
 from bim.gbxml.building import read_gbxml
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
@@ -277,3 +278,30 @@ def test_random_bytes_give_one_line(tmp_path):
     path = tmp_path / "spoilt.gbxml"
     refused = refusals(path, mutations(two_rooms().encode(), 60), read_gbxml)
     assert refused > 20
+
+
+NIST = {  # to SI; NIST SP 811, appendix B
+    "Yards": 0.9144, "Feet": 0.3048, "Inches": 0.0254, "Miles": 1609.344, "Kilometers": 1000.0,
+    "Centimeters": 0.01, "Millimeters": 0.001,
+    "SquareYards": 0.8361274, "SquareFeet": 0.09290304, "SquareInches": 6.4516e-4,
+    "SquareMiles": 2.589988e6, "SquareKilometers": 1e6, "SquareCentimeters": 1e-4,
+    "SquareMillimeters": 1e-6,
+    "CubicYards": 0.7645549, "CubicFeet": 0.02831685, "CubicInches": 1.638706e-5,
+    "CubicMiles": 4.168182e9, "CubicKilometers": 1e9, "CubicCentimeters": 1e-6,
+    "CubicMillimeters": 1e-9,
+    "WattPerSquareFoot": 10.76391, "CFMPerSquareFoot": 5.08e-3, "LPerSecPerSquareM": 1e-3,
+    "CubicMPerHourPerSquareM": 2.777778e-4,
+    "LPerSec": 1e-3, "CFM": 4.719474e-4, "CubicMPerHr": 2.777778e-4,
+    "LPerSecPerPerson": 1e-3, "CFMPerPerson": 4.719474e-4,
+    "BtuPerHourSquareFtF": 5.678263, "HrSquareFtFPerBTU": 0.1761102, "BtuPerHourFtF": 1.730735,
+    "WPerCmC": 100.0, "LbsPerCubicFt": 16.01846, "LbsPerCubicIn": 27679.90,
+    "GramsPerCubicCm": 1000.0, "BTUPerLbF": 4186.8, "BtuPerHourPerson": 0.2930711,
+}  # fmt: skip
+
+
+def test_every_unit_has_the_factor_of_the_tables():
+    tables = [document.METRES, document.SQUARE_METRES, document.CUBIC_METRES, *document.SI.values()]
+    for table in tables:
+        for unit, factor in table.items():
+            assert factor == pytest.approx(NIST.get(unit, 1.0), rel=1e-6), unit
+    assert NIST.keys() <= {unit for table in tables for unit in table}
