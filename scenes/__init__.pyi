@@ -14,6 +14,7 @@ from .results import (
     LuminancePicture as LuminancePicture,
     OperationResult as OperationResult,
     RoomYear as RoomYear,
+    ShadingYear as ShadingYear,
     ThermalResult as ThermalResult,
 )
 from .comply.comply import check_building as check_building

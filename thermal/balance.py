@@ -48,7 +48,7 @@ class BalanceOptions:
         require_range(self.outside_film, 0.1, 1000.0, "outside_film", "W/(m2 K)")
         require_range(self.start_c, -90.0, 90.0, "start_c", "C")
         for name in ("tolerance", "warm_tolerance"):
-            require_range(getattr(self, name), 1e-9, 100.0, name, "K")
+            require_range(getattr(self, name), 1e-12, 100.0, name, "K")
         require_range(self.warm_days, 0, 100_000, "warm_days")
 
 

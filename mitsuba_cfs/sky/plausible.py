@@ -88,7 +88,7 @@ def _clock(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]
         "hours": abs(late),
         "longitude": weather.longitude_deg,
         "zone": weather.timezone_h,
-        "fits": ", ".join(fits),
+        "fits": ", ".join(fits) or "-",
     }
     note = (
         Note(

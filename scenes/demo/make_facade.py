@@ -14,8 +14,8 @@ that do not exist.  216 modules in 12 subsystems of 18, all and only they of one
 
 from __future__ import annotations
 
+import argparse
 import shutil
-import sys
 from pathlib import Path
 
 import ifcopenshell
@@ -148,4 +148,6 @@ def write_facade(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    write_facade(Path(sys.argv[1] if len(sys.argv) > 1 else "facade.ifc"))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("file", type=Path, nargs="?", default=Path("facade.ifc"))
+    write_facade(parser.parse_args().file)

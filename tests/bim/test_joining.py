@@ -101,7 +101,7 @@ def test_what_check_says_is_what_the_commands_take(tmp_path, capsys):
     said = capsys.readouterr().out
     text = said.partition("--join '")[2].partition("'")[0]
     assert cli.run(["check", str(path), "--join", text]) == 0
-    assert "1 rooms" in capsys.readouterr().out
+    assert "rooms: 1 " in capsys.readouterr().out
     out = str(tmp_path / "a.glb")
     assert cli.run(["export", str(path), "--join", text, "--space", text,
                     "--gltf", out]) == 0  # fmt: skip

@@ -105,7 +105,9 @@ def test_the_error_of_a_year_is_half_of_what_its_half_pictures_differ(monkeypatc
 
 def test_the_error_of_a_shown_picture_is_that_of_its_halves(monkeypatch) -> None:
     light = SimpleNamespace(
-        scene=SimpleNamespace(eye=VIEW), systems=[[None]], sky=SimpleNamespace(lit=np.zeros(1))
+        scene=SimpleNamespace(eye=VIEW),
+        systems=[[None]],
+        sky=SimpleNamespace(lit=np.zeros(1, dtype=int), hours=1),
     )
     one_sign(monkeypatch)
     made = [(np.array([0]), Rated())]

@@ -112,7 +112,7 @@ def test_wrong_calls():
     for wrong in ({"background": "other"}, {"search_radius": 0}, {"illuminance": -1.0}):
         with pytest.raises(ValueError, match="expected"):
             GlareOptions(**wrong)
-    with pytest.raises(ValueError, match="field of view"):
+    with pytest.raises(ValueError, match="field_of_view"):
         evaluate(np.ones((220, 220)), AHEAD, field_of_view="one eye")
 
 

@@ -47,7 +47,7 @@ def rated(skies, folder: Path, states, state=0, width: float = 2.0) -> AnnualGla
     room = room_inputs(
         building, space, systems, read_epw(WEATHER), OPTIONS, skies=skies, cache=MatrixCache(folder)
     )
-    of_hours = np.broadcast_to(state, skies.hours)
+    of_hours = np.broadcast_to(state, skies.hours)[:, None]
     return rated_hours(room, room_light(room), of_hours, "DGP", skies.lit)
 
 

@@ -173,7 +173,8 @@ def test_commands_with_rules_of_their_own_say_what_they_leave_out(used):
     """`cfs comply` has the uses, sensors and eyes of its rules."""
     said = unused_notes(replace(used, grids=(ModelGrid("g", np.zeros((1, 3)), np.eye(3)[2:]),)))
     assert said[-1] == (
-        "used.hbjson contains 2 uses of rooms, 1 sensor grids and 0 views; they are not used here."
+        "used.hbjson contains uses of rooms (2), sensor grids (1) and views (0); they are not used "
+        "here."
     )
     assert not unused_notes(read_honeybee(TWO_ROOMS))
     head = head_of(used)  # which every command shows
