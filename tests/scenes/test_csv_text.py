@@ -13,7 +13,7 @@ from mitsuba_cfs.files import write_table
 from scenes.run.outputs import csv_text
 
 TIMES = pd.date_range("2021-01-01 00:30", periods=6, freq="h", name="time")
-VALUES = [0.0, -1234567.0, 1.5e-7, np.nan, np.inf, 20.12345678]
+VALUES = [0.0, -1234567.0, 1.5e-7, np.nan, 1e30, 20.12345678]
 TABLES = {
     "hours": pd.DataFrame(
         {"operative_c": VALUES, "in use": [True, False] * 3, "state": range(6)}, index=TIMES
