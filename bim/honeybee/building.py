@@ -47,7 +47,7 @@ from mitsuba_cfs.errors import DataError
 
 ADJACENCY = {"Outdoors": "outside", "Ground": "ground", "Surface": "space"}
 KINDS = {"Wall": "wall", "Floor": "floor"}  # the others by their slope
-ALIKE = 1e-3  # difference of unit up vectors that are taken as one
+SAME_UP = 1e-3  # difference of unit up vectors that are taken as one
 PARALLEL = 1e-3  # sine of the angle between up vector and normal
 
 
@@ -266,7 +266,7 @@ class _Reader:
             return None
         first, up = ups[0]
         for name, other in ups[1:]:
-            if np.abs(other - up).max() > ALIKE:
+            if np.abs(other - up).max() > SAME_UP:
                 message = f"BSDF {name} has another up_orientation than {first}: give both the same"
                 raise DataError(message, file=self.path, element=one.label, field="states")
         normal = newell_normal(ring)

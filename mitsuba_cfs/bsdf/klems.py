@@ -11,8 +11,10 @@ and in WINDOW's engine.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -223,16 +225,7 @@ class KlemsBsdf:
             theta, phi = basis.centres()
             mirrored.append(basis.index(theta, np.pi - phi))
 
-        def turned(block: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
-            return None if block is None else block[np.ix_(*mirrored)]
-
-        return replace(
-            self,
-            transmission_front=turned(self.transmission_back),
-            transmission_back=turned(self.transmission_front),
-            reflection_front=turned(self.reflection_back),
-            reflection_back=turned(self.reflection_front),
-        )
+        return with_sides_exchanged(self, lambda block: block[np.ix_(*mirrored)])
 
     def transmission_matrix(self) -> NDArray[np.float64]:
         """T [K out, K in]: radiance into the room for radiance from the sky, L_o = T L_i.
@@ -243,3 +236,16 @@ class KlemsBsdf:
         if front is None:
             raise ValueError("neither side of the BSDF transmits light")
         return front * self.basis_in.projected_solid_angles()
+
+
+Bsdf = TypeVar("Bsdf")
+
+
+def with_sides_exchanged(bsdf: Bsdf, turned: Callable[..., object]) -> Bsdf:
+    """A BSDF with front and back exchanged, and each block that it has turned by a function."""
+    blocks = {}
+    for kind in ("transmission", "reflection"):
+        for side, other in (("front", "back"), ("back", "front")):
+            block = getattr(bsdf, f"{kind}_{other}")
+            blocks[f"{kind}_{side}"] = None if block is None else turned(block)
+    return replace(bsdf, **blocks)  # type: ignore[type-var]

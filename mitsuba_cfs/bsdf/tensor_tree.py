@@ -16,13 +16,13 @@ real-world bidirectional scattering distribution functions" (the tree); format a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.bsdf.klems import DUMMY_HEMISPHERICAL
+from mitsuba_cfs.bsdf.klems import DUMMY_HEMISPHERICAL, with_sides_exchanged
 
 MAX_CODE_BITS = 60
 QUARTER = np.pi / 4
@@ -219,17 +219,7 @@ class TensorTreeBsdf:
 
     def turned_round(self) -> TensorTreeBsdf:
         """The same system with its back outdoors, turned by pi about its up."""
-
-        def turned(tree: TensorTree | None) -> TensorTree | None:
-            return None if tree is None else tree.mirrored()
-
-        return replace(
-            self,
-            transmission_front=turned(self.transmission_back),
-            transmission_back=turned(self.transmission_front),
-            reflection_front=turned(self.reflection_back),
-            reflection_back=turned(self.reflection_front),
-        )
+        return with_sides_exchanged(self, TensorTree.mirrored)
 
     def direct_hemispherical(self, block: TensorTree) -> NDArray[np.float64]:
         """Share of each incident cell's light that `block` sends on [2^2D] or [2^(D-1)]."""

@@ -53,7 +53,7 @@ def list_rules(context: click.Context, _: click.Parameter, value: bool) -> None:
 @click.command()
 @click.option(
     "--list", is_flag=True, is_eager=True, expose_value=False, callback=list_rules,
-    help="List the rule sets, with what of each standard is included and left out.",
+    help="List the rule sets, with the parts of each standard that are included and left out.",
 )  # fmt: skip
 @input_options("all")
 @room_options

@@ -191,7 +191,7 @@ def export_files(
     files: Mapping[str, Path | None],
     ground_c: Sequence[float] | None = None,
 ) -> tuple[str, ...]:
-    """Write the models that state U and g of windows, by format; what of these is assumed.
+    """Write the models that state U and g of windows, by format; their assumptions.
 
     Args: files: by "honeybee", "gbxml", "epjson"; ground_c: [12] for EnergyPlus [degC].
     """

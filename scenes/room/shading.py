@@ -228,7 +228,7 @@ def _avoid_glare(
 ) -> None:
     """Set the states [H, N] of control groups to the most open combination without glare.
 
-    At every seat that a rule of theirs names, with all other groups in their states.
+    At every seat that their rules name, with all other groups in their states.
     """
     counts = [group_states(room, c) for c in glare]
     combinations = np.array(list(product(*map(range, counts))), dtype=np.int64)

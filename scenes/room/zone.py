@@ -356,7 +356,9 @@ def zone_surfaces(room: RoomInputs) -> ZoneSurfaces:
 
 def thermal_systems(windows: RoomWindows) -> list[list[ThermalSystem]]:
     """Thermal data of the window groups in each state [G][J]."""
-    return [[thermal_system(system) for system in states] for states in windows.systems]
+    distinct = {id(system): system for states in windows.systems for system in states}
+    known = {number: thermal_system(system) for number, system in distinct.items()}
+    return [[known[id(system)] for system in states] for states in windows.systems]
 
 
 def work_plane(room: RoomInputs, daylight: DaylightResult | None) -> FloatArray | None:

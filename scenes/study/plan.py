@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from bim.building_file import held_states
 from bim.model import Building, Space
@@ -18,7 +19,7 @@ from scenes.fenestration.thermal_file import files_beside
 from scenes.heat.box import building_or_box
 from scenes.input_files import named_files, sha256
 from scenes.input_options import InputOptions
-from scenes.room.operation import read_operation
+from scenes.room.operation import Operation, read_operation
 from scenes.room.options import RoomOptions
 from scenes.study.study_file import NO_SYSTEM, RoomTable, Study
 from scenes.toml_file import ReadTable
@@ -119,6 +120,13 @@ class StudyPlan:
     predicted: float | None = None  # time of the cases whose method `auto` chose [s]
 
 
+class _Read(NamedTuple):
+    """Readers that read each file of a study once."""
+
+    operation: Callable[[Path], Operation]
+    sha256: Callable[[Path], str]
+
+
 def plan_of(study: Study) -> StudyPlan:
     """The grid of a study, ordered so that neighbours share most.
 
@@ -126,13 +134,13 @@ def plan_of(study: Study) -> StudyPlan:
     """
     cases: list[Case] = []
     rooms = {}
-    hashes: dict[Path, str] = {}
+    read = _Read(cache(read_operation), cache(sha256))
     _check_turning(study)
     for room in study.room:
         building, spaces = rooms_of(room, study)
         held = () if study.system else _held_files(building)
         for space in spaces:
-            of_space = list(_of_space(study, room, space, held, hashes))
+            of_space = list(_of_space(study, room, space, held, read))
             rooms[of_space[0].scene] = building, space
             cases += of_space
     return StudyPlan(tuple(cases), rooms)
@@ -146,17 +154,17 @@ def _check_turning(study: Study) -> None:
 
 
 def _of_space(
-    study: Study, room: RoomTable, space: Space, held: Iterable[Path], hashes: dict[Path, str]
+    study: Study, room: RoomTable, space: Space, held: Iterable[Path], read: _Read
 ) -> Iterator[Case]:
     """Every case of one room.
 
-    Args: held: files that the building names; hashes: of files that were read, added to.
+    Args: held: files that the building names.
     """
     for climate in study.climate:
         systems = []
         for system in study.system or (NO_SYSTEM,):
             options = study.inputs(room, system, climate, spaces=(space.guid,))
-            systems.append((system.name, options, _input_files(options, held, hashes)))
+            systems.append((system.name, options, _input_files(options, held, read)))
         for angle in study.orientations_deg:
             for method in study.methods:
                 # an open method keeps the default's place until `auto` is settled
@@ -170,16 +178,11 @@ def _of_space(
                     )  # fmt: skip
 
 
-def _input_files(
-    options: InputOptions, held: Iterable[Path], hashes: dict[Path, str]
-) -> tuple[InputFile, ...]:
+def _input_files(options: InputOptions, held: Iterable[Path], read: _Read) -> tuple[InputFile, ...]:
     """The files of a case with the hashes of their bytes."""
-    operation = None if options.operation is None else read_operation(options.operation)
+    operation = None if options.operation is None else read.operation(options.operation)
     named = named_files(options, operation) | {f"held_{i}": path for i, path in enumerate(held)}
-    for path in named.values():
-        if path not in hashes:
-            hashes[path] = sha256(path)
-    return tuple(InputFile(name, path, hashes[path]) for name, path in named.items())
+    return tuple(InputFile(name, path, read.sha256(path)) for name, path in named.items())
 
 
 def _held_files(building: Building) -> tuple[Path, ...]:
