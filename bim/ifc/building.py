@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import ifcopenshell
 import numpy as np
 import shapely
 
@@ -19,6 +20,7 @@ from bim.fenestration import ShadingState
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.cut_rooms import cut_rooms, room_lids
+from bim.ifc.damage import Damage, entities, instances
 from bim.ifc.defects import DRAWN_TWICE, model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.fenestration_read import read_fenestration
@@ -29,6 +31,7 @@ from bim.ifc.materials import SURFACES
 from bim.ifc.open_spaces import open_spaces
 from bim.ifc.passages import Passage, open_apertures
 from bim.ifc.placing import map_georeference
+from bim.ifc.project import psets_of
 from bim.ifc.raised_rooms import raised_rooms
 from bim.ifc.rooms_from_geometry import rooms_from_geometry
 from bim.ifc.schemes import one_of_each
@@ -36,10 +39,9 @@ from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
 from bim.ifc.space_boundaries import boundary_issues
 from bim.ifc.spaces import SpaceRecord, read_spaces
-from bim.ifc.zones import read_zones
 from bim.isolated_solids import RoomBoundary, room_boundaries
 from bim.mesh_simplification import simplified
-from bim.model import Building, Element, Space
+from bim.model import Building, Element, Space, SpaceGroup
 from bim.neighbours import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
 from bim.outdoors import lifted_sites, mirrors_in_view, unblinded
 from bim.rays import RayMesh, ray_mesh
@@ -48,6 +50,38 @@ from bim.solids import triangles_of
 from bim.soundness import agree, soundness_issues
 from bim.wall_middles import area_to_wall_middles
 from mitsuba_cfs.errors import RoomError
+
+DEEPEST = 20  # zones of zones
+
+
+def read_zones(model: ifcopenshell.file, damage: Damage | None = None) -> tuple[SpaceGroup, ...]:
+    """The IfcZone with spaces, each with those of its parts; its kind is what its texts say.
+
+    Kind: ObjectType, LongName, Description and Pset_ZoneCommon's Category and Reference.
+    """
+    zones = []
+    for zone in instances(model, "IfcZone"):
+        rooms = tuple(dict.fromkeys(_spaces(zone, DEEPEST)))
+        common = psets_of(zone, damage).get("Pset_ZoneCommon", {})
+        texts = [getattr(zone, key, None) for key in ("ObjectType", "LongName", "Description")]
+        texts += [common.get("Category"), common.get("Reference")]
+        if rooms:
+            kind = ", ".join(str(text) for text in texts if text)
+            zones.append(SpaceGroup(zone.Name or kind or zone.GlobalId, kind, rooms))
+    return tuple(zones)
+
+
+def _spaces(group: ifcopenshell.entity_instance, depth: int) -> list[str]:
+    """GUIDs of the spaces of a zone and of the zones in it."""
+    found: list[str] = []
+    for relation in getattr(group, "IsGroupedBy", None) or ():
+        for one in entities(relation.RelatedObjects):
+            if one.is_a("IfcSpace"):
+                found.append(one.GlobalId)
+            elif one.is_a("IfcGroup") and depth:
+                found += _spaces(one, depth - 1)
+    return found
+
 
 SEARCH = 0.3  # share of the stage "rooms" in which they are found, where the file has no spaces
 
