@@ -124,9 +124,12 @@ def read_ifc(
     if any(record.raised for record in records):
         glass = glass_of_rooms(source, apertures, records, mesh)
     elements, finishes, faults = bounding_elements(
-        source.model, source.walls, source.placed.rotation, source.damage,
+        source.model,
+        source.walls,
+        source.placed.rotation,
+        source.damage,
         materials=source.corrections.materials,
-    )  # fmt: skip
+    )
     issues += [*glass.issues, *faults]
     around = _surroundings(mesh, source.walls, records, source.ground)
     attached = [*glass.attachments, *(side for way in rooms.passages for side in way.sides)]

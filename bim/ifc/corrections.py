@@ -57,9 +57,11 @@ KEYS = ("leave_out", "only", "opaque", "keep", "join", "surroundings", "reflecta
 OPEN = "open"  # asks for the rooms that are open to each other by more than a door
 PAINT_KEYS = ("select", "visible", "solar", "specular", "roughness")
 MATERIAL_KEYS = {  # of [[material]]: lowest and highest value
-    "conductivity": (0.005, 500.0), "u": (0.05, 10.0), "density": (0.5, 12000.0),
+    "conductivity": (0.005, 500.0),
+    "u": (0.05, 10.0),
+    "density": (0.5, 12000.0),
     "heat_capacity": (100.0, 5000.0),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, slots=True)

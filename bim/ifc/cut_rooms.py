@@ -56,9 +56,12 @@ def cut_rooms(
             continue
         top, low = float(solid.high[2]), float(solid.low[2])
         values = {
-            "room": record.label, "before": record.volume, "after": after,
-            "top": float(record.solid.high[2]) - top, "bottom": low - float(record.solid.low[2]),
-        }  # fmt: skip
+            "room": record.label,
+            "before": record.volume,
+            "after": after,
+            "top": float(record.solid.high[2]) - top,
+            "bottom": low - float(record.solid.low[2]),
+        }
         issues.append(Issue("room-cut", record.guid, values))
         result[index] = replace(record, solid=solid, volume=after, cut=record.volume - after)
     return result, issues

@@ -104,9 +104,12 @@ def placement_of(
         return None
     damage = Damage() if damage is None else damage
     matrix = damage.read(
-        ifcopenshell.util.placement.get_local_placement, element.ObjectPlacement,
-        of=element, data="placement", default=None,
-    )  # fmt: skip
+        ifcopenshell.util.placement.get_local_placement,
+        element.ObjectPlacement,
+        of=element,
+        data="placement",
+        default=None,
+    )
     return None if matrix is None else np.asarray(matrix, dtype=float)
 
 

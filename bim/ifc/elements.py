@@ -59,9 +59,10 @@ def bounding_elements(
             by_look[i] = GLASS_REFLECTANCE if look.is_glass else look.reflectances
             if look.stated is not None and not look.is_glass:
                 values_of_style = {
-                    "style": look.name, "stated": look.stated,
+                    "style": look.name,
+                    "stated": look.stated,
                     "used": min(max(look.stated, LOWEST_REFLECTANCE), HIGHEST_REFLECTANCE),
-                }  # fmt: skip
+                }
                 issue = Issue("surface-style-bounded", look.name, values_of_style)
                 faults.setdefault(look.name, issue)
         stated = reader.reflectances_of(model.by_id(shape.step_id))

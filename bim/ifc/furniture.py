@@ -79,9 +79,10 @@ def _placed(
             for window in space.windows:
                 if hangs_at(shape.triangles, window):
                     values = {
-                        "element": label, "window": window.name or window.guid,
+                        "element": label,
+                        "window": window.name or window.guid,
                         "window_guid": window.guid,
-                    }  # fmt: skip
+                    }
                     return None, Issue("curtain-at-window", shape.guid, values)
     corners = shape.triangles.reshape(-1, 3)
     corners = corners[np.linspace(0, len(corners) - 1, min(ASKED, len(corners))).astype(int)]

@@ -107,9 +107,11 @@ def glass_of_rooms(
         issues += _said(aperture, found, one, records)
     unfilled = _unfilled(source, records, building, attachments)
     return GlassOfRooms(
-        (*attachments, *unfilled.attachments), (*glass, *unfilled.glass), unfilled.closed,
+        (*attachments, *unfilled.attachments),
+        (*glass, *unfilled.glass),
+        unfilled.closed,
         (*issues, *unfilled.issues),
-    )  # fmt: skip
+    )
 
 
 def lost_glass(
@@ -210,10 +212,12 @@ def _room_below(
 ) -> SpaceRecord | None:
     """The room whose top lies below a point with no slab between."""
     below = [
-        r for r in records
-        if np.all(r.solid.low[:2] < point[:2]) and np.all(r.solid.high[:2] > point[:2])
+        r
+        for r in records
+        if np.all(r.solid.low[:2] < point[:2])
+        and np.all(r.solid.high[:2] > point[:2])
         and 0 < point[2] - r.solid.high[2] < TALLEST_GAP
-    ]  # fmt: skip
+    ]
     if not below:
         return None
     room = max(below, key=lambda r: r.solid.high[2])
@@ -277,10 +281,12 @@ def _unfilled(
         if not _goes_through(aperture, building):
             continue
         found = [
-            a for a in attachments_of(aperture, solids)
-            if a.neighbour is None and not is_phantom("IfcWall", a.aperture.plane.normal)
+            a
+            for a in attachments_of(aperture, solids)
+            if a.neighbour is None
+            and not is_phantom("IfcWall", a.aperture.plane.normal)
             and _looks_out(a, building)
-        ]  # fmt: skip
+        ]
         if not found:
             continue
         area = sum(a.glass.area for a in found)

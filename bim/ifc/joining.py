@@ -65,10 +65,13 @@ def _open_pairs(
         names = _names_to_join(pair, records)
         values = {
             "rooms": tuple(room.label for room in pair),
-            "area": sum(way.area for way in own), "count": len(own),
-            "names": " + ".join(names), "quoted": ", ".join(f'"{name}"' for name in names),
-            "file": corrections_file(source.path).name, "limit": LARGEST_DOOR,
-        }  # fmt: skip
+            "area": sum(way.area for way in own),
+            "count": len(own),
+            "names": " + ".join(names),
+            "quoted": ", ".join(f'"{name}"' for name in names),
+            "file": corrections_file(source.path).name,
+            "limit": LARGEST_DOOR,
+        }
         issues.append(Issue("rooms-open-to-each-other", own[0].opening, values))
     return issues
 
@@ -150,9 +153,12 @@ def _joined(parts: list[SpaceRecord], ways: Sequence[Passage]) -> SpaceRecord | 
     name = JOINT.join(part.name for part in parts)
     areas, volumes = ([getattr(p, key) for p in parts] for key in ("stated_area", "stated_volume"))
     return SpaceRecord(
-        room_solid(first.solid.guid, name, body), name,
-        JOINT.join(part.long_name for part in parts if part.long_name), first.storey,
-        body.volume(), None if None in areas else sum(areas),
+        room_solid(first.solid.guid, name, body),
+        name,
+        JOINT.join(part.long_name for part in parts if part.long_name),
+        first.storey,
+        body.volume(),
+        None if None in areas else sum(areas),
         None if None in volumes else sum(volumes),
         first.type_name if len({part.type_name for part in parts}) == 1 else "",
-    )  # fmt: skip
+    )

@@ -58,9 +58,12 @@ class _Frame:
         drawn = [placement_of(one) for one in model.by_type("IfcElement") if one.Representation]
         places = [unit * one[:3, 3] for one in drawn if one is not None]
         return cls(
-            to_map(model), (latitude, longitude), elevation, place,
+            to_map(model),
+            (latitude, longitude),
+            elevation,
+            place,
             np.array(places).reshape(-1, 3),
-        )  # fmt: skip
+        )
 
     def gap(self, other: _Frame, matrix: NDArray[np.float64]) -> float:
         """Distance of the plans of both files [m], the other moved by [4, 4]."""

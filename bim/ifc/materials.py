@@ -236,12 +236,14 @@ class MaterialReader:
                 and not named_material(material).is_known
             )
             known: dict[str, Any] = {
-                "material": name, "missing": tuple(map(Phrase, missing)), "default": default.name,
+                "material": name,
+                "missing": tuple(map(Phrase, missing)),
+                "default": default.name,
                 "impossible": tuple(
                     Phrase("impossible-value", {"name": Phrase(k), "value": given[k]})
                     for k in wrong
                 ),
-            }  # fmt: skip
+            }
             code = "material-unknown" if unknown else "material-incomplete"
             code = "material-impossible" if wrong else code
             self.issues.setdefault(name, Issue(code, name, known))

@@ -57,11 +57,12 @@ def map_conversions(model: ifcopenshell.file) -> list[MapConversion]:
         return [_conversion(one, names[0].get("Name"), None) for one in found]
     return [
         _conversion(
-            one.get_info(), getattr(one.TargetCRS, "Name", None),
+            one.get_info(),
+            getattr(one.TargetCRS, "Name", None),
             getattr(one.TargetCRS, "MapUnit", None),
         )
         for one in model.by_type("IfcMapConversion")
-    ]  # fmt: skip
+    ]
 
 
 def _conversion(values: dict, crs: str | None, unit) -> MapConversion:
@@ -98,8 +99,10 @@ def north_rotation(
     if abs(difference) <= CONVERGENCE_DEG:
         return _turned(*true), issues
     values = {
-        "map": _azimuth(grid), "true": _azimuth(true), "difference": abs(difference),
-    }  # fmt: skip
+        "map": _azimuth(grid),
+        "true": _azimuth(true),
+        "difference": abs(difference),
+    }
     return _turned(*grid), [*issues, Issue("north-contradicts-map", "IfcMapConversion", values)]
 
 

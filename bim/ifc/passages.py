@@ -139,10 +139,13 @@ def _common_faces(
     name = f"boundary of {one.name} and {other.name}"
     for facet in one.facets:
         plane = facet.plane
-        shared = shapely.union_all([
-            _shared(facet, back) for back in other.facets
-            if back.plane.normal @ plane.normal < OPPOSITE
-        ])  # fmt: skip
+        shared = shapely.union_all(
+            [
+                _shared(facet, back)
+                for back in other.facets
+                if back.plane.normal @ plane.normal < OPPOSITE
+            ]
+        )
         if shared.area < SMALLEST:
             continue
         for part in polygons_of(_free(shared, plane, (-IN_WALL, IN_WALL), bodies)):

@@ -86,11 +86,14 @@ def write_templates(path: str | PathLike[str]) -> None:
     )
     held = [_template(model, one, SET_NAME) for one in fenestration_templates().values()]
     template = model.create_entity(
-        "IfcPropertySetTemplate", _guid(SET_NAME), Name=SET_NAME,
+        "IfcPropertySetTemplate",
+        _guid(SET_NAME),
+        Name=SET_NAME,
         Description=f"{WHAT}; '{SET_NAME}: STATE' for each further state of its shade",
-        TemplateType="PSET_TYPEDRIVENOVERRIDE", ApplicableEntity=",".join(HOLDERS),
+        TemplateType="PSET_TYPEDRIVENOVERRIDE",
+        ApplicableEntity=",".join(HOLDERS),
         HasPropertyTemplates=held,
-    )  # fmt: skip
+    )
     model.create_entity(
         "IfcRelDeclares", _guid("declares"), RelatingContext=library, RelatedDefinitions=[template]
     )
@@ -191,9 +194,11 @@ def _merged(
         if template.usage not in usage.split(" or "):
             usage = f"{usage} or {template.usage}"
         found[name] = replace(
-            known, usage=usage, many=known.many or template.many,
+            known,
+            usage=usage,
+            many=known.many or template.many,
             members=_merged(known.members, template.members),
-        )  # fmt: skip
+        )
     return found
 
 
@@ -229,9 +234,11 @@ def _specification(
     applicability = _child(made, "applicability", minOccurs="0", maxOccurs="unbounded")
     _values(_child(_child(applicability, "entity"), "name"), [name.upper() for name in holders])
     of_property = _child(
-        _child(made, "requirements"), "property", dataType=one.measure.upper(),
+        _child(made, "requirements"),
+        "property",
+        dataType=one.measure.upper(),
         cardinality=cardinality,
-    )  # fmt: skip
+    )
     _restricted(_child(of_property, "propertySet"), pattern=f"{SET_NAME}(: .+)?")
     _child(_child(of_property, "baseName"), "simpleValue").text = one.name
     if one.name == POSITION:

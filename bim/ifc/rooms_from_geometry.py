@@ -96,10 +96,11 @@ def _leaks(bodies: list[tuple[str, Body]], slabs: list[Body]) -> list[Issue]:
         apart = np.maximum(boxes[:, 0] - leak.position, leak.position - boxes[:, 1])
         nearest = np.linalg.norm(np.maximum(apart, 0.0), axis=1).argsort(kind="stable")[:2]
         values = {
-            "width": max(leak.width, size), "size": size,
+            "width": max(leak.width, size),
+            "size": size,
             "elements": tuple(bodies[i][0].strip() for i in nearest),
             **dict(zip("xyz", map(float, leak.position), strict=True)),
-        }  # fmt: skip
+        }
         issues.append(Issue("room-leaks", " ".join(f"{v:.2f}" for v in leak.position), values))
     return issues
 

@@ -100,11 +100,12 @@ def read_shapes(
     styles = _Styles(model)
     try:
         wanted = [
-            product for product in model.by_type("IfcProduct")
+            product
+            for product in model.by_type("IfcProduct")
             if product.id() not in without
             and not product.is_a().startswith(tuple(skipped))
             and _has_body(product)
-        ]  # fmt: skip
+        ]
         if not wanted:
             return {}, []
         iterator = ifcopenshell.geom.iterator(

@@ -126,9 +126,10 @@ def read_source(
             shapes[step_id] = painted(shapes[step_id], paint)
     if corrections.file:
         values = {
-            "removed": len(removed), "repainted": len(corrections.painted(model)),
+            "removed": len(removed),
+            "repainted": len(corrections.painted(model)),
             "unglazed": len(unglazed),
-        }  # fmt: skip
+        }
         issues.append(Issue("corrections-used", corrections.file, values))
     placed = in_world(shapes, rotation)
     return Source(

@@ -58,9 +58,12 @@ def boundary_issues(source: Source, spaces: Sequence[Space]) -> list[Issue]:
         issues += _differences(model.by_guid(element), theirs, rooms[room], hosts)
     differing = len({(i.where, i.values["room"]) for i in issues})
     values = {
-        "count": len(second), "pairs": compared, "agreeing": compared - differing,
-        "percent": 100 * SAME_SHARE, "unread": unread,
-    }  # fmt: skip
+        "count": len(second),
+        "pairs": compared,
+        "agreeing": compared - differing,
+        "percent": 100 * SAME_SHARE,
+        "unread": unread,
+    }
     return [Issue("boundaries-compared", RELATION, values), *issues]
 
 

@@ -144,8 +144,11 @@ def markdown(rows: Sequence[Surveyed]) -> str:
             f"| {row.issues} | {row.check_s:.1f} | {row.export_s:.1f} | {row.cpu_s:.1f} "
             f"| {row.memory_mb:.0f} |"
         )
-    total = {f.name: sum(getattr(r, f.name) for r in rows) for f in fields(Surveyed)
-             if f.type in ("int", "float")}  # fmt: skip
+    total = {
+        f.name: sum(getattr(r, f.name) for r in rows)
+        for f in fields(Surveyed)
+        if f.type in ("int", "float")
+    }
     lines.append(
         f"\n{len(rows)} files, {sum(bool(r.refused) for r in rows)} refused; {total['rooms']} rooms"
         f" ({total['open_rooms']} with an open edge), {total['windows']} windows with "

@@ -45,8 +45,10 @@ from bim.report.issue import Effect, Issue, Phrase
 JUDGED = ("IfcWall", "IfcSlab", "IfcRoof", "IfcCovering", "IfcBuildingElementProxy")
 THINNEST, THICKEST = 0.001, 0.06  # of a pane with its spacers [m]
 NO_GLASS = (  # codes of the issues of transparent surfaces that are no glass
-    "transparent-taken-as-opaque", "transparent-left-out", "transparent-facing-down",
-)  # fmt: skip
+    "transparent-taken-as-opaque",
+    "transparent-left-out",
+    "transparent-facing-down",
+)
 BAR = 0.2  # width up to which a member is no pane [m]
 LIES_ON = 0.03  # from a sheet to what it lies on [m]
 WITHIN = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / [[3], [6], [6], [6]]  # triangles
@@ -61,8 +63,10 @@ GLASS = re.compile(
     r"glas|glaz|verre|vitr|cristal|vidr|vetr[oa]|szk[lł]|\bsklo|cam\b|lasi\b|polycarb|polikarb"
     r"|plexi|acryl|pmma|etfe|ガラス|硝子|玻璃|стекл|γυαλ"
 )
-NOT_GLASS = re.compile(r"glass ?wool|glaswol|glasvlies|laine de verre|fib\w* ?(de )?(glas|verre)"
-                       r"|glasfa|fiberglas|fibreglas|lana de vidrio|グラスウール")  # fmt: skip
+NOT_GLASS = re.compile(
+    r"glass ?wool|glaswol|glasvlies|laine de verre|fib\w* ?(de )?(glas|verre)"
+    r"|glasfa|fiberglas|fibreglas|lana de vidrio|グラスウール"
+)
 
 
 def judged_transparent(
@@ -92,8 +96,10 @@ def judged_transparent(
         if judged is not shape:
             area = transparent_area(shape)
             values = {
-                "element": f"{shape.ifc_class} {shape.name}", "area": area, "reason": Phrase(why),
-            }  # fmt: skip
+                "element": f"{shape.ifc_class} {shape.name}",
+                "area": area,
+                "reason": Phrase(why),
+            }
             code = "transparent-left-out" if judged is None else "transparent-taken-as-opaque"
             issues.append(Issue(code, shape.guid, values, Effect(glass=area)))
     return kept, issues
@@ -126,10 +132,11 @@ def _judged(
     if SEPARATION.search(own) or (materials and all(_is_air(text) for text in materials)):
         return None, "air"
     looks = tuple(
-        look if not look.is_glass or _is_pane(look, materials, thickness)
+        look
+        if not look.is_glass or _is_pane(look, materials, thickness)
         else replace(look, transparency=0.0)
         for look in shape.looks
-    )  # fmt: skip
+    )
     if looks == shape.looks:
         return shape, ""
     if thickness < THINNEST:
@@ -149,10 +156,12 @@ def _lying(
     if not sheets:
         return set()
     bodies = [
-        shape.triangles for key, shape in shapes.items()
-        if key not in judged and shape.ifc_class not in NO_ELEMENTS
+        shape.triangles
+        for key, shape in shapes.items()
+        if key not in judged
+        and shape.ifc_class not in NO_ELEMENTS
         and not shape.ifc_class.startswith("IfcSite")
-    ]  # fmt: skip
+    ]
     mesh = ray_mesh(np.concatenate(bodies or [np.empty((0, 3, 3))]))
     return {key for key in sheets if _lies_on(shapes[key], mesh)}
 

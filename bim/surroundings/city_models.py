@@ -100,8 +100,9 @@ def read_citygml(path: Path) -> SurroundingsFile:
                 member.left_out[NO_GEOMETRY] += 1
         objects += member.objects
         left_out += member.left_out
-    return SurroundingsFile(path, tuple(objects), next(iter(systems), None),
-                       left_out=tuple(left_out.items()))  # fmt: skip
+    return SurroundingsFile(
+        path, tuple(objects), next(iter(systems), None), left_out=tuple(left_out.items())
+    )
 
 
 def _systems(element: Element) -> Iterator[str]:
@@ -264,9 +265,11 @@ def read_cityjson(path: Path) -> SurroundingsFile:
     metadata = content.get("metadata")
     system = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
     return SurroundingsFile(
-        path, tuple(objects), crs_name(system) if isinstance(system, str) else None,
+        path,
+        tuple(objects),
+        crs_name(system) if isinstance(system, str) else None,
         left_out=tuple((what, count) for what, count in left_out.items() if count),
-    )  # fmt: skip
+    )
 
 
 def _has_children(thing: dict[str, Any]) -> bool:

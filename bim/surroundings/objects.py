@@ -67,8 +67,9 @@ def read_meshes(path: Path) -> SurroundingsFile:
         ]
     except FAULTS as error:
         reason = (str(error).splitlines() or [""])[0][:120]
-        raise DataError(f"is no {kind.upper()} mesh: {reason or type(error).__name__}", file=path)\
-            from None  # fmt: skip
+        raise DataError(
+            f"is no {kind.upper()} mesh: {reason or type(error).__name__}", file=path
+        ) from None
     objects = []
     for number, (named, triangles) in enumerate(meshes, 1):
         if kind in ("glb", "gltf"):

@@ -44,8 +44,9 @@ def room_powers(
             strict=True,
         )
     )
-    heat = sum(demand[k] for k in ("heating", "supply air heating", "slab heating",
-                                   "humidification"))  # fmt: skip
+    heat = sum(
+        demand[k] for k in ("heating", "supply air heating", "slab heating", "humidification")
+    )
     cold = sum(demand[k] for k in ("cooling", "slab cooling", "dehumidification"))
     heating_final = heat / performance(plant.heating_cop, outdoor)
     electricity = {
