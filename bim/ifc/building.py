@@ -1,4 +1,4 @@
-"""A building from an IFC file: rooms that are closed, windows that look out, issues named."""
+"""A building from an IFC file: closed rooms, windows to the outdoors, issues of the model."""
 
 from __future__ import annotations
 
@@ -73,14 +73,14 @@ def read_zones(model: ifcopenshell.file, damage: Damage | None = None) -> tuple[
 
 def _spaces(group: ifcopenshell.entity_instance, depth: int) -> list[str]:
     """GUIDs of the spaces of a zone and of the zones in it."""
-    found: list[str] = []
+    guids: list[str] = []
     for relation in getattr(group, "IsGroupedBy", None) or ():
         for one in entities(relation.RelatedObjects):
             if one.is_a("IfcSpace"):
-                found.append(one.GlobalId)
+                guids.append(one.GlobalId)
             elif one.is_a("IfcGroup") and depth:
-                found += _spaces(one, depth - 1)
-    return found
+                guids += _spaces(one, depth - 1)
+    return guids
 
 
 SEARCH = 0.3  # share of the stage "rooms" in which they are found, where the file has no spaces
@@ -99,12 +99,13 @@ def read_ifc(
 
     Args:
         linked: further files of the same building, see `bim.ifc.linked`; an .ifczip may hold all.
-        corrections: what to leave out and repaint; by default those of the file
+        corrections: elements to omit and to repaint; default: the file
             `<model>.corrections.toml` beside the model, if there is one.
-        join: rooms to make one besides, as "Hall + Living", where `corrections` are not given;
-            "open": those that an opening larger than a door leads between.
-        furniture: whether what stands in the rooms is in their light and views.
+        join: further rooms to merge, as "Hall + Living", without `corrections`;
+            "open": those connected by an opening larger than a door.
+        furniture: whether furniture is part of the light and views of its room.
         progress: called with the stage's name and the fraction of it that is done.
+
     Raises: `DataError` where the file is missing or is no readable IFC; faults inside the model are
         the building's `issues`.
     """
@@ -132,14 +133,16 @@ def read_ifc(
     )
     issues += [*glass.issues, *faults]
     around = _surroundings(mesh, source.walls, records, source.ground)
-    attached = [*glass.attachments, *(side for way in rooms.passages for side in way.sides)]
-    own = [[a for a in attached if a.room == r.guid] for r in records]
-    boundaries = room_boundaries([(r.solid, a) for r, a in zip(records, own, strict=True)])
+    attached = [*glass.attachments, *(side for passage in rooms.passages for side in passage.sides)]
+    by_room = [[a for a in attached if a.room == r.guid] for r in records]
+    boundaries = room_boundaries([(r.solid, a) for r, a in zip(records, by_room, strict=True)])
     spaces: list[Space] = []
     for index, boundary in enumerate(boundaries):
         tell("rooms", SEARCH + (1 - SEARCH) * index / len(records))
-        found, more = _space(index, boundary, records, around, elements=elements, finishes=finishes)
-        spaces += found
+        of_boundary, more = _space(
+            index, boundary, records, around, elements=elements, finishes=finishes
+        )
+        spaces += of_boundary
         issues += more
     again = {issue.where for issue in issues if issue.code == DRAWN_TWICE}
     issues += lost_glass(attached, spaces, again)
@@ -196,13 +199,13 @@ def _rooms(
     read, more = cut_rooms(read, covers, fixed)
     issues += more
     apertures = open_apertures(source, read, mesh.triangles)
-    records, ways, more = joined_rooms(source, read, apertures, mesh.triangles)
+    records, passages, more = joined_rooms(source, read, apertures, mesh.triangles)
     issues += more
     if not records:
         read, more = rooms_from_geometry(source, tell)
         records = read
         issues += more
-    return _Rooms(read, records, repeated, ways, covers), issues
+    return _Rooms(read, records, repeated, passages, covers), issues
 
 
 def with_states(
@@ -242,7 +245,7 @@ def guessed_walls(spaces: Sequence[Space]) -> list[Issue]:
 
 
 def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, ...], list[Issue]]:
-    """What stands outdoors, free of what would blind a window."""
+    """The surroundings, without elements that would cover a window."""
     windows = [window for space in spaces for window in space.windows]
     issues = []
     if not windows:
@@ -251,7 +254,7 @@ def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, .
         source.model,
         source.elements,
         reflectance=source.corrections.surroundings,
-        kept=source.corrections.kept(source.model),
+        drawn_shades=source.corrections.drawn_shades(source.model),
         panes=CLEAR_GLAZING,
     )
     elements, issues_of_panes = mirrors_in_view(elements, windows)

@@ -52,9 +52,9 @@ def map_conversions(model: ifcopenshell.file) -> list[MapConversion]:
     if model.schema == "IFC2X3":
         holders = [*model.by_type("IfcProject"), *model.by_type("IfcSite")]
         psets = [psets_of(holder) for holder in holders]
-        found = [pset[MAP_SET] for pset in psets if MAP_SET in pset]
+        conversions = [pset[MAP_SET] for pset in psets if MAP_SET in pset]
         names = [next((p["ePSet_ProjectedCRS"] for p in psets if "ePSet_ProjectedCRS" in p), {})]
-        return [_conversion(one, names[0].get("Name"), None) for one in found]
+        return [_conversion(one, names[0].get("Name"), None) for one in conversions]
     return [
         _conversion(
             one.get_info(),

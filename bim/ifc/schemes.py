@@ -61,7 +61,7 @@ def one_of_each(
 
 
 def shared_by_pair(records: Sequence[SpaceRecord]) -> tuple[Shared, list[Issue]]:
-    """Volume [m3] that each pair of spaces shares, where it is any, and what was not worked out."""
+    """Volume [m3] that each pair of spaces shares, if any, and what could not be computed."""
     near = {
         i: [
             j
@@ -73,15 +73,15 @@ def shared_by_pair(records: Sequence[SpaceRecord]) -> tuple[Shared, list[Issue]]
     bodies = {i: packed(records[i].solid.manifold) for i in near}
     items = [(bodies[i], [bodies[j] for j in others]) for i, others in near.items() if others]
     volumes = iter(shared_volumes(items))
-    found, issues = {}, []
+    by_pair, issues = {}, []
     for i, others in near.items():
         shared = next(volumes) if others else []
         if isinstance(shared, ProcessEnded):
             values = {"room": records[i].solid.name, "reason": str(shared)}
             issues.append(Issue("overlap-not-computed", records[i].guid, values))
             continue
-        found |= {(i, j): volume for j, volume in zip(others, shared, strict=True) if volume > 0}
-    return found, issues
+        by_pair |= {(i, j): volume for j, volume in zip(others, shared, strict=True) if volume > 0}
+    return by_pair, issues
 
 
 def _same(records: Sequence[SpaceRecord], shared: Shared, left: set[int]) -> list[tuple[int, int]]:

@@ -124,26 +124,26 @@ def _judged(
     if shape.ifc_class.startswith("IfcMember"):
         if not _is_bar(shape):
             return shape, ""
-        solid = tuple(replace(look, transparency=0.0) for look in shape.looks)
-        return replace(shape, looks=solid), "bar"
+        solid = tuple(replace(style, transparency=0.0) for style in shape.styles)
+        return replace(shape, styles=solid), "bar"
     materials = _material_texts(element, damage)
-    own = plain_text(f"{element.Name or ''} {getattr(element, 'ObjectType', None) or ''}")
+    names = plain_text(f"{element.Name or ''} {getattr(element, 'ObjectType', None) or ''}")
     thickness = _thickness(shape)
-    if SEPARATION.search(own) or (materials and all(_is_air(text) for text in materials)):
+    if SEPARATION.search(names) or (materials and all(_is_air(text) for text in materials)):
         return None, "air"
-    looks = tuple(
-        look
-        if not look.is_glass or _is_pane(look, materials, thickness)
-        else replace(look, transparency=0.0)
-        for look in shape.looks
+    styles = tuple(
+        style
+        if not style.is_glass or _is_pane(style, materials, thickness)
+        else replace(style, transparency=0.0)
+        for style in shape.styles
     )
-    if looks == shape.looks:
+    if styles == shape.styles:
         return shape, ""
     if thickness < THINNEST:
         return None, "no-thickness"
     if any(_names_a_body(text) for text in materials):
-        return replace(shape, looks=looks), "other-material"
-    return replace(shape, looks=looks), "not-called-glass"
+        return replace(shape, styles=styles), "other-material"
+    return replace(shape, styles=styles), "not-called-glass"
 
 
 def _lying(
@@ -185,12 +185,12 @@ def _lies_on(shape: Shape, bodies: RayMesh) -> bool:
     return bool(np.average(stands, weights=np.linalg.norm(vectors[flat], axis=1)) > HALF)
 
 
-def _is_pane(look, materials: list[str], thickness: float) -> bool:
-    if any(_is_glass(text) for text in (plain_text(look.name), *materials)):
+def _is_pane(style, materials: list[str], thickness: float) -> bool:
+    if any(_is_glass(text) for text in (plain_text(style.name), *materials)):
         return True
     if any(_names_a_body(text) for text in materials):
         return False
-    return THINNEST <= thickness <= THICKEST and look.transparency >= HALF
+    return THINNEST <= thickness <= THICKEST and style.transparency >= HALF
 
 
 def _is_glass(text: str) -> bool:
