@@ -74,12 +74,15 @@ def window_model(
         guess = position_of_share(share)
     place = guess or position or of_layers or "none"
     guessed = guess is not None
-    known = {"u_value": u_value, "g_normal": g_normal}
     if closure.unit is not None:
         by_layer = absorbed(closure.unit, tau, rho, incidence)
-        data = layered_thermal_data(closure.unit, tau, rho, by_layer, **known, item=item)
+        data = layered_thermal_data(
+            closure.unit, tau, rho, by_layer, u_value=u_value, g_normal=g_normal, item=item
+        )
         return WindowModel(data, closure, place, guessed)
-    data = thermal_data(tau, rho, shading_position=place, **known, item=item)
+    data = thermal_data(
+        tau, rho, shading_position=place, u_value=u_value, g_normal=g_normal, item=item
+    )
     unit = typical_unit(place, data.u_value, closure.gap)
     closed = closure.with_typical(unit, data.u_value)
     if unit is None:

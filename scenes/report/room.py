@@ -18,7 +18,6 @@ from scenes.language.numbers import percent, rounded, share
 from scenes.report import (
     daylight_figures,
     glare_figures,
-    operation_figures,
     tables,
     thermal_figures,
 )
@@ -182,15 +181,15 @@ def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
         glare_table=tables.glare_table(result.times, room.glare.pictures)
         if room.glare.pictures
         else None,
-        glare_year=operation_figures.glare_carpet(result, room),
+        glare_year=glare_carpet(result, room),
         temperature=thermal_figures.temperature_carpet(result, room),
         comfort=thermal_figures.comfort_carpet(result, room),
         duration=thermal_figures.duration_curve(room),
         weeks=thermal_figures.extreme_weeks(room),
         gains=thermal_figures.gains_chart(monthly),
         gains_table=tables.gains_table(monthly),
-        states=operation_figures.state_carpets(result, room),
-        loads=operation_figures.loads_chart(room),
+        states=state_carpets(result, room),
+        loads=loads_chart(room),
         loads_table=None
         if room.operation is None
         else tables.values_table(gettext("Annual loads"), room.operation.summary),
