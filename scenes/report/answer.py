@@ -89,9 +89,7 @@ def systems_answer(cases: Sequence[Judged], energy_kwh: Sequence[float | None]) 
         parts.append(_fails(case) + ".")
     if len(others) > MOST_NAMED:
         more = len(others) - MOST_NAMED
-        parts.append(
-            ngettext("{count} more fails some.", "{count} more fail some.", more)
-        )
+        parts.append(ngettext("{count} more fails some.", "{count} more fail some.", more))
     return " ".join([*parts, *_energy(order, best)])
 
 
