@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.language.catalogue import decimal, gettext, ngettext
+from scenes.language.catalogue import gettext, ngettext
 from scenes.language.numbers import (
     colon,
     month_name,
@@ -20,8 +20,9 @@ from scenes.language.numbers import (
     significant,
     spoken,
 )
+from scenes.report.answer import judged, rooms_answer
 from scenes.report.glare_figures import sun_words
-from scenes.report.headline import FAIR, GOOD, POOR, WARM_C, Card, heated, occupied
+from scenes.report.headline import FAIR, GOOD, POOR, WARM_C, Card, dgp_error, heated, occupied
 from scenes.report.method import METHODS
 from scenes.report.names import rooms_counted, systems_counted
 from scenes.report.tables import GLARE_WORDS, Column, Table, glare_class, step_hours
@@ -96,6 +97,8 @@ def _value(card: Card) -> str:
 
 
 def _error(room: RoomYear, card: Card) -> str:
+    if card.error:
+        return card.error
     if card.unit == "DGP":
         worst = max(room.glare.pictures, key=lambda picture: picture.glare["dgp"])
         return plus_minus(worst).strip() or gettext("unknown")
@@ -108,7 +111,7 @@ def _error(room: RoomYear, card: Card) -> str:
 def plus_minus(picture: LuminancePicture) -> str:
     """The standard error of a picture's DGP; empty where it is not known."""
     error = picture.glare.get("dgp_standard_error", float("nan"))
-    return "" if error != error else decimal(f" ± {max(error, 1e-4):.1g}")
+    return "" if error != error else f" {dgp_error(error)}"
 
 
 MOST_NAMES = 4  # of systems in the first sentence, of rooms in that on shading
@@ -122,8 +125,10 @@ class Verdict:
     """The summary on one page."""
 
     question: str
+    answers: tuple[tuple[str, str], ...]  # room (empty: all), which limits are met
     sentences: tuple[tuple[str, str], ...]  # heading, text
     limits: LimitTables
+    by_room: Table | None = None  # of a study: limits met by room and system
 
 
 def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
@@ -151,7 +156,9 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
         (gettext("Shading"), _shading(result)),
     )
     named = [(r.space.label, r, card) for r, card in zip(result.spaces, cards, strict=True)]
-    return Verdict(question, sentences, limits(named, gettext("Room")))
+    answer = rooms_answer([judged(name, figures) for name, _, figures in named])
+    answers = (("", answer),) if answer else ()
+    return Verdict(question, answers, sentences, limits(named, gettext("Room")))
 
 
 def _systems(names: Sequence[str]) -> str:
