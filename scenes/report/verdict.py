@@ -56,11 +56,12 @@ def limits(rooms: Sequence[Named], of: str) -> LimitTables:
 
 def _every(rooms: Sequence[Named], of: str) -> Table:
     columns = (
-        Column(of, numeric=False), Column(gettext("Quantity"), numeric=False),
+        Column(of, numeric=False),
+        Column(gettext("Quantity"), numeric=False),
         Column(gettext("Value"), numeric=False, short=True),
         Column(gettext("Limit"), numeric=False),
         Column(gettext("Standard error"), numeric=False),
-    )  # fmt: skip
+    )
     rows = tuple(
         (name, card.label, _value(card), card.verdict, _error(room, card))
         for name, room, own in rooms
@@ -77,7 +78,7 @@ def _by_figure(rooms: Sequence[Named]) -> Table:
         Column(gettext("Rooms by limit"), numeric=False),
         Column(gettext("Worst rooms"), numeric=False),
         Column(gettext("Standard error of the worst"), numeric=False),
-    )  # fmt: skip
+    )
     rows = []
     judged = [(name, room, card) for name, room, own in rooms for card in own if card.verdict]
     for label in dict.fromkeys(card.label for _, _, card in judged):
