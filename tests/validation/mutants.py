@@ -49,7 +49,6 @@ MODULES = {  # files, and their quick tests; none that numba compiles, whose cod
     "mitsuba_cfs/sky/perez": ["sky/test_perez"],
     "mitsuba_cfs/sky/cie": ["sky/test_cie"],
     "mitsuba_cfs/sky/patches": ["sky/test_patches"],
-    "mitsuba_cfs/sky/ground": ["sky/test_ground"],
     "mitsuba_cfs/sky/albedo": ["sky/test_albedo"],
     "mitsuba_cfs/sky/heat_island": ["sky/test_heat_island"],
     "mitsuba_cfs/sky/plausible": ["sky/test_plausible"],
