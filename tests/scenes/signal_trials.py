@@ -111,7 +111,7 @@ def trial(number: int, earlier_of: Callable[[str], Earlier]) -> Trial:
     code, expected = process.returncode, CODES[SIGNALS[kind][0]]
     faults = []
     ended = "by the signal"
-    if code in BY_PYTHON and " in main\n" not in text:
+    if (code in BY_PYTHON or "KeyboardInterrupt" in text) and " in main\n" not in text:
         ended = "before the program began"
     elif "Traceback" in text or "Exception ignored" in text:
         faults.append(f"traceback: {text.strip().splitlines()[-1][:80]}")
