@@ -86,10 +86,10 @@ def read_radiance_elements(
 
 def _window(name: str, window: PanedWindow, issues: dict[Issue, None]) -> Window:
     """A window with its glazing; `issues` takes those of its layers."""
-    triangles, glass = window.surface.triangles, plain_glass(window.panes)
+    triangles, glass = window.surface.triangles, plain_glass(window.panes, window.beside)
     states, up = (), None
     if glass is None:
-        layered = layered_window(window.panes, window.outwards)
+        layered = layered_window(window.panes, window.outwards, window.beside)
         states, up = (layered.state,), layered.up
         issues |= dict.fromkeys(layered.issues)
     return Window(
