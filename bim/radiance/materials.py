@@ -21,7 +21,7 @@ BLACK = ("light", "glow", "illum", "spotlight")
 MATERIALS = (*OPAQUE, *CLEAR, *SYSTEMS, *BLACK, "mirror", "BRTDfunc")
 PATTERNS = (
     "colorfunc", "brightfunc", "colordata", "brightdata", "colorpict", "colortext", "brighttext",
-    "texfunc", "texdata",
+    "texfunc", "texdata", "spectrum", "specfile", "specfunc", "specdata", "specpict",
 )  # fmt: skip
 GLASS_INDEX = 1.52  # where a glass states none
 NUMBERS = {"plastic": 5, "metal": 5, "trans": 7, "mirror": 3, "glass": 3, "dielectric": 5,

@@ -223,6 +223,11 @@ class _Reader:
             if definition.kind == "alias":
                 above = above or definition
                 modifier = definition.strings[0]
+            elif definition.kind == "illum":  # what it replaces is there instead
+                self._leave_out("illum-replaced", surface)
+                modifier = definition.strings[0] if definition.strings else VOID
+                if modifier == VOID:
+                    return None
             elif definition.kind in MATERIALS:
                 # an alias has the patterns that it names, or inherits those of the material
                 is_alias = above is not None and above.modifier != INHERITED
