@@ -107,7 +107,8 @@ def _clear(scene: RadianceScene, path: Path, facades: Sequence[str]) -> list[str
     }
     if not names:
         there = ", ".join(sorted({thing.material.name for thing in scene.objects})[:12])
-        message = f"has no glass, fabric or BSDF: name the windows' material, there are {there}"
+        message = "has no glass, fabric or BSDF"
+        message += f": name the windows' material, there are {there}" if there else " and no wall"
         raise DataError(message, file=path, field="aperture")
     return sorted(names)
 
