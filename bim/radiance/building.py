@@ -64,8 +64,8 @@ def read_radiance_building(
         if not indoors.stands[indoors.owner == i].any()
     )
     issues += [*layer_issues, *_material_issues(objects)]
-    found = (*scene.issues, *panes.issues, *issues)
-    return Building(path.stem, (space,), elements, found, file=path)
+    every_issue = (*scene.issues, *panes.issues, *issues)
+    return Building(path.stem, (space,), elements, every_issue, file=path)
 
 
 def read_radiance_elements(
@@ -190,7 +190,7 @@ def _faces(
 
 
 def _furniture(objects: Sequence[RadianceObject], indoors: Indoors) -> tuple[Element, ...]:
-    """What stands in the room, with a GUID for each body, and what is lit in cavities round it."""
+    """Furniture of the room, with a GUID for each body, and what is lit in cavities around it."""
     pieces = []
     for i in np.unique(indoors.owner[indoors.furniture]):
         own = indoors.furniture & (indoors.owner == i)

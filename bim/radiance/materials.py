@@ -49,7 +49,7 @@ class RadianceMaterial:
 
     @property
     def is_opaque(self) -> bool:
-        """Whether it stands in the way of light, as the tracer sees it."""
+        """Whether it obstructs light, as the tracer takes it."""
         return self.kind in OPAQUE or self.kind in BLACK or self.kind == "mirror"
 
 

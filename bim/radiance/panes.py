@@ -132,7 +132,7 @@ def panes_of(
 
 @dataclass(frozen=True, slots=True)
 class _Front:
-    """What is in front of a window."""
+    """Layers and other panes in front of a window."""
 
     layers: tuple[RadianceObject, ...]  # of its glazing, the outer one first
     hidden: set[int]  # identities of all that are near
@@ -251,7 +251,7 @@ class _Space:
         return shares if diffuse_mean(shares) > PAST else None
 
     def has_room(self, thing: RadianceObject, surface: WindowSurface) -> bool:
-        """Whether the inner side of a pane looks into a room.
+        """Whether there is a room on the inner side of a pane.
 
         From panes of glass most rays meet something; walks from fabrics and translucent panels,
         which may also be awnings and lamps, stay inside.
@@ -335,7 +335,7 @@ def diffuse_mean(shares: NDArray[np.float64]) -> float:
 
 
 def _optics(thing: RadianceObject) -> object:
-    """What tells layers of different optics apart."""
+    """A key that layers of equal optics share."""
     return replace(thing.material, name=""), tuple(id(one) for one in thing.definitions[:-1])
 
 

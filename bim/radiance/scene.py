@@ -54,7 +54,7 @@ class RadianceObject:
 
 @dataclass(frozen=True, slots=True)
 class RadianceScene:
-    """What scene files hold: surfaces, and what of the files is not used."""
+    """Surfaces of scene files, and which parts of the files are not used."""
 
     objects: tuple[RadianceObject, ...]
     files: tuple[Path, ...]  # all that were read
@@ -175,11 +175,11 @@ class _Reader:
             self._leave_out("primitives-not-read", primitive, kind)
 
     def _add(self, primitive: Primitive, outer: tuple[Xform, ...]) -> None:
-        given = next((x.modifier for x in outer if x.modifier is not None), primitive.modifier)
-        found = self._material(given, primitive)
-        if found is None:
+        modifier = next((x.modifier for x in outer if x.modifier is not None), primitive.modifier)
+        known = self._material(modifier, primitive)
+        if known is None:
             return
-        material, modifiers, definitions = found
+        material, modifiers, definitions = known
         triangles = shapes.triangles_of(primitive)
         if not len(triangles):
             self._leave_out("surfaces-without-area", primitive)
@@ -294,7 +294,7 @@ class _Reader:
         self.first.setdefault((code, kind), primitive)
 
     def issues(self) -> Iterator[Issue]:
-        """What was met and not used, each kind once."""
+        """Parts of the files that are not used, each kind once."""
         for (code, kind), count in self.left_out.items():
             first = self.first[code, kind]
             values = {"count": count, "type": kind, "first": first.name}
