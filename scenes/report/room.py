@@ -21,6 +21,7 @@ from scenes.report import (
 )
 from scenes.report.glare_figures import compass
 from scenes.report.headline import Card, cards
+from scenes.report.method import sun_error_words
 from scenes.results import RoomYear, RunResult
 
 
@@ -139,7 +140,7 @@ def heading(normal: NDArray[np.float64]) -> str:
 def error_words(room: RoomYear) -> str:
     """The standard error of the room's illuminances in one sentence."""
     error = room.daylight.relative_error
-    return ngettext(
+    noise = ngettext(
         "Relative standard error of the annual mean illuminance: {mean} % at the one sensor.",
         "Relative standard error of the annual mean illuminance: {mean} % on average over {count} "
         "sensors, {worst} % at most.",
@@ -147,3 +148,4 @@ def error_words(room: RoomYear) -> str:
         mean=share(float(error.mean())),
         worst=share(float(error.max())),
     )
+    return noise + sun_error_words([room])
