@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.pane_stack import hemispherical_mean
 from mitsuba_cfs.directions import incident_azimuth
-from scenes.fenestration.thermal_system import sun_in_layers, window_model
+from scenes.fenestration.thermal_system import sun_in_layers
 from tests.validation.ashrae140_sun import ANGLES, glass
 from thermal.blackbox import (
     R_INNER,
@@ -43,6 +43,7 @@ from thermal.glazing import Gap
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
 from thermal.iso15099 import iso15099_data, yearly_g_values
 from thermal.shade_layers import sheet_layer, venetian_layer
+from thermal.window_model import window_model
 
 FloatArray = NDArray[np.float64]
 SYSTEMS = ("dgu", "ext_blind", "ext_shade", "int_shade")
@@ -190,7 +191,7 @@ def _of_stated(
     window = window_model(
         optics.tau[order], optics.rho[order], optics.theta[order], PLACES[name],
         Closure(model, gap=GAP if model == "gap" else None),
-        u_value=u_value, g_normal=float(optics.g[order[0]]), item=name,
+        absorbed=sun_in_layers, u_value=u_value, g_normal=float(optics.g[order[0]]), item=name,
     )  # fmt: skip
     if closure == "by direction":
         return window.closure, optics
