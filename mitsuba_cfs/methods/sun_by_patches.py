@@ -32,7 +32,7 @@ def sunny_hour_error(light: ByPhases, state: NDArray[np.int64] | None, illuminan
         state: [G, L] of each window group in each hour, or [L] of all; the first by default.
         illuminance: that of the sensors in this state [S, L] [lx].
     """
-    rows = hourly_states(state, len(light.systems), light.sky)
+    rows = hourly_states(state, light.systems, light.sky)
     seasons = light.seasons() if isinstance(light, SeasonalLight) else [(light, slice(None))]
     square, total, count = np.zeros(len(illuminance)), np.zeros(len(illuminance)), 0
     for one, hours in seasons:
