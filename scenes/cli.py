@@ -204,10 +204,7 @@ class Stop:
         raise Terminated(number)
 
     def _wait(self, number: int) -> None:
-        """Look again after `AGAIN_S`, by the clock of the process where it has one.
-
-        A thread for it may wait for ever: for a lock that the code below the handler holds.
-        """
+        """Look again after `AGAIN_S`, by the timer of the process: no thread is started."""
         if hasattr(signal, "setitimer"):
             signal.signal(signal.SIGALRM, lambda _number, frame: self(number, frame))
             signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
