@@ -142,6 +142,7 @@ def test_rays_through_points_of_pixels_are_those_of_the_whole_picture():
 
 
 def test_the_smallest_picture_has_one_pixel():
-    assert fisheye((0, 0, 0), (0, 1, 0), 1).width == 1
+    one = fisheye((0, 0, 0), (0, 1, 0), 1)
+    assert (one.width, one.height, one.up, one.horizontal_deg) == (1, 1, (0, 0, 1), 180)
     with pytest.raises(ValueError, match="size"):
         fisheye((0, 0, 0), (0, 1, 0), 0)
