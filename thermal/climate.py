@@ -90,6 +90,8 @@ class Solar:
             fault = not np.all(np.isfinite(values)) or bool(np.any(values < -1e-6))
             require(not fault, f"solar {name}", "negative or missing values")
             object.__setattr__(self, name, values)
+        if self.state is not None:
+            object.__setattr__(self, "state", np.asarray(self.state, dtype=np.int64))
 
 
 def no_sun(hours: int, surfaces: int, windows: int) -> Solar:
