@@ -53,7 +53,7 @@ class WindowOptics:
         known = panes and self.panes is not None
         if not known and one.layer_resistance.kind != "constant":
             found.append(f"its layers' resistance, which varies, is that at {TYPICAL[0]:g} C")
-        if one.extra_inner or one.extra_outer:
+        if one.extra_inner or one.extra_outer:  # where air passes across, one of these too
             found.append("what a shade gives to the air behind it is left out")
         return tuple(f"{one.name}: {what}" for what in found)
 
@@ -81,7 +81,10 @@ def complex_state(model: Model, name: str, optics: WindowOptics, *, panes: bool)
     absorbed = [
         (optics.absorptances.outer, np.zeros(size)),
         *still,
-        (optics.absorptances.inner, np.full(size, optics.back_absorptance)),
+        (
+            optics.absorptances.inner + optics.absorptances.air,
+            np.full(size, optics.back_absorptance),
+        ),
     ]
     layers: dict[str, str] = {f"gap_{k}_name": gap for k, gap in enumerate(gaps, 1)}
     for k, (pair, pane) in enumerate(zip(absorbed, stack, strict=True), 1):

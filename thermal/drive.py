@@ -70,6 +70,7 @@ def drive_of(
     drive = records.Drive(
         inner=np.concatenate([part for inner, _ in suns for part in inner], axis=1),
         outer=np.concatenate([part for _, outer in suns for part in outer], axis=1),
+        air=np.stack([_air_sun(*pair, stretch) for pair in zip(zones, solar, strict=True)], axis=1),
         state=np.ascontiguousarray(np.concatenate(states, axis=1)),
         mix=np.stack([stretch.of(mix.of_hour) for mix in mixes], axis=1),
         convective=_hourly([z.gains.convective for z in zones], stretch, "convective gains"),
@@ -136,6 +137,12 @@ def _zone_sun(
     facade = stretch.of(sun.facade) * (absorptance * outdoor)
     outer = [facade, stretch.of(sun.absorbed_outer), at_frames]
     return inner, outer
+
+
+def _air_sun(zone: Zone, sun: Solar, stretch: Stretch) -> FloatArray:
+    """Sun [R] [W] that warms a zone's air behind its shades."""
+    values = np.zeros_like(sun.absorbed_inner) if sun.absorbed_air is None else sun.absorbed_air
+    return stretch.of(np.asarray(values)) @ np.array([w.area for w in zone.windows])
 
 
 def _states(zone: Zone, sun: Solar, stretch: Stretch) -> NDArray[np.int64]:

@@ -65,7 +65,8 @@ class Glass(NamedTuple):
 
     kind: NDArray[np.int64]  # [W, J] of the layer resistance
     coefficient: NDArray[np.float64]  # [W, J, 6]
-    extra: NDArray[np.float64]  # [W, J, 2] outer and inner extra conductance [W/(m2 K)]
+    # [W, J, 3] conductances [W/(m2 K)]: outer and inner extra, room air to the outer layer
+    extra: NDArray[np.float64]
     emissivity_out: NDArray[np.float64]  # [W, J]
 
 
@@ -389,7 +390,7 @@ def _glass(elements: list[tuple[int, OpaqueSurface | WindowElement]]) -> Glass:
     states = max((len(w.states) for w in windows), default=1)
     kind = np.zeros((len(windows), states), dtype=np.int64)
     coefficient = np.zeros((len(windows), states, 6))
-    extra = np.zeros((len(windows), states, 2))
+    extra = np.zeros((len(windows), states, 3))
     emissivity = np.zeros((len(windows), states))
     for w, window in enumerate(windows):
         for j in range(states):
@@ -397,6 +398,6 @@ def _glass(elements: list[tuple[int, OpaqueSurface | WindowElement]]) -> Glass:
             r = state.layer_resistance
             kind[w, j] = _RESISTANCE_KINDS[r.kind]
             coefficient[w, j, : len(r.coefficients)] = r.coefficients
-            extra[w, j] = state.extra_outer, state.extra_inner
+            extra[w, j] = state.extra_outer, state.extra_inner, state.room_to_outer
             emissivity[w, j] = state.emissivity_out
     return Glass(kind, coefficient, extra, emissivity)

@@ -49,6 +49,7 @@ class Drive(NamedTuple):
 
     inner: NDArray[np.float64]  # [R, N] absorbed at the inside faces [W]
     outer: NDArray[np.float64]  # [R, N] absorbed at the outside faces or outer layers [W/m2]
+    air: NDArray[np.float64]  # [R, Z] sun that warms the air behind interior shades [W]
     state: NDArray[np.int64]  # [H, W] shading state
     mix: NDArray[np.int64]  # [H, Z] emissivities of the zone's windows: `WindowMix`
     convective: NDArray[np.float64]  # [H, Z] gains [W]
@@ -107,8 +108,9 @@ class Workspace(NamedTuple):
     source: NDArray[np.float64]  # [N] heat set free at the pipes in the face's wall [W/m2]
     still: NDArray[np.float64]  # [M] amplitudes that the step before alone would give
     ends: NDArray[np.float64]  # [N, 2] what these give the outermost and innermost inner node
-    film: NDArray[np.float64]  # [N] inside film plus extra conductance [W/(m2 K)]
-    # [N, 5] outer face: diagonal, right side, coupling to inside, film sum, sum of film times T
+    film: NDArray[np.float64]  # [N] conductance between inside face and room air [W/(m2 K)]
+    # [N, 6] outer face: diagonal, right side, coupling to inside, film sum, sum of film times T,
+    # coupling to room air
     outdoor: NDArray[np.float64]
     old_inner: NDArray[np.float64]  # [N]
     old_outer: NDArray[np.float64]  # [N]

@@ -189,23 +189,28 @@ def _window_row(
     outer_sun: float,
     method: Method,
 ) -> tuple[float, float]:
-    """Diagonal and right side [per m2] of an inner window layer, its outer layer eliminated."""
+    """Diagonal and right side [per m2] of an inner window layer, its outer layer eliminated.
+
+    Without what goes to the room air.
+    """
     w = net.faces.window[i]
     emissivity = net.glass.emissivity_out[w, shading]
     h, h_t = _outside_exchange(net.faces, i, state.outer[i], emissivity, weather, t, method)
-    extra = net.glass.extra[w, shading, 0]
+    extra, _, to_room = net.glass.extra[w, shading]
     c = _layer_conductance(
         net.glass.kind[w, shading],
         net.glass.coefficient[w, shading],
         state.inner[i],
         state.outer[i],
     )
-    outer_diagonal = h + extra + c
+    outer_diagonal = h + extra + c + to_room
     h_t += extra * weather.outdoor[t]
     outer_right = h_t + outer_sun
     row = work.outdoor[i]
     row[0], row[1], row[2], row[3], row[4] = outer_diagonal, outer_right, c, h + extra, h_t
-    return c - c * c / outer_diagonal, outer_right * c / outer_diagonal
+    row[5] = to_room
+    passed = c / outer_diagonal
+    return c - (c + to_room) * passed, outer_right * passed
 
 
 @inlined
@@ -243,6 +248,11 @@ def _assemble(
             own, r = _window_row(
                 net, i, state, work, weather, t, shading, drive.outer[sun, i], method
             )
+            row = work.outdoor[i]
+            share = row[5] / row[0]  # of what reaches the outer layer from the room's air
+            film += row[2] * share  # by way of the outer layer
+            work.air[z, 0] += area * row[3] * share  # and to outdoors
+            work.air[z, 1] += area * row[1] * share
         elif kind == PARTNER:
             p = faces.partner[i]
             c_o, _, g_o, _, u_o, v_o, _, _ = faces.port[p]
@@ -308,6 +318,7 @@ def _assemble_air(
         work.air[z, 0] = store + outdoor + work.supply[z, 0]
         work.air[z, 1] = store * work.old_air[z] + outdoor * weather.outdoor[t]
         work.air[z, 1] += work.supply[z, 1] + drive.convective[hour, z]
+        work.air[z, 1] += drive.air[t // method.solar_every, z]
         work.carried[z], work.passed[z] = 0.0, 0.0
     for q in range(net.paths.beside.size):
         z, beyond = net.paths.beside[q], drive.beside_c[t, q]
@@ -342,7 +353,8 @@ def _outer_from_inner(net: Network, state: State, work: Workspace, drive: Drive,
         kind = faces.kind[i]
         if kind == OUTDOOR or kind == WINDOW or kind == ADIABATIC:
             row = work.outdoor[i]
-            state.outer[i] = (row[1] + row[2] * state.inner[i]) / row[0]
+            reached = row[1] + row[2] * state.inner[i] + row[5] * state.air[faces.zone[i]]
+            state.outer[i] = reached / row[0]
         elif kind == KNOWN:
             state.outer[i] = drive.beyond[t, faces.beyond[i]]
         elif kind == TWIN:

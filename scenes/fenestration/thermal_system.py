@@ -106,6 +106,7 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     )
     fenestration = closure.close(Fenestration(system.name, data.u_value))
     films = {"r_outer": fenestration.r_outer, "r_inner": fenestration.r_inner}
+    inward = fenestration.inward_shares()
     notes = [
         *map(_note, data.assumptions),
         *_unplaced(system),
@@ -115,7 +116,16 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
         notes += _typical_note(system, window, tau, rho)
     return ThermalSystem(
         fenestration,
-        layer_absorptances(tau, rho, g_value, data.u_value, item=system.name, **films),
+        layer_absorptances(
+            tau,
+            rho,
+            g_value,
+            data.u_value,
+            inward=inward,
+            item=system.name,
+            **films,
+            room_air=window.to_air(),
+        ),
         tau,
         rho,
         g_value,
@@ -134,6 +144,15 @@ class WindowModel:
     closure: Closure
     typical: GlazingUnit | None  # layers that were assumed
     likely: tuple[GlazingUnit, ...] = ()  # others that are as likely
+    absorbed: FloatArray | None = None  # [K, N] by the layers, stated or typical
+
+    def to_air(self) -> FloatArray | float:
+        """Absorbed sun [K] that goes to the room's air behind an interior shade."""
+        films = self.closure.states_films
+        layered = None if films else self.closure.layers(self.data.u_value)
+        if layered is None or layered.behind is None or self.absorbed is None:
+            return 0.0
+        return self.absorbed @ np.array(layered.behind.to_air)
 
 
 def window_model(
@@ -158,15 +177,15 @@ def window_model(
     if closure.unit is not None:
         absorbed = sun_in_layers(closure.unit, tau, rho, incidence)
         data = layered_thermal_data(closure.unit, tau, rho, absorbed, **known)
-        return WindowModel(data, closure, None)
+        return WindowModel(data, closure, None, absorbed=absorbed)
     data = thermal_data(tau, rho, shading_position=position, **known)
     unit = typical_unit(position, data.u_value, closure.gap)
     closed = closure.with_typical(unit, data.u_value)
     if unit is None:
         return WindowModel(data, closed, None)
-    g = _g_of(unit, data, tau, rho, incidence, item)
+    g, absorbed = _g_of(unit, data, tau, rho, incidence, item)
     likely = likely_units(position, data.u_value, closure.gap)
-    return WindowModel(replace(data, g_value=g), closed, unit, tuple(likely))
+    return WindowModel(replace(data, g_value=g), closed, unit, tuple(likely), absorbed)
 
 
 PANE_ABSORPTION = (0.2, 2.5)  # bounds of the panes' absorptance over that of typical ones
@@ -175,11 +194,11 @@ PANE_ABSORPTION = (0.2, 2.5)  # bounds of the panes' absorptance over that of ty
 def _g_of(
     unit: GlazingUnit, data: ThermalData, tau: FloatArray, rho: FloatArray,
     incidence: FloatArray, item: str,
-) -> FloatArray:  # fmt: skip
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """g [K] by the shares of a unit's layers, from that of `data` at normal incidence.
 
     With a shade, the panes absorb what makes the unit's g that of `data`; within
-    `PANE_ABSORPTION`, else the gain is scaled.
+    `PANE_ABSORPTION`, else the gain is scaled.  Also what each layer absorbs [K, N].
     """
     first, normal = float(data.g_value[0]), (tau[:1], rho[:1], incidence[:1])
 
@@ -195,9 +214,10 @@ def _g_of(
         falls = -1.0 if excess(low) > excess(high) else 1.0
         unit = absorbing(unit, bisected(lambda factor: falls * excess(factor), low, high))
     absorbed = sun_in_layers(unit, tau, rho, incidence)
-    return layered_thermal_data(
+    g = layered_thermal_data(
         unit, tau, rho, absorbed, u_value=data.u_value, g_normal=first, item=item
     ).g_value
+    return g, absorbed
 
 
 def _typical_note(
@@ -216,7 +236,7 @@ def _typical_note(
     mean[0][0], mean[1][0] = tau[0], rho[0]
     g = [
         float(share @ _g_of(one, replace(window.data, g_value=window.data.g_value[:1]), *mean,
-                            angles, system.name))
+                            angles, system.name)[0])
         for one in window.likely
     ]  # fmt: skip
     used = float(weight @ window.data.g_value)
