@@ -211,9 +211,12 @@ def _read_ifc(path: Path, options: ReadOptions, progress: Progress) -> Building:
     from bim.ifc.building import read_ifc
 
     return read_ifc(
-        path, linked=options.linked, join=options.join, furniture=options.furniture,
+        path,
+        linked=options.linked,
+        join=options.join,
+        furniture=options.furniture,
         progress=progress,
-    )  # fmt: skip
+    )
 
 
 def _check_there(path: Path) -> None:
@@ -265,9 +268,12 @@ UNREAD = {  # by suffix: what it is, and the file to give instead
     ".skp": "is a SketchUp model; export it as IFC, gbXML or HBJSON",
 }
 MARKS = (  # in the first bytes of a file of any suffix
-    (b"#?RADIANCE\noconv", ".oct"), (b"<ifcXML", ".ifcxml"), (b":ifcXML", ".ifcxml"),
-    (b"ISO_10303_28", ".ifcxml"), (b"dragonfly_version", ".dfjson"),
-)  # fmt: skip
+    (b"#?RADIANCE\noconv", ".oct"),
+    (b"<ifcXML", ".ifcxml"),
+    (b":ifcXML", ".ifcxml"),
+    (b"ISO_10303_28", ".ifcxml"),
+    (b"dragonfly_version", ".dfjson"),
+)
 IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join", "linked"))
 RADIANCE = BuildingFormat(
     "Radiance", (".rad",), _check_there, _read_radiance, ("apertures", "facade_panes")

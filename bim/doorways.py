@@ -1,8 +1,8 @@
-"""Glass and open doorways between two rooms: the faces that are the same opening in both."""
+"""Glass and open doorways between rooms: the same opening in both, and the way of the light."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,10 @@ from bim.defaults import ROOM_REFLECTANCE, default_construction
 from bim.model import Building, Face, Space, centroid
 
 SAME_SIZE = 0.05  # share by which the pane may differ as the two rooms have it
+OPENED = {  # codes of issues of a building whose inner glass and doorways daylight passes
+    "glass-between-rooms": "glass-between-rooms-open",
+    "rooms-open-to-each-other": "rooms-open-to-each-other-lit",
+}
 THINNEST = 1e-3  # walls up to this have no reveal [m]
 Key = tuple[str, str]  # GUID of a room, name of its face
 
@@ -105,3 +109,77 @@ def _through(face: Face, back: Face) -> Sequence[Face]:
             for number, strip in enumerate(reveals_between(face, depth), start=1)
         ),
     ]  # fmt: skip
+
+
+def source_rooms(building: Building, space: Space) -> list[Space]:
+    """The rooms from which light reaches a room through inner glass, in one step or several."""
+    away = panes_to_windows(building)
+    rooms: dict[str, Space] = {}
+    queue = light_sources(building, space, away, away.get(space.guid, -1) + 1)
+    while queue:
+        room = queue.pop(0)
+        if room.guid not in rooms:
+            rooms[room.guid] = room
+            queue += light_sources(building, room, away, away[room.guid])
+    return list(rooms.values())
+
+
+def opened(building: Building) -> Building:
+    """The building with open doorways, whose reflectance is that of the room beyond.
+
+    rho f / (1 - rho (1 - f)), rho the mean reflectance of that room, f the doorway's share of its
+    surface. Issues that advise this option state that it is in use.
+
+    Source: Sumpner 1892 (the integrating sphere), as for light wells and cavities.
+    """
+    rooms = {space.guid: space for space in building.spaces}
+
+    def opened_face(face: Face) -> Face:
+        beyond = rooms.get(face.neighbour or "")
+        if face.pane is None or not face.pane.is_open or beyond is None:
+            return face
+        visible, solar = (_returned(beyond, face.area, band) for band in ("visible", "solar"))
+        return replace(face, reflectance_visible=visible, reflectance_solar=solar)
+
+    spaces = tuple(
+        replace(space, faces=tuple(map(opened_face, space.faces))) for space in building.spaces
+    )
+    issues = tuple(
+        replace(issue, code=OPENED.get(issue.code, issue.code)) for issue in building.issues
+    )
+    return replace(building, spaces=spaces, issues=issues)
+
+
+def _returned(room: Space, area: float, band: str) -> float:
+    """Share of the light through an opening [m2] of a room that returns through it."""
+    parts = [(face.area, face.total_reflectance(band)) for face in room.faces]
+    whole = sum(size for size, _ in parts) + sum(window.area for window in room.windows)
+    mean = sum(size * reflectance for size, reflectance in parts) / whole
+    share = min(area / whole, 1.0)
+    return mean * share / (1 - mean * (1 - share))
+
+
+def panes_to_windows(building: Building) -> dict[str, int]:
+    """Number of panes between a room and the nearest window, by GUID; without unlit rooms."""
+    rooms = {space.guid: space for space in building.spaces}
+    panes = {space.guid: 0 for space in building.spaces if space.windows}
+    newest = list(panes)
+    while newest:
+        reached = {
+            guid for one in newest for guid in panes_between(building, rooms[one])
+        } - panes.keys()
+        panes |= dict.fromkeys(reached, panes[newest[0]] + 1)
+        newest = sorted(reached)
+    return panes
+
+
+def light_sources(
+    building: Building, space: Space, away: Mapping[str, int], below: int
+) -> list[Space]:
+    """The rooms behind a room's panes that are fewer than `below` panes away from a window."""
+    pairs = panes_between(building, space)
+    return [
+        other
+        for other in building.spaces
+        if other.guid in pairs and away.get(other.guid, below) < below
+    ]

@@ -57,9 +57,10 @@ def without_drawn_shades(
             continue
         area = max(outline.area for _, outline in own)
         values = {
-            "element": f"{parts[0].ifc_class} {parts[0].name}", "area": area,
+            "element": f"{parts[0].ifc_class} {parts[0].name}",
+            "area": area,
             "windows": tuple(dict.fromkeys(window.name or window.guid for window, _ in own)),
-        }  # fmt: skip
+        }
         issues.append(Issue("shade-drawn-and-in-system", guid, values))
     gone = {issue.where for issue in issues}
     if not gone:

@@ -54,8 +54,9 @@ class Schedules:
     def _constant(self, value: float) -> str:
         name = f"always {value:g}"
         self.model["Schedule:Constant"][name] = {
-            "hourly_value": value, "schedule_type_limits_name": "any",
-        }  # fmt: skip
+            "hourly_value": value,
+            "schedule_type_limits_name": "any",
+        }
         return name
 
     def csv(self) -> str:
@@ -171,12 +172,14 @@ def ideal_plant(
         },
         IDEAL: plant,
         "ZoneHVAC:EquipmentList": {
-            "equipment": [{
-                "zone_equipment_object_type": IDEAL,
-                "zone_equipment_name": name,
-                "zone_equipment_cooling_sequence": 1,
-                "zone_equipment_heating_or_no_load_sequence": 1,
-            }]
+            "equipment": [
+                {
+                    "zone_equipment_object_type": IDEAL,
+                    "zone_equipment_name": name,
+                    "zone_equipment_cooling_sequence": 1,
+                    "zone_equipment_heating_or_no_load_sequence": 1,
+                }
+            ]
         },
         "ZoneHVAC:EquipmentConnections": {
             "zone_name": zone,
@@ -185,7 +188,7 @@ def ideal_plant(
             "zone_air_node_name": f"{zone} air node",
             "zone_return_air_node_or_nodelist_name": f"{zone} return",
         },
-    }  # fmt: skip
+    }
     for kind, entry in objects.items():
         model.setdefault(kind, {})[name] = entry
     radiant = max(loads.heating_radiant * heats, loads.cooling_radiant * cools)

@@ -107,11 +107,13 @@ def at_most_layers(layers: Sequence[MaterialLayer]) -> tuple[MaterialLayer, ...]
         heat = sum(one.thickness * one.density * one.heat_capacity for one in pair)
         result[at : at + 2] = [
             MaterialLayer(
-                " + ".join(one.name for one in pair), width,
-                width / sum(one.thickness / one.conductivity for one in pair), mass / width,
+                " + ".join(one.name for one in pair),
+                width,
+                width / sum(one.thickness / one.conductivity for one in pair),
+                mass / width,
                 heat / mass if mass else pair[0].heat_capacity,
             )
-        ]  # fmt: skip
+        ]
     return tuple(result)
 
 

@@ -141,8 +141,9 @@ class EnergyPlusTwin:
         """A room; depth: of the outer face behind that in the room, by surface [m]."""
         one, model = room.zone, self.model
         model["Zone"][zone] = {
-            "volume": one.volume, "floor_area": max(room.space.floor_area, 0.01),
-        }  # fmt: skip
+            "volume": one.volume,
+            "floor_area": max(room.space.floor_area, 0.01),
+        }
         if one.air_capacity_factor != 1.0:
             self.notes[f"{one.name}: the air's capacity factor is left out"] = None
         for index, surface in enumerate(one.surfaces):
@@ -184,9 +185,10 @@ class EnergyPlusTwin:
         """Construction and boundary condition of a surface, and what belongs to it."""
         layers, outside, extra = list(surface.layers), "Adiabatic", {}
         outer = FaceFinish(
-            surface.absorptance_out, surface.emissivity_out,
+            surface.absorptance_out,
+            surface.emissivity_out,
             surface.roughness.title().replace(" ", ""),
-        )  # fmt: skip
+        )
         inner = FaceFinish(surface.absorptance_in, surface.emissivity_in)
         if surface.outside == "outdoor":
             outside = "Outdoors"
@@ -360,8 +362,10 @@ def _frame_surface(room: TwinRoom, normal: NDArray[np.float64]) -> OpaqueSurface
 
     Raises: `DataError` where nothing of the room faces outdoors that way.
     """
-    kinds = [room.space.faces[int(np.argmax(room.room.surface_of_face == i))].kind
-             for i in range(len(room.zone.surfaces))]  # fmt: skip
+    kinds = [
+        room.space.faces[int(np.argmax(room.room.surface_of_face == i))].kind
+        for i in range(len(room.zone.surfaces))
+    ]
     fits = [
         (kind != "window frame", -float(one.normal @ normal), i)
         for i, (kind, one) in enumerate(zip(kinds, room.zone.surfaces, strict=True))

@@ -160,9 +160,11 @@ def _basis(model: Model) -> str:
 def _thermal_model(model: Model) -> str:
     name = "ISO 15099"
     model.setdefault("WindowThermalModel:Params", {})[name] = {
-        "standard": "ISO15099", "thermal_model": "ISO15099", "sdscalar": 1.0,
+        "standard": "ISO15099",
+        "thermal_model": "ISO15099",
+        "sdscalar": 1.0,
         "deflection_model": "NoDeflection",
-    }  # fmt: skip
+    }
     return name
 
 
@@ -177,8 +179,11 @@ def _layers(model: Model, optics: WindowOptics, *, panes: bool) -> tuple[list[st
         return [_gas_gap(model, gap)], real
     one = optics.fenestration
     gaps = _gaps(model, float(one.layer_resistance.at(*TYPICAL)))
-    faces = [(one.emissivity_out, NO_EMISSION), *[(NO_EMISSION,) * 2] * (len(gaps) - 1),
-             (NO_EMISSION, one.emissivity_in)]  # fmt: skip
+    faces = [
+        (one.emissivity_out, NO_EMISSION),
+        *[(NO_EMISSION,) * 2] * (len(gaps) - 1),
+        (NO_EMISSION, one.emissivity_in),
+    ]
     return gaps, [_pane(model, *pair, PANE, PANE_CONDUCTIVITY) for pair in faces]
 
 
@@ -202,14 +207,17 @@ def _gas_gap(model: Model, gap: GasGap) -> str:
     gas = " ".join(f"{gas} {share:g}" for gas, share in known)
     name = f"{gas} {1e3 * gap.width:g} mm"
     mixture: dict[str, object] = {
-        "thickness": gap.width, "number_of_gases_in_mixture": len(known),
-    }  # fmt: skip
+        "thickness": gap.width,
+        "number_of_gases_in_mixture": len(known),
+    }
     for k, (one, share) in enumerate(known, 1):
         mixture |= {f"gas_{k}_type": one.title(), f"gas_{k}_fraction": share}
     model.setdefault("WindowMaterial:GasMixture", {})[gas] = mixture
     model.setdefault("WindowMaterial:Gap", {})[name] = {
-        "thickness": gap.width, "gas_or_gas_mixture_": gas, "pressure": 101325.0,
-    }  # fmt: skip
+        "thickness": gap.width,
+        "gas_or_gas_mixture_": gas,
+        "pressure": 101325.0,
+    }
     return name
 
 
@@ -219,6 +227,8 @@ def _gaps(model: Model, resistance: float) -> list[str]:
     gas, gap = "still air", f"Gap {1e3 * thickness / GAPS:.4g} mm"
     model.setdefault("WindowMaterial:Gas", {})[gas] = {"gas_type": "Air", "thickness": 0.01}
     model.setdefault("WindowMaterial:Gap", {})[gap] = {
-        "thickness": thickness / GAPS, "gas_or_gas_mixture_": gas, "pressure": 101325.0,
-    }  # fmt: skip
+        "thickness": thickness / GAPS,
+        "gas_or_gas_mixture_": gas,
+        "pressure": 101325.0,
+    }
     return [gap] * GAPS

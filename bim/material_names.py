@@ -62,7 +62,7 @@ DENSITY = (
     (re.compile(r"(\d+(?:[.,]\d+)?)\s*кг\s*/?\s*(?:м3|м³)"), 1.0),
     (re.compile(r"(\d+(?:[.,]\d+)?)\s*(?:g\s*/\s*cm[3³]|t\s*/\s*m[3³]|kg\s*/\s*dm[3³])"), 1000.0),
     (re.compile(r"(\d+(?:[.,]\d+)?)\s*(?:pcf|lbs?\s*/\s*(?:ft3|ft³|cu\s?ft))"), 16.0185),
-)  # fmt: skip
+)
 WORD = re.compile(r"[^\W\d_]+|\d+")
 CAMEL = re.compile(r"(?<=[a-z]{3})(?=[A-Z][a-z]{2})")
 
@@ -107,10 +107,11 @@ def table() -> tuple[Kind, ...]:
     return tuple(
         Kind(
             MaterialLayer(*(row[key] if key == "name" else float(row[key]) for key in keys)),
-            row["group"], tuple(stem for part in row["stems"].split(",") if (stem := part.strip())),
+            row["group"],
+            tuple(stem for part in row["stems"].split(",") if (stem := part.strip())),
         )
         for row in rows
-    )  # fmt: skip
+    )
 
 
 @lru_cache(maxsize=4096)

@@ -30,9 +30,10 @@ def simplified(elements: list[Element]) -> tuple[list[Element], list[Issue]]:
         if len(triangles) < len(element.triangles):
             values = {
                 "element": f"{element.ifc_class} {element.name}",
-                "before": len(element.triangles), "after": len(triangles),
+                "before": len(element.triangles),
+                "after": len(triangles),
                 "moved_mm": 1000 * error,
-            }  # fmt: skip
+            }
             issues.append(Issue("mesh-simplified", element.guid, values))
             element = replace(element, triangles=triangles)
         result.append(element)

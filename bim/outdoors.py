@@ -60,8 +60,9 @@ def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
         for index in sorted(covers, reverse=True):
             element, body = elements[index], cut[index]
             values = {
-                "element": f"{element.ifc_class} {element.name}", "count": len(covers[index]),
-            }  # fmt: skip
+                "element": f"{element.ifc_class} {element.name}",
+                "count": len(covers[index]),
+            }
             if isinstance(body, np.ndarray):
                 elements[index] = replace(element, triangles=body)
                 issues.append(Issue("element-cut-open", element.guid, values))
@@ -116,9 +117,11 @@ def _shut_in(elements: Sequence[Element], spaces: Sequence[Space]) -> list[Issue
             free = near.open_share(window, own)
             if free < LEAST_OPEN:
                 values = {
-                    "window": window.name, "room": space.label, "area": window.area,
+                    "window": window.name,
+                    "room": space.label,
+                    "area": window.area,
                     "open_percent": 100 * free,
-                }  # fmt: skip
+                }
                 issues.append(Issue(SHUT_IN, window.guid, values, Effect(glass=window.area)))
     return issues
 
@@ -283,10 +286,12 @@ def _opened(
 ) -> list[NDArray[np.float64] | ProcessEnded | None]:
     """Each body with a hole at its windows; None for thin or open ones, which are left out."""
     walls = ("IfcWall", "IfcRoof", "IfcSlab", "IfcCovering", *SITE_CLASSES)
-    return opened([
-        (element.triangles if element.ifc_class.startswith(walls) else NOTHING, _holes(windows))
-        for element, windows in covering
-    ])  # fmt: skip
+    return opened(
+        [
+            (element.triangles if element.ifc_class.startswith(walls) else NOTHING, _holes(windows))
+            for element, windows in covering
+        ]
+    )
 
 
 def _holes(windows: Sequence[Window]) -> list[Outline]:

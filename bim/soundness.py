@@ -25,9 +25,11 @@ def soundness_issues(space: Space) -> list[Issue]:
     enclosed = enclosed_volume(space.shell)
     if space.area_to_middles is not None:
         values = {
-            "room": space.label, "stated": space.stated_area, "drawn": space.area_to_middles,
+            "room": space.label,
+            "stated": space.stated_area,
+            "drawn": space.area_to_middles,
             "used": space.floor_area,
-        }  # fmt: skip
+        }
         issues.append(Issue("area-to-wall-middles", space.guid, values))
     for code, stated, drawn in (
         ("floor-area-differs", space.stated_area, space.area_as_stated),

@@ -57,10 +57,11 @@ class FilledGroup:
     def as_solar(self) -> FilledGroup:
         """The same with its solar band in place of the visible one."""
         solar = [
-            None if one is None or "Solar" not in one.bands
+            None
+            if one is None or "Solar" not in one.bands
             else BsdfFile({"Visible": one.bands["Solar"]}, f"{one.name}, solar")
             for one in (self.bsdf, self.fine)
-        ]  # fmt: skip
+        ]
         return FilledGroup(self.group, *solar)
 
 

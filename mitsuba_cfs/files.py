@@ -375,3 +375,9 @@ def _write_failure(part: Path) -> OSError | None:
 
 def _same(one: str | PathLike[str], other: str | PathLike[str]) -> bool:
     return os.path.realpath(one) == os.path.realpath(other)
+
+
+def sha256(path: Path) -> str:
+    """Hash of a file's bytes."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -224,9 +224,11 @@ def _needed(shape: str, **values: object) -> None:
 def _twice(sheet: SlatMaterial) -> SlatMaterial:
     """Visible and solar of a Radiance material: both its luminance."""
     return replace(
-        sheet, reflectance_front=2 * sheet.reflectance_front,
-        reflectance_back=2 * sheet.reflectance_back, transmittance=2 * sheet.transmittance,
-    )  # fmt: skip
+        sheet,
+        reflectance_front=2 * sheet.reflectance_front,
+        reflectance_back=2 * sheet.reflectance_back,
+        transmittance=2 * sheet.transmittance,
+    )
 
 
 def combined_file(paths: Sequence[Path], name: str = "") -> tuple[BsdfFile, pd.DataFrame]:

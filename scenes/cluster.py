@@ -224,8 +224,9 @@ class Cluster(Generic[T, R]):
         """Connect to the scheduler that comes in place of one that ended; the tasks begin anew."""
         log.warning(
             "the Dask scheduler %s has ended; waiting %.0f s for another one there",
-            self._address, WAIT_SECONDS,
-        )  # fmt: skip
+            self._address,
+            WAIT_SECONDS,
+        )
         self._client.close(timeout=CONNECT_SECONDS)
         self._attempts.clear()
         self._threads.clear()

@@ -75,8 +75,9 @@ class KnownFenestration:
                 result[window.guid] = ExportedGlazing(
                     DEFAULT_U if known[0] is None else known[0],
                     DEFAULT_G if known[1] is None else known[1],
-                    values.visible, values.solar,
-                )  # fmt: skip
+                    values.visible,
+                    values.solar,
+                )
         for (name, names), value in zip(unknown.items(), (DEFAULT_U, DEFAULT_G), strict=True):
             if names:
                 notes.append(f"{windows_named(names)}: no {name} is known, {value:g} is written.")

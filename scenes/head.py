@@ -278,8 +278,11 @@ def _peak_note(system: FenestrationSystem) -> tuple[str, ...]:
     width = HIDDEN
     if tree is not None:
         width = UNRESOLVED * np.sqrt(np.pi) / (1 << max(t.depth for t in tree.blocks().values()))
-    values = {"system": system.name, "peak": float(beam[0]),
-              "file": system.file.name if system.file else system.name}  # fmt: skip
+    values = {
+        "system": system.name,
+        "peak": float(beam[0]),
+        "file": system.file.name if system.file else system.name,
+    }
     if is_stated:
         note = Note(
             "{system}: {share:.0f} % of the transmission peak ({peak:.2f} at normal incidence) "

@@ -5,7 +5,6 @@ No tracer and no IFC reader is loaded for that: a mistake is reported within a s
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -232,9 +231,3 @@ def building_of(options: InputOptions, progress: Progress = silent) -> Building:
     """The building of a command's options; raises as `read_building`."""
     read = options.read
     return read_building_file(options.building, read, summed(progress, "inputs", STAGES))
-
-
-def sha256(path: Path) -> str:
-    """Hash of a file's bytes."""
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

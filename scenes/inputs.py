@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from bim.building_file import read_elements
+from bim.doorways import opened, source_rooms
 from bim.model import Building, Space
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, part, silent
@@ -24,7 +25,6 @@ from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.head import Head, head_of
 from scenes.input_files import InputFiles, building_of, named_files, read_files
 from scenes.input_options import NO_OPTIONS, InputOptions
-from scenes.room.inner_glass import opened, source_rooms
 from scenes.room.operation import (
     Operation,
     check_schedules,
@@ -119,7 +119,6 @@ def inputs_of(
     Raises: `DataError` for a room that is not in the building, a window that nothing fills.
     """
     operation, overrides = files.operation, files.overrides
-    weather = with_albedo(files.weather, options.albedo)
     beyond: dict[str, list[Space]] = {}
     if inner:
         building = opened(building)
@@ -136,19 +135,21 @@ def inputs_of(
     windows = [window for space in traced.values() for window in space.windows]
     filled = fill_windows(windows, overrides, building.file) if fill else {}
     if operation is not None:
-        weather = operation.outdoors(weather)
         check_states(operation, max(len(states) for states in filled.values()))
     states = states or (first_states if operation is None else every_state)
     systems = states(filled)
     used = used_operation(operation, building)
     if used is not None and used is not operation:
-        check_schedules(used.tables, weather, used.file)
+        check_schedules(used.tables, files.weather, used.file)
     notes = (
         *stated_note(building, "" if operation is None else operation.file.name),
         *_state_notes(options, operation, filled, systems, building),
     )
+    building = traced_building(building, systems)
+    weather = with_albedo(files.weather, options.albedo)
+    weather = weather if operation is None else operation.outdoors(weather)
     return Inputs(
-        traced_building(building, systems), spaces, weather, systems, used, options, filled,
+        building, spaces, weather, systems, used, options, filled,
         notes, overrides.light_only,
     )  # fmt: skip
 

@@ -21,6 +21,6 @@ class PictureOptions(InputOptions):
     glare_sources: str = "evalglare"  # bright pixels grouped so, or each of the "pixels"
     glare_sun: str = "source"  # the sun's disc: a source of its own, or part of its "pixels"
     sun_model: str = "spa"  # see `mitsuba_cfs.sky.sun`
-    sky_ground: str = "reflected"  # see `mitsuba_cfs.sky.ground`
+    sky_ground: str = "reflected"  # see `mitsuba_cfs.sky.matrix`
     seed: int = 0
     colour: bool = False  # by the surfaces' colours, in three bands

@@ -46,9 +46,9 @@ ERRORS: dict[str, dict[str, tuple[float, float]]] = {
         "linear": (0.35, 0.52), "layers": (0.17, 0.29),
     },
     "internal": {
-        "typical": (0.43, 0.25), "typical" + BY_DIRECTION: (0.58, 0.32),
-        "gap": (0.40, 0.25), "constant": (0.49, 0.34),
-        "linear": (0.55, 1.03), "layers": (0.44, 0.25),
+        "typical": (0.40, 0.38), "typical" + BY_DIRECTION: (0.54, 0.52),
+        "gap": (0.37, 0.37), "constant": (0.49, 0.34),
+        "linear": (0.55, 1.03), "layers": (0.41, 0.40),
     },
 }  # fmt: skip
 

@@ -61,7 +61,7 @@ def thermal_data(
     """U and g by direction from a BSDF and further thermal data.
 
     g follows from g at one direction with a constant inward share N of the absorption, g = tau + N
-    alpha, N = (g_n - tau_n)/alpha_n; by direction N differs, see `layered.layered_thermal_data`
+    alpha, N = (g_n - tau_n)/alpha_n; by direction N differs, see `window_model`
     with `typical_unit.typical_unit`.  Without g, N and U are those of a typical system with its
     shade "none", "external", "internal" or "integrated"; the assumptions say so.
 

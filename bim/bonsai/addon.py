@@ -174,10 +174,13 @@ def add_on_classes(bpy: Any) -> Sequence[type]:
             out = bpy.path.abspath(settings.results) or tempfile.mkdtemp(prefix="cfs-")
             try:
                 words = run_command(
-                    preferences.program, _ifc().get_path() or "",
-                    bpy.path.abspath(settings.weather), out, quick=settings.quick,
+                    preferences.program,
+                    _ifc().get_path() or "",
+                    bpy.path.abspath(settings.weather),
+                    out,
+                    quick=settings.quick,
                     system=bpy.path.abspath(settings.system),
-                )  # fmt: skip
+                )
                 self.log = tempfile.TemporaryFile("w+", encoding="utf-8")
                 self.job = subprocess.Popen(words, stdout=self.log, stderr=subprocess.STDOUT)
             except (ValueError, OSError) as error:

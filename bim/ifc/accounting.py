@@ -1,4 +1,4 @@
-"""The account of an IFC file: rooms by storey, glass used of what looks out, what fits badly."""
+"""The account of an IFC file: rooms by storey, glass to the outdoors with a room, open edges."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def account_of(
     *,
     repeated: Sequence[str] = (),
 ) -> Account:
-    """What of a file came through.
+    """How much of a file was imported.
 
     Args:
-        read: the spaces that are rooms, before any were joined; found ones where there are none.
+        read: the spaces that are rooms, before any were joined, or those found from geometry.
         built: the finished rooms.
         repeated: GUIDs of spaces that draw a room again: not counted, nor are such windows.
     """
@@ -39,8 +39,8 @@ def account_of(
     failed = {p.where for p in issues if p.effect.lost == "room"}
     kept = [record for record in read if record.guid not in failed]
     guids = {record.guid.split("-")[0] for record in kept}
-    found = not any(space.GlobalId in guids for space in drawn) and bool(kept)
-    missing = [s for s in drawn if s.GlobalId not in guids] if not found else []
+    from_geometry = not any(space.GlobalId in guids for space in drawn) and bool(kept)
+    missing = [s for s in drawn if s.GlobalId not in guids] if not from_geometry else []
     used: Counter[str] = Counter()
     for window in (window for space in built for window in space.windows):
         used[window.guid] += window.area
@@ -51,7 +51,9 @@ def account_of(
     lost = {one.guid: one.out - one.used for one in panes if one.out - one.used > 0.01}
     low = {one.guid for one in panes if one.low is not None}
     return Account(
-        _storeys(source, kept, panes, used, Counter(map(storey_of, drawn)) if not found else None),
+        _storeys(
+            source, kept, panes, used, Counter(map(storey_of, drawn)) if not from_geometry else None
+        ),
         len(panes),
         sum(used[one.guid] > 0 for one in panes),
         sum(min(used[one.guid], one.out) for one in panes if one.assumed),
@@ -67,7 +69,7 @@ def account_of(
         tuple(sorted({one.low.label for one in panes if one.low is not None})),
         tuple(label_of(s.Name or "", s.LongName or "", s.GlobalId) for s in missing),
         tuple(space.label for space in built if open_edges(space.shell)),
-        found,
+        from_geometry,
         any(p.code == "file-cut-off" for p in issues),
         tuple(space.label for space in built if space.raised),
         shut_in_area(issues),

@@ -1,4 +1,4 @@
-"""A building from an IFC file: rooms that are closed, windows that look out, issues named."""
+"""A building from an IFC file: closed rooms, windows to the outdoors, issues of the model."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import ifcopenshell
 import numpy as np
 import shapely
 
@@ -19,6 +20,7 @@ from bim.fenestration import ShadingState
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.cut_rooms import cut_rooms, room_lids
+from bim.ifc.damage import Damage, entities, instances
 from bim.ifc.defects import DRAWN_TWICE, model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.fenestration_read import read_fenestration
@@ -29,6 +31,7 @@ from bim.ifc.materials import SURFACES
 from bim.ifc.open_spaces import open_spaces
 from bim.ifc.passages import Passage, open_apertures
 from bim.ifc.placing import map_georeference
+from bim.ifc.project import psets_of
 from bim.ifc.raised_rooms import raised_rooms
 from bim.ifc.rooms_from_geometry import rooms_from_geometry
 from bim.ifc.schemes import one_of_each
@@ -36,10 +39,9 @@ from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
 from bim.ifc.space_boundaries import boundary_issues
 from bim.ifc.spaces import SpaceRecord, read_spaces
-from bim.ifc.zones import read_zones
 from bim.isolated_solids import RoomBoundary, room_boundaries
 from bim.mesh_simplification import simplified
-from bim.model import Building, Element, Space
+from bim.model import Building, Element, Space, SpaceGroup
 from bim.neighbours import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
 from bim.outdoors import lifted_sites, mirrors_in_view, unblinded
 from bim.rays import RayMesh, ray_mesh
@@ -48,6 +50,38 @@ from bim.solids import triangles_of
 from bim.soundness import agree, soundness_issues
 from bim.wall_middles import area_to_wall_middles
 from mitsuba_cfs.errors import RoomError
+
+DEEPEST = 20  # zones of zones
+
+
+def read_zones(model: ifcopenshell.file, damage: Damage | None = None) -> tuple[SpaceGroup, ...]:
+    """The IfcZone with spaces, each with those of its parts; its kind is what its texts say.
+
+    Kind: ObjectType, LongName, Description and Pset_ZoneCommon's Category and Reference.
+    """
+    zones = []
+    for zone in instances(model, "IfcZone"):
+        rooms = tuple(dict.fromkeys(_spaces(zone, DEEPEST)))
+        common = psets_of(zone, damage).get("Pset_ZoneCommon", {})
+        texts = [getattr(zone, key, None) for key in ("ObjectType", "LongName", "Description")]
+        texts += [common.get("Category"), common.get("Reference")]
+        if rooms:
+            kind = ", ".join(str(text) for text in texts if text)
+            zones.append(SpaceGroup(zone.Name or kind or zone.GlobalId, kind, rooms))
+    return tuple(zones)
+
+
+def _spaces(group: ifcopenshell.entity_instance, depth: int) -> list[str]:
+    """GUIDs of the spaces of a zone and of the zones in it."""
+    guids: list[str] = []
+    for relation in getattr(group, "IsGroupedBy", None) or ():
+        for one in entities(relation.RelatedObjects):
+            if one.is_a("IfcSpace"):
+                guids.append(one.GlobalId)
+            elif one.is_a("IfcGroup") and depth:
+                guids += _spaces(one, depth - 1)
+    return guids
+
 
 SEARCH = 0.3  # share of the stage "rooms" in which they are found, where the file has no spaces
 
@@ -65,12 +99,13 @@ def read_ifc(
 
     Args:
         linked: further files of the same building, see `bim.ifc.linked`; an .ifczip may hold all.
-        corrections: what to leave out and repaint; by default those of the file
+        corrections: elements to omit and to repaint; default: the file
             `<model>.corrections.toml` beside the model, if there is one.
-        join: rooms to make one besides, as "Hall + Living", where `corrections` are not given;
-            "open": those that an opening larger than a door leads between.
-        furniture: whether what stands in the rooms is in their light and views.
+        join: further rooms to merge, as "Hall + Living", without `corrections`;
+            "open": those connected by an opening larger than a door.
+        furniture: whether furniture is part of the light and views of its room.
         progress: called with the stage's name and the fraction of it that is done.
+
     Raises: `DataError` where the file is missing or is no readable IFC; faults inside the model are
         the building's `issues`.
     """
@@ -90,19 +125,24 @@ def read_ifc(
     if any(record.raised for record in records):
         glass = glass_of_rooms(source, apertures, records, mesh)
     elements, finishes, faults = bounding_elements(
-        source.model, source.walls, source.placed.rotation, source.damage,
+        source.model,
+        source.walls,
+        source.placed.rotation,
+        source.damage,
         materials=source.corrections.materials,
-    )  # fmt: skip
+    )
     issues += [*glass.issues, *faults]
     around = _surroundings(mesh, source.walls, records, source.ground)
-    attached = [*glass.attachments, *(side for way in rooms.passages for side in way.sides)]
-    own = [[a for a in attached if a.room == r.guid] for r in records]
-    boundaries = room_boundaries([(r.solid, a) for r, a in zip(records, own, strict=True)])
+    attached = [*glass.attachments, *(side for passage in rooms.passages for side in passage.sides)]
+    by_room = [[a for a in attached if a.room == r.guid] for r in records]
+    boundaries = room_boundaries([(r.solid, a) for r, a in zip(records, by_room, strict=True)])
     spaces: list[Space] = []
     for index, boundary in enumerate(boundaries):
         tell("rooms", SEARCH + (1 - SEARCH) * index / len(records))
-        found, more = _space(index, boundary, records, around, elements=elements, finishes=finishes)
-        spaces += found
+        of_boundary, more = _space(
+            index, boundary, records, around, elements=elements, finishes=finishes
+        )
+        spaces += of_boundary
         issues += more
     again = {issue.where for issue in issues if issue.code == DRAWN_TWICE}
     issues += lost_glass(attached, spaces, again)
@@ -159,13 +199,13 @@ def _rooms(
     read, more = cut_rooms(read, covers, fixed)
     issues += more
     apertures = open_apertures(source, read, mesh.triangles)
-    records, ways, more = joined_rooms(source, read, apertures, mesh.triangles)
+    records, passages, more = joined_rooms(source, read, apertures, mesh.triangles)
     issues += more
     if not records:
         read, more = rooms_from_geometry(source, tell)
         records = read
         issues += more
-    return _Rooms(read, records, repeated, ways, covers), issues
+    return _Rooms(read, records, repeated, passages, covers), issues
 
 
 def with_states(
@@ -205,7 +245,7 @@ def guessed_walls(spaces: Sequence[Space]) -> list[Issue]:
 
 
 def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, ...], list[Issue]]:
-    """What stands outdoors, free of what would blind a window."""
+    """The surroundings, without elements that would cover a window."""
     windows = [window for space in spaces for window in space.windows]
     issues = []
     if not windows:
@@ -214,7 +254,7 @@ def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, .
         source.model,
         source.elements,
         reflectance=source.corrections.surroundings,
-        kept=source.corrections.kept(source.model),
+        drawn_shades=source.corrections.drawn_shades(source.model),
         panes=CLEAR_GLAZING,
     )
     elements, issues_of_panes = mirrors_in_view(elements, windows)

@@ -57,9 +57,11 @@ KEYS = ("leave_out", "only", "opaque", "keep", "join", "surroundings", "reflecta
 OPEN = "open"  # asks for the rooms that are open to each other by more than a door
 PAINT_KEYS = ("select", "visible", "solar", "specular", "roughness")
 MATERIAL_KEYS = {  # of [[material]]: lowest and highest value
-    "conductivity": (0.005, 500.0), "u": (0.05, 10.0), "density": (0.5, 12000.0),
+    "conductivity": (0.005, 500.0),
+    "u": (0.05, 10.0),
+    "density": (0.5, 12000.0),
     "heat_capacity": (100.0, 5000.0),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,14 +100,14 @@ class Corrections:
         for query in self.leave_out:
             gone |= chosen(model, query, self.file)
         if self.only:
-            kept: set[int] = set()
+            only: set[int] = set()
             for query in self.only:
-                kept |= chosen(model, query, self.file)
+                only |= chosen(model, query, self.file)
             openings = {one.id() for one in model.by_type("IfcOpeningElement")}
-            gone |= {one.id() for one in model.by_type("IfcProduct")} - kept - openings
+            gone |= {one.id() for one in model.by_type("IfcProduct")} - only - openings
         return gone
 
-    def kept(self, model: ifcopenshell.file) -> set[int]:
+    def drawn_shades(self, model: ifcopenshell.file) -> set[int]:
         """STEP ids of the products that `keep` chooses."""
         return set().union(*(chosen(model, query, self.file) for query in self.keep))
 
@@ -142,7 +144,7 @@ def chosen(model: ifcopenshell.file, query: str, file: str | Path = "") -> set[i
     from bim.ifc.damage import raised_by_ifcopenshell
     from bim.ifc.elements import cad_layers_of
 
-    found: set[int] = set()
+    step_ids: set[int] = set()
     for group in re.findall(r'(?:"[^"]*"|[^"+])+', query) if LAYER.search(query) else [query]:
         rest = LAYER.sub("", group).strip(" ,")
         try:
@@ -153,8 +155,8 @@ def chosen(model: ifcopenshell.file, query: str, file: str | Path = "") -> set[i
             reason = str(error).strip().splitlines()[0] if str(error).strip() else "no selector"
             raise DataError(reason, file=file or None, field=query) from None
         layers = {name.strip().strip('"') for name in LAYER.findall(group)}
-        found |= {one.id() for one in elements if layers <= set(cad_layers_of(one))}
-    return found
+        step_ids |= {one.id() for one in elements if layers <= set(cad_layers_of(one))}
+    return step_ids
 
 
 def corrections_file(model_path: str | Path) -> Path:

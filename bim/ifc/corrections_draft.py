@@ -57,11 +57,14 @@ def corrections_draft(building: Building) -> str:
         seen.add(name)
         layer = material_named(name).layer
         lines += [
-            "", f"# {_line(one)}", "# [[material]]", f"# name = {_text(name)}",
+            "",
+            f"# {_line(one)}",
+            "# [[material]]",
+            f"# name = {_text(name)}",
             f"# conductivity = {layer.conductivity:g}  # W/(m K); or u = 0.3, W/(m2 K)",
             f"# density = {layer.density:g}  # kg/m3",
             f"# heat_capacity = {layer.heat_capacity:g}  # J/(kg K)",
-        ]  # fmt: skip
+        ]
     return "\n".join(lines) + "\n"
 
 

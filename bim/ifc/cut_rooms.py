@@ -56,9 +56,12 @@ def cut_rooms(
             continue
         top, low = float(solid.high[2]), float(solid.low[2])
         values = {
-            "room": record.label, "before": record.volume, "after": after,
-            "top": float(record.solid.high[2]) - top, "bottom": low - float(record.solid.low[2]),
-        }  # fmt: skip
+            "room": record.label,
+            "before": record.volume,
+            "after": after,
+            "top": float(record.solid.high[2]) - top,
+            "bottom": low - float(record.solid.low[2]),
+        }
         issues.append(Issue("room-cut", record.guid, values))
         result[index] = replace(record, solid=solid, volume=after, cut=record.volume - after)
     return result, issues
@@ -89,7 +92,7 @@ def goes_through(record: SpaceRecord, lids: Sequence[Shape]) -> bool:
 
 def _near(record: SpaceRecord, lids: Sequence[Shape]) -> list[np.ndarray]:
     """Bodies of what may cut a space: inside of its height, over or under it."""
-    found = []
+    meshes = []
     for lid in lids:
         corners = lid.triangles.reshape(-1, 3)
         low, high = corners.min(axis=0), corners.max(axis=0)
@@ -99,8 +102,8 @@ def _near(record: SpaceRecord, lids: Sequence[Shape]) -> list[np.ndarray]:
             and np.all(low[:2] < record.solid.high[:2])
             and np.all(high[:2] > record.solid.low[:2])
         ):
-            found.append(lid.triangles)
-    return found
+            meshes.append(lid.triangles)
+    return meshes
 
 
 def room_lids(source: Source) -> list[Shape]:

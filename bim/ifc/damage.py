@@ -90,10 +90,10 @@ def type_of(
 ) -> ifcopenshell.entity_instance | None:
     """The type of an element; None where the file states none."""
     damage = Damage() if damage is None else damage
-    found = damage.read(
+    type_ = damage.read(
         ifcopenshell.util.element.get_type, element, of=element, data="type", default=None
     )
-    return next(iter(entities(found)), None)
+    return next(iter(entities(type_)), None)
 
 
 def placement_of(
@@ -104,9 +104,12 @@ def placement_of(
         return None
     damage = Damage() if damage is None else damage
     matrix = damage.read(
-        ifcopenshell.util.placement.get_local_placement, element.ObjectPlacement,
-        of=element, data="placement", default=None,
-    )  # fmt: skip
+        ifcopenshell.util.placement.get_local_placement,
+        element.ObjectPlacement,
+        of=element,
+        data="placement",
+        default=None,
+    )
     return None if matrix is None else np.asarray(matrix, dtype=float)
 
 

@@ -29,8 +29,8 @@ Solids = Mapping[int, Solid | ProcessEnded | None]  # by STEP number
 def model_defects(model: ifcopenshell.file, shapes: Sequence[Shape]) -> list[Issue]:
     """Repeated GlobalIds, elements without a body, drawn twice, of a wrong class, open, apart."""
     checked = [shape for shape in shapes if shape.ifc_class.startswith(SOLID_CLASSES)]
-    found = solids_of([shape.triangles for shape in checked])
-    solids = {shape.step_id: solid for shape, solid in zip(checked, found, strict=True)}
+    closed = solids_of([shape.triangles for shape in checked])
+    solids = {shape.step_id: solid for shape, solid in zip(checked, closed, strict=True)}
     return [
         *repeated_guids(model),
         *without_body(model),
@@ -72,9 +72,9 @@ def drawn_twice(shapes: Sequence[Shape]) -> list[Issue]:
         area = float(np.linalg.norm(area_vectors(shape.triangles), axis=1).sum())
         box = np.concatenate([corners.min(axis=0), corners.max(axis=0)])
         bucket = seen[shape.ifc_class.removesuffix("StandardCase")]
-        for other, theirs, their_area in bucket:
-            same = np.abs(box - theirs).max() < SAME_PLACE
-            if same and abs(area - their_area) < SAME_AREA * area:
+        for other, other_box, other_area in bucket:
+            same = np.abs(box - other_box).max() < SAME_PLACE
+            if same and abs(area - other_area) < SAME_AREA * area:
                 values = {"element": f"{shape.ifc_class} {shape.name}", "other": other.guid}
                 issues.append(Issue(DRAWN_TWICE, shape.guid, values))
                 break

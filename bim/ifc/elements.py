@@ -1,4 +1,4 @@
-"""Building elements of an IFC file: what rooms border on, and what stands outdoors."""
+"""Building elements of an IFC file: those that bound rooms, and the surroundings."""
 
 from __future__ import annotations
 
@@ -52,25 +52,26 @@ def bounding_elements(
     faults: dict[str, Issue] = {}
     values, gloss, hues = [], [], []
     for shape in shapes:
-        glosses = np.array([*(look.gloss for look in shape.looks), None], dtype=object)
-        by_look = np.full((len(shape.looks) + 1, 2), -1.0)
-        hue = np.array([*(GREY if look.is_glass else look.hue for look in shape.looks), GREY])
-        for i, look in enumerate(shape.looks):
-            by_look[i] = GLASS_REFLECTANCE if look.is_glass else look.reflectances
-            if look.stated is not None and not look.is_glass:
+        glosses = np.array([*(style.gloss for style in shape.styles), None], dtype=object)
+        by_look = np.full((len(shape.styles) + 1, 2), -1.0)
+        hue = np.array([*(GREY if style.is_glass else style.hue for style in shape.styles), GREY])
+        for i, style in enumerate(shape.styles):
+            by_look[i] = GLASS_REFLECTANCE if style.is_glass else style.reflectances
+            if style.stated is not None and not style.is_glass:
                 values_of_style = {
-                    "style": look.name, "stated": look.stated,
-                    "used": min(max(look.stated, LOWEST_REFLECTANCE), HIGHEST_REFLECTANCE),
-                }  # fmt: skip
-                issue = Issue("surface-style-bounded", look.name, values_of_style)
-                faults.setdefault(look.name, issue)
+                    "style": style.name,
+                    "stated": style.stated,
+                    "used": min(max(style.stated, LOWEST_REFLECTANCE), HIGHEST_REFLECTANCE),
+                }
+                issue = Issue("surface-style-bounded", style.name, values_of_style)
+                faults.setdefault(style.name, issue)
         stated = reader.reflectances_of(model.by_id(shape.step_id))
         if stated is not None and not shape.transparent.any() and not shape.is_painted:
             mirrored = np.array([0.0 if g is None else g.at_normal for g in glosses])
             by_look[:] = np.maximum(np.array(stated) - mirrored[:, None], 0.0)
-        values.append(by_look[shape.look])
-        gloss.append(glosses[shape.look])
-        hues.append(hue[shape.look])
+        values.append(by_look[shape.style_index])
+        gloss.append(glosses[shape.style_index])
+        hues.append(hue[shape.style_index])
     issues = [*reader.issues.values(), *faults.values()]
     finishes = Finishes(
         np.concatenate(values or [np.empty((0, 2))]),
@@ -115,14 +116,14 @@ def outdoor_elements(
     shapes: Sequence[Shape],
     *,
     reflectance: float | None = None,
-    kept: Collection[int] = (),
+    drawn_shades: Collection[int] = (),
     panes: Gloss | None = None,
 ) -> list[Element]:
     """Every building element and terrain, one `Element` for each of its surface styles.
 
     Args:
         reflectance: of everything, in place of what the file says.
-        kept: STEP ids of shading devices that are traced before any BSDF.
+        drawn_shades: STEP ids of shading devices that are traced before any BSDF.
         panes: how glass mirrors whose style does not say it; None: it reflects diffusely.
     """
     result = []
@@ -132,15 +133,15 @@ def outdoor_elements(
         base = Element(
             shape.guid, shape.name or shape.ifc_class, shape.ifc_class, shape.triangles, default,
             default, next(iter(cad_layers_of(entity)), ""), storey_of(entity),
-            material_name(entity), shape.step_id in kept,
+            material_name(entity), shape.step_id in drawn_shades,
         )  # fmt: skip
-        for index in np.unique(shape.look):
+        for index in np.unique(shape.style_index):
             visible = solar = default
             gloss, hue = None, GREY
             if index >= 0:
-                look = shape.looks[index]
-                (visible, solar), gloss, hue = look.reflectances, look.gloss, look.hue
-                if look.is_glass:
+                style = shape.styles[index]
+                (visible, solar), gloss, hue = style.reflectances, style.gloss, style.hue
+                if style.is_glass:
                     gloss = panes if gloss is None else gloss
                     # what a pane mirrors is no diffuse light
                     visible = solar = GLASS_REFLECTANCE if gloss is None else 0.0
@@ -150,7 +151,7 @@ def outdoor_elements(
             result.append(
                 replace(
                     base,
-                    triangles=shape.triangles[shape.look == index],
+                    triangles=shape.triangles[shape.style_index == index],
                     reflectance_visible=visible,
                     reflectance_solar=solar,
                     gloss=gloss,

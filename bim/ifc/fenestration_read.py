@@ -70,7 +70,7 @@ def read_states(
     Args: folder: where relative paths of BSDF files start.
     Raises: `DataError` for a set of that name that cannot be understood.
     """
-    found: dict[str, tuple[ShadingState, ...]] = {}
+    result: dict[str, tuple[ShadingState, ...]] = {}
     cache: dict[int, ShadingState] = {}
     for kind in HOLDERS:
         for element in model.by_type(kind):
@@ -91,8 +91,8 @@ def read_states(
                         bands = read_bsdf_xml(path).bands
                         states[""] = replace(known, bands=bands, file=path, of_type=of_type)
             if states:
-                found[element.GlobalId] = tuple(states.values())
-    return found
+                result[element.GlobalId] = tuple(states.values())
+    return result
 
 
 def _own_sets(source: Entity | None) -> Iterable[Entity]:
@@ -237,18 +237,18 @@ def _position(prop: Entity) -> str:
 
 def _closure(prop: Entity) -> Closure:
     parts = _children(prop)
-    found = {field: _single(parts[name]) for field, name in REALISED.items() if name in parts}
+    fields = {field: _single(parts[name]) for field, name in REALISED.items() if name in parts}
     if GAP in parts:
         of_gap = _children(parts[GAP])
-        found["gap"] = Gap(*_gas_gap(of_gap), _tuple(of_gap["Emissivities"]))
+        fields["gap"] = Gap(*_gas_gap(of_gap), _tuple(of_gap["Emissivities"]))
     if SLOPE in parts:
-        found["slope"] = _single(parts[SLOPE])
+        fields["slope"] = _single(parts[SLOPE])
     if SURFACE in parts:
-        found["surface"] = _tuple(parts[SURFACE])
+        fields["surface"] = _tuple(parts[SURFACE])
     if LAYERS in parts:
-        found["unit"] = _unit(_children(parts[LAYERS]))
+        fields["unit"] = _unit(_children(parts[LAYERS]))
     model = _wrapped(getattr(parts[U_MODEL], "NominalValue", None), U_MODEL)
-    return Closure(model, **found)
+    return Closure(model, **fields)
 
 
 def _tuple(prop: Entity) -> tuple[float, ...]:

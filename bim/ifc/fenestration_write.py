@@ -109,9 +109,12 @@ class _Writer:
     def bounded(self, name: str, low: float, high: float, measure: str, unit: Entity) -> Entity:
         create = self._model.create_entity
         return create(
-            "IfcPropertyBoundedValue", Name=name, UpperBoundValue=create(measure, float(high)),
-            LowerBoundValue=create(measure, float(low)), Unit=unit,
-        )  # fmt: skip
+            "IfcPropertyBoundedValue",
+            Name=name,
+            UpperBoundValue=create(measure, float(high)),
+            LowerBoundValue=create(measure, float(low)),
+            Unit=unit,
+        )
 
     def numbers(self, name: str, values: np.ndarray, measure: str = "IfcReal", unit=None) -> Entity:
         kind = int if measure == "IfcInteger" else float
@@ -217,10 +220,11 @@ class _Writer:
         """Angular g-values, polar angle by polar angle."""
         measure = "IfcPlaneAngleMeasure"
         return self.complex(
-            "G-value", "total solar energy transmittance",
+            "G-value",
+            "total solar energy transmittance",
             [
                 self.numbers("Polar angles", table.polar, measure, self._radian),
                 self.numbers("Azimuthal angles", table.azimuth, measure, self._radian),
                 self.numbers("G-values", table.values, "IfcNormalisedRatioMeasure"),
             ],
-        )  # fmt: skip
+        )

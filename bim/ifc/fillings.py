@@ -116,7 +116,7 @@ def _filling(
 ) -> Filling:
     psets = psets_of(element, damage)
     element_type = type_of(element, damage)
-    opaque = [look for look in shape.looks if not look.is_glass]
+    opaque = [style for style in shape.styles if not style.is_glass]
     panes = _number(psets, "GlassLayers")
     return Filling(
         guid=element.GlobalId,

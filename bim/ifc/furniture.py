@@ -48,24 +48,25 @@ def furnished(
         if step_id in shapes:
             shapes[step_id] = painted(shapes[step_id], visible, solar)
     meshes = [ray_mesh(space.shell) for space in spaces]
-    found: dict[int, list[Element]] = {}
+    pieces_of: dict[int, list[Element]] = {}
     for shape in shapes.values():
         shape = replace(shape, triangles=source.placed.to_world(shape.triangles))
         place, issue = _placed(shape, spaces, meshes)
         issues += [] if issue is None else [issue]
         if place is not None:
             pieces, more = simplified(_elements(shape))
-            found.setdefault(place, []).extend(pieces)
+            pieces_of.setdefault(place, []).extend(pieces)
             issues += more
-    result = _with(spaces, found)
+    result = _with(spaces, pieces_of)
     count = sum(len({e.guid for e in space.furniture}) for space in result)
     issues.append(Issue("furniture-included", FURNITURE, {"count": count}))
     return result, issues
 
 
-def _with(spaces: Sequence[Space], found: Mapping[int, list[Element]]) -> list[Space]:
+def _with(spaces: Sequence[Space], pieces_of: Mapping[int, list[Element]]) -> list[Space]:
     return [
-        replace(space, furniture=tuple(found.get(index, ()))) for index, space in enumerate(spaces)
+        replace(space, furniture=tuple(pieces_of.get(index, ())))
+        for index, space in enumerate(spaces)
     ]
 
 
@@ -79,9 +80,10 @@ def _placed(
             for window in space.windows:
                 if hangs_at(shape.triangles, window):
                     values = {
-                        "element": label, "window": window.name or window.guid,
+                        "element": label,
+                        "window": window.name or window.guid,
                         "window_guid": window.guid,
-                    }  # fmt: skip
+                    }
                     return None, Issue("curtain-at-window", shape.guid, values)
     corners = shape.triangles.reshape(-1, 3)
     corners = corners[np.linspace(0, len(corners) - 1, min(ASKED, len(corners))).astype(int)]
@@ -111,14 +113,14 @@ def _elements(shape: Shape) -> list[Element]:
         shape.guid, shape.name or shape.ifc_class, shape.ifc_class, shape.triangles,
         FURNITURE_REFLECTANCE, FURNITURE_REFLECTANCE,
     )  # fmt: skip
-    found = []
-    for index in np.unique(shape.look[~shape.transparent]):
-        piece = replace(base, triangles=shape.triangles[shape.look == index])
+    parts = []
+    for index in np.unique(shape.style_index[~shape.transparent]):
+        piece = replace(base, triangles=shape.triangles[shape.style_index == index])
         if index >= 0:
-            look = shape.looks[index]
-            visible, solar = look.reflectances
+            style = shape.styles[index]
+            visible, solar = style.reflectances
             piece = replace(
-                piece, reflectance_visible=visible, reflectance_solar=solar, hue=look.hue
+                piece, reflectance_visible=visible, reflectance_solar=solar, hue=style.hue
             )
-        found.append(piece)
-    return found
+        parts.append(piece)
+    return parts

@@ -35,7 +35,7 @@ SMALLEST_OPENING = 0.1  # smaller ones are for ducts [m2]
 DOOR_SILL, DOOR_WIDTH = 0.3, 1.3  # an opening to the floor up to this width is a door [m]
 ASIDE = 0.5  # points asked on both sides of glass lie this far from it [m]
 CLEAR_WAY = 1.0  # an opening goes through where nothing stands in it this far to both sides [m]
-LEAST_LOST = 0.01  # share of a pane from which on what is missing is said
+LEAST_LOST = 0.01  # share of a pane whose loss is reported
 TALLEST_GAP = 30.0  # between the top of a room and glass above it [m]
 DOOR_NAME = re.compile(r"\b(tur|tuer|door|porte?|deur|puerta|porta|ajto|drzwi|dvere|ovi)", re.I)
 NOT_FILLED = "IfcOpeningElement"
@@ -47,7 +47,7 @@ class GlassAccount:
 
     guid: str
     storey: str
-    out: float  # area that looks out [m2]
+    out: float  # area that faces the outdoors [m2]
     used: float  # of it: before a room [m2]
     assumed: bool  # its outline is not drawn in the file
     low: SpaceRecord | None = None  # the room that ends below it
@@ -56,7 +56,7 @@ class GlassAccount:
 
 @dataclass(frozen=True, slots=True)
 class GlassOfRooms:
-    """What the rooms get, what looks out, and the openings that were closed."""
+    """The glass of the rooms, all glass to the outdoors, and the openings that were closed."""
 
     attachments: tuple[Attachment, ...]
     glass: tuple[GlassAccount, ...]
@@ -98,18 +98,20 @@ def glass_of_rooms(
     glass: list[GlassAccount] = []
     issues: list[Issue] = []
     for aperture in apertures:
-        found = _real(attachments_of(aperture, [r.solid for r in records]), issues)
-        attachments += found
+        attached = _without_floors(attachments_of(aperture, [r.solid for r in records]), issues)
+        attachments += attached
         if not records or aperture.glass.is_empty:
             continue
-        one = _account(aperture, found, source, records, building)
+        one = _account(aperture, attached, source, records, building)
         glass.append(one)
-        issues += _said(aperture, found, one, records)
+        issues += _issues_of(aperture, attached, one, records)
     unfilled = _unfilled(source, records, building, attachments)
     return GlassOfRooms(
-        (*attachments, *unfilled.attachments), (*glass, *unfilled.glass), unfilled.closed,
+        (*attachments, *unfilled.attachments),
+        (*glass, *unfilled.glass),
+        unfilled.closed,
         (*issues, *unfilled.issues),
-    )  # fmt: skip
+    )
 
 
 def lost_glass(
@@ -138,10 +140,10 @@ def lost_glass(
     return issues
 
 
-def _real(found: list[Attachment], issues: list[Issue]) -> list[Attachment]:
+def _without_floors(attached: list[Attachment], issues: list[Issue]) -> list[Attachment]:
     """Attachments without the glass of floors: walls and slabs that face down."""
     real = []
-    for one in found:
+    for one in attached:
         filling = one.aperture.filling
         if not is_phantom(filling.ifc_class, one.aperture.plane.normal):
             real.append(one)
@@ -154,20 +156,20 @@ def _real(found: list[Attachment], issues: list[Issue]) -> list[Attachment]:
 
 def _account(
     aperture: Aperture,
-    found: Sequence[Attachment],
+    attached: Sequence[Attachment],
     source: Source,
     records: Sequence[SpaceRecord],
     building: RayMesh,
 ) -> GlassAccount:
-    """How much of a filling's glass looks out, and how much of that a room has."""
+    """How much of a filling's glass faces the outdoors, and how much of that a room has."""
     filling = aperture.filling
     storey = storey_of(source.model.by_guid(filling.guid))
-    used = sum(a.glass.area for a in found if a.neighbour is None)
-    inner = sum(a.glass.area for a in found if a.neighbour is not None) / 2  # one of each side
+    used = sum(a.glass.area for a in attached if a.neighbour is None)
+    inner = sum(a.glass.area for a in attached if a.neighbour is not None) / 2  # one of each side
     rest = max(aperture.glass.area - used - inner, 0.0)
     out, low = used, None
     if rest > 0.01 * aperture.glass.area:
-        inside = _inner_point(aperture, found, building)
+        inside = _inner_point(aperture, attached, building)
         if inside is not None:
             out += rest
             low = _room_below(inside, records, building)
@@ -178,15 +180,15 @@ def _account(
 
 
 def _inner_point(
-    aperture: Aperture, found: Sequence[Attachment], building: RayMesh
+    aperture: Aperture, attached: Sequence[Attachment], building: RayMesh
 ) -> NDArray[np.float64] | None:
-    """A point [3] indoors behind the glass without a room; None where it does not look out.
+    """A point [3] on the room side of glass without a room; None where it faces no outdoors.
 
-    Where both sides are shut in, as below a canopy, the rest of a pane looks out as the part of it
-    that a room has.
+    Where both sides are enclosed, as below a canopy, the rest of a pane faces the same side as
+    the part of it with a room.
     """
     left = aperture.glass
-    for one in found:
+    for one in attached:
         turned = one.aperture.plane.normal @ aperture.plane.normal < 0
         region = shapely.transform(one.region, lambda p: p * [-1.0, 1.0]) if turned else one.region
         left = left.difference(region)
@@ -198,7 +200,7 @@ def _inner_point(
     open_sides = [is_open(point + s * ASIDE * normal, s * normal, building) for s in (1.0, -1.0)]
     out = open_sides[0] - open_sides[1]
     if not any(open_sides):
-        sides = [a.aperture.plane.normal @ normal for a in found if a.neighbour is None]
+        sides = [a.aperture.plane.normal @ normal for a in attached if a.neighbour is None]
         out = min(sides, default=0) if min(sides, default=0) == max(sides, default=0) else 0
     if out == 0:  # within the building, or free-standing outdoors
         return None
@@ -210,10 +212,12 @@ def _room_below(
 ) -> SpaceRecord | None:
     """The room whose top lies below a point with no slab between."""
     below = [
-        r for r in records
-        if np.all(r.solid.low[:2] < point[:2]) and np.all(r.solid.high[:2] > point[:2])
+        r
+        for r in records
+        if np.all(r.solid.low[:2] < point[:2])
+        and np.all(r.solid.high[:2] > point[:2])
         and 0 < point[2] - r.solid.high[2] < TALLEST_GAP
-    ]  # fmt: skip
+    ]
     if not below:
         return None
     room = max(below, key=lambda r: r.solid.high[2])
@@ -222,9 +226,9 @@ def _room_below(
     return room if hit[0] < 0 else None
 
 
-def _said(
+def _issues_of(
     aperture: Aperture,
-    found: Sequence[Attachment],
+    attached: Sequence[Attachment],
     one: GlassAccount,
     records: Sequence[SpaceRecord],
 ) -> list[Issue]:
@@ -238,17 +242,17 @@ def _said(
         values = {"element": label, "area": lost, "room": one.low.label}
         effect = Effect("window" if one.used == 0 else "", lost)
         issues.append(Issue("glass-above-room", filling.guid, values, effect))
-    elif not found:
+    elif not attached:
         values, effect = {"element": label}, Effect("window", max(lost, 0.0))
         issues.append(Issue("window-without-room", filling.guid, values, effect))
     elif lost > 0:
         values, effect = {"element": label, "area": lost}, Effect(glass=lost)
         issues.append(Issue("window-partly-without-room", filling.guid, values, effect))
-    inner = sorted({names[a.room] for a in found if a.neighbour is not None})
+    inner = sorted({names[a.room] for a in attached if a.neighbour is not None})
     if inner:
         values, effect = {"element": label, "rooms": tuple(inner)}, Effect("window")
         issues.append(Issue("glass-between-rooms", filling.guid, values, effect))
-    rooms = sorted({names[a.room] for a in found if a.neighbour is None})
+    rooms = sorted({names[a.room] for a in attached if a.neighbour is None})
     if len(rooms) > 1:
         values = {"element": filling.name, "rooms": tuple(rooms)}
         issues.append(Issue("window-of-several-rooms", filling.guid, values))
@@ -276,22 +280,24 @@ def _unfilled(
             continue
         if not _goes_through(aperture, building):
             continue
-        found = [
-            a for a in attachments_of(aperture, solids)
-            if a.neighbour is None and not is_phantom("IfcWall", a.aperture.plane.normal)
-            and _looks_out(a, building)
-        ]  # fmt: skip
-        if not found:
+        attached = [
+            a
+            for a in attachments_of(aperture, solids)
+            if a.neighbour is None
+            and not is_phantom("IfcWall", a.aperture.plane.normal)
+            and _faces_outdoors(a, building)
+        ]
+        if not attached:
             continue
-        area = sum(a.glass.area for a in found)
+        area = sum(a.glass.area for a in attached)
         label = f"opening {opening.Name or ''} in {host.is_a()} {host.Name or ''}"
         named = DOOR_NAME.search(plain_text(opening.Name or "")) is not None
-        if named or _is_door(found[0], lows[found[0].room]):
+        if named or _is_door(attached[0], lows[attached[0].room]):
             closed += area
             reason = Phrase("called-door" if named else "reaches-floor")
             code, values = "opening-closed", {"element": label, "reason": reason}
         else:
-            attachments += found
+            attachments += attached
             glass.append(GlassAccount(filling.guid, storey_of(host), area, area, True))
             code, values = "opening-glazed", {"element": label}
         issues.append(Issue(code, filling.guid, values, Effect(glass=area)))
@@ -306,8 +312,8 @@ def _pane_of(source: Source, opening, host) -> Filling | None:
         return None
     # an opening may be deeper than it is wide: its plane is that of the wall
     heights = wall.triangles @ direction
-    own = body.triangles @ direction
-    low, high = max(heights.min(), own.min()), min(heights.max(), own.max())
+    depths = body.triangles @ direction
+    low, high = max(heights.min(), depths.min()), min(heights.max(), depths.max())
     if high <= low:
         return None
     plane = plane_through(0.5 * (low + high) * direction, direction)
@@ -338,7 +344,7 @@ def _goes_through(aperture: Aperture, building: RayMesh) -> bool:
     return bool(np.all(hit < 0))
 
 
-def _looks_out(one: Attachment, building: RayMesh) -> bool:
+def _faces_outdoors(one: Attachment, building: RayMesh) -> bool:
     middle = shapely.get_coordinates(shapely.point_on_surface(one.region))
     plane = one.aperture.plane
     return is_open(plane.to_world(middle)[0] + CLEAR_WAY * plane.normal, plane.normal, building)

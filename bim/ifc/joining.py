@@ -32,54 +32,59 @@ def joined_rooms(
 
     Args: apertures, bodies: see `bim.ifc.passages`.
     """
-    ways = passages(apertures, records, bodies)
+    openings = passages(apertures, records, bodies)
     records, issues = list(records), []
     for names in source.corrections.join:
         parts = list({r.guid: r for r in (_named(records, n, source) for n in names)}.values())
-        one, why = _one_room(parts, ways)
+        one, why = _one_room(parts, openings)
         if one is None:
             values = {"rooms": tuple(names), "reason": why}
             issues.append(Issue("rooms-not-joined", source.corrections.file or "join", values))
             continue
         records = [r for r in records if r not in parts] + [one]
-        ways = passages(apertures, records, bodies)
+        openings = passages(apertures, records, bodies)
         issues.append(Issue("rooms-joined", one.solid.guid, {"rooms": tuple(names)}))
     if source.corrections.join_open:
-        records, more = _joined_by_size(records, ways)
+        records, more = _joined_by_size(records, openings)
         issues += more
-        ways = passages(apertures, records, bodies)
-    return records, ways, [*issues, *_open_pairs(records, ways, source)]
+        openings = passages(apertures, records, bodies)
+    return records, openings, [*issues, *_open_pairs(records, openings, source)]
 
 
 def _open_pairs(
-    records: Sequence[SpaceRecord], ways: Sequence[Passage], source: Source
+    records: Sequence[SpaceRecord], openings: Sequence[Passage], source: Source
 ) -> list[Issue]:
     """What there is to say of each pair of rooms that stay open to each other, once."""
     by_pair: dict[frozenset[str], list[Passage]] = {}
-    for way in ways:
-        by_pair.setdefault(way.rooms, []).append(way)
+    for passage in openings:
+        by_pair.setdefault(passage.rooms, []).append(passage)
     named = {record.guid: record for record in records}
     issues = []
-    for rooms, own in by_pair.items():
+    for rooms, of_pair in by_pair.items():
         pair = sorted((named[guid] for guid in rooms), key=lambda room: room.label)
         names = _names_to_join(pair, records)
         values = {
             "rooms": tuple(room.label for room in pair),
-            "area": sum(way.area for way in own), "count": len(own),
-            "names": " + ".join(names), "quoted": ", ".join(f'"{name}"' for name in names),
-            "file": corrections_file(source.path).name, "limit": LARGEST_DOOR,
-        }  # fmt: skip
-        issues.append(Issue("rooms-open-to-each-other", own[0].opening, values))
+            "area": sum(passage.area for passage in of_pair),
+            "count": len(of_pair),
+            "names": " + ".join(names),
+            "quoted": ", ".join(f'"{name}"' for name in names),
+            "file": corrections_file(source.path).name,
+            "limit": LARGEST_DOOR,
+        }
+        issues.append(Issue("rooms-open-to-each-other", of_pair[0].opening, values))
     return issues
 
 
 def _joined_by_size(
-    records: list[SpaceRecord], ways: Sequence[Passage]
+    records: list[SpaceRecord], openings: Sequence[Passage]
 ) -> tuple[list[SpaceRecord], list[Issue]]:
     """Rooms with those made one that openings larger than a door lead between."""
-    large = [way for way in ways if way.is_large]
+    large = [passage for passage in openings if passage.is_large]
     number = {record.guid: i for i, record in enumerate(records)}
-    rows, columns = np.array([[number[r] for r in way.rooms] for way in large]).reshape(-1, 2).T
+    rows, columns = (
+        np.array([[number[r] for r in passage.rooms] for passage in large]).reshape(-1, 2).T
+    )
     links = coo_array((np.ones(len(large)), (rows, columns)), shape=(len(records),) * 2)
     _, group = connected_components(links, directed=False)
     rooms, issues = [], []
@@ -90,7 +95,9 @@ def _joined_by_size(
             continue
         one, why = _one_room(parts, large)
         names = tuple(part.label for part in parts)
-        widest = max(way.area for way in large if way.rooms <= {part.guid for part in parts})
+        widest = max(
+            passage.area for passage in large if passage.rooms <= {part.guid for part in parts}
+        )
         values = {"rooms": names, "area": widest, "limit": LARGEST_DOOR, "reason": why}
         if one is None:
             issues.append(Issue("rooms-not-joined-by-size", parts[0].guid, values))
@@ -102,11 +109,11 @@ def _joined_by_size(
 
 
 def _one_room(
-    parts: list[SpaceRecord], ways: Sequence[Passage]
+    parts: list[SpaceRecord], openings: Sequence[Passage]
 ) -> tuple[SpaceRecord | None, Phrase | str]:
     """One room of several, or why there is none."""
     try:
-        one = _joined(parts, ways) if len(parts) > 1 else None
+        one = _joined(parts, openings) if len(parts) > 1 else None
     except RoomError as error:
         return None, str(error)
     return one, "" if one is not None else Phrase("no-opening-between")
@@ -125,8 +132,8 @@ def _names_to_join(pair: Sequence[SpaceRecord], records: Sequence[SpaceRecord]) 
     """The shortest name of each room that is unique and has no plus, which divides names."""
     names = []
     for room in pair:
-        own = [room.name, room.label]
-        good = (n for n in own if "+" not in n and _is_unique(records, n))
+        stated_names = [room.name, room.label]
+        good = (n for n in stated_names if "+" not in n and _is_unique(records, n))
         names.append(next(good, room.guid))
     return names
 
@@ -138,21 +145,24 @@ def _is_unique(records: Sequence[SpaceRecord], name: str) -> bool:
         return False
 
 
-def _joined(parts: list[SpaceRecord], ways: Sequence[Passage]) -> SpaceRecord | None:
+def _joined(parts: list[SpaceRecord], openings: Sequence[Passage]) -> SpaceRecord | None:
     """One room of several; None where they stay apart."""
     guids = {part.solid.guid for part in parts}
     solids = [packed(part.solid.manifold) for part in parts]
-    found = united(solids, [way.outline for way in ways if way.rooms <= guids])
-    if found is None:
+    union = united(solids, [passage.outline for passage in openings if passage.rooms <= guids])
+    if union is None:
         return None
-    body = unpacked(found)
+    body = unpacked(union)
     first = parts[0]
     name = JOINT.join(part.name for part in parts)
     areas, volumes = ([getattr(p, key) for p in parts] for key in ("stated_area", "stated_volume"))
     return SpaceRecord(
-        room_solid(first.solid.guid, name, body), name,
-        JOINT.join(part.long_name for part in parts if part.long_name), first.storey,
-        body.volume(), None if None in areas else sum(areas),
+        room_solid(first.solid.guid, name, body),
+        name,
+        JOINT.join(part.long_name for part in parts if part.long_name),
+        first.storey,
+        body.volume(),
+        None if None in areas else sum(areas),
         None if None in volumes else sum(volumes),
         first.type_name if len({part.type_name for part in parts}) == 1 else "",
-    )  # fmt: skip
+    )

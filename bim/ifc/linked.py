@@ -58,9 +58,12 @@ class _Frame:
         drawn = [placement_of(one) for one in model.by_type("IfcElement") if one.Representation]
         places = [unit * one[:3, 3] for one in drawn if one is not None]
         return cls(
-            to_map(model), (latitude, longitude), elevation, place,
+            to_map(model),
+            (latitude, longitude),
+            elevation,
+            place,
             np.array(places).reshape(-1, 3),
-        )  # fmt: skip
+        )
 
     def gap(self, other: _Frame, matrix: NDArray[np.float64]) -> float:
         """Distance of the plans of both files [m], the other moved by [4, 4]."""
@@ -72,7 +75,7 @@ class _Frame:
 
 
 @dataclass(frozen=True, slots=True)
-class _Way:
+class _Transform:
     """From the axes of a file to those of the first one [m]."""
 
     by: str  # phrase of the catalogue
@@ -98,16 +101,19 @@ def one_model(
             )
             raise DataError(message, file=name)
         frame = _Frame.of(other)
-        ways = [(way, first.gap(frame, way.matrix)) for way in _ways(first, frame)]
+        transforms = [
+            (transform, first.gap(frame, transform.matrix))
+            for transform in _transforms(first, frame)
+        ]
         convert_units(other, model)
-        issues += _added(model, other, ways, names=(name, first_name))
+        issues += _added(model, other, transforms, names=(name, first_name))
     return model, issues
 
 
 def _added(
     model: ifcopenshell.file,
     other: ifcopenshell.file,
-    ways: Sequence[tuple[_Way, float]],
+    transforms: Sequence[tuple[_Transform, float]],
     names: tuple[str, str],
 ) -> list[Issue]:
     """Add another model to the first one; the issues name how.
@@ -122,12 +128,14 @@ def _added(
     pairs = [
         (one, known[key]) for one in _roots(other) if (key := (one.GlobalId, one.is_a())) in known
     ]
-    way, apart = _way(model, other, pairs, ways)
-    pairs = [(one, same) for one, same in pairs if _distance(one, same, way, unit) <= COINCIDES]
-    issues = _north_issues(model, other, way, name, first_name)
-    if not np.allclose(way.matrix, np.eye(4)):
-        move(other, way.matrix, unit)
-    _drop_georeference(other, keep=way.by == "linked-by-origin" and not _georeferenced(model))
+    transform, apart = _fitting(model, other, pairs, transforms)
+    pairs = [
+        (one, same) for one, same in pairs if _distance(one, same, transform, unit) <= COINCIDES
+    ]
+    issues = _north_issues(model, other, transform, name, first_name)
+    if not np.allclose(transform.matrix, np.eye(4)):
+        move(other, transform.matrix, unit)
+    _drop_georeference(other, keep=transform.by == "linked-by-origin" and not _georeferenced(model))
     storeys = _same_storeys(model, other, [one for one, _ in pairs])
     repeated = sum(one.is_a("IfcElement") for one, _ in pairs)
     pairs += storeys
@@ -153,9 +161,9 @@ def _added(
         model.remove(double)
     mend_guids(model)
     values = {
-        "file": name, "first": first_name, "by": Phrase(way.by), "elements": count - repeated,
-        "repeated": repeated, "storeys": len(storeys),
-        "distance": float(np.linalg.norm(way.matrix[:3, 3])), "angle": _turn_deg(way.matrix),
+        "file": name, "first": first_name, "by": Phrase(transform.by), "elements": count - repeated,
+        "repeated": repeated, "storeys": len(storeys), "angle": _turn_deg(transform.matrix),
+        "distance": float(np.linalg.norm(transform.matrix[:3, 3])),
     }  # fmt: skip
     issues.append(Issue("file-linked", name, values))
     if apart > MARGIN:
@@ -176,46 +184,46 @@ def _roots(model: ifcopenshell.file) -> Iterator[Entity]:
 # ---- where a file lies ----------------------------------------------------------------------
 
 
-def _way(
+def _fitting(
     model: ifcopenshell.file,
     other: ifcopenshell.file,
     pairs: Sequence[tuple[Entity, Entity]],
-    ways: Sequence[tuple[_Way, float]],
-) -> tuple[_Way, float]:
+    transforms: Sequence[tuple[_Transform, float]],
+) -> tuple[_Transform, float]:
     """The first of the ways that fits, else the first, and the gap that it leaves [m]."""
     unit = length_scale(model)
     drawn = [(one, same) for one, same in pairs if getattr(one, "Representation", None) is not None]
     gaps = []
-    for way, gap in ways:
+    for transform, gap in transforms:
         if drawn:
-            gap = float(np.median([_distance(one, same, way, unit) for one, same in drawn]))
+            gap = float(np.median([_distance(one, same, transform, unit) for one, same in drawn]))
         if gap <= (COINCIDES if drawn else MARGIN):
-            return way, gap
+            return transform, gap
         gaps.append(gap)
-    return ways[0][0], gaps[0]
+    return transforms[0][0], gaps[0]
 
 
-def _ways(first: _Frame, other: _Frame) -> Iterator[_Way]:
+def _transforms(first: _Frame, other: _Frame) -> Iterator[_Transform]:
     """The ways from a file's axes to the first one's that they state, the most reliable first."""
     here, there = first.to_map, other.to_map
     if here is not None and there is not None and here[0] == there[0]:
-        yield _Way("linked-by-map", np.linalg.inv(here[1]) @ there[1])
+        yield _Transform("linked-by-map", np.linalg.inv(here[1]) @ there[1])
     known = None not in first.position and first.position == other.position
     if known and first.site is not None and other.site is not None:
         raised = np.eye(4)
         raised[2, 3] = other.elevation - first.elevation
-        yield _Way("linked-by-site", first.site @ raised @ np.linalg.inv(other.site))
-    yield _Way("linked-by-origin", np.eye(4))
+        yield _Transform("linked-by-site", first.site @ raised @ np.linalg.inv(other.site))
+    yield _Transform("linked-by-origin", np.eye(4))
 
 
-def _distance(one: Entity, same: Entity, way: _Way, unit: float) -> float:
+def _distance(one: Entity, same: Entity, transform: _Transform, unit: float) -> float:
     """Distance of two elements' places [m]; 0 for what has no place."""
     if not one.is_a("IfcProduct"):
         return 0.0
     here, there = placement_of(same), placement_of(one)
     if here is None or there is None:
         return 0.0
-    place = way.matrix @ np.array([*unit * there[:3, 3], 1.0])
+    place = transform.matrix @ np.array([*unit * there[:3, 3], 1.0])
     return float(np.linalg.norm(place[:3] - unit * here[:3, 3]))
 
 
@@ -246,13 +254,17 @@ def _turn_deg(matrix: NDArray[np.float64]) -> float:
 
 
 def _north_issues(
-    model: ifcopenshell.file, other: ifcopenshell.file, way: _Way, name: str, first_name: str
+    model: ifcopenshell.file,
+    other: ifcopenshell.file,
+    transform: _Transform,
+    name: str,
+    first_name: str,
 ) -> list[Issue]:
     """An issue where both files state TrueNorth and these differ once the file is placed."""
     norths = [true_north(one)[0] for one in (model, other)]
     if norths[0] is None or norths[1] is None:
         return []
-    x, y = way.matrix[:2, :2] @ norths[1]
+    x, y = transform.matrix[:2, :2] @ norths[1]
     angle = math.degrees(math.atan2(y, x) - math.atan2(norths[0][1], norths[0][0]))
     angle = (angle + 180.0) % 360.0 - 180.0
     values = {"file": name, "first": first_name, "angle": abs(angle)}

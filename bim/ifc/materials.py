@@ -105,10 +105,10 @@ class MaterialReader:
         Pset_MaterialOptical (IFC4), IfcOpticalMaterialProperties (IFC2X3); the front value.
         """
         for material in materials_of(element, self.damage):
-            given = self._optical.get(material.id(), {})
-            if "visible" in given or "solar" in given:
-                visible = given.get("visible", given.get("solar"))
-                return visible, given.get("solar", visible)
+            optical = self._optical.get(material.id(), {})
+            if "visible" in optical or "solar" in optical:
+                visible = optical.get("visible", optical.get("solar"))
+                return visible, optical.get("solar", visible)
         return None
 
     def layers_of(self, element: ifcopenshell.entity_instance) -> ElementLayers | None:
@@ -153,7 +153,7 @@ class MaterialReader:
         """
         constituents = self._constituents(element)
         named = {one.Name: one for one in constituents.values()}
-        found, stated = {}, True
+        layers, stated = {}, True
         for item in items if len(named) > 1 else ():
             styles = self._style_names(item) & set(named)
             of_aspect = constituents.get(self._aspects.get(item, ""))
@@ -161,12 +161,12 @@ class MaterialReader:
             if material is None:
                 continue
             self._contradicting += of_aspect is not None and of_aspect.Name != material.Name
-            found[item], known = self.layer(material, 1.0)
+            layers[item], known = self.layer(material, 1.0)
             stated &= known
         if self._contradicting:
             values = {"count": self._contradicting}
             self.issues["shape aspects"] = Issue("aspect-contradicts-style", "", values)
-        return found, stated
+        return layers, stated
 
     def shares_of(self, element: ifcopenshell.entity_instance) -> tuple[MaterialLayer, ...]:
         """Materials listed without thicknesses, if insulation is one: layers as shares of 1.
@@ -216,16 +216,16 @@ class MaterialReader:
     def layer(self, material, thickness: float) -> tuple[MaterialLayer, bool]:
         """A layer of that material; missing or impossible values from the table by its name."""
         name = (material.Name or "unnamed") if material is not None else "unnamed"
-        given = self._properties.get(material.id(), {}) if material is not None else {}
-        values = {k: v for k, v in given.items() if _is_physical(k, v)}
-        slip = given.get("heat_capacity", 0.0) * 1000.0
+        stated = self._properties.get(material.id(), {}) if material is not None else {}
+        values = {k: v for k, v in stated.items() if _is_physical(k, v)}
+        slip = stated.get("heat_capacity", 0.0) * 1000.0
         if "heat_capacity" not in values and _is_physical("heat_capacity", slip):
             values["heat_capacity"] = slip
             issue = Issue(
                 "heat-capacity-in-kilojoules", name, {"material": name, "stated": slip / 1000}
             )
             self.issues.setdefault(f"{name} kJ", issue)
-        wrong = sorted(set(given) - set(values))
+        wrong = sorted(set(stated) - set(values))
         values |= self._corrected(name, thickness)
         missing = sorted(set(NAMES) - set(values))
         if missing:
@@ -236,12 +236,14 @@ class MaterialReader:
                 and not named_material(material).is_known
             )
             known: dict[str, Any] = {
-                "material": name, "missing": tuple(map(Phrase, missing)), "default": default.name,
+                "material": name,
+                "missing": tuple(map(Phrase, missing)),
+                "default": default.name,
                 "impossible": tuple(
-                    Phrase("impossible-value", {"name": Phrase(k), "value": given[k]})
+                    Phrase("impossible-value", {"name": Phrase(k), "value": stated[k]})
                     for k in wrong
                 ),
-            }  # fmt: skip
+            }
             code = "material-unknown" if unknown else "material-incomplete"
             code = "material-impossible" if wrong else code
             self.issues.setdefault(name, Issue(code, name, known))
@@ -281,11 +283,11 @@ def _material_of(
 ) -> ifcopenshell.entity_instance | None:
     """The material associated with an element or its type: a usage, set, list or material."""
     damage = Damage() if damage is None else damage
-    found = damage.read(
+    material = damage.read(
         ifcopenshell.util.element.get_material, element, should_skip_usage=False,
         of=element, data="material", default=None,
     )  # fmt: skip
-    return next(iter(entities(found)), None)
+    return next(iter(entities(material)), None)
 
 
 def _with_material(
@@ -303,8 +305,8 @@ def _with_material(
         if _material_of(whole, damage) is not None:
             return whole
         read = ifcopenshell.util.element.get_aggregate
-        found = damage.read(read, whole, of=whole, data="whole", default=None)
-        whole = next(iter(entities(found)), None)
+        aggregate = damage.read(read, whole, of=whole, data="whole", default=None)
+        whole = next(iter(entities(aggregate)), None)
     return element
 
 
@@ -333,8 +335,8 @@ def named_material(material: ifcopenshell.entity_instance | None) -> NamedMateri
         return material_named("")
     texts = [*_classified(material), material.Name or ""]
     texts += [getattr(material, key, None) or "" for key in ("Category", "Description")]
-    found = [material_named(text) for text in texts]
-    return next((one for one in found if one.is_known), found[-3])
+    candidates = [material_named(text) for text in texts]
+    return next((one for one in candidates if one.is_known), candidates[-3])
 
 
 def _axis(element: ifcopenshell.entity_instance, usage, damage: Damage) -> np.ndarray | None:

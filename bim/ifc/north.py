@@ -52,16 +52,17 @@ def map_conversions(model: ifcopenshell.file) -> list[MapConversion]:
     if model.schema == "IFC2X3":
         holders = [*model.by_type("IfcProject"), *model.by_type("IfcSite")]
         psets = [psets_of(holder) for holder in holders]
-        found = [pset[MAP_SET] for pset in psets if MAP_SET in pset]
+        conversions = [pset[MAP_SET] for pset in psets if MAP_SET in pset]
         names = [next((p["ePSet_ProjectedCRS"] for p in psets if "ePSet_ProjectedCRS" in p), {})]
-        return [_conversion(one, names[0].get("Name"), None) for one in found]
+        return [_conversion(one, names[0].get("Name"), None) for one in conversions]
     return [
         _conversion(
-            one.get_info(), getattr(one.TargetCRS, "Name", None),
+            one.get_info(),
+            getattr(one.TargetCRS, "Name", None),
             getattr(one.TargetCRS, "MapUnit", None),
         )
         for one in model.by_type("IfcMapConversion")
-    ]  # fmt: skip
+    ]
 
 
 def _conversion(values: dict, crs: str | None, unit) -> MapConversion:
@@ -98,8 +99,10 @@ def north_rotation(
     if abs(difference) <= CONVERGENCE_DEG:
         return _turned(*true), issues
     values = {
-        "map": _azimuth(grid), "true": _azimuth(true), "difference": abs(difference),
-    }  # fmt: skip
+        "map": _azimuth(grid),
+        "true": _azimuth(true),
+        "difference": abs(difference),
+    }
     return _turned(*grid), [*issues, Issue("north-contradicts-map", "IfcMapConversion", values)]
 
 

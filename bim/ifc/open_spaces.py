@@ -182,8 +182,8 @@ def _open_across(free: NDArray[np.bool_], facet: Facet, building: RayMesh) -> fl
     Args: free: of its points [N], whether nothing is beyond.
     """
     points, rows = _grid(facet)
-    found = np.unique(rows)
-    if max((float(np.mean(free[rows == row])) for row in found), default=0.0) < ACROSS:
+    levels = np.unique(rows)
+    if max((float(np.mean(free[rows == row])) for row in levels), default=0.0) < ACROSS:
         return 0.0
     outside = points[free][np.argmax(points[free][:, 2])] + SIDE_REACH * facet.plane.normal
     return float(np.mean(free)) if is_open(outside, facet.plane.normal, building) else 0.0

@@ -68,7 +68,7 @@ def open_apertures(
 
     Args: bodies: triangles [N, 3, 3] of all that may stand there [m].
     """
-    found = []
+    result = []
     for opening, host in unfilled_openings(source.model):
         shape = source.shapes.get(opening.id())
         if shape is None:
@@ -81,11 +81,11 @@ def open_apertures(
         )  # fmt: skip
         aperture, _ = aperture_of(filling)
         if aperture is not None:
-            found.append(replace(aperture, glass=aperture.opening))
+            result.append(replace(aperture, glass=aperture.opening))
     for one, other in combinations([record.solid for record in records], 2):
         if np.all(one.low < other.high + TOUCHING) and np.all(other.low < one.high + TOUCHING):
-            found += _common_faces(one, other, bodies)
-    return found
+            result += _common_faces(one, other, bodies)
+    return result
 
 
 def passages(
@@ -93,14 +93,14 @@ def passages(
 ) -> list[Passage]:
     """Those of the apertures that lead from room to room."""
     solids = [record.solid for record in records]
-    found = []
+    result = []
     for aperture in apertures:
         sides = attachments_of(aperture, solids)
         for one, other in combinations(sides, 2):
             if one.neighbour == other.room and other.neighbour == one.room:
                 passage = _passage(one, other, bodies)
-                found += [] if passage is None else [passage]
-    return found
+                result += [] if passage is None else [passage]
+    return result
 
 
 def _passage(one: Attachment, other: Attachment, bodies: NDArray[np.float64]) -> Passage | None:
@@ -139,10 +139,13 @@ def _common_faces(
     name = f"boundary of {one.name} and {other.name}"
     for facet in one.facets:
         plane = facet.plane
-        shared = shapely.union_all([
-            _shared(facet, back) for back in other.facets
-            if back.plane.normal @ plane.normal < OPPOSITE
-        ])  # fmt: skip
+        shared = shapely.union_all(
+            [
+                _shared(facet, back)
+                for back in other.facets
+                if back.plane.normal @ plane.normal < OPPOSITE
+            ]
+        )
         if shared.area < SMALLEST:
             continue
         for part in polygons_of(_free(shared, plane, (-IN_WALL, IN_WALL), bodies)):

@@ -39,9 +39,9 @@ class Placed:
 
     def matrix(self) -> NDArray[np.float64]:
         """The way from model to world [4, 4]."""
-        found = np.eye(4)
-        found[:3, :3], found[:3, 3] = self.scale * self.rotation, -self.offset
-        return found
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = self.scale * self.rotation, -self.offset
+        return matrix
 
 
 def in_world(shapes: dict[int, Shape], rotation: NDArray[np.float64]) -> Placed:
@@ -146,10 +146,10 @@ def to_map(model: ifcopenshell.file) -> tuple[str, NDArray[np.float64]] | None:
             continue
         x, y = one.x_axis or (1.0, 0.0)
         c, s = x / math.hypot(x, y), y / math.hypot(x, y)
-        way = np.eye(4)
-        way[:2, :2] = (c, -s), (s, c)
-        way[:3, 3] = _metres(model, one.unit) * np.array(one.origin, dtype=float)
-        return crs_name(str(one.crs)), way
+        matrix = np.eye(4)
+        matrix[:2, :2] = (c, -s), (s, c)
+        matrix[:3, 3] = _metres(model, one.unit) * np.array(one.origin, dtype=float)
+        return crs_name(str(one.crs)), matrix
     return None
 
 

@@ -232,12 +232,12 @@ def definitions_of(
     holder: ifcopenshell.entity_instance | None,
 ) -> list[ifcopenshell.entity_instance]:
     """Property and quantity sets of an element or of a type itself."""
-    found = entities(getattr(holder, "HasPropertySets", None))
+    definitions = entities(getattr(holder, "HasPropertySets", None))
     for relation in getattr(holder, "IsDefinedBy", None) or ():
         for definition in entities(getattr(relation, "RelatingPropertyDefinition", None)):
             is_set = definition.is_a("IfcPropertySetDefinitionSet")
-            found += entities(definition.wrappedValue) if is_set else [definition]
-    return found
+            definitions += entities(definition.wrappedValue) if is_set else [definition]
+    return definitions
 
 
 def psets_of(
@@ -248,14 +248,14 @@ def psets_of(
     Complex properties are left out: through the numbers of a BSDF it takes a second.
     """
     damage = Damage() if damage is None else damage
-    found: dict[str, dict] = {}
+    sets: dict[str, dict] = {}
     for holder in (type_of(element, damage), element):
         for definition in definitions_of(holder):
             name = getattr(definition, "Name", None)
             if name is not None:
                 values = _plain_values(definition, element, damage)
-                found.setdefault(name, {}).update(values)
-    return found
+                sets.setdefault(name, {}).update(values)
+    return sets
 
 
 def _plain_values(

@@ -68,14 +68,14 @@ class PropertyTemplate:
 @cache
 def fenestration_templates() -> Mapping[str, PropertyTemplate]:
     """The properties of the set that holds a shading state, by name."""
-    found: Mapping[str, PropertyTemplate] = {}
+    templates: Mapping[str, PropertyTemplate] = {}
     for state in _whole_states():
         model = ifcopenshell.file(schema="IFC4")
         window = model.create_entity("IfcWindow", ifcopenshell.guid.new())
         attach_state(model, [window], state)
         (pset,) = model.by_type("IfcPropertySet")
-        found = _merged(found, _templates(pset.HasProperties))
-    return MappingProxyType(found)
+        templates = _merged(templates, _templates(pset.HasProperties))
+    return MappingProxyType(templates)
 
 
 def write_templates(path: str | PathLike[str]) -> None:
@@ -86,11 +86,14 @@ def write_templates(path: str | PathLike[str]) -> None:
     )
     held = [_template(model, one, SET_NAME) for one in fenestration_templates().values()]
     template = model.create_entity(
-        "IfcPropertySetTemplate", _guid(SET_NAME), Name=SET_NAME,
+        "IfcPropertySetTemplate",
+        _guid(SET_NAME),
+        Name=SET_NAME,
         Description=f"{WHAT}; '{SET_NAME}: STATE' for each further state of its shade",
-        TemplateType="PSET_TYPEDRIVENOVERRIDE", ApplicableEntity=",".join(HOLDERS),
+        TemplateType="PSET_TYPEDRIVENOVERRIDE",
+        ApplicableEntity=",".join(HOLDERS),
         HasPropertyTemplates=held,
-    )  # fmt: skip
+    )
     model.create_entity(
         "IfcRelDeclares", _guid("declares"), RelatingContext=library, RelatedDefinitions=[template]
     )
@@ -143,27 +146,27 @@ def _whole_states() -> Iterator[ShadingState]:
 
 def _templates(properties: Iterable[Entity]) -> dict[str, PropertyTemplate]:
     """The templates of properties by name; of numbered ones the first."""
-    found: dict[str, PropertyTemplate] = {}
+    templates: dict[str, PropertyTemplate] = {}
     for one in properties:
         kind = KINDS[one.is_a()]
         numbered = re.fullmatch(r"(.* )(\d+)", one.Name)
         if numbered and int(numbered[2]) > 1:
             first = f"{numbered[1]}1"
-            if first in found:
+            if first in templates:
                 more = _templates(getattr(one, "HasProperties", None) or ())
-                members = _merged(found[first].members, more)
-                found[first] = replace(found[first], many=True, members=members)
+                members = _merged(templates[first].members, more)
+                templates[first] = replace(templates[first], many=True, members=members)
                 continue
         if kind == "P_COMPLEX":
             members = _templates(one.HasProperties)
-            found[one.Name] = PropertyTemplate(
+            templates[one.Name] = PropertyTemplate(
                 one.Name, kind, usage=one.UsageName, many=bool(numbered), members=members
             )
         else:
-            found[one.Name] = PropertyTemplate(
+            templates[one.Name] = PropertyTemplate(
                 one.Name, kind, _value(one).is_a(), _unit(one.Unit), many=bool(numbered)
             )
-    return found
+    return templates
 
 
 def _unit(unit: Entity | None) -> tuple[str, str | None, str] | None:
@@ -181,20 +184,22 @@ def _merged(
     one: Mapping[str, PropertyTemplate], other: Mapping[str, PropertyTemplate]
 ) -> dict[str, PropertyTemplate]:
     """The templates of both; what both have holds the members of both."""
-    found = dict(one)
+    merged = dict(one)
     for name, template in other.items():
-        known = found.get(name)
+        known = merged.get(name)
         if known is None:
-            found[name] = template
+            merged[name] = template
             continue
         usage = known.usage
         if template.usage not in usage.split(" or "):
             usage = f"{usage} or {template.usage}"
-        found[name] = replace(
-            known, usage=usage, many=known.many or template.many,
+        merged[name] = replace(
+            known,
+            usage=usage,
+            many=known.many or template.many,
             members=_merged(known.members, template.members),
-        )  # fmt: skip
-    return found
+        )
+    return merged
 
 
 def _template(model: ifcopenshell.file, one: PropertyTemplate, within: str) -> Entity:
@@ -229,9 +234,11 @@ def _specification(
     applicability = _child(made, "applicability", minOccurs="0", maxOccurs="unbounded")
     _values(_child(_child(applicability, "entity"), "name"), [name.upper() for name in holders])
     of_property = _child(
-        _child(made, "requirements"), "property", dataType=one.measure.upper(),
+        _child(made, "requirements"),
+        "property",
+        dataType=one.measure.upper(),
         cardinality=cardinality,
-    )  # fmt: skip
+    )
     _restricted(_child(of_property, "propertySet"), pattern=f"{SET_NAME}(: .+)?")
     _child(_child(of_property, "baseName"), "simpleValue").text = one.name
     if one.name == POSITION:

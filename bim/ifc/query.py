@@ -32,8 +32,8 @@ def query(path: str | PathLike[str], selector: str) -> list[ChosenElement]:
     Raises: `DataError` where the file cannot be read or the selector is none.
     """
     model = open_ifc(path)
-    found = [_described(model.by_id(step_id)) for step_id in chosen(model, selector)]
-    return sorted(found, key=lambda one: (one.ifc_class, one.storey, one.name, one.guid))
+    elements = [_described(model.by_id(step_id)) for step_id in chosen(model, selector)]
+    return sorted(elements, key=lambda one: (one.ifc_class, one.storey, one.name, one.guid))
 
 
 def _described(element: ifcopenshell.entity_instance) -> ChosenElement:

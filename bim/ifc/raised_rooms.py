@@ -1,6 +1,6 @@
 """Spaces that end below the glass before them, raised to what really covers them.
 
-A space is raised where glass that looks out lies above its top with no slab between, and slabs,
+A space is raised where glass to the outdoors lies above its top with no slab between, and slabs,
 roofs or coverings close the air above it (`bim.room_tops`).  It stays as it is where the file
 states a suspended ceiling: a covering that covers the space, or a finished ceiling height below its
 height; and where one is likely though nobody drew it: less than `PLENUM` would be won and less

@@ -19,8 +19,8 @@ PROPERTIES = (
 
 
 def read_room_uses(*paths: str | PathLike[str]) -> dict[str, tuple[tuple[str, str], ...]]:
-    """What each IfcSpace says of its use, by GUID: where it is said, and the text."""
-    found: dict[str, tuple[tuple[str, str], ...]] = {}
+    """The stated use of each IfcSpace by GUID: its property, and the text."""
+    uses: dict[str, tuple[tuple[str, str], ...]] = {}
     models = open_all(paths).values()
     for space in (space for model in models for space in model.by_type("IfcSpace")):
         psets = psets_of(space)
@@ -36,5 +36,5 @@ def read_room_uses(*paths: str | PathLike[str]) -> dict[str, tuple[tuple[str, st
         if space.ObjectType:
             texts.append(("ObjectType", space.ObjectType))
         if texts:
-            found.setdefault(space.GlobalId, tuple(texts))
-    return found
+            uses.setdefault(space.GlobalId, tuple(texts))
+    return uses

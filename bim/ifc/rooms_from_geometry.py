@@ -49,7 +49,7 @@ Tell = Callable[[float], None]
 def rooms_from_geometry(source: Source, tell: Tell) -> tuple[list[SpaceRecord], list[Issue]]:
     """Rooms between the building elements, and what had to be closed to find them.
 
-    Args: tell: is told the fraction done.
+    Args: tell: called with the fraction done.
     """
     bodies = _uncut_bodies(source)
     where, lacks = source.path.name, _lack_of_spaces(source)
@@ -89,17 +89,18 @@ def rooms_from_geometry(source: Source, tell: Tell) -> tuple[list[SpaceRecord], 
 
 def _leaks(bodies: list[tuple[str, Body]], slabs: list[Body]) -> list[Issue]:
     """Where would-be rooms are open to the outside, though floor and roof are added."""
-    found, size = leaks([*(body for _, body in bodies), *slabs])
+    escapes, size = leaks([*(body for _, body in bodies), *slabs])
     boxes = np.array([(body.min((0, 1)), body.max((0, 1))) for _, body in bodies])
     issues = []
-    for leak in found:
+    for leak in escapes:
         apart = np.maximum(boxes[:, 0] - leak.position, leak.position - boxes[:, 1])
         nearest = np.linalg.norm(np.maximum(apart, 0.0), axis=1).argsort(kind="stable")[:2]
         values = {
-            "width": max(leak.width, size), "size": size,
+            "width": max(leak.width, size),
+            "size": size,
             "elements": tuple(bodies[i][0].strip() for i in nearest),
             **dict(zip("xyz", map(float, leak.position), strict=True)),
-        }  # fmt: skip
+        }
         issues.append(Issue("room-leaks", " ".join(f"{v:.2f}" for v in leak.position), values))
     return issues
 
@@ -117,22 +118,22 @@ class _Search:
     ) -> tuple[int, list[manifold3d.Manifold]]:
         """Number of the first attempt (bodies besides, gap) that finds rooms, and their solids."""
         for _ in range(MOST_LEFT_OUT + 1):
-            left = max(self._until - time.monotonic(), 0.0)  # where none is left, that is said
+            left = max(self._until - time.monotonic(), 0.0)  # 0 raises the time limit
             meshes = [body for *_, body in self._bodies]
             try:
-                number, found = answer_apart(
-                    first_rooms_enclosed, meshes, attempts, limit_s=left, told=self._told
+                number, enclosed = answer_apart(
+                    first_rooms_enclosed, meshes, attempts, limit_s=left, told=self._on_line
                 )
             except ProcessEnded as error:
                 if not self._leave_out(error):
                     break
                 continue
-            self._say_what_is_less(found)
-            solids = solids_of(found.rooms)
+            self._report_limits(enclosed)
+            solids = solids_of(enclosed.rooms)
             return number, [solid.manifold for solid in solids if isinstance(solid, Solid)]
         return -1, []
 
-    def _told(self, line: str) -> None:
+    def _on_line(self, line: str) -> None:
         done, total = map(int, line.split())
         self._tell(done / max(total, 1))
 
@@ -149,13 +150,13 @@ class _Search:
         self.issues.append(Issue("element-not-in-room-search", guid, values))
         return True
 
-    def _say_what_is_less(self, found: Enclosed) -> None:
+    def _report_limits(self, enclosed: Enclosed) -> None:
         for count, code in (
-            (found.not_widened, "small-elements-not-widened"),
-            (found.hulls, "flat-elements-as-hulls"),
-            (found.not_extended, "found-rooms-not-widened"),
+            (enclosed.not_widened, "small-elements-not-widened"),
+            (enclosed.hulls, "flat-elements-as-hulls"),
+            (enclosed.not_extended, "found-rooms-not-widened"),
         ):
-            if count and found.rooms:
+            if count and enclosed.rooms:
                 self.issues.append(Issue(code, "IfcSpace", {"count": count}))
 
 

@@ -40,9 +40,11 @@ def one_of_each(
         if gone:
             left -= gone
             values = {
-                "attribute": name, "schemes": _schemes(gone, records, model, key),
-                "count": len(gone), "chosen": chosen or Phrase("no-scheme"),
-            }  # fmt: skip
+                "attribute": name,
+                "schemes": _schemes(gone, records, model, key),
+                "count": len(gone),
+                "chosen": chosen or Phrase("no-scheme"),
+            }
             issues.append(Issue("rooms-of-several-schemes", "IfcSpace", values))
     gone = _filled(records, _same(records, shared, left), shared)
     if gone:
@@ -59,33 +61,35 @@ def one_of_each(
 
 
 def shared_by_pair(records: Sequence[SpaceRecord]) -> tuple[Shared, list[Issue]]:
-    """Volume [m3] that each pair of spaces shares, where it is any, and what was not worked out."""
+    """Volume [m3] that each pair of spaces shares, if any, and what could not be computed."""
     near = {
         i: [
-            j for j, b in enumerate(records[i + 1 :], i + 1)
+            j
+            for j, b in enumerate(records[i + 1 :], i + 1)
             if np.all(a.solid.low <= b.solid.high) and np.all(b.solid.low <= a.solid.high)
         ]
         for i, a in enumerate(records)
-    }  # fmt: skip
+    }
     bodies = {i: packed(records[i].solid.manifold) for i in near}
     items = [(bodies[i], [bodies[j] for j in others]) for i, others in near.items() if others]
     volumes = iter(shared_volumes(items))
-    found, issues = {}, []
+    by_pair, issues = {}, []
     for i, others in near.items():
         shared = next(volumes) if others else []
         if isinstance(shared, ProcessEnded):
             values = {"room": records[i].solid.name, "reason": str(shared)}
             issues.append(Issue("overlap-not-computed", records[i].guid, values))
             continue
-        found |= {(i, j): volume for j, volume in zip(others, shared, strict=True) if volume > 0}
-    return found, issues
+        by_pair |= {(i, j): volume for j, volume in zip(others, shared, strict=True) if volume > 0}
+    return by_pair, issues
 
 
 def _same(records: Sequence[SpaceRecord], shared: Shared, left: set[int]) -> list[tuple[int, int]]:
     return [
-        pair for pair, volume in shared.items()
+        pair
+        for pair, volume in shared.items()
         if set(pair) <= left and volume > SAME_ROOM * min(records[i].volume for i in pair)
-    ]  # fmt: skip
+    ]
 
 
 def _by_scheme(
@@ -104,9 +108,11 @@ def _by_scheme(
     volume = {name: sum(records[i].volume for i in involved if scheme[i] == name) for name in count}
     chosen = min(count, key=lambda name: (-count[name], volume[name], name))
     gone = {
-        i for pair in same for i, other in (pair, pair[::-1])
+        i
+        for pair in same
+        for i, other in (pair, pair[::-1])
         if scheme[i] != chosen and scheme[other] == chosen
-    }  # fmt: skip
+    }
     return gone, chosen
 
 

@@ -59,8 +59,8 @@ class Shape:
     ifc_class: str
     name: str
     triangles: NDArray[np.float64]  # [N, 3, 3]
-    looks: tuple[SurfaceStyle, ...]
-    look: NDArray[np.int64]  # [N] index into looks, -1 where the file has no style
+    styles: tuple[SurfaceStyle, ...]
+    style_index: NDArray[np.int64]  # [N] index into styles, -1 where the file has no style
     item: NDArray[np.int64]  # [N] STEP id of the representation item of each triangle
     is_painted: bool = False  # whether its reflectances come from the user's corrections
     is_unglazed: bool = False  # whether the user's corrections say that it has no glass
@@ -68,8 +68,8 @@ class Shape:
     @property
     def transparent(self) -> NDArray[np.bool_]:
         """Which triangles [N] are seen through."""
-        clear = np.array([look.is_glass for look in self.looks] + [False])
-        return clear[self.look]
+        clear = np.array([style.is_glass for style in self.styles] + [False])
+        return clear[self.style_index]
 
 
 def read_shapes(
@@ -100,11 +100,12 @@ def read_shapes(
     styles = _Styles(model)
     try:
         wanted = [
-            product for product in model.by_type("IfcProduct")
+            product
+            for product in model.by_type("IfcProduct")
             if product.id() not in without
             and not product.is_a().startswith(tuple(skipped))
             and _has_body(product)
-        ]  # fmt: skip
+        ]
         if not wanted:
             return {}, []
         iterator = ifcopenshell.geom.iterator(
@@ -141,22 +142,22 @@ def _has_body(product: ifcopenshell.entity_instance) -> bool:
     )
 
 
-def _shape(element, styles: _Styles) -> Shape | None:
+def _shape(element, reader: _Styles) -> Shape | None:
     """Shape of one result of the iterator; None where it has no triangles."""
     geometry = element.geometry
     vertices = np.array(geometry.verts, dtype=float).reshape(-1, 3)
     faces = np.array(geometry.faces, dtype=np.int64).reshape(-1, 3)
     if not len(faces) or not np.isfinite(vertices).all():
         return None
-    looks = tuple(styles.look(style) for style in geometry.materials)
-    look = np.array(geometry.material_ids, dtype=np.int64)
-    if len(look) != len(faces):
-        look = np.full(len(faces), -1)
-    look = np.where(look < len(looks), look, -1)
+    styles = tuple(reader.read(style) for style in geometry.materials)
+    index = np.array(geometry.material_ids, dtype=np.int64)
+    if len(index) != len(faces):
+        index = np.full(len(faces), -1)
+    index = np.where(index < len(styles), index, -1)
     item = np.array(geometry.item_ids, dtype=np.int64)
     item = item if len(item) == len(faces) else np.zeros(len(faces), dtype=np.int64)
     return Shape(
-        element.guid, element.id, element.type, element.name, vertices[faces], looks, look, item
+        element.guid, element.id, element.type, element.name, vertices[faces], styles, index, item
     )
 
 
@@ -165,18 +166,18 @@ class _Styles:
 
     def __init__(self, model: ifcopenshell.file) -> None:
         self._model = model
-        self._looks: dict[str, SurfaceStyle] = {}
+        self._known: dict[str, SurfaceStyle] = {}
 
-    def look(self, style) -> SurfaceStyle:
-        """The look of a style of the geometry engine."""
-        if style.name not in self._looks:
+    def read(self, style) -> SurfaceStyle:
+        """A style of the geometry engine."""
+        if style.name not in self._known:
             colour = style.diffuse
             values = colour.components if hasattr(colour, "components") else colour
             transparency = style.transparency if np.isfinite(style.transparency) else 0.0
-            self._looks[style.name] = surface_style(
+            self._known[style.name] = surface_style(
                 self._model, style.name, tuple(values)[:3], transparency
             )
-        return self._looks[style.name]
+        return self._known[style.name]
 
 
 def mesh_of(shapes: Sequence[Shape]) -> RayMesh:

@@ -126,9 +126,10 @@ def read_source(
             shapes[step_id] = painted(shapes[step_id], paint)
     if corrections.file:
         values = {
-            "removed": len(removed), "repainted": len(corrections.painted(model)),
+            "removed": len(removed),
+            "repainted": len(corrections.painted(model)),
             "unglazed": len(unglazed),
-        }  # fmt: skip
+        }
         issues.append(Issue("corrections-used", corrections.file, values))
     placed = in_world(shapes, rotation)
     return Source(
@@ -148,20 +149,20 @@ def check_materials(model: ifcopenshell.file, corrections: Corrections) -> None:
 
 def opaque(shape: Shape) -> Shape:
     """The shape without glass."""
-    looks = tuple(replace(look, transparency=0.0) for look in shape.looks)
-    return replace(shape, looks=looks, is_unglazed=True)
+    styles = tuple(replace(style, transparency=0.0) for style in shape.styles)
+    return replace(shape, styles=styles, is_unglazed=True)
 
 
 def painted(shape: Shape, paint: Paint) -> Shape:
     """The shape with all that is not glass in one paint; of glass a gloss alone is taken."""
     values = {"reflectance": paint.visible, "solar": paint.solar, "stated": None, "hue": GREY}
     values["gloss"] = paint.gloss
-    looks = tuple(
-        (replace(look, gloss=paint.gloss) if paint.gloss else look)
-        if look.is_glass
-        else replace(look, **values)
-        for look in shape.looks
+    styles = tuple(
+        (replace(style, gloss=paint.gloss) if paint.gloss else style)
+        if style.is_glass
+        else replace(style, **values)
+        for style in shape.styles
     )
     plain = SurfaceStyle("correction", paint.visible, 0.0, None, paint.solar, paint.gloss)
-    index = np.where(shape.look < 0, len(looks), shape.look)
-    return replace(shape, looks=(*looks, plain), look=index, is_painted=True)
+    index = np.where(shape.style_index < 0, len(styles), shape.style_index)
+    return replace(shape, styles=(*styles, plain), style_index=index, is_painted=True)

@@ -51,16 +51,19 @@ def boundary_issues(source: Source, spaces: Sequence[Space]) -> list[Issue]:
     rooms = {space.guid: space for space in spaces}
     issues, compared = [], 0
     hosts = _hosts(model)
-    for (room, element), theirs in stated.items():
+    for (room, element), boundary in stated.items():
         if room not in rooms:
             continue
         compared += 1
-        issues += _differences(model.by_guid(element), theirs, rooms[room], hosts)
+        issues += _differences(model.by_guid(element), boundary, rooms[room], hosts)
     differing = len({(i.where, i.values["room"]) for i in issues})
     values = {
-        "count": len(second), "pairs": compared, "agreeing": compared - differing,
-        "percent": 100 * SAME_SHARE, "unread": unread,
-    }  # fmt: skip
+        "count": len(second),
+        "pairs": compared,
+        "agreeing": compared - differing,
+        "percent": 100 * SAME_SHARE,
+        "unread": unread,
+    }
     return [Issue("boundaries-compared", RELATION, values), *issues]
 
 
@@ -82,7 +85,7 @@ def _stated(
     relations: Sequence[ifcopenshell.entity_instance], scale: float
 ) -> tuple[dict[tuple[str, str], _Stated], int]:
     """The file's boundaries by GUID of room and element, and how many could not be read."""
-    found: dict[tuple[str, str], _Stated] = defaultdict(_Stated)
+    stated: dict[tuple[str, str], _Stated] = defaultdict(_Stated)
     unread = 0
     for one in relations:
         element, room = one.RelatedBuildingElement, one.RelatingSpace
@@ -95,10 +98,10 @@ def _stated(
         if area is None:
             unread += 1
             continue
-        entry = found[room.GlobalId, element.GlobalId]
+        entry = stated[room.GlobalId, element.GlobalId]
         entry.area += area * scale**2
         entry.beyond[one.InternalOrExternalBoundary or ""] += area * scale**2
-    return dict(found), unread
+    return dict(stated), unread
 
 
 def _area(surface: ifcopenshell.entity_instance) -> float | None:
@@ -149,7 +152,7 @@ def _points(curve: ifcopenshell.entity_instance) -> NDArray[np.float64] | None:
 
 def _differences(
     element: ifcopenshell.entity_instance,
-    theirs: _Stated,
+    boundary: _Stated,
     room: Space,
     hosts: Mapping[str, str],
 ) -> list[Issue]:
@@ -157,19 +160,19 @@ def _differences(
     faces = [f for f in room.faces if f.element == element.GlobalId and f.kind != "reveal"]
     net, gross = _own_areas(element.GlobalId, faces, room, hosts)
     values = {"element": f"{element.is_a()} {element.Name or ''}", "room": room.label}
-    between = net < theirs.area < gross  # with some of its openings
-    if not (between or _agree(theirs.area, net) or _agree(theirs.area, gross)):
-        areas = {"stated": theirs.area, "net": net, "gross": gross}
+    between = net < boundary.area < gross  # with some of its openings
+    if not (between or _agree(boundary.area, net) or _agree(boundary.area, gross)):
+        areas = {"stated": boundary.area, "net": net, "gross": gross}
         code = "boundary-area-differs" if net else "boundary-without-face"
         return [Issue(code, element.GlobalId, values | areas)]
-    word = max(theirs.beyond, key=lambda key: theirs.beyond[key])
+    word = max(boundary.beyond, key=lambda key: boundary.beyond[key])
     beyond: Mapping[str, float] = _by_adjacency(faces)
     if not beyond or word not in (*OUTSIDE, "INTERNAL"):
         return []
-    ours = max(beyond, key=lambda key: beyond[key])
-    if ours in OUTSIDE.get(word, INSIDE):
+    computed = max(beyond, key=lambda key: beyond[key])
+    if computed in OUTSIDE.get(word, INSIDE):
         return []
-    neighbours = {"stated": word.lower(), "computed": ours}
+    neighbours = {"stated": word.lower(), "computed": computed}
     return [Issue("boundary-neighbour-differs", element.GlobalId, values | neighbours)]
 
 
@@ -177,10 +180,10 @@ def _own_areas(
     guid: str, faces: Sequence[Face], room: Space, hosts: Mapping[str, str]
 ) -> tuple[float, float]:
     """Area [m2] of an element at a room: without the openings in it, and with them."""
-    own = [window for window in room.windows if window.guid == guid]
-    if own:
-        glass = sum(window.area for window in own)
-        return glass, max(sum(window.opening_area for window in own), glass)
+    same_window = [window for window in room.windows if window.guid == guid]
+    if same_window:
+        glass = sum(window.area for window in same_window)
+        return glass, max(sum(window.opening_area for window in same_window), glass)
     net = sum(face.area for face in faces)
     inner = [f for f in room.faces if f.kind != "reveal" and hosts.get(f.element or "") == guid]
     lit = {w.guid for w in room.windows}  # frames of these are in their openings' area

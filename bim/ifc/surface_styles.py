@@ -57,8 +57,8 @@ def surface_style(
         style = _style_of(model, shading)
         label = (style.Name if style is not None else None) or name
         linear = _reflected(shading, style)
-        given = getattr(shading, "Transparency", None)
-        transparency = transparency if given is None else float(given)
+        stated = getattr(shading, "Transparency", None)
+        transparency = transparency if stated is None else float(stated)
     value = luminance(linear)
     bounded = min(max(value, LOWEST_REFLECTANCE), HIGHEST_REFLECTANCE)
     stated = None if bounded == value else value

@@ -46,8 +46,8 @@ class Surveyed:
     cpu_s: float = 0.0  # of both, all threads: the same on a busy machine
     memory_mb: float = 0.0  # peak of the process
     spaces: int = 0  # IfcSpace in the file, each room once; 0 where rooms are found from geometry
-    glass_used: float = 0.0  # of the glass that looks out: before a room [m2]
-    glass_out: float = 0.0  # all glass that looks out, with or without a room [m2]
+    glass_used: float = 0.0  # of the glass to the outdoors: with a room [m2]
+    glass_out: float = 0.0  # all glass to the outdoors, with or without a room [m2]
     verdict: str = ""  # of the account
     refused: str = ""  # why, where the file cannot be read
 
@@ -144,13 +144,17 @@ def markdown(rows: Sequence[Surveyed]) -> str:
             f"| {row.issues} | {row.check_s:.1f} | {row.export_s:.1f} | {row.cpu_s:.1f} "
             f"| {row.memory_mb:.0f} |"
         )
-    total = {f.name: sum(getattr(r, f.name) for r in rows) for f in fields(Surveyed)
-             if f.type in ("int", "float")}  # fmt: skip
+    total = {
+        f.name: sum(getattr(r, f.name) for r in rows)
+        for f in fields(Surveyed)
+        if f.type in ("int", "float")
+    }
     lines.append(
         f"\n{len(rows)} files, {sum(bool(r.refused) for r in rows)} refused; {total['rooms']} rooms"
         f" ({total['open_rooms']} with an open edge), {total['windows']} windows with "
-        f"{total['glass_used']:.1f} m2 of the {total['glass_out']:.1f} m2 that look out. Within "
-        f"{100 * AGREES:.0f} % of the file's own: floor area {total['areas_between_walls']} of "
+        f"{total['glass_used']:.1f} m2 of the {total['glass_out']:.1f} m2 of glass to the "
+        f"outdoors. Within {100 * AGREES:.0f} % of the file's own: floor area "
+        f"{total['areas_between_walls']} of "
         f"{total['areas']} rooms between the walls and {total['areas_to_middles']} to the middle of"
         f" the walls, volume {total['volumes_agreeing']} of {total['volumes']}."
     )

@@ -51,14 +51,14 @@ class Targets:
 
 def target_elements(model: ifcopenshell.file, path: str | Path, targets: Targets) -> list[Entity]:
     """Windows and window types that are meant; `DataError` lists what there is where one is not."""
-    found: dict[int, Entity] = {}
+    elements: dict[int, Entity] = {}
     if targets.every_window:
-        found |= {one.id(): one for one in model.by_type("IfcWindow")}
-        if not found:
+        elements |= {one.id(): one for one in model.by_type("IfcWindow")}
+        if not elements:
             raise DataError("holds no IfcWindow", file=path)
     for guid in targets.windows:
         one = _by_guid(model, guid, path)
-        found[one.id()] = one
+        elements[one.id()] = one
     of_types = [one for name in targets.types for one in _of_type(model, name, path)]
     if targets.by_place:
         placed = _placed(model, path, targets)
@@ -68,11 +68,11 @@ def target_elements(model: ifcopenshell.file, path: str | Path, targets: Targets
         if not placed:
             raise DataError("no window is in all of these places", file=path)
         of_types = placed
-    found |= {one.id(): one for one in of_types}
-    if not found:
+    elements |= {one.id(): one for one in of_types}
+    if not elements:
         message = "no window chosen: give a GUID, a type, a room, a storey, a facade or all"
         raise DataError(message, file=path)
-    return list(found.values())
+    return list(elements.values())
 
 
 def _by_guid(model: ifcopenshell.file, guid: str, path: str | Path) -> Entity:
@@ -89,14 +89,14 @@ def _of_type(model: ifcopenshell.file, name: str, path: str | Path) -> list[Enti
     """The window type of that name, else the windows whose ObjectType it is."""
     types = [one for one in model.by_type("IfcTypeProduct") if one.is_a().startswith(GLAZED)]
     windows = model.by_type("IfcWindow")
-    found = [one for one in types if one.Name == name]
-    found = found or [one for one in windows if one.ObjectType == name]
-    if not found:
+    matches = [one for one in types if one.Name == name]
+    matches = matches or [one for one in windows if one.ObjectType == name]
+    if not matches:
         names = [one.Name for one in types] + [one.ObjectType for one in windows]
         there = listed(name, (known for known in names if known))
         message = f"no window type {name!r}; there are: {there or 'none with a name'}"
         raise DataError(message, file=path)
-    return found
+    return matches
 
 
 def _type_id(element: Entity) -> int:
@@ -129,12 +129,12 @@ def _room(building: Building, name: str, path: str | Path):
 
 def _storey(building: Building, name: str, path: str | Path) -> str:
     storeys = list(dict.fromkeys(space.storey for space in building.spaces))
-    found = [one for one in storeys if one == name]
-    found = found or [one for one in storeys if one.casefold() == name.strip().casefold()]
-    if len(found) != 1:
+    matches = [one for one in storeys if one == name]
+    matches = matches or [one for one in storeys if one.casefold() == name.strip().casefold()]
+    if len(matches) != 1:
         message = f"no storey {name!r} with rooms; there are: {listed(name, storeys)}"
         raise DataError(message, file=path, field="storey")
-    return found[0]
+    return matches[0]
 
 
 def _sector(name: str, building: Building, path: str | Path) -> tuple[float, float] | None:

@@ -45,8 +45,10 @@ from bim.report.issue import Effect, Issue, Phrase
 JUDGED = ("IfcWall", "IfcSlab", "IfcRoof", "IfcCovering", "IfcBuildingElementProxy")
 THINNEST, THICKEST = 0.001, 0.06  # of a pane with its spacers [m]
 NO_GLASS = (  # codes of the issues of transparent surfaces that are no glass
-    "transparent-taken-as-opaque", "transparent-left-out", "transparent-facing-down",
-)  # fmt: skip
+    "transparent-taken-as-opaque",
+    "transparent-left-out",
+    "transparent-facing-down",
+)
 BAR = 0.2  # width up to which a member is no pane [m]
 LIES_ON = 0.03  # from a sheet to what it lies on [m]
 WITHIN = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / [[3], [6], [6], [6]]  # triangles
@@ -61,8 +63,10 @@ GLASS = re.compile(
     r"glas|glaz|verre|vitr|cristal|vidr|vetr[oa]|szk[lł]|\bsklo|cam\b|lasi\b|polycarb|polikarb"
     r"|plexi|acryl|pmma|etfe|ガラス|硝子|玻璃|стекл|γυαλ"
 )
-NOT_GLASS = re.compile(r"glass ?wool|glaswol|glasvlies|laine de verre|fib\w* ?(de )?(glas|verre)"
-                       r"|glasfa|fiberglas|fibreglas|lana de vidrio|グラスウール")  # fmt: skip
+NOT_GLASS = re.compile(
+    r"glass ?wool|glaswol|glasvlies|laine de verre|fib\w* ?(de )?(glas|verre)"
+    r"|glasfa|fiberglas|fibreglas|lana de vidrio|グラスウール"
+)
 
 
 def judged_transparent(
@@ -92,8 +96,10 @@ def judged_transparent(
         if judged is not shape:
             area = transparent_area(shape)
             values = {
-                "element": f"{shape.ifc_class} {shape.name}", "area": area, "reason": Phrase(why),
-            }  # fmt: skip
+                "element": f"{shape.ifc_class} {shape.name}",
+                "area": area,
+                "reason": Phrase(why),
+            }
             code = "transparent-left-out" if judged is None else "transparent-taken-as-opaque"
             issues.append(Issue(code, shape.guid, values, Effect(glass=area)))
     return kept, issues
@@ -118,25 +124,26 @@ def _judged(
     if shape.ifc_class.startswith("IfcMember"):
         if not _is_bar(shape):
             return shape, ""
-        solid = tuple(replace(look, transparency=0.0) for look in shape.looks)
-        return replace(shape, looks=solid), "bar"
+        solid = tuple(replace(style, transparency=0.0) for style in shape.styles)
+        return replace(shape, styles=solid), "bar"
     materials = _material_texts(element, damage)
-    own = plain_text(f"{element.Name or ''} {getattr(element, 'ObjectType', None) or ''}")
+    names = plain_text(f"{element.Name or ''} {getattr(element, 'ObjectType', None) or ''}")
     thickness = _thickness(shape)
-    if SEPARATION.search(own) or (materials and all(_is_air(text) for text in materials)):
+    if SEPARATION.search(names) or (materials and all(_is_air(text) for text in materials)):
         return None, "air"
-    looks = tuple(
-        look if not look.is_glass or _is_pane(look, materials, thickness)
-        else replace(look, transparency=0.0)
-        for look in shape.looks
-    )  # fmt: skip
-    if looks == shape.looks:
+    styles = tuple(
+        style
+        if not style.is_glass or _is_pane(style, materials, thickness)
+        else replace(style, transparency=0.0)
+        for style in shape.styles
+    )
+    if styles == shape.styles:
         return shape, ""
     if thickness < THINNEST:
         return None, "no-thickness"
     if any(_names_a_body(text) for text in materials):
-        return replace(shape, looks=looks), "other-material"
-    return replace(shape, looks=looks), "not-called-glass"
+        return replace(shape, styles=styles), "other-material"
+    return replace(shape, styles=styles), "not-called-glass"
 
 
 def _lying(
@@ -149,10 +156,12 @@ def _lying(
     if not sheets:
         return set()
     bodies = [
-        shape.triangles for key, shape in shapes.items()
-        if key not in judged and shape.ifc_class not in NO_ELEMENTS
+        shape.triangles
+        for key, shape in shapes.items()
+        if key not in judged
+        and shape.ifc_class not in NO_ELEMENTS
         and not shape.ifc_class.startswith("IfcSite")
-    ]  # fmt: skip
+    ]
     mesh = ray_mesh(np.concatenate(bodies or [np.empty((0, 3, 3))]))
     return {key for key in sheets if _lies_on(shapes[key], mesh)}
 
@@ -176,12 +185,12 @@ def _lies_on(shape: Shape, bodies: RayMesh) -> bool:
     return bool(np.average(stands, weights=np.linalg.norm(vectors[flat], axis=1)) > HALF)
 
 
-def _is_pane(look, materials: list[str], thickness: float) -> bool:
-    if any(_is_glass(text) for text in (plain_text(look.name), *materials)):
+def _is_pane(style, materials: list[str], thickness: float) -> bool:
+    if any(_is_glass(text) for text in (plain_text(style.name), *materials)):
         return True
     if any(_names_a_body(text) for text in materials):
         return False
-    return THINNEST <= thickness <= THICKEST and look.transparency >= HALF
+    return THINNEST <= thickness <= THICKEST and style.transparency >= HALF
 
 
 def _is_glass(text: str) -> bool:

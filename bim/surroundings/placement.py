@@ -18,14 +18,18 @@ from bim.mesh_simplification import simplified_mesh
 from bim.model import Building, Element
 from bim.outdoors import lifted_sites, shut_in_area, unblinded
 from bim.report.issue import Issue, Phrase
-from bim.surroundings.citygml import SUFFIXES as CITYGML
-from bim.surroundings.citygml import read_citygml
-from bim.surroundings.cityjson import read_cityjson
+from bim.surroundings.city_models import SUFFIXES as CITYGML
+from bim.surroundings.city_models import read_citygml, read_cityjson
 from bim.surroundings.crowns import crown_elements
 from bim.surroundings.footprints import read_footprints
 from bim.surroundings.horizon import horizon_wall, read_horizon
-from bim.surroundings.meshes import SUFFIXES, read_meshes
-from bim.surroundings.objects import Foliage, SurroundingObject, SurroundingsFile
+from bim.surroundings.objects import (
+    SUFFIXES,
+    Foliage,
+    SurroundingObject,
+    SurroundingsFile,
+    read_meshes,
+)
 from bim.surroundings.terrain import SUFFIXES as GRIDS
 from bim.surroundings.terrain import graded, read_terrain
 from bim.surroundings.trees import monthly_transmittance, read_trees

@@ -95,8 +95,9 @@ def _ascii_grid(text: str, path: Path) -> FloatArray:
         try:
             fields[name] = float(words[1])
         except ValueError:
-            raise DataError(f"expected a number, got {words[1]!r:.40}", file=path, field=name)\
-                from None  # fmt: skip
+            raise DataError(
+                f"expected a number, got {words[1]!r:.40}", file=path, field=name
+            ) from None
         words = words[2:]
     missing = [name for name in ("ncols", "nrows", "cellsize") if name not in fields]
     for axis in "xy":

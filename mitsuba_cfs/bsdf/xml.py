@@ -310,7 +310,7 @@ def _material(layer: ElementTree.Element, path: str | PathLike[str]) -> dict[str
     if material is None:
         return {}
     result: dict[str, Any] = {
-        "name": _text(material.find("Name")),
+        "name": "" if (name := _text(material.find("Name"))) == "Name" else name,  # genBSDF's own
         "manufacturer": _text(material.find("Manufacturer")),
         "device_type": _text(material.find("DeviceType")) or "Other",
     }

@@ -55,8 +55,9 @@ def _from_file(weather: Weather, source: str) -> Weather:
         warm = int(np.count_nonzero(snow & (_daily_means(weather) > TOO_WARM_C)))
         if warm:
             message = f"has snow in {warm} hours of days warmer than {TOO_WARM_C:g} °C on average"
-            raise DataError(f"{message}; state the albedo by month", file=weather.file,
-                            field="albedo")  # fmt: skip
+            raise DataError(
+                f"{message}; state the albedo by month", file=weather.file, field="albedo"
+            )
         return replace(weather, albedo=np.where(snow, SNOW, weather.albedo))
     stated = weather.stated_albedo
     if stated is None or np.isnan(stated).all():
@@ -67,8 +68,10 @@ def _from_file(weather: Weather, source: str) -> Weather:
         note = Note(
             "{file}: the albedo is missing in {count} hours; {albedo:g} is used there.",
             "{file}: the albedo is missing in {count} hour; {albedo:g} is used there.",
-            file=_name(weather), count=int(missing.sum()), albedo=float(np.mean(weather.albedo)),
-        )  # fmt: skip
+            file=_name(weather),
+            count=int(missing.sum()),
+            albedo=float(np.mean(weather.albedo)),
+        )
         notes = (*notes, note)
     return replace(weather, albedo=np.where(missing, weather.albedo, stated), notes=notes)
 
@@ -86,8 +89,10 @@ def _noted(weather: Weather) -> Weather:
     note = Note(
         "{file}: snow lies in {hours} hours of daylight; the ground reflects {albedo:g} all year. "
         "Facades in snow can receive 13 to 36 % more light and heat: state albedo = 'snow'.",
-        file=_name(weather), hours=hours, albedo=float(np.mean(weather.albedo)),
-    )  # fmt: skip
+        file=_name(weather),
+        hours=hours,
+        albedo=float(np.mean(weather.albedo)),
+    )
     return replace(weather, notes=(*weather.notes, note))
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 SUBDIVISIONS = (1, 2, 4, 6)  # Reinhart's MF of the sky's patches
 SUN_MODELS = ("spa", "radiance")
-GROUNDS = ("reflected", "gendaylit")  # see `mitsuba_cfs.sky.ground`
+GROUNDS = ("reflected", "gendaylit")  # see `mitsuba_cfs.sky.matrix`
 LEAST_ALTITUDE_DEG = 3.0  # below it, global minus diffuse says nothing about the direct beam
 PARTS = ("all", "sky", "sun")
 SUN_PATCHES = 4  # gendaymtx spreads the sun over this many patches

@@ -37,18 +37,23 @@ class Number(click.FloatRange):
 
 
 basis_option = click.option(
-    "--basis", type=click.Choice(["full", "half", "quarter"]), default="full", show_default=True,
+    "--basis",
+    type=click.Choice(["full", "half", "quarter"]),
+    default="full",
+    show_default=True,
     help="Klems basis.",
-)  # fmt: skip
+)
 tensor_tree_option = click.option(
     "--tensor-tree",
     type=click.IntRange(1, 6),
     help="Write a tensor tree of 4^N cells per hemisphere instead.",
 )
 cull_option = click.option(
-    "--cull", type=Number(0, 1, max_open=True), default=0.9,
+    "--cull",
+    type=Number(0, 1, max_open=True),
+    default=0.9,
     help="Fraction of the tensor tree's cells to merge.",
-)  # fmt: skip
+)
 
 
 INFO_ANGLES_DEG = (0, 10, 20, 30, 40, 50, 60, 70, 80)
@@ -159,9 +164,11 @@ def _description(data: BsdfFile) -> list[str]:
 @click.argument("file", type=FILE)
 @click.argument("pairs", required=False, type=click.Choice(["-"]))
 @click.option(
-    "--incident", type=ANGLES, metavar="THETA PHI",
+    "--incident",
+    type=ANGLES,
+    metavar="THETA PHI",
     help="Direction to the light [degrees]; together with --outgoing.",
-)  # fmt: skip
+)
 @click.option(
     "--outgoing",
     type=ANGLES,
@@ -250,9 +257,12 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
 
 @command.command()
 @click.option(
-    "--shape", type=click.Choice(SHAPES), default="venetian", show_default=True,
+    "--shape",
+    type=click.Choice(SHAPES),
+    default="venetian",
+    show_default=True,
     help="Geometry to trace, or the data sheet of a fabric or product.",
-)  # fmt: skip
+)
 @click.option("--depth-mm", type=LENGTH, help="Chord width of a slat, or depth of a pleat.")
 @click.option("--spacing-mm", type=LENGTH, help="Distance between slats, holes, threads or pleats.")
 @click.option("--openness", type=SHARE, help="Open area fraction of a perforated or woven sheet.")
@@ -343,9 +353,12 @@ def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, out:
 @command.command("interpolate")
 @click.argument("files", nargs=-1, required=True, type=FILE, metavar="MEASURED.txt ...")
 @click.option(
-    "--normal", type=click.Choice(["room", "outside"]), default="room", show_default=True,
+    "--normal",
+    type=click.Choice(["room", "outside"]),
+    default="room",
+    show_default=True,
     help="Side to which the sample's normal points.",
-)  # fmt: skip
+)
 @basis_option
 @tensor_tree_option
 @cull_option
@@ -462,9 +475,12 @@ def _print_shares(patterns: Sequence[Pattern], band: int) -> None:
     help="Reference glazing by name; of EN 14501, with --place.",
 )
 @click.option(
-    "--kappa", type=click.FloatRange(0, 1), default=0.4, show_default=True,
+    "--kappa",
+    type=click.FloatRange(0, 1),
+    default=0.4,
+    show_default=True,
     help="Parameter of Kuhn's formula for interior shades.",
-)  # fmt: skip
+)
 @click.option("--out", type=FILE, help="Write the table as .csv, or as .json with g by patch.")
 @click.option("--toml", type=FILE, help="Write the thermal data of one state for the heat balance.")
 def thermal(

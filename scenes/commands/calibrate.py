@@ -12,9 +12,10 @@ from scenes.commands.room_options import size_option
 @click.command()
 @size_option("size", 300, "costs are scaled to those of a study")
 @click.option(
-    "--out", type=click.Path(path_type=Path, dir_okay=False),
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
     help="File to write; default: the one that `cfs study` reads.",
-)  # fmt: skip
+)
 def command(size: int, out: Path | None) -> None:
     """Time every method and glare metric on this machine.
 

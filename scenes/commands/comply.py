@@ -62,19 +62,25 @@ def list_rules(context: click.Context, _: click.Parameter, value: bool) -> None:
     help="Rule set: en17037, leed-v4.1, another of docs/comply.md, or a file; may be repeated.",
 )  # fmt: skip
 @click.option(
-    "--closed", type=FILE,
+    "--closed",
+    type=FILE,
     help="BSDF XML file of every window with its blinds closed; default: the last state that the "
     "IFC holds, else LM-83's shade.",
-)  # fmt: skip
+)
 @click.option("--uses", type=FILE, help="TOML file of room uses; see docs/comply.md.")
 @click.option(
-    "--day", default="03-21", show_default=True, metavar="MM-DD",
+    "--day",
+    default="03-21",
+    show_default=True,
+    metavar="MM-DD",
     help="Date for exposure to sunlight, 02-01 to 03-21.",
-)  # fmt: skip
+)
 @click.option(
-    "--sun-altitude", "least_altitude_deg", type=click.FloatRange(0, 45),
+    "--sun-altitude",
+    "least_altitude_deg",
+    type=click.FloatRange(0, 45),
     help="Minimum solar altitude [deg]; default: the rule's value for the country.",
-)  # fmt: skip
+)
 @eye_height_option
 @grid_option
 @directions_option

@@ -42,9 +42,12 @@ _DEFAULT = YearOptions(Path(), Path())
     METHODS, "path tracing computes single pictures, see cfs picture", default=_DEFAULT.method
 )
 @click.option(
-    "--metric", type=click.Choice(METRICS), default=_DEFAULT.metric, show_default=True,
+    "--metric",
+    type=click.Choice(METRICS),
+    default=_DEFAULT.metric,
+    show_default=True,
     help="DGP; eDGP: sources of direct light only; sDGP: illuminance at the eye only.",
-)  # fmt: skip
+)
 @size_option("size", _DEFAULT.size, "as evalglare recommends")
 @samples_option(_DEFAULT.samples, "shared by all hours")
 @click.option(
@@ -56,9 +59,12 @@ _DEFAULT = YearOptions(Path(), Path())
     show_default=True, help="First and last clock hour of use, every day; past midnight too: 18 8.",
 )  # fmt: skip
 @click.option(
-    "--worst", type=click.IntRange(0, 100), default=_DEFAULT.worst, show_default=True,
+    "--worst",
+    type=click.IntRange(0, 100),
+    default=_DEFAULT.worst,
+    show_default=True,
     help="Number of pictures of each view's worst hours.",
-)  # fmt: skip
+)
 @click.option("--hdr", is_flag=True, help="Also write these pictures as .hdr.")
 @subdivide_option
 @light_options

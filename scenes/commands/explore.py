@@ -18,9 +18,10 @@ RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 @click.command()
 @click.argument("results", type=RESULTS, nargs=-1, required=True, metavar="RESULTS...")
 @click.option(
-    "--out", type=click.Path(path_type=Path),
+    "--out",
+    type=click.Path(path_type=Path),
     help="Write one folder that opens as a file, and exit.",
-)  # fmt: skip
+)
 @click.option(
     "--port",
     type=click.IntRange(0, 65535),
@@ -28,9 +29,12 @@ RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
     help="Port on the loopback address; 0: any free port.",
 )
 @click.option(
-    "--language", type=click.Choice(["en", "de", "fr"]), default="en", show_default=True,
+    "--language",
+    type=click.Choice(["en", "de", "fr"]),
+    default="en",
+    show_default=True,
     help="Language of the page; results of a run state none.",
-)  # fmt: skip
+)
 @click.option("--no-browser", is_flag=True, help="Print the address only.")
 def command(
     results: Sequence[Path], out: Path | None, port: int, language: str, no_browser: bool

@@ -39,25 +39,32 @@ PATTERNS = {  # of the files that an export writes
 @click.command()
 @input_options("all", weather="", system=False)
 @click.option(
-    "--radiance", type=click.Path(file_okay=False, path_type=Path),
+    "--radiance",
+    type=click.Path(file_okay=False, path_type=Path),
     help="Folder for Radiance scenes, with a subfolder for each room.",
-)  # fmt: skip
+)
 @click.option(
-    "--mitsuba", type=click.Path(file_okay=False, path_type=Path),
+    "--mitsuba",
+    type=click.Path(file_okay=False, path_type=Path),
     help="Folder for Mitsuba scenes, with a subfolder for each room with a window.",
-)  # fmt: skip
+)
 @click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
 @click.option(
-    "--weather", "weather", type=FILE,
+    "--weather",
+    "weather",
+    type=FILE,
     help="Hourly weather file (EPW); for the ground temperatures of --epjson.",
-)  # fmt: skip
+)
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
 @click.option("--honeybee", type=click.Path(path_type=Path), help="Honeybee model (.hbjson).")
 @click.option("--gbxml", type=click.Path(path_type=Path), help="gbXML file (.gbxml).")
 @click.option(
-    "--band", type=click.Choice(BANDS, case_sensitive=False), default="Visible", show_default=True,
+    "--band",
+    type=click.Choice(BANDS, case_sensitive=False),
+    default="Visible",
+    show_default=True,
     help="Spectral band of the BSDF: Visible or Solar; of the Radiance and Mitsuba scenes.",
-)  # fmt: skip
+)
 @spacing_option
 @height_option
 @subdivision_option
@@ -108,9 +115,12 @@ def command(
     head = PrintedHead()
     head(head_of(read, light_only=True).with_assumptions(known.notes()))
     writers = room_writers(
-        known, band.lower(), spacing=sensor_spacing, height=sensor_height,
+        known,
+        band.lower(),
+        spacing=sensor_spacing,
+        height=sensor_height,
         sky_division=int(subdivision),
-    )  # fmt: skip
+    )
     export_folders(read, spaces, writers, folders)
     exported = replace(read, spaces=tuple(spaces))
     files = {"epjson": epjson, "honeybee": honeybee, "gbxml": gbxml}

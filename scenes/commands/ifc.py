@@ -26,9 +26,12 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option(
-    "--out", required=True, type=click.Path(path_type=Path, dir_okay=False), metavar="ADDON.zip",
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="ADDON.zip",
     help="The add-on, for Blender's Preferences, Add-ons, Install from Disk.",
-)  # fmt: skip
+)
 def bonsai(out: Path) -> None:
     """Write the Bonsai panel: cfs run on the open IFC file, rooms coloured by result."""
     check_file(out, field="--out")
@@ -55,9 +58,12 @@ def _renamed(name: str, current: click.Command) -> click.Command:
         return current.callback(**chosen) if current.callback is not None else None
 
     return click.Command(
-        name, params=current.params, callback=callback, help=current.help,
+        name,
+        params=current.params,
+        callback=callback,
+        help=current.help,
         short_help=f"Renamed to `cfs {name}`.",
-    )  # fmt: skip
+    )
 
 
 for _name, _current in (("check", check), ("export", export)):
@@ -73,30 +79,41 @@ for _name, _current in (("check", check), ("export", export)):
 @space_option("rooms", "its windows")
 @click.option("--storey", "storeys", multiple=True, metavar="NAME", help="Windows of a storey.")
 @click.option(
-    "--facade", "facades", multiple=True, metavar="N|E|S|W|FROM-TO",
+    "--facade",
+    "facades",
+    multiple=True,
+    metavar="N|E|S|W|FROM-TO",
     help="Windows of this orientation: also NE ..., roof, or azimuths such as 150-210.",
-)  # fmt: skip
+)
 @click.option(
-    "--all", "every_window", is_flag=True,
+    "--all",
+    "every_window",
+    is_flag=True,
     help="Every IfcWindow; choose glazed doors and panels by GUID, room, storey or facade.",
-)  # fmt: skip
+)
 @click.option(
-    "--bsdf", type=FILE,
+    "--bsdf",
+    type=FILE,
     help="BSDF XML file: Klems or tensor tree; U, g and more come from the .toml beside it.",
-)  # fmt: skip
+)
 @click.option(
-    "--g", "g_value", metavar="NUMBER|FILE.csv",
+    "--g",
+    "g_value",
+    metavar="NUMBER|FILE.csv",
     help="g-value at normal incidence; or a CSV file: polar_deg, g and, optionally, azimuth_deg.",
-)  # fmt: skip
+)
 @u_option
 @click.option("--state", default="", help="Name of the shading state; default: the usual one.")
 @click.option(
     "--reference", is_flag=True, help="Store a reference to the BSDF file instead of its contents."
 )
 @click.option(
-    "-o", "--out", required=True, type=click.Path(dir_okay=False, path_type=Path),
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
     help="IFC file to write.",
-)  # fmt: skip
+)
 def attach(
     building: Path,
     *,

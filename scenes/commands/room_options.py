@@ -109,28 +109,41 @@ out_folder_option = click.option(
     "--out", required=True, type=click.Path(path_type=Path), help="Folder of results."
 )
 join_option = click.option(
-    "--join", multiple=True, metavar="'ROOM + ROOM'",
+    "--join",
+    multiple=True,
+    metavar="'ROOM + ROOM'",
     help="Merge rooms that are open to each other; 'open' (IFC): wherever the opening is no door.",
-)  # fmt: skip
+)
 furniture_option = click.option(
     "--furniture", is_flag=True, help="Include the furniture of the model in light and views."
 )
 facade_pane_option = click.option(
-    "--facade-pane", "facade_panes", multiple=True, metavar="MATERIAL",
+    "--facade-pane",
+    "facade_panes",
+    multiple=True,
+    metavar="MATERIAL",
     help="Material of panes with no room behind them in a Radiance scene (.rad); they mirror.",
-)  # fmt: skip
+)
 aperture_option = click.option(
-    "--aperture", "apertures", multiple=True, metavar="MATERIAL",
+    "--aperture",
+    "apertures",
+    multiple=True,
+    metavar="MATERIAL",
     help="Window material of a Radiance scene (.rad); default: all glass and BSDF materials.",
-)  # fmt: skip
+)
 surroundings_option = click.option(
-    "--surroundings", multiple=True, type=FILE,
+    "--surroundings",
+    multiple=True,
+    type=FILE,
     help="Surroundings: OBJ, STL, PLY, glTF, CityJSON, CityGML, GeoJSON or PVGIS horizon.",
-)  # fmt: skip
+)
 surroundings_offset_option = click.option(
-    "--surroundings-offset", type=float, nargs=3, metavar="X Y Z",
+    "--surroundings-offset",
+    type=float,
+    nargs=3,
+    metavar="X Y Z",
     help="Offset added to the surroundings' coordinates [m], instead of georeferences.",
-)  # fmt: skip
+)
 
 
 class Albedo(click.ParamType):
@@ -152,9 +165,11 @@ class Albedo(click.ParamType):
 
 
 albedo_option = click.option(
-    "--albedo", type=Albedo(), metavar="A",
+    "--albedo",
+    type=Albedo(),
+    metavar="A",
     help="Ground reflectance: a number, 12 by month, 'file' or 'snow' (EPW); default: 0.2.",
-)  # fmt: skip
+)
 needed_weather_option = click.option(
     "--weather", required=True, type=FILE, help="Hourly weather file (EPW)."
 )
@@ -162,44 +177,57 @@ weather_option = click.option(
     "--weather", type=FILE, help="Hourly weather file (EPW); required with BUILDING."
 )
 system_option = click.option(
-    "--cfs", "system", type=FILE,
+    "--cfs",
+    "system",
+    type=FILE,
     help="BSDF XML file (Klems full or tensor tree) for all windows; default: those in BUILDING.",
-)  # fmt: skip
+)
 glazing_option = click.option(
-    "--glazing", type=click.Choice(list(GENERIC_GLAZINGS)),
+    "--glazing",
+    type=click.Choice(list(GENERIC_GLAZINGS)),
     help="Reference glazing by name; of windows whose file states no glazing data.",
-)  # fmt: skip
+)
 tau_option = click.option(
-    "--tau", "visible_transmittance", type=click.FloatRange(0, 1, min_open=True),
+    "--tau",
+    "visible_transmittance",
+    type=click.FloatRange(0, 1, min_open=True),
     help="Visible transmittance of windows without a BSDF.",
-)  # fmt: skip
+)
 see_through_option = click.option(
-    "--see-through", multiple=True, metavar="FILE=KIND",
+    "--see-through",
+    multiple=True,
+    metavar="FILE=KIND",
     help="Whether the transmission peak of a BSDF is 'specular', a 'lobe', or the specular share.",
-)  # fmt: skip
+)
 u_option = click.option(
     "--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value of the windows [W/(m2 K)]."
 )
 eye_height_option = click.option(
-    "--eye-height", type=click.FloatRange(0.3, 3), default=1.2, show_default=True,
+    "--eye-height",
+    type=click.FloatRange(0.3, 3),
+    default=1.2,
+    show_default=True,
     help="Height of the eye above the floor [m].",
-)  # fmt: skip
+)
 grid_option = click.option(
     "--grid",
     type=click.FloatRange(0.1, 20),
     help="Spacing of a grid of eye positions [m]; default: one position.",
 )
 directions_option = click.option(
-    "--directions", type=click.IntRange(1, 64), default=1, show_default=True,
+    "--directions",
+    type=click.IntRange(1, 64),
+    default=1,
+    show_default=True,
     help="View directions per eye position; the first faces the largest window.",
-)  # fmt: skip
+)
 seed_option = click.option(
     "--seed",
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
     help="Seed of the random numbers.",
-)  # fmt: skip
+)
 spacing_option = click.option(
     "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_GRID.spacing,
     show_default=True, help="Sensor spacing [m].",
@@ -217,22 +245,33 @@ subdivide_option = click.option(
     help="Subgroups of each window group; 0: choose from the surroundings.",
 )  # fmt: skip
 glare_sources_option = click.option(
-    "--glare-sources", type=click.Choice(GLARE_SOURCES), default=GLARE_SOURCES[0],
+    "--glare-sources",
+    type=click.Choice(GLARE_SOURCES),
+    default=GLARE_SOURCES[0],
     show_default=True,
     help="Group bright pixels into glare sources as evalglare does, or rate each pixel.",
-)  # fmt: skip
+)
 glare_sun_option = click.option(
-    "--glare-sun", type=click.Choice(GLARE_SUN), default=GLARE_SUN[0], show_default=True,
+    "--glare-sun",
+    type=click.Choice(GLARE_SUN),
+    default=GLARE_SUN[0],
+    show_default=True,
     help="Treat the sun's disc as a separate glare source, or spread it over its pixels.",
-)  # fmt: skip
+)
 sun_option = click.option(
-    "--sun-model", type=click.Choice(SUN_MODELS), default=SUN_MODELS[0], show_default=True,
+    "--sun-model",
+    type=click.Choice(SUN_MODELS),
+    default=SUN_MODELS[0],
+    show_default=True,
     help="Sun position by NREL's SPA, or by Radiance's formula (gendaymtx).",
-)  # fmt: skip
+)
 sky_ground_option = click.option(
-    "--sky-ground", type=click.Choice(GROUNDS), default=GROUNDS[0], show_default=True,
+    "--sky-ground",
+    type=click.Choice(GROUNDS),
+    default=GROUNDS[0],
+    show_default=True,
     help="Ground luminance: of a diffusely reflecting plane, or as in gendaylit.",
-)  # fmt: skip
+)
 annual_glare_option = click.option(
     "--annual-glare", is_flag=True, help="Compute DGP for every daylight hour."
 )
@@ -250,20 +289,28 @@ def chosen_language() -> str | None:
 def page_option(command: Callable) -> Callable:
     """`--page` and `--language`; the latter is had by `chosen_language`."""
     language = click.option(
-        "--language", type=click.Choice(["en", "de", "fr"]), expose_value=False,
-        callback=_keep_language, help="Language of the page; default: of --page, else English.",
-    )  # fmt: skip
+        "--language",
+        type=click.Choice(["en", "de", "fr"]),
+        expose_value=False,
+        callback=_keep_language,
+        help="Language of the page; default: of --page, else English.",
+    )
     file = click.option(
-        "--page", type=FILE, metavar="FILE.toml",
+        "--page",
+        type=FILE,
+        metavar="FILE.toml",
         help="Title, author, logo, language and sections of the page; see docs/quickstart.md.",
-    )  # fmt: skip
+    )
     return file(language(command))
 
 
 set_option = click.option(
-    "--set", "settings", multiple=True, metavar="NAME=VALUE",
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
     help="Set an option of the `[options]` table of study files, such as sensor_samples=4096.",
-)  # fmt: skip
+)
 no_cache_option = click.option(
     "--no-cache", "cache", is_flag=True, flag_value=False, default=True,
     help="Neither read nor write the cache of traced matrices.",
@@ -297,9 +344,12 @@ def _only(_context: click.Context, _option: click.Parameter, value: str | None) 
 def method_option(methods: Sequence[str], what: str, *, default: str | None = None) -> Option:
     """`--method`, of the methods that the command has."""
     return click.option(
-        "--method", type=click.Choice(methods), default=default, show_default=default is not None,
+        "--method",
+        type=click.Choice(methods),
+        default=default,
+        show_default=default is not None,
         help=f"Daylight method; {what}.",
-    )  # fmt: skip
+    )
 
 
 def size_option(name: str, default: int, why: str) -> Option:
@@ -401,47 +451,60 @@ def named_settings(settings: Sequence[str], but: Collection[str] = ()) -> dict[s
 
 
 processes_option = click.option(
-    "--processes", type=click.IntRange(1, 64), default=1, show_default=True,
+    "--processes",
+    type=click.IntRange(1, 64),
+    default=1,
+    show_default=True,
     help="Rooms or cases computed in parallel; a single one already uses most cores.",
-)  # fmt: skip
+)
 scheduler_option = click.option(
-    "--scheduler", metavar="ADDRESS",
+    "--scheduler",
+    metavar="ADDRESS",
     help="Dask scheduler, such as tcp://host:8786, whose workers compute the rooms or cases.",
-)  # fmt: skip
+)
 
 
 def samples_option(default: int, why: str) -> Option:
     """`--samples` of pictures; `why` they are that many by default."""
     return click.option(
-        "--samples", type=click.IntRange(1, 4096), default=default, show_default=True,
+        "--samples",
+        type=click.IntRange(1, 4096),
+        default=default,
+        show_default=True,
         help=f"Paths per pixel; {why}.",
-    )  # fmt: skip
+    )
 
 
 def explore_option(rest: str = "") -> Option:
     """`--explore`; the `rest`: what this command's explorer holds."""
     return click.option(
-        "--explore", is_flag=True,
+        "--explore",
+        is_flag=True,
         help="Write the explorer: picture, plan and temperatures of any hour, in a browser"
         + (f"; {rest}." if rest else "."),
-    )  # fmt: skip
+    )
 
 
 def write_ifc_option(sets: str) -> Option:
     """`--write-ifc`; which `sets` there are."""
     return click.option(
-        "--write-ifc", type=click.Path(path_type=Path, dir_okay=False), metavar="OUT.ifc",
+        "--write-ifc",
+        type=click.Path(path_type=Path, dir_okay=False),
+        metavar="OUT.ifc",
         help=f"Write a copy of the building with results in property sets; {sets}.",
-    )  # fmt: skip
+    )
 
 
 def view_option(name: str, what: str, *, several: bool) -> Option:
     """`--view` into the parameter `name`."""
     return click.option(
-        "--view", name, multiple=several, metavar="'-vta ...'|FILE.vf",
+        "--view",
+        name,
+        multiple=several,
+        metavar="'-vta ...'|FILE.vf",
         help=f"View in Radiance's syntax; {what}, default: the view in an HBJSON file, else from "
         "the room's middle to its window.",
-    )  # fmt: skip
+    )
 
 
 def with_demo(chosen: dict) -> dict:

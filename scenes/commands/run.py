@@ -32,8 +32,10 @@ from scenes.run.options import JobOptions
 
 LOADS = ("heating", "cooling", "lighting")
 NEED_PHASES = {
-    "annual_glare": "--annual-glare", "explore": "--explore", "inner_glass": "--inner-glass",
-}  # fmt: skip
+    "annual_glare": "--annual-glare",
+    "explore": "--explore",
+    "inner_glass": "--inner-glass",
+}
 _DEFAULT = RoomOptions()
 
 
@@ -44,9 +46,12 @@ _DEFAULT = RoomOptions()
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g-value at normal incidence.")
 @click.option(
-    "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH[:MM]'",
+    "--picture",
+    "picture_hours",
+    multiple=True,
+    metavar="'MM-DD HH[:MM]'",
     help="Hour to render and rate, may be repeated; default: nine hours and the brightest.",
-)  # fmt: skip
+)
 @size_option(
     "picture_size", _DEFAULT.outputs.picture_size, "up to ten pictures in each room's report"
 )
@@ -57,29 +62,33 @@ _DEFAULT = RoomOptions()
     show_default=True, help="Outdoor air change rate [1/h].",
 )  # fmt: skip
 @click.option(
-    "--operation", type=FILE,
+    "--operation",
+    type=FILE,
     help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
-)  # fmt: skip
+)
 @click.option(
-    "--inner-glass", is_flag=True,
+    "--inner-glass",
+    is_flag=True,
     help="Let daylight through glass and open doorways between rooms; rooms lit by that alone are "
     "computed too, and those open to each other by more than a door are one room.",
-)  # fmt: skip
+)
 @click.option(
     "--no-coupled-heat", "coupled_heat", is_flag=True, flag_value=False, default=True,
     help="Simulate each room alone, with adjacent rooms at its own temperature.",
 )  # fmt: skip
 @click.option(
-    "--no-colour", is_flag=True,
+    "--no-colour",
+    is_flag=True,
     help="Omit the colour picture of each room; implied by --quick.",
-)  # fmt: skip
+)
 @explore_option()
 @processes_option
 @scheduler_option
 @click.option(
-    "--netcdf", is_flag=True,
+    "--netcdf",
+    is_flag=True,
     help="Also write all results to results.nc, for xarray; see docs/formats.md.",
-)  # fmt: skip
+)
 def command(
     out: Path,
     page: Path | None,

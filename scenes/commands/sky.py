@@ -29,9 +29,12 @@ format_option = click.option(
     show_default=True, help="Number format of the matrix.",
 )  # fmt: skip
 ground_option = click.option(
-    "-g", "--ground", type=click.FloatRange(0, 1), default=None,
+    "-g",
+    "--ground",
+    type=click.FloatRange(0, 1),
+    default=None,
     help="Ground reflectance; default: the weather's albedo, 0.2.",
-)  # fmt: skip
+)
 
 
 @click.group()
@@ -65,17 +68,22 @@ def command() -> None:
     help="Only time steps with the sun above the horizon.",
 )
 @click.option(
-    "-5", "--five-phase", is_flag=True,
+    "-5",
+    "--five-phase",
+    is_flag=True,
     help="The sun of each time step as one 0.533 degree disc at the nearest patch (with -m 6).",
-)  # fmt: skip
+)
 @click.option(
     "-c", "--color", type=float, nargs=3, default=(1.0, 1.0, 1.0), show_default=True,
     help="Red, green and blue of the sky; gendaymtx uses .96 1.004 1.118.",
 )  # fmt: skip
 @click.option(
-    "--sun-patches", type=click.IntRange(1, 8), default=SUN_PATCHES, show_default=True,
+    "--sun-patches",
+    type=click.IntRange(1, 8),
+    default=SUN_PATCHES,
+    show_default=True,
     help="Number of nearest patches that share the sun.",
-)  # fmt: skip
+)
 @click.option(
     "--measured",
     is_flag=True,
@@ -207,14 +215,19 @@ def wea(weather: Path, out: Path) -> None:
     "--elevation", type=float, default=0.0, show_default=True, help="Elevation above sea level [m]."
 )
 @click.option(
-    "--label", type=click.Choice(list(LABELS)), default="middle", show_default=True,
+    "--label",
+    type=click.Choice(list(LABELS)),
+    default="middle",
+    show_default=True,
     help="Moment of the interval that a time stamp denotes.",
-)  # fmt: skip
+)
 @click.option(
-    "--least-altitude", type=click.FloatRange(0, 20),
-    default=LEAST_ALTITUDE_DEG, show_default=True,
+    "--least-altitude",
+    type=click.FloatRange(0, 20),
+    default=LEAST_ALTITUDE_DEG,
+    show_default=True,
     help="No direct sun below this altitude [degrees].",
-)  # fmt: skip
+)
 def measured(
     table: Path, out: Path, *, latitude: float, longitude: float, timezone: float,
     elevation: float, label: str, least_altitude: float,

@@ -32,9 +32,10 @@ from scenes.commands.room_options import (
 @out_folder_option
 @click.option("--figures", is_flag=True, help="Write a figure of each room's year as SVG.")
 @click.option(
-    "--energyplus", is_flag=True,
+    "--energyplus",
+    is_flag=True,
     help="Also write the rooms as EnergyPlus input (model.epJSON, schedules.csv).",
-)  # fmt: skip
+)
 @surroundings_option
 @surroundings_offset_option
 @quick_option

@@ -55,8 +55,11 @@ from scenes.room.series import RoomSeries, corner
 
 # the parts of a room's light, as the dossier's last line names their seconds
 PARTS = TRACING, SUMS, GLARE, HEAT = (
-    "V and D", "light and blinds of every hour", "glare by pictures", "temperatures",
-)  # fmt: skip
+    "V and D",
+    "light and blinds of every hour",
+    "glare by pictures",
+    "temperatures",
+)
 OnHead = Callable[[Head], None]
 LIGHT, RAYS = frozenset({"open", "operated", "glare", "heat"}), frozenset({"view", "sun"})
 
@@ -331,9 +334,10 @@ class Check:
             if not rule.fits(weather):
                 yield Note(
                     "{rule}: no verdict. It asks for the weather of {sites}; {file} is not that.",
-                    rule=Note(rule.title), sites=", ".join(rule.sites),
+                    rule=Note(rule.title),
+                    sites=", ".join(rule.sites),
                     file=weather.site if weather.file is None else weather.file.name,
-                )  # fmt: skip
+                )
             for sentence in rule.included:
                 yield Note("{rule}. Included: {what}", rule=Note(rule.title), what=Note(sentence))
             for sentence in rule.left_out:

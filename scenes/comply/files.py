@@ -41,8 +41,10 @@ def read_files(options: ComplyOptions) -> ComplyFiles:
     if options.building is None or options.weather is None:
         raise ValueError("a check of files needs a building and a weather")
     check_building(options)
-    rules = {Path(name).stem if name[-5:] == ".toml" else name: read_rule(name)
-             for name in options.standards}  # fmt: skip
+    rules = {
+        Path(name).stem if name[-5:] == ".toml" else name: read_rule(name)
+        for name in options.standards
+    }
     if not rules:
         raise DataError("expected at least one rule", field="--standard")
     inputs = read_inputs(options, light_only=True)

@@ -33,6 +33,7 @@ def room_heat(
     zone = room_zone(room, zone_surfaces(room), outdoors, state, progress=progress)
     thermal, _ = heat_alone(zone, room.weather, room.options.heat_step_s, progress)
     return RoomHeat(
-        thermal.temperatures["operative_c"].to_numpy(), np.asarray(room.weather.dry_bulb_c),
+        thermal.temperatures["operative_c"].to_numpy(),
+        np.asarray(room.weather.dry_bulb_c),
         room.occupied,
-    )  # fmt: skip
+    )

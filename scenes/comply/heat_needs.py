@@ -80,8 +80,9 @@ class LimitTable(TomlTable):
         if self.slope:
             text = gettext(
                 "{intercept} °C + {slope} x running mean outdoors",
-                intercept=constant, slope=decimal(f"{self.slope:g}"),
-            )  # fmt: skip
+                intercept=constant,
+                slope=decimal(f"{self.slope:g}"),
+            )
             if math.isfinite(self.least_c):
                 least = decimal(f"{self.least_c:g}")
                 text = gettext("{limit}, at least {least} °C", limit=text, least=least)
@@ -91,9 +92,12 @@ class LimitTable(TomlTable):
         if self.night is not None and self.night_c is not None:
             start, end = self.night
             text = gettext(
-                "{limit}; from {start} to {end} o'clock {night} °C", limit=text, start=start,
-                end=end, night=decimal(f"{self.night_c:g}"),
-            )  # fmt: skip
+                "{limit}; from {start} to {end} o'clock {night} °C",
+                limit=text,
+                start=start,
+                end=end,
+                night=decimal(f"{self.night_c:g}"),
+            )
         return text
 
 
@@ -121,9 +125,11 @@ class HeatNeed(Need):
     @property
     def period(self) -> str:
         """The counted hours in words."""
-        text = gettext("in all hours of the year") if self.all_hours else gettext(
-            "in the hours of use"
-        )  # fmt: skip
+        text = (
+            gettext("in all hours of the year")
+            if self.all_hours
+            else gettext("in the hours of use")
+        )
         if self.months is not None:
             first, last = self.months
             text = gettext(
@@ -184,8 +190,10 @@ class DegreeHours(LimitedNeed):
             return text
         return gettext(
             "{quantity}; between the first and the last day with a running mean outdoors of "
-            "{from_c} °C", quantity=text, from_c=decimal(f"{self.season_from_c:g}"),
-        )  # fmt: skip
+            "{from_c} °C",
+            quantity=text,
+            from_c=decimal(f"{self.season_from_c:g}"),
+        )
 
     def value(self, room: Findings) -> float | None:
         """Degree hours [K h]."""
@@ -218,8 +226,9 @@ class HoursAbove(LimitedNeed):
         """The quantity in words."""
         values = {"limit": self.line.words, "period": self.period, "by": decimal(f"{self.by_k:g}")}
         if self.share:
-            return gettext("hours per 100 h that are {by} K or more above {limit}, {period}",
-                           **values)  # fmt: skip
+            return gettext(
+                "hours per 100 h that are {by} K or more above {limit}, {period}", **values
+            )
         return gettext("hours that are {by} K or more above {limit}, {period}", **values)
 
     def value(self, room: Findings) -> float | None:
@@ -248,8 +257,9 @@ class DayWeighted(LimitedNeed):
         """The quantity in words."""
         return gettext(
             "degree hours in whole kelvin above {limit} on the worst day, {period}",
-            limit=self.line.words, period=self.period,
-        )  # fmt: skip
+            limit=self.line.words,
+            period=self.period,
+        )
 
     def value(self, room: Findings) -> float | None:
         """Weighted exceedance [K h]."""
@@ -271,9 +281,10 @@ class GreatestExcess(LimitedNeed):
     def words(self) -> str:
         """The quantity in words."""
         return gettext(
-            "greatest excess above {limit} in whole kelvin, {period}", limit=self.line.words,
+            "greatest excess above {limit} in whole kelvin, {period}",
+            limit=self.line.words,
             period=self.period,
-        )  # fmt: skip
+        )
 
     def value(self, room: Findings) -> float | None:
         """Excess [K]; 0 where the limit is kept."""

@@ -234,9 +234,12 @@ class SunlightExposure(Need):
         if room.light is None:
             return None
         return annual_sunlight_exposure(
-            room.light.direct, room.ten_hours, step_h=room.step_h,
-            threshold=self.lux, most_hours=self.hours,
-        )  # fmt: skip
+            room.light.direct,
+            room.ten_hours,
+            step_h=room.step_h,
+            threshold=self.lux,
+            most_hours=self.hours,
+        )
 
 
 class Equinox(Need):

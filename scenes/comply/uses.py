@@ -103,9 +103,10 @@ class RoomUses:
     def _texts(space: Space, texts: Sequence[tuple[str, str]]) -> Iterator[tuple[str, str]]:
         yield from texts
         names = (
-            (N_("type"), space.type_name), (N_("long name"), space.long_name),
+            (N_("type"), space.type_name),
+            (N_("long name"), space.long_name),
             (N_("name"), space.name),
-        )  # fmt: skip
+        )
         yield from ((where, text) for where, text in names if text)
 
 

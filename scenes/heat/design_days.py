@@ -64,19 +64,25 @@ def design_loads(
         chosen = day_rows * day + first
         suns = [of_hours(per_window(r.solar, r.zone), chosen, hours) for r in rooms]
         results = simulate_zones(
-            [of_hours(zone, chosen, hours) for zone in zones], of_hours(whole, chosen, hours), suns,
-            transfers=[of_hours(one, chosen, hours) for one in transfers], **options,
-        )  # fmt: skip
+            [of_hours(zone, chosen, hours) for zone in zones],
+            of_hours(whole, chosen, hours),
+            suns,
+            transfers=[of_hours(one, chosen, hours) for one in transfers],
+            **options,
+        )
         outdoor = weather.dry_bulb_c[chosen]
         for r in results:
             load = r.cooling + np.maximum(-r.slab, 0.0)
             if r.name not in best or load.max() > best[r.name]["peak_w"]:
                 best[r.name] = {
-                    "room": r.name, "case": "cooling",
+                    "room": r.name,
+                    "case": "cooling",
                     "day": weather.midpoints[chosen[0]].strftime("%m-%d"),
-                    "outdoor_mean_c": outdoor.mean(), "outdoor_extreme_c": outdoor.max(),
-                    "peak_w": load.max(), "peak_hour": float(np.argmax(load) + 1) * weather.step_h,
-                }  # fmt: skip
+                    "outdoor_mean_c": outdoor.mean(),
+                    "outdoor_extreme_c": outdoor.max(),
+                    "peak_w": load.max(),
+                    "peak_hour": float(np.argmax(load) + 1) * weather.step_h,
+                }
     table = pd.DataFrame([*rows, *best.values()])
     area = {room.zone.name: room.space.floor_area for room in rooms}
     return table.assign(peak_w_m2=table["peak_w"] / table["room"].map(area))

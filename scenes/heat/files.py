@@ -75,5 +75,7 @@ def _fits_measured(study: StudyFile, weather: Weather, file: Path | None) -> Non
     if days < YEAR_DAYS and any(one.envelope.ground is not None for one in study.variants):
         raise DataError(
             f"the ground follows a year of weather, got {days:.0f} days; state a temperature by "
-            "[[envelope.neighbour]]", file=file, field="envelope.ground",
-        )  # fmt: skip
+            "[[envelope.neighbour]]",
+            file=file,
+            field="envelope.ground",
+        )

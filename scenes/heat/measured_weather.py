@@ -109,8 +109,9 @@ def _times(data: pd.DataFrame, column: str, path: Path) -> pd.DatetimeIndex:
     try:
         times = pd.DatetimeIndex(pd.to_datetime(data[column], format="ISO8601"))
     except (ValueError, TypeError) as error:
-        raise DataError(f"expected times as 2013-08-21T00:10: {error}", file=path,
-                        field=column) from error  # fmt: skip
+        raise DataError(
+            f"expected times as 2013-08-21T00:10: {error}", file=path, field=column
+        ) from error
     if times.tz is not None or times.hasnans:
         raise DataError("expected times without zone, none missing", file=path, field=column)
     return times
@@ -127,8 +128,9 @@ def _step(times: pd.DatetimeIndex, path: Path) -> pd.Timedelta:
     step = pd.Timedelta(gaps[0])
     minute, hour = pd.Timedelta(minutes=1), pd.Timedelta(hours=1)
     if not minute <= step <= hour or hour % step != pd.Timedelta(0):
-        raise DataError(f"expected steps of 1 to 60 minutes that fill an hour, got {step}",
-                        file=path)  # fmt: skip
+        raise DataError(
+            f"expected steps of 1 to 60 minutes that fill an hour, got {step}", file=path
+        )
     return step
 
 

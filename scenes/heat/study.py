@@ -21,11 +21,17 @@ from scenes.fenestration.systems import States
 from scenes.head import Head
 from scenes.heat.box import building_or_box
 from scenes.heat.design_days import design_loads
-from scenes.heat.energy import energy_by_month, energy_summary, room_powers
 from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
-from scenes.heat.tables import comfort_summary, hourly_table, year_summary
+from scenes.heat.tables import (
+    comfort_summary,
+    energy_by_month,
+    energy_summary,
+    hourly_table,
+    room_powers,
+    year_summary,
+)
 from scenes.inputs import Inputs, every_state, inputs_of
 from scenes.room.heat import felt_by, room_humidity, step_issues
 from scenes.room.inputs import room_inputs, skies_for

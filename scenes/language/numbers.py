@@ -69,6 +69,13 @@ def semicolons(parts: list[str] | tuple[str, ...]) -> str:
     return gettext("; ").join(parts)
 
 
+def inside(name: str) -> str:
+    """A name as it stands inside a sentence; German nouns keep their capital, as do acronyms."""
+    if current_language() == "de" or not name[1:2].islower():
+        return name
+    return name[:1].lower() + name[1:]
+
+
 def listed(names: list[str]) -> str:
     """Names with "and" before the last."""
     if len(names) == 1:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from mitsuba_cfs.glare.classes import hour_not_exceeded, protection_level
-from scenes.language.catalogue import N_, gettext, ngettext
+from scenes.language.catalogue import N_, decimal, gettext, ngettext
 from scenes.language.numbers import percent, rounded, semicolons, significant, spoken
 from scenes.provision_levels import provision_levels
 from scenes.report.names import quantity
@@ -46,6 +46,7 @@ class Card:
     meaning: str = ""
     meter: float | None = None  # 0..100, drawn as a bar
     traced: bool = False  # its error is that of the illuminances
+    error: str = ""  # standard error of this figure, where it is known
     worth: float = 0.0  # orders rooms by this figure: the more the better
 
 
@@ -133,7 +134,16 @@ def _spatial_autonomy(room: RoomYear) -> Card | None:
     card = _of_plane(
         value, gettext("Spatial daylight autonomy"), words, "sda300_50", (grade, verdict)
     )
-    return replace(card, worth=value)
+    own = room_metric(room, "sda300_50_standard_error")
+    error = "" if own is None else points_error(own)
+    return replace(card, worth=value, error=error)
+
+
+def points_error(value: float) -> str:
+    """The standard error of a percentage [percentage points]."""
+    if value < 0.05:
+        return gettext("± less than 0.1 percentage points, from ray tracing")
+    return gettext("± {points} percentage points, from ray tracing", points=significant(value, 2))
 
 
 def _sunlight(room: RoomYear) -> Card | None:
@@ -252,11 +262,18 @@ def _protection(room: RoomYear) -> Card | None:
         "protection from glare (EN 17037): DGP exceeds {dgp} in at most 5 % of the occupied hours",
         dgp=rounded(hour_not_exceeded(dgp), 2),
     )
-    return protection_card(protection_level(dgp), words, -hour_not_exceeded(dgp))
+    errors = room.annual_glare.get("dgp_standard_error", pd.Series(dtype=float)).dropna()
+    noise = float(np.sqrt(np.mean(errors**2))) if len(errors) else None
+    return protection_card(protection_level(dgp), noise, words, -hour_not_exceeded(dgp))
 
 
-def protection_card(level: str, words: str = "", worth: float | None = None) -> Card:
-    """EN 17037's protection from glare by its level: high, medium, minimum or none."""
+def protection_card(
+    level: str, noise: float | None, words: str = "", worth: float | None = None
+) -> Card:
+    """EN 17037's protection from glare by its level: high, medium, minimum or none.
+
+    Args: noise: standard error of an hour's DGP from the tracing; None where it is not known.
+    """
     order = ("none", "minimum", "medium", "high").index(level)
     return Card(
         gettext("Protection from glare"),
@@ -266,8 +283,14 @@ def protection_card(level: str, words: str = "", worth: float | None = None) -> 
         gettext(PROTECTION[level]),
         (POOR, FAIR, GOOD, GOOD)[order],
         quantity("dgp").meaning,
+        error="" if noise is None else gettext("{error} of an hour's DGP", error=dgp_error(noise)),
         worth=float(order) if worth is None else worth,
     )
+
+
+def dgp_error(value: float) -> str:
+    """The standard error of a DGP."""
+    return decimal(f"± {max(value, 1e-4):.1g}")
 
 
 def _warm_hours(room: RoomYear) -> Card | None:

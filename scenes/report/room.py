@@ -1,27 +1,131 @@
-"""Everything that the page shows of one room."""
+"""Everything that the page shows of one room, with its shading states and loads."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from bim.model import Space
-from scenes.figures.chart import Chart
+from scenes.figures.carpet import carpet, class_carpet
+from scenes.figures.chart import Chart, ChartMark, box
 from scenes.figures.plan import FloorPlan
-from scenes.language.catalogue import gettext, ngettext
-from scenes.language.numbers import rounded, share
+from scenes.figures.scale import ColourScale, round_limits
+from scenes.language.catalogue import N_, gettext, ngettext
+from scenes.language.numbers import percent, rounded, share
 from scenes.report import (
     daylight_figures,
     glare_figures,
-    operation_figures,
     tables,
     thermal_figures,
 )
 from scenes.report.glare_figures import compass
-from scenes.report.headline import Card, cards
+from scenes.report.headline import Card, cards, occupied
+from scenes.report.names import quantity
+from scenes.report.tables import monthly_gains
+from scenes.report.thermal_figures import month_chart
 from scenes.results import RoomYear, RunResult
+
+STATE_COLOURS = ("#f0e7c8", "#c9b458", "#8f9d3d", "#4f7f4f", "#2c5f66", "#23395b")
+LOADS = {"heating_w": "part0", "cooling_w": "part1", "lighting_w": "part2"}
+RULES = {
+    "always": N_("one state all year"),
+    "schedule": N_("by schedule"),
+    "irradiance": N_("by irradiance on the windows"),
+    "glare": N_("most open state without glare at the view point"),
+    "cut-off": N_("most open slats that block the direct sun (cut-off)"),
+    "any": N_("several rules, the most closed state"),
+    "all": N_("several rules, the most open state"),
+}
+
+
+def state_carpets(result: RunResult, room: RoomYear) -> tuple[Chart, ...]:
+    """The shading state of every hour with the sun up, of each group of windows that moves."""
+    ran = room.operation
+    if ran is None or len(ran.states) < 2:
+        return ()
+    lit, shading = result.sun[:, 2] > 0, ran.shading
+    several = len(shading.groups) > 1
+    charts = []
+    for group, rule, state in zip(shading.groups, shading.rules, shading.states.T, strict=True):
+        count = np.bincount(state[lit], minlength=len(ran.states))
+        legend = tuple(
+            (STATE_COLOURS[i % len(STATE_COLOURS)], f"{name}: {percent(100 * n / lit.sum())} %")
+            for i, (name, n) in enumerate(zip(ran.states, count, strict=True))
+        )
+        title = gettext("Shading state")
+        charts.append(
+            class_carpet(
+                result.times,
+                np.where(lit, state, -1),
+                legend,
+                title=f"{title}: {group}" if several else title,
+                explanation=gettext(
+                    "Control: {rule}. Hours with the sun up; optical and thermal properties change "
+                    "together.",
+                    rule=gettext(RULES[rule]) if rule in RULES else rule,
+                ),
+            )
+        )
+    return tuple(charts)
+
+
+def loads_chart(room: RoomYear) -> Chart | None:
+    """Heating, cooling and light by month, beside one another; None without any."""
+    if room.operation is None:
+        return None
+    monthly = monthly_gains(room.operation.hours)
+    names = [name for name in LOADS if monthly[name].sum() > 0]
+    if not names:
+        return None
+    top = max(round_limits([0, monthly[names].to_numpy().max()])[1], 1.0)
+    x_range, y_range = (0.0, float(len(monthly))), (0.0, top)
+    width = 0.8 / len(names)
+    marks = []
+    for number, name in enumerate(names):
+        path = "".join(
+            box(i + 0.1 + number * width, i + 0.1 + (number + 0.92) * width, 0, v, x_range, y_range)
+            for i, v in enumerate(monthly[name])
+        )
+        marks.append(ChartMark(path, LOADS[name], quantity(name).label, filled=True))
+    return month_chart(
+        monthly,
+        names,
+        marks,
+        top,
+        title=gettext("Heating, cooling and electric light by month"),
+        explanation=gettext(
+            "Heating and cooling of an ideal system that keeps the set points, and electric light "
+            "dimmed by daylight."
+        ),
+    )
+
+
+def glare_carpet(result: RunResult, room: RoomYear) -> Chart | None:
+    """DGP of every hour of the year; None where it was not computed."""
+    year = room.annual_glare
+    if year is None:
+        return None
+    dgp = year["dgp"].to_numpy(dtype=float)
+    used = dgp_in_use(room)
+    text = quantity("dgp").meaning + " " + gettext("Nights are blank.")
+    if len(used):
+        text += " " + gettext(
+            "DGP exceeds 0.40 in {share} % of the {hours} occupied hours.",
+            share=percent(100 * float(np.mean(used > 0.40))),
+            hours=rounded(len(used), 0),
+        )
+    scale = ColourScale(0.2, 0.6, gettext("Daylight glare probability"), "", colours="inferno")
+    title = gettext("Glare through the year")
+    return carpet(result.times, dgp, scale, title=title, explanation=text, digits=2)
+
+
+def dgp_in_use(room: RoomYear) -> np.ndarray:
+    """DGP of the occupied hours; of dark ones it is 0, for nothing dazzles then."""
+    year: pd.DataFrame = room.annual_glare
+    return year["dgp"].fillna(0.0).to_numpy()[occupied(room).to_numpy()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,15 +181,15 @@ def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
         glare_table=tables.glare_table(result.times, room.glare.pictures)
         if room.glare.pictures
         else None,
-        glare_year=operation_figures.glare_carpet(result, room),
+        glare_year=glare_carpet(result, room),
         temperature=thermal_figures.temperature_carpet(result, room),
         comfort=thermal_figures.comfort_carpet(result, room),
         duration=thermal_figures.duration_curve(room),
         weeks=thermal_figures.extreme_weeks(room),
         gains=thermal_figures.gains_chart(monthly),
         gains_table=tables.gains_table(monthly),
-        states=operation_figures.state_carpets(result, room),
-        loads=operation_figures.loads_chart(room),
+        states=state_carpets(result, room),
+        loads=loads_chart(room),
         loads_table=None
         if room.operation is None
         else tables.values_table(gettext("Annual loads"), room.operation.summary),

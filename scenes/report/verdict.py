@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.language.catalogue import decimal, gettext, ngettext
+from scenes.language.catalogue import gettext, ngettext
 from scenes.language.numbers import (
     colon,
     month_name,
@@ -20,8 +20,9 @@ from scenes.language.numbers import (
     significant,
     spoken,
 )
+from scenes.report.answer import judged, rooms_answer
 from scenes.report.glare_figures import sun_words
-from scenes.report.headline import FAIR, GOOD, POOR, WARM_C, Card, heated, occupied
+from scenes.report.headline import FAIR, GOOD, POOR, WARM_C, Card, dgp_error, heated, occupied
 from scenes.report.method import METHODS
 from scenes.report.names import rooms_counted, systems_counted
 from scenes.report.tables import GLARE_WORDS, Column, Table, glare_class, step_hours
@@ -55,11 +56,12 @@ def limits(rooms: Sequence[Named], of: str) -> LimitTables:
 
 def _every(rooms: Sequence[Named], of: str) -> Table:
     columns = (
-        Column(of, numeric=False), Column(gettext("Quantity"), numeric=False),
+        Column(of, numeric=False),
+        Column(gettext("Quantity"), numeric=False),
         Column(gettext("Value"), numeric=False, short=True),
         Column(gettext("Limit"), numeric=False),
         Column(gettext("Standard error"), numeric=False),
-    )  # fmt: skip
+    )
     rows = tuple(
         (name, card.label, _value(card), card.verdict, _error(room, card))
         for name, room, own in rooms
@@ -76,7 +78,7 @@ def _by_figure(rooms: Sequence[Named]) -> Table:
         Column(gettext("Rooms by limit"), numeric=False),
         Column(gettext("Worst rooms"), numeric=False),
         Column(gettext("Standard error of the worst"), numeric=False),
-    )  # fmt: skip
+    )
     rows = []
     judged = [(name, room, card) for name, room, own in rooms for card in own if card.verdict]
     for label in dict.fromkeys(card.label for _, _, card in judged):
@@ -95,6 +97,8 @@ def _value(card: Card) -> str:
 
 
 def _error(room: RoomYear, card: Card) -> str:
+    if card.error:
+        return card.error
     if card.unit == "DGP":
         worst = max(room.glare.pictures, key=lambda picture: picture.glare["dgp"])
         return plus_minus(worst).strip() or gettext("unknown")
@@ -107,7 +111,7 @@ def _error(room: RoomYear, card: Card) -> str:
 def plus_minus(picture: LuminancePicture) -> str:
     """The standard error of a picture's DGP; empty where it is not known."""
     error = picture.glare.get("dgp_standard_error", float("nan"))
-    return "" if error != error else decimal(f" ± {max(error, 1e-4):.1g}")
+    return "" if error != error else f" {dgp_error(error)}"
 
 
 MOST_NAMES = 4  # of systems in the first sentence, of rooms in that on shading
@@ -121,8 +125,10 @@ class Verdict:
     """The summary on one page."""
 
     question: str
+    answers: tuple[tuple[str, str], ...]  # room (empty: all), which limits are met
     sentences: tuple[tuple[str, str], ...]  # heading, text
     limits: LimitTables
+    by_room: Table | None = None  # of a study: limits met by room and system
 
 
 def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
@@ -150,7 +156,9 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
         (gettext("Shading"), _shading(result)),
     )
     named = [(r.space.label, r, card) for r, card in zip(result.spaces, cards, strict=True)]
-    return Verdict(question, sentences, limits(named, gettext("Room")))
+    answer = rooms_answer([judged(name, figures) for name, _, figures in named])
+    answers = (("", answer),) if answer else ()
+    return Verdict(question, answers, sentences, limits(named, gettext("Room")))
 
 
 def _systems(names: Sequence[str]) -> str:

@@ -214,9 +214,11 @@ class DaylitRoom:
         thermal, operation = heat
         names = (field.name for field in fields(self) if field.name not in {"zone", "issues"})
         return RoomYear(
-            heat=thermal, operation=operation, issues=self.issues + thermal.issues,
+            heat=thermal,
+            operation=operation,
+            issues=self.issues + thermal.issues,
             **{name: getattr(self, name) for name in names},
-        )  # fmt: skip
+        )
 
 
 STEP_TOLERANCE = 0.02  # of a figure, when the time step is halved

@@ -14,7 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.defaults import GLASS_REFLECTANCE, ROOM_REFLECTANCE
-from bim.doorways import THINNEST, panes_between, reveals_between, wall_depth
+from bim.doorways import (
+    THINNEST,
+    light_sources,
+    panes_between,
+    panes_to_windows,
+    reveals_between,
+    wall_depth,
+)
 from bim.model import Building, Element, Face, Space
 from bim.to_tracer import (
     element_surfaces,
@@ -35,10 +42,6 @@ from scenes.fenestration.systems import States
 from scenes.room.windows import room_windows
 
 CLEAR = 0.88  # visible transmittance of glass without a value: a float pane of 6 mm, EN 410
-OPENED = {  # codes of issues of a building whose inner glass and doorways daylight passes
-    "glass-between-rooms": "glass-between-rooms-open",
-    "rooms-open-to-each-other": "rooms-open-to-each-other-lit",
-}
 PANE = "glass between rooms"  # name of a pane in the scene of the room beyond, where it is opaque
 
 
@@ -56,54 +59,6 @@ class InnerGlass:
     faces: frozenset[str]  # names of the room's faces that the glass replaces
 
 
-def source_rooms(building: Building, space: Space) -> list[Space]:
-    """The rooms from which light reaches a room through inner glass, in one step or several."""
-    away = _panes_to_windows(building)
-    rooms: dict[str, Space] = {}
-    queue = _light_sources(building, space, away, away.get(space.guid, -1) + 1)
-    while queue:
-        room = queue.pop(0)
-        if room.guid not in rooms:
-            rooms[room.guid] = room
-            queue += _light_sources(building, room, away, away[room.guid])
-    return list(rooms.values())
-
-
-def opened(building: Building) -> Building:
-    """The building with open doorways, whose reflectance is that of the room beyond.
-
-    rho f / (1 - rho (1 - f)), rho the mean reflectance of that room, f the doorway's share of its
-    surface. Issues that advise this option state that it is in use.
-
-    Source: Sumpner 1892 (the integrating sphere), as for light wells and cavities.
-    """
-    rooms = {space.guid: space for space in building.spaces}
-
-    def opened_face(face: Face) -> Face:
-        beyond = rooms.get(face.neighbour or "")
-        if face.pane is None or not face.pane.is_open or beyond is None:
-            return face
-        visible, solar = (_returned(beyond, face.area, band) for band in ("visible", "solar"))
-        return replace(face, reflectance_visible=visible, reflectance_solar=solar)
-
-    spaces = tuple(
-        replace(space, faces=tuple(map(opened_face, space.faces))) for space in building.spaces
-    )
-    issues = tuple(
-        replace(issue, code=OPENED.get(issue.code, issue.code)) for issue in building.issues
-    )
-    return replace(building, spaces=spaces, issues=issues)
-
-
-def _returned(room: Space, area: float, band: str) -> float:
-    """Share of the light through an opening [m2] of a room that returns through it."""
-    parts = [(face.area, face.total_reflectance(band)) for face in room.faces]
-    whole = sum(size for size, _ in parts) + sum(window.area for window in room.windows)
-    mean = sum(size * reflectance for size, reflectance in parts) / whole
-    share = min(area / whole, 1.0)
-    return mean * share / (1 - mean * (1 - share))
-
-
 def inner_glass(
     building: Building, space: Space, systems: Mapping[str, States]
 ) -> InnerGlass | None:
@@ -115,7 +70,7 @@ def inner_glass(
 
     Args: systems: of the windows of all these rooms, by their GUID.
     """
-    away = _panes_to_windows(building)
+    away = panes_to_windows(building)
     return _inner_glass(building, space, systems, away, away.get(space.guid, -1) + 1)
 
 
@@ -129,7 +84,7 @@ def _inner_glass(
     """Inner glass to rooms fewer than `below` panes away from a window."""
     panes, used = [], []
     dark = AngularScattering(np.zeros(2), np.zeros(2))  # the sun is part of the sky patches
-    for other in _light_sources(building, space, away, below):
+    for other in light_sources(building, space, away, below):
         pairs = panes_between(building, space)[other.guid]
         onward = _inner_glass(building, other, systems, away, away[other.guid])
         scene, transmission = _room_beyond(building, other, pairs, systems, onward)
@@ -167,32 +122,6 @@ def borrowed_share(
         open=inner.open_area,
         rooms=", ".join(dict.fromkeys(inner.names)),
     )
-
-
-def _panes_to_windows(building: Building) -> dict[str, int]:
-    """Number of panes between a room and the nearest window, by GUID; without unlit rooms."""
-    rooms = {space.guid: space for space in building.spaces}
-    panes = {space.guid: 0 for space in building.spaces if space.windows}
-    newest = list(panes)
-    while newest:
-        reached = {
-            guid for one in newest for guid in panes_between(building, rooms[one])
-        } - panes.keys()
-        panes |= dict.fromkeys(reached, panes[newest[0]] + 1)
-        newest = sorted(reached)
-    return panes
-
-
-def _light_sources(
-    building: Building, space: Space, away: Mapping[str, int], below: int
-) -> list[Space]:
-    """The rooms behind a room's panes that are fewer than `below` panes away from a window."""
-    pairs = panes_between(building, space)
-    return [
-        other
-        for other in building.spaces
-        if other.guid in pairs and away.get(other.guid, below) < below
-    ]
 
 
 def _groups(space: Space, faces: Sequence[Face]) -> list[tuple[SystemOptics, WindowGroup]]:

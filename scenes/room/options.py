@@ -61,7 +61,7 @@ class RoomOptions:
     heat_step_s: float = 600.0  # of the heat balance; a whole fraction of an hour
     infiltration_ach: float = 0.5  # [1/h]
     sun_model: str = "spa"  # of the sun's position, see `mitsuba_cfs.sky.sun`
-    sky_ground: str = "reflected"  # luminance of the ground, see `mitsuba_cfs.sky.ground`
+    sky_ground: str = "reflected"  # luminance of the ground, see `mitsuba_cfs.sky.matrix`
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:

@@ -159,11 +159,14 @@ def _by_cut_off(
     sun, tilts = sun_directions(room.weather), np.radians(rule.slat_tilts_deg)
     each = [
         by_cut_off(
-            sun @ room.windows.groups[g].frame.T, beam[:, g], tilts, rule.slat_width,
+            sun @ room.windows.groups[g].frame.T,
+            beam[:, g],
+            tilts,
+            rule.slat_width,
             rule.slat_spacing,
         )
         for g in groups
-    ]  # fmt: skip
+    ]
     states: StateArray = np.max(each, axis=0)
     return states
 
@@ -248,8 +251,9 @@ def _avoid_glare(
         chosen = states.copy()
         chosen[:, glare] = combinations[number]
         rows = light.states(chosen[:, windows.control])
-        steps = part(progress, number / len(combinations), (number + 1) / len(combinations),
-                     "glare control")  # fmt: skip
+        steps = part(
+            progress, number / len(combinations), (number + 1) / len(combinations), "glare control"
+        )
         return np.max([limit(rows, hours, steps) for limit in limits], axis=0)
 
     chosen = by_glare(closure, excess, len(lit))

@@ -12,6 +12,7 @@ from functools import lru_cache, partial
 from importlib import metadata
 from pathlib import Path
 
+from bim.doorways import source_rooms
 from bim.model import Space
 from bim.report.issue import Issue, issue_note
 from bim.sensors import model_grids
@@ -19,6 +20,7 @@ from bim.templates import same_hues
 from bim.to_thermal import same_surfaces, shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import sha256
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -27,13 +29,12 @@ from mitsuba_cfs.source_code import code_version
 from mitsuba_cfs.stored_arrays import PassedArrays, StoredArrays
 from scenes.cluster import Requirements
 from scenes.head import Head
-from scenes.input_files import InputFiles, sha256
+from scenes.input_files import InputFiles
 from scenes.inputs import Inputs, read_inputs
 from scenes.language.catalogue import N_
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
 from scenes.room.heat import DaylitRoom, coupled_years
-from scenes.room.inner_glass import source_rooms
 from scenes.room.inputs import skies_for
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import RoomChoices, compute_room, lit_room

@@ -18,6 +18,7 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import sha256
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, protection_level
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -32,7 +33,7 @@ from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.head import Head, joined, model_lines, tree_notes
 from scenes.heat.box import building_or_box
-from scenes.input_files import building_of, read_files, read_weather, sha256
+from scenes.input_files import building_of, read_files, read_weather
 from scenes.input_options import InputOptions
 from scenes.inputs import Inputs, inputs_of
 from scenes.results import RoomYear

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, NamedTuple
 from bim.building_file import held_states
 from bim.model import Building, Space
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import sha256
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.source_code import code_version
 from scenes.chosen_rooms import chosen_spaces
 from scenes.cluster import Requirements
 from scenes.fenestration.thermal_file import files_beside
 from scenes.heat.box import building_or_box
-from scenes.input_files import named_files, sha256
+from scenes.input_files import named_files
 from scenes.input_options import InputOptions
 from scenes.room.operation import Operation, read_operation
 from scenes.room.options import RoomOptions

@@ -82,21 +82,23 @@ def case_page(
 
 def case_label(study: StudyResult, case: Case) -> str:
     """The case in words, without what is the same in the whole study."""
+    room, *conditions = place_parts(study, case)
+    return ", ".join(part for part in (room, case.system, *conditions) if part)
+
+
+def place_parts(study: StudyResult, case: Case) -> tuple[str, str, str, str]:
+    """Room, climate, orientation and method of a case; empty where the study has only one."""
     _, space = study.plan.rooms[case.scene]
     cases = study.plan.cases
-    parts = []
-    if len({c.scene for c in cases}) > 1:
-        parts.append(
-            case.room if case.space_name == case.room else f"{case.room} {case.space_name}"
-        )
-    parts.append(case.system)
-    if len({c.climate for c in cases}) > 1:
-        parts.append(case.climate)
-    if len({c.orientation_deg for c in cases}) > 1:
-        parts.append(f"{facing(space, case.orientation_deg)} ({case.orientation_deg:g}°)")
-    if len({c.options.method for c in cases}) > 1:
-        parts.append(gettext(METHODS[case.options.method]))
-    return ", ".join(parts)
+    room = case.room if case.space_name == case.room else f"{case.room} {case.space_name}"
+    return (
+        room if len({c.scene for c in cases}) > 1 else "",
+        case.climate if len({c.climate for c in cases}) > 1 else "",
+        f"{facing(space, case.orientation_deg)} ({case.orientation_deg:g}°)"
+        if len({c.orientation_deg for c in cases}) > 1
+        else "",
+        gettext(METHODS[case.options.method]) if len({c.options.method for c in cases}) > 1 else "",
+    )
 
 
 def method_words(case: Case) -> str:

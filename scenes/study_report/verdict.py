@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from mitsuba_cfs.glare.classes import CLASSES
 from scenes.language.catalogue import gettext, ngettext
 from scenes.language.numbers import listed, percent, rounded
+from scenes.report.answer import (
+    Judged,
+    judged,
+    met_cell,
+    rooms_answer,
+    summary_answer,
+    systems_answer,
+)
 from scenes.report.headline import WARM_C, Card, cards, protection_card
 from scenes.report.names import rooms_counted, systems_counted
-from scenes.report.verdict import LimitTables, Verdict, limits
-from scenes.results import RunResult
+from scenes.report.tables import Column, Table
+from scenes.report.verdict import MOST_ROOMS, Verdict, limits
+from scenes.results import RoomYear, RunResult
+from scenes.study.plan import Case
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
-from scenes.study_report.case_page import case_label, room_of
+from scenes.study_report.case_page import case_label, place_parts, room_of
 from scenes.study_report.comparison import finished, glare_share, warm_share
 
 ENERGIES = ("heating_kwh", "cooling_kwh", "lighting_kwh")
@@ -47,7 +58,15 @@ def study_verdict(study: StudyResult) -> Verdict:
         (gettext("Heat and energy"), _heat),
     )
     sentences = tuple((heading, sentence(study)) for heading, sentence in result)
-    return Verdict(question, sentences, _limits(study))
+    limited = _limited(study)
+    rows = [(case_label(study, case), room, own) for case, room, own, _ in limited]
+    return Verdict(
+        question,
+        _answers(study, limited),
+        sentences,
+        limits(rows, gettext("Case")),
+        systems_by_room(study, limited),
+    )
 
 
 def _extremes(
@@ -121,20 +140,59 @@ def _parts(study: StudyResult, label: str) -> str:
     return " + ".join(rounded(float(figures[name]), 0) for name in ENERGIES)
 
 
-def _limits(study: StudyResult) -> LimitTables:
-    """The figures of the cases that a rule limits."""
-    rows = []
+Limited = tuple[Case, RoomYear, tuple[Card, ...], CaseResult]
+
+
+def _limited(study: StudyResult) -> list[Limited]:
+    """The headline figures of each case."""
+    rows: list[Limited] = []
     for _, case, result in finished(study):
         building, _ = study.plan.rooms[case.scene]
         room = room_of(study, case, result)
         times = room.heat.temperatures.index
         run = RunResult(building, times, np.empty((0, 3)), (room,), (), {})
-        own = (*cards(run, room), *_protection(result))
-        rows.append((case_label(study, case), room, own))
-    return limits(rows, gettext("Case"))
+        rows.append((case, room, (*cards(run, room), *_protection(result)), result))
+    return rows
+
+
+def _answers(study: StudyResult, limited: Sequence[Limited]) -> tuple[tuple[str, str], ...]:
+    """Which system meets the limits: for each room, climate, orientation and method."""
+    groups: dict[str, list[tuple[Judged, float | None]]] = {}
+    for case, _, own, result in limited:
+        figures = result.figures
+        energy = sum(figures[e] for e in ENERGIES) if set(ENERGIES) <= set(figures) else None
+        place = ", ".join(part for part in place_parts(study, case) if part)
+        groups.setdefault(place, []).append((judged(case.system, own), energy))
+    if all(len(members) == 1 for members in groups.values()):
+        text = rooms_answer([replace(m[0][0], name=name) for name, m in groups.items() if name])
+        text = text or next(systems_answer(*zip(*m, strict=True)) for m in groups.values())
+        return (("", text),) if text else ()
+    if len(groups) > MOST_ROOMS:
+        text = summary_answer([[case for case, _ in members] for members in groups.values()])
+        return (("", text),) if text else ()
+    answers = ((name, systems_answer(*zip(*m, strict=True))) for name, m in groups.items())
+    return tuple((name, text) for name, text in answers if text)
+
+
+def systems_by_room(study: StudyResult, limited: Sequence[Limited]) -> Table | None:
+    """How many limits each system meets in each room; None for a single room or system."""
+    systems = list(dict.fromkeys(case.system for case, *_ in limited))
+    cells: dict[str, dict[str, str]] = {}
+    for case, _, own, _ in limited:
+        place = ", ".join(part for part in place_parts(study, case) if part)
+        one = judged(case.system, own)
+        cells.setdefault(place, {})[case.system] = met_cell(one)
+    if len(systems) < 2 or len(cells) < 2:
+        return None
+    columns = (Column(gettext("Room"), numeric=False),
+               *(Column(name, numeric=False) for name in systems))  # fmt: skip
+    rows = tuple((place, *(own.get(s, "") for s in systems)) for place, own in cells.items())
+    return Table(gettext("Limits met by room and system"), columns, rows)
 
 
 def _protection(result: CaseResult) -> tuple[Card, ...]:
     """EN 17037's protection from glare as a headline figure."""
     level = result.figures.get("glare_protection")
-    return () if level is None else (protection_card(str(level)),)
+    noise = result.figures.get("dgp_standard_error")
+    known = None if noise is None else float(noise)
+    return () if level is None else (protection_card(str(level), known),)

@@ -17,6 +17,7 @@ from bim.building_file import files_beside
 from bim.model import Building, Space
 from bim.seasons import season_of
 from mitsuba_cfs import variants
+from mitsuba_cfs.files import sha256
 from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, finished_glare
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
 from mitsuba_cfs.images.view import View, format_view
@@ -39,7 +40,7 @@ from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.source_code import code_version
 from scenes.head import NO_HEAD, Head
-from scenes.input_files import InputFiles, sha256
+from scenes.input_files import InputFiles
 from scenes.inputs import first_states, read_inputs
 from scenes.viewed_room import viewed_room
 from scenes.year_of_glare.options import YearOptions
@@ -104,16 +105,6 @@ def read_year(
     weather = inputs.weather
     on_head(inputs.head)
     viewed = viewed_room(inputs, view_of)
-    variants.activate()
-    sampling = sampling_of(options)
-    sky = annual_sky(
-        weather,
-        sampling.subdivision,
-        sun=options.method == "five-phase",
-        sun_model=options.sun_model,
-        ground=options.sky_ground,
-    )
-    progress("inputs", 1.0)
     chosen = [options.method, options.metric, options.samples, options.seed, options.join]
     chosen += [options.window_parts, options.glare_sources, options.glare_sun]
     chosen += [options.sun_model, options.sky_ground, options.furniture, options.apertures]
@@ -126,10 +117,21 @@ def read_year(
     hashes.append(content_digest(*([s.visible, s.fine, s.angular] for s in inputs.used_systems)))
     chosen = [code_version(__name__), *chosen, *hashes]
     digest = hashlib.sha256(json.dumps([*chosen, viewed.space.guid]).encode()).hexdigest()
+    variants.activate()
+    leaks = tuple(viewed.leaks())
+    sampling = sampling_of(options)
+    sky = annual_sky(
+        weather,
+        sampling.subdivision,
+        sun=options.method == "five-phase",
+        sun_model=options.sun_model,
+        ground=options.sky_ground,
+    )
+    progress("inputs", 1.0)
     used = working_hours(weather, *options.occupied)
     return GlareYear(
         options, viewed.space.label, views, viewed.scene, viewed.optics, weather, sky, used, digest,
-        inputs.head, tuple(viewed.leaks()), inputs.sources, viewed.space, viewed.scenes,
+        inputs.head, leaks, inputs.sources, viewed.space, viewed.scenes,
         season_of(viewed.seasons, weather.midpoints[sky.lit].month.to_numpy()),
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ from bim import xml_elements
 from bim.georeference import Georeference, crs_name
 from bim.shell import enclosed_volume
 from bim.shoebox import shoebox
-from bim.surroundings import citygml
+from bim.surroundings import city_models
 from bim.surroundings.placement import read_surroundings, with_surroundings
 from mitsuba_cfs.errors import DataError
 from tests.bim.bim_fuzz import mutations, refusals
@@ -215,7 +215,7 @@ def test_links_that_lead_nowhere_leave_the_next_complete_geometry(tmp_path):
     (one,) = read_surroundings(written(tmp_path, model(whole))).objects
     assert enclosed_volume(one.triangles - CORNER) == pytest.approx(312.0, rel=1e-6)
     context = read_surroundings(written(tmp_path, model(gable(solid(2, LINKS)))))
-    assert context.left_out == ((citygml.NOT_FOUND, 7),)
+    assert context.left_out == ((city_models.NOT_FOUND, 7),)
     assert not context.objects
 
 
@@ -303,9 +303,9 @@ def test_faults_are_one_line(tmp_path, old, new, said):
 
 def test_a_big_file_is_refused(tmp_path, monkeypatch):
     path = written(tmp_path, model(WHOLE))
-    monkeypatch.setattr(citygml, "MOST_BYTES", path.stat().st_size)
+    monkeypatch.setattr(city_models, "MOST_BYTES", path.stat().st_size)
     assert read_surroundings(path).objects
-    monkeypatch.setattr(citygml, "MOST_BYTES", path.stat().st_size - 1)
+    monkeypatch.setattr(city_models, "MOST_BYTES", path.stat().st_size - 1)
     with pytest.raises(DataError, match="too big: at most"):
         read_surroundings(path)
 

@@ -106,8 +106,8 @@ PLACES: list[tuple[Callable[[Path], object], str]] = [
     (gbxml, "bim.gbxml.constructions:resistance_layer"),
     (radiance, "bim.radiance.scene:material_of"),
     (radiance, "bim.radiance.shapes:triangles_of"),
-    (around, "bim.surroundings.cityjson:triangles_of_surfaces"),
-    (around, "bim.surroundings.cityjson:_surfaces"),
+    (around, "bim.surroundings.city_models:triangles_of_surfaces"),
+    (around, "bim.surroundings.city_models:_surfaces"),
     (around, "bim.surroundings.footprints:crs_name"),
     (around, "bim.surroundings.placement:horizon_wall"),
 ]

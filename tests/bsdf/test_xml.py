@@ -88,6 +88,12 @@ def test_negative_values_are_zero_and_noted(text, tmp_path):
     assert "negative" in file.notes[0]
 
 
+def test_the_placeholder_that_genbsdf_writes_is_no_name(text, tmp_path):
+    """Its template has <Name>Name</Name>; the file's own name is shown then."""
+    file = read_bsdf_xml(write(tmp_path, text.replace("blind &amp; glass", "Name")))
+    assert file.name == ""
+
+
 def drop_first(numbers: str) -> str:
     return numbers.split(",", 1)[1]
 

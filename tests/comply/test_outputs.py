@@ -17,12 +17,11 @@ from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
 from scenes.commands.comply import command
 from scenes.comply.comply import check_rooms
-from scenes.comply.drawings import plans, shortened, sun_bars
 from scenes.comply.files import ComplyFiles, least_altitude, read_files
 from scenes.comply.findings import SeatGlare
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outputs import write_compliance, write_into_ifc
-from scenes.comply.page import dossier_html, glare_words, tied
+from scenes.comply.page import dossier_html, glare_words, plans, shortened, sun_bars, tied
 from scenes.comply.results import GridSummary, RoomLights
 from scenes.comply.rules import read_rule
 from scenes.comply.tables import beside_limit, shown

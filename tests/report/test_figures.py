@@ -28,7 +28,7 @@ from scenes.figures.scale import (
 from scenes.language.numbers import percent
 from scenes.report.glare_figures import luminance_scale, outline
 from scenes.report.model3d import building_box, model3d, outline_edges
-from scenes.report.operation_figures import state_carpets
+from scenes.report.room import state_carpets
 from scenes.results import LuminancePicture
 from tests.report.synthetic import run_result, slab
 

@@ -9,10 +9,11 @@ import pytest
 from click.testing import CliRunner
 
 from bim import read_ifc
+from bim.doorways import opened, source_rooms
 from bim.model import Building
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system
-from scenes.room.inner_glass import CLEAR, inner_glass, opened, source_rooms
+from scenes.room.inner_glass import CLEAR, inner_glass
 from scenes.room.windows import in_all_windows, room_windows
 from tests.bim import test_passages as passages
 from tests.bim.small_ifc import DEPTH, FRAME, HEIGHT, WIDTH, SmallIfc, box_model

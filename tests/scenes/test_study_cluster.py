@@ -16,9 +16,9 @@ from pathlib import Path
 import pytest
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import sha256
 from scenes.cluster import Requirements
 from scenes.demo import WEATHER
-from scenes.input_files import sha256
 from scenes.study.plan import Case, plan_of
 from scenes.study.store import computed
 from scenes.study.study_file import read_study

@@ -21,7 +21,6 @@ from scenes.fenestration.thermal_system import (
     scattered_share,
     sun_in_layers,
     thermal_system,
-    window_model,
 )
 from scenes.room.operation import read_operation
 from tests.scenes.fenestration_models import grey, room
@@ -37,7 +36,7 @@ from thermal.iso15099 import (
     prescribed,
     yearly_g_values,
 )
-from thermal.layered import layered_thermal_data
+from thermal.window_model import layered_thermal_data, window_model
 
 BLIND = Path(__file__).parents[2] / "scenes" / "demo" / "venetian_blind.xml"
 ROOT = Path(__file__).parents[2]
@@ -186,7 +185,9 @@ def test_assumed_layers_find_another_glazing_by_u_and_g(shaded):
     first = optics.tau[:1], absorbed[:1]
     g = float(iso15099_g_values(unit, prescribed(*STATED_G), *first)[0])
     place = "internal" if shaded else "none"
-    window = window_model(*known, place, Closure(), u_value=u, g_normal=g, item="clear")
+    window = window_model(
+        *known, place, Closure(), absorbed=sun_in_layers, u_value=u, g_normal=g, item="clear"
+    )
     expected = yearly_g_values(unit, optics.tau, absorbed)
     assert np.abs(window.data.g_value - expected).max() < 0.012
     closed = window.closure.close(Fenestration("clear", u)).layer_resistance

@@ -9,8 +9,7 @@ import pytest
 
 from mitsuba_cfs.sky.annual import annual_sky, given_sky
 from mitsuba_cfs.sky.epw import read_epw
-from mitsuba_cfs.sky.ground import gendaylit_ground
-from mitsuba_cfs.sky.matrix import series_for_suns, sky_series
+from mitsuba_cfs.sky.matrix import gendaylit_ground, series_for_suns, sky_series
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.perez import relative_luminance
 from mitsuba_cfs.sky.sun import direction

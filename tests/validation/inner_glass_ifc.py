@@ -21,6 +21,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.doorways import opened, source_rooms
 from bim.ifc.building import read_ifc
 from bim.ifc.corrections import OPEN
 from bim.model import Building, Space
@@ -34,7 +35,7 @@ from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from scenes.demo import VENETIAN_BLIND
 from scenes.fenestration.systems import read_system
-from scenes.room.inner_glass import PANE, inner_glass, opened, source_rooms
+from scenes.room.inner_glass import PANE, inner_glass
 from scenes.room.light import room_scene
 from scenes.room.options import SensorGrid
 from scenes.room.windows import in_all_windows, room_windows

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
+from bim.doorways import opened
 from bim.ifc.building import read_ifc
 from bim.ifc.corrections import OPEN
 from bim.rays import ray_mesh
@@ -39,7 +40,6 @@ from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.methods.point_in_time import path_picture
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.trace.kernels.sampling import spread_rays
-from scenes.room.inner_glass import opened
 from tests.validation import inner_glass, inner_glass_ifc
 from tests.validation.cut_groups import Quads
 from tests.validation.inner_glass import luminance_by_path, overcast

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.pane_stack import hemispherical_mean
 from mitsuba_cfs.directions import incident_azimuth
-from scenes.fenestration.thermal_system import WindowModel, window_model
+from scenes.fenestration.thermal_system import sun_in_layers
 from tests.validation.ashrae140_sun import ANGLES, glass
 from thermal.blackbox import (
     R_INNER,
@@ -42,6 +42,7 @@ from thermal.closure import Closure
 from thermal.glazing import Gap
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
 from thermal.shade_layers import sheet_layer, venetian_layer
+from thermal.window_model import WindowModel, window_model
 
 FloatArray = NDArray[np.float64]
 SYSTEMS = ("dgu", "ext_blind", "ext_shade", "int_shade")
@@ -191,7 +192,8 @@ def _modelled(
     order = np.argsort(optics.theta, kind="stable")  # the first direction is the normal
     window = window_model(
         optics.tau[order], optics.rho[order], optics.theta[order], PLACES[name], closure,
-        u_value=u_value, g_normal=None if u_value is None else float(optics.g[order[0]]), item=name,
+        absorbed=sun_in_layers, u_value=u_value, item=name,
+        g_normal=None if u_value is None else float(optics.g[order[0]]),
     )  # fmt: skip
     g, absorbed = np.empty_like(optics.g), window.absorbed
     g[order] = window.data.g_value

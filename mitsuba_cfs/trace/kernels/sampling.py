@@ -88,8 +88,11 @@ def column(values: ArrayLike, kind: type | None = None) -> Any:
     """
     kind = mi.Float if kind is None else kind
     names = {
-        mi.Float: np.float32, mi.UInt32: np.uint32, mi.UInt64: np.uint64, mi.Bool: np.bool_,
-    }  # fmt: skip
+        mi.Float: np.float32,
+        mi.UInt32: np.uint32,
+        mi.UInt64: np.uint64,
+        mi.Bool: np.bool_,
+    }
     given = np.asarray(values, dtype=names[kind])
     memory = np.empty(given.nbytes + ALIGNMENT, dtype=np.uint8)
     start = -memory.ctypes.data % ALIGNMENT

@@ -352,9 +352,11 @@ class SceneCache:
         arrays = [None if value is None else np.asarray(value, float) for value in values]
         inputs = (surfaces, *groups)
         key = (
-            variants.activate(), windows_block,
-            *(None if a is None else a.tobytes() for a in arrays), *map(id, inputs),
-        )  # fmt: skip
+            variants.activate(),
+            windows_block,
+            *(None if a is None else a.tobytes() for a in arrays),
+            *map(id, inputs),
+        )
         if key not in self._scenes:
             reflectance, middle = arrays
             self._scenes[key] = inputs, TracedScene(

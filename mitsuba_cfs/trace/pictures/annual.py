@@ -270,8 +270,10 @@ class FivePhasePictures:
     def light(self, batch: NDArray[np.int64]) -> PatchLight:
         """Window luminances for the view's paths in some hours."""
         rest, suns, strength = (
-            self._lighting[:, batch], self._directions[batch], self._illuminance[batch]
-        )  # fmt: skip
+            self._lighting[:, batch],
+            self._directions[batch],
+            self._illuminance[batch],
+        )
         scattered = self._sun.scattered_luminance(suns, strength)
         return PatchLight(rest + scattered.reshape(rest.shape), self._reflected[:, batch])
 

@@ -104,9 +104,12 @@ def outdoors(
         seen.add(lanes, block, start)
     shown, smooth, reflected = seen.faces(seed)
     return OutdoorCoefficients(
-        seen.sky(), reflected, _beams(scattering, basis),
-        OutdoorSun(outside, shown, smooth, view, seed), seen.rough(),
-    )  # fmt: skip
+        seen.sky(),
+        reflected,
+        _beams(scattering, basis),
+        OutdoorSun(outside, shown, smooth, view, seed),
+        seen.rough(),
+    )
 
 
 class SeenOutdoors:

@@ -402,10 +402,13 @@ class _Kernel:
         # a surface's irradiance is pi times the mean by cosine; another window is looked into
         found = dr.zeros(mi.Float64, dr.width(lane))
         starts = PathStarts(
-            lane, dr.select(opaque, place, origin), dr.select(opaque, away, direction),
-            mi.PCG32(generator), self._depth,
+            lane,
+            dr.select(opaque, place, origin),
+            dr.select(opaque, away, direction),
+            mi.PCG32(generator),
+            self._depth,
             mi.Bool(active),  # a copy: the loop changes what it is given
-        )  # fmt: skip
+        )
         add_paths(
             room, sky, found, starts,
             cosine=mi.Float(0), came=dr.select(opaque, dr.dot(away, normal) * dr.inv_pi, 0.0),

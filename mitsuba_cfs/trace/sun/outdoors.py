@@ -112,9 +112,12 @@ class RoughFaces:
     def some(self, chosen: NDArray) -> RoughFaces:
         """Some of the rays."""
         return RoughFaces(
-            self.pixel[chosen], self.weight[chosen], self.triangle[chosen], self.way[:, chosen],
+            self.pixel[chosen],
+            self.weight[chosen],
+            self.triangle[chosen],
+            self.way[:, chosen],
             self.places.some(chosen),
-        )  # fmt: skip
+        )
 
     def lobes(self, outside: TracedScene, suns: NDArray[np.float64]) -> NDArray[np.float32]:
         """f cos of the sun at each face, 0 where it is hidden [r, h]."""

@@ -49,8 +49,11 @@ FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
 MORTON_BITS = 12  # along each axis
 # shifts and masks that leave two empty bits behind each of up to 16
 SPREAD_BITS = (
-    (16, 0xFF0000FF), (8, 0xF00F00F00F), (4, 0xC30C30C30C3), (2, 0x249249249249),
-)  # fmt: skip
+    (16, 0xFF0000FF),
+    (8, 0xF00F00F00F),
+    (4, 0xC30C30C30C3),
+    (2, 0x249249249249),
+)
 ROUGH = 4096  # rough faces whose lobes a row sees, at most
 LANES = 2**22  # shadow rays at once
 

@@ -31,7 +31,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     opaque_vector,
     pixel_positions,
     vectors,
-)  # fmt: skip
+)
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_faces, on_disc_of

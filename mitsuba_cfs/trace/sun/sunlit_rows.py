@@ -107,10 +107,13 @@ class SunlitRows:
         """The shares as the arrays of a file."""
         first, cells = self.mean, self.mean.cells
         arrays = {
-            "close": self.close, "cell_edge": np.array(cells.edge), "cell_low": cells.low,
-            "cell_halvings": np.array(cells.halvings), "cell_keys": cells.keys,
+            "close": self.close,
+            "cell_edge": np.array(cells.edge),
+            "cell_low": cells.low,
+            "cell_halvings": np.array(cells.halvings),
+            "cell_keys": cells.keys,
             "cell_area": cells.area,
-        }  # fmt: skip
+        }
         matrices = {"smooth": first.smooth, "beside": first.edges.beside}
         for i, rows in enumerate((first, self.noise)):
             matrices |= {f"far{i}": rows.share, f"near{i}": rows.near}
@@ -127,9 +130,12 @@ class SunlitRows:
         Raises: `KeyError` where one is missing.
         """
         cells = RoomCells(
-            float(data["cell_edge"]), data["cell_low"], int(data["cell_halvings"]),
-            data["cell_keys"], data["cell_area"],
-        )  # fmt: skip
+            float(data["cell_edge"]),
+            data["cell_low"],
+            int(data["cell_halvings"]),
+            data["cell_keys"],
+            data["cell_area"],
+        )
         places = SurfacePoints(data["places_point"], data["places_normal"])
         more = SurfacePoints(data["more_point"], data["more_normal"])
         smooth, edges = (

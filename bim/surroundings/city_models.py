@@ -1,6 +1,7 @@
-"""CityGML: the buildings, plants and terrain of a quarter, in the finest detail up to LoD 2.
+"""City models, CityJSON and CityGML: buildings, plants and terrain, in detail up to LoD 2.
 
-Source: CityGML 1.0 to 3.0 (https://www.ogc.org/standards/citygml), GML 3.1.1 and 3.2.
+Source: CityJSON 1.0 to 2.0 (https://www.cityjson.org/specs); CityGML 1.0 to 3.0
+(https://www.ogc.org/standards/citygml), GML 3.1.1 and 3.2.
 """
 
 from __future__ import annotations
@@ -8,18 +9,48 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bim.georeference import crs_name
-from bim.surroundings.city import FINEST, NO_GEOMETRY, city_object, triangles_of_surfaces
-from bim.surroundings.objects import MOST_BYTES, SurroundingObject, SurroundingsFile
+from bim.polygon_rooms import triangles_of_rings
+from bim.surroundings.objects import (
+    BODY,
+    MOST_BYTES,
+    TERRAIN,
+    SurroundingObject,
+    SurroundingsFile,
+    read_object,
+)
 from bim.xml_elements import xml_elements
 from mitsuba_cfs.errors import DataError
+
+TERRAINS = ("TINRelief", "Road", "LandUse", "WaterBody", "Railway", "TransportSquare", "Square",
+            "PlantCover")  # fmt: skip
+FINEST = 3.0  # level of detail below which geometry is taken: 2.2 is, 3 (with openings) is not
+NO_GEOMETRY = "objects-without-geometry"  # code of the issue
+
+
+def city_object(name: str, kind: str, triangles: NDArray[np.float64]) -> SurroundingObject:
+    """An object of triangles [T, 3, 3]; some of its kinds are terrain."""
+    return SurroundingObject(name, triangles, TERRAIN if kind in TERRAINS else BODY)
+
+
+def triangles_of_surfaces(
+    surfaces: Iterable[Sequence[NDArray[np.float64]]],
+) -> NDArray[np.float64]:
+    """Triangles [T, 3, 3] of polygons, each of an outline [N, 3] and its holes."""
+    found = [np.empty((0, 3, 3))]
+    for rings in surfaces:
+        if rings and min(map(len, rings)) >= 3:
+            found.append(triangles_of_rings(rings))
+    return np.concatenate(found)
+
 
 SUFFIXES = (".gml", ".xml", ".citygml")
 MEMBERS = ("cityObjectMember", "featureMember", "featureMembers")
@@ -69,8 +100,9 @@ def read_citygml(path: Path) -> SurroundingsFile:
                 member.left_out[NO_GEOMETRY] += 1
         objects += member.objects
         left_out += member.left_out
-    return SurroundingsFile(path, tuple(objects), next(iter(systems), None),
-                       left_out=tuple(left_out.items()))  # fmt: skip
+    return SurroundingsFile(
+        path, tuple(objects), next(iter(systems), None), left_out=tuple(left_out.items())
+    )
 
 
 def _systems(element: Element) -> Iterator[str]:
@@ -203,3 +235,111 @@ def _ring(side: Element, name: str, member: _Member) -> NDArray[np.float64]:
 def _fault(message: str, element: Element, name: str, member: _Member) -> DataError:
     where = f"{name[:60]} (from line {member.line})"
     return DataError(message, file=member.path, element=where, field=element.tag)
+
+
+DEPTH = {"MultiSurface": 1, "CompositeSurface": 1, "Solid": 2, "MultiSolid": 3, "CompositeSolid": 3}
+
+
+def read_cityjson(path: Path) -> SurroundingsFile:
+    """The objects of a CityJSON file; each in its finest level of detail below 3.
+
+    Raises: `DataError` that names file, object and field.
+    """
+    content = read_object(path)
+    if content.get("type") != "CityJSON":
+        found = content.get("type")
+        raise DataError(f"expected CityJSON, got {found!r:.60}", file=path, field="type")
+    vertices = _vertices(content, path)
+    things = content.get("CityObjects")
+    if not isinstance(things, dict):
+        raise DataError("expected objects by name", file=path, field="CityObjects")
+    objects, left_out = [], Counter()
+    for name, thing in things.items():
+        geometry = _geometry(thing, name, path)
+        if geometry is None:
+            left_out[NO_GEOMETRY] += not _has_children(thing)
+            continue
+        triangles = _triangles(geometry, vertices, name, path)
+        if len(triangles):
+            objects.append(city_object(name, str(thing.get("type")), triangles))
+    metadata = content.get("metadata")
+    system = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
+    return SurroundingsFile(
+        path,
+        tuple(objects),
+        crs_name(system) if isinstance(system, str) else None,
+        left_out=tuple((what, count) for what, count in left_out.items() if count),
+    )
+
+
+def _has_children(thing: dict[str, Any]) -> bool:
+    return bool(thing.get("children"))
+
+
+def _vertices(content: dict[str, Any], path: Path) -> NDArray[np.float64]:
+    listed = content.get("vertices")
+    try:
+        points = np.asarray(listed, dtype=float).reshape(-1, 3)
+        transform = content.get("transform")
+        if transform is not None:
+            scale = np.asarray(transform["scale"], dtype=float).reshape(3)
+            points = points * scale + np.asarray(transform["translate"], dtype=float).reshape(3)
+    except (TypeError, ValueError, KeyError, OverflowError):
+        message = "expected triples of numbers, and a transform of scale and translate"
+        raise DataError(message, file=path, field="vertices") from None
+    if not np.isfinite(points).all():
+        raise DataError("expected finite numbers", file=path, field="vertices")
+    return points
+
+
+def _geometry(thing: Any, name: str, path: Path) -> dict[str, Any] | None:
+    """The finest geometry of an object below LoD 3; None without one."""
+    if not isinstance(thing, dict):
+        raise DataError("expected an object", file=path, element=name[:60])
+    listed = thing.get("geometry") or []
+    if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
+        raise DataError("expected a list", file=path, element=name[:60], field="geometry")
+    if not all(isinstance(one.get("type"), str | None) for one in listed):
+        raise DataError("expected a text", file=path, element=name[:60], field="geometry.type")
+    found = [(_level(one), one) for one in listed if one.get("type") in DEPTH]
+    found = [(level, one) for level, one in found if level < FINEST]
+    return max(found, key=lambda pair: pair[0])[1] if found else None
+
+
+def _level(geometry: dict[str, Any]) -> float:
+    try:
+        return float(geometry.get("lod", 0))
+    except (TypeError, ValueError):
+        return 0.0
+
+
+def _triangles(
+    geometry: dict[str, Any], vertices: NDArray[np.float64], name: str, path: Path
+) -> NDArray[np.float64]:
+    """Triangles [T, 3, 3] of all surfaces of a geometry."""
+    boundaries, depth = geometry.get("boundaries"), DEPTH[geometry["type"]]
+    if not _is_nested(boundaries, depth + 1, len(vertices)):
+        message = "expected lists of the numbers of vertices"
+        raise DataError(message, file=path, element=name[:60], field="boundaries")
+    return triangles_of_surfaces(
+        [vertices[np.asarray(ring, dtype=int)] for ring in one]
+        for one in _surfaces(boundaries, depth)
+    )
+
+
+def _is_nested(part: Any, depth: int, count: int) -> bool:
+    """Whether lists in lists, so many deep, hold numbers of so many vertices."""
+    if not isinstance(part, list):
+        return False
+    if depth > 0:
+        return all(_is_nested(one, depth - 1, count) for one in part)
+    return all(isinstance(i, int) and 0 <= i < count for i in part)
+
+
+def _surfaces(boundaries: Any, depth: int) -> Iterator[Any]:
+    """The surfaces in nested boundaries: lists of rings."""
+    for part in boundaries:
+        if depth == 1:
+            yield part
+        else:
+            yield from _surfaces(part, depth - 1)

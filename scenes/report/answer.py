@@ -1,0 +1,217 @@
+"""The first sentences of a report: which rooms and systems meet which limits, and which fail."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from scenes.language.catalogue import gettext, ngettext
+from scenes.language.numbers import inside, listed, rounded, semicolons
+from scenes.report.headline import POOR, Card
+
+MOST_NAMED = 4  # rooms or systems that are named in one sentence
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A room, or a case of a study, with the figures that a rule limits."""
+
+    name: str
+    cards: tuple[Card, ...]
+
+    @property
+    def failed(self) -> tuple[Card, ...]:
+        """The figures whose limit is not met."""
+        return tuple(card for card in self.cards if card.grade == POOR)
+
+    @property
+    def met(self) -> int:
+        """The number of limits that are met."""
+        return len(self.cards) - len(self.failed)
+
+
+def judged(name: str, cards: Sequence[Card]) -> Judged:
+    """The limited figures among the headline figures of a room or case.
+
+    The highest DGP of some pictures counts only where the protection from glare is unknown.
+    """
+    limited = [card for card in cards if card.verdict]
+    if any(card.label == gettext("Protection from glare") for card in limited):
+        limited = [card for card in limited if card.label != gettext("Highest glare")]
+    return Judged(name, tuple(limited))
+
+
+def rooms_answer(rooms: Sequence[Judged]) -> str:
+    """One sentence on the limits met by the rooms of a run; empty where no figure is limited."""
+    rooms = [room for room in rooms if room.cards]
+    if not rooms:
+        return ""
+    if len(rooms) == 1:
+        return _alone(rooms[0])
+    failing = [room for room in rooms if room.failed]
+    if not failing:
+        return gettext("All {count} rooms meet every limit in the table below.", count=len(rooms))
+    met = len(rooms) - len(failing)
+    if not met:
+        head = gettext("None of the {count} rooms meets every limit.", count=len(rooms))
+    else:
+        head = gettext(
+            "{met} of {count} rooms meet every limit in the table below.",
+            met=met,
+            count=len(rooms),
+        )
+    if len(failing) <= MOST_NAMED:
+        lines = [
+            gettext("{name} fails {failed}", name=room.name, failed=_names(room.failed))
+            for room in failing
+        ]
+        return f"{head} {semicolons(lines)}."
+    counts: dict[str, int] = {}
+    for room in failing:
+        for card in room.failed:
+            counts[card.label] = counts.get(card.label, 0) + 1
+    lines = [
+        ngettext("{label} in {count} room", "{label} in {count} rooms", number, label=label)
+        for label, number in sorted(counts.items(), key=lambda one: -one[1])
+    ]
+    return f"{head} " + gettext("Not met: {parts}.", parts=semicolons(lines))
+
+
+def systems_answer(cases: Sequence[Judged], energy_kwh: Sequence[float | None]) -> str:
+    """Which of the cases of a room meets the most limits, what each fails, and its energy.
+
+    Args: energy_kwh: heating, cooling and lighting of each case; None where unknown or none.
+    """
+    pairs = [(case, e) for case, e in zip(cases, energy_kwh, strict=True) if case.cards]
+    if not pairs:
+        return ""
+    if len(pairs) == 1:
+        return _alone(pairs[0][0])
+    order = sorted(
+        pairs, key=lambda one: (len(one[0].failed), math.inf if one[1] is None else one[1])
+    )
+    fewest = len(order[0][0].failed)
+    best = [case for case, _ in order if len(case.failed) == fewest]
+    others = [case for case, _ in order if len(case.failed) > fewest]
+    parts = [_best(best, fewest)]
+    for case in others[:MOST_NAMED]:
+        parts.append(_fails(case) + ".")
+    if len(others) > MOST_NAMED:
+        more = len(others) - MOST_NAMED
+        parts.append(ngettext("{count} more fails some.", "{count} more fail some.", more))
+    return " ".join([*parts, *_energy(order, best)])
+
+
+def summary_answer(groups: Sequence[Sequence[Judged]]) -> str:
+    """In how many of many rooms each system meets every limit.
+
+    Args: groups: the cases of each room.
+    """
+    counts: dict[str, list[int]] = {}
+    for cases in groups:
+        for case in cases:
+            if case.cards:
+                counts.setdefault(case.name, []).append(not case.failed)
+    order = sorted(counts.items(), key=lambda one: -sum(one[1]) / len(one[1]))
+    parts = [
+        gettext("{name} in {met} of {count} rooms", name=name, met=sum(met), count=len(met))
+        for name, met in order[:MOST_NAMED]
+    ]
+    return gettext("Every limit is met by {parts}.", parts=semicolons(parts)) if parts else ""
+
+
+def met_cell(case: Judged) -> str:
+    """The limits met, for a table of rooms by systems, and those that are not."""
+    if not case.cards:
+        return ""
+    count = gettext("{met} of {limits}", met=case.met, limits=len(case.cards))
+    if not case.failed:
+        return count
+    return gettext("{count}; fails {failed}", count=count, failed=_names(case.failed))
+
+
+def _best(best: Sequence[Judged], fewest: int) -> str:
+    shown, more = [case.name for case in best[:MOST_NAMED]], len(best) - MOST_NAMED
+    if more > 0:
+        shown.append(ngettext("{count} more", "{count} more", more))
+    names = listed(shown)
+    count = len(best[0].cards)
+    if not fewest:
+        return ngettext(
+            "{names} meets every limit in the table below.",
+            "{names} meet every limit in the table below.",
+            len(best),
+            names=names,
+        )
+    if not best[0].met:
+        return gettext("No system meets any of the limits in the table below.")
+    facts = {"names": names, "met": best[0].met, "limits": count}
+    if len(best) == 1:
+        return gettext(
+            "No system meets all limits. {names} meets the most, {met} of {limits}, and fails "
+            "{failed}.",
+            **facts,
+            failed=_values(best[0].failed),
+        )
+    parts = [_fails(case) for case in best[:MOST_NAMED]]
+    return gettext(
+        "No system meets all limits. {names} meet the most, {met} of {limits}: {parts}.",
+        **facts,
+        parts=semicolons(parts),
+    )
+
+
+def _energy(order: Sequence[tuple[Judged, float | None]], best: Sequence[Judged]) -> list[str]:
+    """The energy of the best case beside the least of all."""
+    known = [(case, energy) for case, energy in order if energy]
+    if len(known) != len(order):
+        return []
+    least, lowest = min(known, key=lambda one: one[1] or 0.0)
+    first, energy = next(one for one in known if one[0] is best[0])
+    facts = {"name": first.name, "energy": rounded(float(energy or 0.0), 0)}
+    if least is first:
+        return [
+            gettext(
+                "{name} needs the least heating, cooling and lighting energy: {energy} kWh a year.",
+                **facts,
+            )
+        ]
+    return [
+        gettext(
+            "{name} needs {energy} kWh of heating, cooling and lighting a year; the least is "
+            "{lowest} kWh ({least}).",
+            **facts,
+            lowest=rounded(float(lowest or 0.0), 0),
+            least=least.name,
+        )
+    ]
+
+
+def _alone(room: Judged) -> str:
+    facts = {"name": room.name, "met": room.met, "limits": len(room.cards)}
+    if not room.failed:
+        return ngettext(
+            "{names} meets every limit in the table below.",
+            "{names} meet every limit in the table below.",
+            1,
+            names=room.name,
+        )
+    return gettext(
+        "{name} meets {met} of {limits} limits and fails {failed}.",
+        **facts,
+        failed=_values(room.failed),
+    )
+
+
+def _names(cards: Sequence[Card]) -> str:
+    return listed([inside(card.label) for card in cards])
+
+
+def _fails(case: Judged) -> str:
+    return gettext("{name} fails {failed}", name=case.name, failed=_values(case.failed))
+
+
+def _values(cards: Sequence[Card]) -> str:
+    """Each figure with its value."""
+    return listed([f"{inside(c.label)} ({f'{inside(c.value)} {c.unit}'.strip()})" for c in cards])
