@@ -36,6 +36,7 @@ from mitsuba_cfs.methods.coefficients import (
 from mitsuba_cfs.methods.optics import (
     States,
     SystemOptics,
+    check_systems,
     combinations,
     hourly_states,
     in_state,
@@ -141,10 +142,7 @@ def phase_light(
         systems: the states of each window group [G].
         needs: metrics that several calls ask for, as of `phase_matrices`.
     """
-    if len(systems) != len(matrices.scene.groups):
-        raise ValueError(
-            f"systems of {len(systems)} groups for {len(matrices.scene.groups)} window groups"
-        )
+    check_systems(systems, matrices.scene.groups)
     if matrices.five_phase and sky.sun is None:
         raise ValueError("the five-phase method needs the sky's sun: annual_sky(..., sun=True)")
     of_all = [optics for states in systems for optics in states]
@@ -178,7 +176,7 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
         return replace(
             light, sensors=tuple(tuple(map(SensorLight, group)) for group in coefficients)
         )
-    hours = _shining_hours(light)
+    hours = shining_hours(light)
     suns = _direct_sun(light, hours, progress)
     room = _sunlit_room(light, coefficients)
     sensors = tuple(
@@ -291,7 +289,7 @@ def sun_beams(
 
 def states_of(light: PhaseLight, state: State | None) -> State:
     """The state of each group in each hour [G, L], as far as it has states."""
-    rows = hourly_states(state, len(light.systems), light.sky)
+    rows = hourly_states(state, light.systems, light.sky)
     return np.minimum(rows, np.array([[len(states) - 1] for states in light.systems]))
 
 
@@ -348,7 +346,7 @@ def _direct_sun(
     return matrices
 
 
-def _shining_hours(light: PhaseLight) -> NDArray[np.int64]:
+def shining_hours(light: PhaseLight) -> NDArray[np.int64]:
     """The hours L in which the sun is in front of a window."""
     scene, sky = light.scene, light.sky
     facing, lit = np.stack([g.frame[2] for g in scene.groups]), sky.illuminance > 0

@@ -22,6 +22,7 @@ from mitsuba_cfs.methods.light import (
 from mitsuba_cfs.methods.optics import AngularOptics, BsdfOptics
 from mitsuba_cfs.methods.phase_matrices import phase_matrices, with_outdoors
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+from mitsuba_cfs.methods.sun_by_patches import sunny_hour_error
 from mitsuba_cfs.sky.annual import given_sky
 from scenes.demo import VENETIAN_BLIND
 from tests.trace import rooms
@@ -93,6 +94,18 @@ def test_what_is_not_needed_is_not_traced_and_comes_out_the_same_later() -> None
     assert hourly_glare(bare).dgp == hourly_glare(whole).dgp
 
 
+def test_three_phases_say_how_far_their_blurred_sun_is_off() -> None:
+    light, sharp = (
+        daylight(scene(view=None), glass(), SKY, method=method, sampling=FEW)
+        for method in ("three-phase", "five-phase")
+    )
+    blurred, at_sun = illuminance(light), illuminance(sharp)
+    expected = np.abs(blurred - at_sun)[:, 0] / blurred[:, 0]
+    assert expected.max() > 0.2  # a spot of sun lies or does not lie on the sensor
+    np.testing.assert_allclose(sunny_hour_error(light, None, blurred), expected, rtol=1e-6)
+    assert not sunny_hour_error(sharp, None, at_sun).any()
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [("sensor_samples", -1), ("patch_samples", 0), ("subdivision", 0), ("seed", -1),
@@ -103,10 +116,27 @@ def test_a_sampling_that_cannot_be_is_refused(name, value) -> None:
         Sampling(**{name: value})
 
 
-def test_a_state_below_zero_is_refused() -> None:
+@pytest.mark.parametrize("state", [-1, 2])
+def test_a_state_that_no_group_has_is_refused(state) -> None:
     light = daylight(scene(), [[*glass()[0], AngularOptics([0.0, 0.1])]], SKY, sampling=FEW)
-    with pytest.raises(ValueError, match="0 or more"):
-        illuminance(light, np.array([-1]))
+    for call in (illuminance, eye_illuminance, hourly_glare):
+        with pytest.raises(ValueError, match=f"state {state}: expected 0 to 1"):
+            call(light, state=np.array([state]))
+
+
+def test_hours_and_systems_that_cannot_be_are_refused_by_name() -> None:
+    with pytest.raises(ValueError, match=r"systems\[0\]: expected a list of states"):
+        daylight(scene(), glass()[0], SKY, sampling=FEW)
+    with pytest.raises(ValueError, match=r"systems\[0\]"):
+        daylight(scene(), [[]], SKY, sampling=FEW, method="point-in-time")
+    with pytest.raises(ValueError, match="points and normals: expected finite"):
+        replace(scene(), points=POINTS * np.nan)
+    light = daylight(scene(), glass(), SKY, sampling=FEW)
+    for call in (pictures, rated_pictures):
+        with pytest.raises(ValueError, match="hours: expected numbers from 0 to 0"):
+            call(light, [1])
+    with pytest.raises(ValueError, match="hours: expected numbers"):
+        hourly_glare(light, hours=[-1])
 
 
 def test_optics_go_to_another_process_after_their_use() -> None:

@@ -8,6 +8,7 @@ Writes a study file for each control and step into FOLDER and computes it as `cf
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import pandas as pd
@@ -24,7 +25,12 @@ width = 4.0
 depth = 5.0
 height = 3.0
 facing_deg = 180.0
-adjacency = {{ left = "space", right = "space", back = "space", floor = "space", ceiling = "space" }}
+[box.adjacency]
+left = "space"
+right = "space"
+back = "space"
+floor = "space"
+ceiling = "space"
 [[box.window]]
 x = 0.5
 sill = 0.9
@@ -96,7 +102,7 @@ def main(folder: Path, *, epw: Path, minutes: Sequence[int] = (20, 10, 5)) -> pd
             row[f"{name} [{unit}]"] = f"{values[1]:.0f}"
             changes = [
                 f"{100.0 * (fine - coarse) / fine:+.1f}" if fine > 1.0 else "-"
-                for coarse, fine in zip(values, values[1:], strict=False)
+                for coarse, fine in pairwise(values)
             ]
             row[f"{name} [%]"] = ", ".join(changes)
         rows.append(row)
