@@ -140,7 +140,7 @@ def _zone_sun(
 
 
 def _air_sun(zone: Zone, sun: Solar, stretch: Stretch) -> FloatArray:
-    """Sun [R] [W] that warms a zone's air behind its shades."""
+    """Sun [R] [W] that warms a zone's air behind interior shades."""
     values = np.zeros_like(sun.absorbed_inner) if sun.absorbed_air is None else sun.absorbed_air
     return stretch.of(np.asarray(values)) @ np.array([w.area for w in zone.windows])
 

@@ -247,7 +247,7 @@ def _air_behind(
 
 
 def _to_air(unit: GlazingUnit, extra: float, across: float) -> FloatArray:
-    """Share [N] of the sun absorbed in each layer that goes to the air behind the shade.
+    """Share [N] of the sun absorbed in each layer that goes to the air behind an interior shade.
 
     It is what the air takes besides the conductances from both faces, in the mean of `G_STATES`.
     """

@@ -315,7 +315,7 @@ def absorbed_shares(
     """Weights of the groups' irradiance by direction [n, G, K] for `directional_sums`.
 
     What the room's surfaces and windows absorb [W]; outer and inner layers of each group, and the
-    room's air behind its shade [W/m2];
+    room's air behind an interior shade [W/m2];
     what is incident on all windows and what they transmit [W].
 
     Args: transmission: [G, K, K]; area: [G] [m2]; absorption: [G, K, F + G].
