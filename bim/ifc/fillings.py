@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import ifcopenshell
 import numpy as np
@@ -139,7 +140,7 @@ def _filling(
     )
 
 
-def _number(psets: dict[str, dict], *names: str) -> float | None:
+def _number(psets: dict[str, dict[str, Any]], *names: str) -> float | None:
     """First positive number of one of those names in any property set."""
     for name in names:
         for properties in psets.values():

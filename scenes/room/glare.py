@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -99,7 +100,7 @@ def worst_hours(year: pd.DataFrame, count: int) -> list[int]:
 
 def cached_glare(
     light: PhaseLight, windows: RoomWindows, *inputs: object
-) -> Callable[[NDArray], CacheEntry] | None:
+) -> Callable[[NDArray[Any]], CacheEntry] | None:
     """Cache entry of a year of glare with each window group in a state [G]; None: no cache.
 
     Cases of a study with the blind up and with the blind down rate every hour; the case whose blind
@@ -116,7 +117,7 @@ def cached_glare(
         sky.whole, sky.sun, sky.direction, sky.illuminance, *inputs,
     )  # fmt: skip
 
-    def entry(state: NDArray) -> CacheEntry:
+    def entry(state: NDArray[Any]) -> CacheEntry:
         rows = zip(windows.systems, state.tolist(), strict=True)
         chosen = [systems[min(j, len(systems) - 1)] for systems, j in rows]
         optics = [[one.visible, one.fine, one.angular] for one in chosen]
