@@ -32,8 +32,14 @@ class Judged:
 
 
 def judged(name: str, cards: Sequence[Card]) -> Judged:
-    """The limited figures among the headline figures of a room or case."""
-    return Judged(name, tuple(card for card in cards if card.verdict))
+    """The limited figures among the headline figures of a room or case.
+
+    The highest DGP of some pictures counts only where the protection from glare is unknown.
+    """
+    limited = [card for card in cards if card.verdict]
+    if any(card.label == gettext("Protection from glare") for card in limited):
+        limited = [card for card in limited if card.label != gettext("Highest glare")]
+    return Judged(name, tuple(limited))
 
 
 def rooms_answer(rooms: Sequence[Judged]) -> str:
@@ -46,11 +52,15 @@ def rooms_answer(rooms: Sequence[Judged]) -> str:
     failing = [room for room in rooms if room.failed]
     if not failing:
         return gettext("All {count} rooms meet every limit in the table below.", count=len(rooms))
-    head = gettext(
-        "{met} of {count} rooms meet every limit in the table below.",
-        met=len(rooms) - len(failing),
-        count=len(rooms),
-    )
+    met = len(rooms) - len(failing)
+    if not met:
+        head = gettext("None of the {count} rooms meets every limit.", count=len(rooms))
+    else:
+        head = gettext(
+            "{met} of {count} rooms meet every limit in the table below.",
+            met=met,
+            count=len(rooms),
+        )
     if len(failing) <= MOST_NAMED:
         lines = [
             gettext("{name} fails {failed}", name=room.name, failed=_names(room.failed))
