@@ -4,7 +4,8 @@ A system is Kuhn's Blackbox there as here: two layers that absorb what ours abso
 direction.  Where it is two known panes they and their gas stand between them, and EnergyPlus' own
 ISO 15099 says the resistance of the hour.  Else it is that of air that is too thin to flow:
 EnergyPlus 25.2 takes no other gas than its own four there and no other pressure than the sea's, so
-that resistance is made of several gaps, divided by layers that neither absorb nor radiate.
+that resistance, which gives the system's U, is made of several gaps, divided by layers that
+neither absorb nor radiate.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from numpy.typing import NDArray
 
 from bim.energyplus_parts import Model
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from thermal.blackbox import Fenestration, LayerAbsorptances
+from thermal.blackbox import R_INNER, R_OUTER, Fenestration, LayerAbsorptances
 from thermal.glazing_unit import GasGap, GlazingUnit
 
 PANE = 0.001  # [m] thickness of a virtual layer
 PANE_CONDUCTIVITY = 100.0  # [W/(m K)]: a hundred-thousandth of a window's resistance
 NO_EMISSION = 1e-4  # EnergyPlus takes no 0: of the faces to the gap, whose resistance is given
 GAPS = 3  # of a resistance, in every state: EnergyPlus switches between equals only
-TYPICAL = 10.0, 15.0  # mean of the layers [degC] and difference [K] where R is read: EN 673
+TYPICAL = 10.0, 15.0  # mean of the layers [degC] and difference [K]: EN 673
 AIR = 2.873e-3 + 7.76e-5 * (TYPICAL[0] + 273.15)  # conductivity [W/(m K)], ISO 15099 annex B
 
 
@@ -52,9 +53,9 @@ class WindowOptics:
         one = self.fenestration
         known = panes and self.panes is not None
         if not known and one.layer_resistance.kind != "constant":
-            found.append(f"its layers' resistance, which varies, is that at {TYPICAL[0]:g} C")
+            found.append("its layers' resistance, which varies, is that of its U")
         if one.extra_inner or one.extra_outer:
-            found.append("what a shade gives to the air behind it is left out")
+            found.append("what a shade gives to the air behind it counts in its U alone")
         return tuple(f"{one.name}: {what}" for what in found)
 
 
@@ -175,7 +176,7 @@ def _layers(model: Model, optics: WindowOptics, *, panes: bool) -> tuple[list[st
         (gap,) = optics.panes.gaps
         return [_gas_gap(model, gap)], real
     one = optics.fenestration
-    gaps = _gaps(model, float(one.layer_resistance.at(*TYPICAL)))
+    gaps = _gaps(model, _resistance(one))
     faces = [
         (one.emissivity_out, NO_EMISSION),
         *[(NO_EMISSION,) * 2] * (len(gaps) - 1),
@@ -216,6 +217,15 @@ def _gas_gap(model: Model, gap: GasGap) -> str:
         "pressure": 101325.0,
     }
     return name
+
+
+def _resistance(system: Fenestration) -> float:
+    """Resistance between the layers that gives the system's U between the films of EN 673 [m2 K/W].
+
+    So what a shade gives to the air behind it, which has no object of its own, counts in U.
+    """
+    of_u = 1.0 / system.u_value - R_OUTER - R_INNER
+    return of_u if of_u > 0 else float(system.layer_resistance.at(*TYPICAL))
 
 
 def _gaps(model: Model, resistance: float) -> list[str]:

@@ -34,11 +34,15 @@ class PlainGlass:
     """Panes of uncoated glass behind each other, as Radiance's material `glass` describes each."""
 
     panes: tuple[tuple[float, float], ...]  # transmissivity and index of each, the outer one first
+    beside: tuple[float, ...] = ()  # share of light at `ANGLES` that meets the innermost alone
 
     @property
     def table(self) -> AngularTable:
         """Visible transmittance and reflectance by the angle of incidence."""
-        return glass_table(self.panes)
+        whole = glass_table(self.panes)
+        if not self.beside:
+            return whole
+        return whole.mixed(glass_table(self.panes[-1:]), np.asarray(self.beside))
 
     @property
     def transmittance(self) -> float:

@@ -82,7 +82,10 @@ COMMANDS = {
     "calibrate": "Measure the computing time of each method on this machine.",
 }
 USAGE, FAILED, INTERRUPTED = 2, 1, 130
-FOREIGN = ("ifcopenshell", "mitsuba", "drjit")  # modules whose calls no signal may end
+# Modules whose calls no signal may end. Trimesh drops any exception, and so do extension modules
+# that try an import
+IMPORT = ("importlib", "_frozen_importlib", "_frozen_importlib_external")
+FOREIGN = ("ifcopenshell", "mitsuba", "drjit", "trimesh", *IMPORT)
 AGAIN_S = 0.05  # after which a signal that came in one of their calls is sent again
 CLEANING_S = 5.0  # after a signal, in which others are ignored
 SIGNALLED = 128  # and the signal's number
@@ -189,18 +192,27 @@ class Stop:
         """Raise what ends the program."""
         if time.monotonic() < self._cleaning + CLEANING_S:
             return
-        while frame is not None:
-            module = str(frame.f_globals.get("__name__", "")).partition(".")[0]
-            if module in FOREIGN or frame.f_code.co_name == "__del__":
-                again = threading.Timer(AGAIN_S, signal.raise_signal, (number,))
-                again.daemon = True
-                again.start()
-                return
-            frame = frame.f_back
+        if _inside_a_library(frame):
+            again = threading.Timer(AGAIN_S, signal.raise_signal, (number,))
+            again.daemon = True
+            again.start()
+            return
         self._cleaning = time.monotonic()
         if number == signal.SIGINT:
             raise KeyboardInterrupt
         raise Terminated(number)
+
+
+def _inside_a_library(frame: FrameType | None) -> bool:
+    """Whether code of a library waits for this frame, or Python's garbage collector does."""
+    while frame is not None:
+        module = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+        if module in FOREIGN or frame.f_code.co_name == "__del__":
+            return True
+        frame = frame.f_back
+    # the body of a loop, and a BSDF of ours, are called by Dr.Jit without a frame of its own
+    drjit = sys.modules.get("drjit")
+    return drjit is not None and drjit.flag(drjit.JitFlag.SymbolicScope)
 
 
 def run(arguments: Sequence[str]) -> int:

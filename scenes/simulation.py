@@ -14,10 +14,10 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes import plots
 from scenes import quick as quick_run
-from scenes.fenestration.systems import FenestrationSystem
+from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.fenestration.thermal_system import checked_system
 from scenes.head import NO_HEAD, Head
-from scenes.input_files import InputFiles, overrides_of
+from scenes.input_files import InputFiles, overrides_of, read_weather
 from scenes.inputs import inputs_of
 from scenes.report import write_report
 from scenes.report.headline import cards
@@ -90,8 +90,8 @@ class SimulatedYear(RoomYear):
 
 def simulate(
     room: Room,
-    system: FenestrationSystem | None,
-    weather: Weather,
+    system: FenestrationSystem | str | PathLike[str] | None,
+    weather: Weather | str | PathLike[str],
     *,
     operation: Operation | str | PathLike[str] | None = None,
     quick: bool = False,
@@ -105,8 +105,9 @@ def simulate(
 
     Args:
         room: of a building, `read_building("house.ifc").room("Office")`.
-        system: in all windows; None: what the building's file holds for each.
-        weather: of the year, `read_weather("city.epw")`.
+        system: in all windows, a file or `read_system("blind.xml")`; None: what the building's
+            file holds for each.
+        weather: of the year, a file or `read_weather("city.epw")`.
         operation: shading control, gains, set points: a file, or `read_operation("office.toml")`;
             without it the first state holds all year and the room floats freely.
         quick: few rays and one small picture, for a first look, as `--quick`.
@@ -119,6 +120,10 @@ def simulate(
     building = room.building
     if isinstance(operation, str | PathLike):
         operation = read_operation(operation)
+    if isinstance(weather, str | PathLike):
+        weather = read_weather(weather)
+    if isinstance(system, str | PathLike):
+        system = read_system(system)
     if system is None and building.file is None:
         raise DataError("a building that is not from a file needs a system", element="simulate")
     if system is not None:

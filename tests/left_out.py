@@ -9,7 +9,7 @@ from collections.abc import Iterable
 PEERS = "pip install -c constraints.txt '.[peers,distributed]' (`make test` does)"
 BRINGS_IN = [  # what a reason looks like, and what would bring its tests in
     (r"nbclient", "pip install '.[notebooks]'"),
-    (r"axe-core", "npm install axe-core in a folder elsewhere, and AXE_CORE=.../axe.min.js"),
+    (r"axe-core", "pip install --no-deps axe-playwright-python==0.1.8 (`make test` does)"),
     (r"\.\./shared/data", "a folder ../shared/data with real IFC, EPW, BSDF and HDR files"),
     (r"\.\./shared/reference", "a folder ../shared/reference with results of EnergyPlus and "
                                "ASHRAE 140's example programs"),
@@ -19,7 +19,8 @@ BRINGS_IN = [  # what a reason looks like, and what would bring its tests in
     (r"pywincalc|the engine failed", f"{PEERS}; pywincalc has wheels for Python up to 3.12"),
     (r"pyenergyplus|EnergyPlus", PEERS),
     (r"distributed", PEERS),
-    (r"Chromium", "a Chromium on the path (Debian: apt-get install chromium)"),
+    (r"Chromium",
+     "a Chromium on the path (Debian: apt-get install chromium; as root `make test` does)"),
     (r"no disk can be mounted", "running as root where a small file system can be mounted"),
     (r"no LLVM 15 or 16", "an LLVM 15 or 16 beside the good one, and x86"),
     (r"Linux|linux|SIGKILL", "Linux"),

@@ -83,6 +83,13 @@ CASES: list[tuple[str, Callable, str, tuple]] = [
         for name in ("outside_film", "cell", "tolerance", "warm_tolerance", "start_c", "warm_days")
     ),
     ("BalanceOptions", thermal.BalanceOptions, "terrain", ("x", None)),
+    *(
+        ("RoomOptions", scenes.RoomOptions.of, name, bad)
+        for name, bad in (
+            ("sensor_spacing", (*NEGATIVE, 0)), ("sensor_height", NEGATIVE),
+            ("sensor_margin", NEGATIVE), ("picture_size", COUNT), ("floor_per_person", (0, -1)),
+        )
+    ),
     ("RoomOptions", scenes.RoomOptions, "heat_step_s", (*NEGATIVE, 0, 7200)),
     ("RoomOptions", scenes.RoomOptions, "infiltration_ach", NEGATIVE),
     *(

@@ -64,9 +64,7 @@ PREFIXES = ("kept_", "found_", "said_", "heard_", "given_")
 ALLOWED = {"given_sky"}  # public names that stay until the next breaking version
 
 # Parts of the code that still have such phrases or names: the list shrinks, and none enters it
-NOT_CLEAN: set[str] = {
-    "bim/radiance",
-}
+NOT_CLEAN: set[str] = set()
 
 PHRASE = re.compile("|".join(f"(?:{pattern})" for pattern in PHRASES), re.IGNORECASE)
 DOCS = [

@@ -12,7 +12,8 @@ from bim.model import Construction, MaterialLayer
 from bim.polygon_rooms import GlazingValues, SurfaceFinish
 from bim.report.issue import Issue
 
-PARTS = ("Glaze", "Gap", "Frame", "Blind")  # of a window type: its values are used, not these
+PARTS = ("Glaze", "Gap", "Frame", "Blind", "Shade", "ShadingCoeff")  # of a window type: not read
+SHADES = ("interiorShadeType", "exteriorShadeType")  # attributes of an opening, not read
 
 
 class Constructions:
@@ -98,12 +99,16 @@ class Constructions:
     def window(self, opening: ElementTree.Element) -> GlazingValues:
         """What an opening's window type, else its construction states."""
         name = opening.get("windowTypeIdRef") or opening.get("constructionIdRef") or ""
+        guid = opening.get("id", "")
+        for shade in SHADES:
+            if opening.get(shade, "None") not in ("None", "NoShade", ""):
+                values = {"element": _name(opening), "part": shade, "glazing": name}
+                self.issues.append(Issue("glazing-part-not-read", guid, values))
         known = self._by_id["WindowType"].get(name)
         if known is None:
             known = self._by_id["Construction"].get(name)
         if known is None:
             if name:
-                guid = opening.get("id", "")
                 self._missing("windowTypeIdRef", f"no WindowType {name!r:.60}", guid)
             return GlazingValues(name=name)
         if name not in self._windows:

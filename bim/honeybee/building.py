@@ -194,8 +194,8 @@ class _Reader:
         if name is not None and self.energy.has_shade(name):
             known = {"element": one.label, "construction": name}
             self.issues.append(Issue("construction-shade-not-read", one.identifier, known))
-        if name is not None and self.energy.has_frame(name):
-            known = {"element": one.label, "part": "EnergyWindowFrame", "glazing": name}
+        for unread in [] if name is None else self.energy.unread_parts(name):
+            known = {"element": one.label, "part": unread, "glazing": name}
             self.issues.append(Issue("glazing-part-not-read", one.identifier, known))
         field = f"{fields}_modifier"
         modifier = self.light.objects.name(own.radiance, of_room.radiance, part, field)

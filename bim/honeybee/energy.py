@@ -26,6 +26,7 @@ from thermal.iso15099 import NFRC, iso15099_g_values, iso15099_u_value
 
 GASES = {"Air": "air", "Argon": "argon", "Krypton": "krypton", "Xenon": "xenon"}
 GAPS = ("EnergyWindowMaterialGas", "EnergyWindowMaterialGasMixture")
+PASSED = {"visible": 0.9, "solar": 0.85}  # transmittances that honeybee-schema takes by default
 SHADED = ("WindowConstructionShade", "WindowConstructionDynamic")
 
 
@@ -129,11 +130,14 @@ class EnergyLibrary:
             str(m.get("type", "")).endswith(("Shade", "Blind")) for m in self._layers(one)
         )
 
-    def has_frame(self, name: str) -> bool:
-        """Whether a window's construction has a frame."""
+    def unread_parts(self, name: str) -> list[str]:
+        """Parts of a window's construction that are not computed: its frame, panes that scatter."""
         one = self._construction(name)
         inner = one.get("window_construction")
-        return any(isinstance(c, dict) and c.get("frame") for c in (one, inner))
+        constructions = [c for c in (one, inner) if isinstance(c, dict)]
+        parts = ["EnergyWindowFrame"] if any(c.get("frame") for c in constructions) else []
+        layers = [m for c in constructions for m in self._layers(c)]
+        return [*parts, *(["solar_diffusing"] if any(map(_scatters, layers)) else [])]
 
     def _glazing(self, name: str, layers: Sequence[dict], height: float) -> GlazingValues | None:
         kinds = [str(one.get("type", "")) for one in layers]
@@ -193,8 +197,9 @@ class EnergyLibrary:
     def _pane(self, pane: Mapping[str, Any], band: str) -> PaneOptics:
         tau, rho = (
             self.objects.number(pane, f"{band}_{what}", default, most=1.0)
-            for what, default in (("transmittance", 0.85), ("reflectance", 0.075))
+            for what, default in (("transmittance", PASSED[band]), ("reflectance", 0.075))
         )
+        tau *= self.objects.number(pane, "dirt_correction", 1.0, most=1.0)
         back = pane.get(f"{band}_reflectance_back")
         back = rho if not isinstance(back, int | float) else float(back)
         if tau + max(rho, back) > 1 + 1e-9 or back < 0:
@@ -213,3 +218,7 @@ class EnergyLibrary:
         return GasGap(
             width, tuple((GASES[n], float(s)) for n, s in zip(names, shares, strict=True))
         )
+
+
+def _scatters(material: Mapping[str, Any]) -> bool:
+    return material.get("solar_diffusing") is True

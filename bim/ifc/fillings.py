@@ -28,6 +28,10 @@ PANELS = (
     "IfcSlab",
     "IfcCovering",
 )
+# of the glass, from which nothing is computed
+UNREAD = ("FillGas", "GlassColor", "GlassThickness1", "GlassThickness2", "GlassThickness3",
+          "ShadingCoefficient", "SolarAbsorption", "SolarReflectance", "Translucency",
+          "ThermalTransmittanceSummer", "VisibleLightReflectance")  # fmt: skip
 LEAST_GLASS = 0.05  # transparent area that makes a panel a window [m2]
 
 
@@ -52,6 +56,7 @@ def read_fillings(
             values = {"element": _label(element)}
             issues.append(Issue("window-without-geometry", element.GlobalId, values))
         one = _filling(element, shape or body, body, host, scale, damage)
+        issues += _unread_glazing(one, psets_of(element, damage))
         wall = None if host is None else shapes.get(host.id())
         fillings.append(replace(one, beside=beside_opening(wall, body)))
     for class_name in PANELS:
@@ -138,6 +143,16 @@ def _filling(
         panes=None if panes is None else round(panes),
         frame_hue=opaque[0].hue if opaque else GREY,
     )
+
+
+def _unread_glazing(one: Filling, psets: dict[str, dict[str, Any]]) -> list[Issue]:
+    """What the property sets state of the glass, where g or light's transmittance is missing."""
+    if None not in (one.g_value, one.visible_transmittance):
+        return []
+    names = sorted({n for stated in psets.values() for n in stated} & set(UNREAD))
+    values = {"element": f"{one.ifc_class} {one.name}", "part": ", ".join(names),
+              "glazing": one.type_name}  # fmt: skip
+    return [Issue("glazing-part-not-read", one.guid, values)] if names else []
 
 
 def _number(psets: dict[str, dict[str, Any]], *names: str) -> float | None:

@@ -64,8 +64,8 @@ def read_radiance_building(
         if not indoors.stands[indoors.owner == i].any()
     )
     issues += [*layer_issues, *_material_issues(objects)]
-    found = (*scene.issues, *panes.issues, *issues)
-    return Building(path.stem, (space,), elements, found, file=path)
+    every_issue = (*scene.issues, *panes.issues, *issues)
+    return Building(path.stem, (space,), elements, every_issue, file=path)
 
 
 def read_radiance_elements(
@@ -86,10 +86,10 @@ def read_radiance_elements(
 
 def _window(name: str, window: PanedWindow, issues: dict[Issue, None]) -> Window:
     """A window with its glazing; `issues` takes those of its layers."""
-    triangles, glass = window.surface.triangles, plain_glass(window.panes)
+    triangles, glass = window.surface.triangles, plain_glass(window.panes, window.beside)
     states, up = (), None
     if glass is None:
-        layered = layered_window(window.panes, window.outwards)
+        layered = layered_window(window.panes, window.outwards, window.beside)
         states, up = (layered.state,), layered.up
         issues |= dict.fromkeys(layered.issues)
     return Window(
@@ -107,7 +107,8 @@ def _clear(scene: RadianceScene, path: Path, facades: Sequence[str]) -> list[str
     }
     if not names:
         there = ", ".join(sorted({thing.material.name for thing in scene.objects})[:12])
-        message = f"has no glass, fabric or BSDF: name the windows' material, there are {there}"
+        message = "has no glass, fabric or BSDF"
+        message += f": name the windows' material, there are {there}" if there else " and no wall"
         raise DataError(message, file=path, field="aperture")
     return sorted(names)
 
@@ -189,7 +190,7 @@ def _faces(
 
 
 def _furniture(objects: Sequence[RadianceObject], indoors: Indoors) -> tuple[Element, ...]:
-    """What stands in the room, with a GUID for each body, and what is lit in cavities round it."""
+    """Furniture of the room, with a GUID for each body, and what is lit in cavities around it."""
     pieces = []
     for i in np.unique(indoors.owner[indoors.furniture]):
         own = indoors.furniture & (indoors.owner == i)

@@ -46,7 +46,7 @@ def read_radiance_layer(
 
 
 def slat_material(thing: RadianceObject) -> SlatMaterial:
-    """What a surface does with light, in one channel.
+    """Optics of a surface, in one channel.
 
     Raises: `DataError` naming file and line for a material that the tracer does not have.
     """

@@ -107,11 +107,17 @@ def _sky_seen(
     return float(np.mean(is_free & (rays[:, 2] > 0)))
 
 
-def plain_glass(panes: Sequence[RadianceObject]) -> PlainGlass | None:
-    """The panes of a window, the outer one first; None where one is no `glass` without pattern."""
+def plain_glass(
+    panes: Sequence[RadianceObject], beside: NDArray[np.float64] | None = None
+) -> PlainGlass | None:
+    """The panes of a window, the outer one first; None where one is no `glass` without pattern.
+
+    Args: beside: share of light that meets the innermost alone, by angle of incidence.
+    """
     if any(pane.material.kind != "glass" or len(pane.definitions) > 1 for pane in panes):
         return None
-    return PlainGlass(tuple((p.material.transmissivity, p.material.index) for p in panes))
+    each = tuple((p.material.transmissivity, p.material.index) for p in panes)
+    return PlainGlass(each, () if beside is None else tuple(beside.tolist()))
 
 
 def glass_shares(

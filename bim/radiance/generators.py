@@ -1,4 +1,4 @@
-"""What Radiance's generators `genbox` and `genprism` put into a scene, by their manual pages."""
+"""Polygons of Radiance's generators `genbox` and `genprism`, by their manual pages."""
 
 from __future__ import annotations
 

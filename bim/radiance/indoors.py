@@ -1,8 +1,8 @@
-"""What of a Radiance scene is indoors, found by walks of light.
+"""Which surfaces of a Radiance scene are indoors, by random walks.
 
 A walk that starts on a surface goes on in all directions until it meets the inner side of a window
 (it began in the room), its outer side, or nothing (it began outdoors).  The share of walks that end
-at windows tells indoors from outdoors, though the drawing leaves slits open.
+at windows distinguishes indoors from outdoors, even if the drawing has slits.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Indoors:
     body: NDArray[np.int64]  # of each object: those that touch are one
     lit: NDArray[np.bool_]  # [2, T] light of the room gets to the front, to the back
     bounds: NDArray[np.bool_]  # [2, T] and it bounds the room's air: no cavity is before it
-    furniture: NDArray[np.bool_]  # [T] of what stands in the room, or is lit in a cavity
+    furniture: NDArray[np.bool_]  # [T] of bodies in the room, or lit in a cavity
 
     @property
     def stands(self) -> NDArray[np.bool_]:
@@ -93,10 +93,10 @@ def _reaching(share: NDArray[np.float64], step: csr_array) -> NDArray[np.float64
 
     Args: share: that reaches one at once; step: [N, N] to where the others go.
     """
-    found = share.copy()
+    result = share.copy()
     for _ in range(STEPS):
-        found = share + (1 - ENDS) * (step @ found)
-    return found
+        result = share + (1 - ENDS) * (step @ result)
+    return result
 
 
 def _with_furniture(indoors: Indoors, normals: NDArray[np.float64]) -> Indoors:

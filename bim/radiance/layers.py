@@ -80,10 +80,16 @@ class LayeredWindow:
     issues: tuple[Issue, ...] = ()
 
 
-def layered_window(things: Sequence[RadianceObject], outwards: Sequence[bool]) -> LayeredWindow:
+def layered_window(
+    things: Sequence[RadianceObject],
+    outwards: Sequence[bool],
+    beside: NDArray[np.float64] | None = None,
+) -> LayeredWindow:
     """The system of a window's layers, the outer one first.
 
-    Args: outwards: whether the front of each layer is outdoors.
+    Args:
+        outwards: whether the front of each layer is outdoors.
+        beside: [N] share of light at `ANGLES` that meets the innermost alone.
 
     Raises: `DataError` naming file and line for a layer that cannot be computed.
     """
@@ -111,14 +117,35 @@ def layered_window(things: Sequence[RadianceObject], outwards: Sequence[bool]) -
     angular = None
     plain = [layer for layer in layers if isinstance(layer, WindowLayer)]
     if len(plain) == len(layers):
-        whole = stack([layer.specular for layer in plain])
-        values = (whole.tau, whole.rho_front, whole.rho_back)
-        angular = AngularTable(ANGLES, *(np.clip(one.mean(axis=0), 0, 1) for one in values))
+        angular = _beam_table(plain)
+        if beside is not None:
+            angular = angular.mixed(_beam_table(plain[-1:]), beside)
     klems = [layer.klems if isinstance(layer, WindowLayer) else klems_of(layer) for layer in layers]
     system = klems[0] if len(klems) == 1 else combine_layers(klems).bsdf
+    if beside is not None:
+        system = _mixed(system, klems[-1], _patch_means(beside))
     system = replace(system, see_through=0.0) if rough else system
     state = ShadingState(bands={"Visible": system}, angular=angular)
     return LayeredWindow(state, ups[0] if ups else None, tuple(issues))
+
+
+def _beam_table(layers: Sequence[WindowLayer]) -> AngularTable:
+    whole = stack([layer.specular for layer in layers])
+    values = (whole.tau, whole.rho_front, whole.rho_back)
+    return AngularTable(ANGLES, *(np.clip(one.mean(axis=0), 0, 1) for one in values))
+
+
+def _mixed(system: KlemsBsdf, inner: KlemsBsdf, share: NDArray[np.float64]) -> KlemsBsdf:
+    """A system with a share [K] of the light from outdoors that meets its innermost layer alone."""
+    blocks = {
+        "transmission_front": share, "transmission_back": share[:, None], "reflection_front": share,
+    }  # fmt: skip
+    mixed = {}
+    for name, part in blocks.items():
+        whole, other = getattr(system, name), getattr(inner, name)
+        if whole is not None and other is not None:
+            mixed[name] = (1 - part) * whole + part * other
+    return replace(system, **mixed)
 
 
 def up_vector(thing: RadianceObject) -> NDArray[np.float64] | None:

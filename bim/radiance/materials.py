@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bim.radiance.primitives import Primitive
+from bim.radiance.primitives import VOID, Primitive
 from mitsuba_cfs.gloss import ROUGHEST, Gloss, radiance_gloss
 
 LUMINANCE = (0.265, 0.670, 0.065)  # of red, green, blue [1]
@@ -21,7 +21,7 @@ BLACK = ("light", "glow", "illum", "spotlight")
 MATERIALS = (*OPAQUE, *CLEAR, *SYSTEMS, *BLACK, "mirror", "BRTDfunc")
 PATTERNS = (
     "colorfunc", "brightfunc", "colordata", "brightdata", "colorpict", "colortext", "brighttext",
-    "texfunc", "texdata",
+    "texfunc", "texdata", "spectrum", "specfile", "specfunc", "specdata", "specpict",
 )  # fmt: skip
 GLASS_INDEX = 1.52  # where a glass states none
 NUMBERS = {"plastic": 5, "metal": 5, "trans": 7, "mirror": 3, "glass": 3, "dielectric": 5,
@@ -49,7 +49,7 @@ class RadianceMaterial:
 
     @property
     def is_opaque(self) -> bool:
-        """Whether it stands in the way of light, as the tracer sees it."""
+        """Whether it obstructs light, as the tracer takes it."""
         return self.kind in OPAQUE or self.kind in BLACK or self.kind == "mirror"
 
 
@@ -64,6 +64,8 @@ def material_of(primitive: Primitive) -> RadianceMaterial:
     if kind in (*OPAQUE, "mirror", "glass") and min(numbers) < 0:
         raise primitive.fault("a number is negative")
     name = primitive.name
+    if kind == "mirror" and primitive.strings and primitive.strings[0] != VOID:
+        raise primitive.fault(f"its other material {primitive.strings[0]} is not computed")
     if kind in SYSTEMS:
         place = 1 if kind == "BSDF" else 0  # behind the thickness
         if len(primitive.strings) <= place:

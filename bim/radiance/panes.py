@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from bim.radiance.daylight import LAYERS, pane_sides
 from bim.radiance.materials import SYSTEMS
+from bim.radiance.patterns import TURNS
 from bim.radiance.scene import RadianceObject, RadianceScene
 from bim.rays import hemisphere, ray_mesh
 from bim.report.issue import Effect, Issue
+from mitsuba_cfs.bsdf.angular import ANGLES
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.surfaces import WindowSurface, even_numbers, points_on_triangles, triangle_areas
 
@@ -31,6 +33,7 @@ BOUNCES = 6  # of these walks
 RAYS = 128  # from each triangle, or each point, of a pane
 PAST = 3e-4  # share of a pane's light that misses the layers behind it, from which it is a window
 NARROW = 0.1  # translucent strips narrower than this are no panes [m]
+RIM_STEP = 3.0  # between angles at which light past the rims of panes is counted [deg]
 BEFORE = 1e-3  # distance from a pane at which its rays start [m]
 
 
@@ -41,6 +44,8 @@ class PanedWindow:
     surface: WindowSurface  # its innermost pane, seen from outdoors
     panes: tuple[RadianceObject, ...]  # the outer one first
     covered: float = 0.0  # share of the pane that layers of another window cover
+    beside: NDArray[np.float64] | None = None  # [N] share of light at `ANGLES` that meets this pane
+    # alone, past the rims of those in front of it
 
     @property
     def outwards(self) -> list[bool]:
@@ -113,7 +118,12 @@ def panes_of(
             if space.past_share(surface, layers[id(thing)]) <= PAST:
                 continue
             covered = 1.0 - space.free_share(surface, LAYERS)
-        windows.append(PanedWindow(surface, (*front.layers, thing), covered))
+        beside = space.share_beside(surface, front) if front.layers else None
+        if beside is not None:
+            values = {"window": thing.name, "share": 100 * diffuse_mean(beside)}
+            where = f"{thing.primitive.file}:{thing.primitive.line}"
+            issues.append(Issue("glass-beside-panes", where, values))
+        windows.append(PanedWindow(surface, (*front.layers, thing), covered, beside))
         issues += front.issues
     used = {id(pane) for window in windows for pane in window.panes} | set(layers) | far | dark
     rest = [o for o in scene.objects if not o.material.is_opaque and id(o) not in used]
@@ -122,12 +132,13 @@ def panes_of(
 
 @dataclass(frozen=True, slots=True)
 class _Front:
-    """What is in front of a window."""
+    """Layers and other panes in front of a window."""
 
     layers: tuple[RadianceObject, ...]  # of its glazing, the outer one first
     hidden: set[int]  # identities of all that are near
     others: tuple[RadianceObject, ...]  # panes that are left out
     issues: tuple[Issue, ...]
+    numbers: tuple[int, ...] = ()  # of all that are near, in the scene
 
 
 class _Space:
@@ -185,7 +196,7 @@ class _Space:
             issues.append(Issue("pane-before-window", where, values, Effect(glass=surface.area)))
         panes = tuple(self._objects[n] for n in reversed(layers))
         hidden = {id(self._objects[n]) for n in seen}
-        return _Front(panes, hidden, tuple(left_out), tuple(issues))
+        return _Front(panes, hidden, tuple(left_out), tuple(issues), tuple(sorted(seen)))
 
     def free_share(self, surface: WindowSurface, reach: float) -> float:
         """Share of a pane with neither another pane nor a wall on its room side."""
@@ -199,8 +210,7 @@ class _Space:
         that one of them sees.
         """
         inwards = -surface.normal
-        points = points_on_triangles(surface.triangles, even_numbers(POINTS))[0]
-        points += BEFORE * (surface.triangles.mean(axis=(0, 1)) - points)  # off the pane's edges
+        points = _points_off_edges(surface)
         starts = np.repeat(points + BEFORE * inwards, RAYS, axis=0)
         rays = np.tile(hemisphere(inwards, RAYS), (POINTS, 1))
         cosine = rays @ inwards
@@ -218,8 +228,30 @@ class _Space:
                 seen[~seen] = ~meets & (ways @ one.normal < 0)
         return float(cosine[past[seen]].sum() / cosine.sum())
 
+    def share_beside(self, surface: WindowSurface, front: _Front) -> NDArray[np.float64] | None:
+        """Share [N] of light at `ANGLES` that meets a pane past the rims of those in front of it.
+
+        Means over the pane and over azimuths, of the rays that no wall between the panes stops;
+        None where it is below `PAST` of diffuse light.
+        """
+        polar = np.radians(np.arange(0.0, 90.0, RIM_STEP))
+        points = _points_off_edges(surface)
+        depth = max(self._distance(n, surface) for n in front.numbers)
+        rays = cone(surface.normal, polar, TURNS)
+        starts = np.repeat(points + BEFORE * surface.normal, rays[..., 0].size, axis=0)
+        directions = np.tile(rays.reshape(-1, 3), (len(points), 1))
+        distance, hit = self._mesh.first_hits(starts, directions)
+        far = (hit < 0) | (distance * (directions @ surface.normal) > depth)
+        covered = (hit >= 0) & np.isin(self._owner[hit], front.numbers)
+        sums = [
+            values.reshape(len(points), len(polar), TURNS).sum(axis=(0, 2))
+            for values in (far & ~covered, covered)
+        ]
+        shares = np.interp(ANGLES, polar, sums[0] / np.maximum(sums[0] + sums[1], 1))
+        return shares if diffuse_mean(shares) > PAST else None
+
     def has_room(self, thing: RadianceObject, surface: WindowSurface) -> bool:
-        """Whether the inner side of a pane looks into a room.
+        """Whether there is a room on the inner side of a pane.
 
         From panes of glass most rays meet something; walks from fabrics and translucent panels,
         which may also be awnings and lamps, stay inside.
@@ -280,8 +312,30 @@ class _Space:
         return float(apart @ surface.normal)
 
 
+def _points_off_edges(surface: WindowSurface) -> NDArray[np.float64]:
+    """Points [POINTS, 3] on a pane; on its edges, rays would pass between pane and wall."""
+    points = points_on_triangles(surface.triangles, even_numbers(POINTS))[0]
+    return points + BEFORE * (surface.triangles.mean(axis=(0, 1)) - points)
+
+
+def cone(
+    normal: NDArray[np.float64], polar: NDArray[np.float64], turns: int
+) -> NDArray[np.float64]:
+    """Directions [N, turns, 3] at polar angles [N] from a normal."""
+    phi = 2 * np.pi * (np.arange(turns) + 0.5) / turns
+    x = np.cross(normal, [0.0, 0.0, 1.0] if abs(normal[2]) < 0.9 else [1.0, 0.0, 0.0])
+    x /= np.linalg.norm(x)
+    around = np.cos(phi)[:, None] * x + np.sin(phi)[:, None] * np.cross(normal, x)
+    return np.cos(polar)[:, None, None] * normal + np.sin(polar)[:, None, None] * around
+
+
+def diffuse_mean(shares: NDArray[np.float64]) -> float:
+    """Mean of shares [N] at `ANGLES` over uniform light."""
+    return float(np.trapezoid(shares * np.sin(2 * ANGLES), ANGLES))
+
+
 def _optics(thing: RadianceObject) -> object:
-    """What tells layers of different optics apart."""
+    """A key that layers of equal optics share."""
     return replace(thing.material, name=""), tuple(id(one) for one in thing.definitions[:-1])
 
 

@@ -122,8 +122,8 @@ class _Words:
             self.line += 1
             if text.lstrip().startswith("!"):
                 return "!"
-            found = (next(filter(None, m.groups()), "") for m in WORD.finditer(text))
-            for word in found:
+            words = (next(filter(None, m.groups()), "") for m in WORD.finditer(text))
+            for word in words:
                 if word.startswith("#"):
                     break
                 self._rest.append(word)

@@ -29,6 +29,8 @@ from mitsuba_cfs.errors import DataError
 DEEPEST = 32  # files that call each other
 MOST_OBJECTS = 5_000_000
 FARTHEST = 1e7  # of a coordinate [m]
+BEHIND = 5e-4  # from the front of a mirror to its back [m]
+INHERITED = "inherit"  # modifier of an alias that keeps the material's own
 PLAIN = RadianceMaterial("void", VOID)
 
 
@@ -52,7 +54,7 @@ class RadianceObject:
 
 @dataclass(frozen=True, slots=True)
 class RadianceScene:
-    """What scene files hold: surfaces, and what of the files is not used."""
+    """Surfaces of scene files, and which parts of the files are not used."""
 
     objects: tuple[RadianceObject, ...]
     files: tuple[Path, ...]  # all that were read
@@ -173,11 +175,11 @@ class _Reader:
             self._leave_out("primitives-not-read", primitive, kind)
 
     def _add(self, primitive: Primitive, outer: tuple[Xform, ...]) -> None:
-        given = next((x.modifier for x in outer if x.modifier is not None), primitive.modifier)
-        found = self._material(given, primitive)
-        if found is None:
+        modifier = next((x.modifier for x in outer if x.modifier is not None), primitive.modifier)
+        known = self._material(modifier, primitive)
+        if known is None:
             return
-        material, modifiers, definitions = found
+        material, modifiers, definitions = known
         triangles = shapes.triangles_of(primitive)
         if not len(triangles):
             self._leave_out("surfaces-without-area", primitive)
@@ -193,11 +195,15 @@ class _Reader:
             if len(self.objects) >= MOST_OBJECTS:
                 raise primitive.fault(f"more than {MOST_OBJECTS} surfaces")
             shown = self._with_patterns(material, definitions, moved)
-            self.objects.append(
+            sides = [(shown, moved)]
+            if material.kind == "mirror":  # black behind, as in Radiance
+                sides.append((replace(shown, gloss=None), _behind(moved)))
+            self.objects += [
                 RadianceObject(
-                    _name(primitive, outer), shown, modifiers, moved, primitive, definitions
+                    _name(primitive, outer), seen, modifiers, triangles, primitive, definitions
                 )
-            )
+                for seen, triangles in sides
+            ]
 
     def _material(
         self, modifier: str, surface: Primitive
@@ -205,6 +211,7 @@ class _Reader:
         """The material of a surface, its modifiers and definitions; None where none is read."""
         names: list[str] = []
         patterns: list[Definition] = []
+        above: Primitive | None = None  # the outermost alias
         while modifier != VOID:
             known = self.defined.get(modifier)
             if known is None:
@@ -214,9 +221,17 @@ class _Reader:
                 raise surface.fault(f"its modifier {modifier} modifies itself")
             names.append(modifier)
             if definition.kind == "alias":
+                above = above or definition
                 modifier = definition.strings[0]
+            elif definition.kind == "illum":  # what it replaces is there instead
+                self._leave_out("illum-replaced", surface)
+                modifier = definition.strings[0] if definition.strings else VOID
+                if modifier == VOID:
+                    return None
             elif definition.kind in MATERIALS:
-                patterns += self._patterns(definition, surface)
+                # an alias has the patterns that it names, or inherits those of the material
+                is_alias = above is not None and above.modifier != INHERITED
+                patterns += self._patterns(above if is_alias else definition, surface)
                 material = replace(material_of(definition), name=definition.name)
                 return material, tuple(names), (*patterns, known)
             elif definition.kind in PATTERNS:
@@ -279,7 +294,7 @@ class _Reader:
         self.first.setdefault((code, kind), primitive)
 
     def issues(self) -> Iterator[Issue]:
-        """What was met and not used, each kind once."""
+        """Parts of the files that are not used, each kind once."""
         for (code, kind), count in self.left_out.items():
             first = self.first[code, kind]
             values = {"count": count, "type": kind, "first": first.name}
@@ -296,6 +311,13 @@ def _places(outer: tuple[Xform, ...]) -> list[NDArray[np.float64]]:
     for xform in outer:
         places = [place @ copy for place in places for copy in xform.copies]
     return places
+
+
+def _behind(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The back of a sheet [T, 3, 3], seen from behind."""
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return (triangles - BEHIND * normals[:, None])[:, ::-1]
 
 
 def _name(primitive: Primitive, outer: tuple[Xform, ...]) -> str:

@@ -42,8 +42,8 @@ def triangles_of(primitive: Primitive) -> NDArray[np.float64]:
         raise primitive.fault(f"expected {ARGUMENTS[kind]} numbers, got {len(numbers)}")
     if (numbers[6:] < 0).any() or (kind == "sphere" and numbers[3] <= 0):
         raise primitive.fault("a radius is negative")
-    found = sphere(numbers[:3], numbers[3]) if kind == "sphere" else strip(kind, numbers)
-    return found[:, ::-1] if primitive.kind in INWARD else found
+    triangles = sphere(numbers[:3], numbers[3]) if kind == "sphere" else strip(kind, numbers)
+    return triangles[:, ::-1] if primitive.kind in INWARD else triangles
 
 
 def polygon_triangles(corners: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -66,7 +66,7 @@ def _copies(stages: list[tuple[str, int, list[NDArray[np.float64]]]]) -> Iterato
     count = math.prod(n for kind, n, _ in stages if kind == "-a")
     if max(count, *(n for kind, n, _ in stages if kind == "-i")) > MOST_COPIES:
         raise ValueError(f"{count} copies are more than {MOST_COPIES}")
-    found = [np.eye(4)]
+    copies = [np.eye(4)]
     for kind, times, moves in stages:
         once = np.eye(4)
         for move in moves:
@@ -74,8 +74,8 @@ def _copies(stages: list[tuple[str, int, list[NDArray[np.float64]]]]) -> Iterato
         powers = [
             np.linalg.matrix_power(once, k) for k in (range(times) if kind == "-a" else [times])
         ]
-        found = [power @ before for before in found for power in powers]
-    return iter(found)
+        copies = [power @ before for before in copies for power in powers]
+    return iter(copies)
 
 
 def _move(option: str, numbers: list[float]) -> NDArray[np.float64]:

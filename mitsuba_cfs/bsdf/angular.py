@@ -78,6 +78,17 @@ class AngularTable:
         theta, _ = basis.angles_within(np.arange(basis.size)[:, None], places, 0.5)
         return self._at(self.transmittance if values is None else values, end, theta).mean(axis=1)
 
+    def mixed(self, other: AngularTable, share: FloatArray) -> AngularTable:
+        """With a share [N] of light at each angle that meets another system at the same angles.
+
+        The reflectance of the back stays.
+        """
+        front = None
+        if self.reflectance_front is not None and other.reflectance_front is not None:
+            front = (1 - share) * self.reflectance_front + share * other.reflectance_front
+        passed = (1 - share) * self.transmittance + share * other.transmittance
+        return AngularTable(self.theta, passed, front, self.reflectance_back)
+
     def _at(self, values: FloatArray, end: float, theta: ArrayLike) -> FloatArray:
         angles = self.theta
         if angles[-1] < np.pi / 2 - 1e-9:

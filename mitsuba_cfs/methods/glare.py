@@ -49,6 +49,7 @@ from mitsuba_cfs.methods.point_in_time import (
     rooms_by_state,
 )
 from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.sky.annual import hour_numbers
 
 DIRECT_DEPTH = 2  # segments of a direct path after the surface that the eye sees: to window, to sky
 State = ArrayLike | None  # [G, L] of each window group in each hour, or [L] of all; None: the first
@@ -79,8 +80,9 @@ def hourly_glare(
     if metric not in METRICS or metric == "illuminance":
         raise UnknownMethodError(f"metric {metric!r}: expected one of {', '.join(METRICS[:3])}")
     _ = light.scene.eye
-    chosen = np.arange(len(light.sky.lit)) if hours is None else np.asarray(hours, dtype=np.int64)
-    every = hourly_states(state, len(light.systems), light.sky)
+    count = len(light.sky.lit)
+    chosen = np.arange(count) if hours is None else hour_numbers(hours, count)
+    every = hourly_states(state, light.systems, light.sky)
     rows, options = every[:, chosen], options or GlareOptions()
     if isinstance(light, SeasonalLight):
         return _of_seasons(light, metric, chosen, rows, options, progress, checkpoint=checkpoint)
@@ -133,8 +135,8 @@ def pictures(
     progress: Progress = silent,
 ) -> list[Picture]:
     """Luminance pictures [ny, nx] [cd/m2] of some hours [n] of the light's sky."""
-    hours = np.asarray(hours, dtype=np.int64)
-    rows = hourly_states(state, len(light.systems), light.sky)[:, hours]
+    hours = hour_numbers(hours, len(light.sky.lit))
+    rows = hourly_states(state, light.systems, light.sky)[:, hours]
     shown: dict[int, Picture] = {}
     if isinstance(light, PathLight):
         rooms = rooms_by_state(light, rows)
@@ -160,8 +162,8 @@ def rated_pictures(
     progress: Progress = silent,
 ) -> list[tuple[Picture, GlareResult]]:
     """Luminance pictures of some hours as of `pictures`, and the glare of each."""
-    hours, options = np.asarray(hours, dtype=np.int64), options or GlareOptions()
-    rows = hourly_states(state, len(light.systems), light.sky)[:, hours]
+    hours, options = hour_numbers(hours, len(light.sky.lit)), options or GlareOptions()
+    rows = hourly_states(state, light.systems, light.sky)[:, hours]
     if isinstance(light, SeasonalLight):
         return _rated_in_seasons(light, hours, rows, options, progress)
     results: dict[int, tuple[Picture, GlareResult]] = {}

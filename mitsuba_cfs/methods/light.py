@@ -299,7 +299,7 @@ def _by_season(
 
 
 def _states(light: SeasonalLight, state: State | None) -> State:
-    return hourly_states(state, len(light.systems), light.sky)
+    return hourly_states(state, light.systems, light.sky)
 
 
 def _with_view(light: PhaseLight | PathLight, view: View) -> PhaseLight:

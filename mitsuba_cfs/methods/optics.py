@@ -227,15 +227,28 @@ class MatrixOptics:
     outdoor_reflection: NDArray[np.float64] | None = None  # [K, K]
 
 
-def hourly_states(state: ArrayLike | None, groups: int, sky: AnnualSky) -> NDArray[np.int64]:
+def check_systems(systems: Sequence[States], scene_groups: Sequence[object]) -> None:
+    """Raise `ValueError` unless there are states of every window group."""
+    if len(systems) != len(scene_groups):
+        raise ValueError(f"systems of {len(systems)} groups for {len(scene_groups)} window groups")
+    for number, states in enumerate(systems):
+        if not isinstance(states, Sequence) or not states:
+            raise ValueError(f"systems[{number}]: expected a list of states, got {states!r:.60}")
+
+
+def hourly_states(
+    state: ArrayLike | None, systems: Sequence[States], sky: AnnualSky
+) -> NDArray[np.int64]:
     """The state of each window group in each hour of a sky [G, L].
 
-    Args: state: [G, L] or [L] of all groups, or of all hours of the year, [G, H] or [H]; None: the
-        first all the time.
+    Args:
+        state: [G, L] or [L] of all groups, or of all hours of the year, [G, H] or [H]; None: the
+            first all the time.  A group with fewer states than others is then in its last.
+        systems: of each window group its states [G][J].
 
     Raises: `ValueError` for another shape, and for what is no number of a state.
     """
-    hours = len(sky.lit)
+    groups, hours = len(systems), len(sky.lit)
     rows = np.zeros(hours, dtype=np.int64) if state is None else np.asarray(state)
     if not np.issubdtype(rows.dtype, np.integer):
         raise ValueError(f"state: expected whole numbers, got an array of {rows.dtype}")
@@ -245,8 +258,10 @@ def hourly_states(state: ArrayLike | None, groups: int, sky: AnnualSky) -> NDArr
     if rows.shape != (groups, hours):
         year = f"[{groups}, {sky.hours}] of the year"
         raise ValueError(f"state {rows.shape}: expected [{groups}, {hours}], or {year}")
-    if rows.min(initial=0) < 0:
-        raise ValueError(f"state {rows.min()}: expected 0 or more, the number of a system")
+    last = max((len(states) for states in systems), default=1) - 1
+    if not 0 <= rows.min(initial=0) <= rows.max(initial=0) <= last:
+        worst = rows.max() if rows.max() > last else rows.min()
+        raise ValueError(f"state {worst}: expected 0 to {last}, the number of a system")
     return rows
 
 

@@ -36,6 +36,7 @@ from mitsuba_cfs.methods.coefficients import (
 from mitsuba_cfs.methods.optics import (
     States,
     SystemOptics,
+    check_systems,
     combinations,
     hourly_states,
     in_state,
@@ -141,10 +142,7 @@ def phase_light(
         systems: the states of each window group [G].
         needs: metrics that several calls ask for, as of `phase_matrices`.
     """
-    if len(systems) != len(matrices.scene.groups):
-        raise ValueError(
-            f"systems of {len(systems)} groups for {len(matrices.scene.groups)} window groups"
-        )
+    check_systems(systems, matrices.scene.groups)
     if matrices.five_phase and sky.sun is None:
         raise ValueError("the five-phase method needs the sky's sun: annual_sky(..., sun=True)")
     of_all = [optics for states in systems for optics in states]
@@ -291,7 +289,7 @@ def sun_beams(
 
 def states_of(light: PhaseLight, state: State | None) -> State:
     """The state of each group in each hour [G, L], as far as it has states."""
-    rows = hourly_states(state, len(light.systems), light.sky)
+    rows = hourly_states(state, light.systems, light.sky)
     return np.minimum(rows, np.array([[len(states) - 1] for states in light.systems]))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.glare.sun_disc import SunDisc
-from mitsuba_cfs.methods.optics import States, combinations, hourly_states, in_state
+from mitsuba_cfs.methods.optics import States, check_systems, combinations, hourly_states, in_state
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -36,10 +36,7 @@ class PathLight:
     sampling: Sampling = field(default_factory=Sampling)
 
     def __post_init__(self) -> None:
-        if len(self.systems) != len(self.scene.groups):
-            raise ValueError(
-                f"systems of {len(self.systems)} groups for {len(self.scene.groups)} window groups"
-            )
+        check_systems(self.systems, self.scene.groups)
         if self.sky.sun is None:
             raise ValueError("path tracing needs the sky's sun: annual_sky(..., sun=True)")
 
@@ -50,7 +47,7 @@ class PathLight:
 
     def states_of(self, state: State | None) -> State:
         """The state of each group in each hour [G, L]."""
-        return hourly_states(state, len(self.systems), self.sky)
+        return hourly_states(state, self.systems, self.sky)
 
 
 @dataclass(frozen=True)

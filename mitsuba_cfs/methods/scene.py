@@ -43,6 +43,8 @@ class DaylightScene:
             raise ValueError(
                 f"points {self.points.shape}, normals {self.normals.shape}: expected [S, 3] both"
             )
+        if not (np.isfinite(self.points).all() and np.isfinite(self.normals).all()):
+            raise ValueError("points and normals: expected finite numbers")
         if len(self.adjacent) > len(self.groups):
             raise ValueError(
                 f"{len(self.adjacent)} adjacent rooms for {len(self.groups)} window groups: "

@@ -167,6 +167,14 @@ def given_sky(
     )
 
 
+def hour_numbers(hours: ArrayLike, count: int) -> NDArray[np.int64]:
+    """Numbers of hours [n]; `ValueError` where one is not among so many."""
+    numbers = np.asarray(hours, dtype=np.int64)
+    if numbers.ndim != 1 or numbers.min(initial=0) < 0 or numbers.max(initial=0) >= max(count, 1):
+        raise ValueError(f"hours: expected numbers from 0 to {count - 1}, got {hours!r:.60}")
+    return numbers
+
+
 def _of_series(
     series: SkySeries,
     solar: SkySeries | None,
@@ -177,7 +185,8 @@ def _of_series(
     reflectance: float | NDArray[np.float64],
     ground: str,
 ) -> AnnualSky:
-    lit = np.flatnonzero(is_up(series.sun)) if hours is None else np.asarray(hours, dtype=np.int64)
+    every = len(series.sun)
+    lit = np.flatnonzero(is_up(series.sun)) if hours is None else hour_numbers(hours, every)
     options: dict[str, Any] = {
         "ground_reflectance": reflectance,
         "ground": ground,
@@ -188,7 +197,7 @@ def _of_series(
         series.sun[lit],
         series.direct_normal[lit],
         lit,
-        len(series.sun),
+        every,
         series_matrix(series, lit, subdivision, "sun", **options) if sun else None,
         None if solar is None else series_matrix(solar, lit, subdivision, **options),
     )

@@ -6,6 +6,7 @@ names, `RoomOptions.named` returns them.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Any, get_type_hints
 
@@ -71,6 +72,9 @@ class RoomOptions:
             value = getattr(getattr(self, part) if part else self, key)
             if value not in choices:
                 raise ValueError(f"{name}: expected one of {choices}, got {value!r}")
+        for name, low, high, whole in LIMITS:
+            part, key = NAMES[name]
+            check_number(name, getattr(getattr(self, part), key), low, high, whole=whole)
         check_number("heat_step_s", self.heat_step_s, 1.0, 3600.0)
         check_number("infiltration_ach", self.infiltration_ach, 0.0)
         if self.outputs.annual_glare and self.method == "point-in-time":
@@ -145,6 +149,13 @@ NAMES = {
     "seed": ("sampling", "seed"),
 }
 
+# Least and greatest of options that are numbers, and whether they are whole
+LIMITS = (
+    ("sensor_spacing", 1e-3, math.inf, False), ("sensor_height", 0.0, math.inf, False),
+    ("sensor_margin", 0.0, math.inf, False), ("picture_count", 0, math.inf, True),
+    ("picture_size", 1, math.inf, True), ("equipment_w_m2", 0.0, math.inf, False),
+    ("person_w", 0.0, math.inf, False), ("floor_per_person", 1e-3, math.inf, False),
+)  # fmt: skip
 # Allowed values of the options that are words
 CHOICES = {
     "glare_sources": GLARE_SOURCES,

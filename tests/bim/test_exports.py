@@ -218,6 +218,19 @@ def test_a_bsdf_goes_to_energyplus_as_complex_fenestration(tmp_path):
     assert "** Severe" not in errors and len(air_temperatures(rows)) == 8760
 
 
+def test_the_gaps_of_a_complex_fenestration_have_the_u_of_the_system(tmp_path):
+    building = read_ifc(attached(tmp_path))
+    glazing, _ = known_fenestration(building.spaces, tmp_path / "attached.ifc").glazings()
+    write_epjson(building, tmp_path / "room.epJSON", glazing=glazing)
+    model = json.loads((tmp_path / "room.epJSON").read_text())
+    (system,) = model["Construction:ComplexFenestrationState"].values()
+    gaps = [model["WindowMaterial:Gap"][system[f"gap_{k}_name"]] for k in (1, 2, 3)]
+    still_air = 2.873e-3 + 7.76e-5 * (10.0 + 273.15)  # [W/(m K)], ISO 15099 annex B
+    resistance = sum(gap["thickness"] for gap in gaps) / still_air
+    (first, *_) = glazing.values()
+    assert 1 / (resistance + 0.04 + 0.13) == pytest.approx(first.u_value, rel=1e-6)  # EN 673
+
+
 def test_a_bsdf_and_its_u_g_and_tau_go_to_honeybee_and_gbxml(tmp_path):
     building = read_ifc(attached(tmp_path))
     glazing, _ = known_fenestration(building.spaces, tmp_path / "attached.ifc").glazings()

@@ -227,6 +227,42 @@ def test_a_pane_far_in_front_of_a_window_is_refused_unless_the_apertures_are_nam
     assert issue.severity == "loss"
 
 
+def test_light_past_the_rim_of_an_outer_pane_meets_the_inner_one_alone(tmp_path):
+    gap, rim, width, height = 0.1, 0.05, 2.8, 1.6
+    outer = pane("outer", -gap, (0.6 - rim, 3.4 + rim), (0.9 - rim, 2.5 + rim))
+    building = read(tmp_path, TINTED + outer)
+    (window,) = building.windows
+    (issue,) = issue_of(building, "glass-beside-panes")
+    assert 1 < issue.values["share"] < 10
+    phi = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    inner, both = (PlainGlass(panes).table for panes in (window.glass.panes[-1:],
+                                                         window.glass.panes))  # fmt: skip
+    for polar in np.radians([0.0, 45.0, 60.0, 75.0]):
+        over = [
+            np.clip(gap * np.tan(polar) * np.abs(turn(phi)) - rim, 0, size) / size
+            for turn, size in ((np.cos, width), (np.sin, height))
+        ]
+        past = np.mean(1 - (1 - over[0]) * (1 - over[1]))
+        expected = past * inner.transmitted(polar) + (1 - past) * both.transmitted(polar)
+        assert window.glass.table.transmitted(polar) == pytest.approx(expected, rel=0.02)
+
+
+def test_light_past_a_pane_meets_the_fabric_behind_it_alone(tmp_path):
+    scene = OFFICE.read_text().replace("void glass glazing", "void glass outer")
+    scene = scene.replace("glazing polygon", "outer polygon")
+    cloth = CLOTH.format(tau=".1", file=".") + pane("blind", 0.0, (0.6, 3.4), (0.9, 2.5), "cloth")
+    covered = scene.replace("0 0.9", "-0.2 0.9").replace("0 2.5", "-0.2 2.5")
+    path = tmp_path / "scene.rad"
+    path.write_text(covered + cloth)
+    (window,) = read_building_file(path).windows
+    assert [len(window.states), window.glass] == [1, None]
+    (state,) = window.states
+    glass = glass_table([(0.87, 1.52)])
+    for polar in np.radians([45.0, 75.0]):
+        straight = state.angular.transmitted(polar)
+        assert 0.1 * glass.transmitted(polar) * 1.01 < straight < 0.1
+
+
 CLOTH = (
     "void BRTDfunc cloth\n10 0 0 0 {tau} {tau} {tau} 0 0 0 {file}\n0\n"
     "9 .4 .4 .4 .1 .1 .1 .02 .02 .02\n"

@@ -5,13 +5,17 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bim.building_file import read_building_file
+from bim.model import Building
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.fabric import FabricBand, fabric_klems
 from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.surfaces import triangle_areas
+from mitsuba_cfs.trace.paths.scene import without_peaks
 
 DOCS = Path(__file__).parents[2] / "docs"
 OFFICE = (DOCS / "tutorials/office.rad").read_text()
@@ -36,6 +40,26 @@ SHAPES = {
     "mesh": "0", "instance": "0",
 }  # fmt: skip
 
+TUBE, CONE, BALL = 2 * np.pi * 0.2, np.pi * 0.3 * np.hypot(1, 0.1), 4 * np.pi * 0.2**2
+FACE = 0.0426  # reflectance of a face of glass
+PANE_PASSES = (1 - FACE) ** 2 * 0.6 / (1 - (FACE * 0.6) ** 2)
+PATTERN = {"brightfunc": 0.5 + 0.1 * 2, "colorfunc": 0.265 * 0.5 + 0.67 * 0.4 + 0.065 * 0.3}
+# of a surface its area, or diffuse and specular reflectance; of a window its transmittance at
+# normal incidence, all and straight on
+EXPECTED: dict[tuple[str, str], tuple[float, ...]] = {
+    ("polygon", "surface"): (1.0,), ("ring", "surface"): (np.pi * 0.5**2,),
+    **{(kind, "surface"): (TUBE,) for kind in ("cylinder", "tube")},
+    **{(kind, "surface"): (CONE,) for kind in ("cone", "cup")},
+    **{(kind, "surface"): (BALL,) for kind in ("sphere", "bubble")},
+    ("plastic", "surface"): (0.5, 0.0), ("plastic2", "surface"): (0.97 * 0.5, 0.03),
+    **{(kind, "surface"): (0.7 * 0.5, 0.3 * 0.5) for kind in ("metal", "metal2")},
+    ("mirror", "surface"): (0.0, 0.8),
+    **{(kind, "window"): (0.8 * 0.6, 0.8 * 0.6 * 0.2) for kind in ("trans", "trans2")},
+    ("glass", "window"): (PANE_PASSES, PANE_PASSES), ("BRTDfunc", "window"): (0.12, 0.1),
+    **{(kind, "window"): (0.2, 0.1) for kind in ("BSDF", "aBSDF")},
+    **{(kind, "pattern on glass"): (0.917 * 0.87 * mean,) * 2 for kind, mean in PATTERN.items()},
+}  # fmt: skip
+
 
 def rows() -> list[tuple[str, str, str]]:
     text = (DOCS / "radiance.md").read_text().partition("## Modifiers and primitives")[2]
@@ -46,6 +70,29 @@ def rows() -> list[tuple[str, str, str]]:
         if len(cells) == 4 and cells[0].startswith("`"):
             found += [(kind, cells[1], cells[2]) for kind in re.findall(r"`(\w+)`", cells[0])]
     return found
+
+
+def figures(building: Building, use: str) -> list[tuple[float, ...]]:
+    """What of a building compares with `EXPECTED`: of the surface, or of the window."""
+    if "glass" in use or use == "window":
+        (window,) = building.windows
+        if window.glass is not None:
+            return [(window.glass.transmittance,) * 2]
+        (state,) = window.states
+        bsdf = state.bands["Visible"]
+        whole = float(bsdf.direct_hemispherical(bsdf.transmission_front)[0])
+        peaks = without_peaks(bsdf, "transmission")
+        beam = whole - float(peaks.direct_hemispherical(peaks.transmission_front)[0])
+        return [(whole, beam if state.angular is None else state.angular.transmittance[0])]
+    (room,) = building.spaces
+    name = "floor" if "pattern" in use else "thing"
+    parts = [part for part in (*room.furniture, *room.faces) if part.name.startswith(name)]
+    areas = [float(triangle_areas(part.triangles).sum()) for part in parts]
+    shares = [
+        (part.reflectance_visible, 0.0 if part.gloss is None else part.gloss.at_normal)
+        for part in parts
+    ]
+    return [(area,) for area in areas] + shares
 
 
 def scene_of(kind: str, use: str) -> str:
@@ -78,10 +125,35 @@ def test_a_type_has_the_status_of_the_table(tmp_path, kind, use, status):
     if status == "computed":
         assert not issues
         assert len(building.windows) == 1
+        assert_figures(building, kind, use)
     else:
         severities = {"approximated": {"assumption"}, "left out": {"loss", "unused"}}[status]
         assert {issue.severity for issue in issues} <= severities
+        if status == "approximated":
+            assert_figures(building, kind, use)
         assert any(re.search(r"scene\.rad:\d+$", issue.where) for issue in issues)
+
+
+def assert_figures(building: Building, kind: str, use: str) -> None:
+    """The surface or window has the figures of its definition."""
+    plain = (0.25 * PATTERN.get(kind, 1.0), 0.0)  # of the carpet
+    expected = EXPECTED.get((kind, use), plain)
+    values = figures(building, use)
+    assert any(one == pytest.approx(expected, rel=0.02, abs=1e-6) for one in values), values
+
+
+def test_an_illum_is_its_other_material_or_is_not_there(tmp_path):
+    path = tmp_path / "scene.rad"
+    sheet = OFFICE[OFFICE.index("glazing polygon window") :].split("\n\n")[0]
+    for strings, count in (("0", 0), ("1 void", 0), ("1 plaster", 1)):
+        illum = f"\nvoid illum lit\n{strings}\n0\n3 1 1 1\n"
+        path.write_text(OFFICE + illum + f"\nlit polygon thing\n0\n0\n{SHEET}\n")
+        building = read_building_file(path)
+        assert len(building.windows) == 1
+        assert len(figures(building, "surface")) == 2 * count
+    path.write_text(OFFICE + "\nvoid illum lit\n1 glazing\n0\n3 1 1 1\n")
+    path.write_text(path.read_text() + sheet.replace("glazing polygon window", "lit polygon thing"))
+    assert {window.name for window in read_building_file(path).windows} <= {"window", "thing"}
 
 
 def test_the_table_has_all_types_that_are_known():

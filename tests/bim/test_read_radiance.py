@@ -195,6 +195,28 @@ def test_the_last_definition_before_a_surface_counts_and_an_alias_leads_on(tmp_p
     assert len(scene.of_modifiers(["other"])) == 1
 
 
+def test_an_alias_has_the_patterns_that_it_names_or_inherits_those_of_the_material(tmp_path):
+    half = "void brightfunc half\n2 .5 .\n0\n0\n"
+    text = half + GREY + GREY.replace("void plastic grey", "half plastic dim")
+    for modifier, name, reference in (("half", "one", "grey"), ("void", "two", "dim"),
+                                      ("inherit", "three", "dim")):  # fmt: skip
+        text += f"{modifier} alias {name} {reference}\n" + SQUARE.replace("grey", name)
+    diffuse = [one.material.diffuse for one in read_radiance(write(tmp_path, text)).objects]
+    assert diffuse == pytest.approx([0.25, 0.5, 0.25])
+
+
+def test_the_back_of_a_mirror_is_black(tmp_path):
+    text = "void mirror glare\n0\n0\n3 .9 .9 .9\n" + SQUARE.replace("grey", "glare")
+    front, back = read_radiance(write(tmp_path, text)).objects
+    assert front.material.gloss.at_normal == pytest.approx(0.9)
+    assert back.material.gloss is None and back.material.diffuse == 0
+    assert back.normal == pytest.approx(-front.normal)
+    apart = (back.triangles[0, 0] - front.triangles[0, 0]) @ front.normal
+    assert -1e-3 < apart < 0
+    with pytest.raises(DataError, match=r"mirror glare: its other material grey is not computed"):
+        read_radiance(write(tmp_path, GREY + text.replace("glare\n0", "glare\n1 grey")))
+
+
 def test_what_is_not_used_is_named_once_with_its_count(tmp_path):
     text = (
         GREY

@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.glare import classes, indices
-from mitsuba_cfs.glare.position_index import guth_index, iwata_index, kim_index, position_index
+from mitsuba_cfs.glare.position_index import (
+    guth_index,
+    iwata_index,
+    kim_index,
+    position_index,
+    view_angles,
+)
 from mitsuba_cfs.images.view import fisheye
 
 ONE = (np.array([1e4]), np.array([0.01]), np.array([2.0]))  # L, omega, P
@@ -109,3 +115,103 @@ def test_veiling_luminance_by_hand():
     sigma = np.radians([30.0, 60.0])
     by_hand = 5 * (1e4 * 0.01 * math.sqrt(3) / 2 / 30 + 2e4 * 0.02 * 0.5 / 60)
     assert indices.veiling_luminance([1e4, 2e4], [0.01, 0.02], sigma) == pytest.approx(by_hand)
+
+
+def test_each_index_by_hand():
+    inf, nan = math.inf, math.nan
+    # Q = 20.4 omega + 1.52 omega^0.2 - 0.075 of an omega of 0.01; of one source the power is 1
+    Q = 0.204 + 1.52 * 0.01**0.2 - 0.075
+    dgi = 10 * math.log10(0.478 * 1e4**1.6 * 0.0025**0.8 / (2**0.85 + 70))
+    none = ([], [], [])
+    for value, by_hand in (
+        (indices.daylight_glare_probability(0.5, 0.0), 5.87e-5 * 0.5 + 0.159),
+        # contrast 0.25 * 400 / 100 = 1: UGR 0, UGP 0
+        (indices.unified_glare_rating(400.0, 100.0), 0.0),
+        (indices.unified_glare_rating(1.0, 0.25), 0.0),
+        (indices.unified_glare_rating(400.0, 0.0), -99.0),
+        (indices.unified_glare_probability(400.0, 100.0), 0.0),
+        (indices.unified_glare_probability(0.0, 100.0), 0.0),
+        (indices.unified_glare_probability(0.4, 0.01), 0.26),
+        # (1 + 2/7 32^-0.2)^-10 = (8/7)^-10
+        (indices.logistic_ugp(3200.0, 100.0), (8 / 7) ** -10),
+        (indices.logistic_ugp(0.32, 0.01), (8 / 7) ** -10),
+        (indices.logistic_ugp(0.0, 100.0), 0.0),
+        (indices.cie_glare_index(1000.0, 1000.0, 0.0), 8 * math.log10(2.0)),
+        (indices.cie_glare_index(0.5, 1.0, 0.0), 0.0),
+        (indices.simplified_dgp(1000.0), 0.2462),
+        (indices.age_factor(70.0), 1 / 0.75),
+        (indices.age_factor(0.0), 1 / 1.1),
+        (indices.low_light_factor(1000.0 / 3), 1 / (1 + math.exp(-4.0))),
+        (indices.discomfort_glare_rating(*ONE, 3.0), 0.5 * 1e4 * Q / (2 * 3**0.44)),
+        (indices.discomfort_glare_rating(*none, 3.0), 0.0),
+        (indices.modified_dgi(*ONE, 2 * math.pi), dgi),
+        (indices.daylight_glare_index([1e4], [0.01], [3.0], 100),
+         10 * math.log10(0.478 * 1e4**1.6 * (0.01 / 9) ** 0.8 / 170)),
+        # E_v = 10 pi: 8; sum L omega/P^2 = 1e4 * 0.01 / 4 = 25 over 0.25: 16
+        (indices.experimental_ugr(*ONE, 0.25, 10 * math.pi), 24.0),
+        (indices.experimental_ugr([1e4], [0.02], [3.0], 1.0, math.pi), 8 * math.log10(200 / 9)),
+        (indices.experimental_ugr(*none, 2.5, 10 * math.pi), 0.0),
+        (indices.visual_comfort_probability(19.9), 100.0),
+        (indices.visual_comfort_probability(20.0),
+         50 * math.erf((6.374 - 1.3227 * math.log(20)) / math.sqrt(2)) + 50),
+        (indices.visual_comfort_probability(750.5), 0.0),
+        (indices.cie_veiling_luminance([2.7], np.radians([3.0]))[0], 3.0),
+        (indices._ratio(0.5, 0.0), inf),
+        (indices._ratio(0.0, 2.0), 0.0),
+        (indices._ratio(0.0, 0.0), nan),
+        (indices._log10(0.0), -inf),
+        (indices._log10(0.1), -1.0),
+        (indices._log10(-1.0), nan),
+    ):  # fmt: skip
+        assert value == pytest.approx(by_hand, rel=1e-9, abs=1e-12, nan_ok=True)
+    with pytest.raises(ValueError, match="age"):
+        indices.age_factor(150.0)
+
+
+def test_position_indices_by_hand():
+    """Guth's at 20 and 90 degrees, Kim's of four angles, by their polynomials in degrees."""
+    for sigma, tau in ((20.0, 90.0), (35.0, 45.0)):
+        linear = 35.2 - 0.31889 * tau - 1.22 * math.exp(-2 * tau / 9)
+        square = 21 + 0.26667 * tau - 0.002963 * tau**2
+        guth = math.exp(1e-3 * linear * sigma + 1e-5 * square * sigma**2)
+        assert guth_index(*np.radians([sigma, tau])) == pytest.approx(guth)
+        middle = -9e-6 * tau**3 + 1.4e-3 * tau**2 + 0.0866 * tau + 21.633
+        width = -9e-6 * tau**3 + 1.3e-3 * tau**2 + 0.0853 * tau + 8.772
+        kim = math.exp((sigma - middle) / width)
+        assert kim_index(*np.radians([sigma, tau])) == pytest.approx(kim)
+    # at 30 degrees straight to the side Iwata's beta is sigma
+    assert iwata_index(math.pi / 6, math.pi / 2) == pytest.approx(math.exp(0.1947 + 0.189))
+    view = fisheye((0, 0, 0), (0, 1, 0), 100)
+    above = [0.0, math.cos(0.3), math.sin(0.3)]
+    aside = [math.sin(0.3), math.cos(0.3), 0.0]
+    sigma, tau, below = view_angles([above, aside, [0, 1, 0], [1, 0, 0], [0, 0, -1]], view)
+    assert sigma == pytest.approx([0.3, 0.3, 0.0, math.pi / 2, math.pi / 2])
+    assert tau[:2] == pytest.approx([0.0, math.pi / 2]) and tau[3:] == pytest.approx(
+        [math.pi / 2, math.pi]
+    )
+    assert list(below) == [False, False, False, False, True]
+    assert view_angles([[0, 1, 0.5]], view)[2] == [False]
+    assert position_index([above], view, model="kim") == pytest.approx(kim_index(0.3, 0.0))
+    assert position_index([above], view) == pytest.approx(guth_index(0.3, 0.0))
+
+
+def test_tau_is_measured_from_the_vector_that_was_stated():
+    """Looking 45 degrees down with the vertical as up: what is above the axis is 45 degrees off."""
+    view = fisheye((0, 0, 0), (0, 1, -1), 100)
+    forward, up = np.array([0, 1, -1]) / math.sqrt(2), np.array([0, 1, 1]) / math.sqrt(2)
+    _, tau, below = view_angles([math.cos(0.2) * forward + math.sin(0.2) * up], view)
+    assert tau == pytest.approx([math.pi / 4]) and not below[0]
+
+
+def test_shares_and_quantiles_refuse_what_is_no_year():
+    for wrong in ([], [[0.3]], [0.3, np.nan]):
+        for function in (classes.hour_not_exceeded, lambda dgp: classes.exceeded_share(dgp, 0.4)):
+            with pytest.raises(ValueError, match="all finite"):
+                function(wrong)
+    tenths = np.arange(10) / 10
+    assert classes.hour_not_exceeded(tenths, 0.1) == 0.8
+    assert classes.hour_not_exceeded(tenths, 0.099) == 0.9  # not one whole hour
+    assert classes.hour_not_exceeded(tenths, 0.0) == 0.9
+    assert classes.exceeded_share(tenths, 0.8) == pytest.approx(0.1)
+    hours = classes.class_hours([0.35, 0.36, 0.40, 0.45, 0.46, 0.47])
+    assert list(hours) == [1, 2, 1, 2] and len(classes.class_hours([0.1])) == 4

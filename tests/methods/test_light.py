@@ -103,10 +103,27 @@ def test_a_sampling_that_cannot_be_is_refused(name, value) -> None:
         Sampling(**{name: value})
 
 
-def test_a_state_below_zero_is_refused() -> None:
+@pytest.mark.parametrize("state", [-1, 2])
+def test_a_state_that_no_group_has_is_refused(state) -> None:
     light = daylight(scene(), [[*glass()[0], AngularOptics([0.0, 0.1])]], SKY, sampling=FEW)
-    with pytest.raises(ValueError, match="0 or more"):
-        illuminance(light, np.array([-1]))
+    for call in (illuminance, eye_illuminance, hourly_glare):
+        with pytest.raises(ValueError, match=f"state {state}: expected 0 to 1"):
+            call(light, state=np.array([state]))
+
+
+def test_hours_and_systems_that_cannot_be_are_refused_by_name() -> None:
+    with pytest.raises(ValueError, match=r"systems\[0\]: expected a list of states"):
+        daylight(scene(), glass()[0], SKY, sampling=FEW)
+    with pytest.raises(ValueError, match=r"systems\[0\]"):
+        daylight(scene(), [[]], SKY, sampling=FEW, method="point-in-time")
+    with pytest.raises(ValueError, match="points and normals: expected finite"):
+        replace(scene(), points=POINTS * np.nan)
+    light = daylight(scene(), glass(), SKY, sampling=FEW)
+    for call in (pictures, rated_pictures):
+        with pytest.raises(ValueError, match="hours: expected numbers from 0 to 0"):
+            call(light, [1])
+    with pytest.raises(ValueError, match="hours: expected numbers"):
+        hourly_glare(light, hours=[-1])
 
 
 def test_optics_go_to_another_process_after_their_use() -> None:

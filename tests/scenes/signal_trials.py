@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +26,7 @@ CODES = {signal.SIGTERM: 143, signal.SIGHUP: 129, signal.SIGINT: 130}
 WORDS = {143: "terminated", 129: "terminated", 130: "interrupted"}
 TRACING = ("run", "demo", "comply", "pv", "dgp", "study", "picture", "calibrate", "thermal")
 LONGEST_S = 20.0  # until the signal of a command that traces rays
+PROMPT_S = 2.0  # after a signal, in which a result may still take its place
 LIMIT_S = 120.0  # until a process has to have ended
 BY_PYTHON = (-signal.SIGTERM, -signal.SIGHUP, -signal.SIGINT)  # before the program has begun
 
@@ -41,35 +44,59 @@ class Trial:
     faults: tuple[str, ...]
 
 
-def trial(number: int, folder: Path) -> Trial:
-    """Start a command on an earlier result of it, and send signals.
+@dataclass(frozen=True, slots=True)
+class Earlier:
+    """A command's earlier result in a folder, where trials follow each other."""
 
-    Args: folder: empty.
-    """
+    place: Place
+    environment: dict[str, str]
+    scratch: Path
+    content: dict[str, bytes]
+    seconds: float  # that it took
+
+    @classmethod
+    def of(cls, command: str, folder: Path) -> Earlier:
+        """Make it. Args: folder: empty."""
+        place = Place(JOBS[command], folder / "inputs", folder / "results" / JOBS[command].name)
+        scratch = folder / "tmp"
+        for one in (place.inputs, place.out.parent, scratch):
+            one.mkdir()
+        environment = os.environ | {"TMPDIR": str(scratch), "CFS_CACHE": str(folder / "cache")}
+        begin = time.monotonic()
+        process = _started("tests.scenes.quick_work", place, environment)
+        _, text = process.communicate(timeout=LIMIT_S)
+        if process.returncode:
+            raise RuntimeError(f"{command}: {text}")
+        seconds = time.monotonic() - begin
+        return cls(place, environment, scratch, place.content(), seconds)
+
+    @property
+    def unchanged(self) -> bool:
+        """Whether the result is still that one, without files left beside it."""
+        return self.content == self.place.content() and not self.left()
+
+    def left(self) -> list[Path]:
+        """Temporary files."""
+        return [*self.place.temporaries(), *self.scratch.iterdir()]
+
+
+def trial(number: int, earlier_of: Callable[[str], Earlier]) -> Trial:
+    """Start a command on an earlier result of it, and send signals."""
     chance = random.Random(number)
     command = chance.choice(sorted(JOBS))
     kind = chance.choice(sorted(SIGNALS))
-    place = Place(JOBS[command], folder / "inputs", folder / "results" / JOBS[command].name)
-    scratch = folder / "tmp"
-    for one in (place.inputs, place.out.parent, scratch):
-        one.mkdir()
-    environment = os.environ | {"TMPDIR": str(scratch), "CFS_CACHE": str(folder / "cache")}
-    begin = time.monotonic()
-    earlier = _started("tests.scenes.quick_work", place, environment)
-    _, text = earlier.communicate(timeout=LIMIT_S)
-    if earlier.returncode:
-        raise RuntimeError(f"{command}: {text}")
-    longest = time.monotonic() - begin
-    before = place.content()
+    earlier = earlier_of(command)
+    place, environment, longest = earlier.place, earlier.environment, earlier.seconds
     traces = command.split()[0] in TRACING
     after = chance.uniform(0.0, max(longest, LONGEST_S) if traces else longest)
     again = chance.uniform(0.0, 0.5)
+    shutil.rmtree(place.out / "cases", ignore_errors=True)  # made-up ones, and those of trials
     process = _started("scenes.cli", place, environment)
     try:
         _, text = process.communicate(timeout=after)
         return Trial(number, command, kind, after, "before it", 0.0, ())
     except subprocess.TimeoutExpired:
-        sent = time.monotonic()
+        sent, sent_at = time.monotonic(), time.time()
         for index, one in enumerate(SIGNALS[kind]):
             time.sleep(again * bool(index))
             process.send_signal(one)
@@ -90,14 +117,16 @@ def trial(number: int, folder: Path) -> Trial:
         faults.append(f"traceback: {text.strip().splitlines()[-1][:80]}")
     elif code == 0:
         ended = "before it"
+        late = place.newest() - sent_at
+        if late > PROMPT_S:
+            faults.append(f"the signal was lost: a result {late:.1f} s after it, exit code 0")
     elif code != expected:
         faults.append(f"exit code {code}")
     elif not text.rstrip().endswith(WORDS[expected]):
         faults.append(f"last line: {text.rstrip()[-60:]}")
-    if place.temporaries() or any(scratch.iterdir()):
-        left = [*place.temporaries(), *scratch.iterdir()]
+    if left := earlier.left():
         faults.append(f"left {', '.join(sorted(one.name for one in left))}")
-    if ended != "before it" and place.content() != before:
+    if ended != "before it" and place.content() != earlier.content:
         faults.append("the earlier result has changed")
     return Trial(number, command, kind, after, ended, seconds, tuple(faults))
 

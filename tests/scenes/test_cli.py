@@ -230,6 +230,29 @@ def test_no_signal_ends_a_call_of_a_library(name, number, raised):
     assert space["ended"] == [number]
 
 
+def test_no_signal_ends_the_body_of_a_traced_loop(variant):
+    """Dr.Jit answers an exception in it with a `RuntimeError`: the signal comes after the loop."""
+    import drjit as dr
+    import mitsuba as mi
+
+    ended = []
+
+    def body(number):
+        signal.raise_signal(signal.SIGTERM)
+        ended.append(number)
+        return (number + 1,)
+
+    before = signal.signal(signal.SIGTERM, cli.Stop())
+    try:
+        with pytest.raises(cli.Terminated):
+            dr.while_loop((mi.UInt(0),), lambda number: number < 5, body)
+            assert ended
+            time.sleep(5)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert ended
+
+
 def test_a_second_signal_does_not_end_the_cleaning_up():
     """Nor the exit: Python has its own handlers by then."""
     program = (

@@ -196,6 +196,10 @@ class Place:
             if not {"cases", "ratings", "filler"} & set(name.split("/"))
         }
 
+    def newest(self) -> float:
+        """When the last file of the output was written [s since 1970]."""
+        return max(p.stat().st_mtime for p in (self.out, *self.out.rglob("*")) if p.is_file())
+
     def temporaries(self) -> list[Path]:
         """What is left of unfinished work."""
         roots = (self.out.parent, self.inputs)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.sky import albedo
 from mitsuba_cfs.sky.albedo import SNOW, with_albedo
 from mitsuba_cfs.sky.annual import annual_sky
 from mitsuba_cfs.sky.epw import read_epw
@@ -79,3 +80,35 @@ def test_columns_of_an_epw(tmp_path):
     np.testing.assert_allclose(weather.stated_albedo[:10], 0.63)
     assert np.isnan(weather.stated_albedo[10:]).all()
     np.testing.assert_allclose(weather.snow_depth_cm[:11], [15.0] * 10 + [0.0])
+
+
+def test_numbers_of_the_sources():
+    """Liu and Jordan: 0.7 under snow; days warmer than 10 degC and 100 hours are this program's."""
+    assert (SNOW, albedo.SNOW_CM, albedo.TOO_WARM_C, albedo.MANY_HOURS) == (0.7, 1.0, 10.0, 100)
+
+
+@pytest.mark.parametrize("wrong", [-0.01, 1.01, (0.2,) * 11, (*(0.2,) * 11, 1.5), (-0.1,) * 12])
+def test_reflectances_outside_of_their_range_are_refused(weather, wrong):
+    with pytest.raises(DataError, match="from 0 to 1"):
+        with_albedo(weather, wrong)
+
+
+def test_all_of_zero_and_one_are_reflectances(weather):
+    assert with_albedo(weather, 0.0).albedo == 0.0
+    months = (1.0, *(0.0,) * 11)
+    by_hour = with_albedo(weather, months).albedo
+    assert by_hour[:744].all() and not by_hour[744:].any()
+
+
+def test_snow_counts_in_hours_of_any_light(weather):
+    """There is a note from 100 hours of daylight on: a sky without sun counts, night does not."""
+    day = np.flatnonzero((weather.direct_normal == 0) & (weather.diffuse_horizontal > 0))
+    night = np.flatnonzero(weather.direct_normal + weather.diffuse_horizontal == 0)
+    cold = replace(weather, dry_bulb_c=np.full(8760, 0.0), notes=())
+    for hours, noted in ((day[:100], True), (day[:99], False), (night[:300], False)):
+        depth = np.zeros(8760)
+        depth[hours] = 1.0
+        assert bool(with_albedo(replace(cold, snow_depth_cm=depth), None).notes) == noted
+        thin = replace(cold, snow_depth_cm=0.99 * depth)
+        assert not with_albedo(thin, None).notes
+    assert len(day) >= 100 and len(night) >= 300

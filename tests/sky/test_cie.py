@@ -107,3 +107,53 @@ def test_unknown_kinds():
             relative_luminance(wrong, HIGH, sun_at(40, 90))
     with pytest.raises(ValueError, match="not negative"):
         cie_patches("overcast", FINE, -1.0)
+
+
+ISO_15469 = """
+1 4 -.7 0 -1 0, 2 4 -.7 2 -1.5 .15, 3 1.1 -.8 0 -1 0, 4 1.1 -.8 2 -1.5 .15, 5 0 -1 0 -1 0,
+6 0 -1 2 -1.5 .15, 7 0 -1 5 -2.5 .3, 8 0 -1 10 -3 .45, 9 -1 -.55 2 -1.5 .15,
+10 -1 -.55 5 -2.5 .3, 11 -1 -.55 10 -3 .45, 12 -1 -.32 10 -3 .45, 13 -1 -.32 16 -3 .3,
+14 -1 -.15 16 -3 .3, 15 -1 -.15 24 -2.8 .15
+"""
+
+
+@pytest.mark.parametrize("row", ISO_15469.split(","))
+def test_standard_skies_by_the_formula_of_the_standard(row):
+    """phi(Z) f(chi)/(phi(0) f(Z_s)) of ISO 15469, equations 1 to 5, one direction at a time."""
+    number, a, b, c, d, e = map(float, row.split())
+    sun = sun_at(33.0, 140.0)
+
+    def phi(cosine):
+        return 1 + a * np.exp(b / cosine)
+
+    def f(chi):
+        return 1 + c * (np.exp(d * chi) - np.exp(d * np.pi / 2)) + e * np.cos(chi) ** 2
+
+    for altitude, azimuth in ((10.0, 30.0), (55.0, 150.0)):
+        towards = sun_at(altitude, azimuth)
+        chi = np.arccos(towards @ sun)
+        by_hand = phi(towards[2]) * f(chi) / (phi(1.0) * f(np.radians(90.0 - 33.0)))
+        assert relative_luminance(int(number), [towards], sun)[0] == pytest.approx(by_hand)
+
+
+def test_clear_and_intermediate_skies_by_the_formulas_of_gensky():
+    """skybright.cal: 0.91 + 10 exp(-3 chi) + 0.45 cos^2 chi; Nakamura's intermediate sky."""
+    sun, towards = sun_at(33.0, 140.0), sun_at(55.0, 200.0)
+    z, zs, chi = np.radians(35.0), np.radians(57.0), np.arccos(towards @ sun)
+
+    def f(angle):
+        return 0.91 + 10 * np.exp(-3 * angle) + 0.45 * np.cos(angle) ** 2
+
+    clear = f(chi) * (1 - np.exp(-0.32 / np.cos(z))) / (f(zs) * (1 - np.exp(-0.32)))
+    assert relative_luminance("clear", [towards], sun)[0] == pytest.approx(clear)
+
+    def between(z, chi):
+        level = (1.35 * np.sin(5.631 - 3.59 * z) + 3.12) * np.sin(4.396 - 2.6 * zs) + 6.37 - z
+        return level * np.exp(-chi * 0.563 * ((2.629 - z) * (1.562 - zs) + 0.812))
+
+    found = relative_luminance("intermediate", [towards], sun)[0]
+    assert found == pytest.approx(between(z, chi) / between(0.0, zs))
+    with pytest.raises(ValueError, match="not negative"):
+        cie_patches("overcast", FINE, 1.0, direct_horizontal=-0.5)
+    dark = cie_patches("overcast", FINE, 0.0, direct_horizontal=np.pi, ground_reflectance=0.5)
+    assert dark[0] == pytest.approx(0.5) and not dark[1:].any()

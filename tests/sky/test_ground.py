@@ -9,7 +9,12 @@ import pytest
 
 from mitsuba_cfs.sky.annual import annual_sky, given_sky
 from mitsuba_cfs.sky.epw import read_epw
-from mitsuba_cfs.sky.matrix import gendaylit_ground, series_for_suns, sky_series
+from mitsuba_cfs.sky.matrix import (
+    gendaylit_ground,
+    reflected_ground,
+    series_for_suns,
+    sky_series,
+)
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.perez import relative_luminance
 from mitsuba_cfs.sky.sun import direction
@@ -114,3 +119,28 @@ def test_what_does_not_fit_is_refused():
 def _three_hours(dew):
     padded = np.concatenate([[dew[0]] * 2, dew])
     return np.convolve(padded, np.full(3, 1 / 3), mode="valid")
+
+
+def test_ground_of_three_skies_by_gendaylits_formulas():
+    """Zenith 1,000 cd/m2, sun at 50 degrees with 3,000 lx on the ground, reflectance 0.3."""
+    h = np.radians(50.0)
+    suns = direction(np.full(3, h), np.full(3, 2.0))
+    found = gendaylit_ground(
+        np.full(3, 1e3), np.full(3, 3e3), np.array([1.0, 5.99, 6.0]), suns, 0.3
+    )
+    x, below = (50.0 - 45.0) / 45.0, np.pi / 2 - h
+    clear = 0.274 * (0.91 + 10 * np.exp(-3 * below) + 0.45 * np.sin(h) ** 2)
+    series = 2.766521 + 0.547665 * x - 0.369832 * x**2 + 0.009237 * x**3 + 0.059229 * x**4
+    between = 2.739 + 0.9891 * np.sin(0.3119 + 2.6 * h)
+    between *= np.exp(-below * (0.4441 + 1.48 * h))
+    middle = 3.5556 - 2.7152 * x - 1.3081 * x**2 + 1.0660 * x**3 + 0.60227 * x**4
+    factors = np.array([0.777778, middle / between / np.pi, series / clear / np.pi])
+    assert found == pytest.approx(0.3 * (1e3 * factors + 3e3 / np.pi))
+    # x = -1 at the horizon, where the polynomials' odd terms change sign
+    low = gendaylit_ground(
+        np.full(1, 1e3), np.zeros(1), np.array([7.0]), np.array([[0.0, 1.0, 0.0]]), 1.0
+    )
+    clear = 0.274 * (0.91 + 10 * np.exp(-1.5 * np.pi))
+    series = 2.766521 - 0.547665 - 0.369832 - 0.009237 + 0.059229
+    assert low == pytest.approx(1e3 * series / clear / np.pi)
+    assert reflected_ground(np.array([1e4]), 0.2) == pytest.approx(2e3 / np.pi)

@@ -133,3 +133,56 @@ def test_a_study_out_of_range_is_one_line() -> None:
 def test_energyplus_is_not_given_a_street() -> None:
     with pytest.raises(DataError, match="without a heat island"):
         check_twin(_study())
+
+
+def test_limits_and_numbers_of_the_source() -> None:
+    """0.2 to 0.9, 0 to 0.4, cities of north-western Europe; a knot is 0.514 m/s."""
+    for sky, green in ((0.2, 0.0), (0.9, 0.4)):
+        found = maximum_heat_island(sky, green, 1.0, 1.0, 1.0)
+        assert found == pytest.approx(2 - sky - green)
+    for sky, green, word in ((0.19, 0.2, "sky_view"), (0.91, 0.2, "sky_view"),
+                             (0.5, -0.01, "vegetation"), (0.5, 0.41, "vegetation")):  # fmt: skip
+        with pytest.raises(ValueError, match=f"{word}: expected"):
+            maximum_heat_island(sky, green, 1.0, 1.0, 1.0)
+    for wind in (0.0, [1.0, 0.0]):
+        with pytest.raises(ValueError, match="without any"):
+            maximum_heat_island(0.5, 0.2, 1.0, 1.0, wind)
+
+
+def test_a_calm_day_counts_with_half_a_metre_per_second() -> None:
+    calm, slow = (
+        in_city(_weather(wind_speed=np.full(72, wind)), 0.5, 0.2, NIGHT).dry_bulb_c
+        for wind in (0.1, 0.5)
+    )
+    np.testing.assert_array_equal(calm, slow)
+
+
+def test_density_by_the_gas_law() -> None:
+    """287.058 and 1007 J/(kg K): at 20 degC and 101,325 Pa 1.2041 kg/m3."""
+    still = _weather(dry_bulb_c=np.full(72, 20.0) + 10.0 * (np.arange(72) % 24 == 12))
+    density = 101325 / (287.058 * np.where(np.arange(24) == 12, 303.15, 293.15))
+    heating = (still.global_horizontal[24:48] / (density * 1007)).mean()
+    warmer = in_city(still, 0.5, 0.2, [1.0] * 24).dry_bulb_c[34] - 20.0
+    assert warmer == pytest.approx(1.3 * (heating * 1000 / 3) ** 0.25, rel=1e-6)
+
+
+@pytest.mark.parametrize(("north", "east", "noted"), [
+    (45.0, -11.0, False), (61.0, 16.0, False), (44.9, 5.0, True), (61.1, 5.0, True),
+    (52.0, -11.1, True), (52.0, 16.1, True), (30.0, 50.0, True),
+])  # fmt: skip
+def test_places_elsewhere_are_noted_once(north, east, noted) -> None:
+    notes = in_city(_weather(latitude_deg=north, longitude_deg=east), 0.5, 0.2, NIGHT).notes
+    assert sum("is elsewhere" in str(note) for note in notes) == noted
+
+
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"step_h": 0.5}, "whole days"),
+    ({"times": pd.date_range("2001-06-01 02:00", periods=72, freq="h")}, "whole days"),
+    ({"global_horizontal": None}, "global irradiance"), ({"dry_bulb_c": None}, "temperature"),
+    ({"dew_point_c": None}, "dew point"), ({"wind_speed": None}, "wind"),
+])  # fmt: skip
+def test_weather_that_the_equation_cannot_take(changes, words) -> None:
+    with pytest.raises(ValueError, match=words):
+        in_city(_weather(**changes), 0.5, 0.2, NIGHT)
+    with pytest.raises(ValueError, match="expected 24"):
+        in_city(_weather(), 0.5, 0.2, NIGHT[1:])

@@ -89,3 +89,90 @@ def test_efficacies_are_plausible():
     direct = [model_of(moment).direct_efficacy[0] for moment in MOMENTS]
     assert 105 < min(diffuse) and max(diffuse) < 150
     assert 60 < min(direct) and max(direct) < 112
+
+
+def test_tables_are_those_compared_with_radiance():
+    """Check sums of the tables with which the tests against gendaymtx passed: none is edited."""
+    for table, total, by_row in (
+        (perez.LUMINANCE_COEFFICIENTS.reshape(8, 20),
+         [-5.1834, -2.6211, 1.2101, 3.9695, -0.0146, -0.9411, -20.8714, 8.1859, 152.8983,
+          -55.8689, -165.867, 156.0597, -26.3376, 1.8118, 18.3288, 0.7327, 3.2311, -0.7705,
+          -0.8177, 1.3916],
+         [-31.0785, -8.8258, 4.6497, 23.0045, 1.0439, -3.6357, -83.1421, 33.8121, 794.7713,
+          -292.3158, -858.9755, 824.7576, -154.0358, 6.1765, 123.8427, 11.3221, 21.3176, -5.8293,
+          -0.929, 9.5512]),
+        (perez.DIFFUSE_EFFICACY, [913.06, 21.26, -164.3, -110.11],
+         [4389.22, 101.86, -1124.7, -552.45]),
+        (perez.DIRECT_EFFICACY, [796.84, -21.62, -13.51, 40.51],
+         [3750.66, -58.85, -53.92, -401.37]),
+    ):  # fmt: skip
+        assert table.sum(axis=0) == pytest.approx(total, abs=1e-9)
+        assert np.arange(1, 9) @ table == pytest.approx(by_row, abs=1e-9)
+    bins = [1.065, 1.230, 1.500, 1.950, 2.800, 4.500, 6.200]  # table 1's upper bounds
+    assert list(perez.CLEARNESS_BINS) == bins
+    assert perez.CLEARNESS_LIMITS == (1.0, 11.9) and perez.BRIGHTNESS_LIMITS == (0.01, 0.6)
+
+
+def test_efficacies_and_sky_of_one_moment_by_hand():
+    """Clear sky at 40 degrees: epsilon 5.27 (category 7), each figure by the printed equations."""
+    zenith, day, dew = np.radians(50.0), 100.0, 5.0
+    direct, diffuse = 700.0, 100.0
+    sun = [[0.0, np.sin(zenith), np.cos(zenith)]]
+    sky = perez.perez_sky([direct], [diffuse], sun, day_of_year=[day], dew_point_c=[dew])
+    cube = 1.041 * zenith**3
+    epsilon = (1 + direct / diffuse + cube) / (1 + cube)
+    assert sky.clearness == pytest.approx([epsilon]) and 4.5 < epsilon < 6.2
+    mass = 1 / (np.cos(zenith) + 0.15 * (93.885 - 50.0) ** -1.253)
+    t = 2 * np.pi * (day - 1) / 365
+    near = 1.00011 + 0.034221 * np.cos(t) + 0.00128 * np.sin(t)
+    near += 0.000719 * np.cos(2 * t) + 0.000077 * np.sin(2 * t)
+    delta = diffuse * mass / (1367 * near)
+    assert sky.brightness == pytest.approx([delta])
+    water = np.exp(0.07 * dew - 0.075)
+    lit = 141.88 + 1.90 * water - 53.24 * np.cos(zenith) - 14.03 * np.log(delta)
+    assert sky.diffuse_efficacy == pytest.approx([lit])
+    beam = 105.75 + 0.77 * water - 1.26 * np.exp(5.73 * zenith - 5) - 34.44 * delta
+    assert sky.direct_efficacy == pytest.approx([beam])
+    row = (
+        "-1.0000 0.0211 0.5025 -0.5119 -0.3000 0.1922 0.7023 -1.6317 19.0000 -5.0000 1.2438 "
+        "-1.9094 -4.0000 0.0250 0.3844 0.2656 1.0468 -0.3788 -2.4517 1.4656"
+    )
+    x = np.array(row.split(), float).reshape(5, 4)
+    a, b, c, d, e = x @ [1.0, zenith, delta, delta * zenith]
+    assert sky.coefficients[:, 0] == pytest.approx([a, b, c, d, e])
+    towards = np.array([[0.6, 0.0, 0.8]])
+    gamma = np.arccos(towards[0] @ sun[0])
+    by_hand = 1 + a * np.exp(b / 0.8)
+    by_hand *= 1 + c * np.exp(d * gamma) + e * np.cos(gamma) ** 2
+    assert sky.relative_luminance(towards) == pytest.approx(np.array([[by_hand]]))
+
+
+def test_overcast_moment_by_its_own_equations():
+    """Perez 1993, (7) and (8), for c and d of the first category; no direct light: efficacy 0."""
+    zenith = np.radians(60.0)
+    sun = [[0.0, np.sin(zenith), np.cos(zenith)]]
+    sky = perez.perez_sky([0.0], [150.0], sun, day_of_year=[1.0])
+    assert sky.clearness == pytest.approx([1.0])
+    delta = sky.brightness[0]
+    c = np.exp((delta * (2.8 + 0.6004 * zenith)) ** 1.2375) - 1.0
+    d = -np.exp(delta * (1.8734 + 0.6297 * zenith)) + 0.9738 + delta * 0.2809
+    assert sky.coefficients[2:4, 0] == pytest.approx([c, d])
+    water = np.exp(0.07 * 11.0 - 0.075)
+    lit = 97.24 - 0.46 * water + 12.0 * np.cos(zenith) - 8.91 * np.log(delta)
+    assert sky.diffuse_efficacy == pytest.approx([lit])
+    # between 1.065 and 2.8 the brightness counts as 0.2 at least
+    dim = perez.perez_sky([50.0], [60.0], sun, day_of_year=[1.0])
+    assert 1.23 < dim.clearness[0] < 1.5 and dim.brightness[0] < 0.2
+    first = -1.1 - 0.2515 * zenith + 0.2 * (0.8952 + 0.0156 * zenith)
+    assert dim.coefficients[0, 0] == pytest.approx(first)
+
+
+def test_limits_of_the_model():
+    """No diffuse light: 11.9; the zenith angle between 3 and 90 degrees; brightness 0.01 to 0.6."""
+    up = perez.perez_sky([900.0], [0.0], [[0.0, 0.0, 1.0]], day_of_year=[1.0])
+    assert (up.clearness[0], up.brightness[0]) == (11.9, 0.01)
+    assert up.sun[0, 2] == pytest.approx(np.cos(np.radians(3.0)))
+    low = perez.perez_sky([0.0], [900.0], [[1.0, 0.0, -0.2]], day_of_year=[1.0])
+    assert low.brightness[0] == 0.6
+    np.testing.assert_allclose(low.sun, [[1.0, 0.0, 0.0]], atol=1e-12)
+    assert low.direct_efficacy[0] == 0.0

@@ -122,3 +122,51 @@ def test_weather_turned_round_the_model():
     assert np.mod(turned.wind_direction_deg - 180.0, 360.0) == pytest.approx(
         np.mod(wind - 230.0, 360.0), abs=1e-9
     )
+
+
+def test_figures_of_the_disc():
+    """Radiance's disc of 0.533 degrees: pi r^2 = 6.7966e-5 sr."""
+    assert pytest.approx(np.pi * np.radians(0.2665) ** 2, rel=1e-5) == sun.SUN_SOLID_ANGLE
+    assert np.degrees(sun.SUN_RADIUS) == pytest.approx(0.2665)
+    assert sun.SOLAR_CONSTANT == 1361.0  # Kopp and Lean 2011
+
+
+def test_day_of_the_sun_is_of_minutes_and_those_of_the_weather():
+    weather = weather_at(["2017-06-21 06:00", "2017-06-21 18:30"], 48.0, 15.0, 1.0)
+    day = sun.day_of_sun(weather, pd.Timestamp("2017-06-21"))
+    assert day.shape == (1441, 3)
+    np.testing.assert_allclose(day[[360, 1110]], sun.sun_directions(weather), atol=1e-12)
+    turned = sun.day_of_sun(weather.turned(30.0), pd.Timestamp("2017-06-21"))
+    np.testing.assert_allclose(turned, sun.rotated(day, 30.0), atol=1e-12)
+
+
+def test_air_of_the_weather_bends_the_light():
+    """Refraction grows with pressure and falls with temperature; without either: standard air."""
+
+    def height(elevation=0.0, **air):
+        weather = weather_at(["2017-03-20 06:20"], 0.0, 0.0, 0.0, elevation, **air)
+        return np.degrees(sun.altitude(sun.sun_directions(weather))[0])
+
+    plain = height()
+    same = height(pressure_pa=np.array([101325.0]), dry_bulb_c=np.array([12.0]))
+    assert plain == pytest.approx(same, abs=2e-5)
+    assert height(pressure_pa=np.array([70000.0])) < plain - 0.02
+    assert height(elevation=3000.0) < plain - 0.02
+    assert height(dry_bulb_c=np.array([-30.0])) > plain + 0.01
+
+
+def test_radiances_formulas_by_hand():
+    """sun.c: declination, and solar time at 12:30:36 of day 100, 17 degrees east in zone 1."""
+    weather = weather_at(["2017-04-10 12:30:36"], 48.0, 17.0, 1.0)
+    declination, hour = sun.declination_and_time(weather)
+    assert declination == pytest.approx(0.4093 * np.sin(2 * np.pi / 365 * (100 - 81)))
+    equation = 0.170 * np.sin(4 * np.pi / 373 * 20) - 0.129 * np.sin(2 * np.pi / 355 * 92)
+    assert hour == pytest.approx(12.51 + equation + 17 / 15 - 1)
+    d, t = declination[0], np.pi * (hour[0] - 12) / 12
+    phi = np.radians(48.0)
+    up = np.sin(phi) * np.sin(d) + np.cos(phi) * np.cos(d) * np.cos(t)
+    found = sun.sun_directions(weather, model="radiance")[0]
+    assert found[2] == pytest.approx(up)
+    assert found[0] == pytest.approx(-np.cos(d) * np.sin(t))
+    with pytest.raises(ValueError, match="sun model: expected one of"):
+        sun.sun_directions(weather, model="other")

@@ -9,8 +9,17 @@ import pytest
 
 from tests.thermal.rooms import box
 from thermal.blackbox import Fenestration
-from thermal.climate import SIGMA, sky_temperature, to_steps, undisturbed_ground
+from thermal.climate import (
+    SIGMA,
+    Climate,
+    Solar,
+    no_sun,
+    sky_temperature,
+    to_steps,
+    undisturbed_ground,
+)
 from thermal.convection import local_wind_factor
+from thermal.errors import ThermalInputError
 from thermal.network import network
 
 
@@ -31,7 +40,8 @@ def test_ground_is_damped_and_late():
     ground = undisturbed_ground(outdoor, depth=1.0)
     decay = np.sqrt(np.pi / (365 * 0.055))  # at 1 m
     assert ground.mean() == pytest.approx(10.0)
-    assert np.ptp(ground) / 2 == pytest.approx(12.0 * np.exp(-decay), rel=1e-3)
+    np.testing.assert_allclose(undisturbed_ground(outdoor, depth=0.5), undisturbed_ground(outdoor))
+    assert np.ptp(ground) / 2 == pytest.approx(12.0 * np.exp(-decay), rel=1e-4)
     late = (np.argmin(ground) - np.argmin(outdoor)) / 24
     assert late == pytest.approx(decay / (2 * np.pi) * 365, abs=0.5)
 
@@ -55,3 +65,39 @@ def test_forced_film_takes_the_local_wind_to_its_power():
     factor = local_wind_factor(1.5, "suburbs")
     # DOE-2 / MoWiTT: 3.26 V^0.89 windward, 3.55 V^0.617 leeward
     np.testing.assert_allclose(net.faces.wind[0], [3.26 * factor**0.89, 3.55 * factor**0.617])
+
+
+LIMITS = {
+    "outdoor_c": (-90.0, 70.0), "sky_c": (-150.0, 70.0), "wind_speed": (0.0, 100.0),
+    "wind_direction_deg": (0.0, 360.0), "ground_c": (-60.0, 60.0), "pressure": (3e4, 1.2e5),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_weather_is_refused_from_its_limits_on(name):
+    low, high = LIMITS[name]
+    middle = {one: np.full(3, sum(pair) / 2) for one, pair in LIMITS.items()}
+    assert Climate(**middle | {name: [low, high, low]}).hours == 3
+    for wrong in (np.nextafter(low, -np.inf), np.nextafter(high, np.inf), np.nan):
+        with pytest.raises(ThermalInputError, match=f"{name}: 1 hours outside .*first .1"):
+            Climate(**middle | {name: [low, wrong, high]})
+    with pytest.raises(ThermalInputError, match=r"expected \[3\] values|expected \[4\] values"):
+        Climate(**middle | {name: [low] * 4})
+
+
+@pytest.mark.parametrize("name", ["absorbed_outer", "absorbed_inner", "inside", "facade"])
+def test_sun_is_refused_with_its_array(name):
+    dark = no_sun(2, 6, 1)
+    assert dark.inside.shape == (2, 6) and dark.absorbed_outer.shape == (2, 1)
+    parts = {one: getattr(dark, one) for one in ("absorbed_outer", "absorbed_inner", "inside")}
+    parts["facade"] = dark.facade
+    assert not dark.facade.any() and not dark.absorbed_inner.any()
+    for wrong, words in (
+        (np.zeros(2), "expected two axes"),
+        (np.array([[0.0, -2e-6]]), "negative or missing"),
+        (np.array([[0.0, np.nan]]), "negative or missing"),
+        (np.array([[0.0, np.inf]]), "negative or missing"),
+    ):
+        with pytest.raises(ThermalInputError, match=f"solar {name}: {words}"):
+            Solar(**parts | {name: wrong})
+    Solar(**parts | {name: np.array([[5.0, -0.5e-6]])})  # what remains of a difference

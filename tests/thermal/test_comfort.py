@@ -8,6 +8,7 @@ from pythermalcomfort.models import adaptive_ashrae, adaptive_en
 
 from thermal.comfort import (
     adaptive_comfort,
+    degree_hours,
     mean_radiant_temperature,
     operative_temperature,
     pmv_ppd,
@@ -123,3 +124,19 @@ def test_surroundings_are_broadcast_and_checked(index):
             first(**changes)
     with pytest.raises(ThermalInputError, match="missing"):
         index([np.nan], 24.0)
+
+
+def test_degree_hours_of_half_hours_by_hand():
+    assert degree_hours([26.0, 27.0, 24.0], 25.0, step_h=0.5) == 1.5
+    assert degree_hours([26.0, 27.0], [26.5, 25.0], step_h=2.0) == 4.0
+
+
+@pytest.mark.parametrize("index", [pmv_ppd, standard_effective_temperature])
+def test_stated_defaults_and_no_rounding(index):
+    """0.1 m/s, 50 %, 1.2 met, 0.5 clo; the package would round to two digits."""
+    found = np.asarray(index([31.7], 40.0))
+    full = index([31.7], 40.0, air_speed=0.1, humidity=50.0, metabolic_rate=1.2, clothing=0.5)
+    np.testing.assert_array_equal(found, np.asarray(full))
+    assert np.any(np.abs(np.round(found, 2) - found) > 1e-6)
+    hot = index([60.0], 60.0)  # outside the standard's limits: computed all the same
+    assert np.all(np.isfinite(hot))

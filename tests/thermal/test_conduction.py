@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.thermal.rooms import CONCRETE, INSULATION, PLASTER
-from thermal.conduction import wall_grid
+from thermal.conduction import u_value, wall_grid
 from thermal.zone import Layer
 
 AIR = Layer(0.02, 0.1, 0.0, 0.0)  # two cells without any heat, and beside another such layer one
@@ -35,3 +35,20 @@ def test_modes_go_as_the_nodes_do(layers: tuple[Layer, ...], step_s: float) -> N
         stored = capacity @ (fresh - node)
         assert modes.heat @ (moved - amplitude) == pytest.approx(stored, abs=1e-7)
         node, amplitude = fresh, moved
+
+
+def test_u_value_of_iso_6946_by_hand():
+    """R = 0.04 + 0.1/0.5 + 0.2/0.04 + 0.13 m2 K/W; other films where they are named."""
+    layers = (Layer(0.1, 0.5, 1000.0, 900.0), Layer(0.2, 0.04, 0.0, 0.0))
+    assert u_value(layers) == pytest.approx(1 / 5.37)
+    assert u_value(layers, r_outer=0.1, r_inner=0.2) == pytest.approx(1 / 5.5)
+
+
+def test_the_cells_of_a_wall_hold_its_heat_and_resistance():
+    layers = (Layer(0.1, 0.5, 1000.0, 900.0), Layer(0.05, 0.04, 0.0, 0.0))
+    grid = wall_grid(layers, cell=0.02)
+    assert grid.capacity.sum() == pytest.approx(0.1 * 1000 * 900)
+    assert (1 / grid.conductance).sum() == pytest.approx(0.1 / 0.5 + 0.05 / 0.04)
+    # five cells of 20 mm, half of each at its ends; two of the layer without heat
+    np.testing.assert_allclose(grid.width, [0.02] * 5 + [0.025] * 2)
+    np.testing.assert_allclose(grid.capacity, np.array([9, 18, 18, 18, 18, 9, 0, 0]) * 1e3)

@@ -9,6 +9,7 @@ from tests.thermal.rooms import CONCRETE, box, climate
 from thermal.balance import BalanceOptions, simulate
 from thermal.climate import no_sun
 from thermal.emitters import IdealLoads
+from thermal.errors import ThermalInputError
 from thermal.ground import (
     R_SE,
     R_SI_DOWN,
@@ -199,3 +200,98 @@ def test_neighbour_at_a_known_temperature_has_its_u():
     np.testing.assert_allclose(found.heat_flow["ground and neighbours"], -12 * u * 10, rtol=1e-6)
     np.testing.assert_allclose(found.heat_flow["thermal bridges"], -1.5 * 20.0, rtol=1e-9)
     np.testing.assert_allclose(found.heating, 12 * u * 10 + 1.5 * 20.0, rtol=1e-6)
+
+
+def test_slabs_by_the_printed_equations():
+    """ISO 13370 (4), (5), annexes D and H: B' = 5 m, d = 0.3 + 1.5 (0.17 + R + 0.04)."""
+    b, k, depth = 5.0, 1.5, np.sqrt(3.15e7 * 1.5 / (np.pi * 3.0e6))
+    thick = 0.3 + k * (0.17 + 4.0 + 0.04)
+    assert slab_on_ground(HOUSE, 4.0).u_value == pytest.approx(k / (0.457 * b + thick))
+    d = 0.3 + k * (0.17 + 1.0 + 0.04)
+    plain = 2 * k / (np.pi * b + d) * np.log(np.pi * b / d + 1)
+    bare = slab_on_ground(HOUSE, 1.0)
+    assert bare.u_value == pytest.approx(plain)
+    swing = np.log(depth / d + 1)
+    assert bare.swing == pytest.approx(0.37 * 40 * k * swing / 100)
+    assert (bare.lag, bare.resistance, bare.r_si) == (1.0, 1.0, 0.17)
+    edged = slab_on_ground(HOUSE, 1.0, edge=(0.8, 2.0), vertical=False)
+    psi = edge_transmittance(HOUSE, d, 0.8, 2.0, vertical=False)
+    more = _more(psi, 0.8, k, d)
+    assert more == pytest.approx((1.5 - 0.035) * 2.0)  # less the soil that it replaces
+    assert edged.u_value == pytest.approx(plain + 2 * psi / b)
+    left = np.exp(-0.8 / depth)
+    inner = (1 - left) * np.log(depth / (d + more) + 1) + left * swing
+    assert edged.swing == pytest.approx(0.37 * 40 * k * inner / 100)
+    assert edge_transmittance(HOUSE, d, 0.4, 2.0, vertical=True) == pytest.approx(psi)
+    upright = slab_on_ground(HOUSE, 1.0, edge=(0.4, 2.0))
+    assert (upright.u_value, upright.swing) == pytest.approx((edged.u_value, edged.swing))
+
+
+def _more(psi: float, width: float, k: float, d: float) -> float:
+    """d' of (D.2) [m] from the Psi that it gives."""
+    whole = np.log(width / d + 1) + np.pi * psi / k
+    return width / (np.exp(whole) - 1) - d
+
+
+def test_crawl_space_by_the_printed_equations():
+    """ISO 13370 (8) to (10): U_g of its ground, U_x of walls and wind, in series with the floor."""
+    b, k = 5.0, 1.5
+    d = 0.3 + k * (0.17 + 0.04)
+    ground = 2 * k / (np.pi * b + d) * np.log(np.pi * b / d + 1)
+    around = 2 * 0.5 * 0.8 / b + 1450 * 0.002 * 4.0 * 0.05 / b
+    floor = 1 / (2 * 0.17 + 1.0)
+    space = suspended_floor(HOUSE, 1.0, height=0.5, wall_u=0.8, vents=0.002, wind=4.0)
+    assert space.u_value == pytest.approx(1 / (1 / floor + 1 / (ground + around)))
+    sheltered, exposed = (
+        suspended_floor(HOUSE, 1.0, height=0.5, wall_u=0.8, vents=0.002, wind=4.0, shield=shield)
+        for shield in ("sheltered", "exposed")
+    )
+    assert sheltered.u_value < space.u_value < exposed.u_value
+    depth = np.sqrt(3.15e7 * k / (np.pi * 3.0e6))
+    edge = 0.37 * 40 * k * np.log(depth / d + 1) / 100
+    assert space.swing == pytest.approx(floor * (edge + around) / (k / depth + around + floor))
+    assert (space.lag, space.resistance, space.r_si, space.soil) == (0.0, 1.0, 0.17, None)
+    with pytest.raises(ThermalInputError, match="is none of sheltered"):
+        suspended_floor(HOUSE, 1.0, height=1, wall_u=1, vents=0, wind=0, shield="none")
+
+
+def test_basement_by_the_printed_equations():
+    """ISO 13370 (11) to (14) and H.7 at 2 m: floor (d + z/2 against B'), walls, the swing."""
+    b, k, z, depth = 5.0, 1.5, 2.0, np.sqrt(3.15e7 * 1.5 / (np.pi * 3.0e6))
+    d, w = 0.3 + k * (0.17 + 0.5 + 0.04), k * (0.13 + 1.0 + 0.04)
+    floor, wall = basement(HOUSE, 0.5, 1.0, z)
+    below = np.pi * b + d + z / 2
+    assert floor.u_value == pytest.approx(2 * k / below * np.log(np.pi * b / (d + z / 2) + 1))
+    sides = 2 * k / (np.pi * z) * (1 + 0.5 * d / (d + z)) * np.log(z / w + 1)
+    assert wall.u_value == pytest.approx(sides)
+    left = np.exp(-z / depth)
+    assert floor.swing == pytest.approx(0.37 * 40 * k * left * np.log(depth / d + 1) / 100)
+    assert wall.swing == pytest.approx(0.37 * k * 2 * (1 - left) * np.log(depth / w + 1) / z)
+    assert (floor.lag, wall.lag, floor.r_si, wall.r_si) == (1.0, 1.0, 0.17, 0.13)
+
+
+def test_layers_and_temperature_beyond_give_the_heat_flow_of_the_standard():
+    """Steady flow through soil and virtual layer is U (T_i - T_e); the swing adds H_pe."""
+    slab = slab_on_ground(HOUSE, 1.0)
+    virtual, soil, _ = slab.layers((CONCRETE,))
+    total = virtual.resistance + soil.resistance + 1.0 + 0.17
+    assert total == pytest.approx(1.0 / slab.u_value)
+    assert (soil.thickness, soil.conductivity) == (0.5, 1.5)
+    assert soil.density * soil.heat_capacity == pytest.approx(3.0e6)
+    hours = np.arange(0.0, YEAR)
+    beyond = slab.temperature(20.0, 10.0, 9.0, 500.0, hours)
+    flow = slab.u_value * (20.0 - beyond)
+    assert flow.mean() == pytest.approx(slab.u_value * 10.0)
+    assert np.ptp(flow) / 2 == pytest.approx(slab.swing * 9.0, rel=1e-5)
+    assert hours[np.argmax(flow)] == pytest.approx(500.0 + YEAR / 12, abs=1)  # a month late
+    floor = suspended_floor(HOUSE, 1.0, height=0.5, wall_u=0.8, vents=0.002, wind=4.0)
+    (air, _) = floor.layers((CONCRETE,))
+    assert air.resistance == pytest.approx(1.0 / floor.u_value - 1.0 - 0.17)
+
+
+def test_harmonic_of_a_cosine():
+    hours = np.arange(0.5, YEAR)
+    outdoor = 9.0 - 11.0 * np.cos(2 * np.pi * (hours - 700.0) / YEAR)
+    assert harmonic(outdoor, hours) == pytest.approx((9.0, 11.0, 700.0))
+    warm = 9.0 + 11.0 * np.cos(2 * np.pi * (hours - 700.0) / YEAR)
+    assert harmonic(warm, hours)[2] == pytest.approx(700.0 + YEAR / 2)

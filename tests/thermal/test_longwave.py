@@ -5,14 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from thermal.blackbox import LayerAbsorptances
 from thermal.convection import doe2_outside, iso15099_inside, local_wind_factor, tarp_inside
+from thermal.errors import ThermalInputError
 from thermal.longwave import (
     area_view_factors,
+    closed_exchange,
     exchange_from_view_factors,
     exchange_star,
     outside_factors,
 )
-from thermal.shortwave import absorbed_after_reflections, spread_evenly
+from thermal.shortwave import (
+    absorbed_after_reflections,
+    layer_absorption,
+    spread_evenly,
+    window_share,
+)
 
 
 def test_parallel_plates_exchange_by_the_closed_form():
@@ -97,3 +105,70 @@ def test_room_light_is_conserved():
     np.testing.assert_allclose(kept.sum(axis=1), hit.sum(axis=1))
     # with view factors by area the series is EnergyPlus' uniform spread exactly
     np.testing.assert_allclose(kept, spread_evenly(hit, rho, area), rtol=1e-9)
+
+
+def test_view_factors_by_area_leave_out_what_faces_the_same_way():
+    """Of three faces the second is 9 degrees off the first, then 11: by cos 10 degrees apart."""
+    for degrees, first in ((9.0, [0, 0, 1]), (11.0, [0, 2 / 5, 3 / 5])):
+        normals = [[1, 0, 0], [*np.cos(np.radians([degrees, 90 - degrees])), 0], [-1, 0, 0]]
+        np.testing.assert_allclose(area_view_factors([1.0, 2.0, 3.0], normals)[0], first)
+    with pytest.raises(ThermalInputError, match="sees no other"):
+        area_view_factors([1.0, 1.0], [[1, 0, 0], [1, 0, 0]])
+
+
+def test_star_of_two_faces_is_that_of_parallel_plates():
+    """Carroll's F close two equal faces: A/(1/eps_1 + 1/eps_2 + 1/F_1 + 1/F_2 - 2), F = 2."""
+    x = exchange_star([3.0, 3.0], [0.9, 0.3])
+    assert x[0, 1] == pytest.approx(3.0 / (1 / 0.9 + 1 / 0.3 - 1), rel=1e-6)
+    np.testing.assert_allclose(exchange_star([1.0, 1, 1], [1.0, 1, 0.0])[2], 0.0, atol=1e-5)
+    cube = exchange_star(np.full(6, 2.0), np.full(6, 1.0))  # F = 1.2: A F / 6 to each, itself too
+    np.testing.assert_allclose(cube, 2.0 * 1.2 / 6, rtol=1e-6)
+
+
+def test_exchange_areas_are_closed_though_the_factors_are_noisy():
+    areas = np.array([1.0, 2.0, 4.0])
+    noisy = np.array([[0.0, 0.4, 0.7], [0.3, 0.0, 1.6], [0.6, 1.7, 1.9]])
+    closed = closed_exchange(noisy, areas)
+    np.testing.assert_allclose(closed.sum(axis=1), areas, rtol=1e-9)
+    np.testing.assert_allclose(closed, closed.T, rtol=1e-12)
+    for wrong, words in (
+        (np.ones((2, 3)) / 3, r"expected \[2, 2\]"),
+        ([[1.1, -0.1], [0.0, 1.0]], "negative"),
+        ([[0.0, 0.89], [1.0, 0.0]], "rows sum to"),
+    ):
+        with pytest.raises(ThermalInputError, match=words):
+            exchange_from_view_factors([1.0, 1.0], [0.9, 0.9], wrong)
+    exchange_from_view_factors([1.0, 1.0], [0.9, 0.9], [[0.0, 0.91], [1.0, 0.0]])
+
+
+def test_sun_in_a_room_of_two_faces_by_hand():
+    """50 W on the first of two faces that see each other: series of r = 0.5 * 0.2."""
+    kept = absorbed_after_reflections([[50.0, 0.0]], [0.5, 0.2], [[0.0, 1.0], [1.0, 0.0]])
+    np.testing.assert_allclose(kept, [[25.0 / 0.9, 25.0 * 0.8 / 0.9]])
+    # spread: 25 W reflected, by 1 m2 * 0.5 and 2 m2 * 0.8
+    even = spread_evenly([[50.0, 0.0]], [0.5, 0.2], [1.0, 2.0])
+    np.testing.assert_allclose(even, [[25 + 25 * 0.5 / 2.1, 25 * 1.6 / 2.1]])
+    for hit, rho, f, words in (
+        ([[1.0]], [0.5, 0.2], np.eye(2), "first hit: expected"),
+        ([[1.0, 1.0]], [0.5, 0.2], np.eye(3), "view factors: expected"),
+        ([[1.0, 1.0]], [0.5, 1.0], np.eye(2), "reflectance"),
+        ([[1.0, 1.0]], [0.5, -0.1], np.eye(2), "reflectance"),
+    ):
+        with pytest.raises(ThermalInputError, match=words):
+            absorbed_after_reflections(hit, rho, f)
+    absorbed_after_reflections([[1.0, 1.0]], [0.0, 0.5], np.eye(2))
+
+
+def test_sun_in_the_layers_and_the_windows_share_by_hand():
+    layers = LayerAbsorptances(np.array([0.1, 0.2]), np.array([0.3, 0.4]), 0.0)
+    outer, inner = layer_absorption([[10.0, 100.0]], layers)
+    assert (outer, inner) == (pytest.approx(21.0), pytest.approx(43.0))
+    with pytest.raises(ThermalInputError, match="irradiance: expected"):
+        layer_absorption([[10.0]], layers)
+    # 8 W not reflected, of 1 - 0.2: the inner layer keeps 0.3 of 0.8
+    assert window_share([8.0], 0.5, 0.3, 0.2) == pytest.approx(3.0)
+    assert window_share(8.0, 0.5, 0.3 + 5e-7, 0.2) == pytest.approx(3.0, rel=1e-5)
+    with pytest.raises(ThermalInputError, match="exceed 1 - reflectance"):
+        window_share([8.0], 0.5, 0.3 + 2e-6, 0.2)
+    with pytest.raises(ThermalInputError, match="reflects all light"):
+        window_share([8.0], 0.0, 0.0, 1.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import astuple, replace
 
 import numpy as np
 import pandas as pd
@@ -12,8 +13,15 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from scenes import cli
 from scenes.fenestration.thermal_file import ThermalFile
 from scenes.fenestration.thermal_system import sun_in_layers
+from thermal.glazing import Gap, en410_g_value, en673_u_value, gap_conductances
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
-from thermal.ratings import REFERENCE_GLAZINGS, ThermalRating, layered_ratings, shade_ratings
+from thermal.ratings import (
+    REFERENCE_GLAZINGS,
+    ThermalRating,
+    _known_to_en673,
+    layered_ratings,
+    shade_ratings,
+)
 from thermal.shade_layers import sheet_layer
 
 
@@ -158,3 +166,56 @@ def test_command_names_what_does_not_go_together(shade, capsys, options, words):
 def test_command_names_a_file_that_is_missing(tmp_path, capsys):
     assert cli.run(["bsdf", "thermal", str(tmp_path / "none.xml")]) != 0
     assert "none.xml" in capsys.readouterr().err
+
+
+def test_tables_of_en_14501():
+    """Annex A: U, g, tau, rho, rho' of the reference glazings; the limits of the classes."""
+    printed = {
+        "A": (5.8, 0.85, 0.83, 0.08, 0.08), "B": (2.9, 0.76, 0.69, 0.14, 0.14),
+        "C": (1.2, 0.59, 0.49, 0.29, 0.27), "D": (1.1, 0.32, 0.27, 0.29, 0.38),
+    }  # fmt: skip
+    assert {name: astuple(glazing) for name, glazing in REFERENCE_GLAZINGS.items()} == printed
+    for of, limits in (
+        ("g", (0.5, 0.35, 0.15, 0.1)), ("secondary", (0.3, 0.2, 0.1, 0.03)),
+        ("tau", (0.2, 0.15, 0.1, 0.05)),
+    ):  # fmt: skip
+        for number, limit in enumerate(limits):
+            for value, expected in ((limit + 1e-9, number), (limit - 1e-9, number + 1)):
+                tau = value if of == "tau" else 0.0
+                assert rated(tau, tau if of == "tau" else value).solar_class(of) == expected
+
+
+def test_european_rating_by_the_formulas():
+    """EN 673's U with 1 W/(m K) glass, EN 410's q_i over half panes and the gap; by tilt."""
+    panes = (GlazingLayer(0.006, 1.0, (0.837, 0.837), solar=(0.8, 0.07, 0.07)),
+             GlazingLayer(0.008, 0.9, (0.1, 0.837), solar=(0.6, 0.2, 0.2)))  # fmt: skip
+    gap = GasGap(0.016, (("argon", 0.9), ("air", 0.1)))
+    found = {}
+    for tilt, position in ((90.0, "vertical"), (60.0, "tilted"), (15.0, "horizontal")):
+        unit = GlazingUnit(panes, (gap,), tilt_deg=tilt)
+        rating = layered_ratings(unit, 0.5, [0.15, 0.12])[-1]
+        gaps = [Gap(0.016, gap.gas, (0.837, 0.1))]
+        solid = [0.006, 0.008 / 0.9]
+        inner = 0.837
+        assert rating.u_value == pytest.approx(
+            en673_u_value(solid, gaps, position=position, emissivity_in=inner, conductivity=1.0)
+        )
+        between = 1 / gap_conductances(gaps, position) + (0.006 + 0.008 / 0.9) / 2
+        assert rating.g_value == pytest.approx(
+            float(en410_g_value(np.array([0.5]), np.array([[0.15, 0.12]]), between)[0])
+        )
+        found[position] = rating.u_value
+    assert found["vertical"] < found["tilted"] < found["horizontal"]
+    other = GasGap(0.016, (("argon", 1.0), ("xenon", 0.0)))
+    assert _known_to_en673(GlazingUnit(panes, (other,)))
+    assert not _known_to_en673(GlazingUnit(panes, (replace(other, gas=(("xenon", 1.0),)),)))
+
+
+def test_a_shade_within_by_en_13363():
+    """Integrated: g tau + g (alpha + (1 - g) rho) L/3 with 1/L = 1/U + 1/3."""
+    glazing = REFERENCE_GLAZINGS["B"]
+    (within,) = shade_ratings(0.2, 0.5, "integrated", glazing)
+    whole = 1 / (1 / 2.9 + 1 / 3)
+    by_hand = 0.76 * 0.2 + 0.76 * (0.3 + (1 - 0.76) * 0.5) * whole / 3
+    assert within.g_value == pytest.approx(by_hand)
+    assert within.transmittance == pytest.approx(0.2 * 0.69 / (1 - 0.5 * 0.14))

@@ -76,6 +76,8 @@ def ours() -> dict[str, tuple[str, list[str]]]:
         "\nvoid glass facade\n0\n0\n3 .6 .6 .6\nvoid plastic dark\n0\n0\n5 0 0 0 0 0\n"
         "!genbox dark block 16 4 12 | xform -t -6 -10.02 0\n"
     ) + _pane("facade", -6, (-6, 10), (0, 12))
+    corners = ["0.01 1 0.5", "0.01 5 0.5", "0.01 5 2.5", "0.01 1 2.5"]
+    mirror = "\nvoid mirror silver\n0\n0\n3 .85 .85 .85\nsilver polygon sheet\n0\n0\n12 {}\n"
     outer = tinted + _pane("tinted", -0.05, (0.5, 3.5), (0.8, 2.6))
     trans = "void trans glazing\n0\n0\n7 .8 .8 .8 0 {} .6 .5\n"
     louvres = f"void BSDF glazing\n6 0 {VENETIAN_BLIND} {{}} .\n0\n0\n"
@@ -83,6 +85,8 @@ def ours() -> dict[str, tuple[str, list[str]]]:
         "tinted pane 5 cm outside": office + outer,
         "fabric of 5 %": office + _cloth(0.05) + _pane("cloth", 0.1),
         "fabric of 5 %, 5 cm beside it": office + niche + _cloth(0.05) + narrow,
+        "mirror on a wall": office + mirror.format("  ".join(corners)),
+        "mirror on a wall, turned": office + mirror.format("  ".join(corners[::-1])),
         "smooth trans": _glazed(trans.format(0)),
         "rough trans": _glazed(trans.format(0.1)),
         "louvres": _glazed(louvres.format("0 0 1")),

@@ -15,25 +15,37 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
-from tests.scenes.signal_trials import SIGNALS, Trial, trial
+from tests.scenes.signal_trials import SIGNALS, Earlier, Trial, trial
 
 
 def main(
     *,
     trials: Annotated[int, "number of trials"] = 200,
     first: Annotated[int, "seed of the first"] = 0,
-    json_: Annotated[Path | None, "every trial, as JSON"] = None,
+    json_: Annotated[Path | None, "every trial, as JSON; none of these is tried again"] = None,
 ) -> None:
     """Table of trials by signal, and one line for each fault."""
     results: list[Trial] = []
-    for number in range(first, first + trials):
-        with tempfile.TemporaryDirectory() as folder:
-            results.append(trial(number, Path(folder)))
-        one = results[-1]
-        print(one.number, one.command, one.kind, f"{one.after_s:.2f}", one.ended,
-              f"{one.seconds:.1f}", "; ".join(one.faults), file=sys.stderr, flush=True)  # fmt: skip
-        if json_ is not None:
-            json_.write_text(json.dumps([asdict(one) for one in results], indent=1))
+    if json_ is not None and json_.exists():
+        results = [Trial(**one) for one in json.loads(json_.read_text())]
+    done = {one.number for one in results}
+    with tempfile.TemporaryDirectory() as folder:
+        earlier: dict[str, Earlier] = {}
+
+        def earlier_of(command: str) -> Earlier:
+            """A result that no trial has changed."""
+            if command not in earlier or not earlier[command].unchanged:
+                earlier[command] = Earlier.of(command, Path(tempfile.mkdtemp(dir=folder)))
+            return earlier[command]
+
+        for number in sorted(set(range(first, first + trials)) - done):
+            one = trial(number, earlier_of)
+            results.append(one)
+            print(one.number, one.command, one.kind, f"{one.after_s:.2f}", one.ended,
+                  f"{one.seconds:.1f}", "; ".join(one.faults),
+                  file=sys.stderr, flush=True)  # fmt: skip
+            if json_ is not None:
+                json_.write_text(json.dumps([asdict(one) for one in results], indent=1))
     print("| signal | trials | ended by it | before the program began | ended before | faults |"
           " longest time to the end [s] |")  # fmt: skip
     print("|---|---|---|---|---|---|---|")
