@@ -17,6 +17,9 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.picture_year.year import PictureYear
 from scenes.head import NO_HEAD, Head
 
+# [%] column of the sensors with three phases: `mitsuba_cfs.methods.sun_by_patches`
+SUNNY_HOUR_ERROR = "sunny_hour_error"
+
 
 @dataclass(frozen=True, slots=True)
 class LuminancePicture:

@@ -176,7 +176,7 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
         return replace(
             light, sensors=tuple(tuple(map(SensorLight, group)) for group in coefficients)
         )
-    hours = _shining_hours(light)
+    hours = shining_hours(light)
     suns = _direct_sun(light, hours, progress)
     room = _sunlit_room(light, coefficients)
     sensors = tuple(
@@ -346,7 +346,7 @@ def _direct_sun(
     return matrices
 
 
-def _shining_hours(light: PhaseLight) -> NDArray[np.int64]:
+def shining_hours(light: PhaseLight) -> NDArray[np.int64]:
     """The hours L in which the sun is in front of a window."""
     scene, sky = light.scene, light.sky
     facing, lit = np.stack([g.frame[2] for g in scene.groups]), sky.illuminance > 0

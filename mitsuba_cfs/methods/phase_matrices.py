@@ -171,6 +171,14 @@ def with_direct_daylight(matrices: PhaseMatrices, *, progress: Progress = silent
     return replace(matrices, direct_daylight=direct, straight_daylight=straight)
 
 
+def as_five_phase(matrices: PhaseMatrices) -> PhaseMatrices:
+    """Those of the three-phase method with D_d and V_d, as the five-phase method takes them."""
+    matrices = with_direct_daylight(replace(matrices, five_phase=True))
+    if matrices.sensors is None or matrices.direct_sensors is not None:
+        return matrices
+    return replace(matrices, direct_sensors=_sensors(matrices, 1, silent).values)
+
+
 def has_sharp_beam(matrices: PhaseMatrices, g: int) -> bool:
     """Whether what passes a window group straight on is traced apart from V T D."""
     scene = matrices.scene

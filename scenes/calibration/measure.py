@@ -55,7 +55,7 @@ def room_costs(progress: Progress = silent, options: RoomOptions | None = None) 
     systems = (system, system, replace(system, visible=darker))
     for number, method in enumerate(PHASES):
         chosen = replace(options, method=method)
-        skies = skies_for(weather, method, chosen.sampling)
+        skies = skies_for(weather, chosen.sampling)
         with scratch_folder() as folder:
             cold, warm = MatrixCache(folder / "cold"), MatrixCache(folder / "warm")
             timed = [

@@ -236,7 +236,7 @@ class Check:
         start, options = time.monotonic(), self.options
         self.progress("sky", 0.0)
         room = options.room
-        skies = skies_for(self.files.weather, room.method, room.sampling, **room.sky)
+        skies = skies_for(self.files.weather, room.sampling, **room.sky)
         self.progress("sky", 1.0)
         cache = MatrixCache.of_user() if options.cache else None
 

@@ -105,7 +105,7 @@ def run_study(
     variants.activate()
     options, trace = study.options, study.trace
     cache = MatrixCache.of_user()
-    skies = skies_for(weather, options.method, options.sampling, cache, **options.sky)
+    skies = skies_for(weather, options.sampling, cache, **options.sky)
     rooms, radiants = [], []
     for i, space in enumerate(spaces):
         steps = item(progress, "room", i + 1, len(spaces), space.label)

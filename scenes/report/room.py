@@ -23,6 +23,7 @@ from scenes.report import (
 )
 from scenes.report.glare_figures import compass
 from scenes.report.headline import Card, cards, occupied
+from scenes.report.method import sun_error_words
 from scenes.report.names import quantity
 from scenes.report.tables import monthly_gains
 from scenes.report.thermal_figures import month_chart
@@ -243,7 +244,7 @@ def heading(normal: NDArray[np.float64]) -> str:
 def error_words(room: RoomYear) -> str:
     """The standard error of the room's illuminances in one sentence."""
     error = room.daylight.relative_error
-    return ngettext(
+    noise = ngettext(
         "Relative standard error of the annual mean illuminance: {mean} % at the one sensor.",
         "Relative standard error of the annual mean illuminance: {mean} % on average over {count} "
         "sensors, {worst} % at most.",
@@ -251,3 +252,4 @@ def error_words(room: RoomYear) -> str:
         mean=share(float(error.mean())),
         worst=share(float(error.max())),
     )
+    return noise + sun_error_words([room])

@@ -14,6 +14,7 @@ from mitsuba_cfs.methods.light import (
 )
 from mitsuba_cfs.methods.phase_light import PhaseLight, with_sensor_light
 from mitsuba_cfs.methods.standard_error import relative_error_under
+from mitsuba_cfs.methods.sun_by_patches import sunny_hour_error
 from mitsuba_cfs.metrics.autonomy import daylight_autonomy_error
 from mitsuba_cfs.metrics.daylight_factor import daylight_factor
 from mitsuba_cfs.metrics.lm83 import spatial_daylight_autonomy_error
@@ -24,7 +25,7 @@ from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.weather import Weather
 from scenes.provision_levels import level_number
-from scenes.results import DaylightResult, GridDaylight
+from scenes.results import SUNNY_HOUR_ERROR, DaylightResult, GridDaylight
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight, picture_light
 
@@ -43,6 +44,9 @@ def room_daylight(
         picture_light(room, light), lit_state, progress=part(progress, 0.9, 1.0, "daylight")
     )
     illuminance = room.skies.whole_year(lit.astype(np.float32)).T
+    blurred = None
+    if room.options.method == "three-phase":
+        blurred = 100.0 * sunny_hour_error(lights, lit_state, lit)
     # LM-83's direct sun and the daylight factor are those of open blinds
     direct = direct_sun(lights)
     direct = None if direct is None else room.skies.whole_year(direct.astype(np.float32)).T
@@ -55,6 +59,8 @@ def room_daylight(
             relative_error=error[sensors],
         )  # fmt: skip
         table["daylight_factor_standard_error"] = 100.0 * factor_error[sensors]
+        if blurred is not None:
+            table[SUNNY_HOUR_ERROR] = blurred[sensors]
         return table, of_room
 
     counts = [len(grid.points) for grid in room.file_sensors.grids]

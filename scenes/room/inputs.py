@@ -118,7 +118,7 @@ def room_inputs(
         and the building does not contain.
     """
     if skies is None:
-        skies = skies_for(weather, options.method, options.sampling, cache, **options.sky)
+        skies = skies_for(weather, options.sampling, cache, **options.sky)
     tables = None if operation is None else operation.of_room(building, space)
     control = control_groups(space, None if tables is None else tables.control)
     return RoomInputs(
@@ -141,21 +141,17 @@ def room_inputs(
 
 def skies_for(
     weather: Weather,
-    method: str,
     sampling: Sampling,
     cache: MatrixCache | None = None,
     /,
     **choices: str,
 ) -> AnnualSky:
-    """Sky patches and sun of the year as a method needs them; the same for every room.
+    """Sky patches and sun of the year; the same for every room and method.
 
     Args: cache: of the sun's directions; choices: `RoomOptions.sky`.
     """
     towards = cached_sun_directions(weather, choices.get("sun_model", "spa"), cache)
-    return annual_sky(
-        weather, sampling.subdivision, sun=method != "three-phase", solar=True, towards=towards,
-        **choices,
-    )  # fmt: skip
+    return annual_sky(weather, sampling.subdivision, solar=True, towards=towards, **choices)
 
 
 def cached_sun_directions(

@@ -232,7 +232,7 @@ def _read(options: JobOptions, run: str) -> tuple[Inputs, Sequence[Space], Annua
     if _identity(options, inputs) != run:
         message = "a worker has other input files or another version of the program"
         raise DataError(message, field="--scheduler")
-    skies = skies_for(inputs.weather, room.method, room.sampling, **room.sky)
+    skies = skies_for(inputs.weather, room.sampling, **room.sky)
     return inputs, run_spaces(inputs, options), skies
 
 
@@ -308,7 +308,7 @@ def run_inputs(
     variant = variants.activate()
     progress("sky", 0.0)
     room = options.room
-    skies = skies_for(weather, room.method, room.sampling, **room.sky)
+    skies = skies_for(weather, room.sampling, **room.sky)
     progress("sky", 1.0)
     results, issues, notes = computed_rooms(
         inputs, skies, options, progress, on_room=on_room, on_light=on_light, workers=workers

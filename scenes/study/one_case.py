@@ -90,7 +90,7 @@ def case_year(inputs: Inputs, case: Case, **chosen: Unpack[RoomChoices]) -> Room
     """The room's year by the case's options; chosen: as of `lit_room`."""
     options, (space,) = case.options, inputs.spaces
     weather = _file(case, "weather"), case.orientation_deg
-    skies = _skies(*weather, options.method, options.sampling, *options.sky.items())
+    skies = _skies(*weather, options.sampling, *options.sky.items())
     return compute_room(
         inputs.building, space, inputs.systems, inputs.weather, options,
         operation=inputs.operation, skies=skies, cache=MatrixCache.of_user(), pictures=False,
@@ -179,10 +179,8 @@ def _turned(source: InputFile, angle: float) -> Weather:
 
 
 @lru_cache(maxsize=1)  # some 100 MB each; neighbours in the grid share it
-def _skies(
-    source: InputFile, angle: float, method: str, sampling: Sampling, *sky: tuple[str, str]
-) -> AnnualSky:
-    return skies_for(_turned(source, angle), method, sampling, **dict(sky))
+def _skies(source: InputFile, angle: float, sampling: Sampling, *sky: tuple[str, str]) -> AnnualSky:
+    return skies_for(_turned(source, angle), sampling, **dict(sky))
 
 
 def _rated_hours(weather: Weather, options: RoomOptions) -> NDArray[np.int64]:

@@ -6,12 +6,21 @@ from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    create_model,
+    model_validator,
+)
 
 from mitsuba_cfs.errors import DataError
 from scenes import plausible
 from scenes.calibration.durations import seconds_of, share_of
 from scenes.heat.study_file import BoxTable
+from scenes.input_files import peak_share
 from scenes.input_options import InputOptions
 from scenes.quick import ROOM, picks
 from scenes.room.operation import read_operation
@@ -30,6 +39,15 @@ OF_TABLES = {
 Name = Annotated[str, Field(min_length=1)]
 
 
+def _peak(text: str) -> str:
+    """A text of `--see-through`; `DataError` for another."""
+    peak_share(text)
+    return text
+
+
+Peak = Annotated[str, AfterValidator(_peak)]
+
+
 class _Table(TomlTable):
     model_config = ConfigDict(validate_default=True)
 
@@ -42,6 +60,7 @@ class RoomTable(_Table, ReadTable):
     spaces: tuple[Name, ...] = ()  # names or GUIDs; none: every space with a window
     box: BoxTable | None = None
     specular: bool = False  # something in the room mirrors: glare then needs full pictures
+    see_through: tuple[Peak, ...] = ()  # as `--see-through`, of systems of the building's file
 
     @model_validator(mode="after")
     def _one_source(self) -> RoomTable:
@@ -63,6 +82,7 @@ class SystemTable(_Table):
     operation: Path | None = None
     u_value: Annotated[float, Field(ge=0.1, le=7)] | None = None  # [W/(m2 K)]
     g_value: Annotated[float, Field(ge=0, le=1)] | None = None
+    see_through: tuple[Peak, ...] = ()  # as `--see-through`
 
     @model_validator(mode="after")
     def _of_a_file(self) -> SystemTable:
@@ -150,12 +170,14 @@ class Study(_Table, OutdoorTable):
         Args: room: None for those of the other files; spaces: in place of the room's own.
         """
         tables = (self,) if room is None else (room, self)
+        peaks = system.see_through if system is not NO_SYSTEM or room is None else room.see_through
         if spaces is None:
             spaces = () if room is None else room.spaces
         return InputOptions(
             None if room is None else room.building,
             None if climate is None else climate.weather,
             system.bsdf, spaces, u_value=system.u_value, g_value=system.g_value,
+            see_through=peaks,
             operation=system.operation or self.operation, **read_options(*tables),
         )  # fmt: skip
 

@@ -22,6 +22,7 @@ from mitsuba_cfs.methods.light import (
 from mitsuba_cfs.methods.optics import AngularOptics, BsdfOptics
 from mitsuba_cfs.methods.phase_matrices import phase_matrices, with_outdoors
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+from mitsuba_cfs.methods.sun_by_patches import sunny_hour_error
 from mitsuba_cfs.sky.annual import given_sky
 from scenes.demo import VENETIAN_BLIND
 from tests.trace import rooms
@@ -91,6 +92,18 @@ def test_what_is_not_needed_is_not_traced_and_comes_out_the_same_later() -> None
     for one, other in zip(illuminance_with_error(bare), illuminance_with_error(whole), strict=True):
         np.testing.assert_array_equal(one, other)
     assert hourly_glare(bare).dgp == hourly_glare(whole).dgp
+
+
+def test_three_phases_say_how_far_their_blurred_sun_is_off() -> None:
+    light, sharp = (
+        daylight(scene(view=None), glass(), SKY, method=method, sampling=FEW)
+        for method in ("three-phase", "five-phase")
+    )
+    blurred, at_sun = illuminance(light), illuminance(sharp)
+    expected = np.abs(blurred - at_sun)[:, 0] / blurred[:, 0]
+    assert expected.max() > 0.2  # a spot of sun lies or does not lie on the sensor
+    np.testing.assert_allclose(sunny_hour_error(light, None, blurred), expected, rtol=1e-6)
+    assert not sunny_hour_error(sharp, None, at_sun).any()
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ def milk() -> FenestrationSystem:
 @pytest.fixture(scope="session")
 def skies(weather) -> AnnualSky:
     """The skies of a few hours, as if the others were dark."""
-    return only(skies_for(weather, SMALL.method, SMALL.sampling), HOURS)
+    return only(skies_for(weather, SMALL.sampling), HOURS)
 
 
 def only(skies: AnnualSky, hours: tuple[int, ...]) -> AnnualSky:

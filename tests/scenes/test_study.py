@@ -61,6 +61,10 @@ WRONG = {
         "", BOX + '[[system]]\noperation = "a.toml"\n' + CLIMATE, "system.0.operation: no such",
     ),
     "no such file": ("", BOX + SYSTEM.replace(".xml", ".xlm") + CLIMATE, "system.0.bsdf: no such"),
+    "no such peak": (
+        "", BOX + SYSTEM + 'see_through = ["blind.xml=sharp"]\n' + CLIMATE,
+        "system.0.see_through.0: --see-through: expected FILE=specular",
+    ),
     "negative option": (
         "", BOX + SYSTEM + CLIMATE + "[options]\nsensor_spacing = -1\n", "options.sensor_spacing:",
     ),
@@ -95,6 +99,18 @@ def test_the_grid_holds_every_combination_once(tmp_path):
     assert len({c.scene for c in cases}) == 1
 
 
+def test_a_study_says_which_peaks_are_lobes(tmp_path):
+    from scenes.study.one_case import case_inputs
+
+    lobe = f'see_through = ["{VENETIAN_BLIND.name}=lobe"]\n'
+    twin = SYSTEM.replace('name = "blind"', 'name = "lobe"') + lobe
+    shares = {}
+    for case in plan_of(read_study(study_file(tmp_path, "", system=SYSTEM + twin))).cases:
+        ((state,), *_) = case_inputs(case).systems.values()
+        shares[case.system] = state.visible.see_through
+    assert shares == {"blind": None, "lobe": 0.0}
+
+
 def test_a_case_is_known_by_what_its_numbers_depend_on(tmp_path):
     case = grid(tmp_path).cases[0]
     twin = replace(case, room="other name", system="x", climate="y", chosen="why")
@@ -106,7 +122,7 @@ def test_a_case_is_known_by_what_its_numbers_depend_on(tmp_path):
         {"program": "newer"},
         *(
             {"inputs": replace(case.inputs, **one)}
-            for one in ({"u_value": 2.0}, {"spaces": ("b",)})
+            for one in ({"u_value": 2.0}, {"spaces": ("b",)}, {"see_through": ("a.xml=lobe",)})
         ),
     ]
     for number, file in enumerate(case.files):
@@ -217,7 +233,7 @@ def test_shared_matrices_are_traced_once(tmp_path, monkeypatch):
     study = read_study(study_file(tmp_path, head, system=SYSTEM + SECOND))
     run_study(study, Store(tmp_path / "out"))
     found = [f.name.rpartition("-")[0] for f in (tmp_path / "cache").glob("*.npz")]
-    assert found.count("view-matrix") == 1, found
+    assert found.count("view-matrix") == 2, found  # V, and V_d for the error of the blurred sun
     assert found.count("daylight-matrix") == 1, found
 
 

@@ -133,7 +133,7 @@ def test_the_sun_through_a_crown_by_month_is_that_of_beers_law(variant, weather,
     stand before this window, and that leaves stick out of the hull.
     """
     options = replace(SMALL, sampling=replace(SMALL.sampling, patch_samples=256))
-    skies = skies_for(weather, "five-phase", options.sampling)
+    skies = skies_for(weather, options.sampling)
     path = tmp_path / "trees.toml"
     path.write_text(LIST)
     (one,) = read_trees(path).objects

@@ -63,3 +63,25 @@ def test_generators_of_paths_are_even():
         assert chi_square(u[a], u[b]) > 1e-4
     for one in u:  # paths next to each other
         assert chi_square(one[:-1], one[1:]) > 1e-4
+
+
+def test_every_seed_has_paths_of_its_own():
+    """The first bounce of a picture's paths was the same with every seed."""
+    from mitsuba_cfs.images.view import fisheye
+    from mitsuba_cfs.trace.matrices.pixel_view import picture_matrix_blocks
+    from tests.trace import rooms
+
+    room, groups = rooms.test_room()
+    view = fisheye((1.8, 2.5, 1.2), (0.5, 1.0, 0.0), 8)  # of walls alone
+
+    def rows(seed: int) -> np.ndarray:
+        ((_, matrix),) = picture_matrix_blocks(
+            room, groups, view, samples=2, max_depth=1, seed=seed
+        )
+        return matrix
+
+    np.testing.assert_array_equal(rows(1), rows(1))
+    lit = rows(0).sum(axis=(1, 2)) > 0
+    assert lit.sum() > 30
+    same = np.all(rows(0) == rows(1), axis=(1, 2))
+    assert not same[lit].any()

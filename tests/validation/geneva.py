@@ -2,6 +2,7 @@ r"""An office that others published: DGP and Ev of the Geneva office of raytrave
 
     python -m tests.validation geneva [FOLDER] [--by functions] [--every 20] [--size 300]
     python -m tests.validation geneva [FOLDER] --by command --cases 01_glz --views 1
+    python -m tests.validation geneva [FOLDER] --by rtrace --every 150
 
 FOLDER holds `validations/base1compdv` of stephanwaz/raytraverse: scene, views, skies, weather and
 the brute-force reference of 2,022 hours.  By functions: the five-phase method of `import
@@ -9,9 +10,10 @@ mitsuba_cfs` under the reference's own skies, rated as raytools sums (pixel by p
 evalglare groups; fabric and panes are described in `geneva_scene`.  By command: `cfs dgp FILE.rad
 --weather EPW`, every hour of the year, the scene's files as they are.  The irradiances of the EPW
 are those of the reference's sky; its dew point is not, which `gendaylit -ang` takes as 11 degC for
-the luminous efficacies (`--dew-point gendaylit` writes it into the EPW).  Errors as raytraverse
-publishes them: over the hours whose reference DGP is 0.25 to 0.75, the mean absolute difference of
-DGP, and of Ev as a share of it.
+the luminous efficacies (`--dew-point gendaylit` writes it into the EPW).  By rtrace: Ev by
+Radiance's own program under the reference's skies, which shows the reference's own error.  Errors
+as raytraverse publishes them: over the hours whose reference DGP is 0.25 to 0.75, the mean absolute
+difference of DGP, and of Ev as a share of it.
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ import mitsuba_cfs as cfs
 from mitsuba_cfs.images.view import format_view
 from mitsuba_cfs.methods.phase_matrices import with_eye, with_needs
 from mitsuba_cfs.sky.matrix import DEFAULT_DEW_POINT_C
+from tests.benchmarks.radiance import eye_illuminance
 from tests.validation import geneva_scene as geneva
 from tests.validation.differences import mean_absolute
 
@@ -100,6 +103,24 @@ def by_command(
         yield table
 
 
+def by_rtrace(folder: Path, case: str, views: Sequence[int], every: int) -> Iterator[pd.DataFrame]:
+    """Ev [lx] by hour of the year as `rtrace` computes it from 20,000 rays."""
+    rows = np.loadtxt(folder / "refs/skydata.txt")
+    files = [f"scene/options/{geneva.CASES[case]}.rad", "scene/RAD/office.rad"]
+    for number in views:
+        eye = (folder / "POINTS/sensors.txt").read_text().splitlines()[number - 1]
+        truth = geneva.reference(folder, case, number)
+        hours = truth.hour[(truth.dgp > RANGE[0]) & (truth.dgp < RANGE[1])][::every]
+        with tempfile.TemporaryDirectory() as temporary:
+            shutil.copytree(folder, Path(temporary) / "scene")  # as a function's file is named
+            values = []
+            for x, y, z, beam, diffuse in rows[hours]:
+                altitude, azimuth = np.degrees([np.arcsin(z), np.arctan2(-x, -y)])  # from south
+                sky = f"-ang {altitude:.4f} {azimuth:.4f} -W {beam:g} {diffuse:g}"
+                values.append(eye_illuminance(Path(temporary), files, sky, eye))
+        yield pd.DataFrame({"Ev": values}, index=hours)
+
+
 def with_dew_point(epw: Path, folder: Path, dew_point_c: float) -> Path:
     """A copy of an EPW whose dew point is the same all year."""
     lines = epw.read_text().splitlines()
@@ -130,10 +151,10 @@ def error_row(table: pd.DataFrame, folder: Path, case: str, number: int) -> dict
 def main(
     folder: Path = FOLDER,
     *,
-    by: Annotated[str, ("functions", "command")] = "functions",
+    by: Annotated[str, ("functions", "command", "rtrace")] = "functions",
     cases: Annotated[Sequence[str], geneva.CASES] = tuple(geneva.CASES),
     views: Annotated[Sequence[int], geneva.VIEWS] = geneva.VIEWS,
-    every: Annotated[int, "of the 2,022 hours; by functions"] = 20,
+    every: Annotated[int, "of the 2,022 hours, by rtrace of those that count"] = 20,
     size: Annotated[int, "[px]"] = 300,
     dew_point: Annotated[str, ("epw", "gendaylit")] = "epw",
 ) -> pd.DataFrame:
@@ -142,6 +163,8 @@ def main(
     for case in cases:
         if by == "command":
             tables = by_command(folder, case, views, size, dew_point)
+        elif by == "rtrace":
+            tables = by_rtrace(folder, case, views, every)
         else:
             tables = by_functions(folder, case, views, every, size)
         rows += [error_row(t, folder, case, v) for v, t in zip(views, tables, strict=True)]

@@ -24,15 +24,13 @@ import pandas as pd
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import DEFAULT_DEW_POINT_C
 from scenes.demo import VENETIAN_BLIND, WEATHER
-from tests.benchmarks.radiance import environment, run
+from tests.benchmarks.radiance import environment, eye_illuminance
 from tests.validation.geneva import with_dew_point
 
 FOLDER = Path(__file__).parents[3] / "shared" / "cases" / "radiance"
 OFFICE = Path(__file__).parents[2] / "docs" / "tutorials" / "office.rad"
 HOURS = {"overcast": "12-21 09:00", "sunny": "03-21 12:00"}  # [month-day hour] of the EPW
 EYE, DIRECTION = (2.0, 4.0, 1.2), (0.0, -1.0, 0.0)
-LUX = (47.435, 119.93, 11.635)  # lm/W of Radiance's channels
-RTRACE = "-I+ -h -ab 12 -aa 0 -ad 20000 -as 0 -lw 1e-8 -lr 16 -dj 0.5 -dc 1 -dt 0"
 
 
 def _pane(material: str, y: float, x: Sequence[float] = (0, 4), z: Sequence[float] = (0, 3)) -> str:
@@ -127,19 +125,9 @@ def by_rtrace(scene: Path, weather: Path, at: str, runs: int) -> tuple[float, fl
     )
     place = f"-a {hours.latitude_deg} -o {-hours.longitude_deg} -m {-15 * hours.timezone_h}"
     beam, diffuse = hours.direct_normal[row], hours.diffuse_horizontal[row]
-    sky = "skyfunc glow sky_glow 0 0 4 1 1 1 0 sky_glow source sky 0 0 4 0 0 1 180 "
-    sky += "skyfunc glow ground_glow 0 0 4 1 1 1 0 ground_glow source ground 0 0 4 0 0 -1 180"
-    folder = scene.parent
-    (folder / "sky.rad").write_bytes(
-        run(f"gendaylit {month} {day} {hour + 0.5} {place} -W {beam:g} {diffuse:g}", folder)
-        + sky.encode()
-    )
-    run(f"oconv sky.rad {scene.name} > {scene.stem}.oct", folder)
+    sky = f"{month} {day} {hour + 0.5} {place} -W {beam:g} {diffuse:g}"
     eye = f"{_words(EYE)} {_words(DIRECTION)}"
-    values = []
-    for _ in range(runs):
-        rgb = run(f"echo {eye} | rtrace {RTRACE} {scene.stem}.oct", folder).split()
-        values.append(float(np.dot(LUX, [float(v) for v in rgb[:3]])))
+    values = [eye_illuminance(scene.parent, [scene.name], sky, eye) for _ in range(runs)]
     return float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(runs))
 
 

@@ -53,6 +53,11 @@ def lattice_2d(sample: mi.UInt32, stream: mi.UInt32, dimension: int) -> mi.Point
     return mi.Point2f(lattice(sample, stream, dimension), lattice(sample, stream, dimension + 1))
 
 
+def streams(number: NDArray[np.integer], seed: int) -> mi.UInt32:
+    """Streams [n] of `lattice` of pixels or rows, others with each seed."""
+    return column((number + seed * 1_000_003) & 0xFFFFFFFF, mi.UInt32)
+
+
 def path_generator(path: mi.UInt32, seed: mi.UInt32) -> mi.PCG32:
     """Random generator keyed by the global path number: chunks do not change the result."""
     a, b = mi.sample_tea_32(path, seed)

@@ -79,7 +79,7 @@ def adjacent_daylight(
             mi.Bool(True),
             row=paths.patch,
             beta=mi.Float(1),
-            stream=paths.patch,
+            stream=paths.stream,
             sample=path - paths.patch * dr.opaque(mi.UInt32, n),
             generator=paths.generator,
             max_depth=dr.opaque(mi.UInt32, max_depth),

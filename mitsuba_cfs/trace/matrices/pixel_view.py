@@ -27,6 +27,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     opaque,
     path_generator,
     pixel_positions,
+    streams,
     sums_of,
     tables,
     vectors,
@@ -171,7 +172,7 @@ def _block(
     shape = own + 2 * b, columns if light is None else light.hours
     matrix, patches = empty_sums(math.prod(shape)), []
     eye, share = tracer.place(view.position), column(weight)
-    number, first = column(pixels, mi.UInt32), column(time * samples, mi.UInt32)
+    stream, first = streams(pixels, seed), column(time * samples, mi.UInt32)
     lit, again = column(own + place, mi.UInt32), dr.opaque(mi.UInt32, b)
     path = column(pixels + time * view.width * view.height & 0xFFFFFFFF, mi.UInt32)
     places = pixel_positions((int(time.max(initial=0)) + 1) * samples)
@@ -188,11 +189,11 @@ def _block(
             way,
             hit,
             active=exist,
-            row=dr.arange(mi.UInt32, dr.width(number)),
+            row=dr.arange(mi.UInt32, dr.width(first)),
             lit=lit,
             later=lit + again,
             beta=share,
-            stream=number,
+            stream=stream,
             sample=first + dr.opaque(mi.UInt32, j),
             generator=path_generator(path, batch_key(seed, j)),
             max_depth=dr.opaque(mi.UInt32, max_depth),

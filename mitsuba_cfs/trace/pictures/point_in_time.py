@@ -29,6 +29,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     lattice_2d,
     path_generator,
     pixel_positions,
+    streams,
     tables,
     vectors,
 )
@@ -236,7 +237,7 @@ class _Kernel:
         self._samples, self._places = samples, pixel_positions(samples)
         self._eye = eye_of(room, view)
         self._depth = dr.opaque(mi.UInt32, max_depth)
-        self._key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
+        self._seed, self._key = seed, dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
         self._beams = any(system.beam is not None for system in room.systems)
         self._mirrors = any(m is not None for system in room.systems for m in system.mirrors)
 
@@ -264,7 +265,7 @@ class _Kernel:
         row, column = np.divmod(number, self._view.width)
         tile = self._tiles.of_pixels(number, np.zeros_like(number))
         place = (row % size * size + column % size) * n + np.arange(len(number)) % n
-        return mi.UInt32(tile.astype(np.uint32)), mi.UInt32(place.astype(np.uint32))
+        return streams(tile, self._seed), mi.UInt32(place.astype(np.uint32))
 
     def _rays(
         self,

@@ -27,7 +27,7 @@ from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, pixel_hits, tile_size
-from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, tables
+from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, streams, tables
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 
@@ -175,7 +175,7 @@ class _Look:
         sample = np.add.outer(number * samples, np.arange(samples)).ravel()
         row = np.repeat(half, samples)
         place = column(sample, mi.UInt32)
-        stream = column(row + seed * 1_000_003 & 0xFFFFFFFF, mi.UInt32)
+        stream = streams(row, seed)
         parts = []
         for omega, distance, group, found in (
             self._to_point(position, normal, lattice_2d(place, stream, 0), lit),

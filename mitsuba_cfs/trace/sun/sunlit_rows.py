@@ -34,7 +34,7 @@ from mitsuba_cfs.images.view import View, pixel_solid_angles
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
 from mitsuba_cfs.trace.kernels.pixel_rows import FACE_STEPS, PictureRows, numbered, pixel_hits
-from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, tables
+from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, streams, tables
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_points, reflecting_points
@@ -259,7 +259,7 @@ class _Look:
         pixel = lane // dr.opaque(mi.UInt32, samples)
         number = column(part.number * samples, mi.UInt32)
         sample = dr.gather(mi.UInt32, number, pixel) + lane - pixel * dr.opaque(mi.UInt32, samples)
-        stream = column(part.row + self._seed * 1_000_003 & 0xFFFFFFFF, mi.UInt32)
+        stream = streams(part.row, self._seed)
         value = dr.gather(mi.Float, column(part.weight / (np.pi * samples)), pixel)
         # ----- What the ray shows, and what is near to that -----
         eye, way, hit, found = pixel_hits(tracer, self._view, part.pixel, samples)
