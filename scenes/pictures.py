@@ -21,6 +21,8 @@ from mitsuba_cfs.glare.areas import angles_to
 from mitsuba_cfs.glare.evaluation import GlareResult
 from mitsuba_cfs.glare.glare_view import in_picture_order
 from mitsuba_cfs.images.hdr import EFFICACY, LUMINANCE_WEIGHTS
+from scenes.language.catalogue import NARROW_SPACE, decimal, gettext, ngettext
+from scenes.language.numbers import rounded, significant
 
 COLOURS = "turbo"
 DARKEST, KEY = 1.0, 0.18  # [cd/m2] lower end of the falsecolour scale; middle grey of a print
@@ -77,7 +79,7 @@ def _falsecolour_frame(
     if logarithmic:
         bar.ax.yaxis.set_major_locator(LogLocator(10, subs=(1.0, 3.0), numticks=20))
         bar.minorticks_off()  # a quarter of the time of the picture, without a number beside one
-    bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
+    bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _mark(value)))
     return figure, axes, image
 
 
@@ -150,7 +152,7 @@ def write_tone_mapped(path: Path, pixels: NDArray, *, scale: bool = False, title
     bar.set_title("cd/m²", **TITLE)
     bar.imshow(_srgb(greys), extent=(0, 1, 0, 1), aspect="auto")
     marks = 10.0 ** np.arange(np.log10(low), np.log10(high) + 0.5)
-    bar.set_yticks(np.log(marks / low) / np.log(high / low), [f"{m:,.6g}" for m in marks])
+    bar.set_yticks(np.log(marks / low) / np.log(high / low), [_mark(m) for m in marks])
     bar.set_xticks([])
     bar.yaxis.tick_right()
     bar.tick_params(labelsize=8)
@@ -199,7 +201,7 @@ def write_check_picture(path: Path, result: GlareResult, *, title: str = "") -> 
     axes = figure.add_axes((0.02, 0.02, 0.78, 0.90))
     axes.imshow(shown, interpolation="nearest")
     axes.set_axis_off()
-    axes.set_title(title or f"DGP {result.dgp:.3f}", **TITLE)
+    axes.set_title(title or f"DGP {rounded(result.dgp, 3)}", **TITLE)
     outline = [withStroke(linewidth=2.5, foreground="white")]
     found, height = result.sources, result.geometry.view.height
     largest = np.argsort(-(found.luminance**2) * found.solid_angle / result.position**2)[:12]
@@ -213,16 +215,22 @@ def write_check_picture(path: Path, result: GlareResult, *, title: str = "") -> 
 def _list_sources(figure: Figure, result: GlareResult, largest: NDArray) -> None:
     """The sources beside the picture, the most glaring first."""
     found, colours = result.sources, source_colours(result.count)
-    figure.text(
-        0.81, 0.92, f"E_v {result.Ev:,.0f} lx\n{result.count} glare sources", fontsize=8, va="top"
-    )
+    counted = ngettext("{count} glare source", "{count} glare sources", result.count)
+    figure.text(0.81, 0.92, f"E_v {rounded(result.Ev, 0)} lx\n{counted}", fontsize=8, va="top")
     for line, i in enumerate(largest):
         y = 0.83 - 0.062 * line
         figure.text(0.81, y, "■", color=colours[i], fontsize=9)
-        text = f"{i + 1}  {found.luminance[i]:,.0f} cd/m²\n    {found.solid_angle[i]:.3g} sr"
+        luminance, size = rounded(found.luminance[i], 0), significant(found.solid_angle[i])
+        text = f"{i + 1}  {luminance} cd/m²\n    {size} sr"
         figure.text(0.835, y, text, fontsize=6.5, va="center")
     if result.count > len(largest):
-        figure.text(0.81, 0.05, f"and {result.count - len(largest)} smaller", fontsize=7)
+        smaller = gettext("and {rest} smaller", rest=result.count - len(largest))
+        figure.text(0.81, 0.05, smaller, fontsize=7)
+
+
+def _mark(value: float) -> str:
+    """A luminance at a scale's mark."""
+    return decimal(f"{value:,.6g}".replace(",", NARROW_SPACE))
 
 
 def _figure(shape: tuple[int, ...]) -> Figure:

@@ -104,7 +104,7 @@ def command(out: Path, page: Path | None, **chosen) -> None:
     folder = ResultFolder(out, "dgp", inputs=files)
     read = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
-    from scenes.language.catalogue import ngettext
+    from scenes.language.catalogue import in_language, ngettext
     from scenes.year_of_glare import outputs
     from scenes.year_of_glare.page import write_page
     from scenes.year_of_glare.year import rate_views, read_year
@@ -116,7 +116,8 @@ def command(out: Path, page: Path | None, **chosen) -> None:
         year = read_year(options, progress, read, head)
         views = rate_views(year, folder.checkpoints(outputs.KEPT), progress)
         with folder.replaced() as place:
-            rows = [outputs.write_view(year, rated, place) for rated in views]
+            with in_language(page_options.language):
+                rows = [outputs.write_view(year, rated, place) for rated in views]
             table = outputs.write_summary(year, rows, place)
             write_page(year, table, place / "report.html", page_options)
     worst = table.loc[table["highest_dgp"].idxmax()]

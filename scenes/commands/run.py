@@ -144,7 +144,7 @@ def run_to_folder(
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar, compiled_beside
     from scenes.explore.folder import write_explorer
-    from scenes.language.catalogue import ngettext
+    from scenes.language.catalogue import in_language, ngettext
     from scenes.report import write_report
     from scenes.result_folder import EXPLORER
     from scenes.run.outputs import write_results
@@ -163,10 +163,11 @@ def run_to_folder(
         progress("results", 0.0)
         report = partial(write_report, page=page_options)
         explorer = partial(write_explorer, page=page_options) if options.explore else None
-        write_results(
-            result, folder, report, explorer,
-            netcdf=options.netcdf, processes=processes, progress=progress,
-        )  # fmt: skip
+        with in_language(page_options.language):
+            write_results(
+                result, folder, report, explorer,
+                netcdf=options.netcdf, processes=processes, progress=progress,
+            )  # fmt: skip
         progress("results", 1.0)
     head.notes(note for note in result.notes if note != quick_run.NOTE)
     if result.issues:

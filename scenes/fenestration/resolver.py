@@ -344,7 +344,10 @@ def stated_systems(
         if values.missing(overrides.light_only):
             continue
         if values not in known:
-            known[values] = (glazing_system(values, path.name),)
+            system = glazing_system(values, path.name)
+            if any(system.name == other.name for (other,) in known.values()):
+                system = glazing_system(values, path.name, digits=6)
+            known[values] = (system,)
         result[window.guid] = known[values]
     return result
 
@@ -406,8 +409,8 @@ def _first(*values: float | None) -> float | None:
     return next((value for value in values if value is not None), None)
 
 
-def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
-    """A glazing of known values at normal incidence.
+def glazing_system(values: StatedValues, file: str, digits: int = 3) -> FenestrationSystem:
+    """A glazing of known values at normal incidence; its name has them with so many digits.
 
     Light: a single pane whose transmissivity and index are known follows Fresnel's equations, any
     other glazing falls with the angle after Roos et al. 2001. Sun: what is not stated follows from
@@ -415,7 +418,7 @@ def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
     """
     u = TYPICAL_SYSTEMS["none"][0] if values.u_value is None else values.u_value
     panes = values.panes or (1 if u > HIGH_U else 2)
-    name = "glazing, " + _in_words(values)
+    name = "glazing, " + _in_words(values, digits)
     if values.glass is None:
         front, back = visible_reflectances(values.visible)
         clear = Glazing(name, values.visible, front, back, panes)
@@ -478,8 +481,9 @@ def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
     )  # fmt: skip
 
 
-def _in_words(values: StatedValues) -> str:
+def _in_words(values: StatedValues, digits: int) -> str:
     parts = {"U": values.u_value, "g": values.g_value, "visible transmittance": values.visible}
     if values.solar is not None:
         parts["solar transmittance"] = values.solar
-    return ", ".join(f"{name} {value:g}" for name, value in parts.items() if value is not None)
+    stated = ((name, value) for name, value in parts.items() if value is not None)
+    return ", ".join(f"{name} {value:.{digits}g}" for name, value in stated)

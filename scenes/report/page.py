@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import jinja2
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from mitsuba_cfs.files import json_text, write_text
 from scenes.head import Head
@@ -29,6 +29,7 @@ from scenes.results import RunResult
 
 FILES = page_files("scenes.report")  # that other pages share
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (°C|%|lx|h|m²|m³|kWh|cd/m²)(?!\w)")
+OPTION = re.compile(r"(?<!\w)--[a-z][\w-]*")
 UNIT_EXPONENT = re.compile(r"(?<![\w.-])(k?m|cm|mm)([23])(?![\w.-])")
 EXPONENTS = {"2": "²", "3": "³"}
 SCRIPTS = ("tables.js", "pointer.js", "viewer.js", "storeys.js")
@@ -113,9 +114,14 @@ def environment(own: Mapping[str, str] | None = None) -> jinja2.Environment:
     )
     environment.filters["script_json"] = script_json
     environment.filters["packed_json"] = packed_json
-    environment.filters["tied"] = prose
+    environment.filters["tied"] = tied
     environment.install_gettext_callables(gettext, ngettext)
     return environment
+
+
+def tied(text: str) -> Markup:
+    """`prose`, whose options such as --quick are not broken at the end of a line."""
+    return Markup(OPTION.sub(r'<span class="option">\g<0></span>', str(escape(prose(text)))))
 
 
 def prose(text: str) -> str:

@@ -24,6 +24,8 @@ from mitsuba_cfs.files import (
 )
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.progress import Progress, silent
+from scenes.language.catalogue import current_language, in_language
+from scenes.language.numbers import rounded, spoken
 from scenes.pictures import write_falsecolour, write_tone_mapped
 from scenes.result_folder import EXPLORER, ResultFolder
 from scenes.results import GridDaylight, RoomYear, RunResult
@@ -56,7 +58,8 @@ def write_results(
         netcdf: whether all numbers are written as one netCDF file besides.
         processes: that many rooms' files are written at a time.
 
-    A fault of the program in one of these pages is raised when all else is in place.
+    Captions in pictures are in the language of `in_language`. A fault of the program in one of
+    these pages is raised when all else is in place.
     """
     faults = []
     with folder.replaced() as temporary:
@@ -106,7 +109,7 @@ def _write_rooms(
     rooms = list(zip(result.spaces, places, strict=True))
     tasks = Tasks(
         rooms,
-        _Files(result.times),
+        _Files(result.times, current_language()),
         _fault,
         key=lambda item: item[0].space.guid,
         scene=lambda item: item[0].space.guid,
@@ -130,11 +133,13 @@ class _Files:
     """Writes the files of a room."""
 
     times: pd.DatetimeIndex
+    language: str  # of captions in pictures
 
     def __call__(self, item: tuple[RoomYear, Path]) -> None:
         room, place = item
         place.mkdir(exist_ok=True)
-        _write_room(room, self.times, place)
+        with in_language(self.language):
+            _write_room(room, self.times, place)
 
 
 def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
@@ -157,12 +162,12 @@ def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
     for picture in room.glare.pictures:
         name = f"view_{times[picture.hour]:%m-%d_%Hh}"
         write_hdr(place / f"{name}.hdr", picture.luminance, room.glare.view)
-        title = f"{times[picture.hour]:%d %B %H:%M}, DGP {picture.glare['dgp']:.2f}"
+        title = f"{spoken(times[picture.hour])}, DGP {rounded(picture.glare['dgp'], 2)}"
         write_falsecolour(place / f"{name}.png", picture.luminance, title=title)
     if (colour := room.glare.colour) is not None:
         name = f"view_{times[colour.hour]:%m-%d_%Hh}_colour"
         write_hdr(place / f"{name}.hdr", colour.radiance, room.glare.view)
-        title = f"{times[colour.hour]:%d %B %H:%M}"
+        title = spoken(times[colour.hour])
         write_tone_mapped(place / f"{name}.png", colour.radiance, scale=True, title=title)
 
 

@@ -23,7 +23,11 @@ from mitsuba_cfs.glare.classes import (
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import format_view
 from scenes.figures.carpet import day_grid
+from scenes.language.catalogue import gettext
+from scenes.language.numbers import rounded, short_month, spoken
 from scenes.pictures import write_check_picture, write_falsecolour
+from scenes.report.headline import LEVEL_WORDS
+from scenes.report.method import METHODS
 from scenes.year_of_glare.year import GlareYear, ViewYear, rating_of, used_dgp
 
 KEPT = "ratings"  # folder of the finished ratings, inside that of the results
@@ -36,14 +40,18 @@ COLOURS = LinearSegmentedColormap.from_list(
 
 
 def write_view(year: GlareYear, rated: ViewYear, folder: Path) -> dict[str, object]:
-    """Write a view's ratings, heat map and pictures; its row of `views.csv`."""
+    """Write a view's ratings, heat map and pictures; its row of `views.csv`.
+
+    Captions are in the language of `in_language`.
+    """
     name = rated.view.name
     write_table(rated.ratings, folder / f"{name}.parquet")
     row = view_row(year, rated)
     write_heat_map(folder / f"{name}_heat_map.png", year, rated)
     for moment, (picture, result) in rated.pictures.items():
         where = folder / f"{name}_{moment:%m-%d_%Hh}"
-        title = f"{moment:%d %B %H:%M}, {year.options.metric} {rated.ratings.dgp[moment]:.2f}"
+        dgp = rounded(rated.ratings.dgp[moment], 2)
+        title = f"{spoken(moment)}, {year.options.metric} {dgp}"
         write_falsecolour(where.with_suffix(".png"), picture, title=title)
         write_check_picture(Path(f"{where}_sources.png"), result, title=title)
         if year.options.hdr:
@@ -91,22 +99,33 @@ def write_heat_map(path: Path, year: GlareYear, rated: ViewYear) -> None:
     )  # fmt: skip
     starts = pd.date_range(times[0].normalize(), periods=days, freq="D")
     first = np.flatnonzero(starts.day == 1)
-    axes.set_xticks(first, [f"{starts[d]:%b}" for d in first], ha="left", fontsize=8)
+    axes.set_xticks(first, [short_month(starts[d].month) for d in first], ha="left", fontsize=8)
     axes.set_yticks(range(0, 25, 3), [f"{h:02d}:00" for h in range(0, 25, 3)], fontsize=8)
-    axes.set_ylabel("local standard time", fontsize=8)
+    axes.set_ylabel(gettext("Hour of the day (local standard time)"), fontsize=8)
     dgp = used_dgp(year, rated.ratings.dgp.to_numpy())
     start, end = year.options.occupied
     axes.set_title(
-        f"{year.options.metric}, {year.options.method}, {year.room}, {rated.view.name}: "
-        f"above 0.45 in {100 * exceeded_share(dgp, 0.45):.1f} % of the hours of use "
-        f"({start} to {end} o'clock), protection: {protection_level(dgp)}",
+        gettext(
+            "{metric}, {method}, {room}, {view}: above {limit} in {share} % of the hours of use "
+            "({start} to {end} o'clock), protection: {level}",
+            metric=year.options.metric,
+            method=gettext(METHODS.get(year.options.method, year.options.method)),
+            room=year.room,
+            view=rated.view.name,
+            limit=rounded(0.45, 2),
+            share=rounded(100 * exceeded_share(dgp, 0.45), 1),
+            start=start,
+            end=end,
+            level=gettext(LEVEL_WORDS[protection_level(dgp)]),
+        ),
         fontsize=8,
         loc="left",
     )
     for hour in (start, end):
         axes.axhline(hour, color="black", linewidth=0.6, linestyle=":")
     bar = figure.colorbar(image, cax=figure.add_axes((0.88, 0.15, 0.02, 0.70)), extend="both")
-    bar.set_ticks([0.15, 0.25, *LIMITS, 0.60], labels=["0.15", "0.25", *map(str, LIMITS), "0.60"])
+    ticks = [0.15, 0.25, *LIMITS, 0.60]
+    bar.set_ticks(ticks, labels=[rounded(tick, 2) for tick in ticks])
     bar.ax.tick_params(labelsize=8)
     with replacing(path) as part:
         figure.savefig(part)

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import re
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 
+from mitsuba_cfs.glare.evaluation import evaluate
+from mitsuba_cfs.images.view import fisheye
 from scenes.figures.plan import plan_frame
 from scenes.head import NO_HEAD
+from scenes.language.catalogue import in_language
 from scenes.page_options import OWN_PAGE, PageOptions
+from scenes.pictures import write_check_picture
 from scenes.year_of_glare.options import YearOptions
+from scenes.year_of_glare.outputs import write_heat_map
 from scenes.year_of_glare.page import RoseWedge, roses, write_page
 from tests.devtools import Page, chromium
 from tests.report.synthetic import two_rooms
@@ -107,3 +115,52 @@ def test_the_page_opens_without_a_fault(page, tmp_path) -> None:
         assert browser.value("document.documentElement.scrollWidth") <= 1400
         missing = [f for f in browser.faults if "ERR_FILE_NOT_FOUND" not in f]  # its two pictures
         assert missing == []
+
+
+def captions(monkeypatch, draw) -> str:
+    """Every text of the figures that a call saves."""
+    texts = []
+
+    def save(figure: Figure, *_: object, **__: object) -> None:
+        figure.draw_without_rendering()
+        texts.extend(text.get_text() for text in figure.findobj(Text))
+
+    monkeypatch.setattr(Figure, "savefig", save)
+    draw()
+    return "\n".join(texts)
+
+
+@pytest.mark.parametrize(
+    ("language", "words"),
+    [
+        ("en", ("Mar", "0.45", "o'clock", "glare source", "protection: high")),
+        ("de", ("Mär", "0,45", "Uhr", "Blendquelle", "Schutz: hoch", "Nutzungsstunden")),
+        ("fr", ("mars", "0,45", "heures", "éblouissement", "protection")),
+    ],
+)
+def test_captions_in_pictures_are_in_the_language_of_the_page(
+    tmp_path, monkeypatch, language, words
+) -> None:
+    times = pd.date_range("2017-01-01 00:30", periods=8760, freq="h")
+    dgp = pd.Series(0.2, index=times)
+    year = SimpleNamespace(
+        options=YearOptions("office.ifc", "city.epw"), room="office",
+        weather=SimpleNamespace(midpoints=times), sky=SimpleNamespace(lit=np.arange(8760)),
+    )  # fmt: skip
+    rated = SimpleNamespace(ratings=SimpleNamespace(dgp=dgp), view=SimpleNamespace(name="seat"))
+    luminance = np.full((40, 40), 100.0)
+    luminance[18:22, 18:22] = 1e5
+    bright = evaluate(luminance, fisheye((0.0, 0.0, 1.2), (0.0, 1.0, 0.0), 40))
+    monkeypatch.setattr("scenes.year_of_glare.outputs.used_dgp", lambda _, values: values)
+
+    def draw() -> None:
+        write_heat_map(tmp_path / "map.png", year, rated)
+        write_check_picture(tmp_path / "sources.png", bright)
+
+    monkeypatch.setattr("scenes.pictures.replacing", nullcontext)
+    monkeypatch.setattr("scenes.year_of_glare.outputs.replacing", nullcontext)
+    with in_language(language):
+        text = captions(monkeypatch, draw)
+    for word in words:
+        assert word in text, text
+    assert language == "en" or not re.search(r"protection: high|o'clock|\d\.\d", text)

@@ -17,7 +17,7 @@ from bim.account import Account, StoreyAccount
 from bim.report.issue import Effect, Issue, issue_text
 from scenes.report import write_report
 from scenes.report.glare_figures import gallery
-from scenes.report.page import report_html
+from scenes.report.page import report_html, tied
 from scenes.results import GlareResults
 from tests.report.synthetic import run_result
 
@@ -192,3 +192,9 @@ def test_a_room_shows_one_picture_in_colour_where_it_has_one() -> None:
     assert shown.size == (64, 64)
     red, _, blue = np.asarray(shown, dtype=float).reshape(-1, 3).mean(axis=0)
     assert red > 1.2 * blue, "the made-up room is lit by a red light"
+
+
+def test_options_of_a_command_are_not_broken_at_the_end_of_a_line() -> None:
+    text = tied("run without --quick, for 5 m2 of <glass>")
+    assert '<span class="option">--quick</span>, for 5\N{NO-BREAK SPACE}m²' in text
+    assert "&lt;glass&gt;" in text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 
 from bim.building_file import read_building_file
 from bim.exported_glazing import normal_transmittance
+from bim.fenestration import PlainGlass
 from bim.ifc.building import read_ifc
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.simple_glazing import solar_transmittance
@@ -422,6 +424,11 @@ def test_u_and_g_given_for_a_radiance_scene_make_its_solar_transmittance(tmp_pat
     light = system.visible.direct_hemispherical(system.visible.transmission_front)[0]
     sun = system.solar.direct_hemispherical(system.solar.transmission_front)[0]
     assert sun == pytest.approx(solar_transmittance(1.1, 0.4), rel=1e-3) and sun < 0.4 < light
+    assert system.name == "glazing, U 1.1, g 0.4, visible transmittance 0.799"
+    twin = replace(windows[0], guid="twin", glass=PlainGlass(((0.8701, 1.52),)),
+                   visible_transmittance=0.79868)  # fmt: skip
+    names = [one[0].name for one in fill_windows([windows[0], twin], given, scene).values()]
+    assert len(set(names)) == 2  # values that differ beyond three digits
     alone = fill_windows(windows, WindowOverrides(), scene)[windows[0].guid][0]
     assert alone.solar is alone.visible and any("Solar band" in note for note in alone.notes)
 
