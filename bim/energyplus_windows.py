@@ -82,7 +82,10 @@ def complex_state(model: Model, name: str, optics: WindowOptics, *, panes: bool)
     absorbed = [
         (optics.absorptances.outer, np.zeros(size)),
         *still,
-        (optics.absorptances.inner, np.full(size, optics.back_absorptance)),
+        (
+            optics.absorptances.inner + optics.absorptances.air,
+            np.full(size, optics.back_absorptance),
+        ),
     ]
     layers: dict[str, str] = {f"gap_{k}_name": gap for k, gap in enumerate(gaps, 1)}
     for k, (pair, pane) in enumerate(zip(absorbed, stack, strict=True), 1):

@@ -1,10 +1,11 @@
 """Outdoor air, opened windows, supplied air and the slab's power in a time step, compiled.
 
-Leaks and the flow through opened windows follow the air of the last iterate.  Windows open where
-the air of the step would rise above their upper limit, and close where shut it would not exceed the
-lower one.  Where fully open it would fall below the lower limit, they are open in part and hold it.
-So no on and off of windows is left that the time step would have to resolve.  Supply air and
-slab follow the air at the start of the step.
+Leaks, the flow through opened windows and the slab follow the air of the last iterate.  Windows
+open where the air of the step would rise above their upper limit, and close where shut it would not
+exceed the lower one.  Where fully open it would fall below the lower limit, they are open in part
+and hold it.  The bypass of a heat recovery likewise holds its temperature (or the one above which
+the room would be cooled); it is shut while the room is heated.  So no on and off is left that the
+time step would have to resolve.
 """
 
 from __future__ import annotations
@@ -24,18 +25,12 @@ def start_air_flows(
     net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
     t: int, hour: int,
 ) -> None:  # fmt: skip
-    """Set supply air, slab power and the windows' limits of every zone for the step."""
+    """Set the limits of windows and bypass of every zone for the step."""
     for z in range(work.flow.size):
-        _set_supply(net, state, work, weather, drive, t, hour, z)
         _set_limits(net, state, work, weather, drive, t, z)
-        face = net.emitters.slab[z]
-        if face >= 0:
-            full_heat, full_cold, band = net.emitters.power[z]
-            lacks = (drive.slab_c[t, z, 0] - state.air[z]) / band + 0.5
-            exceeds = (state.air[z] - drive.slab_c[t, z, 1]) / band + 0.5
-            power = full_heat * min(max(lacks, 0.0), 1.0) - full_cold * min(max(exceeds, 0.0), 1.0)
-            work.slab[z] = power
-            work.source[face] = power / net.faces.area[face]
+        above = max(min(net.paths.fan[z, 1], drive.cooling_c[t, z]), drive.heating_c[t, z])
+        work.bypass_c[z] = above
+        work.bypass[z] = OPEN if state.air[z] > above else SHUT
 
 
 @inlined
@@ -43,8 +38,9 @@ def set_air_flows(
     net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
     t: int, hour: int,
 ) -> None:  # fmt: skip
-    """Set the outdoor air of every zone, and the air through its windows when open."""
+    """Set the air of every zone from outdoors, through its windows when open, and from its fan."""
     for z in range(work.flow.size):
+        _set_supply(net, state, work, weather, drive, t, hour, z)
         work.flow[z] = drive.airflow[hour, z] + _leaks(net, state, weather, drive, t, hour, z)
         work.airing[z, 2] = 0.0
         if drive.airing[hour, z] > 0.0:
@@ -101,18 +97,32 @@ def _set_supply(
     net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
     t: int, hour: int, z: int,
 ) -> None:  # fmt: skip
+    """Set the air of a fan with all heat recovered, and with what its least lets it bypass."""
     full = weather.density[t] * AIR_HEAT * drive.supply[hour, z]
     given, inside, out = drive.supply_c[t, z], state.air[z], weather.outdoor[t]
     recovery, bypass, least = net.paths.fan[z]
-    row = work.supply[z]
+    shut, passed = work.recovered[z], work.bypassed[z]
+    passed[0], passed[1] = 0.0, 0.0
     if not np.isnan(given):
-        row[0], row[1], row[2] = full, full * given, 0.0
+        shut[0], shut[1], shut[2] = full, full * given, 0.0
         return
-    if inside > bypass and out < inside:
-        recovery = 0.0
     reached = out + recovery * (inside - out)
     if reached < least:
-        row[0], row[1], row[2] = full, full * least, full * (least - reached)
-    else:
-        row[0] = full * (1.0 - recovery)
-        row[1], row[2] = row[0] * out, 0.0
+        shut[0], shut[1], shut[2] = full, full * least, full * (least - reached)
+        return
+    shut[0] = full * (1.0 - recovery)
+    shut[1], shut[2] = shut[0] * out, 0.0
+    if recovery > 0.0 and out < inside and np.isfinite(bypass):
+        passed[0], passed[1] = full, full * max(out, least)
+
+
+@inlined
+def set_slab(net: Network, state: State, work: Workspace, drive: Drive, t: int, z: int) -> None:
+    """Set the power of a zone's slab, by the air of the last iterate."""
+    face = net.emitters.slab[z]
+    full_heat, full_cold, band = net.emitters.power[z]
+    lacks = (drive.slab_c[t, z, 0] - state.air[z]) / band + 0.5
+    exceeds = (state.air[z] - drive.slab_c[t, z, 1]) / band + 0.5
+    power = full_heat * min(max(lacks, 0.0), 1.0) - full_cold * min(max(exceeds, 0.0), 1.0)
+    work.slab[z] = power
+    work.source[face] = power / net.faces.area[face]

@@ -15,7 +15,7 @@ from thermal.conduction import CELL
 from thermal.convection import TERRAIN
 from thermal.drive import drive_of, stretches
 from thermal.errors import require, require_range
-from thermal.network import Network, network
+from thermal.network import Network, network, window_mix
 from thermal.ventilation import AirTransfer
 from thermal.zone import Zone
 
@@ -167,8 +167,10 @@ def simulate_zones(
     steps, told = _steps_per_row(step_s, row_s), progress or (lambda share: None)
     told(0.0)
     link = _links(air_links, len(zones))
+    pairs = zip(zones, solar, strict=True)
+    mixes = [window_mix(zone, sun.state, climate.hours) for zone, sun in pairs]
     net = network(
-        zones, step_s=step_s, terrain=options.terrain, cell=options.cell,
+        zones, mixes, step_s=step_s, terrain=options.terrain, cell=options.cell,
         link=link, transfers=transfers,
     )  # fmt: skip
     method = _method(options, steps, step_s)
@@ -176,7 +178,7 @@ def simulate_zones(
     work, years, days = _work(net, state), [], 0
     first_day = min(round(24 * HOUR / row_s), climate.hours)
     for stretch in stretches(climate.hours, steps, max(STRETCH, first_day)):
-        drive, every = drive_of(zones, climate, solar, stretch, transfers)
+        drive, every = drive_of(zones, climate, solar, stretch, mixes, transfers)
         method = method._replace(solar_every=every)
         weather = records.OutdoorConditions(*map(stretch.of, outdoors))
         if not stretch.first:
@@ -185,8 +187,7 @@ def simulate_zones(
         kernel.advance(net, state, work, weather, drive, method, stretch.size, means)
         np.divide(means.terms, steps, out=means.terms)
         results = (
-            _result(zone, net, z, means, days=days, state=drive.state)
-            for z, zone in enumerate(zones)
+            _result(zone, net, z, means, days=days, drive=drive) for z, zone in enumerate(zones)
         )
         years.append([*map(storage or (lambda result: result), results)])
         told(stretch.last / climate.hours)
@@ -277,6 +278,10 @@ def _work(net: Network, state: records.State) -> records.Workspace:
         flow=np.zeros(zones),
         aired=np.zeros(zones),
         supply=np.zeros((zones, 3)),
+        bypass=np.zeros(zones, dtype=np.int64),
+        bypass_c=np.zeros(zones),
+        recovered=np.zeros((zones, 3)),
+        bypassed=np.zeros((zones, 2)),
         carried=np.zeros(zones),
         passed=np.zeros(zones),
         slab=np.zeros(zones),
@@ -284,7 +289,7 @@ def _work(net: Network, state: records.State) -> records.Workspace:
         still=np.zeros(m),
         ends=np.zeros((n, 2)),
         film=np.zeros(n),
-        outdoor=np.zeros((n, 5)),
+        outdoor=np.zeros((n, 6)),
         old_inner=state.inner.copy(),
         old_outer=state.outer.copy(),
         old_air=state.air.copy(),
@@ -298,20 +303,20 @@ def _result(
     means: records.Means,
     *,
     days: int,
-    state: NDArray[np.int64],
+    drive: records.Drive,
 ) -> ZoneResult:
     air, terms = means.air[:, z], means.terms[:, z]
     mine = np.flatnonzero(net.faces.zone == z)
     inner, outer, windows = means.inner[:, mine], means.outer[:, mine], net.faces.window[mine]
     glass, solid = np.flatnonzero(windows >= 0), np.flatnonzero(windows < 0)
-    weight = net.faces.radiant_share[mine]
-    room = 0.5 * (air + inner @ weight)
+    weight = net.radiation.shares(z)[drive.mix[:, z]]
+    room = 0.5 * (air + (inner * weight).sum(axis=1))
     seen = inner.copy()
     for column, window in zip(glass, zone.windows, strict=True):
         report = np.array([s.inner_report for s in window.states])
-        share = report[state[:, windows[column]]]
+        share = report[drive.state[:, windows[column]]]
         seen[:, column] = room + share * (inner[:, column] - room)
-    mrt = seen @ weight
+    mrt = (seen * weight).sum(axis=1)
     flows = {name: terms[:, i] for i, name in enumerate(records.TERMS)}
     load = flows["ideal loads"]
     return ZoneResult(

@@ -15,7 +15,7 @@ Source: Kuhn et al. 2011, Energy and Buildings 43:19-27, whose primes mark the m
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -79,6 +79,7 @@ class Fenestration:
     resistance: LayerResistance | None = None  # None: constant, from U
     extra_outer: float = 0.0  # [W/(m2 K)] outer layer to outdoor air, besides the film
     extra_inner: float = 0.0  # [W/(m2 K)] inner layer to room air, besides the film
+    room_to_outer: float = 0.0  # [W/(m2 K)] room air to outer layer, behind an interior shade
     inner_report: float = 1.0  # share of (T_inner - T_room) that the visible face shows
     emissivity_in: float = 0.84
     emissivity_out: float = 0.84
@@ -95,11 +96,48 @@ class Fenestration:
             object.__setattr__(self, "layer_resistance", LayerResistance("constant", (r,)))
         else:
             object.__setattr__(self, "layer_resistance", self.resistance)
-        for value, label in ((self.extra_outer, "extra outer"), (self.extra_inner, "extra inner")):
-            require_range(value, 0.0, 200.0, f"{item}: {label} conductance", "W/(m2 K)")
+        for name in ("extra_outer", "extra_inner", "room_to_outer"):
+            require_range(getattr(self, name), 0.0, 200.0, f"{item}: {name}", "W/(m2 K)")
         require_range(self.emissivity_in, 0.0, 1.0, f"{item}: inside emissivity")
         require_range(self.emissivity_out, 0.0, 1.0, f"{item}: outside emissivity")
         require_range(self.inner_report, 0.0, 1.5, f"{item}: inner report weight")
+
+    def inward_shares(self) -> tuple[float, float]:
+        """Shares of the heat absorbed in the outer and in the inner layer that go indoors.
+
+        With the films of the measurement, and the layer resistance that gives U with them.
+        """
+        across = self.room_to_outer
+        if across == 0.0:  # the extra conductances are in realised films
+            return self.u_value * self.r_outer, 1.0 - self.u_value * self.r_inner
+        outer, inner = 1.0 / self.r_outer, 1.0 / self.r_inner + self.extra_inner
+        through = 1.0 / middle_resistance(self.u_value, outer, inner, across)
+        network = [[outer + across + through, -through], [-through, inner + through]]
+        shares = np.linalg.solve(network, [across, inner])  # by reciprocity
+        return float(shares[0]), float(shares[1])
+
+    def in_series(self) -> Fenestration:
+        """With the film of the dark state in place of the path from the room to the outer layer."""
+        if self.room_to_outer == 0.0:
+            return self
+        past = self.room_to_outer * (1.0 - self.u_value * self.r_outer)
+        share = (self.u_value - past) / self.u_value  # of the heat that passes both layers
+        film = share / (1.0 / self.r_inner + self.extra_inner)
+        layers = self.layer_resistance
+        resistance = replace(layers, coefficients=tuple(c / share for c in layers.coefficients))
+        plain = replace(self, resistance=resistance, extra_inner=0.0, room_to_outer=0.0)
+        return with_realised_films(plain, r_inner_realised=film)
+
+
+def middle_resistance(u_value: float, outer: float, inner: float, across: float) -> float:
+    """Resistance [m2 K/W] between the layers with which all paths together pass U.
+
+    Args: conductances [W/(m2 K)]: outer layer to outdoors, inner layer to the room, and room to
+        outer layer.
+    """
+    at_outer = u_value / outer  # temperatures at 1 indoors and 0 outdoors
+    through = u_value - across * (1.0 - at_outer)
+    return (1.0 - through / inner - at_outer) / through
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +147,7 @@ class LayerAbsorptances:
     outer: NDArray[np.float64]  # [...]
     inner: NDArray[np.float64]  # [...]
     clipped: float  # largest absorptance that had to be moved to stay between 0 and alpha
+    air: NDArray[np.float64] | float = 0.0  # [...] to the room's air behind an interior shade
 
 
 def layer_absorptances(
@@ -119,6 +158,8 @@ def layer_absorptances(
     *,
     r_outer: float = R_OUTER,
     r_inner: float = R_INNER,
+    inward: tuple[float, float] | None = None,
+    room_air: ArrayLike = 0.0,
     item: str = "fenestration",
 ) -> LayerAbsorptances:
     """Absorptances of the outer and inner layer, from data of one measuring condition.
@@ -129,6 +170,8 @@ def layer_absorptances(
     Args:
         transmittance, reflectance, g_value: [...] solar, per direction (or diffuse).
         u_value: [W/(m2 K)]; r_outer, r_inner: [m2 K/W] films at which g and U were measured.
+        inward: shares of `Fenestration.inward_shares`; None: those of U and the films.
+        room_air: [...] absorbed sun that goes to the room's air behind an interior shade.
 
     Raises: `ThermalInputError` for g below the transmittance, R not positive, values out of range.
 
@@ -147,14 +190,17 @@ def layer_absorptances(
     message = f"{stated:g} is below the solar transmittance {least:.3f}, the least that g can be"
     require(least - stated <= 0.01, f"{item}: g", message)
     alpha, q_i = np.maximum(1.0 - tau - rho, 0.0), np.maximum(g - tau, 0.0)
-    inner = (q_i / u_value - alpha * r_outer) / r
-    kept = np.clip(inner, 0.0, alpha)
+    outer_share, inner_share = inward or (u_value * r_outer, u_value * (r_outer + r))
+    to_room = np.minimum(np.broadcast_to(room_air, alpha.shape), np.minimum(alpha, q_i))
+    layers = alpha - to_room
+    inner = (q_i - to_room - layers * outer_share) / (inner_share - outer_share)
+    kept = np.clip(inner, 0.0, layers)
     clipped = float(np.max(np.abs(inner - kept), initial=0.0))
     message = f"a layer's absorptance is out of range by {clipped:.3f}"
     require(clipped <= MEASUREMENT_SLACK, f"{item}: g and U", message)
     if clipped > 1e-6:
         _log.warning("%s: %s; clipped", item, message)
-    return LayerAbsorptances(outer=alpha - kept, inner=kept, clipped=clipped)
+    return LayerAbsorptances(outer=layers - kept, inner=kept, clipped=clipped, air=to_room)
 
 
 def linear_u(u_value: float, *, slope: float = SLOPE, reference_c: float = 10.0) -> LayerResistance:

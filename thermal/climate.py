@@ -81,6 +81,8 @@ class Solar:
     # [T, W] light of the room absorbed at the room side of the windows [W/m2 of glazing]
     window_inside: NDArray[np.float64] | None = None
     window_facade: NDArray[np.float64] | None = None  # [T, W] irradiance on the frames [W/m2]
+    # [T, W] sun that warms the room's air behind an interior shade [W/m2 of glazing]
+    absorbed_air: NDArray[np.float64] | None = None
     state: NDArray[np.int64] | None = None  # [H, W] shading state of every hour
 
     def __post_init__(self) -> None:
@@ -90,6 +92,8 @@ class Solar:
             fault = not np.all(np.isfinite(values)) or bool(np.any(values < -1e-6))
             require(not fault, f"solar {name}", "negative or missing values")
             object.__setattr__(self, name, values)
+        if self.state is not None:
+            object.__setattr__(self, "state", np.asarray(self.state, dtype=np.int64))
 
 
 def no_sun(hours: int, surfaces: int, windows: int) -> Solar:

@@ -46,9 +46,9 @@ ERRORS: dict[str, dict[str, tuple[float, float]]] = {
         "linear": (0.35, 0.52), "layers": (0.17, 0.29),
     },
     "internal": {
-        "typical": (0.43, 0.25), "typical" + BY_DIRECTION: (0.58, 0.32),
-        "gap": (0.40, 0.25), "constant": (0.49, 0.34),
-        "linear": (0.55, 1.03), "layers": (0.44, 0.25),
+        "typical": (0.40, 0.38), "typical" + BY_DIRECTION: (0.54, 0.52),
+        "gap": (0.37, 0.37), "constant": (0.49, 0.34),
+        "linear": (0.55, 1.03), "layers": (0.41, 0.40),
     },
 }  # fmt: skip
 
@@ -137,6 +137,13 @@ class Closure:
                 emissivity_out=ends[0].emissivity[0] + ends[0].infrared_transmittance,
                 emissivity_in=ends[1].emissivity[1] + ends[1].infrared_transmittance,
             )
+            if data.behind is not None and films == (None, None):
+                return replace(
+                    closed,
+                    resistance=data.behind.resistance,
+                    extra_inner=data.behind.extra,
+                    room_to_outer=data.behind.across,
+                )
             films = (
                 data.r_inner if place == "internal" and films[0] is None else films[0],
                 data.r_outer if place == "external" and films[1] is None else films[1],

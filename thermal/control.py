@@ -157,7 +157,9 @@ def switched(suns: Sequence[Solar], chosen: ArrayLike, states: ArrayLike | None 
         require(same, f"solar {name}", "the combinations differ in shape")
         return np.stack(arrays)[at, np.arange(rows)]
 
-    names = ("absorbed_outer", "absorbed_inner", "inside", "facade", "window_inside")
-    parts: dict[str, Any] = {name: pick(name) for name in (*names, "window_facade")}
+    names = ("absorbed_outer", "absorbed_inner", "absorbed_air", "inside", "facade")
+    parts: dict[str, Any] = {
+        name: pick(name) for name in (*names, "window_inside", "window_facade")
+    }
     of_windows = np.repeat(choice[:, None], windows, axis=1) if states is None else states
     return Solar(**parts, state=np.asarray(of_windows, dtype=np.int64))

@@ -13,7 +13,7 @@ from thermal import records
 from thermal.climate import Climate, Solar, to_steps
 from thermal.emitters import HeatedSlab
 from thermal.errors import require
-from thermal.network import framed, known_surfaces
+from thermal.network import WindowMix, framed, known_surfaces
 from thermal.ventilation import AirTransfer, SupplyAir
 from thermal.zone import Zone
 
@@ -55,6 +55,7 @@ def drive_of(
     climate: Climate,
     solar: Sequence[Solar],
     stretch: Stretch,
+    mixes: Sequence[WindowMix],
     transfers: Sequence[AirTransfer] = (),
 ) -> tuple[records.Drive, int]:
     """The drive of zones in a stretch, and the steps for which one row of sun holds."""
@@ -69,7 +70,9 @@ def drive_of(
     drive = records.Drive(
         inner=np.concatenate([part for inner, _ in suns for part in inner], axis=1),
         outer=np.concatenate([part for _, outer in suns for part in outer], axis=1),
+        air=np.stack([_air_sun(*pair, stretch) for pair in zip(zones, solar, strict=True)], axis=1),
         state=np.ascontiguousarray(np.concatenate(states, axis=1)),
+        mix=np.stack([stretch.of(mix.of_hour) for mix in mixes], axis=1),
         convective=_hourly([z.gains.convective for z in zones], stretch, "convective gains"),
         radiant=_hourly([z.gains.radiant for z in zones], stretch, "radiant gains"),
         beyond=_beyond(zones, climate, stretch),
@@ -136,17 +139,16 @@ def _zone_sun(
     return inner, outer
 
 
+def _air_sun(zone: Zone, sun: Solar, stretch: Stretch) -> FloatArray:
+    """Sun [R] [W] that warms a zone's air behind interior shades."""
+    values = np.zeros_like(sun.absorbed_inner) if sun.absorbed_air is None else sun.absorbed_air
+    return stretch.of(np.asarray(values)) @ np.array([w.area for w in zone.windows])
+
+
 def _states(zone: Zone, sun: Solar, stretch: Stretch) -> NDArray[np.int64]:
-    whole = stretch.hours, len(zone.windows)
     if sun.state is None:
-        return np.zeros((stretch.size, whole[1]), dtype=np.int64)
-    state = np.asarray(sun.state, dtype=np.int64)
-    item = f"shading state of zone {zone.name}"
-    require(state.shape == whole, item, f"expected {whole}")
-    state = stretch.of(state)
-    count = np.array([len(w.states) for w in zone.windows])
-    require(bool(np.all((state >= 0) & (state < count))), item, "a state that no window has")
-    return state
+        return np.zeros((stretch.size, len(zone.windows)), dtype=np.int64)
+    return stretch.of(sun.state)
 
 
 def _flows(

@@ -41,6 +41,7 @@ def _account(
     heat = weather.density[t] * AIR_HEAT
     for z in range(work.old_air.size):
         warmer = weather.outdoor[t] - state.air[z]
+        terms[z, on.SUN] += drive.air[sun, z]
         terms[z, on.GAINS] += drive.convective[hour, z] + drive.radiant[hour, z]
         terms[z, on.AIR] += heat * (work.flow[z] + work.aired[z]) * warmer + work.carried[z]
         terms[z, on.AIR] -= work.passed[z] * state.air[z]

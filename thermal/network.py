@@ -38,11 +38,10 @@ class Faces(NamedTuple):
     beyond: NDArray[np.int64]  # [N] column of `Drive.beyond`; 0: the ground
     normal: NDArray[np.float64]  # [N, 3] out of the room
     height: NDArray[np.float64]  # [N] glazing height for the inside film [m]
-    emissivity_out: NDArray[np.float64]  # [N]
+    emissivity_out: NDArray[np.float64]  # [N] of opaque ones; of windows: `Glass`
     hemisphere: NDArray[np.float64]  # [N, 3] shares of sky, air, ground
     roughness: NDArray[np.float64]  # [N] DOE-2 multiplier
     wind: NDArray[np.float64]  # [N, 2] a (local wind factor)^b, windward and leeward
-    radiant_share: NDArray[np.float64]  # [N] of the zone's radiant gains
     first_mode: NDArray[np.uint64]  # [N] of the wall's inner nodes
     mode_count: NDArray[np.uint64]  # [N]; 0: the wall's layers are not its own
     port: NDArray[np.float64]  # [N, 8] C_out, C_in, G_out, G_in, u_o, v_o, u_i, v_i
@@ -66,14 +65,22 @@ class Glass(NamedTuple):
 
     kind: NDArray[np.int64]  # [W, J] of the layer resistance
     coefficient: NDArray[np.float64]  # [W, J, 6]
-    extra: NDArray[np.float64]  # [W, J, 2] outer and inner extra conductance [W/(m2 K)]
+    # [W, J, 3] conductances [W/(m2 K)]: outer and inner extra, room air to the outer layer
+    extra: NDArray[np.float64]
+    emissivity_out: NDArray[np.float64]  # [W, J]
+
+
+class WindowMix(NamedTuple):
+    """Inside emissivities of a zone's windows that occur together in the year."""
+
+    emissivity: NDArray[np.float64]  # [V, W]
+    of_hour: NDArray[np.int64]  # [H] which of the V
 
 
 class Couplings(NamedTuple):
     """Pairs of unknowns that exchange heat, and their entries in the system's columns."""
 
-    exchange: NDArray[np.float64]  # [P] longwave exchange area [m2]
-    faces: NDArray[np.int64]  # [P, 2] that exchange it
+    faces: NDArray[np.int64]  # [P, 2] that exchange longwave radiation
     at_exchange: NDArray[np.int64]  # [P]
     at_film: NDArray[np.int64]  # [N] face and its zone's air
     at_partner: NDArray[np.int64]  # [N] face and the one at the wall's other side, -1 without
@@ -82,12 +89,33 @@ class Couplings(NamedTuple):
     at_link: NDArray[np.int64]  # [Q]
 
 
+class Radiation(NamedTuple):
+    """Longwave exchange and shares of radiant gains in each zone, for each of its window mixes.
+
+    A zone's V mixes follow each other, each with all its pairs or faces.
+    """
+
+    first_pair: NDArray[np.int64]  # [Z + 1]
+    first_face: NDArray[np.int64]  # [Z + 1]
+    exchange: NDArray[np.float64]  # [sum of V P] exchange area [m2]
+    at_exchange: NDArray[np.int64]  # [Z] start of the zone's
+    share: NDArray[np.float64]  # [sum of V N] of the zone's radiant gains
+    at_share: NDArray[np.int64]  # [Z]
+
+    def shares(self, z: int) -> NDArray[np.float64]:
+        """Shares [V, N] of zone z."""
+        last = self.at_share[z + 1] if z + 1 < len(self.at_share) else None
+        faces = self.first_face[z + 1] - self.first_face[z]
+        return self.share[self.at_share[z] : last].reshape(-1, faces)
+
+
 class Network(NamedTuple):
     """All that the compiled loop needs of the building."""
 
     faces: Faces
     modes: Modes
     glass: Glass
+    radiation: Radiation
     couplings: Couplings
     system: Elimination
     air_capacity: NDArray[np.float64]  # [Z] volume times capacity factor [m3]
@@ -115,8 +143,27 @@ def framed(zone: Zone) -> list[WindowElement]:
     return [window for window in zone.windows if window.frame_area > 0]
 
 
+def window_mix(zone: Zone, state: NDArray[np.int64] | None, hours: int) -> WindowMix:
+    """The emissivities that a zone's windows have together; state: [H, W] shading states."""
+    windows = zone.windows
+    if state is None:
+        state = np.zeros((hours, len(windows)), dtype=np.int64)
+    item = f"shading state of zone {zone.name}"
+    require(state.shape == (hours, len(windows)), item, f"expected {(hours, len(windows))}")
+    count = np.array([len(w.states) for w in windows])
+    require(bool(np.all((state >= 0) & (state < count))), item, "a state that no window has")
+    columns = [np.array([s.emissivity_in for s in w.states])[state[:, i]]
+               for i, w in enumerate(windows)]  # fmt: skip
+    table = np.array(columns).reshape(len(windows), hours).T
+    if not len(windows) or bool(np.all(table == table[0])):
+        return WindowMix(table[:1], np.zeros(hours, dtype=np.int64))
+    mixes, of_hour = np.unique(table, axis=0, return_inverse=True)
+    return WindowMix(mixes, of_hour.reshape(-1).astype(np.int64))
+
+
 def network(
     zones: Sequence[Zone],
+    mixes: Sequence[WindowMix],
     *,
     step_s: float,
     terrain: str,
@@ -131,25 +178,49 @@ def network(
     pipes = {face: zones[z].slab.depth for z, face in enumerate(slabs) if face >= 0}
     ports, modes = _walls([e for _, e in elements], partners, step_s, cell, pipes)
     faces = _faces(zones, elements, partners, ports, terrain)
-    found = [np.empty((3, 0))]
-    for z, zone in enumerate(zones):
-        mine = np.flatnonzero(faces.zone == z)
-        exchange = _zone_exchange(zone, [elements[i][1] for i in mine])
-        i, j = np.nonzero(np.tril(exchange, -1) > 0.0)
-        found.append(np.stack([mine[i], mine[j], exchange[i, j]]))
-    couplings, system = _couplings(faces, np.concatenate(found, axis=1), link)
+    radiation, seen = _radiation(zones, mixes, faces)
+    couplings, system = _couplings(faces, seen, link)
     capacity = np.array([zone.volume * zone.air_capacity_factor for zone in zones])
     paths = air_paths(zones, transfers, terrain)
     heated = emitters(zones, slabs, faces.mode_count)
-    return Network(faces, modes, _glass(elements), couplings, system, capacity, paths, heated)
+    glass = _glass(elements)
+    return Network(faces, modes, glass, radiation, couplings, system, capacity, paths, heated)
+
+
+def _radiation(
+    zones: Sequence[Zone], mixes: Sequence[WindowMix], faces: Faces
+) -> tuple[Radiation, NDArray[np.int64]]:
+    """The exchange in every zone, and the pairs of faces [P, 2] between which there is any."""
+    pairs, exchange, share = [np.empty((0, 2), dtype=np.int64)], [np.empty(0)], []
+    first_face = np.searchsorted(faces.zone, np.arange(len(zones) + 1))
+    for z, (zone, mix) in enumerate(zip(zones, mixes, strict=True)):
+        here = slice(first_face[z], first_face[z + 1])
+        area = faces.area[here]
+        emissivity = [_emissivities(zone, windows) for windows in mix.emissivity]
+        areas = np.stack([_zone_exchange(zone, area, eps) for eps in emissivity])
+        i, j = np.nonzero(np.tril(areas.max(axis=0), -1) > 0.0)
+        pairs.append(first_face[z] + np.stack([i, j], axis=1))
+        exchange.append(areas[:, i, j].ravel())
+        # all black to longwave: share by area
+        weight = np.maximum(area * emissivity, 1e-12 * area)
+        share.append((weight / weight.sum(axis=1, keepdims=True)).ravel())
+    starts = [np.cumsum([0, *map(len, parts)]) for parts in (pairs[1:], exchange[1:], share)]
+    radiation = Radiation(
+        first_pair=starts[0],
+        first_face=first_face,
+        exchange=np.concatenate(exchange),
+        at_exchange=starts[1][:-1],
+        share=np.concatenate(share),
+        at_share=starts[2][:-1],
+    )
+    return radiation, np.concatenate(pairs)
 
 
 def _couplings(
-    faces: Faces, exchange: NDArray[np.float64], link: NDArray[np.float64]
+    faces: Faces, seen: NDArray[np.int64], link: NDArray[np.float64]
 ) -> tuple[Couplings, Elimination]:
-    """What is coupled, and the system's columns; exchange: [3, P] two faces, area [m2]."""
+    """What is coupled, and the system's columns; seen: [P, 2] faces that see each other."""
     n = faces.area.size
-    seen = exchange[:2].T.astype(np.int64)
     films = np.stack([np.arange(n), n + faces.zone], axis=1)
     walls = np.flatnonzero(faces.partner >= 0)
     sides = np.stack([walls, faces.partner[walls]], axis=1)
@@ -159,7 +230,6 @@ def _couplings(
     at_partner = np.full(n, -1, dtype=np.int64)
     at_partner[walls] = system.entries(sides)
     couplings = Couplings(
-        exchange=np.ascontiguousarray(exchange[2]),
         faces=np.ascontiguousarray(seen),
         at_exchange=system.entries(seen),
         at_film=system.entries(films),
@@ -175,19 +245,16 @@ def _elements(zone: Zone) -> list[OpaqueSurface | WindowElement]:
     return [*zone.surfaces, *zone.windows, *(frame_surface(w) for w in framed(zone))]
 
 
-def emissivity_in(element: OpaqueSurface | WindowElement) -> float:
-    """Inside emissivity of a surface or of a window's first state."""
-    if isinstance(element, OpaqueSurface):
-        return element.emissivity_in
-    return element.states[0].emissivity_in
+def _emissivities(zone: Zone, windows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inside emissivities [N] of a zone's faces with those of its windows [W]."""
+    frames = [frame_surface(w).emissivity_in for w in framed(zone)]
+    return np.array([*(s.emissivity_in for s in zone.surfaces), *windows, *frames])
 
 
 def _zone_exchange(
-    zone: Zone, elements: list[OpaqueSurface | WindowElement]
+    zone: Zone, area: NDArray[np.float64], eps: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    area = [e.area for e in elements]
-    eps = [emissivity_in(e) for e in elements]
-    if len(elements) == 1:
+    if len(area) == 1:
         return np.zeros((1, 1))
     if zone.view_factors is None:
         return exchange_star(area, eps)
@@ -281,9 +348,6 @@ def _faces(
     solid = [e for _, e in elements]
     area = np.array([e.area for e in solid])
     zone = np.array([z for z, _ in elements])
-    weight = area * np.array([emissivity_in(e) for e in solid])
-    weight = np.maximum(weight, 1e-12 * area)  # all black to longwave: share by area
-    totals = np.bincount(zone, weights=weight, minlength=len(zones))
     factor = [local_wind_factor(e.height, terrain) for e in solid]
     forms = (DOE2_WINDWARD, DOE2_LEEWARD)
     return Faces(
@@ -295,11 +359,10 @@ def _faces(
         beyond=_beyond([e for _, e in elements]),
         normal=np.array([e.normal for e in solid]),
         height=np.array([getattr(e, "glazing_height", 1.5) for e in solid]),
-        emissivity_out=np.array([_emissivity_out(e) for e in solid]),
+        emissivity_out=np.array([getattr(e, "emissivity_out", np.nan) for e in solid]),
         hemisphere=np.array([outside_factors(e.normal[2], e.sky_seen) for e in solid]),
         roughness=np.array([ROUGHNESS[getattr(e, "roughness", "very smooth")] for e in solid]),
         wind=np.array([[a * f**b for a, b in forms] for f in factor]),
-        radiant_share=weight / totals[zone],
         first_mode=np.array([p[0] for p in ports], dtype=np.uint64),
         mode_count=np.array([p[1] for p in ports], dtype=np.uint64),
         port=np.array([p[2] for p in ports]),
@@ -322,23 +385,19 @@ def _beyond(elements: Sequence[OpaqueSurface | WindowElement]) -> NDArray[np.int
     return np.array(found, dtype=np.int64)
 
 
-def _emissivity_out(element: OpaqueSurface | WindowElement) -> float:
-    if isinstance(element, OpaqueSurface):
-        return element.emissivity_out
-    return element.states[0].emissivity_out
-
-
 def _glass(elements: list[tuple[int, OpaqueSurface | WindowElement]]) -> Glass:
     windows = [e for _, e in elements if isinstance(e, WindowElement)]
     states = max((len(w.states) for w in windows), default=1)
     kind = np.zeros((len(windows), states), dtype=np.int64)
     coefficient = np.zeros((len(windows), states, 6))
-    extra = np.zeros((len(windows), states, 2))
+    extra = np.zeros((len(windows), states, 3))
+    emissivity = np.zeros((len(windows), states))
     for w, window in enumerate(windows):
         for j in range(states):
             state = window.states[min(j, len(window.states) - 1)]
             r = state.layer_resistance
             kind[w, j] = _RESISTANCE_KINDS[r.kind]
             coefficient[w, j, : len(r.coefficients)] = r.coefficients
-            extra[w, j] = state.extra_outer, state.extra_inner
-    return Glass(kind, coefficient, extra)
+            extra[w, j] = state.extra_outer, state.extra_inner, state.room_to_outer
+            emissivity[w, j] = state.emissivity_out
+    return Glass(kind, coefficient, extra, emissivity)

@@ -10,12 +10,15 @@ doi:10.1137/S1052623401383558 (primal-dual active sets).
 
 from __future__ import annotations
 
+import numpy as np
+
 from thermal.air_flow import OPEN, SHUT, TOO_COLD_OPEN, TOO_WARM_SHUT
 from thermal.network import Network
 from thermal.records import AIR_HEAT, Drive, OutdoorConditions, State, Workspace, inlined
 
 FREE, HEATS, HEATS_FULLY, COOLS, COOLS_FULLY = range(5)  # what the plant of a zone does
 VENTS = 5  # windows, partly open, hold the air at their lower limit
+PASSES = 6  # the bypass of the heat recovery, partly open, holds the air at its temperature
 ROUNDING = 1e-10  # of temperatures [K]
 RADIANT_PART = 1e-4  # that the shares of a load may be off, of it
 LEAST_REPLY = 0.01  # of the load's other part, less by each watt that is radiant
@@ -23,16 +26,18 @@ LEAST_REPLY = 0.01  # of the load's other part, less by each watt that is radian
 
 @inlined
 def is_held(plant: int) -> bool:
-    """Whether plant or windows hold the air of their zone at a temperature."""
-    return plant == HEATS or plant == COOLS or plant == VENTS
+    """Whether plant, windows or bypass hold the air of their zone at a temperature."""
+    return plant == HEATS or plant == COOLS or plant >= VENTS
 
 
 @inlined
 def set_point(work: Workspace, drive: Drive, t: int, z: int) -> float:
-    """The air temperature that plant or windows hold [degC]."""
+    """The air temperature that plant, windows or bypass hold [degC]."""
     plant = work.plant[z]
     if plant == VENTS:
         return work.airing[z, 0]
+    if plant == PASSES:
+        return work.bypass_c[z]
     return drive.heating_c[t, z] if plant == HEATS else drive.cooling_c[t, z]
 
 
@@ -44,7 +49,7 @@ def radiant_load(net: Network, work: Workspace, drive: Drive, z: int) -> float:
         return share[0] * drive.limit[z, 0]
     if plant == COOLS_FULLY:
         return -share[1] * drive.limit[z, 1]
-    return work.radiant[z] if is_held(plant) else 0.0
+    return work.radiant[z] if plant == HEATS or plant == COOLS else 0.0
 
 
 @inlined
@@ -93,6 +98,8 @@ def plants_agree(
         if plant == VENTS:
             asked = stiffness * air - work.air[z, 1]
             work.aired[z] = asked / (heat * (weather.outdoor[t] - air))
+        elif plant == PASSES:
+            work.supply[z, 1] = stiffness * air - work.air[z, 1]
         elif is_held(plant):
             convective = stiffness * air - work.air[z, 1]
             state.load[z] = convective + work.radiant[z]
@@ -102,11 +109,12 @@ def plants_agree(
             state.load[z] = drive.limit[z, 0]
         elif plant == COOLS_FULLY:
             state.load[z] = -drive.limit[z, 1]
-        if plant != VENTS:
+        if plant < VENTS:
             work.plant[z] = _plant(plant, air, asked, stiffness * ROUNDING, drive, t, z)
         agree &= work.plant[z] == plant
         agree &= _windows_agree(work, z, air)
-        if not is_held(work.plant[z]):
+        agree &= _bypass_agrees(work, z, air)
+        if work.plant[z] != HEATS and work.plant[z] != COOLS:
             work.radiant[z] = 0.0
     return agree
 
@@ -115,28 +123,57 @@ def plants_agree(
 def _windows_agree(work: Workspace, z: int, air: float) -> bool:
     """Whether the windows do what this air temperature asks, else they change."""
     lower, upper, full = work.airing[z]
-    windows = work.windows[z]
     if work.plant[z] == VENTS:
         if 0.0 <= work.aired[z] <= full:
             return True
         work.plant[z], work.windows[z] = FREE, OPEN if work.aired[z] > full else SHUT
         return False
-    if windows & OPEN:
-        if full > 0.0 and air >= lower - ROUNDING:
-            return True
-        if windows & TOO_WARM_SHUT and full > 0.0:
-            work.plant[z] = VENTS
-        else:
-            work.windows[z] = SHUT | TOO_COLD_OPEN
-        return False
-    limit = lower if windows & TOO_COLD_OPEN else upper
-    if full == 0.0 or air <= limit + ROUNDING:
-        return True
-    if windows & TOO_COLD_OPEN:
+    work.windows[z], agree, holds = _opening(work.windows[z], air, lower, upper, full > 0.0)
+    if holds:
         work.plant[z] = VENTS
-    else:
-        work.windows[z] = OPEN | TOO_WARM_SHUT
-    return False
+    return agree
+
+
+@inlined
+def _bypass_agrees(work: Workspace, z: int, air: float) -> bool:
+    """Whether the bypass does what this air temperature asks, else it changes."""
+    limit, full = work.bypass_c[z], work.bypassed[z, 0]
+    if work.plant[z] == PASSES:
+        coldest = work.bypassed[z, 1]
+        warmest = work.recovered[z, 1] + (full - work.recovered[z, 0]) * air
+        if full > 0.0 and coldest <= work.supply[z, 1] <= warmest:
+            return True
+        work.plant[z] = FREE
+        work.bypass[z] = OPEN if full > 0.0 and work.supply[z, 1] < coldest else SHUT
+        return False
+    if work.plant[z] == COOLS or work.plant[z] == COOLS_FULLY:
+        air = np.inf  # too warm, though it is held
+    work.bypass[z], agree, holds = _opening(work.bypass[z], air, limit, limit, full > 0.0)
+    if holds:
+        work.plant[z] = PASSES
+    return agree
+
+
+@inlined
+def _opening(
+    opening: int, air: float, lower: float, upper: float, possible: bool
+) -> tuple[int, bool, bool]:
+    """What it does next, whether that is what it does, and whether it is partly open and holds.
+
+    It opens above the upper temperature and closes below the lower one [degC].
+    """
+    if opening & OPEN:
+        if possible and air >= lower - ROUNDING:
+            return opening, True, False
+        if opening & TOO_WARM_SHUT and possible:
+            return opening, False, True
+        return SHUT | TOO_COLD_OPEN, False, False
+    limit = lower if opening & TOO_COLD_OPEN else upper
+    if not possible or air <= limit + ROUNDING:
+        return opening, True, False
+    if opening & TOO_COLD_OPEN:
+        return opening, False, True
+    return OPEN | TOO_WARM_SHUT, False, False
 
 
 @inlined

@@ -49,7 +49,9 @@ class Drive(NamedTuple):
 
     inner: NDArray[np.float64]  # [R, N] absorbed at the inside faces [W]
     outer: NDArray[np.float64]  # [R, N] absorbed at the outside faces or outer layers [W/m2]
+    air: NDArray[np.float64]  # [R, Z] sun that warms the air behind interior shades [W]
     state: NDArray[np.int64]  # [H, W] shading state
+    mix: NDArray[np.int64]  # [H, Z] emissivities of the zone's windows: `WindowMix`
     convective: NDArray[np.float64]  # [H, Z] gains [W]
     radiant: NDArray[np.float64]  # [H, Z] gains [W]
     beyond: NDArray[np.float64]  # [T, B] of outer faces: the ground, then the known ones [degC]
@@ -86,7 +88,7 @@ class Workspace(NamedTuple):
     right: NDArray[np.float64]  # [U]
     unknown: NDArray[np.float64]  # [U] inside faces, then air
     air: NDArray[np.float64]  # [Z, 2] conductance to all around [W/K], what flows in from it [W]
-    plant: NDArray[np.int64]  # [Z] what the plant does: FREE ... VENTS
+    plant: NDArray[np.int64]  # [Z] what the plant does: FREE ... PASSES
     windows: NDArray[np.int64]  # [Z] SHUT, OPEN; with what was tried in the step
     # [Z, 3] air in which windows close or are partly open, in which they open [degC]; flow [m3/s]
     airing: NDArray[np.float64]
@@ -96,14 +98,19 @@ class Workspace(NamedTuple):
     flow: NDArray[np.float64]  # [Z] outdoor air but that of fans and opened windows [m3/s]
     aired: NDArray[np.float64]  # [Z] air through opened windows [m3/s]
     supply: NDArray[np.float64]  # [Z, 3] fans: conductance [W/K], it times temperature, coil [W]
+    bypass: NDArray[np.int64]  # [Z] of the heat recovery, as `windows`
+    bypass_c: NDArray[np.float64]  # [Z] air in which it opens, or that it holds [degC]
+    recovered: NDArray[np.float64]  # [Z, 3] fans with the bypass shut, as `supply`
+    bypassed: NDArray[np.float64]  # [Z, 2] and with it open; 0: it is not used
     carried: NDArray[np.float64]  # [Z] heat of the air from other zones and neighbours [W]
     passed: NDArray[np.float64]  # [Z] conductance of the air to the neighbours [W/K]
     slab: NDArray[np.float64]  # [Z] power of the slab [W]
     source: NDArray[np.float64]  # [N] heat set free at the pipes in the face's wall [W/m2]
     still: NDArray[np.float64]  # [M] amplitudes that the step before alone would give
     ends: NDArray[np.float64]  # [N, 2] what these give the outermost and innermost inner node
-    film: NDArray[np.float64]  # [N] inside film plus extra conductance [W/(m2 K)]
-    # [N, 5] outer face: diagonal, right side, coupling to inside, film sum, sum of film times T
+    film: NDArray[np.float64]  # [N] conductance between inside face and room air [W/(m2 K)]
+    # [N, 6] outer face: diagonal, right side, coupling to inside, film sum, sum of film times T,
+    # coupling to room air
     outdoor: NDArray[np.float64]
     old_inner: NDArray[np.float64]  # [N]
     old_outer: NDArray[np.float64]  # [N]

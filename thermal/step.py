@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.air_flow import OPEN, set_air_flows, start_air_flows
+from thermal.air_flow import OPEN, set_air_flows, set_slab, start_air_flows
 from thermal.climate import SIGMA
 from thermal.convection import (
     constant_inside,
@@ -34,7 +34,16 @@ from thermal.network import (
     Modes,
     Network,
 )
-from thermal.plant import FREE, VENTS, close_air, is_held, plants_agree, radiant_load, set_point
+from thermal.plant import (
+    FREE,
+    PASSES,
+    VENTS,
+    close_air,
+    is_held,
+    plants_agree,
+    radiant_load,
+    set_point,
+)
 from thermal.records import (
     AIR_HEAT,
     Drive,
@@ -87,8 +96,9 @@ def _inside_film(faces: Faces, i: int, surface: float, air: float, choice: int) 
 
 @inlined
 def _outside_exchange(
-    faces: Faces, i: int, surface: float, weather: OutdoorConditions, t: int, method: Method
-) -> tuple[float, float]:
+    faces: Faces, i: int, surface: float, emissivity: float,
+    weather: OutdoorConditions, t: int, method: Method,
+) -> tuple[float, float]:  # fmt: skip
     """Sum of the outside coefficients [W/(m2 K)], and of them times their temperatures."""
     out, sky = weather.outdoor[t], weather.sky[t]
     nx, ny, nz = faces.normal[i]
@@ -103,7 +113,7 @@ def _outside_exchange(
         h = mowitt_outside(surface, out, forced)
     else:
         h = method.outside_film
-    radiant = SIGMA * faces.emissivity_out[i]
+    radiant = SIGMA * emissivity
     h_sky = radiant * faces.hemisphere[i, 0] * _cube(surface, sky)
     share = faces.hemisphere[i, 1] + faces.hemisphere[i, 2]
     h_out = h + radiant * share * _cube(surface, out)
@@ -114,13 +124,18 @@ def _outside_exchange(
 def _still_modes(faces: Faces, modes: Modes, state: State, work: Workspace) -> None:
     """Modes with both faces at zero, the part that comes from the step before, and their ends."""
     for i in range(faces.area.size):
-        first, source, at_out, at_in = faces.first_mode[i], work.source[i], 0.0, 0.0
-        for m in range(first, first + faces.mode_count[i]):
-            still = modes.decay[m] * state.mode[m] + modes.from_pipes[m] * source
-            at_out += modes.at_out[m] * still
-            at_in += modes.at_in[m] * still
-            work.still[m] = still
-        work.ends[i, 0], work.ends[i, 1] = at_out, at_in
+        _still_wall(faces, modes, state, work, i)
+
+
+@summed
+def _still_wall(faces: Faces, modes: Modes, state: State, work: Workspace, i: int) -> None:
+    first, source, at_out, at_in = faces.first_mode[i], work.source[i], 0.0, 0.0
+    for m in range(first, first + faces.mode_count[i]):
+        still = modes.decay[m] * state.mode[m] + modes.from_pipes[m] * source
+        at_out += modes.at_out[m] * still
+        at_in += modes.at_in[m] * still
+        work.still[m] = still
+    work.ends[i, 0], work.ends[i, 1] = at_out, at_in
 
 
 @inlined
@@ -150,7 +165,8 @@ def _wall_row(
         return diagonal, right
     h, h_t = 0.0, 0.0
     if kind == OUTDOOR:
-        h, h_t = _outside_exchange(faces, i, state.outer[i], weather, t, method)
+        emissivity = faces.emissivity_out[i]
+        h, h_t = _outside_exchange(faces, i, state.outer[i], emissivity, weather, t, method)
     outer_diagonal = c_o + g_o * (1.0 - u_o) + h
     outer_right = c_o * work.old_outer[i] + g_o * y_o + h_t
     if kind == OUTDOOR:
@@ -173,22 +189,37 @@ def _window_row(
     outer_sun: float,
     method: Method,
 ) -> tuple[float, float]:
-    """Diagonal and right side [per m2] of an inner window layer, its outer layer eliminated."""
+    """Diagonal and right side [per m2] of an inner window layer, its outer layer eliminated.
+
+    Without what goes to the room air.
+    """
     w = net.faces.window[i]
-    h, h_t = _outside_exchange(net.faces, i, state.outer[i], weather, t, method)
-    extra = net.glass.extra[w, shading, 0]
+    emissivity = net.glass.emissivity_out[w, shading]
+    h, h_t = _outside_exchange(net.faces, i, state.outer[i], emissivity, weather, t, method)
+    extra, _, to_room = net.glass.extra[w, shading]
     c = _layer_conductance(
         net.glass.kind[w, shading],
         net.glass.coefficient[w, shading],
         state.inner[i],
         state.outer[i],
     )
-    outer_diagonal = h + extra + c
+    outer_diagonal = h + extra + c + to_room
     h_t += extra * weather.outdoor[t]
     outer_right = h_t + outer_sun
     row = work.outdoor[i]
     row[0], row[1], row[2], row[3], row[4] = outer_diagonal, outer_right, c, h + extra, h_t
-    return c - c * c / outer_diagonal, outer_right * c / outer_diagonal
+    row[5] = to_room
+    passed = c / outer_diagonal
+    return c - (c + to_room) * passed, outer_right * passed
+
+
+@inlined
+def _share(net: Network, drive: Drive, hour: int, z: int, i: int) -> float:
+    """Share of the zone's radiant gains that face i takes."""
+    first, last = net.radiation.first_face[z], net.radiation.first_face[z + 1]
+    return net.radiation.share[
+        net.radiation.at_share[z] + drive.mix[hour, z] * (last - first) + i - first
+    ]
 
 
 @inlined
@@ -217,6 +248,11 @@ def _assemble(
             own, r = _window_row(
                 net, i, state, work, weather, t, shading, drive.outer[sun, i], method
             )
+            row = work.outdoor[i]
+            share = row[5] / row[0]  # of what reaches the outer layer from the room's air
+            film += row[2] * share  # by way of the outer layer
+            work.air[z, 0] += area * row[3] * share  # and to outdoors
+            work.air[z, 1] += area * row[1] * share
         elif kind == PARTNER:
             p = faces.partner[i]
             c_o, _, g_o, _, u_o, v_o, _, _ = faces.port[p]
@@ -230,19 +266,34 @@ def _assemble(
         work.film[i] = film
         d[k] = area * (own + film)
         radiant = drive.radiant[hour, z] + radiant_load(net, work, drive, z)
-        b[k] = area * r + drive.inner[sun, i] + radiant * faces.radiant_share[i]
+        b[k] = area * r + drive.inner[sun, i] + radiant * _share(net, drive, hour, z, i)
         work.air[z, 0] += area * film
         if is_held(work.plant[z]):
             b[k] += area * film * set_point(work, drive, t, z)
         else:
             e[pairs.at_film[i]] = -area * film
-    for q in range(pairs.exchange.size):
-        i, j = pairs.faces[q]
-        h = SIGMA * pairs.exchange[q] * _cube(state.inner[i], state.inner[j])
-        e[pairs.at_exchange[q]] -= h
-        d[place[i]] += h
-        d[place[j]] += h
+    for z in range(work.plant.size):
+        first, last = net.radiation.first_pair[z], net.radiation.first_pair[z + 1]
+        at = net.radiation.at_exchange[z] + drive.mix[hour, z] * (last - first) - first
+        for q in range(first, last):
+            i, j = pairs.faces[q]
+            area = net.radiation.exchange[at + q]
+            h = SIGMA * area * _cube(state.inner[i], state.inner[j])
+            e[pairs.at_exchange[q]] -= h
+            d[place[i]] += h
+            d[place[j]] += h
     close_air(net, work, weather, drive, t)
+
+
+@inlined
+def _choose_supply(work: Workspace, z: int) -> None:
+    """The supply air by what the bypass does; partly open, its heat follows from the solution."""
+    row, shut, passed = work.supply[z], work.recovered[z], work.bypassed[z]
+    row[0], row[1], row[2] = shut[0], shut[1], shut[2]
+    if work.plant[z] == PASSES:
+        row[0], row[1] = passed[0], 0.0
+    elif work.bypass[z] & OPEN and passed[0] > 0.0:
+        row[0], row[1] = passed[0], passed[1]
 
 
 @inlined
@@ -259,6 +310,7 @@ def _assemble_air(
     hour, pairs = t // method.steps, net.couplings
     heat = weather.density[t] * AIR_HEAT
     for z in range(work.plant.size):
+        _choose_supply(work, z)
         through = work.windows[z] & OPEN and work.plant[z] != VENTS
         work.aired[z] = work.airing[z, 2] if through else 0.0
         outdoor = heat * (work.flow[z] + work.aired[z]) + net.paths.bridges[z]
@@ -266,6 +318,7 @@ def _assemble_air(
         work.air[z, 0] = store + outdoor + work.supply[z, 0]
         work.air[z, 1] = store * work.old_air[z] + outdoor * weather.outdoor[t]
         work.air[z, 1] += work.supply[z, 1] + drive.convective[hour, z]
+        work.air[z, 1] += drive.air[t // method.solar_every, z]
         work.carried[z], work.passed[z] = 0.0, 0.0
     for q in range(net.paths.beside.size):
         z, beyond = net.paths.beside[q], drive.beside_c[t, q]
@@ -300,7 +353,8 @@ def _outer_from_inner(net: Network, state: State, work: Workspace, drive: Drive,
         kind = faces.kind[i]
         if kind == OUTDOOR or kind == WINDOW or kind == ADIABATIC:
             row = work.outdoor[i]
-            state.outer[i] = (row[1] + row[2] * state.inner[i]) / row[0]
+            reached = row[1] + row[2] * state.inner[i] + row[5] * state.air[faces.zone[i]]
+            state.outer[i] = reached / row[0]
         elif kind == KNOWN:
             state.outer[i] = drive.beyond[t, faces.beyond[i]]
         elif kind == TWIN:
@@ -323,7 +377,7 @@ def step(
     n, hour = net.faces.area.size, t // method.steps
     start_air_flows(net, state, work, weather, drive, t, hour)
     for z in range(work.plant.size):
-        if work.plant[z] == VENTS:
+        if work.plant[z] >= VENTS:
             work.plant[z] = FREE
     _go_on(state.inner, work.old_inner)
     _go_on(state.outer, work.old_outer)
@@ -331,6 +385,11 @@ def step(
     _still_modes(net.faces, net.modes, state, work)
     for _ in range(method.iterations):
         set_air_flows(net, state, work, weather, drive, t, hour)
+        for z in range(work.plant.size):
+            face = net.emitters.slab[z]
+            if face >= 0:
+                set_slab(net, state, work, drive, t, z)
+                _still_wall(net.faces, net.modes, state, work, face)
         for _ in range(MOST_CHANGES):
             _assemble(net, state, work, weather, drive, t, method)
             eliminate(net.system, work.diagonal, work.below, work.right)

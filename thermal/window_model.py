@@ -38,6 +38,15 @@ class WindowModel:
     guessed: bool = False  # the position follows from U and g
     typical: GlazingUnit | None = None  # layers that were assumed
     likely: tuple[GlazingUnit, ...] = ()  # others that are as likely
+    absorbed: FloatArray | None = None  # [K, N] by the layers, stated or typical
+
+    def to_air(self) -> FloatArray | float:
+        """Absorbed sun [K] that goes to the room's air behind an interior shade."""
+        films = self.closure.states_films
+        layered = None if films else self.closure.layers(self.data.u_value)
+        if layered is None or layered.behind is None or self.absorbed is None:
+            return 0.0
+        return self.absorbed @ np.array(layered.behind.to_air)
 
 
 def window_model(
@@ -79,7 +88,7 @@ def window_model(
         data = layered_thermal_data(
             closure.unit, tau, rho, by_layer, u_value=u_value, g_normal=g_normal, item=item
         )
-        return WindowModel(data, closure, place, guessed)
+        return WindowModel(data, closure, place, guessed, absorbed=by_layer)
     data = thermal_data(
         tau, rho, shading_position=place, u_value=u_value, g_normal=g_normal, item=item
     )
@@ -87,9 +96,10 @@ def window_model(
     closed = closure.with_typical(unit, data.u_value)
     if unit is None:
         return WindowModel(data, closed, place, guessed)
-    g = g_of_unit(unit, data, (tau, rho, incidence), absorbed, item)
-    likely = likely_units(place, data.u_value, closure.gap)
-    return WindowModel(replace(data, g_value=g), closed, place, guessed, unit, tuple(likely))
+    g, by_layer = g_of_unit(unit, data, (tau, rho, incidence), absorbed, item)
+    likely = tuple(likely_units(place, data.u_value, closure.gap))
+    data = replace(data, g_value=g)
+    return WindowModel(data, closed, place, guessed, unit, likely, by_layer)
 
 
 def g_of_unit(
@@ -98,11 +108,11 @@ def g_of_unit(
     optics: tuple[FloatArray, FloatArray, FloatArray],
     absorbed: Absorbed,
     item: str,
-) -> FloatArray:
+) -> tuple[FloatArray, FloatArray]:
     """g [K] by the shares of a unit's layers, from that of `data` at normal incidence.
 
     With a shade, the panes absorb what makes the unit's g that of `data`; within
-    `PANE_ABSORPTION`, else the gain is scaled.
+    `PANE_ABSORPTION`, else the gain is scaled.  Also what each layer absorbs [K, N].
 
     Args: optics: tau, rho, incidence [K] of the system.
     """
@@ -120,9 +130,10 @@ def g_of_unit(
         falls = -1.0 if excess(low) > excess(high) else 1.0
         unit = absorbing(unit, bisected(lambda factor: falls * excess(factor), low, high))
     by_layer = absorbed(unit, tau, rho, incidence)
-    return layered_thermal_data(
+    layered = layered_thermal_data(
         unit, tau, rho, by_layer, u_value=data.u_value, g_normal=first, item=item
-    ).g_value
+    )
+    return layered.g_value, by_layer
 
 
 def likely_diffuse_g(
@@ -144,7 +155,8 @@ def likely_diffuse_g(
     mean_tau[0], mean_rho[0] = tau[0], rho[0]
     normal = replace(window.data, g_value=window.data.g_value[:1])
     means = (mean_tau, mean_rho, angles)
-    return [float(share @ g_of_unit(one, normal, means, absorbed, item)) for one in window.likely]
+    units = window.likely
+    return [float(share @ g_of_unit(unit, normal, means, absorbed, item)[0]) for unit in units]
 
 
 def layered_thermal_data(

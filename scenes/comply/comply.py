@@ -438,12 +438,14 @@ class Check:
         if "heat" in self.parts:
             template = (
                 N_(
-                    "Temperatures are without heating and cooling, with blinds closed by the rule "
-                    "of LM-83, {air_changes:g} air changes per hour and gains in the hours of use."
+                    "Temperatures for rules without a set-up are without heating and cooling, with "
+                    "blinds closed by the rule of LM-83, {air_changes:g} air changes per hour and "
+                    "gains in the hours of use."
                 )
                 if self.shaded
                 else N_(
-                    "Temperatures are without heating and cooling, without blinds, with "
+                    "Temperatures for rules without a set-up are without heating and cooling, "
+                    "without blinds, with "
                     "{air_changes:g} air changes per hour and gains in the hours of use."
                 )
             )

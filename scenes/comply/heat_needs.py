@@ -75,13 +75,13 @@ class LimitTable(TomlTable):
     @property
     def words(self) -> str:
         """The limit in words."""
-        constant = decimal(f"{self.intercept_c:g}")
+        constant = decimal(f"{self.intercept_c:.3g}")
         text = gettext("{limit} °C", limit=constant)
         if self.slope:
             text = gettext(
                 "{intercept} °C + {slope} x running mean outdoors",
                 intercept=constant,
-                slope=decimal(f"{self.slope:g}"),
+                slope=decimal(f"{self.slope:.3g}"),
             )
             if math.isfinite(self.least_c):
                 least = decimal(f"{self.least_c:g}")
@@ -224,7 +224,12 @@ class HoursAbove(LimitedNeed):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        values = {"limit": self.line.words, "period": self.period, "by": decimal(f"{self.by_k:g}")}
+        values = {"limit": self.line.words, "period": self.period}
+        if self.by_k == 0.0:
+            if self.share:
+                return gettext("hours per 100 h above {limit}, {period}", **values)
+            return gettext("hours above {limit}, {period}", **values)
+        values["by"] = decimal(f"{self.by_k:g}")
         if self.share:
             return gettext(
                 "hours per 100 h that are {by} K or more above {limit}, {period}", **values

@@ -115,7 +115,7 @@ def thermal_toml(state: RatedState) -> str:
     ]
     if state.system.shading_position is not None:
         lines.append(f'shading_position = "{state.system.shading_position}"')
-    films = state.heat.fenestration
+    films = state.heat.fenestration.in_series()
     resistance = films.layer_resistance
     if resistance.kind == "surface":
         lines.append(f"surface = [{', '.join(f'{c:.6g}' for c in resistance.coefficients)}]")

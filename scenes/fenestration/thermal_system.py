@@ -106,7 +106,10 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     g_value = system.g_by_patch if by_patch else data.g_value
     fenestration = closure.close(Fenestration(system.name, data.u_value))
     films = {"r_outer": fenestration.r_outer, "r_inner": fenestration.r_inner}
-    absorptances = layer_absorptances(tau, rho, g_value, data.u_value, item=system.name, **films)
+    absorptances = layer_absorptances(
+        tau, rho, g_value, data.u_value, item=system.name, **films,
+        inward=fenestration.inward_shares(), room_air=window.to_air(),
+    )  # fmt: skip
     model = closure.described(window.position, g_by_direction=by_patch)
     notes = [*map(_note, data.assumptions), *_position_note(system, window, scatters)]
     if window.typical is not None and not by_patch and not system.from_values:

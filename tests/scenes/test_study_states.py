@@ -59,9 +59,6 @@ def test_a_system_that_stays_in_a_state_is_that_state(years):
     assert plan.cases[2].key != plan.cases[3].key
 
 
-@pytest.mark.xfail(
-    strict=True, reason="long-wave radiation takes the emissivities of a window's first state"
-)
 def test_the_heat_of_a_system_that_stays_in_a_state_is_that_states(years):
     stays(years[0], "operative_mean_c")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.special import erfc
@@ -219,6 +221,27 @@ def test_shading_state_switches_the_thermal_state():
     )
     result = simulate(zone, climate(hours), switched)
     assert result.heating[30] < 0.8 * result.heating[20]
+
+
+def test_each_state_has_its_emissivities():
+    """A state beside others is as by itself; where states change, the account still closes."""
+    hours = 48
+    bare = Fenestration("bare", 5.0)
+    coated = Fenestration("coated", 5.0, emissivity_in=0.2, emissivity_out=0.1)
+    room, alone = box(window=bare), box(window=coated)
+    (window,) = room.windows
+    both = replace(room, windows=(replace(window, states=(bare, coated)),))
+    shine = sun(hours, room)
+    cold = climate(hours, outdoor=-5.0, sky=-20.0)
+    states = np.ones((hours, 1), dtype=int)
+    expected = simulate(alone, cold, shine)
+    result = simulate(both, cold, replace(shine, state=states))
+    np.testing.assert_allclose(result.mrt_c, expected.mrt_c, atol=1e-9)
+    np.testing.assert_allclose(result.window_outer_c, expected.window_outer_c, atol=1e-9)
+    assert np.abs(simulate(room, cold, shine).window_inner_c - expected.window_inner_c).max() > 0.5
+    states[::3] = 0
+    mixed = simulate(both, cold, replace(shine, state=states))
+    assert np.abs(mixed.residual).max() < 1e-6
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from thermal.climate import (
 )
 from thermal.convection import local_wind_factor
 from thermal.errors import ThermalInputError
-from thermal.network import network
+from thermal.network import network, window_mix
 
 
 def test_steps_lie_on_the_line_between_the_hours_ends():
@@ -46,6 +46,11 @@ def test_ground_is_damped_and_late():
     assert late == pytest.approx(decay / (2 * np.pi) * 365, abs=0.5)
 
 
+def network_of(zone):
+    mixes = [window_mix(zone, None, 1)]
+    return network([zone], mixes, step_s=600.0, terrain="suburbs", cell=0.02, link=np.zeros((1, 1)))
+
+
 def test_walls_windows_and_frames_see_their_own_share_of_the_sky():
     glass = Fenestration("glass", 1.2)
     zone = box(window=glass)
@@ -53,7 +58,7 @@ def test_walls_windows_and_frames_see_their_own_share_of_the_sky():
     hidden = replace(window, frame_area=0.4, sky_seen=0.25)
     wall = replace(zone.surfaces[0], sky_seen=0.5)
     zone = replace(zone, surfaces=(wall, *zone.surfaces[1:]), windows=(hidden,))
-    net = network([zone], step_s=600.0, terrain="suburbs", cell=0.02, link=np.zeros((1, 1)))
+    net = network_of(zone)
     half = np.array([0.5**1.5, 0.5 - 0.5**1.5])
     for face, seen in ((0, 0.5), (1, 1.0), (6, 0.25), (7, 0.25)):
         expected = [*half * seen, 1.0 - 0.5 * seen]
@@ -61,7 +66,7 @@ def test_walls_windows_and_frames_see_their_own_share_of_the_sky():
 
 
 def test_forced_film_takes_the_local_wind_to_its_power():
-    net = network([box()], step_s=600.0, terrain="suburbs", cell=0.02, link=np.zeros((1, 1)))
+    net = network_of(box())
     factor = local_wind_factor(1.5, "suburbs")
     # DOE-2 / MoWiTT: 3.26 V^0.89 windward, 3.55 V^0.617 leeward
     np.testing.assert_allclose(net.faces.wind[0], [3.26 * factor**0.89, 3.55 * factor**0.617])

@@ -78,7 +78,7 @@ def test_leaks_by_their_formulas(leakage, flow):
         (SupplyAir(2.0, recovery=0.75), 4.5),
         (SupplyAir(2.0, 16.0), 4.0),
         (SupplyAir(2.0, recovery=0.5, least_c=18.0), 2.0),  # recovered to 11, heated to 18
-        (SupplyAir(2.0, recovery=0.75, bypass_above_c=19.0), 18.0),
+        (SupplyAir(2.0, recovery=0.75, bypass_above_c=19.0), 4.5),  # not while it is heated
         (SupplyAir(2.0, recovery=0.75, bypass_above_c=21.0), 4.5),
     ],
 )
@@ -89,6 +89,48 @@ def test_supply_air_by_its_temperature(fan, expected):
     np.testing.assert_allclose(result.fan_air, 2.0 * VOLUME / 3600.0)
     heated = 7.0 if fan.least_c > 0 else 0.0
     np.testing.assert_allclose(result.coil, HEAT * 2.0 * VOLUME / 3600 * heated, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("power", "air"),
+    [
+        (100.0, OUT + 100.0 / (0.25 * HEAT * 2.0 * VOLUME / 3600.0)),  # all recovered
+        (400.0, 20.0),  # in part: it holds its temperature
+        (800.0, OUT + 800.0 / (HEAT * 2.0 * VOLUME / 3600.0)),  # open
+    ],
+)
+def test_bypass_opens_as_far_as_it_must(power, air):
+    fan = SupplyAir(2.0, recovery=0.75, bypass_above_c=20.0)
+    zone = sealed(gains=Gains(convective=power), supply=fan)
+    result = simulate(zone, climate(24, outdoor=OUT), no_sun(24, 2, 0), options=OPTIONS)
+    assert result.air_c[-1] == pytest.approx(air, abs=1e-6)
+    assert np.abs(result.residual).max() < 1e-6
+    assert result.heat_flow["supply air"][-1] == pytest.approx(-power)
+    full = HEAT * 2.0 * VOLUME / 3600.0
+    cooled = replace(zone, loads=IdealLoads(-np.inf, 19.0))  # the bypass opens first
+    assert load(cooled) == pytest.approx(min(full * 17.0 - power, 0.0))
+    tempered = replace(zone, supply=replace(fan, least_c=14.0))  # bypassed no further than that
+    result = simulate(tempered, climate(24, outdoor=OUT), no_sun(24, 2, 0), options=OPTIONS)
+    expected = {100.0: 14.0 + 100.0 / full, 400.0: 14.0 + 400.0 / full, 800.0: 14.0 + 800.0 / full}
+    assert result.air_c[-1] == pytest.approx(expected[power], abs=1e-6)
+    assert (result.coil[-1] > 0.0) == (power == 100.0)
+
+
+def test_bypass_makes_no_heat_of_the_time_step():
+    """A heated floor beside a bypass: of on and off by the step before came a fifth more heat."""
+    hours = 24 * 14
+    outdoor = 5.0 - 6.0 * np.cos((np.arange(hours) - 3.0) / 24 * 2 * np.pi)
+    by_day = np.tile(np.repeat([0.0, 700.0, 0.0], [8, 10, 6]), 14)
+    slab = HeatedSlab("floor", 0.05, heating_c=21.0, heating_limit=1200.0)
+    fan = SupplyAir(2.0, recovery=0.8, bypass_above_c=22.5)
+    room = box(loads=IdealLoads(), gains=Gains(by_day), supply=fan, slab=slab)
+    dark = no_sun(hours, len(room.surfaces), 0)
+    heats = []
+    for step_s in (60.0, 600.0, 1200.0):
+        result = simulate(room, climate(hours, outdoor=outdoor), dark, step_s=step_s)
+        assert np.abs(result.residual).max() < 1e-6 * result.slab.max()
+        heats.append(result.slab.sum())
+    assert heats[1:] == pytest.approx([heats[0]] * 2, rel=0.01)
 
 
 def test_open_door_carries_what_brown_and_solvason_say():

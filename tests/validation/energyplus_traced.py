@@ -148,12 +148,14 @@ def with_one_diffuse(
                           where=own > 0)  # fmt: skip
         return values * share[:, None]
 
-    outer, inner = system.absorptances.outer, system.absorptances.inner
+    outer = system.absorptances.outer
+    inner = system.absorptances.inner + system.absorptances.air
     passed = ("transmitted_w", system.transmittance)
     solar = replace(
         room.solar,
         absorbed_outer=sun.absorbed_outer + scaled(sky.absorbed_outer, "absorbed_outer_w", outer),
         absorbed_inner=sun.absorbed_inner + scaled(sky.absorbed_inner, "absorbed_inner_w", inner),
+        absorbed_air=sun.absorbed_air + scaled(sky.absorbed_air, "absorbed_inner_w", inner),
         inside=sun.inside + scaled(sky.inside, *passed),
         window_inside=sun.window_inside + scaled(sky.window_inside, *passed),
     )

@@ -41,9 +41,8 @@ from thermal.blackbox import (
 from thermal.closure import Closure
 from thermal.glazing import Gap
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
-from thermal.iso15099 import iso15099_data, yearly_g_values
 from thermal.shade_layers import sheet_layer, venetian_layer
-from thermal.window_model import window_model
+from thermal.window_model import WindowModel, window_model
 
 FloatArray = NDArray[np.float64]
 SYSTEMS = ("dgu", "ext_blind", "ext_shade", "int_shade")
@@ -170,44 +169,51 @@ def layers(name: str) -> GlazingUnit:
     return GlazingUnit((shade, *panes), (GasGap(wide), argon))
 
 
-def _of_layers(folder: Path, name: str, optics: Optics) -> tuple[Closure, float, Optics]:
-    """Closure, U and optics with g, all from the layers."""
-    unit = layers(name)
+def _of_layers(folder: Path, name: str, optics: Optics) -> tuple[WindowModel, Optics]:
+    """Window model and optics with g, all from the layers."""
 
-    def g(tau: FloatArray, rho: FloatArray, theta: FloatArray) -> FloatArray:
-        absorbed = sun_in_layers(unit, tau, rho, theta)
-        return yearly_g_values(unit, tau, absorbed)
-
-    found = _with_g(folder, optics, g(optics.tau, optics.rho, optics.theta))
-    return Closure("layers", unit=unit), iso15099_data(unit).u_value, found
+    return _modelled(folder, name, optics, Closure("layers", unit=layers(name)), None)
 
 
 def _of_stated(
     folder: Path, name: str, optics: Optics, u_value: float, closure: str
-) -> tuple[Closure, Optics]:
-    """Closure and optics with g by direction, from U and g at normal incidence alone."""
-    order = np.argsort(optics.theta, kind="stable")  # the first direction is the normal
+) -> tuple[WindowModel, Optics]:
+    """Window model and optics with g by direction, from U and g at normal incidence alone."""
     model = {"by direction": "typical", "linear U": "linear"}.get(closure, closure)
+    stated = Closure(model, gap=GAP if model == "gap" else None)
+    window, found = _modelled(folder, name, optics, stated, u_value)
+    return window, optics if closure == "by direction" else found
+
+
+def _modelled(
+    folder: Path, name: str, optics: Optics, closure: Closure, u_value: float | None
+) -> tuple[WindowModel, Optics]:
+    """As a study has it, g at normal incidence stated where U is."""
+    order = np.argsort(optics.theta, kind="stable")  # the first direction is the normal
     window = window_model(
-        optics.tau[order], optics.rho[order], optics.theta[order], PLACES[name],
-        Closure(model, gap=GAP if model == "gap" else None),
-        absorbed=sun_in_layers, u_value=u_value, g_normal=float(optics.g[order[0]]), item=name,
+        optics.tau[order], optics.rho[order], optics.theta[order], PLACES[name], closure,
+        absorbed=sun_in_layers, u_value=u_value, item=name,
+        g_normal=None if u_value is None else float(optics.g[order[0]]),
     )  # fmt: skip
-    if closure == "by direction":
-        return window.closure, optics
-    g = np.empty_like(optics.g)
+    g, absorbed = np.empty_like(optics.g), window.absorbed
     g[order] = window.data.g_value
-    return window.closure, _with_g(folder, optics, g)
+    if absorbed is not None:
+        window = replace(window, absorbed=absorbed[np.argsort(order)])
+    return window, _with_g(folder, optics, g)
 
 
 def _with_g(folder: Path, optics: Optics, g: FloatArray) -> Optics:
     """Optics with g [K] by direction, and its means over the light of sky and ground."""
     diffuse = optics.diffuse.copy()
-    if optics.phi is None:
-        diffuse[:, 2] = hemispherical_mean(g, optics.theta)
-    else:
-        diffuse[:, 2] = _halves(folder, optics.phi, g[None])[:, 0]
+    diffuse[:, 2] = _of_diffuse(folder, optics, g)
     return replace(optics, g=g, diffuse=diffuse)
+
+
+def _of_diffuse(folder: Path, optics: Optics, values: FloatArray) -> FloatArray:
+    """Means [2] of values [K] over the light of sky and ground."""
+    if optics.phi is None:
+        return np.full(2, hemispherical_mean(values, optics.theta))
+    return _halves(folder, optics.phi, values[None])[:, 0]
 
 
 def system(
@@ -234,12 +240,15 @@ def system(
     plain = Fenestration(
         name, u, R_OUTER, R_INNER, resistance, emissivity_in=emissivity, emissivity_out=outside
     )
+    window, air = None, np.zeros_like(optics.tau)
     if closure in STATED:
-        known, optics = _of_stated(folder, name, optics, u, closure)
-        plain = known.close(replace(plain, resistance=None))
+        window, optics = _of_stated(folder, name, optics, u, closure)
     if closure == "layers":
-        known, u, optics = _of_layers(folder, name, optics)
-        plain = known.close(replace(plain, u_value=u, resistance=None))
+        window, optics = _of_layers(folder, name, optics)
+    if window is not None:
+        u = window.data.u_value
+        plain = window.closure.close(replace(plain, u_value=u, resistance=None))
+        air = np.broadcast_to(window.to_air(), optics.tau.shape)
     if closure == "films":
         plain = with_realised_films(
             plain,
@@ -247,9 +256,11 @@ def system(
             r_outer_realised=state["R_e"] if name.startswith("ext") else None,
         )
     films = {"r_outer": plain.r_outer, "r_inner": plain.r_inner, "item": name}
-    direct = layer_absorptances(optics.tau, optics.rho, optics.g, u, **films)
+    films |= {"inward": plain.inward_shares()}
+    direct = layer_absorptances(optics.tau, optics.rho, optics.g, u, room_air=air, **films)
     tau, rho, g = optics.diffuse.T
-    diffuse = layer_absorptances(tau, rho, g, u, **films)
+    of_diffuse = _of_diffuse(folder, optics, air)
+    diffuse = layer_absorptances(tau, rho, g, u, room_air=of_diffuse, **films)
     return ReferenceSystem(plain, optics, direct, diffuse, _back_layers(data, optics, plain))
 
 
@@ -259,6 +270,6 @@ def _back_layers(data: dict, optics: Optics, f: Fenestration) -> tuple[float, fl
     if data["cfs"] == "dgu":
         alpha = alpha[::-1]  # the engine lists a specular system's back side the other way round
     inward = np.array(data["N_inward_fractions"])
-    r = 1.0 / f.u_value - f.r_outer - f.r_inner
-    inner = np.clip((inward / f.u_value - f.r_outer) / r, 0.0, 1.0)
+    outer, behind = f.inward_shares()
+    inner = np.clip((inward - outer) / (behind - outer), 0.0, 1.0)
     return float(alpha @ (1 - inner)), float(alpha @ inner)
