@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,7 +137,7 @@ def borrowed_share(
 
 def _groups(space: Space, faces: Sequence[Face]) -> list[tuple[SystemOptics, WindowGroup]]:
     """Panes of a room in groups of one orientation and one transmittance, with their optics."""
-    by_tau: dict[float | None, list] = {}
+    by_tau: dict[float | None, list[Any]] = {}
     for face in faces:
         tau = None if face.pane.is_open else face.pane.visible_transmittance or CLEAR
         by_tau.setdefault(tau, []).append(face.pane)
