@@ -114,9 +114,10 @@ class _Apart:
         """Value and error of a task; `ProcessEnded` if the process was stopped or crashed."""
         process, stopped = self._process, threading.Event()
         timer = threading.Timer(limit_s, lambda: (stopped.set(), process.kill()))
-        timer.start()
+        timer.daemon = True  # an exit that a signal begins in `start` does not wait for it
         last, answer = "", ""
         try:
+            timer.start()
             with contextlib.suppress(BrokenPipeError):  # it died while it had nothing to do
                 process.stdin.write(_packed(task) + "\n")
                 process.stdin.flush()

@@ -86,7 +86,8 @@ USAGE, FAILED, INTERRUPTED = 2, 1, 130
 # that try an import
 IMPORT = ("importlib", "_frozen_importlib", "_frozen_importlib_external")
 FOREIGN = ("ifcopenshell", "mitsuba", "drjit", "trimesh", *IMPORT)
-AGAIN_S = 0.05  # after which a signal that came in one of their calls is sent again
+FILES = "mitsuba_cfs.files"  # whose locks and temporary files it would leave
+AGAIN_S = 0.05  # after which a signal that came in one of their calls is looked at again
 CLEANING_S = 5.0  # after a signal, in which others are ignored
 SIGNALLED = 128  # and the signal's number
 # OpenBLAS reads it when NumPy is loaded: its threads wait for work in 2^4 turns of a loop, not in
@@ -173,6 +174,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             signal.signal(number, stop)
             handled.append(number)
     code = run(sys.argv[1:] if arguments is None else arguments)
+    if handled and hasattr(signal, "SIGALRM"):
+        handled.insert(0, signal.SIGALRM)
     for number in handled:
         signal.signal(number, signal.SIG_IGN)  # the exit code is that of what has been done
     sys.exit(code)
@@ -193,21 +196,31 @@ class Stop:
         if time.monotonic() < self._cleaning + CLEANING_S:
             return
         if _inside_a_library(frame):
-            again = threading.Timer(AGAIN_S, signal.raise_signal, (number,))
-            again.daemon = True
-            again.start()
+            self._wait(number)
             return
         self._cleaning = time.monotonic()
         if number == signal.SIGINT:
             raise KeyboardInterrupt
         raise Terminated(number)
 
+    def _wait(self, number: int) -> None:
+        """Look again after `AGAIN_S`, by the timer of the process: no thread is started."""
+        if hasattr(signal, "setitimer"):
+            signal.signal(signal.SIGALRM, lambda _number, frame: self(number, frame))
+            signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
+        else:  # Windows
+            again = threading.Timer(AGAIN_S, signal.raise_signal, (number,))
+            again.daemon = True
+            again.start()
+
 
 def _inside_a_library(frame: FrameType | None) -> bool:
-    """Whether code of a library waits for this frame, or Python's garbage collector does."""
+    """Whether a library, the writing of a file or Python's garbage collector waits for it."""
     while frame is not None:
-        module = str(frame.f_globals.get("__name__", "")).partition(".")[0]
-        if module in FOREIGN or frame.f_code.co_name == "__del__":
+        module = str(frame.f_globals.get("__name__", ""))
+        if module == FILES or module.partition(".")[0] in FOREIGN:
+            return True
+        if frame.f_code.co_name == "__del__":
             return True
         frame = frame.f_back
     # the body of a loop, and a BSDF of ours, are called by Dr.Jit without a frame of its own

@@ -61,3 +61,29 @@ def running(pid: int) -> bool:
     except ProcessLookupError:
         return False
     return True
+
+
+INTERRUPTED = """
+import threading
+from mitsuba_cfs.processes import answer_apart
+from tests.test_processes import sleeps
+
+begin = threading.Timer.start
+
+def start(timer):
+    begin(timer)
+    raise KeyboardInterrupt
+
+threading.Timer.start = start
+answer_apart(sleeps, limit_s=600)
+"""
+
+
+def test_a_signal_at_the_start_of_a_task_ends_the_program():
+    """It comes while the timer of the task starts; the exit would wait for that for 600 s."""
+    root = Path(__file__).parents[1]
+    process = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED], cwd=root, capture_output=True, text=True,
+        timeout=120, check=False,
+    )  # fmt: skip
+    assert process.stderr.rstrip().endswith("KeyboardInterrupt")

@@ -56,8 +56,9 @@ def read_radiance_building(
         raise DataError("has no opaque surface", file=path)
     indoors = indoors_of(objects, windows)
     if not indoors.bounds.any():
-        raise DataError("no surface is indoors: is the room closed?", file=path, field="aperture")
-    space, issues = _space(path.stem, objects, indoors, windows)
+        message = f"no surface is indoors: is the room closed?{_not_read(scene)}"
+        raise DataError(message, file=path, field="aperture")
+    space, issues = _space(path.stem, objects, indoors, windows, _not_read(scene))
     elements = tuple(
         _element(f"{path.stem}-{i}", thing, thing.triangles)
         for i, thing in enumerate(objects)
@@ -127,18 +128,28 @@ def _material_issues(objects: Sequence[RadianceObject]) -> list[Issue]:
     return list(issues.values())
 
 
+def _not_read(scene: RadianceScene) -> str:
+    """Surfaces that are left out, for the error of a room that is not closed without them."""
+    left_out = [issue for issue in scene.issues if issue.code == "surfaces-not-read"]
+    types = [
+        f"{one.values['count']} of type {one.values['type']} ({one.where})" for one in left_out
+    ]
+    return f"; surfaces that are not read: {', '.join(types)}" if types else ""
+
+
 def _space(
     name: str,
     objects: Sequence[RadianceObject],
     indoors: Indoors,
     windows: tuple[Window, ...],
+    not_read: str,
 ) -> tuple[Space, list[Issue]]:
     pieces = _furniture(objects, indoors)
     seen = indoors.bounds.any(axis=0) & ~indoors.furniture
     faces = _faces(objects, indoors.outward(seen), indoors.owner[seen], windows)
     floor = sum(face.area for face in faces if face.kind == "floor")
     if not floor:
-        raise RoomError(f"space {name}: has no floor")
+        raise RoomError(f"space {name}: has no floor{not_read}")
     shell = np.concatenate([part.triangles for part in (*faces, *windows)])
     volume = enclosed_volume(shell)
     drawn = floor * float(np.ptp(shell[..., 2]))

@@ -13,7 +13,7 @@ from bim.sensors import sensor_grid, view_point
 from bim.shell import enclosed_volume
 from mitsuba_cfs.bsdf.angular import glass_table
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.trace.paths.scene import without_peaks
 from scenes.fenestration.resolver import glazing_system, stated_values
 from scenes.fenestration.systems import WindowOverrides
@@ -119,6 +119,14 @@ def test_options_of_other_formats_are_refused(tmp_path):
         read_building_file("house.ifc", ReadOptions(apertures=("glass",)))
     with pytest.raises(DataError, match="no such file"):
         check_building_file(tmp_path / "missing.rad")
+
+
+def test_a_room_without_its_floor_names_the_surfaces_that_are_not_read(tmp_path):
+    mixed = "\nvoid mixfunc mixed\n4 plaster carpet .5 .\n0\n0\n\nmixed polygon floor"
+    path = tmp_path / "scene.rad"
+    path.write_text(OFFICE.read_text().replace("\ncarpet polygon floor", mixed))
+    with pytest.raises(RoomError, match=r"has no floor; .* 1 of type mixfunc \(.*scene\.rad:\d+\)"):
+        read_building_file(path)
 
 
 TINTED = "\nvoid glass tinted\n0\n0\n3 .4 .4 .4\n"

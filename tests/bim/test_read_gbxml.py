@@ -11,6 +11,8 @@ import pytest
 from bim.building_file import read_building_file
 from bim.gbxml import document
 from bim.gbxml.building import read_gbxml
+from bim.gbxml.constructions import Constructions
+from bim.gbxml.document import read_document
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
 from tests.bim.bim_fuzz import mutations, refusals
@@ -305,3 +307,87 @@ def test_every_unit_has_the_factor_of_the_tables():
         for unit, factor in table.items():
             assert factor == pytest.approx(NIST.get(unit, 1.0), rel=1e-6), unit
     assert NIST.keys() <= {unit for table in tables for unit in table}
+
+
+def changed(folder: Path, *pairs: tuple[str, str], azimuth: float = 0.0):
+    """The two rooms with texts replaced, each of which occurs."""
+    text = two_rooms(azimuth)
+    for old, new in pairs:
+        assert old in text, old
+        text = text.replace(old, new)
+    return read_gbxml(written(folder, text))
+
+
+CONSTRUCTION = '<LayerId layerIdRef="l1"/>'
+
+
+@pytest.mark.parametrize(
+    ("stated", "visible", "solar", "outer", "emissivity"),
+    [
+        ('<Reflectance type="IntSolar">0.4</Reflectance>', None, 0.4, None, None),
+        ('<Absorptance type="IntSolar">0.3</Absorptance>', None, 0.7, None, None),
+        ('<Reflectance type="IntSolar">0.4</Reflectance>'
+         '<Absorptance type="IntSolar">0.3</Absorptance>', None, 0.4, None, None),
+        ('<Reflectance type="IntVisible" unit="Percent">45</Reflectance>', 0.45, None, None, None),
+        ('<Reflectance type="IntVis">1</Reflectance>', 1.0, None, None, None),
+        ('<Reflectance type="ExtVisible">0.2</Reflectance><Emittance type="IntIR">0.5</Emittance>',
+         None, None, 0.2, 0.5),
+        ('<Reflectance type="IntVisible" incidentAngle="60">0.9</Reflectance>'
+         '<Reflectance type="IntVisible" incidentAngle="0.0">0.3</Reflectance>',
+         0.3, None, None, None),
+    ],
+)  # fmt: skip
+def test_the_finish_of_a_construction_is_what_it_states(
+    tmp_path, stated, visible, solar, outer, emissivity
+):
+    start, end = MATERIALS.index(" <Reflectance"), MATERIALS.index("</Construction>")
+    text = two_rooms().replace(MATERIALS[start:end], stated)
+    finish = Constructions(read_document(written(tmp_path, text))).finish("wall")
+    assert finish.visible == (None if visible is None else pytest.approx(visible))
+    assert finish.solar == (None if solar is None else pytest.approx(solar))
+    assert finish.outer == outer
+    assert emissivity is None or finish.emissivity == emissivity
+
+
+@pytest.mark.parametrize(
+    ("stated", "words"),
+    [
+        ('<Reflectance type="IntVisible">1.01</Reflectance>', "expected 0 to 1, got 1.01"),
+        ('<Reflectance type="IntVisible" unit="Percent">101</Reflectance>', "101"),
+        ('<Reflectance type="IntVisible" unit="Lux">0.1</Reflectance>', "unit 'Lux', expected"),
+    ],
+)
+def test_a_share_that_cannot_be_is_an_issue(tmp_path, stated, words):
+    found = changed(tmp_path, (CONSTRUCTION, CONSTRUCTION + stated))
+    assert [one for one in found.issues if words in str(one)]
+
+
+def test_a_construction_that_is_not_there_is_one_issue(tmp_path):
+    """Every wall refers to it; the file's elevation is in its own unit, its name may be missing."""
+    found = changed(
+        tmp_path, ('constructionIdRef="wall"', 'constructionIdRef="none"'),
+        ("<Longitude>", "<Elevation>100</Elevation><Longitude>"),
+        ("<Name>Two rooms</Name>", ""), ('lengthUnit="Meters"', 'lengthUnit="Feet"'),
+    )  # fmt: skip
+    missing = [one for one in found.issues if "no Construction 'none'" in str(one)]
+    assert len(missing) == 1
+    assert found.elevation == pytest.approx(30.48) and found.name == "c"
+    assert changed(tmp_path).elevation == 0.0
+
+
+def test_openings_without_a_polygon_or_of_air(tmp_path):
+    """Named, and no window; glass that the same room has on both sides is named with its area."""
+    window = loop([(1, 0, 0.9), (4, 0, 0.9), (4, 0, 2.4), (1, 0, 2.4)])
+    empty = changed(tmp_path, (window, ""))
+    assert "opening-without-polygon" in {one.code for one in empty.issues}
+    air = changed(tmp_path, ('openingType="FixedWindow"', 'openingType="Air"'))
+    assert "opening-of-air" in {one.code for one in air.issues}
+    assert not air.spaces[0].windows and not empty.spaces[0].windows
+    within = ('<AdjacentSpaceId spaceIdRef="Hall"/>', '<AdjacentSpaceId spaceIdRef="Office"/>')
+    glass = ('openingType="NonSlidingDoor"', 'openingType="OperableWindow"')
+    both = changed(tmp_path, within, glass)
+    (issue,) = [one for one in both.issues if one.code == "glass-within-room"]
+    assert issue.effect.glass == pytest.approx(2.0)
+    assert "glass-within-room" not in {one.code for one in changed(tmp_path, within).issues}
+    odd = changed(tmp_path, ('openingType="FixedWindow"', f'openingType="{"W" * 50}"'))
+    assert [one for one in odd.issues if f"'{'W' * 40}', expected of" in str(one)]

@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.angular import AngularTable, roos_table, stack_table
+from mitsuba_cfs.bsdf.angular import AngularTable, check_specular, roos_table, stack_table
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, pane_values, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.errors import DataError
 
 DEGREES = np.array([0.0, 30, 60, 75, 80, 85, 88])
 THETA = np.radians(DEGREES)
@@ -166,3 +168,26 @@ def test_a_pane_of_the_igsdb_is_windows_at_every_angle(real_data):
     table = stack_table([read_pane_file(path).visible_pane()])
     assert table.transmitted(THETA) == pytest.approx(tau, abs=1e-3)
     assert table.reflected("front", THETA) == pytest.approx(rho, abs=1e-3)
+
+
+def test_a_function_of_the_angle_belongs_to_a_bsdf_without_scattering():
+    """The same pane fits; another transmittance, and a sheet that scatters all, are refused."""
+    pane, other = Pane("p", 0.8, 0.08, 0.08), Pane("q", 0.6, 0.08, 0.08)
+    bsdf, table = specular_klems(pane, KLEMS_FULL), stack_table([pane])
+    check_specular(bsdf, table, Path("a.xml"))
+    check_specular(bsdf, None, Path("a.xml"))
+    with pytest.raises(DataError, match=r"a.xml: angular: passes 0\.5. of diffuse light"):
+        check_specular(bsdf, stack_table([other]), Path("a.xml"))
+    even = np.full((KLEMS_FULL.size,) * 2, 0.3 / np.pi)
+    sheet = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, even, even, even, even)
+    with pytest.raises(DataError, match="scatters 100 % of what it passes"):
+        check_specular(sheet, table, Path("a.xml"))
+
+
+def test_means_over_patches_are_taken_at_all_of_their_places():
+    """Of cos(theta) in the first patch, 5 degrees wide: 2/3 (c1^3 - c2^3)/(c1^2 - c2^2)."""
+    angles = np.radians(np.arange(0.0, 91.0, 1.0))
+    table = AngularTable(angles, np.cos(angles))
+    c1, c2 = 1.0, np.cos(np.radians(5.0))
+    by_hand = 2 / 3 * (c1**3 - c2**3) / (c1**2 - c2**2)
+    assert table.patch_means(KLEMS_FULL)[0] == pytest.approx(by_hand, rel=1e-4)

@@ -12,6 +12,7 @@ import pytest
 from mitsuba_cfs.bsdf.glazing import (
     Glazing,
     Pane,
+    coated_values,
     glazing_values,
     pane_values,
     roos_factor,
@@ -209,3 +210,50 @@ def narrow_basis(theta: float) -> KlemsBasis:
     inner = [theta - half] if theta > half else []
     bounds = (0.0, *inner, theta + half, np.pi / 2)
     return KlemsBasis("narrow", bounds, (1,) + (4,) * (len(bounds) - 2))
+
+
+def test_coated_panes_by_the_shapes_of_window_4():
+    """Finlayson et al. 1993: polynomials in cos(theta) of clear and of bronze glass, at 60 deg."""
+    for normal, tau, whole in (
+        (0.7, (-0.0015, 3.355, -3.840, 1.460, 0.0288), (0.999, -0.563, 2.043, -2.532, 1.054)),
+        (0.645, (-0.002, 2.813, -2.341, -0.05725, 0.599), (0.997, -1.868, 6.513, -7.862, 3.225)),
+    ):
+        t, both = (sum(k * 0.5**n for n, k in enumerate(shape)) for shape in (tau, whole))
+        r = both - t
+        found = coated_values(normal, 0.1, 0.2, np.radians(60.0))
+        expected = (normal * t, 0.1 * (1 - r) + r, 0.2 * (1 - r) + r)
+        assert [float(value) for value in found] == pytest.approx(expected)
+        np.testing.assert_allclose(
+            [float(value) for value in coated_values(normal, 0.1, 0.2, 0.0)], [normal, 0.1, 0.2]
+        )
+    assert coated_values(0.7, 0.1, 0.2, np.radians(89.999))[0] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_shares_of_a_pane_that_cannot_be():
+    for values in ((-0.1, 0.1, 0.1), (0.5, -0.1, -0.1), (0.5, 0.1, -0.1), (0.9, 0.11, 0.11),
+                   (0.9, 0.05, 0.11)):  # fmt: skip
+        with pytest.raises(ValueError, match="expected shares of 1"):
+            Pane("p", *values, coated=True)
+    Pane("p", 0.9, 0.1, 0.05, coated=True)
+    with pytest.raises(ValueError, match="alike on both sides"):
+        Pane("p", 0.5, 0.1, 0.2)
+
+
+def test_roos_by_its_formula():
+    for panes, category in ((1, 1), (3, 10), (2, 4.5)):
+        z = 0.6
+        a, b = 8.0, 0.25 / category
+        gamma = 5.26 + 0.06 * panes + (0.73 + 0.04 * panes) * category
+        by_hand = 1 - a * z ** (5.2 + 0.7 * category) - b * z**2 - (1 - a - b) * z**gamma
+        found = roos_factor(0.3 * np.pi, panes=panes, category=category)
+        assert found == pytest.approx(np.clip(by_hand, 0, 1))
+    for panes, category in ((0, 4), (4, 4), (2, 0.9), (2, 10.1)):
+        with pytest.raises(ValueError, match="expected 1 to 3 panes"):
+            roos_factor(0.5, panes=panes, category=category)
+
+
+def test_layers_that_do_not_fit_together():
+    with pytest.raises(ValueError, match="needs a layer"):
+        combine_layers([])
+    with pytest.raises(ValueError, match="different bases"):
+        combine_layers([diffuser(0.5, 0.2, 0.2), diffuser(0.5, 0.2, 0.2, KLEMS_FULL)])

@@ -15,6 +15,7 @@ from mitsuba_cfs.images.view import (
     format_view,
     parse_view,
     pixel_directions,
+    pixel_rays,
     pixel_solid_angles,
     rays,
 )
@@ -128,3 +129,20 @@ def test_which_views_cover_the_hemisphere_before_the_eye(
 ) -> None:
     view = View(kind, horizontal_deg=across, vertical_deg=along)
     assert (view.covers_hemisphere, view.is_disc) == (covers, disc)
+
+
+def test_rays_through_points_of_pixels_are_those_of_the_whole_picture():
+    view = fisheye((0, 0, 0), (0, 1, 0), 8)
+    across, up = (np.arange(8) + 0.25) / 8, 1 - (np.arange(8)[:, None] + 0.75) / 8
+    whole, exists = rays(view, *np.broadcast_arrays(across, up))
+    pixels = np.array([3 * 8 + 5, 4 * 8 + 2])
+    found, there = pixel_rays(view, pixels, 0.25, 0.75)
+    np.testing.assert_allclose(found, whole.reshape(-1, 3)[pixels])
+    np.testing.assert_array_equal(there, exists.ravel()[pixels])
+
+
+def test_the_smallest_picture_has_one_pixel():
+    one = fisheye((0, 0, 0), (0, 1, 0), 1)
+    assert (one.width, one.height, one.up, one.horizontal_deg) == (1, 1, (0, 0, 1), 180)
+    with pytest.raises(ValueError, match="size"):
+        fisheye((0, 0, 0), (0, 1, 0), 0)

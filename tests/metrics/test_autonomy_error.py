@@ -5,8 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_cfs.metrics.autonomy import daylight_autonomy, daylight_autonomy_error
-from mitsuba_cfs.metrics.lm83 import spatial_daylight_autonomy_error
+from mitsuba_cfs.metrics.autonomy import (
+    UDI_LIMITS_2005,
+    area_share,
+    continuous_daylight_autonomy,
+    daylight_autonomy,
+    daylight_autonomy_error,
+    sensor_weights,
+    useful_daylight_illuminance,
+)
+from mitsuba_cfs.metrics.lm83 import (
+    annual_sunlight_exposure,
+    blinds_operated,
+    spatial_daylight_autonomy,
+    spatial_daylight_autonomy_error,
+    sunlit_hours,
+)
 
 
 def test_the_error_of_da_is_its_spread() -> None:
@@ -23,3 +37,84 @@ def test_sensors_near_the_limit_make_the_error_of_sda() -> None:
     found = spatial_daylight_autonomy_error([0.5, 0.9, 0.1, 0.5], [0.01, 0.01, 0.01, 0.0])
     assert found == pytest.approx(0.25 * 0.5)
     assert spatial_daylight_autonomy_error([0.9], [0.01]) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_last_group_closes_of_equals_and_two_percent_may_stay_lit() -> None:
+    """Fifty points of equal weight: one lit is 2 %; groups of one point each, of 600 and 400 lx."""
+    direct = np.zeros((2, 4, 50))
+    direct[0, 0, 0] = 1500.0  # one point: 2 %, all stay open
+    direct[0, 1, :2] = 1500.0  # two: the only group with sun closes
+    direct[:, 2, 0], direct[:, 2, 1] = (600.0, 400.0), 1500.0  # both have the second point
+    direct[0, 3, 0] = direct[1, 3, 1] = direct[1, 3, 2] = (
+        1500.0  # the first alone leaves its one point
+    )
+    closed = blinds_operated(direct)
+    np.testing.assert_array_equal(closed[:, 0], [False, False])
+    np.testing.assert_array_equal(closed[:, 1], [True, False])
+    assert closed[:, 2].any()
+    np.testing.assert_array_equal(closed[:, 3], [False, True])
+    both = np.zeros((2, 1, 50))
+    both[0, 0, :2], both[1, 0, :2] = 600.0, 400.0  # together 1,000 lx on two points
+    np.testing.assert_array_equal(blinds_operated(both)[:, 0], [False, True])
+    both[:, 0, 2:] = 1e-3  # weak sun elsewhere does not count
+    np.testing.assert_array_equal(blinds_operated(both)[:, 0], [False, True])
+    with pytest.raises(ValueError, match=r"expected \[G\]\[H, S\]"):
+        blinds_operated(direct[0])
+
+
+def test_the_sums_rounding_closes_no_blinds() -> None:
+    """Three of 150 points are exactly 2 %, whatever the sum of their weights is rounded to."""
+    direct = np.zeros((1, 2, 150))
+    direct[0, 0, :3] = direct[0, 1, :4] = 1e3
+    np.testing.assert_array_equal(blinds_operated(direct), [[False, True]])
+    # of areas 1 and 49.5: 1.98 %, and 1.01 of 50: 2.02 %
+    two = np.array([[[1e3, 0.0]]])
+    assert not blinds_operated(two, areas=[1.98, 98.02]).any()
+    assert blinds_operated(two, areas=[2.02, 97.98]).all()
+
+
+def test_limits_hold_as_the_standard_says() -> None:
+    """300 lx suffice for half the time; 1,000 lx are no sunlight, 250 hours are not too many."""
+    lux = np.array([[300.0, 299.9], [300.0, 300.0], [0.0, 0.0], [0.0, 0.0]])
+    every = np.ones(4, dtype=bool)
+    assert spatial_daylight_autonomy(lux, every) == 0.5
+    assert list(daylight_autonomy(lux, every)) == [0.5, 0.25]
+    sun = np.array([[1000.0, 1000.1], [1000.0, 1000.1]])
+    assert list(sunlit_hours(sun, np.ones(2, dtype=bool))) == [0.0, 2.0]
+    assert list(sunlit_hours(sun, np.ones(2, dtype=bool), step_h=0.25)) == [0.0, 0.5]
+    year = np.zeros((251, 3))
+    year[:250, 0], year[:, 1], year[:, 2] = 2e3, 2e3, 900.0
+    exposed = annual_sunlight_exposure(year, np.ones(251, dtype=bool), areas=[1.0, 2.0, 5.0])
+    assert exposed == 0.25
+    bins = useful_daylight_illuminance([[99.0], [100.0], [300.0], [3000.0], [3001.0]],
+                                       np.ones(5, dtype=bool))  # fmt: skip
+    np.testing.assert_allclose(bins[:, 0], [0.2, 0.2, 0.4, 0.2])
+    older = useful_daylight_illuminance([[500.0], [2000.0], [2001.0]], np.ones(3, dtype=bool),
+                                        UDI_LIMITS_2005)  # fmt: skip
+    np.testing.assert_allclose(older[:, 0] * 3, [0.0, 0.0, 2.0, 1.0])
+    part = continuous_daylight_autonomy([[150.0], [600.0]], np.ones(2, dtype=bool))
+    assert part == pytest.approx(0.75)
+
+
+def test_weights_and_limits_that_cannot_be() -> None:
+    np.testing.assert_allclose(sensor_weights([1.0, 3.0], 2), [0.25, 0.75])
+    np.testing.assert_allclose(sensor_weights([0.0, 3.0], 2), [0.0, 1.0])
+    assert area_share([True, False, True], [1.0, 2.0, 1.0]) == 0.5
+    for areas in ([1.0], [3.0, -1.0], [0.0, 0.0], [[1.0, 1.0]], [2.0, np.nan]):
+        with pytest.raises(ValueError, match="areas: expected 2"):
+            sensor_weights(areas, 2)
+    with pytest.raises(ValueError, match="at least one sensor"):
+        sensor_weights(None, 0)
+    one = np.ones((1, 1)), np.ones(1, dtype=bool)
+    for limits in ((), (0.0, 100.0), (300.0, 100.0), (100.0, 100.0)):
+        with pytest.raises(ValueError, match="rising positive"):
+            useful_daylight_illuminance(*one, limits)
+    for lux, hours, words in (
+        ([1.0], [True], "expected illuminance"), ([[1.0]], [True, True], "expected illuminance"),
+        ([[1.0]], [1.0], "expected illuminance"), ([[1.0]], [False], "no time step"),
+        ([[-1.0]], [True], "not negative"), ([[np.inf]], [True], "finite"),
+        ([[np.nan]], [True], "finite"),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=words):
+            daylight_autonomy(np.array(lux), np.array(hours))
+    assert daylight_autonomy(np.array([[300]]), one[1]) == 1.0  # whole numbers

@@ -295,3 +295,29 @@ def test_wrong_areas_limits_and_rules():
         schedules.working_hours(year(), 8, 8)
     with pytest.raises(ValueError, match="outdoor_horizontal"):
         daylight_factor([1.0], 0.0)
+
+
+def test_figures_of_a_room_by_hand():
+    """Two sensors of 1 and 3 m2 with 150 and 5,000 lx at all times, the second one in the sun."""
+    weather = year()
+    lux = np.tile([150.0, 5000.0], (8760, 1))
+    room = room_metrics(lux, weather, direct_illuminance=lux - 500.0 * (lux > 200), areas=[1, 3])
+    table = room.by_sensor()
+    assert list(table["daylight_autonomy"]) == [0.0, 100.0]
+    assert list(table["continuous_daylight_autonomy"]) == [50.0, 100.0]
+    for name, values in (
+        ("udi_below_100", [0, 0]), ("udi_100_300", [100, 0]), ("udi_300_3000", [0, 0]),
+        ("udi_above_3000", [0, 100]), ("udi_100_2000", [100, 0]), ("sunlit_hours", [0, 3650]),
+        ("mean_illuminance_lx", [150, 5000]),
+    ):  # fmt: skip
+        assert list(table[name]) == pytest.approx(values), name
+    figures = room.of_room()
+    for name, value in (
+        ("daylight_autonomy", 75.0), ("continuous_daylight_autonomy", 87.5),
+        ("udi_100_300", 25.0), ("udi_above_3000", 75.0), ("udi_below_100", 0.0),
+        ("udi_300_3000", 0.0), ("udi_100_2000", 25.0), ("mean_illuminance_lx", 3787.5),
+        ("spatial_daylight_autonomy", 75.0), ("annual_sunlight_exposure", 75.0),
+    ):  # fmt: skip
+        assert figures[name] == pytest.approx(value), name
+    dark = room_metrics(lux, weather)
+    assert dark.annual_sunlight_exposure is None and dark.sunlit_hours is None

@@ -111,7 +111,7 @@ def trial(number: int, earlier_of: Callable[[str], Earlier]) -> Trial:
     code, expected = process.returncode, CODES[SIGNALS[kind][0]]
     faults = []
     ended = "by the signal"
-    if code in BY_PYTHON and " in main\n" not in text:
+    if (code in BY_PYTHON or "KeyboardInterrupt" in text) and " in main\n" not in text:
         ended = "before the program began"
     elif "Traceback" in text or "Exception ignored" in text:
         faults.append(f"traceback: {text.strip().splitlines()[-1][:80]}")
@@ -126,7 +126,8 @@ def trial(number: int, earlier_of: Callable[[str], Earlier]) -> Trial:
         faults.append(f"last line: {text.rstrip()[-60:]}")
     if left := earlier.left():
         faults.append(f"left {', '.join(sorted(one.name for one in left))}")
-    if ended != "before it" and place.content() != earlier.content:
+    one_file = not place.job.folder  # takes its place at once: the one or the other
+    if ended != "before it" and not one_file and place.content() != earlier.content:
         faults.append("the earlier result has changed")
     return Trial(number, command, kind, after, ended, seconds, tuple(faults))
 

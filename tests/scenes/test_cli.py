@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 
@@ -207,7 +208,7 @@ def test_progress_of_a_stage_that_failed_is_not_reported_as_done(capsys) -> None
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("name", [*cli.FOREIGN, "__del__"])
+@pytest.mark.parametrize("name", [*cli.FOREIGN, cli.FILES, "__del__"])
 @pytest.mark.parametrize(
     ("number", "raised"),
     [(signal.SIGTERM, cli.Terminated), (signal.SIGHUP, cli.Terminated),
@@ -217,7 +218,8 @@ def test_no_signal_ends_a_call_of_a_library(name, number, raised):
     """IfcOpenShell answers an exception in its calls with `SystemError`, Python's `__del__` with
     a printed traceback: the signal comes once they have returned."""
     function = "__del__" if name == "__del__" else "call"
-    space = {"__name__": f"{name}.fake", "signal": signal, "ended": []}
+    module = name if name == cli.FILES else f"{name}.fake"
+    space = {"__name__": module, "signal": signal, "ended": []}
     exec(f"def {function}(n):\n    signal.raise_signal(n)\n    ended.append(n)\n", space)
     before = signal.signal(number, cli.Stop())
     try:
@@ -251,6 +253,20 @@ def test_no_signal_ends_the_body_of_a_traced_loop(variant):
     finally:
         signal.signal(signal.SIGTERM, before)
     assert ended
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="Linux")
+def test_a_signal_is_held_back_without_a_thread():
+    before, threads = signal.signal(signal.SIGTERM, cli.Stop()), threading.active_count()
+    space = {"__name__": "trimesh.fake", "signal": signal}
+    exec("def call():\n    signal.raise_signal(signal.SIGTERM)\n", space)
+    try:
+        with pytest.raises(cli.Terminated):
+            space["call"]()
+            assert threading.active_count() == threads
+            time.sleep(5)
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def test_a_second_signal_does_not_end_the_cleaning_up():

@@ -87,7 +87,9 @@ def test_numbers_of_the_sources():
     assert (SNOW, albedo.SNOW_CM, albedo.TOO_WARM_C, albedo.MANY_HOURS) == (0.7, 1.0, 10.0, 100)
 
 
-@pytest.mark.parametrize("wrong", [-0.01, 1.01, (0.2,) * 11, (*(0.2,) * 11, 1.5), (-0.1,) * 12])
+@pytest.mark.parametrize(
+    "wrong", [-0.01, 1.01, (0.2,) * 11, (*(0.2,) * 11, 1.5), (*(0.2,) * 11, -0.1), (-0.1,) * 12]
+)
 def test_reflectances_outside_of_their_range_are_refused(weather, wrong):
     with pytest.raises(DataError, match="from 0 to 1"):
         with_albedo(weather, wrong)

@@ -99,6 +99,9 @@ def test_a_calm_day_counts_with_half_a_metre_a_second() -> None:
         for wind in (0.0, 0.5)
     )
     np.testing.assert_array_equal(calm, slow)
+    faster = in_city(_weather(wind_speed=np.full(72, 0.55)), 0.5, 0.2, NIGHT).dry_bulb_c
+    dry = _weather().dry_bulb_c
+    np.testing.assert_allclose((calm - dry)[:5] / (faster - dry)[:5], 1.1**0.25)
 
 
 def test_without_global_irradiance_it_is_refused() -> None:

@@ -153,3 +153,12 @@ def test_wrong_calls(tmp_path):
     with pytest.raises(DataError, match="cannot be written"):
         write_matrix(tmp_path / "no" / "m.mtx", np.zeros((2, 2)))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_luminance_of_one_component_and_of_three():
+    one = np.arange(6.0).reshape(2, 3, 1)
+    np.testing.assert_array_equal(luminance(one), one[..., 0])
+    np.testing.assert_allclose(luminance(np.ones((2, 1, 3)), (0.2, 0.3, 0.4)), [[0.9], [0.9]])
+    for wrong in (np.ones((2, 3)), np.ones((2, 3, 2))):
+        with pytest.raises(ValueError, match="1 or 3"):
+            luminance(wrong)

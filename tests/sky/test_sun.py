@@ -161,7 +161,7 @@ def test_radiances_formulas_by_hand():
     declination, hour = sun.declination_and_time(weather)
     assert declination == pytest.approx(0.4093 * np.sin(2 * np.pi / 365 * (100 - 81)))
     equation = 0.170 * np.sin(4 * np.pi / 373 * 20) - 0.129 * np.sin(2 * np.pi / 355 * 92)
-    assert hour == pytest.approx(12.51 + equation + 17 / 15 - 1)
+    assert hour == pytest.approx(12.51 + equation + 17 / 15 - 1, rel=1e-12)
     d, t = declination[0], np.pi * (hour[0] - 12) / 12
     phi = np.radians(48.0)
     up = np.sin(phi) * np.sin(d) + np.cos(phi) * np.cos(d) * np.cos(t)

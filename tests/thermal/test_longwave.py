@@ -112,6 +112,8 @@ def test_view_factors_by_area_leave_out_what_faces_the_same_way():
     for degrees, first in ((9.0, [0, 0, 1]), (11.0, [0, 2 / 5, 3 / 5])):
         normals = [[1, 0, 0], [*np.cos(np.radians([degrees, 90 - degrees])), 0], [-1, 0, 0]]
         np.testing.assert_allclose(area_view_factors([1.0, 2.0, 3.0], normals)[0], first)
+    small = area_view_factors([0.1, 0.2, 0.3], np.diag([1, -1, 1]) + np.diag([0, 0], 1))
+    np.testing.assert_allclose(small.sum(axis=1), 1.0)
     with pytest.raises(ThermalInputError, match="sees no other"):
         area_view_factors([1.0, 1.0], [[1, 0, 0], [1, 0, 0]])
 

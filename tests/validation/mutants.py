@@ -63,7 +63,7 @@ MODULES = {  # files, and their quick tests; none that numba compiles, whose cod
     "mitsuba_cfs/bsdf/xml": ["bsdf/test_xml"],
     "mitsuba_cfs/bsdf/layers": ["bsdf/test_layers"],
     "mitsuba_cfs/bsdf/angular": ["bsdf/test_angular"],
-    "mitsuba_cfs/bsdf/glazing": ["bsdf/test_angular"],
+    "mitsuba_cfs/bsdf/glazing": ["bsdf/test_layers"],
     "mitsuba_cfs/images/hdr": ["images/test_hdr"],
     "mitsuba_cfs/images/view": ["images/test_view"],
     "mitsuba_cfs/matrices/mtx_io": ["sky/test_mtx_io"],

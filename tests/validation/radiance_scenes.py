@@ -146,7 +146,8 @@ def main(
 ) -> pd.DataFrame:
     """A row for each scene and hour [lx]."""
     environment()  # says at once where there is no Radiance
-    scenes = {path.name: (path.read_text(), []) for path in sorted(folder.glob("*.rad"))} | ours()
+    files = {path.name: path.read_text() for path in sorted(folder.glob("*.rad"))}
+    scenes = {name: (text, []) for name, text in files.items() if "polygon" in text} | ours()
     rows = []
     with tempfile.TemporaryDirectory() as temporary:
         epw = with_dew_point(weather, Path(temporary), DEFAULT_DEW_POINT_C)
