@@ -14,6 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import shapely
@@ -99,6 +100,6 @@ def _outline(triangles: NDArray[np.float64], window: Window) -> shapely.Geometry
     return outline if covered else shapely.Polygon()
 
 
-def _flat(triangles: Sequence) -> NDArray:
+def _flat(triangles: Sequence) -> NDArray[Any]:
     """Hulls of triangles [N, 3, 3] on their plane: polygons, or lines where seen from the side."""
     return shapely.convex_hull(shapely.multipoints(np.asarray(triangles)[..., :2]))

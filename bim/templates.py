@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,8 +94,8 @@ def _same(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
 
 
 def _same_constructions(a: Space, b: Space) -> bool:
-    def areas(space: Space) -> dict:
-        table: dict = {}
+    def areas(space: Space) -> dict[str, Any]:
+        table: dict[str, Any] = {}
         for face in space.faces:
             key = face.kind, face.adjacency, face.construction.layers
             table[key] = table.get(key, 0.0) + face.area

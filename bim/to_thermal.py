@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -188,7 +189,7 @@ def door_links(spaces: Sequence[Space], flow: float) -> NDArray[np.float64]:
 
 def _faces_of_surfaces(space: Space) -> list[list[int]]:
     """The faces of a room that are one surface of its zone."""
-    groups: dict[tuple, list[int]] = {}
+    groups: dict[tuple[Any, ...], list[int]] = {}
     for i, face in enumerate(space.faces):
         key = (face.kind, face.adjacency, face.neighbour, face.construction)
         key += tuple(np.round(face.normal, 2))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from bim.model import Building, Element, Face, Space, Window
+from bim.model import COLOURS, Building, Element, Face, Space, Window
 from bim.names import numbered
 from mitsuba_cfs.directions import window_frame
+from mitsuba_cfs.images.view import View
+from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 
 SAME_ORIENTATION = 5e-4  # difference between frame axes [1] within a group: 0.03 degrees
@@ -92,3 +94,22 @@ def orientation_name(window: Window) -> str:
         return "roof"
     azimuth = np.degrees(np.arctan2(window.normal[0], window.normal[1]))
     return COMPASS[int(np.round(azimuth / 45)) % 8]
+
+
+def band_scenes(
+    building: Building,
+    space: Space,
+    groups: Sequence[WindowGroup],
+    view: View,
+    bands: Sequence[str] = COLOURS,
+) -> tuple[DaylightScene, ...]:
+    """The scene of a room with a view in each band."""
+    return tuple(
+        DaylightScene(
+            furnished_surfaces(space, band),
+            exterior_surfaces(building, space, band),
+            groups,
+            view=view,
+        )
+        for band in bands
+    )

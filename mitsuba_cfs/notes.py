@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 
 class Note(str):
@@ -26,7 +27,7 @@ class Note(str):
         self.template, self.singular, self.values = template, singular, values
         return self
 
-    def __reduce__(self) -> tuple:
+    def __reduce__(self) -> tuple[Any, ...]:
         """For copies and other processes."""
         return _note, (self.template, self.singular, dict(self.values))
 

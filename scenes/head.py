@@ -80,7 +80,7 @@ class Head:
         return replace(self, assumed=tuple(dict.fromkeys([*self.assumed, *sentences])))
 
     @property
-    def record(self) -> dict[str, list]:
+    def record(self) -> dict[str, list[Any]]:
         """The head as data for a JSON file: issues by kind, the largest glass area first."""
         return {
             "model": list(self.model),

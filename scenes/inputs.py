@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from bim.building_file import read_elements
 from bim.doorways import opened, source_rooms
@@ -61,7 +61,7 @@ class Inputs:
         )
 
     @property
-    def sources(self) -> list[dict]:
+    def sources(self) -> list[dict[str, Any]]:
         """Name and source of each system, and its windows."""
         windows = [window for space in self.spaces for window in space.windows]
         return window_sources([w for w in windows if w.guid in self.systems], self.systems)
@@ -81,7 +81,10 @@ class Inputs:
 
 
 def read_inputs(
-    options: InputOptions, files: InputFiles | None = None, progress: Progress = silent, **chosen
+    options: InputOptions,
+    files: InputFiles | None = None,
+    progress: Progress = silent,
+    **chosen: Any,
 ) -> Inputs:
     """The inputs of a command from its options: the building is read last.
 

@@ -25,7 +25,6 @@ def read_files(options: PictureOptions) -> PictureFiles:
 
     Raises: `DataError` for a file that cannot be used, `PictureHourError` for a wrong hour.
     """
-    input_files.check_building(options)
     view = None if options.view is None else parsed_view(options.view)
     files = input_files.read_files(options, light_only=True)
     return PictureFiles(files, hour_of(options.at, files.weather.midpoints, "--at"), view)

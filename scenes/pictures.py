@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -30,7 +31,7 @@ DPI = 150
 TITLE = {"fontsize": 9, "loc": "left", "y": 1.0}  # without y each title's place is looked for
 
 
-def scale_limits(luminance: NDArray) -> tuple[float, float]:
+def scale_limits(luminance: NDArray[Any]) -> tuple[float, float]:
     """Round ends [cd/m2] of a logarithmic scale that holds a picture: two to five decades."""
     lit = luminance[np.isfinite(luminance) & (luminance > 0)]
     if not lit.size:
@@ -42,7 +43,7 @@ def scale_limits(luminance: NDArray) -> tuple[float, float]:
 
 def write_falsecolour(
     path: Path,
-    luminance: NDArray,
+    luminance: NDArray[Any],
     *,
     title: str = "",
     limits: tuple[float, float] | None = None,
@@ -83,7 +84,7 @@ def _falsecolour_frame(
     return figure, axes, image
 
 
-def tone_mapped(pixels: NDArray, *, white: float | None = None) -> NDArray[np.uint8]:
+def tone_mapped(pixels: NDArray[Any], *, white: float | None = None) -> NDArray[np.uint8]:
     """sRGB bytes [ny, nx, 3] of radiance [ny, nx, 3] or luminance [ny, nx].
 
     The log-average becomes middle grey; what is `white` times brighter (default: the 99.5th
@@ -102,11 +103,13 @@ def tone_mapped(pixels: NDArray, *, white: float | None = None) -> NDArray[np.ui
     return _srgb(linear)
 
 
-def _luminance(pixels: NDArray) -> NDArray:
+def _luminance(pixels: NDArray[Any]) -> NDArray[Any]:
     return pixels if pixels.ndim == 2 else EFFICACY * (pixels @ np.asarray(LUMINANCE_WEIGHTS))
 
 
-def _tone_curve(luminance: NDArray, white: float | None = None) -> Callable[[NDArray], NDArray]:
+def _tone_curve(
+    luminance: NDArray[Any], white: float | None = None
+) -> Callable[[NDArray[Any]], NDArray[Any]]:
     """What luminance becomes in a print of the picture, 0..1; see `tone_mapped`."""
     lit = luminance[luminance > 0]
     if not lit.size:
@@ -115,21 +118,23 @@ def _tone_curve(luminance: NDArray, white: float | None = None) -> Callable[[NDA
     if white is None:
         white = max(float(np.percentile(factor * luminance, 99.5)), 1.0)
 
-    def curve(values: NDArray) -> NDArray:
+    def curve(values: NDArray[Any]) -> NDArray[Any]:
         scaled = factor * values
         return np.minimum(scaled * (1 + scaled / white**2) / (1 + scaled), 1.0)
 
     return curve
 
 
-def _srgb(linear: NDArray) -> NDArray[np.uint8]:
+def _srgb(linear: NDArray[Any]) -> NDArray[np.uint8]:
     """Bytes of linear light 0..1 in sRGB's transfer curve (IEC 61966-2-1)."""
     linear = np.clip(linear, 0.0, 1.0)
     curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     return (255 * curve + 0.5).astype(np.uint8)
 
 
-def write_tone_mapped(path: Path, pixels: NDArray, *, scale: bool = False, title: str = "") -> None:
+def write_tone_mapped(
+    path: Path, pixels: NDArray[Any], *, scale: bool = False, title: str = ""
+) -> None:
     """Write radiance [ny, nx, 3] or luminance [ny, nx] as a picture for the eye (PNG).
 
     Args:
@@ -212,7 +217,7 @@ def write_check_picture(path: Path, result: GlareResult, *, title: str = "") -> 
     _save(figure, path)
 
 
-def _list_sources(figure: Figure, result: GlareResult, largest: NDArray) -> None:
+def _list_sources(figure: Figure, result: GlareResult, largest: NDArray[Any]) -> None:
     """The sources beside the picture, the most glaring first."""
     found, colours = result.sources, source_colours(result.count)
     counted = ngettext("{count} glare source", "{count} glare sources", result.count)

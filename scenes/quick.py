@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from typing import Any
 
 from scenes.language.catalogue import N_
 
@@ -35,6 +36,6 @@ HEAT = {
 PV = {"samples": 512}  # of `scenes.photovoltaics.study.run_pv`
 
 
-def picks(table: Mapping[str, object], stated: Collection[str]) -> dict:
+def picks(table: Mapping[str, object], stated: Collection[str]) -> dict[str, Any]:
     """The choices of a table for options that the user did not state."""
     return {name: value for name, value in table.items() if name not in stated}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -233,7 +234,7 @@ class RunResult:
     sun: NDArray[np.float64]  # [H, 3] direction to the sun
     spaces: Sequence[RoomYear]
     issues: tuple[Issue, ...]
-    manifest: dict  # of run.json: inputs with hashes, options, versions, seed, timings
+    manifest: dict[str, Any]  # of run.json: inputs with hashes, options, versions, seed, timings
     notes: tuple[str, ...] = field(default=())  # sentences for the head of the results
     method: str = "three-phase"  # one of mitsuba_cfs.methods.METHODS
     head: Head = NO_HEAD  # what was left out, what was assumed

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 from bim.model import COLOURS, Building, Space
 from bim.seasons import Season, in_month, seasons
+from bim.to_tracer import band_scenes
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.scene import DaylightScene
 from scenes.inputs import Inputs
-from scenes.room.glare import band_scenes
 from scenes.room.leaks import leak_notes
 from scenes.room.windows import room_windows
 

@@ -226,7 +226,7 @@ def with_states(
 
 def guessed_walls(spaces: Sequence[Space]) -> list[Issue]:
     """Outer walls of which the file does not state all layers: their layers and U, by area."""
-    areas: Counter[tuple[str, tuple]] = Counter()
+    areas: Counter[tuple[str, tuple[Any, ...]]] = Counter()
     for face in (face for space in spaces for face in space.faces):
         known = face.construction.source == "IFC"
         if face.kind == "wall" and face.adjacency == "outside" and not known:
@@ -338,7 +338,7 @@ def _closed_space(
     return space, boundary.issues + _assumptions(record, assumed) + soundness_issues(space)
 
 
-def _assumptions(record: SpaceRecord, assumed: Counter) -> list[Issue]:
+def _assumptions(record: SpaceRecord, assumed: Counter[str]) -> list[Issue]:
     guid, name = record.solid.guid, record.solid.name
     return [
         Issue(f"{key}-assumed", guid, {"room": name, "count": count})

@@ -40,7 +40,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bim.material_names import MaterialCorrection
 from mitsuba_cfs.errors import DataError, no_such_key
@@ -136,7 +136,7 @@ class Corrections:
         return result
 
 
-def chosen(model: ifcopenshell.file, query: str, file: str | Path = "") -> set[int]:
+def chosen(model: ifcopenshell.file, query: str, file: str | PathLike[str] = "") -> set[int]:
     """STEP ids of the elements that a selector chooses; `DataError` where it is none."""
     # here, so that a mistake in the small file is found before these are loaded
     from ifcopenshell.util.selector import filter_elements
@@ -159,12 +159,12 @@ def chosen(model: ifcopenshell.file, query: str, file: str | Path = "") -> set[i
     return step_ids
 
 
-def corrections_file(model_path: str | Path) -> Path:
+def corrections_file(model_path: str | PathLike[str]) -> Path:
     """Where the corrections of a model are kept: `<model>.corrections.toml` beside it."""
     return Path(model_path).with_suffix(".corrections.toml")
 
 
-def corrections_beside(model_path: str | Path, join: Sequence[str] = ()) -> Corrections:
+def corrections_beside(model_path: str | PathLike[str], join: Sequence[str] = ()) -> Corrections:
     """The corrections in the file beside the model, if there is one, and rooms to join besides.
 
     Args: join: texts of room names with a plus between them, as "Hall + Living"; or "open": all
@@ -214,14 +214,14 @@ def read_corrections(path: str | PathLike[str]) -> Corrections:
     )  # fmt: skip
 
 
-def _tables(table: dict, key: str, path: Path) -> list:
+def _tables(table: dict[str, Any], key: str, path: Path) -> list[Any]:
     entries = table.get(key, [])
     if not isinstance(entries, list):
         raise DataError(f"expected tables, [[{key}]]", file=path, field=key)
     return entries
 
 
-def _north(table: dict, path: Path) -> float | None:
+def _north(table: dict[str, Any], path: Path) -> float | None:
     value = table.get("north")
     if value is None:
         return None
@@ -231,7 +231,7 @@ def _north(table: dict, path: Path) -> float | None:
     return float(value)
 
 
-def _material(entry: dict, path: Path) -> MaterialCorrection:
+def _material(entry: dict[str, Any], path: Path) -> MaterialCorrection:
     if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
         raise DataError("expected name = '...'", file=path, field="material")
     _check_keys(entry, ("name", *MATERIAL_KEYS), path, "material.")
@@ -251,14 +251,14 @@ def _material(entry: dict, path: Path) -> MaterialCorrection:
     return MaterialCorrection(entry["name"], {k: float(v) for k, v in values.items()})
 
 
-def _check_keys(table: dict, known: Sequence[str], path: Path, prefix: str = "") -> None:
+def _check_keys(table: dict[str, Any], known: Sequence[str], path: Path, prefix: str = "") -> None:
     """Refuse a key that there is not, naming the nearest."""
     for key in table:
         if key not in known:
             raise DataError(no_such_key(key, known), file=path, field=prefix + key)
 
 
-def _paint(entry: dict, path: Path) -> Paint:
+def _paint(entry: dict[str, Any], path: Path) -> Paint:
     if not isinstance(entry, dict) or not isinstance(entry.get("select"), str):
         raise DataError("expected select = '...'", file=path, field="reflectance")
     _check_keys(entry, PAINT_KEYS, path, "reflectance.")
@@ -286,7 +286,7 @@ def _share(value: object, path: Path, field: str) -> float:
     return float(value)
 
 
-def _texts(table: dict, key: str, path: Path) -> tuple[str, ...]:
+def _texts(table: dict[str, Any], key: str, path: Path) -> tuple[str, ...]:
     values = table.get(key, [])
     if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
         raise DataError("expected a list of texts", file=path, field=key)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import ifcopenshell
 import numpy as np
@@ -143,7 +144,7 @@ def walls_apart(shapes: Sequence[Shape], solids: Solids) -> list[Issue]:
     return _gap_issues(near)
 
 
-def _gap_issues(near: Sequence[tuple[Shape, PackedSolid, list]]) -> list[Issue]:
+def _gap_issues(near: Sequence[tuple[Shape, PackedSolid, list[Any]]]) -> list[Issue]:
     """Walls, each with its neighbours: those that do not meet."""
     bodies = [(body, [its_body for _, its_body in others]) for _, body, others in near]
     issues = []

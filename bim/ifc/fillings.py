@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import ifcopenshell
 import numpy as np
@@ -144,7 +145,7 @@ def _filling(
     )
 
 
-def _unread_glazing(one: Filling, psets: dict[str, dict]) -> list[Issue]:
+def _unread_glazing(one: Filling, psets: dict[str, dict[str, Any]]) -> list[Issue]:
     """What the property sets state of the glass, where g or light's transmittance is missing."""
     if None not in (one.g_value, one.visible_transmittance):
         return []
@@ -154,7 +155,7 @@ def _unread_glazing(one: Filling, psets: dict[str, dict]) -> list[Issue]:
     return [Issue("glazing-part-not-read", one.guid, values)] if names else []
 
 
-def _number(psets: dict[str, dict], *names: str) -> float | None:
+def _number(psets: dict[str, dict[str, Any]], *names: str) -> float | None:
     """First positive number of one of those names in any property set."""
     for name in names:
         for properties in psets.values():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import zipfile
+from os import PathLike
 from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
@@ -15,7 +16,7 @@ LARGEST = 2**30  # of a zipped model, unpacked [bytes]: reading takes ten times 
 SCHEMA = re.compile(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'")
 
 
-def check_head(path: str | Path) -> None:
+def check_head(path: str | PathLike[str]) -> None:
     """Raise `DataError` where a file is no IFC model (.ifc, .ifczip) of our schemas."""
     path = Path(path)
     if not path.is_file():

@@ -189,7 +189,7 @@ class MaterialReader:
         ]
         return tuple(replace(one, thickness=f) for one, f in zip(layers, fractions, strict=True))
 
-    def _constituents(self, element: ifcopenshell.entity_instance) -> dict:
+    def _constituents(self, element: ifcopenshell.entity_instance) -> dict[str, Any]:
         """Materials of an element without layers, by the names of constituents or their own."""
         material = _material_of(_with_material(element, self.damage), self.damage)
         if material is not None and material.is_a("IfcMaterialConstituentSet"):

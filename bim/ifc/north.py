@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import ifcopenshell
 import numpy as np
@@ -65,7 +66,7 @@ def map_conversions(model: ifcopenshell.file) -> list[MapConversion]:
     ]
 
 
-def _conversion(values: dict, crs: str | None, unit) -> MapConversion:
+def _conversion(values: dict[str, Any], crs: str | None, unit) -> MapConversion:
     origin = [_number(values.get(k)) for k in ("Eastings", "Northings", "OrthogonalHeight")]
     x, y = _number(values.get("XAxisAbscissa")), _number(values.get("XAxisOrdinate"))
     turned = x is not None and y is not None and math.hypot(x, y) > 1e-9

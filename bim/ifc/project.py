@@ -6,7 +6,9 @@ import shutil
 import uuid
 import zipfile
 from collections.abc import Iterator, Sequence
+from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import ifcopenshell
 import ifcopenshell.guid
@@ -22,7 +24,7 @@ from mitsuba_cfs.files import scratch_folder
 END = 4096  # bytes in which the end of a STEP file is looked for
 
 
-def open_ifc(path: str | Path) -> ifcopenshell.file:
+def open_ifc(path: str | PathLike[str]) -> ifcopenshell.file:
     """The one model of a file (.ifc, .ifczip); `DataError` where it is none, or has several."""
     models = open_all([path])
     if len(models) > 1:
@@ -31,7 +33,7 @@ def open_ifc(path: str | Path) -> ifcopenshell.file:
     return next(iter(models.values()))
 
 
-def open_all(paths: Sequence[str | Path]) -> dict[str, ifcopenshell.file]:
+def open_all(paths: Sequence[str | PathLike[str]]) -> dict[str, ifcopenshell.file]:
     """The models of files by name, those of an .ifczip each, the one with most spaces first."""
     models: dict[str, ifcopenshell.file] = {}
     for path in map(Path, paths):
@@ -111,7 +113,7 @@ def _mend_stars(model: ifcopenshell.file) -> None:
                 product[index] = None
 
 
-def ending_issues(path: str | Path) -> list[Issue]:
+def ending_issues(path: str | PathLike[str]) -> list[Issue]:
     """An issue for each STEP file that has lost its end."""
     path = Path(path)
     return [
@@ -242,13 +244,13 @@ def definitions_of(
 
 def psets_of(
     element: ifcopenshell.entity_instance, damage: Damage | None = None
-) -> dict[str, dict]:
+) -> dict[str, dict[str, Any]]:
     """Properties and quantities, by the name of their set, of an element and its type.
 
     Complex properties are left out: through the numbers of a BSDF it takes a second.
     """
     damage = Damage() if damage is None else damage
-    sets: dict[str, dict] = {}
+    sets: dict[str, dict[str, Any]] = {}
     for holder in (type_of(element, damage), element):
         for definition in definitions_of(holder):
             name = getattr(definition, "Name", None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 AREA_NAMES = ("GrossFloorArea", "NetFloorArea", "GSA BIM Area", "Area", "Gross Area", "FloorArea",
               "Gemessene Nettofläche")  # fmt: skip
@@ -22,7 +23,7 @@ class QuantityScales:
 
 
 def stated_quantities(
-    psets: dict[str, dict], scales: QuantityScales
+    psets: dict[str, dict[str, Any]], scales: QuantityScales
 ) -> tuple[float | None, float | None]:
     """Stated floor area [m2] and volume [m3]; base quantities first, then other property sets."""
     return (
@@ -31,12 +32,12 @@ def stated_quantities(
     )
 
 
-def _first(psets: dict[str, dict], names: tuple[str, ...], scale: float) -> float | None:
+def _first(psets: dict[str, dict[str, Any]], names: tuple[str, ...], scale: float) -> float | None:
     values = _all(psets, names)
     return values[0] * scale if values else None
 
 
-def _all(psets: dict[str, dict], names: tuple[str, ...]) -> list[float]:
+def _all(psets: dict[str, dict[str, Any]], names: tuple[str, ...]) -> list[float]:
     """Every positive number of those names, the likeliest first."""
     order = sorted(psets, key=lambda name: (name not in BASE_SETS, name))
     values = (psets[pset].get(name) for name in names for pset in order)
@@ -48,7 +49,7 @@ def _all(psets: dict[str, dict], names: tuple[str, ...]) -> list[float]:
 
 
 def checked_volume(
-    stated: float | None, drawn: float, psets: dict[str, dict], length_scale: float
+    stated: float | None, drawn: float, psets: dict[str, dict[str, Any]], length_scale: float
 ) -> tuple[float | None, tuple[str, dict[str, float]] | None]:
     """The stated volume [m3] without the exporter's error of unit; code and values of that error.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from os import PathLike
 from pathlib import Path
 
 import ifcopenshell
@@ -88,10 +89,10 @@ class Source:
 
 
 def read_source(
-    path: str | Path,
+    path: str | PathLike[str],
     corrections: Corrections,
     tell: Progress,
-    linked: Sequence[str | Path] = (),
+    linked: Sequence[str | PathLike[str]] = (),
 ) -> Source:
     """The opened model, its shapes meshed, corrected and placed.
 

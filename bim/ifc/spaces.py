@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import ifcopenshell
 
@@ -125,7 +126,7 @@ def _type_name(space: ifcopenshell.entity_instance, damage: Damage | None) -> st
     return (kind.Name if kind is not None else space.ObjectType) or ""
 
 
-def is_outdoors(space: ifcopenshell.entity_instance, psets: dict[str, dict]) -> bool:
+def is_outdoors(space: ifcopenshell.entity_instance, psets: dict[str, dict[str, Any]]) -> bool:
     """Whether the file says that a space is external."""
     common = psets.get("Pset_SpaceCommon", {})
     kinds = (

@@ -13,6 +13,7 @@ from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, polarised_va
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.bsdf.pane_stack import PaneOptics, pane_optics, stack
+from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, spectral_glazing
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import polarised_shares
 
@@ -170,3 +171,16 @@ def check_specular(klems: KlemsBsdf, angular: AngularTable | None, path: Path) -
     if abs(means - beam) > DIFFUSE_TOLERANCE:
         message = f"passes {means:.2f} of diffuse light, the BSDF {beam:.2f}: not the same system"
         raise DataError(message, file=path, field="angular")
+
+
+def spectral_tables(panes: Sequence[SpectralPane]) -> dict[str, AngularTable]:
+    """The table of each band of panes from outside to inside, wavelength by wavelength."""
+    return {
+        band: AngularTable(
+            ANGLES,
+            np.clip(one.transmittance, 0.0, 1.0),
+            np.clip(one.reflectance_front, 0.0, 1.0),
+            np.clip(one.reflectance_back, 0.0, 1.0),
+        )
+        for band, one in spectral_glazing(panes, ANGLES).items()
+    }

@@ -143,12 +143,6 @@ def neighbours(basis: KlemsBasis) -> list[NDArray[np.int64]]:
     return result
 
 
-def matrix_beam(transmission: NDArray[np.float64], basis: KlemsBasis) -> NDArray[np.float64]:
-    """Direct transmission [K] of a matrix T [K, K], B times the projected solid angles."""
-    block = transmission / basis.projected_solid_angles()
-    return np.minimum(through_peak(block, basis).transmittance, np.diag(transmission))
-
-
 def held_beams(
     transmission: NDArray[np.float64], beams: NDArray[np.float64], basis: KlemsBasis
 ) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.klems_peak import held_beams
-from mitsuba_cfs.methods.optics import States, SystemOptics
+from mitsuba_cfs.methods.optics import States, SystemOptics, straight_transmittance
 from mitsuba_cfs.methods.phase_matrices import (
     INDOOR_DEPTH,
     OUTDOOR_DEPTH,
@@ -136,7 +136,7 @@ def direct_transmittance(matrices: PhaseMatrices, optics: SystemOptics, g: int) 
         return matrices.scene.adjacent[inner].beam
     omega = KLEMS_FULL.projected_solid_angles()
     beam = patch_beams([optics.scattering], KLEMS_FULL)[0]
-    on_diagonal = np.minimum(beam, np.diag(optics.transmission))
+    on_diagonal = straight_transmittance(optics)
     if omega @ on_diagonal < ON_DIAGONAL * (omega @ beam):
         return np.zeros_like(on_diagonal)
     return on_diagonal

@@ -19,6 +19,7 @@ from mitsuba_cfs.trace.kernels.scattering import (
     AngularBeam,
     AngularScattering,
     Scattering,
+    patch_beams,
     sun_scattering,
 )
 from mitsuba_cfs.trace.paths.scene import PathOptics, path_optics, without_peaks
@@ -234,6 +235,12 @@ def check_systems(systems: Sequence[States], scene_groups: Sequence[object]) -> 
     for number, states in enumerate(systems):
         if not isinstance(states, Sequence) or not states:
             raise ValueError(f"systems[{number}]: expected a list of states, got {states!r:.60}")
+
+
+def straight_transmittance(optics: SystemOptics) -> NDArray[np.float64]:
+    """The part of T's diagonal that goes straight on [K]."""
+    beam = patch_beams([optics.scattering], KLEMS_FULL)[0]
+    return np.minimum(beam, np.diag(optics.transmission))
 
 
 def hourly_states(

@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.klems_peak import matrix_beam
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods import METRICS, UnknownMethodError
-from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene, Sampling
 from mitsuba_cfs.methods.subdivision import CellLight, Parts, allowed, subdivided
 from mitsuba_cfs.methods.view_cache import cached_view, view_is_cached
 from mitsuba_cfs.progress import Progress, part, silent
@@ -291,16 +290,14 @@ def view_of_light(matrices: PhaseMatrices, light: PatchLight) -> ViewMatrices:
     return _view(matrices, INDOOR_DEPTH, light)
 
 
-def adjacent_room(
-    matrices: PhaseMatrices, transmission: Sequence[NDArray[np.float64]]
-) -> AdjacentRoomLight:
-    """The room of the matrices with T of its groups [G][K, K], as an adjacent room sees it."""
+def adjacent_room(matrices: PhaseMatrices, room: AdjacentRoom) -> AdjacentRoomLight:
+    """The room of the matrices as an adjacent room sees it."""
     daylight, of_group = matrices.daylight.values, matrices.parts.group
     pairs = zip(of_group, daylight, strict=True)
-    through = np.stack([transmission[n] @ d for n, d in pairs])
+    through = np.stack([room.transmission[n] @ d for n, d in pairs])
     beam = np.zeros((len(of_group), KLEMS_FULL.size))
     for q, n in enumerate(of_group[: matrices.outdoor_parts]):
-        beam[q] = matrix_beam(transmission[n], KLEMS_FULL)
+        beam[q] = room.straight[n]
     scene = matrices.scene
     return AdjacentRoomLight(
         scene.interior, matrices.parts.groups, through, scene.exterior, beam, daylight,
@@ -441,7 +438,7 @@ def _adjacent_rooms(
                 cache=cache,
                 scenes=scenes,
             )
-            rooms[id(room.scene)] = adjacent_room(matrices, room.transmission)
+            rooms[id(room.scene)] = adjacent_room(matrices, room)
     return tuple(rooms[id(room.scene)] for room in scene.adjacent)
 
 

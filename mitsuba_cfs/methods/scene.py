@@ -23,6 +23,7 @@ class AdjacentRoom:
 
     scene: DaylightScene  # its interior without the glass that is looked through
     transmission: tuple[NDArray[np.float64], ...]  # [G][K, K] T of its window groups
+    straight: tuple[NDArray[np.float64], ...]  # [G][K] what T's diagonal has of their beam
     beam: NDArray[np.float64]  # [K] direct transmittance of the group that looks into it
 
 

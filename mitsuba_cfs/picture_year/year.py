@@ -13,6 +13,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,13 +54,13 @@ class Patterns:
         """Number of patterns."""
         return len(self.pattern)
 
-    def amounts(self, values: NDArray[np.floating]) -> tuple[NDArray, NDArray]:
+    def amounts(self, values: NDArray[np.floating]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Scale [h] and amounts [h, r] of hours of values [h, n]."""
         scale = mean_of(values, self.weight)
         relative = values / scale[:, None] / self.typical * np.sqrt(self.weight)
         return scale, (relative @ self.axes.T) / self.spread
 
-    def values(self, scale: NDArray, amounts: NDArray) -> NDArray[np.float32]:
+    def values(self, scale: NDArray[Any], amounts: NDArray[Any]) -> NDArray[np.float32]:
         """Values of hours [h, n], reconstructed and non-negative."""
         relative = amounts.astype(np.float32) @ (self.pattern.astype(np.float32) * self.step)
         return np.maximum(relative, 0.0) * self.typical * scale[:, None].astype(np.float32)
@@ -277,12 +278,12 @@ class _Work:
         self.codes: list[bytes] = [b""] * H
         self.discs: list[tuple[SunDisc, ...]] = [()] * H
 
-    def _sampled(self, hours: NDArray[np.int64]) -> tuple[NDArray, NDArray]:
+    def _sampled(self, hours: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[Any]]:
         parts = [self._pictures.by_rows(hours[i : i + 50]) for i in range(0, len(hours), 50)]
         rows, own = zip(*parts, strict=True)
         return np.concatenate(rows), np.concatenate(own)
 
-    def add(self, batch: NDArray[np.int64], rows: NDArray, own: NDArray) -> None:
+    def add(self, batch: NDArray[np.int64], rows: NDArray[Any], own: NDArray[Any]) -> None:
         """Add a batch of hours: luminance of rows [h, m] and of pixels [h, n]."""
         shown = own[:, self.window]
         known = self._fitted(0, batch, rows), self._fitted(1, batch, shown)
@@ -296,7 +297,7 @@ class _Work:
         for hour, discs in zip(batch.tolist(), self._pictures.discs(batch), strict=True):
             self.discs[hour] = discs
 
-    def _fitted(self, which: int, batch: NDArray[np.int64], values: NDArray) -> NDArray:
+    def _fitted(self, which: int, batch: NDArray[np.int64], values: NDArray[Any]) -> NDArray[Any]:
         """The hours [h, ..] by the patterns, with the original illuminance at the eye."""
         patterns, weight = self.patterns[which], self._weights[which]
         scale, amounts = patterns.amounts(values)
@@ -307,7 +308,7 @@ class _Work:
         self._amounts[which][batch] = amounts
         return known * factor[:, None]
 
-    def dgp(self, values: NDArray, discs: tuple[SunDisc, ...]) -> float:
+    def dgp(self, values: NDArray[Any], discs: tuple[SunDisc, ...]) -> float:
         """DGP of pixels' luminance [n], and of the sun's disc and its images."""
         picture = full_picture(values, self._pictures.pixels, self._pictures.view)
         return evaluate(picture, self._geometry, discs=discs).dgp

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from scenes.calibration.costs import Calibration, Workload
 from scenes.calibration.durations import spoken_time
@@ -75,7 +76,7 @@ def choose(demand: Demand, calibration: Calibration) -> MethodChoice:
     return _choice(taken, seconds, demand, words)
 
 
-def _choice(pair, seconds: dict, demand: Demand, words: str) -> MethodChoice:
+def _choice(pair, seconds: dict[str, Any], demand: Demand, words: str) -> MethodChoice:
     method, metric = pair
     time, error = seconds[pair], demand.errors[pair]
     why = (

@@ -7,6 +7,7 @@ import os
 import platform
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import json_text, write_text
@@ -78,7 +79,7 @@ class Calibration:
         write_text(path, json_text(table, indent=2) + "\n")
 
     @classmethod
-    def of(cls, table: dict) -> Calibration:
+    def of(cls, table: dict[str, Any]) -> Calibration:
         """The calibration that `dataclasses.asdict` made a table of."""
         costs = tuple(Cost(**record) for record in table["costs"])
         return cls(**table | {"costs": costs})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -110,7 +110,7 @@ def _one(
     request: Request,
     *,
     several: bool,
-) -> dict | None:
+) -> dict[str, Any] | None:
     """Rate one picture and print it; its row of the table."""
     from mitsuba_cfs.glare import report
     from mitsuba_cfs.glare.classes import glare_class
@@ -299,7 +299,7 @@ def _write_png(folder: Path, name: str, picture: Picture, result: GlareResult, l
     drawn.write_check_picture(folder / f"{name}_sources.png", result, title=title)
 
 
-def _write_table(path: Path, rows: list[dict]) -> None:
+def _write_table(path: Path, rows: list[dict[str, Any]]) -> None:
     import pandas as pd
 
     write_table(pd.DataFrame(rows), path, index=False, float_format="%.6g")

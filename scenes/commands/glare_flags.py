@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -57,8 +57,8 @@ VIEW_FLAGS = "-vta, -vth, -vtv, -vh DEGREES, -vv DEGREES, -vp, -vd, -vu X Y Z, -
 class Request:
     """What a command line asks for."""
 
-    stated: dict[str, tuple] = field(default_factory=dict)  # flag: values
-    view: dict = field(default_factory=dict)  # fields of `View`
+    stated: dict[str, tuple[Any, ...]] = field(default_factory=dict)  # flag: values
+    view: dict[str, Any] = field(default_factory=dict[str, Any])  # fields of `View`
     paths: list[Path] = field(default_factory=list)
 
     def value(self, flag: str):
@@ -93,7 +93,9 @@ def parse(words: tuple[str, ...]) -> Request:
     return request
 
 
-def _values(flag: str, types: tuple[type, ...], names: str, words: tuple[str, ...]) -> tuple:
+def _values(
+    flag: str, types: tuple[type, ...], names: str, words: tuple[str, ...]
+) -> tuple[Any, ...]:
     if len(words) < len(types):
         raise click.UsageError(f"{flag} needs {names}")
     try:

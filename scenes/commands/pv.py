@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -89,7 +89,7 @@ def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
     click.echo(f"results: {out}")
 
 
-def _write(result, record: dict, results: ResultFolder) -> None:
+def _write(result, record: dict[str, Any], results: ResultFolder) -> None:
     """Tables, hourly power, pictures."""
     import pandas as pd
 

@@ -10,7 +10,7 @@ import tomllib
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -411,7 +411,7 @@ def room_options(command: Callable) -> Callable:
     )(command)  # fmt: skip
 
 
-def taken(options: type, chosen: dict) -> dict[str, object]:
+def taken(options: type, chosen: dict[str, Any]) -> dict[str, object]:
     """The parameters of a command that are fields of its options; they leave `chosen`."""
     names = [field.name for field in fields(options) if field.name in chosen]
     return {name: chosen.pop(name) for name in names}
@@ -507,7 +507,7 @@ def view_option(name: str, what: str, *, several: bool) -> Option:
     )
 
 
-def with_demo(chosen: dict) -> dict:
+def with_demo(chosen: dict[str, Any]) -> dict[str, Any]:
     """The parameters with the demo's building, weather and system where there is no building."""
     names = ("building", "weather", "system")
     building, weather, system = (chosen[name] for name in names)
@@ -530,7 +530,7 @@ class PrintedHead:
     def __init__(self) -> None:
         """Nothing is printed yet."""
         self._lines: dict[str, None] = {}
-        self.record: dict[str, list] = {}  # of the head
+        self.record: dict[str, list[Any]] = {}  # of the head
 
     def __call__(self, head: Head) -> None:
         """Print the lines of a head that were not printed yet."""

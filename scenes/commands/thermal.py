@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -106,7 +106,7 @@ def _twin_taken(study: StudyFile, twins: list[EnergyPlusTwin]) -> Callable[[Bala
 
 def _write(
     rooms: Sequence[ThermalYear],
-    record: dict,
+    record: dict[str, Any],
     results: ResultFolder,
     *,
     figures: bool,

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,7 +119,7 @@ def _measure(
     return Cost(method, metric, per_scene, per_system, per_step)
 
 
-def _timed(work: Callable, clock: Callable[[], float]) -> tuple:
+def _timed(work: Callable, clock: Callable[[], float]) -> tuple[Any, ...]:
     start = clock()
     result = work()
     return result, clock() - start

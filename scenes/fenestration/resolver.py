@@ -18,6 +18,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +80,7 @@ def usual_first(states: Iterable[ShadingState]) -> list[ShadingState]:
     return sorted(states, key=lambda state: state.name != "")
 
 
-def _content(state: ShadingState) -> list:
+def _content(state: ShadingState) -> list[Any]:
     bands = [[name, bsdf] for name, bsdf in sorted(state.bands.items())]
     thermal = [state.g_value, state.u_value, state.g_normal, state.g_by_patch]
     beside = None if state.file is None else str(state.file)
@@ -109,7 +110,7 @@ def _source(states: Iterable[ShadingState], path: Path) -> str:
     return f"what is attached to {' and '.join(holders)} in {path.name}"
 
 
-def held_thermal(state: ShadingState) -> dict:
+def held_thermal(state: ShadingState) -> dict[str, Any]:
     """U, g, closure and place of the shade: of the model, else of the file beside the BSDF's."""
     beside = ThermalFile()
     if state.file is not None:
@@ -261,9 +262,11 @@ def _changed(system: FenestrationSystem, overrides: WindowOverrides) -> Fenestra
     return replace(system, source=source)
 
 
-def window_sources(windows: Iterable[Window], systems: Mapping[str, States]) -> list[dict]:
+def window_sources(
+    windows: Iterable[Window], systems: Mapping[str, States]
+) -> list[dict[str, Any]]:
     """Each system once: its name, its source, and the windows that it fills."""
-    result: dict[int, dict] = {}
+    result: dict[int, dict[str, Any]] = {}
     for window in windows:
         for system in systems[window.guid]:
             about = {"system": system.name, "source": system.source, "windows": []}
@@ -272,7 +275,7 @@ def window_sources(windows: Iterable[Window], systems: Mapping[str, States]) -> 
     return list(result.values())
 
 
-def source_notes(sources: Iterable[dict]) -> tuple[str, ...]:
+def source_notes(sources: Iterable[dict[str, Any]]) -> tuple[str, ...]:
     """A sentence for each system on what it fills and where it is from."""
     return tuple(
         Note(

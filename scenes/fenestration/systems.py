@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.angular import (
-    ANGLES,
     AngularTable,
     check_specular,
+    spectral_tables,
     specular_matrices,
     stack_table,
 )
@@ -204,7 +204,7 @@ def system_of_panes(layers: Sequence[GlazingLayerTable]) -> FenestrationSystem:
     name = "panes " + ", ".join(_named(layer) for layer in layers)
     panes = spectral_panes(layers)
     if panes:
-        notes, tables = [], _by_wavelength(panes)
+        notes, tables = [], spectral_tables(panes)
     else:
         notes = [
             Note(
@@ -221,20 +221,6 @@ def system_of_panes(layers: Sequence[GlazingLayerTable]) -> FenestrationSystem:
         name, visible, solar, shading_position="none", notes=tuple(notes),
         angular=tables["Visible"], panes=panes,
     )  # fmt: skip
-
-
-def _by_wavelength(panes: Sequence[SpectralPane]) -> dict[str, AngularTable]:
-    result = spectral_glazing(panes, ANGLES)
-    return {
-        band: AngularTable(
-            ANGLES,
-            *(
-                np.clip(values, 0.0, 1.0)
-                for values in (one.transmittance, one.reflectance_front, one.reflectance_back)
-            ),
-        )
-        for band, one in result.items()
-    }
 
 
 def _pane(layer: GlazingLayerTable, band: str) -> Pane:

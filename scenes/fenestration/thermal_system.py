@@ -111,11 +111,13 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
         inward=fenestration.inward_shares(), room_air=window.to_air(),
     )  # fmt: skip
     model = closure.described(window.position, g_by_direction=by_patch)
+    layers = None if by_patch or system.from_values else window.typical
+    optics = (tau, rho, incidence)
+    likely = layers and likely_diffuse_g(window, optics, weight, sun_in_layers, system.name)
     notes = [*map(_note, data.assumptions), *_position_note(system, window, scatters)]
-    if window.typical is not None and not by_patch and not system.from_values:
-        likely = likely_diffuse_g(window, (tau, rho, incidence), weight, sun_in_layers, system.name)
+    if layers is not None and likely is not None:
         used = float(weight @ data.g_value)
-        notes.append(_typical_note(system.name, window.typical, used, likely))
+        notes.append(_typical_note(system.name, layers, used, likely))
     return ThermalSystem(
         fenestration, absorptances, tau, rho, g_value,
         back_rho, max(1.0 - back_rho - back_tau, 0.0), tuple(notes), _note(model),

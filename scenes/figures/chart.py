@@ -7,6 +7,7 @@ type stays readable from a phone to a print.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,7 +50,7 @@ class Chart:
     scale: ColourScale | None = None
     classes: tuple[tuple[str, str], ...] = ()  # colour and name: legend of a picture of classes
     readout: Readout | None = None
-    carpet: dict | None = None  # what the pointer shows on a carpet plot
+    carpet: dict[str, Any] | None = None  # what the pointer shows on a carpet plot
     height: int = 240  # [px] of the box
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +41,7 @@ def bytes_uri(content: bytes, kind: str) -> str:
     return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 
-def reduced(values: NDArray, factor: int) -> NDArray:
+def reduced(values: NDArray[Any], factor: int) -> NDArray[Any]:
     """Means over blocks of `factor` x `factor` pixels of [ny, nx, ...]; a ragged edge is cut."""
     if factor <= 1:
         return values

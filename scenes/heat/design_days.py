@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -59,7 +59,7 @@ def design_loads(
          "peak_hour": float("nan")}
         for r in results
     ]  # fmt: skip
-    best: dict[str, dict] = {}
+    best: dict[str, dict[str, Any]] = {}
     for day in _hot_days(rooms, weather, day_rows):
         chosen = day_rows * day + first
         suns = [of_hours(per_window(r.solar, r.zone), chosen, hours) for r in rooms]

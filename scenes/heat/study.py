@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -165,7 +166,7 @@ def _balanced(
     step_s = study.options.heat_step_s
     notes: tuple[str, ...] = ()
     progress("heat balance", 0.0)
-    groups: list[tuple[Sequence[RoomZone], dict]] = [([room], {}) for room in rooms]
+    groups: list[tuple[Sequence[RoomZone], dict[str, Any]]] = [([room], {}) for room in rooms]
     if study.couple:
         rooms, links, notes = coupled(rooms, study.air.door_m3_s)
         transfers = _transfers(study, building, rooms, weather)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -127,7 +129,7 @@ def hourly_table(
     return pd.DataFrame(table, index=weather.midpoints).rename_axis("time")
 
 
-def _in_hours(counts: NDArray[np.int64], weather: Weather) -> NDArray:
+def _in_hours(counts: NDArray[np.int64], weather: Weather) -> NDArray[Any]:
     """Counts of time steps as hours; whole ones stay whole."""
     return counts if weather.step_h == 1.0 else counts * weather.step_h
 

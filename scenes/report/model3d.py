@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,14 +53,14 @@ class Model3D:
     centre: tuple[float, float, float]  # [m]
     whole: tuple[tuple[float, ...], ...]  # lowest and highest corner of the building from there [m]
     unit: float  # metres per integer step
-    batches: tuple[dict, ...]  # room index (-1 outdoors), storey, kind, triangles, edges
-    sensors: dict  # room and storey of each, corners
+    batches: tuple[dict[str, Any], ...]  # room index (-1 outdoors), storey, kind, triangles, edges
+    sensors: dict[str, Any]  # room and storey of each, corners
     layers: tuple[ColourLayer, ...]
     rooms: tuple[str, ...]
     storeys: tuple[str, ...]  # names, the lowest first
     left_out: int
 
-    def json(self) -> dict:
+    def json(self) -> dict[str, Any]:
         """The parts that go into the page as JSON."""
         return {
             "unit": self.unit,
@@ -171,7 +172,7 @@ def storey_levels(
 
 def room_batches(space: Space):
     """Kind, triangles and outlines of a room's surfaces, grouped by kind."""
-    groups: dict[str, list] = {}
+    groups: dict[str, list[Any]] = {}
     for face in space.faces:
         groups.setdefault(KIND_OF_FACE[face.kind], []).append(face.triangles)
     for window in space.windows:
@@ -227,7 +228,7 @@ def layers(result: RunResult) -> tuple[ColourLayer, ...]:
     return (*found, _layer("annual_mean", np.concatenate(mean)))
 
 
-def _layer(key: str, values: NDArray) -> ColourLayer:
+def _layer(key: str, values: NDArray[Any]) -> ColourLayer:
     q = quantity(key)
     whole = q.unit == "%" and q.digits == 0
     high = 100.0 if whole else top_of_scale(values)
@@ -235,10 +236,10 @@ def _layer(key: str, values: NDArray) -> ColourLayer:
     return ColourLayer(key, scale, colour_bytes(scale, values), q.digits)
 
 
-def colour_bytes(scale: ColourScale, values: NDArray) -> str:
+def colour_bytes(scale: ColourScale, values: NDArray[Any]) -> str:
     """The colours of values [S] as the viewer takes them."""
     return _base64(scale.rgba(values)[:, :3])
 
 
-def _base64(array: NDArray) -> str:
+def _base64(array: NDArray[Any]) -> str:
     return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

@@ -6,6 +6,7 @@ import re
 import tomllib
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Any
 
 from scenes.language.catalogue import N_, gettext, ngettext
 from scenes.language.numbers import colon
@@ -30,7 +31,7 @@ class Quantity:
     values: tuple[str, ...] = ()  # names of the values 0, 1, 2, ... where they are classes
 
 
-def _words() -> dict:
+def _words() -> dict[str, Any]:
     """The package's table of quantities and the glossary."""
     return tomllib.loads((files("scenes.report") / "words.toml").read_text("utf-8"))
 

@@ -7,6 +7,7 @@ import re
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import jinja2
 from markupsafe import Markup, escape
@@ -81,7 +82,7 @@ def _filled(result: RunResult, page: PageOptions) -> str:
     )  # fmt: skip
 
 
-def storey_data(metrics: Sequence[RoomMetric], rooms: int) -> list[dict]:
+def storey_data(metrics: Sequence[RoomMetric], rooms: int) -> list[dict[str, Any]]:
     """Words and colours of every room, for the plans of the storeys."""
     return [
         {
@@ -271,7 +272,7 @@ def timings_table(result: RunResult) -> tables.Table:
     return tables.Table(gettext("Computing time"), columns, tuple(rows))
 
 
-def remaining(manifest: Mapping) -> dict:
+def remaining(manifest: Mapping) -> dict[str, Any]:
     """What the manifest holds besides the parts shown in tables of their own."""
     shown = (
         "quick",

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import COLOURS, Building, Space
 from bim.seasons import in_month
-from bim.to_tracer import exterior_surfaces, furnished_surfaces
+from bim.to_tracer import band_scenes
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.glare.evaluation import GlareOptions
-from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import CacheEntry, digest
 from mitsuba_cfs.methods.colour_view import coloured_picture, has_colour
 from mitsuba_cfs.methods.glare import hourly_glare, rated_pictures
@@ -24,7 +23,6 @@ from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
-from mitsuba_cfs.surfaces import WindowGroup
 from scenes.results import ColourPicture, GlareResults, LuminancePicture
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight, picture_light
@@ -99,7 +97,7 @@ def worst_hours(year: pd.DataFrame, count: int) -> list[int]:
 
 def cached_glare(
     light: PhaseLight, windows: RoomWindows, *inputs: object
-) -> Callable[[NDArray], CacheEntry] | None:
+) -> Callable[[NDArray[Any]], CacheEntry] | None:
     """Cache entry of a year of glare with each window group in a state [G]; None: no cache.
 
     Cases of a study with the blind up and with the blind down rate every hour; the case whose blind
@@ -116,7 +114,7 @@ def cached_glare(
         sky.whole, sky.sun, sky.direction, sky.illuminance, *inputs,
     )  # fmt: skip
 
-    def entry(state: NDArray) -> CacheEntry:
+    def entry(state: NDArray[Any]) -> CacheEntry:
         rows = zip(windows.systems, state.tolist(), strict=True)
         chosen = [systems[min(j, len(systems) - 1)] for systems, j in rows]
         optics = [[one.visible, one.fine, one.angular] for one in chosen]
@@ -200,25 +198,6 @@ def glare_table(result: GlareResults, times: pd.DatetimeIndex) -> pd.DataFrame:
     """One row for each picture: its time and glare."""
     rows = [{"time": times[p.hour], **p.glare} for p in result.pictures]
     return pd.DataFrame(rows).set_index("time")
-
-
-def band_scenes(
-    building: Building,
-    space: Space,
-    groups: Sequence[WindowGroup],
-    view: View,
-    bands: Sequence[str] = COLOURS,
-) -> tuple[DaylightScene, ...]:
-    """The scene of a room with a view in each band."""
-    return tuple(
-        DaylightScene(
-            furnished_surfaces(space, band),
-            exterior_surfaces(building, space, band),
-            groups,
-            view=view,
-        )
-        for band in bands
-    )
 
 
 def brightest_picture(glare: GlareResults) -> LuminancePicture:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,12 @@ from bim.to_tracer import (
 )
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.light import SeasonalLight, group_shares
-from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics, SystemOptics
+from mitsuba_cfs.methods.optics import (
+    BsdfOptics,
+    MatrixOptics,
+    SystemOptics,
+    straight_transmittance,
+)
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene
 from mitsuba_cfs.notes import Note
@@ -87,13 +93,18 @@ def _inner_glass(
     for other in light_sources(building, space, away, below):
         pairs = panes_between(building, space)[other.guid]
         onward = _inner_glass(building, other, systems, away, away[other.guid])
-        scene, transmission = _room_beyond(building, other, pairs, systems, onward)
+        scene, through = _room_beyond(building, other, pairs, systems, onward)
         used += [face for face, _ in pairs]
         for optics, group in _groups(space, [face for face, _ in pairs]):
             matrix_optics = MatrixOptics(optics.transmission, dark, reflection=optics.reflection)
             beam = np.diag(optics.transmission)
             named = replace(group, name=f"{group.name}, to {other.label}")
-            beyond = AdjacentRoom(scene, transmission, beam)
+            beyond = AdjacentRoom(
+                scene,
+                tuple(one.transmission for one in through),
+                tuple(map(straight_transmittance, through)),
+                beam,
+            )
             panes.append((named, (matrix_optics,), beyond, other.label))
     if not panes:
         return None
@@ -126,7 +137,7 @@ def borrowed_share(
 
 def _groups(space: Space, faces: Sequence[Face]) -> list[tuple[SystemOptics, WindowGroup]]:
     """Panes of a room in groups of one orientation and one transmittance, with their optics."""
-    by_tau: dict[float | None, list] = {}
+    by_tau: dict[float | None, list[Any]] = {}
     for face in faces:
         tau = None if face.pane.is_open else face.pane.visible_transmittance or CLEAR
         by_tau.setdefault(tau, []).append(face.pane)
@@ -147,8 +158,8 @@ def _room_beyond(
     pairs: Sequence[tuple[Face, Face]],
     systems: Mapping[str, States],
     onward: InnerGlass | None,
-) -> tuple[DaylightScene, tuple[NDArray[np.float64], ...]]:
-    """The scene of a room beyond panes, and T of all glass that lights it."""
+) -> tuple[DaylightScene, list[SystemOptics]]:
+    """The scene of a room beyond panes, and the optics of all glass that lights it."""
     open_ = {back.name for _, back in pairs} | (set() if onward is None else onward.faces)
     opaque = [face for face in room.faces if face.name not in open_]
     glass = [
@@ -174,7 +185,7 @@ def _room_beyond(
         adjacent=() if onward is None else onward.beyond,
     )
     optics = [*windows.optics(), *(() if onward is None else onward.optics)]
-    return scene, tuple(states[0].transmission for states in optics)
+    return scene, [states[0] for states in optics]
 
 
 def _piece(face: Face, name: str, triangles: NDArray[np.float64], reflectance: float) -> Element:

@@ -48,13 +48,14 @@ def leak_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None)
         points, _ = sensor_grid(space, spacing=SPACING, height=WORK_PLANE, margin=SPACING / 2)
     except RoomError:  # too low for a work plane: from the eye alone
         points = np.empty((0, 3))
+    eye = view_point(space)
     scene = DaylightScene(
         furnished_surfaces(space, "visible"),
         Surfaces.none(),
         window_groups(space),
         points,
         np.tile([0.0, 0.0, 1.0], (len(points), 1)),
-        fisheye(*view_point(space), EYE_PIXELS),
+        fisheye(*eye, EYE_PIXELS),
     )
     issues = leak_issues(space, scene, seed=seed, cache=cache)
     return [issue_note(issue, "python") for issue in issues]

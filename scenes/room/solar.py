@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -227,7 +228,7 @@ def facade_irradiance(
     return facade
 
 
-def _sampled(scene: PhaseMatrices) -> dict:
+def _sampled(scene: PhaseMatrices) -> dict[str, Any]:
     """Sampling of the matrices that are traced for the heat balance alone."""
     return {
         "samples": max(scene.sampling.patch_samples // BATCHES, 1),
@@ -285,7 +286,7 @@ def _gains_in_states(
     taken, outer, inner, air, whole = (rows.T for rows in sums)
     retained = np.array([h.back_absorptance / max(1.0 - h.back_reflectance, 1e-9) for h in heats])
 
-    def year(values: NDArray) -> NDArray:
+    def year(values: NDArray[Any]) -> NDArray[Any]:
         return skies.whole_year(np.ascontiguousarray(values.T)).T
 
     solar = Solar(

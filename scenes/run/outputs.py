@@ -10,6 +10,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -217,7 +218,7 @@ def csv_text(table: pd.DataFrame, *, index: bool = True) -> str:
     return head.getvalue() + (row * len(table)) % tuple(entries)  # all at once, in C
 
 
-def _entries(values: pd.Series) -> tuple[str, list]:
+def _entries(values: pd.Series) -> tuple[str, list[Any]]:
     """A column's entries, and how each is written."""
     if values.dtype == bool:
         return "%s", values.tolist()

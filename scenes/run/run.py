@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from functools import lru_cache, partial
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 from bim.doorways import source_rooms
 from bim.model import Space
@@ -342,7 +343,7 @@ def _manifest(
     variant: str,
     inputs: Inputs,
     results: Sequence[RoomYear],
-) -> dict:
+) -> dict[str, Any]:
     """Inputs, options, versions and seed: the data to reproduce the results."""
     packages = ("mitsuba-cfs", "mitsuba", "drjit", "numpy", "ifcopenshell", "pvlib")
     return {

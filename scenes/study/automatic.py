@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -94,8 +95,8 @@ def work_of(cases: list[Case]) -> Workload:
 
 def case_traits(cases: list[Case], plan: StudyPlan) -> list[Traits]:
     """What a method's error goes by, of each system in each room under each climate."""
-    rooms: dict[tuple, tuple[float, float]] = {}
-    systems: dict[tuple, list[tuple[float, float, float, float]]] = {}
+    rooms: dict[tuple[Any, ...], tuple[float, float]] = {}
+    systems: dict[tuple[Any, ...], list[tuple[float, float, float, float]]] = {}
     result: dict[Traits, None] = {}
     for case in cases:
         building, space = plan.rooms[case.scene]

@@ -7,7 +7,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 import pandas as pd
@@ -71,7 +71,7 @@ def case_inputs(
 
 def plan_head(plan: StudyPlan) -> Head:
     """What was left out of the buildings of a study, and what is assumed in its cases."""
-    rooms: dict[tuple, tuple[Case, Building, list[str]]] = {}
+    rooms: dict[tuple[Any, ...], tuple[Case, Building, list[str]]] = {}
     for case in plan.cases:
         building, space = plan.rooms[case.scene]
         key = (id(building), replace(case.inputs, spaces=()))
@@ -221,7 +221,7 @@ def rating_figures(rated: AnnualGlare) -> dict[str, float | str]:
     return result
 
 
-def room_figures(room: RoomYear) -> tuple[dict[str, float | str], dict[str, NDArray]]:
+def room_figures(room: RoomYear) -> tuple[dict[str, float | str], dict[str, NDArray[Any]]]:
     """Daylight, temperatures and comfort as figures of the table and arrays of the report."""
     daylight, heat = room.daylight, room.heat
     figures: dict[str, float | str] = {k: float(v) for k, v in daylight.room_metrics.items()}
@@ -235,7 +235,7 @@ def room_figures(room: RoomYear) -> tuple[dict[str, float | str], dict[str, NDAr
         figures |= {k: float(v) for k, v in room.operation.summary.items()}
     figures |= {f"{stage}_s": seconds for stage, seconds in room.seconds.items()}
     times = heat.temperatures.index.to_numpy().astype("datetime64[s]")
-    arrays: dict[str, NDArray] = {
+    arrays: dict[str, NDArray[Any]] = {
         "times": times.astype(np.int64),
         "points": daylight.points,
         "relative_error": daylight.relative_error,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bim.building_file import held_states
 from bim.model import Building, Space
@@ -90,7 +90,7 @@ class Case:
         return digest(files, box, _plain(self.inputs.named(), OF_ROOM))[:32]
 
 
-def _plain(table: dict, names: Iterable[str] | None = None) -> list:
+def _plain(table: dict[str, Any], names: Iterable[str] | None = None) -> list[Any]:
     names = sorted(table) if names is None else names
     values = ((name, table[name]) for name in names)
     return [[name, list(v) if isinstance(v, tuple) else v] for name, v in values]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ class CaseResult:
 
     key: str
     figures: dict[str, float | str] = field(default_factory=dict)
-    arrays: dict[str, NDArray] = field(default_factory=dict)
+    arrays: dict[str, NDArray[Any]] = field(default_factory=dict)
     error: str = ""  # one line; then there is nothing else
 
     def to_bytes(self) -> bytes:
@@ -81,8 +81,8 @@ class Store:
 
     def write(
         self,
-        rows: Iterable[dict],
-        manifest: dict,
+        rows: Iterable[dict[str, Any]],
+        manifest: dict[str, Any],
         report: Callable[[Path], object] | None = None,
         explorer: Callable[[Path], object] | None = None,
     ) -> None:

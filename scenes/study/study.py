@@ -8,6 +8,7 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -77,7 +78,7 @@ class StudyResult:
         """The table, for notebooks."""
         return self.table._repr_html_()
 
-    def rows(self) -> list[dict]:
+    def rows(self) -> list[dict[str, Any]]:
         """One row per case: its inputs, its status and every result."""
         columns = dict.fromkeys(name for r in self.results for name in r.figures)
         rows = []
@@ -196,7 +197,7 @@ def write_study(
     store.write(result.rows(), manifest(study, result), report, explorer)
 
 
-def described(case: Case, space: Space) -> dict:
+def described(case: Case, space: Space) -> dict[str, Any]:
     """What a case is, in the columns that come first."""
     return {
         "room": case.room,
@@ -231,7 +232,7 @@ def _status(result: CaseResult) -> str:
     return "failed" if result.error else "done"
 
 
-def manifest(study: Study, result: StudyResult) -> dict:
+def manifest(study: Study, result: StudyResult) -> dict[str, Any]:
     """What makes the same table again: the study, and the hashes of its files."""
     plan = result.plan
     files = {str(file.path): file.sha256 for case in plan.cases for file in case.files}

@@ -227,7 +227,7 @@ def read_study(
     return _with_places(study, path)
 
 
-def _name_entries(table: dict) -> None:
+def _name_entries(table: dict[str, Any]) -> None:
     """Give rooms, systems and climates without a name that of their file."""
     for key, file in (("room", "building"), ("system", "bsdf"), ("climate", "weather")):
         entries = table.get(key)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from bim.ifc.results_write import SET_NAME, write_results
 from bim.model import Space
@@ -53,7 +54,7 @@ def _by_variant(
     return found
 
 
-def _values(space: Space, case: Case, result: CaseResult) -> dict[str, dict]:
+def _values(space: Space, case: Case, result: CaseResult) -> dict[str, dict[str, Any]]:
     """Every figure on the space, the fenestration's on the windows."""
     figures = {k: v for k, v in result.figures.items() if v is not None}
     about = {"system": case.system, "method": case.options.method, "glare_metric": case.glare}

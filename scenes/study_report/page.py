@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -212,7 +213,7 @@ def _moved_room(room: RoomYear, offset: np.ndarray) -> RoomYear:
 
 def _layers(study: StudyResult, scenes: list[str]) -> tuple[ColourLayer, ...]:
     """A colouring for each case but its room, with the values of every room that has that case."""
-    groups: dict[tuple, dict[str, tuple[Case, CaseResult]]] = {}
+    groups: dict[tuple[Any, ...], dict[str, tuple[Case, CaseResult]]] = {}
     for case, result in zip(study.plan.cases, study.results, strict=True):
         if not result.error:
             key = (case.system, case.climate, case.orientation_deg, case.options.method)

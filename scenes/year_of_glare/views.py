@@ -5,7 +5,7 @@ from __future__ import annotations
 from bim.model import Building, Space
 from mitsuba_cfs.errors import DataError
 from scenes import input_files
-from scenes.input_files import InputFiles, check_building
+from scenes.input_files import InputFiles
 from scenes.room_views import NamedView, check_eye, eyes_of, held_fisheyes, parsed_views
 from scenes.year_of_glare.options import YearOptions
 
@@ -39,7 +39,6 @@ def read_files(options: YearOptions) -> InputFiles:
 
     Raises: `DataError` for what cannot be used.
     """
-    check_building(options)
     rated_views(options)
     return input_files.read_files(options, light_only=True)
 

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -75,7 +76,9 @@ class GlareYear:
     digest: str  # of all inputs
     head: Head = NO_HEAD  # what was left out, what was assumed
     notes: tuple[str, ...] = ()  # light that is lost through leaks of the model
-    fenestration: Sequence[dict] = ()  # system, source and windows of each, see `resolver`
+    fenestration: Sequence[
+        dict[str, Any]
+    ] = ()  # system, source and windows of each, see `resolver`
     space: Space | None = None  # the room, for its plan
     scenes: Sequence[DaylightScene] = ()  # of each season; none where it is always the same
     season: NDArray[np.int64] | None = None  # [L] of each hour of the sky

@@ -11,8 +11,10 @@ from click.testing import CliRunner
 from bim import read_ifc
 from bim.doorways import opened, source_rooms
 from bim.model import Building
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.klems_peak import through_peak
 from scenes.demo import VENETIAN_BLIND, WEATHER
-from scenes.fenestration.systems import read_system
+from scenes.fenestration.systems import read_system, with_see_through
 from scenes.room.inner_glass import CLEAR, inner_glass
 from scenes.room.windows import in_all_windows, room_windows
 from tests.bim import test_passages as passages
@@ -101,6 +103,18 @@ def test_the_dark_room_looks_into_the_lit_one_through_a_closed_reveal(building: 
     total = room.scene.interior.areas.sum()
     faces = sum(face.area for face in lit.faces)
     assert total == pytest.approx(faces + reveal, rel=1e-3)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5, 0.0])
+def test_a_peak_that_the_user_calls_a_lobe_is_no_beam_of_the_lit_room(building, share) -> None:
+    """The sky beyond two panes was seen through any peak."""
+    blind = read_system(VENETIAN_BLIND)
+    lit = building.space("lit")
+    systems = in_all_windows(lit, with_see_through(blind, share))
+    (beyond,) = inner_glass(building, building.space("dark"), systems).beyond
+    peak = through_peak(blind.visible.transmission_front, KLEMS_FULL).transmittance
+    assert peak.max() > 0.1
+    np.testing.assert_allclose(beyond.straight[0], share * peak, atol=1e-6)
 
 
 def test_light_goes_through_a_dark_room_to_the_one_behind_it(three_rooms: Building) -> None:

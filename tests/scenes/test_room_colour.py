@@ -12,12 +12,13 @@ from bim.colours import hue_of
 from bim.model import Space
 from bim.names import folder_names
 from bim.templates import same_hues, template_rooms
+from bim.to_tracer import band_scenes
 from mitsuba_cfs.images.hdr import luminance, read_hdr
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.sky.annual import annual_sky
 from scenes.result_folder import ResultFolder
 from scenes.results import GlareResults, LuminancePicture
-from scenes.room.glare import band_scenes, brightest_picture, with_colour
+from scenes.room.glare import brightest_picture, with_colour
 from scenes.room.windows import in_all_windows, room_windows
 from scenes.run.outputs import write_results
 from tests.report.synthetic import run_result

@@ -112,9 +112,10 @@ def scene(rooms: int) -> DaylightScene:
         last = number == rooms - 1
         taken = [] if last else [(upright(walls_at(rooms)[number + 1], GLASS, north=True), 0.0)]
         tau = INNER_TAU if number > 1 else TAU
-        beyond = (
-            () if found is None else (AdjacentRoom(found, (tau * eye,), INNER_TAU * np.ones(145)),)
-        )
+        beyond = ()
+        if found is not None:
+            straight, glass = tau * np.ones(145), INNER_TAU * np.ones(145)
+            beyond = (AdjacentRoom(found, (tau * eye,), (straight,), glass),)
         found = DaylightScene(
             surfaces([*room(number, rooms), *taken]), Surfaces.none(), [group(number, rooms)],
             *((sensors(rooms), UP) if last else ()), adjacent=beyond,
