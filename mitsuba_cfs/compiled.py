@@ -27,6 +27,12 @@ class _OwnedCode(IndexDataCacheFile):
                 return data
         return None  # another's, or of an older form: compiled again
 
+    def _load_index(self) -> dict:
+        try:
+            return super()._load_index()
+        except (AttributeError, ImportError):
+            return {}  # of another version, with arguments of types that this one does not have
+
     def cached(self) -> bool:
         """Whether code of this source is cached, for any arguments."""
         return any(self.load(key) is not None for key in self._load_index())

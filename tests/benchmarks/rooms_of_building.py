@@ -38,7 +38,7 @@ def main(
     options = JobOptions(building, weather, cfs, spaces=tuple(space), quick=True, room=room)
     inputs = read_inputs(options, lambda stage, fraction: None)
     variants.activate()
-    skies = skies_for(inputs.weather, room.method, room.sampling, **room.sky)
+    skies = skies_for(inputs.weather, room.sampling, **room.sky)
     kept = {}
     for space in inputs.spaces:
         seconds, compiled, result = _timed(inputs, space, room, skies)

@@ -51,7 +51,7 @@ def test_seats_and_blinds(variant):
         sky_subdivision=1, sensor_samples=256, patch_samples=128, sun_points=16, picture_size=48,
         picture_samples=4, sensor_spacing=1.5,
     )  # fmt: skip
-    skies = skies_for(weather, "five-phase", options.sampling)
+    skies = skies_for(weather, options.sampling)
     skies = skies.part(np.arange(0, len(skies.lit), EVERY))
     room = room_inputs(building, space, systems, weather, options, skies=skies)
     light = room_light(room)

@@ -82,7 +82,7 @@ def room(variant):
     options = RoomOptions.of(
         sky_subdivision=1, sensor_samples=1024, patch_samples=256, sun_points=64
     )
-    skies = skies_for(weather, "five-phase", options.sampling)
+    skies = skies_for(weather, options.sampling)
     skies = skies.part(np.arange(0, len(skies.lit), EVERY))
     systems = open_and_closed({w.guid: (glazing(),) for w in space.windows}, None)
     same = {w.guid: systems[space.windows[0].guid] for w in space.windows}

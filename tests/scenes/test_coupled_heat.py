@@ -153,7 +153,7 @@ def test_a_run_has_the_temperatures_of_a_coupled_study(variant, weather, blind, 
     operation = read_operation(tmp_path / "operation.toml")
     inputs = rooms.Inputs(building, list(building.spaces), weather, systems, operation)
     room = study.options.changed(picture_size=32, picture_samples=1, picture_count=1)
-    skies = skies_for(weather, room.method, room.sampling, **room.sky)
+    skies = skies_for(weather, room.sampling, **room.sky)
     options = JobOptions(OFFICE, WEATHER, cache=False, room=room)
     heard: list[str] = []
     found, issues, notes = rooms.computed_rooms(

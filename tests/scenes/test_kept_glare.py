@@ -35,7 +35,7 @@ def pane(transmittance: float) -> FenestrationSystem:
 
 @pytest.fixture(scope="module")
 def skies():
-    found = skies_for(read_epw(WEATHER), "five-phase", OPTIONS.sampling)
+    found = skies_for(read_epw(WEATHER), OPTIONS.sampling)
     return found.part(np.arange(0, len(found.lit), EVERY))
 
 

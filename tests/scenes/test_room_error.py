@@ -61,7 +61,7 @@ def only_high_rooms_are_made_up(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def rooms_of(inputs: job.Inputs):
     room = OPTIONS.room
-    skies = skies_for(inputs.weather, room.method, room.sampling)
+    skies = skies_for(inputs.weather, room.sampling)
     return job.computed_rooms(inputs, skies, OPTIONS, silent)
 
 

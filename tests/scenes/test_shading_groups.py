@@ -57,7 +57,7 @@ def turned_round(building: Building) -> Building:
 
 @pytest.fixture(scope="module")
 def year(weather):
-    return skies_for(weather, FEW.method, FEW.sampling)
+    return skies_for(weather, FEW.sampling)
 
 
 @pytest.fixture

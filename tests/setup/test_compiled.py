@@ -51,6 +51,33 @@ def test_every_kept_function_goes_through_one_door() -> None:
     assert found == {"mitsuba_cfs/compiled.py"}
 
 
+TUPLES = """
+from collections import namedtuple
+import numpy as np
+from mitsuba_cfs.compiled import compiled
+{name} = namedtuple("{name}", "x")
+@compiled()
+def first(values):
+    return values.x[0]
+print(first({name}(np.array([7.0]))))
+"""
+
+
+def test_code_of_another_version_with_other_types_is_compiled_again(tmp_path) -> None:
+    """An index that names a type which is gone stopped every command after a change of version."""
+    environment = os.environ | {
+        "NUMBA_CACHE_DIR": str(tmp_path / "kept"),
+        "PYTHONPATH": os.pathsep.join([str(tmp_path), str(REPOSITORY)]),
+    }
+    for name in ("Older", "Newer"):
+        (tmp_path / "tuples.py").write_text(TUPLES.format(name=name))
+        ran = subprocess.run(
+            [sys.executable, "-c", "import tuples"], cwd=tmp_path, env=environment,
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert ran.stdout == "7.0\n", ran.stderr[-500:]
+
+
 CALL = """
 import sys, time
 from pathlib import Path

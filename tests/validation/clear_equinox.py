@@ -113,7 +113,7 @@ def compared(
         sky_subdivision=SUBDIVISION, sensor_samples=sensor_samples, patch_samples=1024,
         sun_points=128, seed=seed,
     )  # fmt: skip
-    skies = skies_for(weather, "five-phase", options.sampling)
+    skies = skies_for(weather, options.sampling)
     room = room_inputs(
         building, space, in_all_windows(space, glass()), weather, options, skies=skies, grids=[GRID]
     )

@@ -178,7 +178,7 @@ def compare(
     for name in climates:
         weather = read_epw(epw / EPW_FILES[name])
         options = study.options
-        skies = skies_for(weather, options.method, options.sampling, cache, **options.sky)
+        skies = skies_for(weather, options.sampling, cache, **options.sky)
         series = sky_series(weather, "solar")
         sun = series_matrix(series, skies.lit, options.sampling.subdivision, "sun")
         place = Place(name, weather, skies, sun.astype(np.float32))
