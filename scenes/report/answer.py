@@ -51,15 +51,13 @@ def rooms_answer(rooms: Sequence[Judged]) -> str:
         return _alone(rooms[0])
     failing = [room for room in rooms if room.failed]
     if not failing:
-        return gettext("All {count} rooms meet every limit in the table below.", count=len(rooms))
+        return gettext("Every room meets every limit in the table below.")
     met = len(rooms) - len(failing)
     if not met:
-        head = gettext("None of the {count} rooms meets every limit.", count=len(rooms))
+        head = gettext("No room meets every limit in the table below.")
     else:
         head = gettext(
-            "{met} of {count} rooms meet every limit in the table below.",
-            met=met,
-            count=len(rooms),
+            "{met} of {all} rooms meet every limit in the table below.", met=met, all=len(rooms)
         )
     if len(failing) <= MOST_NAMED:
         lines = [
@@ -99,7 +97,7 @@ def systems_answer(cases: Sequence[Judged], energy_kwh: Sequence[float | None]) 
         parts.append(_fails(case) + ".")
     if len(others) > MOST_NAMED:
         more = len(others) - MOST_NAMED
-        parts.append(ngettext("{count} more fails some.", "{count} more fail some.", more))
+        parts.append(ngettext("{count} other fails some.", "{count} others fail some.", more))
     return " ".join([*parts, *_energy(order, best)])
 
 
@@ -115,7 +113,7 @@ def summary_answer(groups: Sequence[Sequence[Judged]]) -> str:
                 counts.setdefault(case.name, []).append(not case.failed)
     order = sorted(counts.items(), key=lambda one: -sum(one[1]) / len(one[1]))
     parts = [
-        gettext("{name} in {met} of {count} rooms", name=name, met=sum(met), count=len(met))
+        gettext("{name} in {met} of {all} rooms", name=name, met=sum(met), all=len(met))
         for name, met in order[:MOST_NAMED]
     ]
     return gettext("Every limit is met by {parts}.", parts=semicolons(parts)) if parts else ""
@@ -134,7 +132,7 @@ def met_cell(case: Judged) -> str:
 def _best(best: Sequence[Judged], fewest: int) -> str:
     shown, more = [case.name for case in best[:MOST_NAMED]], len(best) - MOST_NAMED
     if more > 0:
-        shown.append(ngettext("{count} more", "{count} more", more))
+        shown.append(ngettext("{count} other", "{count} others", more))
     names = listed(shown)
     count = len(best[0].cards)
     if not fewest:

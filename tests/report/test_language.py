@@ -91,6 +91,7 @@ def marked(result):
 def shown(page: str) -> list[str]:
     """Text that a reader sees or hears: of elements, labels, titles and alternatives."""
     page = re.sub(r"<(script|style)\b.*?</\1>", "", page, flags=re.DOTALL)
+    page = re.sub(r"""<span class="option">([^<]*)</span>""", r"\1", page)  # kept on one line
     said = re.findall(r"""\b(?:aria-label|title|alt)="([^"]*)\"""", page)
     said += re.findall(r">([^<]+)<", page)
     return [unescape(text).strip() for text in said if text.strip()]
