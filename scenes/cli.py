@@ -178,6 +178,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         handled.insert(0, signal.SIGALRM)
     for number in handled:
         signal.signal(number, signal.SIG_IGN)  # the exit code is that of what has been done
+    if stop.waiting and not code:  # it came while the last file was written
+        code = _ended(stop.waiting)
     sys.exit(code)
 
 
@@ -190,6 +192,7 @@ class Stop:
 
     def __init__(self) -> None:
         self._cleaning = -CLEANING_S  # when it began, by `time.monotonic`
+        self.waiting = 0  # the signal that waits for a library or a file
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Raise what ends the program."""
@@ -205,6 +208,7 @@ class Stop:
 
     def _wait(self, number: int) -> None:
         """Look again after `AGAIN_S`, by the timer of the process: no thread is started."""
+        self.waiting = number
         if hasattr(signal, "setitimer"):
             signal.signal(signal.SIGALRM, lambda _number, frame: self(number, frame))
             signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
@@ -238,17 +242,21 @@ def run(arguments: Sequence[str]) -> int:
         click.echo(error.format_message(), err=True)
         return USAGE
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted", err=True)
-        return INTERRUPTED
+        return _ended(signal.SIGINT)
     except Terminated as ended:
-        click.echo("terminated", err=True)
-        return SIGNALLED + ended.number
+        return _ended(ended.number)
     except Exception as error:
         line = _user_line(error)
         if line is None or os.environ.get("CFS_DEBUG") == "1":
             raise
         click.echo(line, err=True)
         return USAGE if isinstance(error, click.UsageError) else FAILED
+
+
+def _ended(number: int) -> int:
+    """The exit code of a program that a signal ended, whose word is printed."""
+    click.echo("interrupted" if number == signal.SIGINT else "terminated", err=True)
+    return INTERRUPTED if number == signal.SIGINT else SIGNALLED + number
 
 
 def _user_line(error: Exception) -> str | None:

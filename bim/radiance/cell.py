@@ -38,6 +38,8 @@ def read_radiance_layer(
     sheets: dict[SlatMaterial, int] = {}
     triangles, used = [], []
     for thing in scene.objects:
+        if thing.material.kind == "mirror" and thing.material.gloss is None:
+            continue  # the black sheet behind a mirror: the back of its slat is black already
         number = sheets.setdefault(slat_material(thing), len(sheets))
         triangles.append(thing.triangles * INWARDS)
         used += [number] * len(thing.triangles)

@@ -7,6 +7,7 @@ that file and stands still just before the first result takes its place.
 from __future__ import annotations
 
 import os
+import signal
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -190,7 +191,9 @@ def stop_before_the_first_result(announce: Path) -> None:
         def stopping(self, target, *, move=move):
             if not any(TEMPORARY.fullmatch(part) for part in Path(target).parts):
                 announce.touch()
-                time.sleep(60)
+                end = time.monotonic() + 60
+                while time.monotonic() < end and not signal.getitimer(signal.ITIMER_REAL)[0]:
+                    time.sleep(0.05)  # a signal waits, by this timer, for a file to be whole
             return move(self, target)
 
         setattr(Path, name, stopping)

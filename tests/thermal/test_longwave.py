@@ -163,8 +163,8 @@ def test_sun_in_a_room_of_two_faces_by_hand():
 
 def test_sun_in_the_layers_and_the_windows_share_by_hand():
     layers = LayerAbsorptances(np.array([0.1, 0.2]), np.array([0.3, 0.4]), 0.0)
-    outer, inner = layer_absorption([[10.0, 100.0]], layers)
-    assert (outer, inner) == (pytest.approx(21.0), pytest.approx(43.0))
+    outer, inner, air = layer_absorption([[10.0, 100.0]], layers)
+    assert (outer, inner, air) == (pytest.approx(21.0), pytest.approx(43.0), 0.0)
     with pytest.raises(ThermalInputError, match="irradiance: expected"):
         layer_absorption([[10.0]], layers)
     # 8 W not reflected, of 1 - 0.2: the inner layer keeps 0.3 of 0.8

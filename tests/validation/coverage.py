@@ -2,12 +2,13 @@ r"""How often twice the stated standard error covers the error, over many seeds.
 
     python -m tests.validation coverage [--seeds 100] [--json FILE]
 
-A shoebox behind clear glass, four sensors, an eye beside them, six sunny hours and six overcast
-ones, by few paths, so that the noise is large.  Each seed traces all matrices again.  The truth is
-the mean over the other seeds; its own error is a tenth of that of one seed and is included.
+A shoebox behind clear glass, four sensors, an eye beside them, each eighth hour of the demo's
+weather with the sun up, by few paths, so that the noise is large.  Each seed traces all matrices
+again.  The truth is the mean over the other seeds; its own error is a tenth of that of one seed
+and is included.
 Illuminance: mean over the hours at each sensor; DF: overcast sky; DA: share of the hours above the
-median illuminance of a sensor; sDA: share of sensors with that in half of the hours; DGP: of each
-sunny hour.
+median illuminance of a sensor; sDA: share of sensors with that in half of the hours; DGP: of the
+six brightest hours.
 """
 
 from __future__ import annotations
@@ -29,13 +30,15 @@ from mitsuba_cfs.metrics.daylight_factor import daylight_factor
 from mitsuba_cfs.metrics.lm83 import spatial_daylight_autonomy_error
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
+from scenes import demo
 from scenes.cost import room as box
 
 SUBDIVISION = 1
 POINTS = np.array([[1.8, y, 0.8] for y in (0.5, 1.5, 2.5, 3.5)])
 UP = np.tile([0.0, 0.0, 1.0], (len(POINTS), 1))
 SIZE = 48  # [px]
-HOURS = 6
+EVERY = 8
+PICTURES = 6  # the brightest hours
 PATHS = {
     "sensor_samples": 1_024, "patch_samples": 1_024, "sun_points": 256, "view_samples": 2,
     "outdoor_samples": 2,
@@ -43,22 +46,10 @@ PATHS = {
 
 
 def sky() -> cfs.AnnualSky:
-    """Hours of a clear sky with the sun, then overcast ones of less and less light."""
-    sphere = ReinhartSky(SUBDIVISION)
-    azimuth = np.radians(np.linspace(150, 230, HOURS))
-    height = np.radians(np.linspace(25, 55, HOURS))
-    sun = np.stack(
-        [np.sin(azimuth) * np.cos(height), np.cos(azimuth) * np.cos(height), np.sin(height)], axis=1
-    )
-    clear = np.stack([cie_patches("clear", sphere, 12_000.0, sun=one) for one in sun], axis=1)
-    overcast = cie_patches("overcast", sphere, 1.0)[:, None] * np.linspace(6e3, 3e4, HOURS)
-    alone = np.zeros((sphere.size, 2 * HOURS))
-    patch = sphere.index(sun)
-    alone[patch, np.arange(HOURS)] = 60_000.0 / sphere.solid_angles[patch]
-    lux = np.repeat([60_000.0, 0.0], HOURS)
-    hours = np.arange(2 * HOURS)
-    whole = np.concatenate([clear, overcast], axis=1) + alone
-    return cfs.AnnualSky(whole, np.concatenate([sun, sun]), lux, hours, 8760, sun=alone)
+    """Each eighth hour with the sun up of the demo's weather."""
+    weather = cfs.read_epw(next(Path(demo.__file__).parent.glob("*.epw")))
+    year = cfs.annual_sky(weather, SUBDIVISION)
+    return year.part(np.arange(0, len(year.lit), EVERY))
 
 
 def of_seed(
@@ -80,7 +71,7 @@ def of_seed(
     overcast = cie_patches("overcast", ReinhartSky(SUBDIVISION), 1.0)
     factor = daylight_factor(cfs.daylight_coefficients(light) @ overcast, 1.0)
     of_factor = relative_error_under(with_sensor_light(light), overcast)
-    rated = cfs.hourly_glare(light, hours=np.arange(HOURS))
+    rated = cfs.hourly_glare(light, hours=np.sort(np.argsort(under.illuminance)[-PICTURES:]))
     mean = lux.mean(axis=1)
     sda = np.array([np.mean(da >= 0.5)])
     return {
