@@ -56,6 +56,8 @@ def write_results(
 def _property(model: ifcopenshell.file, name: str, value: Value) -> Entity:
     if hasattr(value, "item"):  # NumPy's numbers
         value = value.item()
+    if isinstance(value, str):  # a note is a text that can be translated
+        value = str(value)
     if type(value) not in MEASURES or (isinstance(value, float) and not math.isfinite(value)):
         raise ValueError(f"result {name}: expected a number, truth value or text, got {value!r}")
     nominal = model.create_entity(MEASURES[type(value)], value)

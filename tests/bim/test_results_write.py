@@ -10,6 +10,7 @@ import pytest
 from bim.ifc.building import read_ifc
 from bim.ifc.results_write import SET_NAME, write_results
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.notes import Note
 from tests.bim.small_ifc import box_room
 from tests.bim.test_fenestration_ifc import faults
 
@@ -35,7 +36,7 @@ def test_results_are_found_again_and_replaced(path, tmp_path):
     building = read_ifc(path)
     space, window = building.spaces[0].guid, building.windows[0].guid
     values = {"DA 300 lx [%]": np.float64(0.1 + 0.2), "hours": np.int64(7), "met": True}
-    values["method"] = "3-phase"
+    values["method"] = Note("{count}-phase", count=3)  # a text that can be translated
     assert write_results(path, {space: values, window: {"gain [kWh]": 1 / 3}}, out) == ()
     assert results_of(out, space) == {**values, "DA 300 lx [%]": 0.1 + 0.2}
     assert results_of(out, window) == {"gain [kWh]": 1 / 3}
