@@ -227,7 +227,7 @@ def _inside_a_library(frame: FrameType | None) -> bool:
         if frame.f_code.co_name == "__del__":
             return True
         frame = frame.f_back
-    # the body of a loop, and a BSDF of ours, are called by Dr.Jit without a frame of its own
+    # the body of a loop, and a BSDF plugin's, are called by Dr.Jit without a frame
     drjit = sys.modules.get("drjit")
     return drjit is not None and drjit.flag(drjit.JitFlag.SymbolicScope)
 

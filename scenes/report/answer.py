@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from scenes.language.catalogue import gettext, ngettext
@@ -60,18 +61,11 @@ def rooms_answer(rooms: Sequence[Judged]) -> str:
             "{met} of {all} rooms meet every limit in the table below.", met=met, all=len(rooms)
         )
     if len(failing) <= MOST_NAMED:
-        lines = [
-            gettext("{name} fails {failed}", name=room.name, failed=_names(room.failed))
-            for room in failing
-        ]
-        return f"{head} {semicolons(lines)}."
-    counts: dict[str, int] = {}
-    for room in failing:
-        for card in room.failed:
-            counts[card.label] = counts.get(card.label, 0) + 1
+        return f"{head} {semicolons([_fails(room, _names) for room in failing])}."
+    counts = Counter(card.label for room in failing for card in room.failed)
     lines = [
         ngettext("{label} in {count} room", "{label} in {count} rooms", number, label=label)
-        for label, number in sorted(counts.items(), key=lambda one: -one[1])
+        for label, number in counts.most_common()
     ]
     return f"{head} " + gettext("Not met: {parts}.", parts=semicolons(lines))
 
@@ -162,13 +156,12 @@ def _best(best: Sequence[Judged], fewest: int) -> str:
 
 def _energy(order: Sequence[tuple[Judged, float | None]], best: Sequence[Judged]) -> list[str]:
     """The energy of the best case beside the least of all."""
-    known = [(case, energy) for case, energy in order if energy]
+    known = {case.name: energy for case, energy in order if energy}
     if len(known) != len(order):
         return []
-    least, lowest = min(known, key=lambda one: one[1] or 0.0)
-    first, energy = next(one for one in known if one[0] is best[0])
-    facts = {"name": first.name, "energy": rounded(float(energy or 0.0), 0)}
-    if least is first:
+    least, first = min(known, key=known.__getitem__), best[0].name
+    facts = {"name": first, "energy": rounded(known[first], 0)}
+    if least == first:
         return [
             gettext(
                 "{name} needs the least heating, cooling and lighting energy: {energy} kWh a year.",
@@ -180,14 +173,13 @@ def _energy(order: Sequence[tuple[Judged, float | None]], best: Sequence[Judged]
             "{name} needs {energy} kWh of heating, cooling and lighting a year; the least is "
             "{lowest} kWh ({least}).",
             **facts,
-            lowest=rounded(float(lowest or 0.0), 0),
-            least=least.name,
+            lowest=rounded(known[least], 0),
+            least=least,
         )
     ]
 
 
 def _alone(room: Judged) -> str:
-    facts = {"name": room.name, "met": room.met, "limits": len(room.cards)}
     if not room.failed:
         return ngettext(
             "{names} meets every limit in the table below.",
@@ -197,7 +189,9 @@ def _alone(room: Judged) -> str:
         )
     return gettext(
         "{name} meets {met} of {limits} limits and fails {failed}.",
-        **facts,
+        name=room.name,
+        met=room.met,
+        limits=len(room.cards),
         failed=_values(room.failed),
     )
 
@@ -206,10 +200,10 @@ def _names(cards: Sequence[Card]) -> str:
     return listed([inside(card.label) for card in cards])
 
 
-def _fails(case: Judged) -> str:
-    return gettext("{name} fails {failed}", name=case.name, failed=_values(case.failed))
-
-
 def _values(cards: Sequence[Card]) -> str:
     """Each figure with its value."""
     return listed([f"{inside(c.label)} ({f'{inside(c.value)} {c.unit}'.strip()})" for c in cards])
+
+
+def _fails(case: Judged, figures: Callable[[Sequence[Card]], str] = _values) -> str:
+    return gettext("{name} fails {failed}", name=case.name, failed=figures(case.failed))
