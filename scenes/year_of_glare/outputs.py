@@ -28,6 +28,7 @@ from scenes.language.numbers import rounded, short_month, spoken
 from scenes.pictures import write_check_picture, write_falsecolour
 from scenes.report.headline import LEVEL_WORDS
 from scenes.report.method import METHODS
+from scenes.results import DGP_SUNNY_HOUR_ERROR, sunny_hour_dgp_notes
 from scenes.year_of_glare.year import GlareYear, ViewYear, rating_of, used_dgp
 
 KEPT = "ratings"  # folder of the finished ratings, inside that of the results
@@ -76,6 +77,7 @@ def view_row(year: GlareYear, rated: ViewYear) -> dict[str, object]:
         "highest_dgp": float(rated.ratings.dgp.max()),
         "highest_dgp_standard_error": float(errors[rated.ratings.dgp.idxmax()]),
         "dgp_standard_error": float(np.sqrt(np.mean(errors**2))),
+        DGP_SUNNY_HOUR_ERROR: rated.sunny_hour_error,
         "worst_hour": str(rated.ratings.dgp.idxmax()),
         "seconds": round(rated.seconds, 1),
         "VIEW": format_view(view),
@@ -144,12 +146,17 @@ def write_summary(year: GlareYear, rows: list[dict[str, object]], folder: Path) 
         "glare_rule": rating_of(options).rule,
         "fenestration": list(year.fenestration),
         "head": year.head.record,
-        "notes": [*year.head.notes, *year.notes],
+        "notes": [*year.head.notes, *all_notes(year, table)],
         "hours_with_sun": len(year.sky.lit),
         "version": metadata.version("mitsuba-cfs"),
     }
     write_text(folder / "glare_year.json", json_text(manifest, indent=2) + "\n")
     return table
+
+
+def all_notes(year: GlareYear, table: pd.DataFrame) -> tuple[str, ...]:
+    """Notes on the year besides those of its head; table: a row for each view."""
+    return (*year.notes, *sunny_hour_dgp_notes(float(table[DGP_SUNNY_HOUR_ERROR].max())))
 
 
 def _plain(value: object) -> object:

@@ -35,6 +35,7 @@ from mitsuba_cfs.methods.phase_matrices import (
     with_outdoors,
 )
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+from mitsuba_cfs.methods.sun_by_patches import sunny_hour_dgp_error
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, item, part, silent, summed
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
@@ -59,6 +60,7 @@ class ViewYear:
     ratings: pd.DataFrame  # [L, figures] by the time of each lit hour
     pictures: dict[pd.Timestamp, tuple[NDArray[np.float32], GlareResult]]  # none for sDGP
     seconds: float
+    sunny_hour_error: float = 0.0  # of DGP by three phases, see `sunny_hour_dgp_error`
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +128,6 @@ def read_year(
     sky = annual_sky(
         weather,
         sampling.subdivision,
-        sun=options.method == "five-phase",
         sun_model=options.sun_model,
         ground=options.sky_ground,
     )
@@ -189,8 +190,10 @@ def rate_views(
             {name: getattr(result, name) for name in FIGURES}, index=times.rename("time")
         )
         shown = _pictures(light, year, result)
+        rating = rating_of(options)
+        error = sunny_hour_dgp_error(light, result.dgp, options.metric, options=rating)
         steps("", 1.0)
-        yield ViewYear(named, table, shown, time.monotonic() - start)
+        yield ViewYear(named, table, shown, time.monotonic() - start, error)
 
 
 def _light(
