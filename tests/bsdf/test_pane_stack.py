@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.glazing import Pane
-from mitsuba_cfs.bsdf.pane_stack import hemispherical_mean, pane_optics, stack
+from mitsuba_cfs.bsdf.glazing import Pane, hemispherical_mean, pane_optics, stack
 
 ANGLES = np.radians(np.arange(0.0, 90.0, 10.0))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.simple_glazing import (
+from mitsuba_cfs.bsdf.glazing import (
     solar_reflectance,
     solar_transmittance,
     visible_reflectances,
