@@ -22,6 +22,7 @@ from mitsuba_cfs.glare.classes import (
 )
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import format_view
+from scenes.fenestration.peaks import lobe_note
 from scenes.figures.carpet import day_grid
 from scenes.language.catalogue import gettext
 from scenes.language.numbers import rounded, short_month, spoken
@@ -78,6 +79,7 @@ def view_row(year: GlareYear, rated: ViewYear) -> dict[str, object]:
         "highest_dgp_standard_error": float(errors[rated.ratings.dgp.idxmax()]),
         "dgp_standard_error": float(np.sqrt(np.mean(errors**2))),
         DGP_SUNNY_HOUR_ERROR: rated.sunny_hour_error,
+        **rated.as_lobe,
         "worst_hour": str(rated.ratings.dgp.idxmax()),
         "seconds": round(rated.seconds, 1),
         "VIEW": format_view(view),
@@ -156,7 +158,11 @@ def write_summary(year: GlareYear, rows: list[dict[str, object]], folder: Path) 
 
 def all_notes(year: GlareYear, table: pd.DataFrame) -> tuple[str, ...]:
     """Notes on the year besides those of its head; table: a row for each view."""
-    return (*year.notes, *sunny_hour_dgp_notes(float(table[DGP_SUNNY_HOUR_ERROR].max())))
+    notes = (*year.notes, *sunny_hour_dgp_notes(float(table[DGP_SUNNY_HOUR_ERROR].max())))
+    if "dgp_as_lobe" not in table:
+        return notes
+    most = (table["dgp_as_lobe"] - table["dgp_as_beam"]).abs().idxmax()
+    return (*notes, lobe_note(table.loc[most]))
 
 
 def _plain(value: object) -> object:

@@ -50,6 +50,24 @@ def random_tree_system(seed: int) -> TensorTreeBsdf:
     return TensorTreeBsdf(transmission_front=tree, transmission_back=tree)
 
 
+def test_panes_before_a_fabric_do_not_hide_the_sun_that_it_scatters():
+    """Pictures were 10 % below rtrace where panes are free beside a fabric."""
+    from mitsuba_cfs.trace.paths.scene import Sky
+
+    from .test_matrices import panes_before_a_screen
+
+    room, sky = black(rooms.test_room()[0]), Sky(DARK, SUN, SUN_LUMINANCE)
+    alone, (screen, panes) = panes_before_a_screen(0.1)
+    by_itself, behind = (
+        eye_illuminance(picture(systems, sky, (room, groups, rooms.NOTHING)))
+        for groups, systems in (
+            ([alone], [diffuser(0.3)]),
+            ([screen, panes], [diffuser(0.3), glass()]),
+        )
+    )
+    assert behind == pytest.approx(by_itself, rel=0.01)
+
+
 def test_no_light_of_a_picture_comes_through_the_room_from_behind():
     """A box closed round the window's outside: no sky or sun may light it through the window."""
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering

@@ -110,9 +110,7 @@ def test_a_system_scatters_by_the_up_vector_of_its_window(up):
     front = np.outer(to_below, from_above) * 1.0
     system = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, front)
     sky = np.where(np.arange(146) == 0, 200.0, np.linspace(500.0, 5000.0, 146))
-    found = traced(
-        [path_optics(system)], Sky(sky, NO_SUN, 0), scene=(room, groups, rooms.NOTHING)
-    )
+    found = traced([path_optics(system)], Sky(sky, NO_SUN, 0), scene=(room, groups, rooms.NOTHING))
     view = view_matrix(room, groups, POINTS, UP, samples=16384)
     daylight = daylight_matrix(rooms.NOTHING, groups, subdivision=1, samples=2048)
     matrices = [system.transmission_matrix()]
