@@ -242,7 +242,7 @@ def add_paths(
         local = room.inside.to_local(group, direction, glazed)
         facing = dr.select(outdoors, -local.z, local.z) > 1e-4  # windows are one-sided
         active &= ~glazed | facing
-        glazed &= facing
+        glazed &= active
         glass_cosine = dr.select(glazed & ~outdoors, local.z, 0.0)
         density = _density(
             room, sky, cosine, direction, t, glass_cosine=glass_cosine, later=depth > 0
