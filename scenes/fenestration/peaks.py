@@ -52,11 +52,11 @@ def lobe_note(effect: Mapping[str, float]) -> str:
     """The sentence on a `lobe_effect`."""
     return Note(
         "The data do not show whether the transmission peak is specular. Computed both ways in "
-        "{count} hours: as a lobe, DGP is {lobe:.2f} instead of {beam:.2f} where it differs most, "
-        "and the illuminance at the eye differs by {least:+.0f} to {most:+.0f} %.",
+        "{count} hours: as a lobe, DGP is {lobe:.3f} instead of {beam:.3f} where it differs most, "
+        "and the illuminance at the eye differs by {least:+.1f} to {most:+.1f} %.",
         "The data do not show whether the transmission peak is specular. Computed both ways: as a "
-        "lobe, DGP is {lobe:.2f} instead of {beam:.2f}, and the illuminance at the eye differs by "
-        "{most:+.0f} %.",
+        "lobe, DGP is {lobe:.3f} instead of {beam:.3f}, and the illuminance at the eye differs by "
+        "{most:+.1f} %.",
         count=int(effect["hours_both_ways"]),
         lobe=effect["dgp_as_lobe"],
         beam=effect["dgp_as_beam"],
