@@ -39,7 +39,8 @@ from mitsuba_cfs.methods.point_in_time import (
     relative_error_of_mean,
 )
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
-from mitsuba_cfs.methods.standard_error import relative_standard_error
+from mitsuba_cfs.methods.standard_error import noise_of_sums, relative_standard_error
+from mitsuba_cfs.metrics.noise import Noise
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 
@@ -168,7 +169,8 @@ def illuminance_with_error(
 ) -> tuple[Array, Array]:
     """Illuminance of the sensors [S, L] [lx], and the relative standard error of its mean [S].
 
-    The error is that of tracing.  Seasons are taken as independent.
+    The error is that of tracing, with Student's factor of its batches.  Seasons are taken as
+    independent.
     """
     if isinstance(light, PathLight):
         return path_illuminance(light, state, progress=progress)
@@ -183,6 +185,39 @@ def illuminance_with_error(
         lit[:, hours], error = illuminance_with_error(one, rows[:, hours])
         variance += (error * lit[:, hours].sum(axis=1)) ** 2
     return lit, relative_error_of_mean(lit, variance)
+
+
+def illuminance_noise(
+    light: Light,
+    illuminance: Array,
+    relative_error: Array,
+    weights: Array,
+    state: State | None = None,
+) -> Noise:
+    """Noise of the sums over hours of each sensor's illuminance times weights of its own [S].
+
+    Path tracing takes the hours as independent and their relative errors as equal.
+
+    Args:
+        illuminance, relative_error: [S, L], [S] of `illuminance_with_error` in this state.
+        weights: [S, L], not negative, 0 in most hours.
+    """
+    if isinstance(light, PathLight):
+        total, squares = illuminance.sum(axis=1), (illuminance**2).sum(axis=1)
+        of_hour = np.divide(total**2, squares, out=np.zeros_like(total), where=squares > 0)
+        weighted = ((weights * illuminance) ** 2).sum(axis=1) * of_hour * relative_error**2
+        return Noise(weighted, np.zeros_like(weighted), np.zeros_like(weighted))
+    if isinstance(light, PhaseLight):
+        light, count = with_sensor_light(light), len(light.scene.points)
+        sensors = len(light.scene.sensors()[0])
+        eye = np.zeros((sensors - count, weights.shape[1]))
+        of_all = np.concatenate([illuminance, eye]), np.concatenate([weights, eye])
+        return noise_of_sums(light, state, *of_all).part(slice(count))
+    rows, noise = _states(light, state), Noise.none(len(light.scene.points))
+    for one, hours in light.seasons():
+        part = illuminance[:, hours], relative_error, weights[:, hours]
+        noise += illuminance_noise(one, *part, rows[:, hours])
+    return noise
 
 
 def eye_illuminance(light: Light, state: State | None = None) -> Array:
