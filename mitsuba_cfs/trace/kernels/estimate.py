@@ -87,8 +87,8 @@ class Estimate:
 
 
 def blocks(size: int, count: int = BLOCKS) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First entries and sizes of at most so many blocks of an axis, of one entry at least."""
-    ends = np.linspace(0, size, min(count, max(size, 1)) + 1).astype(np.int64)
+    """First entries and sizes of at most so many blocks of an axis, none of them empty."""
+    ends = np.linspace(0, size, min(count, size) + 1).astype(np.int64)
     return ends[:-1], np.diff(ends)
 
 
