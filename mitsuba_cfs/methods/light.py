@@ -188,36 +188,37 @@ def illuminance_with_error(
 
 
 def illuminance_noise(
-    light: Light,
-    illuminance: Array,
-    relative_error: Array,
-    weights: Array,
-    state: State | None = None,
-) -> Noise:
-    """Noise of the sums over hours of each sensor's illuminance times weights of its own [S].
+    light: Light, illuminance: Array, relative_error: Array, state: State | None = None
+) -> Callable[[Array], Noise]:
+    """Noise [S] of each sensor's illuminance times weights, summed over the hours, by weights.
 
-    Path tracing takes the hours as independent and their relative errors as equal.
+    The weights [S, L] are each sensor's own, not negative, and 0 in most hours.  Path tracing takes
+    the hours as independent and their relative errors as equal.
 
-    Args:
-        illuminance, relative_error: [S, L], [S] of `illuminance_with_error` in this state.
-        weights: [S, L], not negative, 0 in most hours.
+    Args: illuminance, relative_error: [S, L], [S] of `illuminance_with_error` in this state.
     """
     if isinstance(light, PathLight):
         total, squares = illuminance.sum(axis=1), (illuminance**2).sum(axis=1)
         of_hour = np.divide(total**2, squares, out=np.zeros_like(total), where=squares > 0)
-        weighted = ((weights * illuminance) ** 2).sum(axis=1) * of_hour * relative_error**2
-        return Noise(weighted, np.zeros_like(weighted), np.zeros_like(weighted))
+        hourly = illuminance * (np.sqrt(of_hour) * relative_error)[:, None]
+
+        def of_paths(weights: Array) -> Noise:
+            variance = ((weights * hourly) ** 2).sum(axis=1)
+            return Noise.of(variance, np.zeros_like(variance))
+
+        return of_paths
     if isinstance(light, PhaseLight):
         light, count = with_sensor_light(light), len(light.scene.points)
-        sensors = len(light.scene.sensors()[0])
-        eye = np.zeros((sensors - count, weights.shape[1]))
-        of_all = np.concatenate([illuminance, eye]), np.concatenate([weights, eye])
-        return noise_of_sums(light, state, *of_all).part(slice(count))
-    rows, noise = _states(light, state), Noise.none(len(light.scene.points))
-    for one, hours in light.seasons():
-        part = illuminance[:, hours], relative_error, weights[:, hours]
-        noise += illuminance_noise(one, *part, rows[:, hours])
-    return noise
+        eye = np.zeros((len(light.scene.sensors()[0]) - count, illuminance.shape[1]))
+        of_all = noise_of_sums(light, state, np.concatenate([illuminance, eye]))
+        return lambda weights: of_all(np.concatenate([weights, eye])).part(slice(count))
+    rows = _states(light, state)
+    seasons = [
+        (illuminance_noise(one, illuminance[:, hours], relative_error, rows[:, hours]), hours)
+        for one, hours in light.seasons()
+    ]
+    none = Noise.none(len(light.scene.points))
+    return lambda weights: sum((noise(weights[:, hours]) for noise, hours in seasons), start=none)
 
 
 def eye_illuminance(light: Light, state: State | None = None) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,21 +53,25 @@ def relative_standard_error(light: PhaseLight, state: State | None, illuminance:
 
 
 def noise_of_sums(
-    light: PhaseLight, state: State | None, illuminance: Array, weights: Array
-) -> Noise:
-    """Noise of each sensor's illuminance times weights of its own, summed over the hours [S + 1].
+    light: PhaseLight, state: State | None, illuminance: Array
+) -> Callable[[Array], Noise]:
+    """Noise [S + 1] of each sensor's illuminance times weights, summed over the hours, by weights.
 
-    What windows reflect, and D's means over a part of a group, have the same share of the
-    illuminance as in the mean over all hours.
+    The weights [S + 1, L] are not negative, and 0 in most hours.  What windows reflect, and D's
+    means over a part of a group, have the same share of the illuminance as in the mean over all
+    hours.
 
-    Args:
-        illuminance: as of `relative_standard_error`.
-        weights: [S + 1, L], not negative, 0 in most hours.
+    Args: illuminance: as of `relative_standard_error`.
     """
-    rows = states_of(light, state)
-    total, weighted = illuminance.sum(axis=1), (weights * illuminance).sum(axis=1)
-    share = np.divide(weighted, total, out=np.zeros_like(total), where=total > 0)
-    return _of_tracing(light, rows, weights) + _of_method(light, rows).scaled(share)
+    rows, total = states_of(light, state), illuminance.sum(axis=1)
+    of_method = _of_method(light, rows)
+
+    def noise(weights: Array) -> Noise:
+        weighted = (weights * illuminance).sum(axis=1)
+        share = np.divide(weighted, total, out=np.zeros_like(total), where=total > 0)
+        return _of_tracing(light, rows, weights) + of_method.scaled(share)
+
+    return noise
 
 
 def relative_error_under(light: PhaseLight, sky: Array, state: int = 0) -> Array:

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, t
+from scipy.special import ndtr, stdtrit
 
 Array = NDArray[np.float64]
+MANY = 1e9  # degrees of freedom
 COVERED = 2.0  # standard errors that are to cover what they cover of a normal distribution, 95 %
 
 
@@ -59,9 +60,9 @@ class Noise:
         """
         total = self.own + self.shared
         freedom = np.divide(
-            total**2, self.by_freedom, out=np.full_like(total, np.inf), where=self.by_freedom > 0
+            total**2, self.by_freedom, out=np.full_like(total, MANY), where=self.by_freedom > 0
         )
-        factor: Array = t.ppf(norm.cdf(COVERED), np.maximum(freedom, 1.0)) / COVERED
+        factor: Array = stdtrit(np.clip(freedom, 1.0, MANY), ndtr(COVERED)) / COVERED
         return factor
 
     def standard_error(self) -> Array:

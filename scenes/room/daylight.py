@@ -42,16 +42,18 @@ def room_daylight(
     """Illuminance of the year with the shading states of each hour [H, G], and its metrics."""
     progress("daylight", 0.0)
     lights, lit_state, points = light.light, light.states(state), light.scene.points
-    traced, sky = picture_light(room, light), lights.sky
+    traced = picture_light(room, light)
     lit, error = illuminance_with_error(
         traced, lit_state, progress=part(progress, 0.9, 1.0, "daylight")
     )
     illuminance = room.skies.whole_year(lit.astype(np.float32)).T
+    noise = illuminance_noise(traced, lit, error, lit_state)
     autonomy_noise = daylight_autonomy_noise(
-        illuminance, lm83_hours(room.weather),
-        lambda weights: illuminance_noise(traced, lit, error, weights[sky.lit].T, lit_state),
+        illuminance,
+        lm83_hours(room.weather),
+        lambda weights: noise(weights[lights.sky.lit].T),
         relative_error=error,
-    )  # fmt: skip
+    )
     blurred = None
     if room.options.method == "three-phase":
         blurred = 100.0 * sunny_hour_error(lights, lit_state, lit)

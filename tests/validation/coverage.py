@@ -68,11 +68,14 @@ def of_seed(
     every = np.ones(lux.shape[1], dtype=bool)
     scaled = lux.T / limits
     da = daylight_autonomy(scaled, every, 1.0)
+    of_sums = illuminance_noise(light, lux, relative)
     noise = daylight_autonomy_noise(
-        scaled, every,
-        lambda weights: illuminance_noise(light, lux, relative, weights.T / limits[:, None]),
-        relative_error=relative, threshold=1.0,
-    )  # fmt: skip
+        scaled,
+        every,
+        lambda weights: of_sums(weights.T / limits[:, None]),
+        relative_error=relative,
+        threshold=1.0,
+    )
     overcast = cie_patches("overcast", ReinhartSky(SUBDIVISION), 1.0)
     factor = daylight_factor(cfs.daylight_coefficients(light) @ overcast, 1.0)
     of_factor = relative_error_under(with_sensor_light(light), overcast)
