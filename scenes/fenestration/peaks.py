@@ -13,6 +13,7 @@ from mitsuba_cfs.glare.sun_disc import spread_sun_dgp
 from mitsuba_cfs.notes import Note
 from scenes.fenestration.systems import FenestrationSystem, States, with_see_through
 
+DIM = 10.0  # [lx] at the eye, below which relative changes do not matter
 LEAST_PEAK = 0.01  # transmittance at normal incidence below which a peak is not noted
 
 
@@ -38,7 +39,7 @@ def lobe_effect(
     Args: beam, lobe: DGP and illuminance at the eye [n] [lx] with the peak as a beam, as a lobe.
     """
     most = int(np.argmax(np.abs(lobe[0] - beam[0])))
-    change = 100 * (lobe[1] / np.maximum(beam[1], 1e-9) - 1)
+    change = 100 * (lobe[1] - beam[1]) / np.maximum(np.maximum(beam[1], lobe[1]), DIM)
     return {
         "hours_both_ways": float(len(change)),
         "dgp_as_beam": float(beam[0][most]),
