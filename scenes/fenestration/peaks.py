@@ -39,7 +39,7 @@ def lobe_effect(
     Args: beam, lobe: DGP and illuminance at the eye [n] [lx] with the peak as a beam, as a lobe.
     """
     most = int(np.argmax(np.abs(lobe[0] - beam[0])))
-    change = 100 * (lobe[1] - beam[1]) / np.maximum(np.maximum(beam[1], lobe[1]), DIM)
+    change = 100 * (lobe[1] - beam[1]) / np.maximum(beam[1], DIM)
     return {
         "hours_both_ways": float(len(change)),
         "dgp_as_beam": float(beam[0][most]),
