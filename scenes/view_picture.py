@@ -17,8 +17,7 @@ from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import View, fisheye, fitted, pixel_directions
 from mitsuba_cfs.methods.colour_view import coloured_picture
-from mitsuba_cfs.methods.glare import rated_pictures
-from mitsuba_cfs.methods.other_systems import glare_with
+from mitsuba_cfs.methods.glare import glare_with, rated_pictures
 from mitsuba_cfs.methods.point_in_time import PathLight, path_picture
 from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.progress import Progress, part, silent

@@ -24,10 +24,9 @@ from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
 from mitsuba_cfs.images.view import View, format_view
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.matrices.cache import digest as content_digest
-from mitsuba_cfs.methods.glare import hourly_glare, rated_pictures
+from mitsuba_cfs.methods.glare import bright_hours, glare_with, hourly_glare, rated_pictures
 from mitsuba_cfs.methods.light import SeasonalLight, seasonal_light
 from mitsuba_cfs.methods.optics import States
-from mitsuba_cfs.methods.other_systems import bright_hours, glare_with
 from mitsuba_cfs.methods.phase_light import PhaseLight, phase_light
 from mitsuba_cfs.methods.phase_matrices import (
     PhaseMatrices,
