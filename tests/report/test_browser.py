@@ -29,7 +29,7 @@ def test_page_works_in_a_browser(page, tmp_path, width, flags) -> None:
     found = inspect(page, tmp_path, *flags, width=width)
     assert found["faults"] == []
     assert found["scroll"] <= found["width"], "the page scrolls sideways"
-    # the orientation; of two rooms, the 3D view, and the second room's year of glare, shading state and loads
+    # orientation, two rooms, 3D view; the second room's year of glare, shading state and loads
     assert len(found["figures"]) == 1 + 2 * (5 + 1 + 5 + 6) + 1 + 3
     for name, *sizes in found["figures"]:
         assert sizes, f"{name} shows nothing"
