@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +108,7 @@ def _merged(name: str, rooms: Sequence[RoomZone]) -> RoomZone:
     )  # fmt: skip
 
 
-def _total(values: Iterable[FloatArray | float]):
+def _total(values: Iterable[Any]) -> Any:  # of numbers or arrays [H]
     return sum(values, start=0.0)
 
 
@@ -136,7 +137,7 @@ def _zone(name: str, zones: Sequence[Zone]) -> Zone:
     """One air of the zones' volume; what acts on the air is added up."""
     first, volume = zones[0], sum(zone.volume for zone in zones)
 
-    def mean(values: Iterable[FloatArray | float]):
+    def mean(values: Iterable[Any]) -> Any:
         """Air changes of all volumes by those of each."""
         return _total(v * z.volume for v, z in zip(values, zones, strict=True)) / volume
 
@@ -201,7 +202,7 @@ def _view_factors(zones: Sequence[Zone]) -> FloatArray | None:
 
 def _solar(rooms: Sequence[RoomZone]) -> Solar:
     """The sun of all faces and windows; what a room has none of is zero."""
-    joined: dict[str, NDArray | None] = {}
+    joined: dict[str, Any] = {}
     for name in SUNS:
         parts = [getattr(room.solar, name) for room in rooms]
         blank = [np.zeros((len(r.solar.inside), len(r.zone.windows))) for r in rooms]
