@@ -10,7 +10,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky import air
 from mitsuba_cfs.sky.epw import read_epw, spikes
 from mitsuba_cfs.sky.wea import read_wea, write_wea
-from mitsuba_cfs.sky.weather_table import EpwColumns, epw_location, year_of
+from mitsuba_cfs.sky.weather_table import EpwColumns, epw_ground, epw_location, year_of
 
 FEBRUARY_3_14H = 24 * (31 + 2) + 13  # row of the hour that ends at 14:00
 DNI, DRY, DEW, HUMIDITY, PRESSURE, INFRARED, COVER, WIND = 14, 6, 7, 8, 9, 12, 23, 21
@@ -290,6 +290,29 @@ def test_a_place_is_on_earth(number, name, most):
         with pytest.raises(DataError, match=f"a.epw: {name}: expected -{most} to {most}, got"):
             site(value)
     assert site(0).name == "City, XYZ"
+
+
+def test_ground_temperatures_are_those_of_each_depth():
+    blocks = [
+        ["0.5", "", "", "", *map(str, range(1, 13))],
+        ["2", "", "", "", *map(str, range(13, 25))],
+    ]
+
+    def ground(*fields: str):
+        return epw_ground(["", "", "", ",".join(["GROUND TEMPERATURES", *fields])], "a.epw")
+
+    depth, months = ground("2", *blocks[0], *blocks[1])
+    assert depth.tolist() == [0.5, 2.0]
+    np.testing.assert_array_equal(months, np.arange(1.0, 25.0).reshape(2, 12))
+    assert ground("0") == ground("") == (None, None)
+    for fields, words in (
+        (("2", *blocks[0]), "expected 32 fields for 2 depths, got 16"),
+        (("x", *blocks[0]), "expected a number, got 'x'"),
+        (("1", "deep", *blocks[0][1:]), "ground depth: expected a number, got 'deep'"),
+        (("1", *blocks[0][:-1], "cold"), "ground temperature: expected a number, got 'cold'"),
+    ):
+        with pytest.raises(DataError, match=f"a.epw: line 4: .*{words}"):
+            ground(*fields)
 
 
 UNITS = {"latitude": "deg", "longitude": "deg", "time zone": "h", "elevation": "m"}

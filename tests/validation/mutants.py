@@ -14,6 +14,7 @@ import ast
 import copy
 import inspect
 import json
+import logging
 import os
 import random
 import resource
@@ -246,6 +247,7 @@ def noticed(module: str, sources: list[str], tests: list[str]) -> list[bool]:
         child = os.fork()
         if child == 0:
             code = 1
+            logging.getLogger().setLevel(logging.WARNING)  # as in a run of pytest alone
             try:
                 sink = os.open(Path(folder) / "output", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
                 os.dup2(sink, 1)
