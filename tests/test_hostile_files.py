@@ -80,6 +80,18 @@ visible = 0.6
 """
 
 
+RING = [[8.0, 50.0], [8.001, 50.0], [8.001, 50.001], [8.0, 50.0]]
+FOOTPRINTS = {"type": "FeatureCollection", "features": [
+    {"type": "Feature", "properties": {"height": 9.0, "building:levels": "3", "name": "block"},
+     "geometry": {"type": "Polygon", "coordinates": [RING]}},
+    {"type": "Feature",
+     "properties": {"crown_radius": 3.0, "height": 8.0, "transmittance": "deciduous"},
+     "geometry": {"type": "Point", "coordinates": [8.0, 50.0]}},
+]}  # fmt: skip
+MESH = "o box\nv 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 5\nf 1 2 3\nf 1 3 4\nf 1 2 4\nf 2 3 4\n"
+TERRAIN = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 10\n1 2 3\n4 5 6\n"
+
+
 def klems(file: Path) -> None:
     values = np.random.default_rng(1).uniform(0, 0.1, (4, 41, 41))
     blocks = dict(zip(BLOCKS, values, strict=True))
@@ -239,6 +251,9 @@ ROWS = {
     "cityjson": Row("c.city.json", json_text(city({"a": ((0, 0, 0), (9, 9, 9))})),
                     mutators.of_json, read_surroundings),
     "citygml": Row("c.gml", text(model(WHOLE, PART, RELIEF)), mutators.of_xml, read_surroundings),
+    "geojson": Row("f.geojson", json_text(FOOTPRINTS), mutators.of_json, read_surroundings),
+    "mesh": Row("m.obj", text(MESH), mutators.of_text, read_surroundings),
+    "terrain": Row("t.asc", text(TERRAIN), mutators.of_text, read_surroundings),
     "horizon": Row("h.csv", text("A,H_hor\n-180,5\n-90,10\n0,3\n90,2\n"), mutators.of_text,
                    read_horizon),
     "picture": Row("p.hdr", picture, mutators.of_picture, glare_of),

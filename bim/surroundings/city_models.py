@@ -25,6 +25,7 @@ from bim.surroundings.objects import (
     TERRAIN,
     SurroundingObject,
     SurroundingsFile,
+    are_coordinates,
     read_object,
 )
 from bim.xml_elements import xml_elements
@@ -227,7 +228,7 @@ def _ring(side: Element, name: str, member: _Member) -> NDArray[np.float64]:
     except ValueError:
         message = "expected triples of numbers"
         raise _fault(message, lists[0], name, member) from None
-    if not (np.abs(points) < 1e12).all():
+    if not are_coordinates(points):
         raise _fault("expected finite numbers", lists[0], name, member)
     return points[:-1] if len(points) > 1 and (points[0] == points[-1]).all() else points
 
@@ -287,7 +288,7 @@ def _vertices(content: dict[str, Any], path: Path) -> NDArray[np.float64]:
     except (TypeError, ValueError, KeyError, OverflowError):
         message = "expected triples of numbers, and a transform of scale and translate"
         raise DataError(message, file=path, field="vertices") from None
-    if not np.isfinite(points).all():
+    if not are_coordinates(points):
         raise DataError("expected finite numbers", file=path, field="vertices")
     return points
 

@@ -16,7 +16,13 @@ import shapely.geometry
 from bim.georeference import LONGITUDE_LATITUDE, crs_name, local_metres
 from bim.planes import plane_through, polygons_of
 from bim.solids import prism, triangles_of
-from bim.surroundings.objects import SurroundingObject, SurroundingsFile, is_number, read_object
+from bim.surroundings.objects import (
+    SurroundingObject,
+    SurroundingsFile,
+    are_coordinates,
+    is_number,
+    read_object,
+)
 from bim.surroundings.trees import tree_of
 from mitsuba_cfs.errors import DataError
 
@@ -76,7 +82,7 @@ def _block(feature: Any, name: str, path: Path) -> list[SurroundingObject]:
         return []
     try:
         shape = shapely.make_valid(shapely.force_2d(shapely.geometry.shape(geometry)))
-        finite = bool(np.isfinite(shapely.get_coordinates(shape)).all())
+        finite = are_coordinates(shapely.get_coordinates(shape))
     except (ValueError, TypeError, LookupError, AttributeError, shapely.errors.ShapelyError):
         finite = False
     if not finite:

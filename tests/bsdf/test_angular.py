@@ -10,7 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.angular import AngularTable, check_specular, roos_table, stack_table
+from mitsuba_cfs.bsdf.angular import (
+    AngularTable,
+    check_specular,
+    glass_table,
+    roos_table,
+    stack_table,
+)
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, pane_values, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.errors import DataError
@@ -57,6 +63,22 @@ def test_a_stack_of_one_is_the_pane_and_of_clear_ones_passes_by_either_polarisat
     p = ((index * np.cos(THETA) - inner) / (index * np.cos(THETA) + inner)) ** 2
     expected = np.mean([1 - 4 * r / (1 + 3 * r) for r in (s, p)], axis=0)
     assert table.transmitted(THETA) == pytest.approx(expected, abs=2e-4)
+
+
+def test_glass_passes_fresnels_shares_and_absorbs_along_its_way():
+    """Of either polarisation (1 - r)^2 a / (1 - r^2 a^2), a of the way inside (Radiance, 3.2)."""
+    for index, through in ((1.52, 0.96), (1.5, 1.0)):
+        cosine = np.cos(THETA)
+        inner = np.sqrt(1 - (np.sin(THETA) / index) ** 2)
+        s = ((cosine - index * inner) / (cosine + index * inner)) ** 2
+        p = ((index * cosine - inner) / (index * cosine + inner)) ** 2
+        a = through ** (1 / inner)
+        passed = np.mean([(1 - r) ** 2 * a / (1 - (r * a) ** 2) for r in (s, p)], axis=0)
+        back = [r + r * (1 - r) ** 2 * a**2 / (1 - (r * a) ** 2) for r in (s, p)]
+        table = glass_table([(through, index)])
+        assert table.transmitted(THETA) == pytest.approx(passed, abs=2e-4)
+        for side in ("front", "back"):
+            assert table.reflected(side, THETA) == pytest.approx(np.mean(back, axis=0), abs=2e-4)
 
 
 def test_a_turned_stack_reflects_its_other_side():
