@@ -33,7 +33,9 @@ from _pytest import main as pytest_main
 from mitsuba_cfs.source_code import OWN
 from tests.conftest import REPOSITORY
 
-MODULES = {  # files, and their quick tests; none that numba compiles, whose code is cached on disk
+# Files, and their quick tests: none that numba compiles, whose code is cached on disk, and no test
+# that traces in this process, whose threads a fork does not have
+MODULES = {
     "thermal/comfort": ["thermal/test_comfort"],
     "thermal/conduction": ["thermal/test_conduction"],
     "thermal/climate": ["thermal/test_climate"],
@@ -76,7 +78,7 @@ MODULES = {  # files, and their quick tests; none that numba compiles, whose cod
     "bim/gbxml/document": ["bim/test_read_gbxml"],
     "bim/gbxml/use": ["bim/test_read_gbxml", "bim/test_stated_use"],
     "mitsuba_cfs/files": ["scenes/test_result_folder", "scenes/test_csv_text", "test_finite"],
-    "scenes/result_folder": ["scenes/test_result_folder", "scenes/test_folders_of_results"],
+    "scenes/result_folder": ["scenes/test_result_folder"],
     "scenes/toml_file": ["scenes/test_toml_file"],
 }
 SWAPPED = {
