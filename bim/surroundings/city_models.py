@@ -221,10 +221,9 @@ def _block(feature: Any, name: str, path: Path) -> list[SurroundingObject]:
         return []
     try:
         shape = shapely.make_valid(shapely.force_2d(shapely.geometry.shape(geometry)))
-        finite = are_coordinates(shapely.get_coordinates(shape))
     except (ValueError, TypeError, LookupError, AttributeError, shapely.errors.ShapelyError):
-        finite = False
-    if not finite:
+        shape = None
+    if shape is None or not are_coordinates(shapely.get_coordinates(shape)):
         raise DataError("is no polygon", file=path, element=name, field="geometry.coordinates")
     label = str(fields.get("name") or fields.get("id") or name)[:60]
     return [
