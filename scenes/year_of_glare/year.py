@@ -62,7 +62,7 @@ class ViewYear:
     ratings: pd.DataFrame  # [L, figures] by the time of each lit hour
     pictures: dict[pd.Timestamp, tuple[NDArray[np.float32], GlareResult]]  # none for sDGP
     seconds: float
-    sunny_hour_error: float = 0.0  # of DGP by three phases, see `sunny_hour_dgp_error`
+    sunny_hour_error: float = 0.0  # of three-phase DGP, see `sunny_hour_dgp_error`
     as_lobe: dict[str, float] = field(default_factory=dict)  # of `lobe_effect`
 
 
