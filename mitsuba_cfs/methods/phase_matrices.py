@@ -265,7 +265,6 @@ def with_sunlit(matrices: PhaseMatrices) -> PhaseMatrices:
     interior, parts = matrices.scene.interior, matrices.parts.groups
     sunlit = window_sunlit_shares(
         matrices.scenes.scene(interior, parts),
-        interior,
         samples=_exchange_samples(matrices.sampling, parts, EXCHANGE_SHARE),
         seed=matrices.sampling.seed,
     )
