@@ -11,6 +11,7 @@ from mitsuba_cfs.methods.coefficients import (
     GroupCoefficients,
     beam_matrix,
     direct_daylight,
+    reflected_shares,
     sensor_matrix,
     without_straight,
 )
@@ -27,7 +28,6 @@ from mitsuba_cfs.methods.subdivision import coarse_sky
 from mitsuba_cfs.methods.window_reflection import (
     reflects,
     reflects_outdoors,
-    shares_before_windows,
     variance_by_outdoors,
     variance_by_room,
     with_exchange_of,
@@ -131,7 +131,7 @@ def _exchange_variance(
     if outwards and matrices.outdoor_exchange is not None:
         if light.reflected is not None:
             before = before + replaced_luminance(light.reflected, some) / len(sky.lit)
-        shares = shares_before_windows(matrices, view.values, optics)
+        shares = reflected_shares(matrices, optics).before
         variance += variance_by_outdoors(shares, matrices.outdoor_exchange, optics, before)
     return variance
 
