@@ -5,7 +5,6 @@ from .surroundings.placement import with_surroundings as with_surroundings
 from .fenestration import ShadingState as ShadingState
 from .gbxml.building import read_gbxml as read_gbxml
 from .gbxml.write import write_gbxml as write_gbxml
-from .georeference import Georeference as Georeference
 from .honeybee.building import read_honeybee as read_honeybee
 from .honeybee.write import write_honeybee as write_honeybee
 from .ifc.building import read_ifc as read_ifc
@@ -17,6 +16,7 @@ from .model import (
     Construction as Construction,
     Element as Element,
     Face as Face,
+    Georeference as Georeference,
     MaterialLayer as MaterialLayer,
     Room as Room,
     Space as Space,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from bim.energyplus_windows import WindowOptics
 from bim.model import Window
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf, BsdfFile
-from mitsuba_cfs.bsdf.resample import klems_of
+from mitsuba_cfs.bsdf.evaluate import klems_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from .bsdf.generate import (
     generate_klems as generate_klems,
     generate_tensor_tree as generate_tensor_tree,
 )
+from .bsdf.evaluate import klems_of as klems_of
 from .bsdf.glazing import (
     Glazing as Glazing,
     Pane as Pane,
@@ -19,7 +20,6 @@ from .bsdf.klems import KLEMS_FULL as KLEMS_FULL, KlemsBasis as KlemsBasis, Klem
 from .bsdf.layers import LayeredSystem as LayeredSystem, combine_layers as combine_layers
 from .bsdf.periodic import PeriodicLayer as PeriodicLayer, SlatMaterial as SlatMaterial
 from .bsdf.plugin import klems_plugin as klems_plugin
-from .bsdf.resample import klems_of as klems_of
 from .bsdf.tensor_plugin import tensor_tree_plugin as tensor_tree_plugin
 from .bsdf.tensor_tree import TensorTreeBsdf as TensorTreeBsdf
 from .bsdf.xml import read_bsdf_xml as read_bsdf_xml

@@ -17,7 +17,7 @@ from bim.doorways import opened, source_rooms
 from bim.model import Building, Space
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, part, silent
-from mitsuba_cfs.sky.albedo import with_albedo
+from mitsuba_cfs.sky.annual import with_albedo
 from mitsuba_cfs.sky.weather import Weather
 from scenes.chosen_rooms import chosen_spaces, named_spaces
 from scenes.fenestration.resolver import fill_windows, window_sources

@@ -17,8 +17,8 @@ import pytest
 
 from bim.building_file import read_building_file
 from bim.ifc.corrections import read_corrections
-from bim.surroundings.horizon import read_horizon
 from bim.surroundings.placement import read_surroundings
+from bim.surroundings.terrain import read_horizon
 from mitsuba_cfs.bsdf.klems import KLEMS_QUARTER, KlemsBsdf
 from mitsuba_cfs.bsdf.measured_file import read_measurement
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf

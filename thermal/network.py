@@ -2,6 +2,9 @@
 
 Faces (axis N) are the inside faces of all zones: per zone its opaque surfaces, its windows, its
 window frames, in this order.
+
+The arrays hold outdoor air, air between zones, emitters, and longwave exchange between the inside
+faces of a room and from outside faces to the sky.
 """
 
 from __future__ import annotations
@@ -10,16 +13,195 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from thermal.air_paths import AirPaths, Emitters, air_paths, emitters, slab_faces
 from thermal.conduction import WallGrid, WallModes, wall_grid
 from thermal.convection import DOE2_LEEWARD, DOE2_WINDWARD, local_wind_factor
 from thermal.elimination import Elimination, elimination
 from thermal.errors import require
-from thermal.longwave import exchange_from_view_factors, exchange_star, outside_factors
-from thermal.ventilation import AirTransfer
+from thermal.ventilation import AirTransfer, SupplyAir, WindowAiring
 from thermal.zone import ROUGHNESS, Layer, OpaqueSurface, WindowElement, Zone
+
+
+def exchange_from_view_factors(
+    area: ArrayLike, emissivity: ArrayLike, view_factors: ArrayLike
+) -> NDArray[np.float64]:
+    """Exchange areas X [N, N] [m2] of grey surfaces: Q_ij = X_ij sigma (T_i^4 - T_j^4).
+
+    Hottel's total exchange areas; X is symmetric, and A_i eps_i = sum_j X_ij with j = i included.
+    The view factors are first made to obey reciprocity and to sum to one (a few Sinkhorn steps),
+    so that traced ones with their noise conserve energy.
+
+    Source: Hottel and Sarofim 1967, Radiative Transfer, ch. 3.
+    """
+    a, eps = np.asarray(area, dtype=float), np.asarray(emissivity, dtype=float)
+    f = np.asarray(view_factors, dtype=float)
+    n = len(a)
+    require(f.shape == (n, n), "view factors", f"expected [{n}, {n}], got {f.shape}")
+    require(bool(np.all(f >= -1e-9)), "view factors", "negative")
+    sums = f.sum(axis=1)
+    require(bool(np.all(np.abs(sums - 1.0) < 0.1)), "view factors", f"rows sum to {sums.round(3)}")
+    direct = closed_exchange(a[:, None] * f, a)
+    rho_over = (1.0 - eps) / a
+    radiosity = np.linalg.inv(np.eye(n) - rho_over[:, None] * direct)
+    return (eps[:, None] * direct) @ radiosity * eps[None, :]
+
+
+def closed_exchange(direct: ArrayLike, area: ArrayLike) -> NDArray[np.float64]:
+    """Direct exchange areas [N, N] made symmetric with rows that sum to the areas [N]."""
+    s = np.asarray(direct, dtype=float)
+    s = 0.5 * (s + s.T)
+    a = np.asarray(area, dtype=float)
+    for _ in range(200):
+        scale = np.sqrt(a / np.maximum(s.sum(axis=1), 1e-12))
+        s = s * scale[:, None] * scale[None, :]
+        if np.max(np.abs(s.sum(axis=1) - a)) < 1e-10 * a.max():
+            break
+    return s
+
+
+def exchange_star(area: ArrayLike, emissivity: ArrayLike) -> NDArray[np.float64]:
+    """Exchange areas X [N, N] [m2] of a mean radiant star, for rooms without view factors.
+
+    Each surface sees a common radiant node through A/(1/F + (1 - eps)/eps); the F close the
+    enclosure.  The node is eliminated: X_ij = g_i g_j / sum g.
+
+    Source: Carroll 1980, A comparison of methods for modelling radiant heat exchange, ASHRAE
+    Transactions 86; EnergyPlus Engineering Reference ("CarrollMRT").
+    """
+    a, eps = np.asarray(area, dtype=float), np.asarray(emissivity, dtype=float)
+    f = np.ones_like(a)
+    for _ in range(500):
+        fresh = 1.0 / np.maximum(1.0 - a * f / np.sum(a * f), 1e-3)
+        if np.max(np.abs(fresh - f)) < 1e-12:
+            break
+        f = 0.5 * (f + fresh)
+    g = a / (1.0 / f + (1.0 - eps) / np.maximum(eps, 1e-6))
+    return g[:, None] * g[None, :] / g.sum()
+
+
+def area_view_factors(area: ArrayLike, normals: ArrayLike) -> NDArray[np.float64]:
+    """View factors [N, N] by area among surfaces that do not face the same way (EnergyPlus)."""
+    a, n = np.asarray(area, dtype=float), np.asarray(normals, dtype=float)
+    apart = (n @ n.T) < np.cos(np.radians(10.0))
+    seen = apart * a[None, :]
+    total = seen.sum(axis=1, keepdims=True)
+    require(bool(np.all(total > 0)), "view factors", "a surface sees no other")
+    return seen / total
+
+
+def outside_factors(normal_z: float, sky_seen: float = 1.0) -> tuple[float, float, float]:
+    """Shares (sky, air, ground) of the longwave exchange of an outside face.
+
+    The sky half of a tilted face splits into sky and air by beta = sqrt((1 + cos tilt)/2)
+    (Walton 1983; EnergyPlus).  What hides the sky counts with the ground, at the temperature of
+    the air: F_sky = sky_seen (1 + cos tilt)/2 (EnergyPlus; ISO 52016-1 6.5.13.3 likewise takes the
+    sky's share with obstacles off).
+
+    Args: normal_z: z component of the exterior normal; sky_seen: share of the sky that is not
+        hidden by obstructions.
+    """
+    half = 0.5 * (1.0 + normal_z)
+    beta, seen = np.sqrt(half), half * sky_seen
+    return float(seen * beta), float(seen * (1.0 - beta)), float(1.0 - seen)
+
+
+SITE_HEIGHT = 10.0  # [m] of the wind that EN 16798-7 takes for open windows
+_SHUT = WindowAiring(0.0, 0.0, share=0.0)
+
+
+class AirPaths(NamedTuple):
+    """Air flows into the zones Z."""
+
+    leak: NDArray[np.float64]  # [Z, 8] a, b, c, d, s, m, w, n of `Leakage`
+    wind: NDArray[np.float64]  # [Z] of the weather's, at the zone's height
+    airing: NDArray[np.float64]  # [Z, 4] w, s, 1 where both are added, constant flow
+    # [Z, 6] opened above, closed below [degC], least difference [K], greatest wind, least outdoor,
+    # 1 where the zone may be heated while they are open
+    opens: NDArray[np.float64]
+    site: float  # wind on the site, of the weather's
+    fan: NDArray[np.float64]  # [Z, 3] recovery, bypass above, least temperature
+    bridges: NDArray[np.float64]  # [Z] [W/K]
+    transfer: NDArray[np.int64]  # [Q, 2] zone that gives air, zone that takes it
+    beside: NDArray[np.int64]  # [D] zone of each opening to a neighbour of known temperature
+    buoyant: NDArray[np.float64]  # [D] its flow each way at |dT| = T [m3/s]
+
+
+class Emitters(NamedTuple):
+    """Heating and cooling of the zones Z."""
+
+    radiant: NDArray[np.float64]  # [Z, 2] share of heating and cooling
+    slab: NDArray[np.int64]  # [Z] face, -1 without
+    power: NDArray[np.float64]  # [Z, 3] of the slab: heating, cooling [W], band [K]
+
+
+def air_paths(zones: Sequence[Zone], transfers: Sequence[AirTransfer], terrain: str) -> AirPaths:
+    """The air of the zones."""
+    leaks, index = [zone.leakage for zone in zones], {zone.name: z for z, zone in enumerate(zones)}
+    airings = [zone.airing or _SHUT for zone in zones]
+    fans = [zone.supply or SupplyAir(0.0) for zone in zones]
+    for one in transfers:
+        for name in (one.source, one.target):
+            require(name in index, "air between zones", f"no zone {name!r} is simulated")
+    pairs = [(index[one.source], index[one.target]) for one in transfers]
+    openings = [(z, one) for z, zone in enumerate(zones) for one in zone.beside]
+    return AirPaths(
+        leak=np.array(
+            [(*x.factors, x.stack, x.stack_exponent, x.wind, x.wind_exponent) for x in leaks]
+        ),
+        wind=np.array([local_wind_factor(_height(zone), terrain) for zone in zones]),
+        airing=np.array([(x.wind, x.stack, float(x.both), x.flow) for x in airings]),
+        opens=np.array(
+            [(x.open_above_c, x.close_below_c, x.least_difference, x.greatest_wind,
+              x.least_outdoor_c, float(x.heating_while_open)) for x in airings]
+        ),
+        site=local_wind_factor(SITE_HEIGHT, terrain),
+        fan=np.array([(x.recovery, x.bypass_above_c, x.least_c) for x in fans]),
+        bridges=np.array([zone.bridges for zone in zones]),
+        transfer=np.array(pairs, dtype=np.int64).reshape(-1, 2),
+        beside=np.array([z for z, _ in openings], dtype=np.int64),
+        buoyant=np.array([one.buoyant for _, one in openings], dtype=np.float64),
+    )  # fmt: skip
+
+
+def slab_faces(zones: Sequence[Zone]) -> list[int]:
+    """The face of each zone's heated slab among the faces of all, -1 without one."""
+    face, found = 0, []
+    for zone in zones:
+        found.append(-1 if zone.slab is None else face + zone.index_of(zone.slab.surface))
+        frames = sum(window.frame_area > 0 for window in zone.windows)
+        face += len(zone.surfaces) + len(zone.windows) + frames
+    return found
+
+
+def emitters(
+    zones: Sequence[Zone], slabs: Sequence[int], mode_count: NDArray[np.uint64]
+) -> Emitters:
+    """The emitters of the zones; slabs: their faces; mode_count: [N] of the faces' own walls."""
+    power = []
+    for zone, face in zip(zones, slabs, strict=True):
+        here = zone.slab
+        if here is None:
+            power.append((0.0, 0.0, 1.0))
+            continue
+        item = f"heated slab {here.surface}"
+        require(mode_count[face] > 0, item, "its layers belong to the zone at its other side")
+        power.append((here.heating_limit, here.cooling_limit, here.band))
+    loads = [zone.loads for zone in zones]
+    return Emitters(
+        radiant=np.array([(x.heating_radiant, x.cooling_radiant) for x in loads]),
+        slab=np.array(slabs, dtype=np.int64),
+        power=np.array(power),
+    )
+
+
+def _height(zone: Zone) -> float:
+    """Mean height [m] of what faces outdoors, weighted by area."""
+    out = [s for s in zone.surfaces if s.outside == "outdoor"] + list(zone.windows)
+    if not out:
+        return 1.5
+    return float(np.average([e.height for e in out], weights=[e.area for e in out]))
+
 
 OUTDOOR, KNOWN, ADIABATIC, TWIN, PARTITION, PARTNER, WINDOW = range(7)
 _CODES = {"outdoor": OUTDOOR, "ground": KNOWN, "known": KNOWN, "adiabatic": ADIABATIC}

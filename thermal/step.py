@@ -2,9 +2,21 @@
 
 Backward Euler: the inside faces of all zones and their air are solved together, with the walls
 eliminated to two-ports and the outer window layers to conductances.  Film coefficients, longwave
-coefficients and layer resistances are those of the last iterate.  What the plants do is guessed and
-changed until temperatures and loads agree with it.  The equations that are solved are
+coefficients and layer resistances are those of the last iterate.  The equations that are solved are
 linear, so their energy balance closes to rounding whatever the number of iterations.
+
+Plants and opened windows: a plant is free, holds a set point, or is at its limit; windows are shut,
+fully open, or partly open to hold a temperature. Their modes are guessed, and changed until
+temperatures and loads agree with it: the system is an M-matrix with bounds, for which that ends.
+Source: Hintermueller, Ito and Kunisch 2002, doi:10.1137/S1052623401383558 (primal-dual active
+sets).
+
+Outdoor air and the slab: leaks, the flow through opened windows and the slab follow the air of the
+last iterate. Windows open where the air of the step would rise above their upper limit, and close
+where shut it would not exceed the lower one. Where fully open it would fall below the lower limit,
+they are open in part and hold it. The bypass of a heat recovery likewise holds its temperature (or
+the one above which the room would be cooled); it is shut while the room is heated. So no on and off
+is left that the time step would have to resolve.
 """
 
 from __future__ import annotations
@@ -12,7 +24,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.air_flow import OPEN, set_air_flows, set_slab, start_air_flows
 from thermal.climate import SIGMA
 from thermal.convection import (
     constant_inside,
@@ -34,16 +45,6 @@ from thermal.network import (
     Modes,
     Network,
 )
-from thermal.plant import (
-    FREE,
-    PASSES,
-    VENTS,
-    close_air,
-    is_held,
-    plants_agree,
-    radiant_load,
-    set_point,
-)
 from thermal.records import (
     AIR_HEAT,
     Drive,
@@ -54,6 +55,320 @@ from thermal.records import (
     inlined,
     summed,
 )
+from thermal.ventilation import REFERENCE_DENSITY
+
+SHUT, OPEN = 0, 1  # windows of a zone in an iterate
+TOO_WARM_SHUT, TOO_COLD_OPEN = 2, 4  # what was tried in the step, added to these
+
+
+@inlined
+def start_air_flows(
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
+    t: int, hour: int,
+) -> None:  # fmt: skip
+    """Set the limits of windows and bypass of every zone for the step."""
+    for z in range(work.flow.size):
+        _set_limits(net, state, work, weather, drive, t, z)
+        above = max(min(net.paths.fan[z, 1], drive.cooling_c[t, z]), drive.heating_c[t, z])
+        work.bypass_c[z] = above
+        work.bypass[z] = OPEN if state.air[z] > above else SHUT
+
+
+@inlined
+def set_air_flows(
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
+    t: int, hour: int,
+) -> None:  # fmt: skip
+    """Set the air of every zone from outdoors, through its windows when open, and from its fan."""
+    for z in range(work.flow.size):
+        _set_supply(net, state, work, weather, drive, t, hour, z)
+        work.flow[z] = drive.airflow[hour, z] + _leaks(net, state, weather, drive, t, hour, z)
+        work.airing[z, 2] = 0.0
+        if drive.airing[hour, z] > 0.0:
+            work.airing[z, 2] = _airing(net, state, work, weather, drive, t, hour, z)
+
+
+@inlined
+def _leaks(
+    net: Network, state: State, weather: OutdoorConditions, drive: Drive, t: int, hour: int, z: int
+) -> float:
+    a, b, c, d, s, m, w, n = net.paths.leak[z]
+    gap, v = abs(state.air[z] - weather.outdoor[t]), weather.speed[t] * net.paths.wind[z]
+    flow = drive.leaks[hour, z] * (a + b * gap + c * v + d * v * v)
+    if s > 0.0 or w > 0.0:
+        stack, wind = s * gap**m, w * v**n
+        flow += np.sqrt(stack * stack + wind * wind)
+    return flow
+
+
+@inlined
+def _set_limits(
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
+    t: int, z: int,
+) -> None:  # fmt: skip
+    """Air temperatures at which the windows close and open."""
+    above, below, difference = net.paths.opens[z, 0], net.paths.opens[z, 1], net.paths.opens[z, 2]
+    lower = max(below, weather.outdoor[t] + difference)
+    if net.paths.opens[z, 5] == 0.0:
+        lower = max(lower, drive.heating_c[t, z])
+    upper = max(above, lower)
+    work.airing[z, 0], work.airing[z, 1] = lower, upper
+    work.windows[z] = OPEN if state.opened[z] else SHUT
+
+
+@inlined
+def _airing(
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
+    t: int, hour: int, z: int,
+) -> float:  # fmt: skip
+    """Air through the windows when open [m3/s]; 0 where they must stay shut."""
+    greatest, least_out = net.paths.opens[z, 3], net.paths.opens[z, 4]
+    v, out = weather.speed[t] * net.paths.site, weather.outdoor[t]
+    if v > greatest or out < least_out or work.airing[z, 0] > drive.cooling_c[t, z]:
+        return 0.0
+    w, s, both, flow = net.paths.airing[z]
+    wind, stack = w * v * v, s * abs(state.air[z] - out)
+    squared = wind + stack if both > 0.0 else max(wind, stack)
+    flow += REFERENCE_DENSITY / weather.density[t] * np.sqrt(squared)
+    return drive.airing[hour, z] * flow
+
+
+@inlined
+def _set_supply(
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
+    t: int, hour: int, z: int,
+) -> None:  # fmt: skip
+    """Set the air of a fan with all heat recovered, and with what its least lets it bypass."""
+    full = weather.density[t] * AIR_HEAT * drive.supply[hour, z]
+    given, inside, out = drive.supply_c[t, z], state.air[z], weather.outdoor[t]
+    recovery, bypass, least = net.paths.fan[z]
+    shut, passed = work.recovered[z], work.bypassed[z]
+    passed[0], passed[1] = 0.0, 0.0
+    if not np.isnan(given):
+        shut[0], shut[1], shut[2] = full, full * given, 0.0
+        return
+    reached = out + recovery * (inside - out)
+    if reached < least:
+        shut[0], shut[1], shut[2] = full, full * least, full * (least - reached)
+        return
+    shut[0] = full * (1.0 - recovery)
+    shut[1], shut[2] = shut[0] * out, 0.0
+    if recovery > 0.0 and out < inside and np.isfinite(bypass):
+        passed[0], passed[1] = full, full * max(out, least)
+
+
+@inlined
+def set_slab(net: Network, state: State, work: Workspace, drive: Drive, t: int, z: int) -> None:
+    """Set the power of a zone's slab, by the air of the last iterate."""
+    face = net.emitters.slab[z]
+    full_heat, full_cold, band = net.emitters.power[z]
+    lacks = (drive.slab_c[t, z, 0] - state.air[z]) / band + 0.5
+    exceeds = (state.air[z] - drive.slab_c[t, z, 1]) / band + 0.5
+    power = full_heat * min(max(lacks, 0.0), 1.0) - full_cold * min(max(exceeds, 0.0), 1.0)
+    work.slab[z] = power
+    work.source[face] = power / net.faces.area[face]
+
+
+FREE, HEATS, HEATS_FULLY, COOLS, COOLS_FULLY = range(5)  # what the plant of a zone does
+VENTS = 5  # windows, partly open, hold the air at their lower limit
+PASSES = 6  # the bypass of the heat recovery, partly open, holds the air at its temperature
+ROUNDING = 1e-10  # of temperatures [K]
+RADIANT_PART = 1e-4  # that the shares of a load may be off, of it
+LEAST_REPLY = 0.01  # of the load's other part, less by each watt that is radiant
+
+
+@inlined
+def is_held(plant: int) -> bool:
+    """Whether plant, windows or bypass hold the air of their zone at a temperature."""
+    return plant == HEATS or plant == COOLS or plant >= VENTS
+
+
+@inlined
+def set_point(work: Workspace, drive: Drive, t: int, z: int) -> float:
+    """The air temperature that plant, windows or bypass hold [degC]."""
+    plant = work.plant[z]
+    if plant == VENTS:
+        return work.airing[z, 0]
+    if plant == PASSES:
+        return work.bypass_c[z]
+    return drive.heating_c[t, z] if plant == HEATS else drive.cooling_c[t, z]
+
+
+@inlined
+def radiant_load(net: Network, work: Workspace, drive: Drive, z: int) -> float:
+    """What a plant radiates [W], as guessed where it holds a set point."""
+    plant, share = work.plant[z], net.emitters.radiant[z]
+    if plant == HEATS_FULLY:
+        return share[0] * drive.limit[z, 0]
+    if plant == COOLS_FULLY:
+        return -share[1] * drive.limit[z, 1]
+    return work.radiant[z] if plant == HEATS or plant == COOLS else 0.0
+
+
+@inlined
+def close_air(
+    net: Network, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int
+) -> None:
+    """Rows of the air: the plant holds the set point, or gives a known load."""
+    n, place, pairs = net.faces.area.size, net.system.place, net.couplings
+    d, b = work.diagonal, work.right
+    for z in range(work.plant.size):
+        k, plant = place[n + z], work.plant[z]
+        if is_held(plant):
+            d[k], b[k] = 1.0, set_point(work, drive, t, z)
+            continue
+        d[k], b[k] = work.air[z, 0], work.air[z, 1]
+        if plant == HEATS_FULLY:
+            b[k] += (1.0 - net.emitters.radiant[z, 0]) * drive.limit[z, 0]
+        elif plant == COOLS_FULLY:
+            b[k] -= (1.0 - net.emitters.radiant[z, 1]) * drive.limit[z, 1]
+    heat = weather.density[t] * AIR_HEAT
+    for q in range(pairs.link.size):
+        z, y = pairs.zones[q]
+        if is_held(work.plant[z]) and not is_held(work.plant[y]):
+            b[place[n + y]] += heat * pairs.link[q] * b[place[n + z]]
+        elif is_held(work.plant[y]) and not is_held(work.plant[z]):
+            b[place[n + z]] += heat * pairs.link[q] * b[place[n + y]]
+
+
+@inlined
+def plants_agree(
+    net: Network, work: Workspace, state: State, weather: OutdoorConditions, drive: Drive, t: int
+) -> bool:
+    """Set the loads; whether each plant does what its zone's temperature asks, else it changes."""
+    faces, pairs, x = net.faces, net.couplings, work.unknown
+    n, heat = faces.area.size, weather.density[t] * AIR_HEAT
+    for i in range(n):
+        work.air[faces.zone[i], 1] += faces.area[i] * work.film[i] * x[i]
+    for q in range(pairs.link.size):
+        z, y = pairs.zones[q]
+        work.air[z, 1] += heat * pairs.link[q] * x[n + y]
+        work.air[y, 1] += heat * pairs.link[q] * x[n + z]
+    agree = True
+    for z in range(work.plant.size):
+        air, stiffness, plant = x[n + z], work.air[z, 0], work.plant[z]
+        state.load[z] = asked = 0.0
+        if plant == VENTS:
+            asked = stiffness * air - work.air[z, 1]
+            work.aired[z] = asked / (heat * (weather.outdoor[t] - air))
+        elif plant == PASSES:
+            work.supply[z, 1] = stiffness * air - work.air[z, 1]
+        elif is_held(plant):
+            convective = stiffness * air - work.air[z, 1]
+            state.load[z] = convective + work.radiant[z]
+            asked = _whole_load(net, work, z, convective)
+            agree &= abs(state.load[z] - asked) <= RADIANT_PART * (1.0 + abs(asked))
+        elif plant == HEATS_FULLY:
+            state.load[z] = drive.limit[z, 0]
+        elif plant == COOLS_FULLY:
+            state.load[z] = -drive.limit[z, 1]
+        if plant < VENTS:
+            work.plant[z] = _plant(plant, air, asked, stiffness * ROUNDING, drive, t, z)
+        agree &= work.plant[z] == plant
+        agree &= _windows_agree(work, z, air)
+        agree &= _bypass_agrees(work, z, air)
+        if work.plant[z] != HEATS and work.plant[z] != COOLS:
+            work.radiant[z] = 0.0
+    return agree
+
+
+@inlined
+def _windows_agree(work: Workspace, z: int, air: float) -> bool:
+    """Whether the windows do what this air temperature asks, else they change."""
+    lower, upper, full = work.airing[z]
+    if work.plant[z] == VENTS:
+        if 0.0 <= work.aired[z] <= full:
+            return True
+        work.plant[z], work.windows[z] = FREE, OPEN if work.aired[z] > full else SHUT
+        return False
+    work.windows[z], agree, holds = _opening(work.windows[z], air, lower, upper, full > 0.0)
+    if holds:
+        work.plant[z] = VENTS
+    return agree
+
+
+@inlined
+def _bypass_agrees(work: Workspace, z: int, air: float) -> bool:
+    """Whether the bypass does what this air temperature asks, else it changes."""
+    limit, full = work.bypass_c[z], work.bypassed[z, 0]
+    if work.plant[z] == PASSES:
+        coldest = work.bypassed[z, 1]
+        warmest = work.recovered[z, 1] + (full - work.recovered[z, 0]) * air
+        if full > 0.0 and coldest <= work.supply[z, 1] <= warmest:
+            return True
+        work.plant[z] = FREE
+        work.bypass[z] = OPEN if full > 0.0 and work.supply[z, 1] < coldest else SHUT
+        return False
+    if work.plant[z] == COOLS or work.plant[z] == COOLS_FULLY:
+        air = np.inf  # too warm, though it is held
+    work.bypass[z], agree, holds = _opening(work.bypass[z], air, limit, limit, full > 0.0)
+    if holds:
+        work.plant[z] = PASSES
+    return agree
+
+
+@inlined
+def _opening(
+    opening: int, air: float, lower: float, upper: float, possible: bool
+) -> tuple[int, bool, bool]:
+    """What it does next, whether that is what it does, and whether it is partly open and holds.
+
+    It opens above the upper temperature and closes below the lower one [degC].
+    """
+    if opening & OPEN:
+        if possible and air >= lower - ROUNDING:
+            return opening, True, False
+        if opening & TOO_WARM_SHUT and possible:
+            return opening, False, True
+        return SHUT | TOO_COLD_OPEN, False, False
+    limit = lower if opening & TOO_COLD_OPEN else upper
+    if not possible or air <= limit + ROUNDING:
+        return opening, True, False
+    if opening & TOO_COLD_OPEN:
+        return opening, False, True
+    return OPEN | TOO_WARM_SHUT, False, False
+
+
+@inlined
+def _whole_load(net: Network, work: Workspace, z: int, convective: float) -> float:
+    """The load [W] whose parts have the plant's shares; its radiant part is the next guess.
+
+    The convective part falls linearly with the radiant one: by the slope between the last two.
+    """
+    plant, radiant, seen = work.plant[z], work.radiant[z], work.radiant_seen[z]
+    share = net.emitters.radiant[z, 0 if plant == HEATS else 1]
+    if share == 0.0:
+        work.radiant[z] = 0.0
+        return convective + radiant
+    if abs(radiant - seen[1]) > 1e-3:
+        seen[2] = min(max((seen[0] - convective) / (radiant - seen[1]), LEAST_REPLY), 1.0)
+    seen[0], seen[1] = convective, radiant
+    whole = (convective + seen[2] * radiant) / (1.0 - share + share * seen[2])
+    work.radiant[z] = share * whole
+    return whole
+
+
+@inlined
+def _plant(
+    plant: int, air: float, load: float, rounding: float, drive: Drive, t: int, z: int
+) -> int:
+    """What the plant must do where, doing `plant`, it gives this air temperature and load."""
+    if plant == HEATS:
+        if load > drive.limit[z, 0]:
+            return HEATS_FULLY
+        return HEATS if load >= -rounding else FREE
+    if plant == COOLS:
+        if -load > drive.limit[z, 1]:
+            return COOLS_FULLY
+        return COOLS if load <= rounding else FREE
+    if plant == HEATS_FULLY:
+        return HEATS if air > drive.heating_c[t, z] + ROUNDING else plant
+    if plant == COOLS_FULLY:
+        return COOLS if air < drive.cooling_c[t, z] - ROUNDING else plant
+    if air < drive.heating_c[t, z] - ROUNDING:
+        return HEATS
+    return COOLS if air > drive.cooling_c[t, z] + ROUNDING else FREE
+
 
 MOST_CHANGES = 50  # of the plants in an iterate; each changes a few times at the most
 

@@ -18,7 +18,7 @@ from bim.defaults import air_layer, resistance_layer
 from bim.honeybee.library import NamedObjects
 from bim.model import Construction, MaterialLayer
 from bim.polygon_rooms import GlazingValues
-from mitsuba_cfs.bsdf.pane_stack import PaneOptics, stack
+from mitsuba_cfs.bsdf.glazing import PaneOptics, stack
 from mitsuba_cfs.errors import DataError
 from thermal.errors import ThermalInputError
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit

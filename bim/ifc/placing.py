@@ -10,11 +10,11 @@ import ifcopenshell.util.unit
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.georeference import Georeference, crs_name
 from bim.ifc.damage import Damage, placement_of
 from bim.ifc.north import map_conversions
 from bim.ifc.project import length_scale
 from bim.ifc.shapes import Shape
+from bim.model import Georeference, crs_name
 from bim.report.issue import Issue
 
 FAR_OFF = 5000.0  # coordinates beyond this cost precision [m]

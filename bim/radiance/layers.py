@@ -33,11 +33,11 @@ from bim.radiance.patterns import (
 from bim.radiance.scene import RadianceObject
 from bim.report.issue import Issue
 from mitsuba_cfs.bsdf.angular import ANGLES, AngularTable
+from mitsuba_cfs.bsdf.evaluate import klems_of
+from mitsuba_cfs.bsdf.glazing import PaneOptics, stack
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.lobe import NARROWEST, lobe_tree
-from mitsuba_cfs.bsdf.pane_stack import PaneOptics, stack
-from mitsuba_cfs.bsdf.resample import klems_of
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.gloss import lacquer, polarised_shares

@@ -22,11 +22,24 @@ LOST = {"room": 2, "window": 1}
 
 @dataclass(frozen=True, slots=True)
 class Ranked:
-    """Issues of one kind: how many, how much glass they concern, and the weightiest of them."""
+    """Issues of one kind."""
 
-    count: int
-    glass: float  # [m2]
-    first: Issue
+    issues: tuple[Issue, ...]
+
+    @property
+    def count(self) -> int:
+        """How many issues these are."""
+        return len(self.issues)
+
+    @property
+    def glass(self) -> float:
+        """Area of the glass that they concern [m2]."""
+        return sum(issue.effect.glass for issue in self.issues)
+
+    @property
+    def first(self) -> Issue:
+        """The weightiest of them."""
+        return max(self.issues, key=lambda issue: issue.effect.glass)
 
     def text(self, audience: Audience = "python", fill: Fill = filled) -> IssueText:
         """The text of the first issue as an example, after the number of issues."""
@@ -42,10 +55,7 @@ def ranked(issues: Sequence[Issue]) -> list[Ranked]:
     groups: dict[tuple[object, ...], list[Issue]] = {}
     for issue in issues:
         groups.setdefault(_kind(issue), []).append(issue)
-    result = [
-        Ranked(len(g), sum(i.effect.glass for i in g), max(g, key=lambda issue: issue.effect.glass))
-        for g in groups.values()
-    ]
+    result = [Ranked(tuple(group)) for group in groups.values()]
     return sorted(result, key=lambda r: (-r.glass, -LOST.get(r.first.effect.lost, 0), -r.count))
 
 

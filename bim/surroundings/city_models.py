@@ -1,12 +1,34 @@
-"""City models, CityJSON and CityGML: buildings, plants and terrain, in detail up to LoD 2.
+"""Surroundings as objects: city models, footprints and trees.
+
+CityJSON and CityGML: buildings, plants and terrain, in detail up to LoD 2.
 
 Source: CityJSON 1.0 to 2.0 (https://www.cityjson.org/specs); CityGML 1.0 to 3.0
 (https://www.ogc.org/standards/citygml), GML 3.1.1 and 3.2.
+
+GeoJSON: footprints with heights, as blocks on the ground, and points of trees.
+
+Source: RFC 7946; the fields of heights are those of OpenStreetMap and of usual exports.
+
+Trees as crowns that pass a share of the sun by month: a list of them as TOML, or GeoJSON points.
+
+    [[tree]]
+    at = [12.0, -8.0]                # metres of the building; a third number: the ground's height
+    height = 11.0
+    crown_radius = 3.5
+    crown_base = 2.5                 # a quarter of the height by default
+    transmittance = "deciduous"      # or "evergreen", one value, or twelve from January
+
+    [[tree]]
+    object = "oak"                   # a closed mesh of another file of `--surroundings`
+    transmittance = 0.2
+
+A transmittance is the mean of the beam over the crown's shadow where the light comes level.
 """
 
 from __future__ import annotations
 
 import re
+import tomllib
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,20 +37,270 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
+import shapely.errors
+import shapely.geometry
+import trimesh
 from numpy.typing import NDArray
 
-from bim.georeference import crs_name
+from bim.model import LONGITUDE_LATITUDE, crs_name, local_metres
+from bim.planes import plane_through, polygons_of
 from bim.polygon_rooms import triangles_of_rings
+from bim.solids import prism, triangles_of
 from bim.surroundings.objects import (
     BODY,
     MOST_BYTES,
     TERRAIN,
+    Foliage,
     SurroundingObject,
     SurroundingsFile,
+    is_number,
+    read_bytes,
     read_object,
 )
 from bim.xml_elements import xml_elements
 from mitsuba_cfs.errors import DataError
+
+# Middles of the ranges of Konarska et al. 2014, doi:10.1007/s00704-013-1000-3, five deciduous
+# species in Gothenburg: 1.3 to 5.3 % with leaves, 40.2 to 51.9 % without
+LEAFED, BARE = 0.033, 0.46
+LEAFY_MONTHS = range(5, 11)  # May to October on the northern half of the earth: an assumption
+FOLIAGE = ("deciduous", "evergreen")
+LEAST = 0.01  # of a transmittance; what passes less is a body
+FIELDS = ("at", "object", "name", "height", "crown_radius", "crown_base", "transmittance")
+ROUND = 3  # subdivisions of an icosahedron: 1,280 triangles
+
+
+def read_trees(path: Path) -> SurroundingsFile:
+    """The trees of a TOML list; those that are objects of other files by their names.
+
+    Raises: `DataError` that names file, tree and field.
+    """
+    try:
+        listed = tomllib.loads(read_bytes(path).decode("utf-8")).get("tree")
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise DataError(f"is no TOML: {error}", file=path) from None
+    if not isinstance(listed, list) or not listed or not all(isinstance(t, dict) for t in listed):
+        raise DataError("expected tables [[tree]]", file=path, field="tree")
+    objects: list[SurroundingObject] = []
+    crowns: list[tuple[str, Foliage]] = []
+    for number, fields in enumerate(listed):
+        element = f"tree {number}"
+        unknown = sorted(set(fields) - set(FIELDS))
+        if unknown:
+            message = f"is unknown; there are {', '.join(FIELDS)}"
+            raise DataError(message, file=path, element=element, field=unknown[0])
+        if "object" in fields:
+            if not isinstance(fields["object"], str) or "at" in fields:
+                message = "expected the name of an object in place of at, height and radius"
+                raise DataError(message, file=path, element=element, field="object")
+            crowns.append((fields["object"], foliage_of(fields, element, path)))
+            continue
+        at = fields.get("at")
+        if not (isinstance(at, list) and len(at) in (2, 3) and all(map(is_number, at))):
+            message = "expected [x, y] or [x, y, z] in metres"
+            raise DataError(message, file=path, element=element, field="at")
+        objects.append(tree_of(fields, at, element, path))
+    return SurroundingsFile(path, tuple(objects), crowns=tuple(crowns))
+
+
+def tree_of(
+    fields: dict[str, Any], at: list[float], element: str, path: Path, *, scale: Any = 1.0
+) -> SurroundingObject:
+    """A tree at [x, y] or [x, y, z] as the ellipsoid of its crown.
+
+    Args: scale: [2] or one, of metres in the coordinates of `at`.
+    """
+    height = _metres(fields, "height", element, path)
+    radius = _metres(fields, "crown_radius", element, path)
+    base = _metres(fields, "crown_base", element, path, height / 4)
+    if not base < height or not radius > 0:
+        message = f"expected a crown from {base:g} m up to a greater height, with a radius"
+        raise DataError(message, file=path, element=element, field="height")
+    sphere = trimesh.creation.icosphere(subdivisions=ROUND)
+    corners = np.asarray(sphere.triangles) * (4 / 3 * np.pi / sphere.volume) ** (1 / 3)
+    half, foot = (height - base) / 2, at[2] if len(at) == 3 else 0.0
+    triangles = corners * [radius, radius, half] + [0.0, 0.0, foot + base + half]
+    triangles[..., :2] = triangles[..., :2] * scale + np.asarray(at[:2], dtype=float)
+    label = str(fields.get("name") or element)[:60]
+    return SurroundingObject(label, triangles, foliage=foliage_of(fields, element, path))
+
+
+def foliage_of(fields: dict[str, Any], element: str, path: Path) -> Foliage:
+    """The `transmittance` of a tree: a kind, or twelve values."""
+    value = fields.get("transmittance")
+    if isinstance(value, str) and value in FOLIAGE:
+        return value
+    months = value if isinstance(value, list) else [value]
+    if len(months) not in (1, 12) or not all(is_number(v) and LEAST <= v <= 1 for v in months):
+        message = f"expected {' or '.join(FOLIAGE)}, or one or twelve values from {LEAST} to 1"
+        raise DataError(message, file=path, element=element, field="transmittance")
+    return tuple(float(v) for v in (months * 12)[:12])
+
+
+def monthly_transmittance(foliage: Foliage, latitude_deg: float | None) -> tuple[float, ...]:
+    """Transmittance of a crown in each month [12]; south of the equator leaves come half a year on.
+
+    Source: Konarska, Lindberg, Larsson, Thorsson and Holmer 2014, doi:10.1007/s00704-013-1000-3.
+    What an evergreen crown passes is taken as a deciduous one's with leaves.
+    """
+    if not isinstance(foliage, str):
+        return foliage
+    if foliage == "evergreen":
+        return (LEAFED,) * 12
+    shift = 6 if latitude_deg is not None and latitude_deg < 0 else 0
+    return tuple(
+        LEAFED if (month + shift - 1) % 12 + 1 in LEAFY_MONTHS else BARE for month in range(1, 13)
+    )
+
+
+def _metres(
+    fields: dict[str, Any], name: str, element: str, path: Path, default: float | None = None
+) -> float:
+    value = fields.get(name, default)
+    if not is_number(value) or not 0 <= value < 200:
+        message = f"expected metres, got {value!r:.40}"
+        raise DataError(message, file=path, element=element, field=name)
+    return float(value)
+
+
+HEIGHTS = ("height", "building:height", "measuredHeight", "measuredheight", "Height", "HEIGHT")
+LEVELS = ("building:levels", "levels", "num_floors")
+BASES = ("min_height", "building:min_height", "base")
+SMALL_DEG = 1e-4  # of which the metres at a place are taken
+STOREY = 3.0  # height of one, where only their number is stated [m]
+
+
+def read_footprints(path: Path) -> SurroundingsFile:
+    """The polygons of a GeoJSON file that state a height, their corners in its coordinates.
+
+    Points that state a `crown_radius` are trees, with the fields of `bim.surroundings.city_models`.
+
+    Raises: `DataError` that names file, feature and field; a file without any height.
+    """
+    content = read_object(path)
+    features = content.get("features")
+    if content.get("type") != "FeatureCollection" or not isinstance(features, list):
+        raise DataError("expected a FeatureCollection of GeoJSON", file=path, field="type")
+    objects: list[SurroundingObject] = []
+    without, crs = 0, _crs(content)
+    for number, feature in enumerate(features):
+        element = f"feature {number}"
+        found = _block(feature, element, path) or _tree(feature, crs, element, path)
+        without += not found
+        objects += found
+    if not objects:
+        message = f"no polygon states a height ({', '.join(HEIGHTS[:3])}, or {LEVELS[0]})"
+        raise DataError(message, file=path, field="properties")
+    left_out = (("features-without-height", without),) if without else ()
+    return SurroundingsFile(path, tuple(objects), crs, True, left_out)
+
+
+def _crs(content: dict[str, Any]) -> str:
+    """Longitude and latitude, unless the file states another system in the old way."""
+    try:
+        name = str(content["crs"]["properties"]["name"])
+    except (KeyError, TypeError):
+        return LONGITUDE_LATITUDE
+    return crs_name(name)
+
+
+def _block(feature: Any, name: str, path: Path) -> list[SurroundingObject]:
+    """A feature's polygons from base to top; none without a height."""
+    if not isinstance(feature, dict) or not isinstance(feature.get("properties") or {}, dict):
+        raise DataError("expected a feature", file=path, element=name)
+    fields = feature.get("properties") or {}
+    geometry = feature.get("geometry") or {}
+    is_polygon = isinstance(geometry, dict) and geometry.get("type") in ("Polygon", "MultiPolygon")
+    height = _number(fields, HEIGHTS, name, path)
+    levels = _number(fields, LEVELS, name, path)
+    top = height if height is not None else None if levels is None else STOREY * levels
+    base = _number(fields, BASES, name, path) or 0.0
+    if not is_polygon or top is None or top <= base:
+        return []
+    try:
+        shape = shapely.make_valid(shapely.force_2d(shapely.geometry.shape(geometry)))
+        finite = bool(np.isfinite(shapely.get_coordinates(shape)).all())
+    except (ValueError, TypeError, LookupError, AttributeError, shapely.errors.ShapelyError):
+        finite = False
+    if not finite:
+        raise DataError("is no polygon", file=path, element=name, field="geometry.coordinates")
+    label = str(fields.get("name") or fields.get("id") or name)[:60]
+    return [
+        SurroundingObject(label, triangles)
+        for polygon in shapely.get_parts(shape)
+        if polygon.geom_type == "Polygon" and len(triangles := _prism(polygon, base, top))
+    ]
+
+
+def _tree(feature: dict[str, Any], crs: str, name: str, path: Path) -> list[SurroundingObject]:
+    """A point that states a crown."""
+    fields, geometry = feature.get("properties") or {}, feature.get("geometry") or {}
+    if not isinstance(geometry, dict) or geometry.get("type") != "Point":
+        return []
+    if "crown_radius" not in fields:
+        return []
+    at = geometry.get("coordinates")
+    on_globe = crs == LONGITUDE_LATITUDE
+    if (
+        not isinstance(at, list)
+        or len(at) not in (2, 3)
+        or not all(map(is_number, at))
+        or (on_globe and not abs(at[1]) < 89)
+    ):
+        raise DataError("is no point", file=path, element=name, field="geometry.coordinates")
+    scale: Any = 1.0
+    if on_globe:
+        step = np.array([[at[0] + SMALL_DEG, at[1]], [at[0], at[1] + SMALL_DEG]])
+        scale = SMALL_DEG / np.diag(local_metres(step, at[0], at[1]))
+    # heights of a footprint's file start at the ground
+    return [tree_of(fields, at[:2], name, path, scale=scale)]
+
+
+def _number(fields: dict[str, Any], names: tuple[str, ...], name: str, path: Path) -> float | None:
+    """The first of some fields that is stated; texts as "12.5 m" are read."""
+    for key in names:
+        value = fields.get(key)
+        if isinstance(value, str):
+            try:
+                value = float(value.strip().removesuffix("m").strip().replace(",", "."))
+            except ValueError:
+                raise DataError(
+                    f"expected metres, got {value[:40]!r}", file=path, element=name, field=key
+                ) from None
+        if value is None:
+            continue
+        if not is_number(value) or not 0 <= value < 10_000:
+            message = f"expected metres, got {value!r:.40}"
+            raise DataError(message, file=path, element=name, field=key)
+        return float(value)
+    return None
+
+
+def _prism(polygon: shapely.Polygon, base: float, top: float) -> np.ndarray:
+    """Triangles of the block over a polygon.
+
+    Degrees are far apart in number and near in metres: the polygon is lifted to a size at which
+    nothing is dust, and put back.
+    """
+    low = np.asarray(polygon.bounds[:2])
+    size = max(np.ptp(np.asarray(polygon.bounds).reshape(2, 2), axis=0).max(), 1e-12)
+    scale = 100.0 / size
+    unit = shapely.transform(polygon, lambda p: (p - low) * scale)
+    plane = plane_through(np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    parts = polygons_of(shapely.transform(unit, lambda p: plane.to_plane(_flat(p))[:, :2]))
+    if not parts:
+        return np.empty((0, 3, 3))
+    body = prism(shapely.union_all(parts), plane, base, top)
+    if body is None:
+        return np.empty((0, 3, 3))
+    triangles, _ = triangles_of(body)
+    return np.concatenate([triangles[..., :2] / scale + low, triangles[..., 2:]], axis=2)
+
+
+def _flat(points: np.ndarray) -> np.ndarray:
+    return np.column_stack([points, np.zeros(len(points))])
+
 
 TERRAINS = ("TINRelief", "Road", "LandUse", "WaterBody", "Railway", "TransportSquare", "Square",
             "PlantCover")  # fmt: skip

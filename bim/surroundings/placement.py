@@ -13,16 +13,19 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.defaults import FACADE_REFLECTANCE, SITE_REFLECTANCE
-from bim.georeference import LONGITUDE_LATITUDE, local_metres, transformed
 from bim.mesh_simplification import simplified_mesh
-from bim.model import Building, Element
+from bim.model import LONGITUDE_LATITUDE, Building, Element, local_metres, transformed
 from bim.outdoors import lifted_sites, shut_in_area, unblinded
 from bim.report.issue import Issue, Phrase
 from bim.surroundings.city_models import SUFFIXES as CITYGML
-from bim.surroundings.city_models import read_citygml, read_cityjson
+from bim.surroundings.city_models import (
+    monthly_transmittance,
+    read_citygml,
+    read_cityjson,
+    read_footprints,
+    read_trees,
+)
 from bim.surroundings.crowns import crown_elements
-from bim.surroundings.footprints import read_footprints
-from bim.surroundings.horizon import horizon_wall, read_horizon
 from bim.surroundings.objects import (
     SUFFIXES,
     Foliage,
@@ -31,8 +34,7 @@ from bim.surroundings.objects import (
     read_meshes,
 )
 from bim.surroundings.terrain import SUFFIXES as GRIDS
-from bim.surroundings.terrain import graded, read_terrain
-from bim.surroundings.trees import monthly_transmittance, read_trees
+from bim.surroundings.terrain import graded, horizon_wall, read_horizon, read_terrain
 from mitsuba_cfs.errors import DataError
 
 READ = (*SUFFIXES, ".city.json", *CITYGML, ".geojson", ".json", ".csv", ".toml", *GRIDS)

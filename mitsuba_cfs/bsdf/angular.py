@@ -9,10 +9,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, polarised_values
+from mitsuba_cfs.bsdf.glazing import (
+    Glazing,
+    Pane,
+    PaneOptics,
+    glazing_values,
+    pane_optics,
+    polarised_values,
+    stack,
+)
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.klems_peak import through_peak
-from mitsuba_cfs.bsdf.pane_stack import PaneOptics, pane_optics, stack
 from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, spectral_glazing
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import polarised_shares

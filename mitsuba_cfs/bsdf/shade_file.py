@@ -17,9 +17,9 @@ import numpy as np
 
 from mitsuba_cfs.bsdf.blinds import venetian_blind
 from mitsuba_cfs.bsdf.en410 import solar_value
-from mitsuba_cfs.bsdf.pane_file import PaneFile, product_pane, read_product_file
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial
 from mitsuba_cfs.bsdf.screens import perforated_screen, thread_screen, woven_screen
+from mitsuba_cfs.bsdf.spectral_pane import PaneFile, product_pane, read_product_file
 from mitsuba_cfs.errors import DataError
 
 KINDS = {

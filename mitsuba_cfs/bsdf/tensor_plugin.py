@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.colour import leaf_means, relative_rgb
+from mitsuba_cfs.bsdf.evaluate import through_peak
 from mitsuba_cfs.bsdf.plugin_base import window_bsdf
 from mitsuba_cfs.bsdf.plugin_data import PREFIXES, read_band
-from mitsuba_cfs.bsdf.tensor_peak import through_peak
 from mitsuba_cfs.bsdf.tensor_sampling import SamplingTree, joined, sampling_tree
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
 

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
+from mitsuba_cfs.bsdf.evaluate import klems_of
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.bsdf.resample import klems_of
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.kernels.scattering import (
     AngularBeam,

@@ -9,9 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.notes import Note
-from mitsuba_cfs.sky import air, weather_table
-from mitsuba_cfs.sky.plausible import checked_sun
-from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.sky import weather_table
+from mitsuba_cfs.sky.weather import (
+    Weather,
+    dew_point,
+    relative_humidity,
+    sky_longwave,
+    standard_pressure,
+)
+from mitsuba_cfs.sky.weather_table import checked_sun
 
 FloatArray = NDArray[np.float64]
 # Values that no weather has.  Records by the WMO: 56.7 and -89.2 degC (Antarctica apart -67.8), a
@@ -45,8 +51,8 @@ def read_epw(path: str | PathLike[str]) -> Weather:
         humidity = column.filled("relative humidity", humidity)
     wind = column.required("wind speed")
     notes = implausible(column, site.name, dry, dew, humidity, wind)
-    humidity = np.where(np.isnan(humidity), air.relative_humidity(dry, dew), humidity)
-    dew = np.where(np.isnan(dew), air.dew_point(dry, humidity), dew)
+    humidity = np.where(np.isnan(humidity), relative_humidity(dry, dew), humidity)
+    dew = np.where(np.isnan(dew), dew_point(dry, humidity), dew)
     pressure, more = _pressure(column, site)
     infrared = _infrared(column, dry, dew)
     direct = column.required("direct normal irradiance")
@@ -150,7 +156,7 @@ def _pressure(
     hour of it is not worth a file.
     """
     pressure, wrong = column.plausible("pressure")
-    standard = air.standard_pressure(site.elevation_m)
+    standard = standard_pressure(site.elevation_m)
     notes: tuple[str, ...] = ()
     if wrong.any():
         row = int(np.argmax(wrong))
@@ -183,5 +189,5 @@ def _infrared(column: weather_table.EpwColumns, dry: FloatArray, dew: FloatArray
                 int(np.argmax(unknown)),
                 "missing, and so is the sky cover it could be estimated from",
             )
-        infrared = np.where(missing, air.sky_longwave(dry, dew, cover), infrared)
+        infrared = np.where(missing, sky_longwave(dry, dew, cover), infrared)
     return infrared

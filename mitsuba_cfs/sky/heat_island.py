@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.notes import Note
-from mitsuba_cfs.sky.air import relative_humidity, standard_pressure
-from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.sky.weather import Weather, relative_humidity, standard_pressure
 
 SKY_VIEW, VEGETATION = (0.2, 0.9), (0.0, 0.4)  # that the equation was tried on
 NORTH_DEG, EAST_DEG = (45.0, 61.0), (-11.0, 16.0)  # about where its cities lie

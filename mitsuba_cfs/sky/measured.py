@@ -13,8 +13,8 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
 from mitsuba_cfs.sky import sun
 from mitsuba_cfs.sky.options import LABELS, LEAST_ALTITUDE_DEG
-from mitsuba_cfs.sky.plausible import checked_sun
 from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.sky.weather_table import checked_sun
 
 COLUMNS = ("time", "global_horizontal", "diffuse_horizontal")
 MOST_IRRADIANCE = 1800.0  # [W/m2] broken clouds can double a clear sky's diffuse light

@@ -6,9 +6,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.sky import air
 from mitsuba_cfs.sky.options import LEAST_ALTITUDE_DEG, SUN_MODELS
-from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.sky.weather import Weather, standard_pressure
 
 SUN_ANGLE_DEG = 0.533  # full angle of the disc that Radiance uses
 SUN_RADIUS = np.radians(SUN_ANGLE_DEG / 2)  # [rad]
@@ -49,7 +48,7 @@ def _spa_directions(weather: Weather, times: pd.DatetimeIndex) -> NDArray[np.flo
 
     utc = times - pd.Timedelta(hours=weather.timezone_h)
     pressure, temperature = weather.pressure_pa, weather.dry_bulb_c
-    standard = air.standard_pressure(weather.elevation_m)
+    standard = standard_pressure(weather.elevation_m)
     table = solarposition.spa_python(
         utc.tz_localize("UTC"),
         weather.latitude_deg,

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import write_bytes
 from mitsuba_cfs.sky import weather_table
-from mitsuba_cfs.sky.plausible import checked_sun
 from mitsuba_cfs.sky.sun import direct_normal_from_global, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.sky.weather_table import (
@@ -22,6 +21,7 @@ from mitsuba_cfs.sky.weather_table import (
     FilePath,
     Location,
     check_length,
+    checked_sun,
     location,
     number,
     read_lines,

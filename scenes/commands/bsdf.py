@@ -401,8 +401,8 @@ def interpolate(
 
 def _interpolated(measured: Sequence[Measurement], means: _Means) -> dict[str, Bsdf]:
     """The BSDF of each band, of the blocks that were measured."""
+    from mitsuba_cfs.bsdf.evaluate import BLOCKS
     from mitsuba_cfs.bsdf.measured import ScatteringInterpolant, patterns_of
-    from mitsuba_cfs.bsdf.resample import BLOCKS
 
     bands = measured[0].bands
     for one in measured:

@@ -38,7 +38,14 @@ UNCUT = 100_000  # columns of a table that nobody sees
     help="Also write a corrections file with every doubt of the model, its default and "
     "alternatives as comments; default: MODEL.corrections.toml beside the model, where it is used.",
 )
-def command(issues: Path | None, fix: Path | None, **chosen) -> None:
+@click.option(
+    "--bcf",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.bcfzip",
+    help="Also write a BCF 2.1 file: a topic for each kind of problem, with its elements, for the "
+    "author of the model.",
+)
+def command(issues: Path | None, fix: Path | None, bcf: Path | None, **chosen) -> None:
     """List rooms, windows and problems of a building model as the simulation reads them.
 
     BUILDING is a honeybee model (.hbjson), gbXML, a Radiance scene (.rad) or IFC: one file or
@@ -55,6 +62,9 @@ def command(issues: Path | None, fix: Path | None, **chosen) -> None:
         check_file(fix, field="--fix", inputs=options.building_files)
         if fix.exists():
             raise DataError("exists; give another name", file=fix, field="--fix")
+    if bcf is not None:
+        check_is_ifc(options.building, "--bcf")
+        check_file(bcf, field="--bcf", inputs=options.building_files)
     from rich.console import Console
 
     from scenes.chosen_rooms import named_spaces
@@ -87,6 +97,10 @@ def command(issues: Path | None, fix: Path | None, **chosen) -> None:
 
         write_text(fix, corrections_draft(read))
         console.print(f"corrections: {fix}", markup=False, highlight=False)
+    if bcf is not None:
+        from bim.bcf import write_bcf
+
+        console.print(f"{bcf}: topics: {write_bcf(read, bcf)}", markup=False, highlight=False)
     if issues is not None:
         import pandas as pd
 

@@ -150,6 +150,36 @@ def attach(
 
 
 @command.command()
+@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
+@click.option(
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="IFC file to write.",
+)
+def correct(building: Path, out: Path) -> None:
+    """Write the corrections beside an IFC file into a copy of it.
+
+    North, outdoor spaces, properties of materials and elements left out are written; entries that
+    IFC cannot hold are written to a corrections file beside the copy.
+    """
+    check_file(out, inputs=[building])
+    from bim.ifc.correct import correct as corrected
+
+    done = corrected(building, out)
+    if done.north_deg is not None:
+        click.echo(f"north: the model's +y axis points {done.north_deg:g} degrees from north")
+    click.echo(
+        f"spaces outdoors: {done.outdoors}, materials: {done.materials}, "
+        f"elements removed: {done.removed}"
+    )
+    if done.left_file is not None:
+        click.echo(f"remain corrections, in {done.left_file}: {', '.join(done.left)}")
+    click.echo(out)
+
+
+@command.command()
 @out_folder_option
 def templates(out: Path) -> None:
     """Write the definition of the windows' property set for other programs.

@@ -27,14 +27,15 @@ from bim.building_file import held_states, is_ifc
 from bim.fenestration import AngularGValue, PlainGlass, ShadingState
 from bim.model import Window
 from mitsuba_cfs.bsdf.angular import roos_table, specular_matrices
-from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
-from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.simple_glazing import (
+from mitsuba_cfs.bsdf.glazing import (
     HIGH_U,
+    Glazing,
     solar_reflectance,
     solar_transmittance,
+    specular_klems,
     visible_reflectances,
 )
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.notes import Note
@@ -417,7 +418,7 @@ def glazing_system(values: StatedValues, file: str, digits: int = 3) -> Fenestra
 
     Light: a single pane whose transmissivity and index are known follows Fresnel's equations, any
     other glazing falls with the angle after Roos et al. 2001. Sun: what is not stated follows from
-    U and g by the simple window model (`mitsuba_cfs.bsdf.simple_glazing`).
+    U and g by the simple window model (`mitsuba_cfs.bsdf.glazing`).
     """
     u = TYPICAL_SYSTEMS["none"][0] if values.u_value is None else values.u_value
     panes = values.panes or (1 if u > HIGH_U else 2)

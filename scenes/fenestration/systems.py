@@ -18,9 +18,9 @@ from mitsuba_cfs.bsdf.angular import (
     stack_table,
 )
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
+from mitsuba_cfs.bsdf.evaluate import klems_of
 from mitsuba_cfs.bsdf.glazing import Pane
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.bsdf.resample import klems_of
 from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, spectral_glazing
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml

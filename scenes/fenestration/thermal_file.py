@@ -35,9 +35,10 @@ from pydantic import Field, model_validator
 from mitsuba_cfs.bsdf.angular import AngularTable, roos_table, stack_table
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.pane_file import read_glazing_layers, read_pane_file
 from mitsuba_cfs.bsdf.spectral_pane import (
     SpectralPane,
+    read_glazing_layers,
+    read_pane_file,
     read_spectral_pane,
     spectral_glazing,
 )

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bim.energyplus_windows import WindowOptics
-from mitsuba_cfs.bsdf.glazing import Pane
+from mitsuba_cfs.bsdf.glazing import Pane, absorbed_by_layers
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
-from mitsuba_cfs.bsdf.pane_stack import absorbed_by_layers
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.notes import Note
 from scenes.fenestration.systems import FenestrationSystem

@@ -14,9 +14,8 @@ from pydantic import Field
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
 from mitsuba_cfs.notes import Note
-from mitsuba_cfs.sky import air
 from mitsuba_cfs.sky.sun import sun_directions
-from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.sky.weather import Weather, standard_pressure
 from scenes.toml_file import TomlTable
 
 FloatArray = NDArray[np.float64]
@@ -74,7 +73,7 @@ def read_measured(path: Path, table: MeasuredTable) -> Weather:
     values, times, notes = {k: v[kept] for k, v in values.items()}, times[kept], []
     values["relative_humidity"] = values["relative_humidity"] / 100.0
     if "pressure_pa" not in values:
-        values["pressure_pa"] = np.full(whole, air.standard_pressure(table.elevation_m))
+        values["pressure_pa"] = np.full(whole, standard_pressure(table.elevation_m))
         notes.append(
             Note("{file}: no pressure; that of the standard atmosphere is used.", file=path.name)
         )

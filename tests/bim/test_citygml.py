@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bim import xml_elements
-from bim.georeference import Georeference, crs_name
+from bim.model import Georeference, crs_name
 from bim.shell import enclosed_volume
 from bim.shoebox import shoebox
 from bim.surroundings import city_models

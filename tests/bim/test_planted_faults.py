@@ -108,7 +108,7 @@ PLACES: list[tuple[Callable[[Path], object], str]] = [
     (radiance, "bim.radiance.shapes:triangles_of"),
     (around, "bim.surroundings.city_models:triangles_of_surfaces"),
     (around, "bim.surroundings.city_models:_surfaces"),
-    (around, "bim.surroundings.footprints:crs_name"),
+    (around, "bim.surroundings.city_models:crs_name"),
     (around, "bim.surroundings.placement:horizon_wall"),
 ]
 

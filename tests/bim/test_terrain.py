@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bim.georeference import Georeference
+from bim.model import Georeference
 from bim.rays import ray_mesh
 from bim.shoebox import WindowRectangle, shoebox
 from bim.surroundings.placement import read_surroundings, with_surroundings

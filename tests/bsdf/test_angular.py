@@ -159,7 +159,7 @@ print(json.dumps(found), flush=True)
 @pytest.mark.peer
 def test_a_pane_of_the_igsdb_is_windows_at_every_angle(real_data):
     """Fresnel of the mean over the spectrum against the mean of Fresnel at each wavelength."""
-    from mitsuba_cfs.bsdf.pane_file import read_pane_file
+    from mitsuba_cfs.bsdf.spectral_pane import read_pane_file
 
     path = real_data / "bsdf/products_spectral/igsdb_product_364.json"
     words = [sys.executable, "-c", ENGINE, str(path), json.dumps(DEGREES.tolist())]

@@ -9,8 +9,7 @@ import pytest
 
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.bsdf.pane_file import read_pane_file
-from mitsuba_cfs.bsdf.spectral_pane import read_spectral_pane
+from mitsuba_cfs.bsdf.spectral_pane import read_pane_file, read_spectral_pane
 from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from scenes import cli

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from mitsuba_cfs.bsdf.pane_file import read_glazing_layers, read_pane_file
+from mitsuba_cfs.bsdf.spectral_pane import read_glazing_layers, read_pane_file
 from mitsuba_cfs.errors import DataError
 from tests.bim.bim_fuzz import mutations, odd_values
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from plugin_setup import UP, context, interaction, random_directions, sampled, to_mitsuba
 
-from mitsuba_cfs.bsdf.evaluate import direct_hemispherical
-from mitsuba_cfs.bsdf.tensor_peak import through_peak
+from mitsuba_cfs.bsdf.evaluate import direct_hemispherical, through_peak
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf, morton
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 

@@ -74,7 +74,7 @@ def test_a_coated_pane_may_be_turned(tmp_path):
 
 
 def test_layers_of_a_glazing_system_are_read(tmp_path, real_data):
-    from mitsuba_cfs.bsdf.pane_file import read_glazing_layers
+    from mitsuba_cfs.bsdf.spectral_pane import read_glazing_layers
 
     path = real_data / "bsdf/products_spectral/afc_glazing_system_dgl00_clr.json"
     panes = [layer.visible_pane() for layer in read_glazing_layers(path)]

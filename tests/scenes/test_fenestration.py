@@ -15,7 +15,7 @@ from bim.exported_glazing import normal_transmittance
 from bim.fenestration import PlainGlass
 from bim.ifc.building import read_ifc
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
-from mitsuba_cfs.bsdf.simple_glazing import solar_transmittance
+from mitsuba_cfs.bsdf.glazing import solar_transmittance
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import write_text

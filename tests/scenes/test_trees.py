@@ -12,9 +12,9 @@ import pytest
 from bim.model import Building
 from bim.rays import ray_mesh
 from bim.seasons import seasons
+from bim.surroundings.city_models import read_trees
 from bim.surroundings.crowns import _attenuations
 from bim.surroundings.placement import with_surroundings
-from bim.surroundings.trees import read_trees
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods.light import direct_sun
 from scenes import cli

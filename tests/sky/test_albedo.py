@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.sky import albedo
-from mitsuba_cfs.sky.albedo import SNOW, with_albedo
-from mitsuba_cfs.sky.annual import annual_sky
+from mitsuba_cfs.sky.annual import MANY_HOURS, SNOW, SNOW_CM, TOO_WARM_C, annual_sky, with_albedo
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.demo import WEATHER
 
@@ -84,7 +82,7 @@ def test_columns_of_an_epw(tmp_path):
 
 def test_numbers_of_the_sources():
     """Liu and Jordan: 0.7 under snow; days warmer than 10 degC and 100 hours are this program's."""
-    assert (SNOW, albedo.SNOW_CM, albedo.TOO_WARM_C, albedo.MANY_HOURS) == (0.7, 1.0, 10.0, 100)
+    assert (SNOW, SNOW_CM, TOO_WARM_C, MANY_HOURS) == (0.7, 1.0, 10.0, 100)
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ import pytest
 from weather_files import epw_rows, write_epw
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.sky import air
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.wea import read_wea, write_wea
+from mitsuba_cfs.sky.weather import relative_humidity
 
 FEBRUARY_3_14H = 24 * (31 + 2) + 13  # row of the hour that ends at 14:00
 DNI, DRY, DEW, HUMIDITY, PRESSURE, INFRARED, COVER, WIND = 14, 6, 7, 8, 9, 12, 23, 21
@@ -72,7 +72,7 @@ def test_missing_fields_that_can_be_derived(tmp_path, year):
     # standard atmosphere at 250 m (ASHRAE table: 98.36 kPa); dew point of 10 degC and 71 %: 4.97
     np.testing.assert_allclose(weather.pressure_pa, 98358, atol=20)
     np.testing.assert_allclose(weather.dew_point_c, 4.97, atol=0.02)
-    back = air.relative_humidity(weather.dry_bulb_c, weather.dew_point_c)
+    back = relative_humidity(weather.dry_bulb_c, weather.dew_point_c)
     np.testing.assert_allclose(back, 0.71, rtol=1e-12)  # the formula and its inverse
     # EnergyPlus's formula worked by hand: eps = (.787 + .764 ln(278.12/273)) 1.0595, T = 283.15
     emissivity = (0.787 + 0.764 * np.log(278.12 / 273)) * (1 + 0.112 - 0.0875 + 0.035)

@@ -15,7 +15,7 @@ from tests.trace.test_view_factors import parallel
 from thermal.balance import simulate
 from thermal.blackbox import Fenestration
 from thermal.comfort import operative_temperature
-from thermal.longwave import exchange_from_view_factors
+from thermal.network import exchange_from_view_factors
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.bsdf.glazing import Pane
-from mitsuba_cfs.bsdf.pane_stack import hemispherical_mean, pane_optics, stack
+from mitsuba_cfs.bsdf.glazing import Pane, hemispherical_mean, pane_optics, stack
 from tests.validation.ashrae140_cases import NORMALS, SEEN_FROM, Opening, opening_rooms
 from tests.validation.facade_sun import FacadeSun, SunSteps, facade_sun
 from tests.validation.sunlit_facade import diffuse_lit_share, lit_share

@@ -24,8 +24,7 @@ import numpy as np
 import pandas as pd
 
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
-from mitsuba_cfs.bsdf.glazing import Pane
-from mitsuba_cfs.bsdf.pane_stack import HEMISPHERE, hemispherical_mean, pane_optics, stack
+from mitsuba_cfs.bsdf.glazing import HEMISPHERE, Pane, hemispherical_mean, pane_optics, stack
 from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.progress import silent
 from scenes.fenestration.thermal_system import sun_in_layers

@@ -23,7 +23,7 @@ from tests.validation.facade_sun import facade_sun, sun_steps
 from tests.validation.reference_systems import clear_double
 from thermal.balance import ZoneResult, simulate_zones
 from thermal.climate import Solar
-from thermal.longwave import area_view_factors
+from thermal.network import area_view_factors
 from thermal.zone import Zone
 
 OUTPUTS = {

@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
+from mitsuba_cfs.bsdf.evaluate import klems_of
 from mitsuba_cfs.bsdf.generate import generate_tensor_tree
 from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.bsdf.resample import klems_of
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods import METHODS

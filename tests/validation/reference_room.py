@@ -12,7 +12,7 @@ from tests.validation.sunlit_room import BeamTable, BoxRoom, diffuse_hits, first
 from thermal.blackbox import Fenestration
 from thermal.climate import Climate, Solar, sky_temperature
 from thermal.emitters import IdealLoads
-from thermal.longwave import area_view_factors
+from thermal.network import area_view_factors
 from thermal.shortwave import spread_evenly
 from thermal.zone import Gains, Layer, OpaqueSurface, WindowElement, Zone, work_hours
 

@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.bsdf.pane_stack import hemispherical_mean
+from mitsuba_cfs.bsdf.glazing import hemispherical_mean
 from mitsuba_cfs.directions import incident_azimuth
 from scenes.fenestration.thermal_system import sun_in_layers
 from tests.validation.ashrae140_sun import ANGLES, glass

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 import mitsuba_cfs as cfs
 from mitsuba_cfs import variants
+from mitsuba_cfs.bsdf.evaluate import klems_of
 from mitsuba_cfs.bsdf.generate import TracedLayer, follow, generate_tensor_tree
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, plastic
-from mitsuba_cfs.bsdf.resample import klems_of
 from mitsuba_cfs.bsdf.screens import woven_screen
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.glare.annual import full_picture

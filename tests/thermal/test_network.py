@@ -8,7 +8,7 @@ import pytest
 from thermal.blackbox import LayerAbsorptances
 from thermal.convection import doe2_outside, iso15099_inside, local_wind_factor, tarp_inside
 from thermal.errors import ThermalInputError
-from thermal.longwave import (
+from thermal.network import (
     area_view_factors,
     closed_exchange,
     exchange_from_view_factors,

@@ -7,7 +7,7 @@ import pytest
 from thermal.glazing import Gap
 from thermal.gvalue import TYPICAL_SYSTEMS
 from thermal.iso15099 import U_STATE_C, iso15099_data, iso15099_u_value, prescribed
-from thermal.typical_unit import likely_units, typical_unit
+from thermal.window_model import likely_units, typical_unit
 
 STATE = prescribed(*U_STATE_C)
 

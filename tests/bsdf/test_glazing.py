@@ -1,12 +1,22 @@
-"""Panes behind each other: Fresnel's formulas, conservation of energy, a geometric series."""
+"""Panes behind each other: Fresnel's formulas, conservation of energy, a geometric series.
+
+The simple window model: pinned to its polynomials' values, energy kept, g given back.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.glazing import Pane
-from mitsuba_cfs.bsdf.pane_stack import hemispherical_mean, pane_optics, stack
+from mitsuba_cfs.bsdf.glazing import (
+    Pane,
+    hemispherical_mean,
+    pane_optics,
+    solar_reflectance,
+    solar_transmittance,
+    stack,
+    visible_reflectances,
+)
 
 ANGLES = np.radians(np.arange(0.0, 90.0, 10.0))
 
@@ -72,3 +82,59 @@ def test_coated_pane_keeps_its_normal_values_and_energy():
     assert pane.turned().rho_front is pane.rho_back
     with pytest.raises(ValueError, match="shares of 1"):
         low_e(angles, 0.7, 0.2, 0.4)
+
+
+@pytest.mark.parametrize(
+    ("u", "g", "expected"),
+    [(1.0, 0.1, 0.04104), (1.2, 0.5, 0.418463), (5.8, 0.5, 0.33666), (5.8, 0.82, 0.764253),
+     (3.95, 0.5, (0.418463 + 0.33666) / 2)],
+)  # fmt: skip
+def test_solar_transmittance_is_that_of_the_polynomials(u, g, expected) -> None:
+    assert solar_transmittance(u, g) == pytest.approx(expected, abs=2e-6)
+
+
+def test_shares_of_one_in_the_whole_range() -> None:
+    for u in np.linspace(0.3, 5.8, 12):
+        for g in np.linspace(0.02, 0.95, 20):
+            tau = solar_transmittance(u, g)
+            rho = solar_reflectance(u, g, tau)
+            assert 0 < tau <= g and 0 <= rho < 1 - tau
+            # what is absorbed suffices for what of it goes inwards
+            assert g - tau <= 1 - tau - rho + 1e-9
+    for tau in np.linspace(0.01, 1, 30):
+        assert all(0 <= rho <= 1 - tau for rho in visible_reflectances(tau))
+
+
+def test_reflectance_by_the_polynomials_of_the_source() -> None:
+    """Arasteh, Kohler, Griffith 2009, steps 2, 5 and 6, for insulating and single glazing."""
+    for u, g, tau in ((1.2, 0.5, 0.4), (5.8, 0.7, 0.6), (6.2, 0.7, 0.6), (2.0, 0.3, 0.25)):
+        x = g - tau
+        if u < 4:
+            inner = 199.8208128 * x**3 - 90.639733 * x**2 + 19.737055 * x + 6.766575
+            outer = 5.763355 * x + 20.541528
+        else:
+            inner = 29.436546 * x**3 - 21.943415 * x**2 + 9.945872 * x + 7.426151
+            outer = 2.225824 * x + 20.57708
+        winter = 1.788041 * u - 2.886625 if u >= 5.85 else 0.359073 * np.log(u) + 6.949915
+        layer = max(1 / u - 1 / winter - 1 / (0.025342 * u + 29.163853), 0.0)
+        inwards = (1 / outer + layer / 2) / (1 / outer + layer + 1 / inner)
+        assert solar_reflectance(u, g, tau) == pytest.approx(1 - tau - x / inwards)
+    assert solar_reflectance(5.8, 0.99, 0.99) == pytest.approx(0.01, abs=2e-9)
+    assert solar_reflectance(5.8, 0.99, 0.99) < 1 - 0.99  # something is absorbed
+    assert solar_reflectance(1.2, 0.9, 0.2) == 0.0
+
+
+def test_visible_reflectances_by_the_polynomials_of_the_source() -> None:
+    t = 0.6
+    front, back = visible_reflectances(t)
+    assert front == pytest.approx(-0.0622 * t**3 + 0.4277 * t**2 - 0.4169 * t + 0.2399)
+    assert back == pytest.approx(-0.7409 * t**3 + 1.6531 * t**2 - 1.2299 * t + 0.4547)
+
+
+def test_transmittance_at_the_ends_of_its_ranges() -> None:
+    for u, g, by_hand in (
+        (5.8, 0.72, 0.939998 * 0.72**2 + 0.20332 * 0.72), (5.8, 0.73, 1.30415 * 0.73 - 0.30515),
+        (1.2, 0.15, 0.4104 * 0.15), (1.2, 0.16, 0.085775 * 0.16**2 + 0.963954 * 0.16 - 0.084958),
+    ):  # fmt: skip
+        assert solar_transmittance(u, g) == pytest.approx(by_hand)
+    assert solar_transmittance(5.8, 1.0) <= 1.0

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.evaluate import bsdf_values, direct_hemispherical
+from mitsuba_cfs.bsdf.evaluate import BLOCKS, _block, bsdf_values, direct_hemispherical, klems_of
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_HALF, KlemsBsdf
-from mitsuba_cfs.bsdf.resample import BLOCKS, _block, klems_of
 from mitsuba_cfs.bsdf.tensor_merge import merged_tree
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf, morton
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
