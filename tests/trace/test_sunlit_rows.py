@@ -219,6 +219,35 @@ def test_grazing_sun_lights_a_picture_by_its_flux() -> None:
     assert noise.max() < 0.03
 
 
+def test_the_sun_on_cells_is_followed_once_for_the_same_hours(monkeypatch) -> None:
+    """A picture, its noise and the windows have the cells of one scene and equal hours."""
+    from mitsuba_cfs.trace.sun.sunlit_cells import Beam
+
+    interior, groups = box.room(), box.window_groups()
+    view = cfs.fisheye((1.8, 2.0, 1.5), (0.0, -1.0, 0.0), 40)
+    tracer = TracedScene(interior, groups)
+    rows = PictureRows.of_view(tracer, view, tile_size(view))
+    of_rows, _ = picture_sunlit_shares(tracer, view, rows, rows.times(smoothed=True))
+    of_windows = window_sunlit_shares(tracer, samples=4)
+    clear = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.ones(145))
+    sun, followed, flux = PictureSun(interior, box.NOTHING, groups, [clear], view), [], Beam.flux
+
+    def counted(self, cells, suns):
+        followed.append(suns)
+        return flux(self, cells, suns)
+
+    monkeypatch.setattr(Beam, "flux", counted)
+    towards = np.array([[0.0, -0.6, 0.8], [0.6, -0.64, 0.48]])
+    first = sun.sunlit_luminance(of_rows, towards[:1].copy(), np.full(1, 1e5))
+    sun.sunlit_luminance(of_windows, towards[:1].copy(), np.full(1, 1e5))
+    assert len(followed) == 1
+    other = sun.sunlit_luminance(of_rows, towards[1:], np.full(1, 1e5))
+    dimmed = sun.sunlit_luminance(of_rows, towards[:1], np.full(1, 5e4))
+    assert len(followed) == 3
+    assert first.sum() > 0 and not np.allclose(first, other)
+    np.testing.assert_allclose(dimmed, first / 2, rtol=1e-5)
+
+
 @pytest.mark.parametrize("turn_deg", [0.0, 30.0, 45.0])
 @pytest.mark.parametrize("gap", [0.03, 0.1])
 def test_a_skin_behind_a_wall_takes_no_area_from_its_cells(gap: float, turn_deg: float) -> None:
