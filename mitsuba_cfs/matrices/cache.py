@@ -37,6 +37,7 @@ UNREADABLE = (
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")
+Inputs = tuple[object, ...]
 
 
 class RecentResults:
@@ -46,7 +47,7 @@ class RecentResults:
         """Empty; `most`: number of results."""
         self._most = most
         # with their inputs, so that no other object gets the ids in the key
-        self._results: OrderedDict[tuple, tuple[tuple, Any]] = OrderedDict()
+        self._results: OrderedDict[Inputs, tuple[Inputs, Any]] = OrderedDict()
 
     def of(self, function: Callable[..., T], *inputs: object) -> T:
         """The result of a function of these inputs, computed if it is not among the last ones."""

@@ -128,10 +128,10 @@ def _exchange_variance(
         pairs = zip(optics, before, strict=True)
         luminance = np.stack([one.transmission @ values for one, values in pairs])
         variance += variance_by_room(view.values, matrices.exchange, optics, luminance)
-    if outwards and matrices.outdoor_exchange is not None:
+    shares = reflected_shares(matrices, optics).before
+    if shares is not None and matrices.outdoor_exchange is not None:
         if light.reflected is not None:
             before = before + replaced_luminance(light.reflected, some) / len(sky.lit)
-        shares = reflected_shares(matrices, optics).before
         variance += variance_by_outdoors(shares, matrices.outdoor_exchange, optics, before)
     return variance
 
