@@ -68,7 +68,7 @@ class BatchMean:
     count: int  # batches so far
     mean: NDArray[np.float64]
     spread: NDArray[np.float64]  # same shape; sum of squared deviations from the mean
-    sum_spread: NDArray[np.float64]  # the same of the sum over the last axis
+    covariance: NDArray[np.float64]  # [..., R, R] that of products of R blocks of the last axis
     seconds: float  # spent so far
     finished: bool
 
@@ -163,7 +163,7 @@ class CacheEntry:
                     int(data["count"]),
                     data["mean"].astype(float),
                     data["spread"].astype(float),
-                    data["sum_spread"].astype(float),
+                    data["covariance"].astype(float),
                     float(data["seconds"]),
                     bool(data["finished"]),
                 )
@@ -174,10 +174,8 @@ class CacheEntry:
             log.info("%s: ignored, cannot be read: %s", self.path, error)
             return None
         shape = state.mean.shape
-        whole = state.count > 0 and (state.spread.shape, state.sum_spread.shape) == (
-            shape,
-            shape[:-1],
-        )
+        whole = state.count > 0 and state.spread.shape == shape
+        whole = whole and state.covariance.shape[:-2] == shape[:-1]
         return state if whole else None
 
     def save(self, state: BatchMean) -> None:
@@ -193,7 +191,7 @@ class CacheEntry:
                     count=state.count,
                     mean=state.mean,
                     spread=state.spread,
-                    sum_spread=state.sum_spread,
+                    covariance=state.covariance,
                     seconds=state.seconds,
                     finished=state.finished,
                 )
@@ -214,7 +212,7 @@ def cached_or_computed(
     matrix = compute()
     if entry is not None:
         none, seconds = np.zeros_like(matrix), time.monotonic() - start
-        entry.save(BatchMean(1, matrix, none, none[..., 0], seconds, finished=True))
+        entry.save(BatchMean(1, matrix, none, none[..., :1, None], seconds, finished=True))
     return matrix
 
 
