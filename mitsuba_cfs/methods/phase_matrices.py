@@ -93,7 +93,7 @@ def _view_entries(
 ) -> tuple[CacheEntry, CacheEntry]:
     """The entries of a view by its pixels, and of its sunlit surfaces."""
     of_hours = () if light is None else (light.lit, light.later)
-    by = view_matrices.__module__
+    by = ViewMatrices.__module__
     pictures = cache.entry("view pictures", view, *inputs, *of_hours, by=by)
     return pictures, cache.entry("view sunlit", view, *inputs, by=by)
 
