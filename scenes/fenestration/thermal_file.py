@@ -303,13 +303,13 @@ def _listed() -> str:
 
 
 def glazing_unit(
-    layers: tuple[GlazingLayerTable, ...], height: float, tilt_deg: float
+    layers: tuple[GlazingLayerTable, ...], height: float, width: float, tilt_deg: float
 ) -> GlazingUnit:
     """The unit of layers from outside to inside; `ThermalInputError` where they are none."""
     gaps = tuple(
         GasGap(one.gap.width, tuple(one.gap.gas.items())) for one in layers if one.gap is not None
     )
-    return GlazingUnit(tuple(one.layer() for one in layers), gaps, height, 1.0, tilt_deg)
+    return GlazingUnit(tuple(one.layer() for one in layers), gaps, height, width, tilt_deg)
 
 
 class GapTable(TomlTable):
@@ -330,6 +330,7 @@ class ClosureTable(TomlTable):
     surface: Annotated[tuple[float, ...], Field(min_length=6, max_length=6)] | None = None
     layers: tuple[GlazingLayerTable, ...] = ()  # outermost first: ISO 15099
     glazing_height: Annotated[Positive, plausible.LENGTH] = 1.5  # [m] of the layers
+    glazing_width: Annotated[Positive, plausible.LENGTH] = 1.0  # [m]: open edges at its sides
     glazing_tilt_deg: Annotated[float, Field(ge=0, le=180)] = 90.0  # from horizontal
     realised_inner_resistance: Film | None = None  # [m2 K/W], see thermal.blackbox
     realised_outer_resistance: Film | None = None
@@ -366,7 +367,9 @@ class ClosureTable(TomlTable):
         if gap is not None:
             gap = Gap(gap.width, tuple(gap.gas.items()), gap.emissivity)
         if self.layers:
-            unit = glazing_unit(self.layers, self.glazing_height, self.glazing_tilt_deg)
+            unit = glazing_unit(
+                self.layers, self.glazing_height, self.glazing_width, self.glazing_tilt_deg
+            )
         stated = [OF_MODEL[key] for key in OF_MODEL if getattr(self, key)]
         if self.realised_inner_resistance or self.realised_outer_resistance:
             stated.append("constant")

@@ -241,6 +241,9 @@ def test_toml_says_panes_gases_and_shade(tmp_path):
     )
     u = iso15099_u_value(unit, prescribed(0.0, 20.0))
     assert 1.1 < u < 1.2
+    wide = operation(tmp_path, f"glazing_width = 3.0\n{LAYERS}").closure.unit
+    # of the air behind the shade, less passes the sides of a wide one
+    assert wide == replace(unit, width=3.0) and iso15099_u_value(wide, prescribed(0.0, 20.0)) < u
     sloped = operation(tmp_path, "u_slope = 0.004\n").closure
     assert (sloped.u_model, sloped.slope) == ("linear", 0.004)
     fit = operation(tmp_path, "surface = [1.2, 0.005, 0.03, -1e-4, -3e-4, 7e-5]\n").closure

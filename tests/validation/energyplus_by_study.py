@@ -141,7 +141,7 @@ def window_text(window: KnownWindow, name: str, inputs: str) -> str:
     """The tables of the window in a study file."""
     head = f'[[system]]\nbsdf = "{window.bsdf}"\n'
     if inputs == "layers":
-        return f"{head}glazing_height = 1.5\n{LAYERS[name]}\n"
+        return f"{head}glazing_height = 1.5\nglazing_width = 3.0\n{LAYERS[name]}\n"
     text = f"{head}u_value = {window.u_value:.4g}\ng_value = {window.g_normal:.4g}\n"
     if inputs == "plain":
         return text

@@ -47,6 +47,7 @@ FloatArray = NDArray[np.float64]
 SYSTEMS = ("dgu", "ext_blind", "ext_shade", "int_shade")
 STATED = ("typical", "gap", "by direction", "constant", "linear U")  # from g at normal incidence
 CLOSURES = ("kuhn", "linear", "surface", "films", "layers", *STATED)
+WIDTH = 3.0  # [m] of the set's window
 GAP = Gap(0.016, (("argon", 0.9), ("air", 0.1)), (0.84, 0.05))  # of the set's glazing
 REALISED_STATE = 0  # of the U list: 0/20 degC
 PLACES = {"dgu": "none", "int_shade": "internal", "ext_blind": "external", "ext_shade": "external"}
@@ -156,7 +157,7 @@ def layers(name: str) -> GlazingUnit:
     low_e = GlazingLayer(0.006, 0.9, (0.05, 0.84), solar=(0.600, 0.220, 0.170))
     panes, argon = (clear, low_e), GasGap(GAP.width, GAP.gas)
     if name == "dgu":
-        return GlazingUnit(panes, (argon,))
+        return GlazingUnit(panes, (argon,), width=WIDTH)
     wide = 0.05 if name == "int_shade" else 0.1
     edges = (wide,) * 4
     if name == "ext_blind":
@@ -164,8 +165,8 @@ def layers(name: str) -> GlazingUnit:
     else:
         shade = sheet_layer(0.0, thickness=0.0005, conductivity=0.15, edges=edges)
     if name == "int_shade":
-        return GlazingUnit((*panes, shade), (argon, GasGap(wide)))
-    return GlazingUnit((shade, *panes), (GasGap(wide), argon))
+        return GlazingUnit((*panes, shade), (argon, GasGap(wide)), width=WIDTH)
+    return GlazingUnit((shade, *panes), (GasGap(wide), argon), width=WIDTH)
 
 
 def _of_layers(folder: Path, name: str, optics: Optics) -> tuple[WindowModel, Optics]:
