@@ -231,7 +231,10 @@ STRETCH = 744  # rows, a month of hours: the part of all zones in memory at a ti
 class BalanceOptions:
     """Choices of the model; the defaults are EnergyPlus' own."""
 
-    inside_convection: str = "tarp"  # or "constant"
+    inside_convection: str = "tarp"  # or "constant", "stated"
+    inside_films: tuple[float, float, float] | None = None  # [W/(m2 K)] for "stated": upright faces
+    # (up to 45 degrees from it), others with heat that rises, with heat that sinks
+    inside_radiation: float | None = None  # [W/(m2 K)] between black faces; None: sigma T^4
     outside_convection: str = "doe2"  # or "mowitt", "constant"
     outside_film: float = 20.0  # [W/(m2 K)] for "constant"
     terrain: str = "suburbs"  # or "country", "city"
@@ -248,6 +251,12 @@ class BalanceOptions:
         require(self.iterations >= 1, "iterations", "expected at least 1")
         require_range(self.cell, 1e-5, 1.0, "cell", "m")
         _choice("terrain", self.terrain, tuple(TERRAIN))
+        stated = self.inside_convection == "stated"
+        message = "belong to inside_convection = 'stated', and that to them"
+        require(stated == (self.inside_films is not None), "inside_films", message)
+        for film in (*(self.inside_films or ()), self.inside_radiation):
+            if film is not None:
+                require_range(film, 0.01, 1000.0, "inside_films, inside_radiation", "W/(m2 K)")
         require_range(self.outside_film, 0.1, 1000.0, "outside_film", "W/(m2 K)")
         require_range(self.start_c, -90.0, 90.0, "start_c", "C")
         for name in ("tolerance", "warm_tolerance"):
@@ -255,7 +264,7 @@ class BalanceOptions:
         require_range(self.warm_days, 0, 100_000, "warm_days")
 
 
-_INSIDE = ("tarp", "constant")
+_INSIDE = ("tarp", "constant", "stated")
 _OUTSIDE = ("doe2", "mowitt", "constant")
 
 
@@ -406,6 +415,8 @@ def _method(options: BalanceOptions, steps: int, step_s: float) -> records.Metho
         step_s=float(step_s),
         solar_every=steps,
         inside=_INSIDE.index(options.inside_convection),
+        inside_films=options.inside_films or (0.0, 0.0, 0.0),
+        inside_radiation=options.inside_radiation or 0.0,
         outside=_OUTSIDE.index(options.outside_convection),
         outside_film=float(options.outside_film),
         iterations=options.iterations,

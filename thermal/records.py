@@ -134,7 +134,9 @@ class Method(NamedTuple):
     steps: int  # per hour
     step_s: float
     solar_every: int  # steps for which one solar row holds
-    inside: int  # 0 TARP and ISO 15099, 1 constant
+    inside: int  # 0 TARP and ISO 15099, 1 constant, 2 inside_films
+    inside_films: tuple[float, float, float]  # [W/(m2 K)] walls, heat that rises, that sinks
+    inside_radiation: float  # [W/(m2 K)] between black faces; 0: by their temperatures
     outside: int  # 0 DOE-2, 1 MoWiTT, 2 constant
     outside_film: float  # [W/(m2 K)] for 2
     iterations: int

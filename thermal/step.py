@@ -370,6 +370,7 @@ def _plant(
     return COOLS if air > drive.cooling_c[t, z] + ROUNDING else FREE
 
 
+UPRIGHT = 0.7071  # of the normal's z: faces within 45 degrees of upright
 MOST_CHANGES = 50  # of the plants in an iterate; each changes a few times at the most
 
 
@@ -400,10 +401,14 @@ def _layer_conductance(kind: int, c: NDArray[np.float64], inner: float, outer: f
 
 
 @inlined
-def _inside_film(faces: Faces, i: int, surface: float, air: float, choice: int) -> float:
+def _inside_film(faces: Faces, i: int, surface: float, air: float, method: Method) -> float:
     nz = faces.normal[i, 2]
-    if choice == 1:
+    if method.inside == 1:
         return constant_inside(surface, air, nz)
+    if method.inside == 2:
+        if abs(nz) < UPRIGHT:
+            return method.inside_films[0]
+        return method.inside_films[1 if (surface - air) * nz < 0.0 else 2]
     if faces.kind[i] == WINDOW and abs(nz) < 0.1:
         return iso15099_inside(surface, air, faces.height[i])
     return tarp_inside(surface, air, nz)
@@ -556,7 +561,7 @@ def _assemble(
     _assemble_air(net, state, work, weather, drive, t, method)
     for i in range(n):
         z, kind, area, k = faces.zone[i], faces.kind[i], faces.area[i], place[i]
-        film = _inside_film(faces, i, state.inner[i], state.air[z], method.inside)
+        film = _inside_film(faces, i, state.inner[i], state.air[z], method)
         if kind == WINDOW:
             shading = drive.state[hour, faces.window[i]]
             film += net.glass.extra[faces.window[i], shading, 1]
@@ -593,7 +598,9 @@ def _assemble(
         for q in range(first, last):
             i, j = pairs.faces[q]
             area = net.radiation.exchange[at + q]
-            h = SIGMA * area * _cube(state.inner[i], state.inner[j])
+            h = method.inside_radiation * area
+            if h == 0.0:
+                h = SIGMA * area * _cube(state.inner[i], state.inner[j])
             e[pairs.at_exchange[q]] -= h
             d[place[i]] += h
             d[place[j]] += h

@@ -48,7 +48,7 @@ class BatchMean:
     count: int  # batches so far
     mean: NDArray[np.float64]
     spread: NDArray[np.float64]  # same shape; sum of squared deviations from the mean
-    sum_spread: NDArray[np.float64]  # the same of the sum over the last axis
+    covariance: NDArray[np.float64]  # [..., R, R] that of products of R blocks of the last axis
     seconds: float  # spent so far
     finished: bool
 
@@ -176,10 +176,11 @@ class CacheEntry:
 
 def _batch_mean(data: Mapping[str, NDArray[Any]]) -> BatchMean | None:
     """None where the shapes do not go together."""
-    mean, spread, sum_spread = (data[n].astype(float) for n in ("mean", "spread", "sum_spread"))
+    mean, spread, covariance = (data[n].astype(float) for n in ("mean", "spread", "covariance"))
     count, seconds, finished = int(data["count"]), float(data["seconds"]), bool(data["finished"])
-    whole = count > 0 and (spread.shape, sum_spread.shape) == (mean.shape, mean.shape[:-1])
-    return BatchMean(count, mean, spread, sum_spread, seconds, finished) if whole else None
+    shape = mean.shape
+    whole = count > 0 and spread.shape == shape and covariance.shape[:-2] == shape[:-1]
+    return BatchMean(count, mean, spread, covariance, seconds, finished) if whole else None
 
 
 def cached_or_computed(
@@ -193,7 +194,7 @@ def cached_or_computed(
     matrix = compute()
     if entry is not None:
         none, seconds = np.zeros_like(matrix), time.monotonic() - start
-        entry.save(BatchMean(1, matrix, none, none[..., 0], seconds, finished=True))
+        entry.save(BatchMean(1, matrix, none, none[..., :1, None], seconds, finished=True))
     return matrix
 
 

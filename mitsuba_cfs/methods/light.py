@@ -39,7 +39,8 @@ from mitsuba_cfs.methods.point_in_time import (
     relative_error_of_mean,
 )
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
-from mitsuba_cfs.methods.standard_error import relative_standard_error
+from mitsuba_cfs.methods.standard_error import noise_of_sums, relative_standard_error
+from mitsuba_cfs.metrics.noise import Noise
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 
@@ -168,7 +169,8 @@ def illuminance_with_error(
 ) -> tuple[Array, Array]:
     """Illuminance of the sensors [S, L] [lx], and the relative standard error of its mean [S].
 
-    The error is that of tracing.  Seasons are taken as independent.
+    The error is that of tracing, with Student's factor of its batches.  Seasons are taken as
+    independent.
     """
     if isinstance(light, PathLight):
         return path_illuminance(light, state, progress=progress)
@@ -183,6 +185,40 @@ def illuminance_with_error(
         lit[:, hours], error = illuminance_with_error(one, rows[:, hours])
         variance += (error * lit[:, hours].sum(axis=1)) ** 2
     return lit, relative_error_of_mean(lit, variance)
+
+
+def illuminance_noise(
+    light: Light, illuminance: Array, relative_error: Array, state: State | None = None
+) -> Callable[[Array], Noise]:
+    """Noise [S] of each sensor's illuminance times weights, summed over the hours, by weights.
+
+    The weights [S, L] are each sensor's own, not negative, and 0 in most hours.  Path tracing takes
+    the hours as independent and their relative errors as equal.
+
+    Args: illuminance, relative_error: [S, L], [S] of `illuminance_with_error` in this state.
+    """
+    if isinstance(light, PathLight):
+        total, squares = illuminance.sum(axis=1), (illuminance**2).sum(axis=1)
+        of_hour = np.divide(total**2, squares, out=np.zeros_like(total), where=squares > 0)
+        hourly = illuminance * (np.sqrt(of_hour) * relative_error)[:, None]
+
+        def of_paths(weights: Array) -> Noise:
+            variance = ((weights * hourly) ** 2).sum(axis=1)
+            return Noise.of(variance, np.zeros_like(variance))
+
+        return of_paths
+    if isinstance(light, PhaseLight):
+        light, count = with_sensor_light(light), len(light.scene.points)
+        eye = np.zeros((len(light.scene.sensors()[0]) - count, illuminance.shape[1]))
+        of_all = noise_of_sums(light, state, np.concatenate([illuminance, eye]))
+        return lambda weights: of_all(np.concatenate([weights, eye])).part(slice(count))
+    rows = _states(light, state)
+    seasons = [
+        (illuminance_noise(one, illuminance[:, hours], relative_error, rows[:, hours]), hours)
+        for one, hours in light.seasons()
+    ]
+    none = Noise.none(len(light.scene.points))
+    return lambda weights: sum((noise(weights[:, hours]) for noise, hours in seasons), start=none)
 
 
 def eye_illuminance(light: Light, state: State | None = None) -> Array:

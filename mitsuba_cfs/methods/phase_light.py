@@ -82,6 +82,19 @@ class WindowLight:
 
 
 @dataclass(frozen=True, slots=True)
+class SunNoise:
+    """What was traced of the sun in some hours h, times a factor of each."""
+
+    traced: Estimate  # [S, h]
+    factor: Array  # [h]
+    hours: NDArray[np.int64]  # [h] their numbers among L
+
+    def variance_of(self, weights: Array) -> tuple[Array, Array]:
+        """As of `Estimate` of the sensors' sums over the hours [S], by weights [1 or S, L]."""
+        return self.traced.variance_of(weights[:, self.hours] * self.factor)
+
+
+@dataclass(frozen=True, slots=True)
 class SensorLight:
     """The light of the sensors, the eye last, through one window group in one state.
 
@@ -91,7 +104,7 @@ class SensorLight:
     coefficients: GroupCoefficients
     added: Array | None = None  # [S, L] the reflected sun in place of `coefficients.by_sun` [lx]
     sun: Array | None = None  # [S, L] C_ds s_sun [lx]; None with the three-phase method
-    sun_error: Array | float = 0.0  # [S] of the hours' sums of these two
+    sun_noise: tuple[SunNoise, ...] = ()  # of these two
 
 
 @dataclass(frozen=True)
@@ -382,19 +395,20 @@ def _sensor_light(
     Args: direct: C_ds [G, S, h], and the hours h that it is of.
     """
     beam, added = _passes_beam(one), None
-    error: Array | float = 0.0
+    noise: list[SunNoise] = []
     if light.reflected is None:
         added = _beam_in_room(light, one, g) if beam else None
     elif g < len(light.scene.outdoor_groups):
         cells = room if beam else None
-        more = reflected_to_sensors(light.matrices, light.reflected, cells, one, g)
-        added, error = more.values, more.sum_error
+        more, traced = reflected_to_sensors(light.matrices, light.reflected, cells, one, g)
+        added, shining = more, light.reflected.shining
+        noise.append(SunNoise(traced, np.ones(len(shining)), shining))
     sun, (matrix, hours) = np.zeros((len(one.whole), len(light.sky.lit))), direct
-    if matrix is None:
-        return SensorLight(one, added, sun, error)
-    luminance, of_group = light.sky.illuminance[hours] / SUN_SOLID_ANGLE, matrix.part(np.s_[g])
-    sun[:, hours] = of_group.values * luminance
-    return SensorLight(one, added, sun, np.hypot(error, of_group.error_of(luminance)))
+    if matrix is not None:
+        luminance, of_group = light.sky.illuminance[hours] / SUN_SOLID_ANGLE, matrix.part(np.s_[g])
+        sun[:, hours] = of_group.values * luminance
+        noise.append(SunNoise(of_group, luminance, hours))
+    return SensorLight(one, added, sun, tuple(noise))
 
 
 def _beam_in_room(light: PhaseLight, one: GroupCoefficients, g: int) -> Array:

@@ -460,7 +460,7 @@ def _no_daylight(sampling: Sampling) -> Estimate:
     """D of a room without windows."""
     size = ReinhartSky(sampling.subdivision).size
     values = np.zeros((0, KLEMS_FULL.size, size))
-    return Estimate(values, values, values[..., 0], BATCHES, 0.0)
+    return Estimate(values, values, values[..., :1, None], BATCHES, 0.0)
 
 
 def _daylight(

@@ -15,7 +15,8 @@ the five-phase method computes this light at points that represent the outdoor s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,10 +115,12 @@ def reflected_to_sensors(
     room: SunlitRoom | None,
     group: GroupCoefficients,
     g: int,
-) -> Estimate:
+) -> tuple[NDArray[np.float64], Estimate]:
     """Illuminance to add to that of the sensors through a group in a state [S, L] [lx].
 
     Args: room: None where no beam of the sun passes the group.
+
+    Returns: what is added, and what was traced of it, in the hours h with sun [S, h].
     """
     views = [
         view_shares(
@@ -146,24 +149,21 @@ def reflected_to_sensors(
             )  # fmt: skip
         return light
 
-    estimate = accumulate(light_of, stopping=Stopping(BATCHES))
-    return replace(
-        estimate,
-        values=_all_hours(sun, estimate.values) - _by_patches(matrices, sun, group, rest, g),
-        standard_error=_all_hours(sun, estimate.standard_error),
-    )
+    traced = accumulate(light_of, stopping=Stopping(BATCHES))
+    by_patches = _by_patches(matrices, sun, group, rest, g)
+    return np.asarray(_all_hours(sun, traced.values) - by_patches, dtype=float), traced
 
 
-def replaced_luminance(sun: ReflectedSun, hours: NDArray[np.bool_]) -> Array:
-    """Luminance outside windows [Q, K], the sum over some hours, by shadow rays less by patches.
+def replaced_luminance(sun: ReflectedSun, weights: NDArray[Any], on_patches: NDArray[Any]) -> Array:
+    """Luminance outside windows [Q, K, n], summed over hours, by shadow rays less by patches.
 
-    Args: hours: [L] which.
+    Args: weights: of the hours [L, n]; on_patches: the sun's weighted sum on the patches [P, n].
     """
     if not sun.before:
-        return np.zeros(sun.by_patches.shape[:2])
-    some = hours[sun.shining].astype(np.float32)
-    mean = sum(before @ some for before in sun.before) / BATCHES
-    return mean - sun.by_patches @ sun.sky.totals(hours)[1]
+        return np.zeros((*sun.by_patches.shape[:2], weights.shape[1]))
+    some = weights[sun.shining].astype(np.float32)
+    mean = np.sum([before @ some for before in sun.before], axis=0) / BATCHES
+    return np.asarray(mean - sun.by_patches @ on_patches)
 
 
 def replaced_before(sun: ReflectedSun, shares: Array | None, hours: NDArray[np.int64]) -> Array:

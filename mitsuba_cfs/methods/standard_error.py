@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ from mitsuba_cfs.methods.window_reflection import (
     variance_by_room,
     with_exchange_of,
 )
+from mitsuba_cfs.metrics.noise import Noise
 
 Array = NDArray[np.float64]
 
@@ -45,16 +46,32 @@ def relative_standard_error(light: PhaseLight, state: State | None, illuminance:
 
     Args: illuminance: that of the sensors in this state, the eye last [S + 1, L] [lx].
     """
-    rows, sensors = states_of(light, state), sensor_light(light)
-    variance = _matrix_variance(light, rows)
-    for g, row in enumerate(rows):
-        share = np.bincount(row, minlength=len(sensors[g])) / len(row)
-        sun = sum(w * one.sun_error for w, one in zip(share, sensors[g], strict=True))
-        variance = variance + (sun / len(row)) ** 2
-    for kind, hours in combinations(rows):
-        variance = variance + _exchange_variance(light, light.optics(kind), hours)
-    mean = illuminance.mean(axis=1)
-    return np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
+    rows = states_of(light, state)
+    noise = _of_tracing(light, rows, None) + _of_method(light, rows)
+    error, total = noise.standard_error(), illuminance.sum(axis=1)
+    return np.divide(error, total, out=np.zeros_like(total), where=total > 0)
+
+
+def noise_of_sums(
+    light: PhaseLight, state: State | None, illuminance: Array
+) -> Callable[[Array], Noise]:
+    """Noise [S + 1] of each sensor's illuminance times weights, summed over the hours, by weights.
+
+    The weights [S + 1, L] are not negative, and 0 in most hours.  What windows reflect, and D's
+    means over a part of a group, have the same share of the illuminance as in the mean over all
+    hours.
+
+    Args: illuminance: as of `relative_standard_error`.
+    """
+    rows, total = states_of(light, state), illuminance.sum(axis=1)
+    of_method = _of_method(light, rows)
+
+    def noise(weights: Array) -> Noise:
+        weighted = (weights * illuminance).sum(axis=1)
+        share = np.divide(weighted, total, out=np.zeros_like(total), where=total > 0)
+        return _of_tracing(light, rows, weights) + of_method.scaled(share)
+
+    return noise
 
 
 def relative_error_under(light: PhaseLight, sky: Array, state: int = 0) -> Array:
@@ -65,46 +82,79 @@ def relative_error_under(light: PhaseLight, sky: Array, state: int = 0) -> Array
     Args: sky: [P] luminance of the patches.
     """
     matrices, sensors = light.matrices, sensor_light(light)
-    count = len(light.scene.points)
-    variance = np.zeros(count)
+    noise = Noise.none(len(light.scene.sensors()[0]))
     for g, states in enumerate(sensors):
         group = states[min(state, len(states) - 1)].coefficients
         for q in matrices.parts.of(g):
-            variance += _part_variance(light, group, q, sky, None)[:count]
+            noise += _part_noise(light, group, q, sky[:, None], None)
         if group.straight is not None:
-            variance += group.straight.values.error_of(sky)[:count] ** 2
-    total = coefficients_in_state(light, state)[:count] @ sky
-    return np.divide(np.sqrt(variance), total, out=np.zeros_like(total), where=total > 0)
+            noise += Noise.of(*group.straight.values.variance_of(sky))
+    count = len(light.scene.points)
+    total, error = coefficients_in_state(light, state)[:count] @ sky, noise.standard_error()[:count]
+    return np.divide(error, total, out=np.zeros_like(total), where=total > 0)
 
 
-def _matrix_variance(light: PhaseLight, rows: State) -> Array:
-    """Variance of each sensor's mean over the hours by V, D and B [S], and by D's means.
+def _of_tracing(light: PhaseLight, rows: State, weights: Array | None) -> Noise:
+    """Noise of each sensor's weighted sum over the hours by V, D, B, C_ds and the reflected sun.
 
     Of the sun that is computed by shadow rays the matrices have no part.
 
-    Args: rows: [G, L] state of each window group in each hour.
+    Args:
+        rows: [G, L] state of each window group in each hour.
+        weights: [S, L]; None: 1 everywhere.
     """
-    matrices, sky, reflected = light.matrices, light.sky, light.reflected
-    variance = np.zeros(len(light.scene.sensors()[0]))
-    hours = len(sky.lit)
-    outdoors = len(light.scene.outdoor_groups)
+    matrices, reflected = light.matrices, light.reflected
+    noise = Noise.none(len(light.scene.sensors()[0]))
+    outdoors, skies = len(light.scene.outdoor_groups), {}
     for g, row in enumerate(rows):
-        by_means = np.zeros(len(variance))
         for j in np.unique(row):
-            group, some = sensor_light(light)[g][j].coefficients, row == j
-            whole, of_sun, rest = sky.totals(some)
+            one, some = sensor_light(light)[g][j], row == j
+            group = one.coefficients
+            of_hours = some[:, None] * (np.ones(1) if weights is None else weights.T)
+            if some.tobytes() not in skies:  # those of most groups are the same
+                skies[some.tobytes()] = _weighted_sky(light, some, weights)
+            whole, of_sun, rest = skies[some.tobytes()]
+            sun, seen = None, whole
             if reflected is not None and g < outdoors:
-                mean = rest / hours
-                sun = of_sun / hours, replaced_luminance(reflected, some) / hours
-            else:
-                mean, sun = whole / hours, None
+                sun, seen = (of_sun, replaced_luminance(reflected, of_hours, of_sun)), rest
             for q in matrices.parts.of(g):
-                variance += _part_variance(light, group, q, mean, sun)
+                noise += _part_noise(light, group, q, seen, sun)
             if group.straight is not None:
-                variance += group.straight.values.error_of(mean) ** 2
-            by_means += _error_of_means(light, group, g, some)
-        variance += by_means**2
-    return variance
+                noise += Noise.of(*group.straight.values.variance_of(seen.T))
+            for beam in one.sun_noise:
+                noise += Noise.of(*beam.variance_of(of_hours.T), shared=True)
+    return noise
+
+
+def _weighted_sky(
+    light: PhaseLight, some: NDArray[np.bool_], weights: Array | None
+) -> tuple[Array, ...]:
+    """Sums over some hours: the whole sky, the sun alone, and the rest [P, 1] or [P, S]."""
+    sky = light.sky
+    if weights is None:
+        whole, of_sun, rest = (one[:, None] for one in sky.totals(some))
+        return whole, of_sun, rest
+    hours = np.flatnonzero(some & weights.any(axis=0))
+    factors = weights[:, hours].T
+    whole = sky.whole[:, hours] @ factors
+    if sky.sun is None:
+        return whole, np.zeros_like(whole), np.zeros_like(whole)
+    return whole, sky.sun_alone(hours) @ factors, sky.without_sun(hours) @ factors
+
+
+def _of_method(light: PhaseLight, rows: State) -> Noise:
+    """Noise of each sensor's sum over the hours by W and X, and the error of D's means."""
+    count, hours = len(light.scene.sensors()[0]), len(light.sky.lit)
+    variance = np.zeros(count)
+    for kind, some in combinations(rows):
+        variance = variance + _exchange_variance(light, light.optics(kind), some)
+    for g, row in enumerate(rows):
+        means = np.zeros(count)
+        for j in np.unique(row):
+            means += _error_of_means(light, sensor_light(light)[g][j].coefficients, g, row == j)
+        variance = variance + means**2
+    shared = variance * hours**2
+    return Noise(np.zeros(count), shared, np.zeros(count))
 
 
 def _exchange_variance(
@@ -130,43 +180,46 @@ def _exchange_variance(
         variance += variance_by_room(view.values, matrices.exchange, optics, luminance)
     if outwards and matrices.outdoor_exchange is not None:
         if light.reflected is not None:
-            before = before + replaced_luminance(light.reflected, some) / len(sky.lit)
+            sun = sky.totals(some)[1][:, None]
+            replaced = replaced_luminance(light.reflected, some[:, None], sun)[..., 0]
+            before = before + replaced / len(sky.lit)
         shares = shares_before_windows(matrices, view.values, optics)
         variance += variance_by_outdoors(shares, matrices.outdoor_exchange, optics, before)
     return variance
 
 
-def _part_variance(
+def _part_noise(
     light: PhaseLight,
     group: GroupCoefficients,
     q: int,
     sky: Array,
-    sun: tuple[Array, Array] | None,
-) -> Array:
-    """Variance of the sensors [S] by V and D of a part of a group in a state.
+    sun: tuple[NDArray[np.floating], ...] | None,
+) -> Noise:
+    """Noise of the sensors [S] by V and D of a part of a group in a state.
 
     Args:
-        sky: [P] mean luminance.
-        sun: that of the sun on its patches [P], and the luminance that the outdoors reflects of it
-            to the window patches, less that in D [Q, K].
+        sky: luminance [P, 1], or that of each sensor [P, S].
+        sun: that of the sun on its patches [P, 1 or S], and the luminance that the outdoors
+            reflects of it to the window patches, less that in D [Q, K, 1 or S].
     """
     matrices, T = light.matrices, group.optics.transmission
-    view = sensor_matrix(matrices)
-    before = matrices.daylight.values[q] @ sky
+    view, daylight = sensor_matrix(matrices), matrices.daylight.part(np.s_[q])
+    before = daylight.values @ sky
     if sun is not None:
         on_patches, replaced = sun
-        before = before + matrices.daylight.values[q] @ on_patches + replaced[q]
+        before = before + daylight.values @ on_patches + replaced[q]
         direct = direct_daylight(matrices)[q] @ on_patches
         through = T @ before - beam_matrix(group.optics) @ direct
     else:
         through = T @ before
-    by_view = view.part(np.s_[:, q]).error_of(np.maximum(through, 0.0))
-    by_daylight = (
-        without_straight(matrices, group, q) ** 2
-        @ matrices.daylight.part(np.s_[q]).error_of(sky) ** 2
-    )
-    variance: Array = by_view**2 + by_daylight
-    return variance
+    seen = np.maximum(through, 0.0).T
+    # the sensors' first reflections are at the same points of the room
+    by_view = Noise.of(*view.part(np.s_[:, q]).variance_of(seen), shared=True)
+    # the rows of D are independent: each has rays of its own
+    by_row = without_straight(matrices, group, q) ** 2 * daylight.variances_of(sky).T
+    of_rows = (by_row**2).sum(axis=1) / (daylight.batches - 1)
+    by_daylight = Noise(np.zeros(len(by_row)), by_row.sum(axis=1), of_rows)
+    return by_view + by_daylight
 
 
 def _error_of_means(

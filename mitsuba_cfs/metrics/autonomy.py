@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.metrics.noise import Noise
+
 FloatArray = NDArray[np.float64]
+NoiseOfSums = Callable[[FloatArray], Noise]  # of weights [H, S]
 
 THRESHOLD = 300.0  # [lx] daylight autonomy
-ERROR_STEP = 3.0  # standard errors by which hours are moved to count those near the threshold
+ERROR_STEP = 3.0  # standard errors from the threshold: hours within are near it
+NEAR_HOURS = 30  # so many hours near the threshold are looked for at least
+LEAST_WIDTH, MOST_WIDTH = 1e-6, 0.25  # how far from the threshold, as a share of it
+TYPICAL_HOURS = 4  # hours near the threshold whose own noise is computed
 UDI_LIMITS = (100.0, 300.0, 3000.0)  # [lx] Mardaljevic et al. 2012: fell short, supplementary,
 # autonomous, exceeded
 UDI_LIMITS_2005 = (100.0, 300.0, 2000.0)  # [lx] upper limit of Nabil and Mardaljevic 2005
@@ -28,27 +36,60 @@ def daylight_autonomy(
     return np.mean(scheduled(illuminance, hours) >= threshold, axis=0)
 
 
-def daylight_autonomy_error(
+def daylight_autonomy_noise(
     illuminance: ArrayLike,
     hours: ArrayLike,
+    noise_of: NoiseOfSums,
+    *,
     relative_error: ArrayLike,
     threshold: float = THRESHOLD,
-) -> FloatArray:
-    """Standard error of DA [S] (0 to 1) by the noise of the illuminance.
+) -> Noise:
+    """Noise of DA (0 to 1) [S] by that of the illuminance.
 
-        (DA(E (1 + k e)) - DA(E (1 - k e))) / 2 k
+    Hours near the threshold decide.  Of n hours within t (1 -+ a), a part 1 / 2 a t crosses it for
+    each lux:
 
-    A sensor's noise is that of its matrices, about the same share of the illuminance in all hours.
-    Few hours are close to the threshold: k = 3 counts enough of them.
+        variance = (n / 2 a H)^2 c + n / (2 a H^2) sqrt(v) / sqrt(pi)
+
+    where c is the part of their relative variance that the hours have in common, and v the part
+    that each has alone: that of a mean hour is c + v, that of their mean is c + v / n.  Two normal
+    values of the variance v are 2 sqrt(v / pi) apart.
 
     Args:
         illuminance: [H, S] [lx].
-        hours: [H] mask of the scheduled time steps.
-        relative_error: [S] relative standard error of the illuminance.
+        hours: [H] mask of the H scheduled time steps.
+        noise_of: that of the sums over the hours of the illuminance times weights [H, S].
+        relative_error: [S] relative standard error of the mean illuminance.
     """
-    values, error = scheduled(illuminance, hours), ERROR_STEP * np.asarray(relative_error)
-    above, below = (np.mean(values * (1 + s * error) >= threshold, axis=0) for s in (1, -1))
-    return np.asarray((above - below) / (2 * ERROR_STEP))
+    values, of_schedule = scheduled(illuminance, hours), np.asarray(hours)
+    distance = np.abs(values / threshold - 1)
+    few = np.partition(distance, min(NEAR_HOURS, len(distance)) - 1, axis=0)
+    few = few[min(NEAR_HOURS, len(distance)) - 1]
+    width = np.maximum(ERROR_STEP * np.asarray(relative_error), few)
+    width = np.clip(width, LEAST_WIDTH, MOST_WIDTH)
+    near = distance <= width
+    count, steps = near.sum(axis=0), len(values)
+    weights = np.zeros((len(of_schedule), values.shape[1]))
+    weights[of_schedule] = near / (2 * width * threshold * steps)
+    together = noise_of(weights)
+    if not count.any():
+        return together
+    # of the hours' mean, relative; and of some hours each
+    scale = np.divide(2 * width * steps, count, out=np.zeros(len(count)), where=count > 0)
+    of_mean = (together.own + together.shared) * scale**2
+    of_hour = np.zeros(len(count))
+    for i in range(TYPICAL_HOURS):
+        rank = np.ceil((i + 0.5) / TYPICAL_HOURS * count)
+        chosen = near & (np.cumsum(near, axis=0) == np.maximum(rank, 1))
+        weights[of_schedule] = chosen / threshold
+        hourly = noise_of(weights)
+        of_hour += (hourly.own + hourly.shared) / TYPICAL_HOURS
+    alone = np.maximum(of_hour - of_mean, 0.0) * count / np.maximum(count - 1, 1)
+    common = np.maximum(of_mean - alone / np.maximum(count, 1), 0.0)
+    share = np.divide(common, of_mean, out=np.ones(len(count)), where=of_mean > 0)
+    crossing = count / (2 * width * steps**2) * np.sqrt(alone / np.pi)
+    nothing = np.zeros(len(count))
+    return together.scaled(np.sqrt(share)) + Noise(crossing, nothing, nothing)
 
 
 def continuous_daylight_autonomy(

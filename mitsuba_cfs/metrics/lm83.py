@@ -15,6 +15,7 @@ from mitsuba_cfs.metrics.autonomy import (
     scheduled,
     sensor_weights,
 )
+from mitsuba_cfs.metrics.noise import Noise
 
 FloatArray = NDArray[np.float64]
 
@@ -114,20 +115,26 @@ def blinds_operated(
 
 def spatial_daylight_autonomy_error(
     autonomy: ArrayLike,
-    error: ArrayLike,
+    noise: Noise,
     *,
     areas: ArrayLike | None = None,
     time: float = SDA_TIME,
 ) -> float:
     """Standard error of sDA (0 to 1) from the noise of DA.
 
-        error = sqrt(sum w_i^2 p_i (1 - p_i)), p_i = Phi((DA_i - time) / error_i)
+        variance = sum w_i^2 p_i (1 - s_i) + (sum w_i sqrt(p_i s_i))^2
+        p_i = Phi(-|DA_i - time| / error_i)
 
-    The noise of sensors is taken as independent.
+    p_i is the probability that a sensor is counted wrongly, s_i the part of the variance of its DA
+    that it shares with the other sensors.
 
-    Args: autonomy, error: [S] DA and its standard error (0 to 1).
+    Args: autonomy, noise: [S] DA (0 to 1) and its noise.
     """
-    distance, error = np.asarray(autonomy, dtype=float) - time, np.asarray(error, dtype=float)
-    share = ndtr(np.divide(distance, error, out=np.full(len(error), np.inf), where=error > 0))
+    distance, error = np.asarray(autonomy, dtype=float) - time, noise.standard_error()
+    steps = np.divide(np.abs(distance), error, out=np.full(len(error), np.inf), where=error > 0)
+    wrong = ndtr(-steps)
+    total = noise.own + noise.shared
+    shared = np.divide(noise.shared, total, out=np.zeros_like(total), where=total > 0)
     weights = sensor_weights(areas, len(error))
-    return float(np.sqrt(np.sum(weights**2 * share * (1 - share))))
+    own = np.sum(weights**2 * wrong * (1 - shared))
+    return float(np.sqrt(own + np.sum(weights * np.sqrt(wrong * shared)) ** 2))

@@ -10,13 +10,15 @@ from mitsuba_cfs.methods.light import (
     SeasonalLight,
     daylight_coefficients,
     direct_sun,
+    illuminance_noise,
     illuminance_with_error,
 )
 from mitsuba_cfs.methods.phase_light import PhaseLight, with_sensor_light
 from mitsuba_cfs.methods.standard_error import relative_error_under
 from mitsuba_cfs.methods.sun_by_patches import sunny_hour_error
-from mitsuba_cfs.metrics.autonomy import daylight_autonomy_error
+from mitsuba_cfs.metrics.autonomy import daylight_autonomy_noise
 from mitsuba_cfs.metrics.lm83 import spatial_daylight_autonomy_error
+from mitsuba_cfs.metrics.noise import Noise
 from mitsuba_cfs.metrics.room import daylight_factor, room_metrics
 from mitsuba_cfs.metrics.schedules import lm83_hours
 from mitsuba_cfs.progress import Progress, part, silent
@@ -39,10 +41,18 @@ def room_daylight(
     """Illuminance of the year with the shading states of each hour [H, G], and its metrics."""
     progress("daylight", 0.0)
     lights, lit_state, points = light.light, light.states(state), light.scene.points
+    traced = picture_light(room, light)
     lit, error = illuminance_with_error(
-        picture_light(room, light), lit_state, progress=part(progress, 0.9, 1.0, "daylight")
+        traced, lit_state, progress=part(progress, 0.9, 1.0, "daylight")
     )
     illuminance = room.skies.whole_year(lit.astype(np.float32)).T
+    noise = illuminance_noise(traced, lit, error, lit_state)
+    autonomy_noise = daylight_autonomy_noise(
+        illuminance,
+        lm83_hours(room.weather),
+        lambda weights: noise(weights[lights.sky.lit].T),
+        relative_error=error,
+    )
     blurred = None
     if room.options.method == "three-phase":
         blurred = 100.0 * sunny_hour_error(lights, lit_state, lit)
@@ -55,7 +65,7 @@ def room_daylight(
         sun = None if direct is None else direct[:, sensors]
         table, of_room = daylight_metrics(
             points[sensors], illuminance[:, sensors], factor[sensors], room.weather, sun,
-            relative_error=error[sensors],
+            autonomy_noise=autonomy_noise.part(sensors),
         )  # fmt: skip
         table["daylight_factor_standard_error"] = 100.0 * factor_error[sensors]
         if blurred is not None:
@@ -125,29 +135,28 @@ def daylight_metrics(
     weather: Weather,
     direct: NDArray[np.float32] | None = None,
     *,
-    relative_error: NDArray[np.float64],
+    autonomy_noise: Noise,
 ) -> tuple[pd.DataFrame, dict[str, float]]:
     """Metrics by sensor (a table with the positions) and of the room, shares in per cent.
 
     Args:
         points: [S, 3]; illuminance: [H, S] [lx]; daylight_factor: [S] 0 to 1.
         direct: [H, S] [lx] straight from the sun, for annual sunlight exposure.
-        relative_error: [S] relative standard error of the illuminance, for those of DA and sDA.
+        autonomy_noise: [S] of DA.
     """
     metrics = room_metrics(illuminance, weather, direct_illuminance=direct)
     by_sensor = metrics.by_sensor()
     table = pd.DataFrame(points, columns=["x", "y", "z"]).rename_axis("sensor")
     for column, source in SENSOR_COLUMNS.items():
         table[column] = by_sensor[source].to_numpy()
-    autonomy_error = daylight_autonomy_error(illuminance, lm83_hours(weather), relative_error)
-    table["da300_standard_error"] = 100.0 * autonomy_error
+    table["da300_standard_error"] = 100.0 * autonomy_noise.standard_error()
     if metrics.sunlit_hours is not None:
         table["sunlit_hours"] = metrics.sunlit_hours
     table["daylight_factor"] = 100.0 * daylight_factor
     of_room = metrics.of_room()
     room = {column: of_room[source] for column, source in ROOM_COLUMNS.items()}
     room["sda300_50_standard_error"] = 100.0 * spatial_daylight_autonomy_error(
-        metrics.daylight_autonomy / 100.0, autonomy_error, areas=metrics.areas
+        metrics.daylight_autonomy / 100.0, autonomy_noise, areas=metrics.areas
     )
     if metrics.annual_sunlight_exposure is not None:
         room["ase1000_250"] = metrics.annual_sunlight_exposure

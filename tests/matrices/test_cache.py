@@ -20,7 +20,7 @@ from mitsuba_cfs.matrices.cache import BatchMean, MatrixCache, default_folder, d
 from tests.trace import rooms
 
 BY = "mitsuba_cfs.trace.kernels.estimate"  # the module that computes what these tests keep
-STATE = BatchMean(3, np.arange(6.0).reshape(2, 3), np.ones((2, 3)), np.ones(2), 1.5, True)
+STATE = BatchMean(3, np.arange(6.0).reshape(2, 3), np.ones((2, 3)), np.ones((2, 3, 3)), 1.5, True)
 
 
 @pytest.fixture

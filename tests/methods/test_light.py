@@ -13,9 +13,11 @@ from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods.glare import hourly_glare, pictures, rated_pictures
 from mitsuba_cfs.methods.light import (
+    SeasonalLight,
     daylight,
     eye_illuminance,
     illuminance,
+    illuminance_noise,
     illuminance_with_error,
     with_view,
 )
@@ -104,6 +106,26 @@ def test_three_phases_say_how_far_their_blurred_sun_is_off() -> None:
     assert expected.max() > 0.2  # a spot of sun lies or does not lie on the sensor
     np.testing.assert_allclose(sunny_hour_error(light, None, blurred), expected, rtol=1e-6)
     assert not sunny_hour_error(sharp, None, at_sun).any()
+
+
+@pytest.mark.parametrize("method", ["three-phase", "five-phase", "point-in-time"])
+def test_the_noise_of_all_hours_is_the_error_of_their_mean(method) -> None:
+    days = given_sky(
+        [[0.0, -0.8, 0.6], [0.6, -0.5, 0.62], [0.0, -0.6, 0.8]], [800.0, 300.0, 0.0],
+        [90.0, 120.0, 60.0], 1, day_of_year=172,
+    )  # fmt: skip
+    light = daylight(scene(), glass(), days, method=method, sampling=FEW)
+    lux, relative = illuminance_with_error(light)
+    noise = illuminance_noise(light, lux, relative)
+    whole = noise(np.ones_like(lux)).standard_error()
+    np.testing.assert_allclose(whole, relative * lux.sum(axis=1), rtol=1e-4)
+    first, second = (noise(np.tile(one, (2, 1))).standard_error() for one in np.eye(3)[:2])
+    assert np.all(first > 0) and not np.allclose(first, second)
+    if method == "point-in-time":
+        return
+    seasons = SeasonalLight((light,), days, np.zeros(3, dtype=np.int64))
+    of_seasons = illuminance_noise(seasons, lux, relative)(np.ones_like(lux))
+    np.testing.assert_allclose(of_seasons.standard_error(), whole, rtol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from mitsuba_cfs.metrics.autonomy import (
     UDI_LIMITS_2005,
     area_share,
     continuous_daylight_autonomy,
     daylight_autonomy,
-    daylight_autonomy_error,
+    daylight_autonomy_noise,
     sensor_weights,
     useful_daylight_illuminance,
 )
@@ -21,6 +22,7 @@ from mitsuba_cfs.metrics.lm83 import (
     spatial_daylight_autonomy_error,
     sunlit_hours,
 )
+from mitsuba_cfs.metrics.noise import Noise
 
 
 def test_the_error_of_da_is_its_spread() -> None:
@@ -28,15 +30,72 @@ def test_the_error_of_da_is_its_spread() -> None:
     lux, hours = np.arange(0.05, 1000, 0.1)[:, None], np.ones(10_000, dtype=bool)
     random = np.random.default_rng(1)
     spread = np.std([daylight_autonomy(lux * f, hours)[0] for f in random.normal(1, 0.02, 400)])
-    found = daylight_autonomy_error(lux, hours, np.array([0.02]))[0]
-    assert found == pytest.approx(0.3 * 0.02, rel=0.02)
-    assert spread == pytest.approx(found, rel=0.15)  # 400 trials: 3.5 %
+    noise = daylight_autonomy_noise(
+        lux, hours, lambda weights: shared((0.02 * (weights * lux).sum(axis=0)) ** 2),
+        relative_error=np.array([0.02]),
+    )  # fmt: skip
+    assert noise.standard_error()[0] == pytest.approx(0.3 * 0.02, rel=0.02)
+    assert noise.own[0] < 1e-3 * noise.shared[0]  # what the hours have alone
+    assert spread == pytest.approx(0.3 * 0.02, rel=0.15)  # 400 trials: 3.5 %
+
+
+def test_the_noise_of_each_hour_alone_moves_da_too() -> None:
+    """Of 10,000 hours even up to 1,000 lx, each with 5 % of noise of its own."""
+    lux, hours = np.arange(0.05, 1000, 0.1)[:, None], np.ones(10_000, dtype=bool)
+    random = np.random.default_rng(1)
+    trials = [lux * random.normal(1, 0.05, lux.shape) for _ in range(400)]
+    spread = np.std([daylight_autonomy(trial, hours)[0] for trial in trials])
+    noise = daylight_autonomy_noise(
+        lux, hours, lambda weights: own((0.05**2 * (weights * lux) ** 2).sum(axis=0)),
+        relative_error=np.array([0.05 / np.sqrt(7500)]),
+    )  # fmt: skip
+    assert noise.standard_error()[0] == pytest.approx(spread, rel=0.15)
+
+
+def test_few_batches_raise_the_error_by_students_factor() -> None:
+    """97.7 % of Student's t: 2.87 with four degrees of freedom; two such parts have eight."""
+    nine = np.array([9.0])
+    one = Noise.of(nine, nine**2 / 4)
+    assert one.standard_error()[0] == pytest.approx(3.0 * 2.869 / 2, rel=1e-3)
+    both = one + Noise.of(nine, nine**2 / 4, shared=True)
+    assert both.standard_error()[0] == pytest.approx(3.0 * np.sqrt(2) * 2.366 / 2, rel=1e-3)
+    assert Noise.of(nine, np.zeros(1)).standard_error()[0] == pytest.approx(3.0)
+    scaled = both.scaled(np.array([0.5]))
+    assert scaled.standard_error()[0] == pytest.approx(both.standard_error()[0] / 2)
 
 
 def test_sensors_near_the_limit_make_the_error_of_sda() -> None:
-    found = spatial_daylight_autonomy_error([0.5, 0.9, 0.1, 0.5], [0.01, 0.01, 0.01, 0.0])
-    assert found == pytest.approx(0.25 * 0.5)
-    assert spatial_daylight_autonomy_error([0.9], [0.01]) == pytest.approx(0.0, abs=1e-9)
+    """At the limit a sensor is counted wrongly in half of all trials."""
+    autonomy, variance = [0.5, 0.9, 0.1, 0.5], np.array([0.01, 0.01, 0.01, 0.0]) ** 2
+    found = spatial_daylight_autonomy_error(autonomy, own(variance))
+    assert found == pytest.approx(0.25 * np.sqrt(0.5))
+    far = np.array([0.01]) ** 2
+    assert spatial_daylight_autonomy_error([0.9], own(far)) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_what_sensors_share_makes_them_cross_the_limit_together(share: float) -> None:
+    """Forty sensors a standard error from the limit, against trials of truths about them."""
+    count, random = 40, np.random.default_rng(1)
+    variance = np.full(count, 0.02**2)
+    noise = Noise(variance * (1 - share), variance * share, np.zeros(count))
+    found = spatial_daylight_autonomy_error(np.full(count, 0.52), noise)
+    together = random.normal(size=(20_000, 1)) * np.sqrt(share)
+    alone = random.normal(size=(20_000, count)) * np.sqrt(1 - share)
+    wrong = 0.52 + 0.02 * (together + alone) < 0.5
+    about = wrong.mean(axis=1)
+    expected = np.sqrt(np.mean(about**2) if share else np.mean(about) / count)
+    assert found == pytest.approx(expected, rel=0.03)
+
+
+def own(variance: NDArray[np.float64]) -> Noise:
+    """Noise of many batches that the sensors have alone."""
+    return Noise(variance, np.zeros_like(variance), np.zeros_like(variance))
+
+
+def shared(variance: NDArray[np.float64]) -> Noise:
+    """Noise of many batches that the sensors have in common."""
+    return Noise(np.zeros_like(variance), variance, np.zeros_like(variance))
 
 
 def test_the_last_group_closes_of_equals_and_two_percent_may_stay_lit() -> None:

@@ -15,6 +15,7 @@ from thermal.climate import Solar, no_sun
 from thermal.conduction import u_value
 from thermal.emitters import IdealLoads
 from thermal.errors import ThermalInputError
+from thermal.network import exchange_star
 from thermal.zone import Gains, Layer, OpaqueSurface, WindowElement, Zone
 
 SOUTH = np.array([0.0, -1.0, 0.0])
@@ -38,6 +39,57 @@ def test_steady_wall_has_its_u_value():
     assert result.heating[-1] == pytest.approx(u * 10.0 * 20.0, rel=1e-5)
     inside = 20.0 - u * 20.0 / INSIDE_FILM
     assert result.surface_in_c[-1, 0] == pytest.approx(inside, abs=0.01)
+
+
+DAY = 2.0 * np.pi / 86400.0  # [rad/s]
+
+
+def chain(layers) -> np.ndarray:
+    """Temperature and flow at the outer face from those at the inner one, at a period of a day."""
+    matrix = np.eye(2, dtype=complex)
+    for x in layers:
+        root = np.sqrt(1j * DAY * x.density * x.heat_capacity / x.conductivity)
+        c, s = np.cosh(root * x.thickness), np.sinh(root * x.thickness)
+        flow = x.conductivity * root
+        matrix = matrix @ np.array([[c, s / flow], [flow * s, c]])
+    return matrix
+
+
+def periodic_load(zone: Zone, films, radiant: float, outer: float) -> complex:
+    """Load of a room held at one temperature by a radiant gain of 1 W that swings once a day."""
+    area = np.array([face.area for face in zone.surfaces])
+    exchange = radiant * exchange_star(area, np.ones(len(area)))
+    np.fill_diagonal(exchange, 0.0)
+    taken = []
+    for face in zone.surfaces:
+        (a, b), (c, d) = chain(face.layers)
+        twin = face.outside == "twin"
+        taken.append((a - 1.0) / b if twin else (outer * a + c) / (outer * b + d))
+    own = area * (np.array(taken) + films) + exchange.sum(axis=1)
+    faces = np.linalg.solve(np.diag(own) - exchange, area / area.sum())
+    return complex((films * area) @ faces)
+
+
+@pytest.mark.parametrize(("step", "late"), [(600.0, 1.0), (3600.0, 5.0)])
+def test_the_load_of_a_periodic_gain_is_the_closed_form(step, late):
+    zone = box()
+    faces = tuple(replace(f, emissivity_in=1.0, emissivity_out=0.0) for f in zone.surfaces)
+    t = np.arange(0.5, 30 * 86400 / step) * step
+    zone = replace(
+        zone, surfaces=faces, infiltration_ach=0.0, air_capacity_factor=0.0,
+        gains=Gains(radiant=1000.0 + 500.0 * np.sin(DAY * t)), loads=IdealLoads(26.0, 26.0),
+    )  # fmt: skip
+    options = BalanceOptions(
+        inside_convection="stated", inside_films=(2.7, 1.7, 1.7), inside_radiation=5.0,
+        outside_convection="constant", outside_film=20.0, warm_days=0, start_c=26.0,
+    )  # fmt: skip
+    weather, dark = climate(len(t), outdoor=26.0), no_sun(len(t), len(faces), 0)
+    year = simulate(zone, weather, dark, step_s=step, row_s=step, options=options)
+    last = slice(-round(86400 / step), None)
+    swing = np.mean((year.cooling - year.heating)[last] * np.exp(-1j * DAY * t[last])) * 2j / 500.0
+    closed = periodic_load(zone, np.array([2.7, 2.7, 2.7, 2.7, 1.7, 1.7]), 5.0, 20.0)
+    assert abs(swing) == pytest.approx(abs(closed), rel=0.003)  # 0.2555: the rest is stored
+    assert np.degrees(abs(np.angle(swing / closed))) < late  # half a step late
 
 
 def test_semi_infinite_wall_follows_the_closed_form():

@@ -104,7 +104,7 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     sun = reflected_sun(matrices, sky)
     expected -= np.einsum("sgk,gkh->sh", view - direct_view, by_patch)
     for g, cells in enumerate((sunlit_room(matrices, sun), None)):  # the diffuser has no beam
-        expected += reflected_to_sensors(matrices, sun, cells, groups[g], g).values
+        expected += reflected_to_sensors(matrices, sun, cells, groups[g], g)[0]
     whole, direct = groups[0].straight.values.values, groups[0].straight.direct
     lost = direct_view[:, 0] * groups[0].beam
     expected += (whole - lost @ matrices.daylight.values[0]) @ sky.whole

@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 import mitsuba_cfs as cfs
 from mitsuba_cfs import variants
 from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.methods.light import illuminance_noise
 from mitsuba_cfs.methods.phase_light import with_sensor_light
 from mitsuba_cfs.methods.standard_error import relative_error_under
-from mitsuba_cfs.metrics.autonomy import daylight_autonomy, daylight_autonomy_error
+from mitsuba_cfs.metrics.autonomy import daylight_autonomy, daylight_autonomy_noise
 from mitsuba_cfs.metrics.lm83 import spatial_daylight_autonomy_error
 from mitsuba_cfs.metrics.room import daylight_factor
 from mitsuba_cfs.sky.cie import cie_patches
@@ -67,7 +68,14 @@ def of_seed(
     every = np.ones(lux.shape[1], dtype=bool)
     scaled = lux.T / limits
     da = daylight_autonomy(scaled, every, 1.0)
-    da_error = daylight_autonomy_error(scaled, every, relative, 1.0)
+    of_sums = illuminance_noise(light, lux, relative)
+    noise = daylight_autonomy_noise(
+        scaled,
+        every,
+        lambda weights: of_sums(weights.T / limits[:, None]),
+        relative_error=relative,
+        threshold=1.0,
+    )
     overcast = cie_patches("overcast", ReinhartSky(SUBDIVISION), 1.0)
     factor = daylight_factor(cfs.daylight_coefficients(light) @ overcast, 1.0)
     of_factor = relative_error_under(with_sensor_light(light), overcast)
@@ -77,8 +85,8 @@ def of_seed(
     return {
         "illuminance": (mean, relative * mean),
         "daylight factor": (factor, of_factor * factor),
-        "DA": (da, da_error),
-        "sDA": (sda, np.array([spatial_daylight_autonomy_error(da, da_error)])),
+        "DA": (da, noise.standard_error()),
+        "sDA": (sda, np.array([spatial_daylight_autonomy_error(da, noise)])),
         "DGP": (rated.dgp, rated.dgp_standard_error),
     }, limits  # fmt: skip
 

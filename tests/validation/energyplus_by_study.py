@@ -33,7 +33,7 @@ from scenes.heat.study_file import read_study
 from tests.validation.ashrae140_sun import ANGLES, PANE
 from tests.validation.differences import rmse_and_bias
 from tests.validation.energyplus_program import room_model, run_energyplus
-from tests.validation.energyplus_reference import loads
+from tests.validation.energyplus_reference import load_hours
 from tests.validation.energyplus_study import COLUMNS, FIRST_HOUR, GLAZING, STUDY
 from tests.validation.energyplus_traced import traced_system
 from tests.validation.reference_room import ORIENTATIONS
@@ -183,7 +183,7 @@ def main(
             for name in systems:
                 patches = PATCHES.get(name, (name,))
                 theirs = run_energyplus(room_model(orientation, *patches), epw)
-                needs = list(loads(patches, orientation, epw).values())
+                needs = load_hours(patches, orientation, epw)
                 for kind in inputs:
                     row: dict[str, object] = {
                         "climate": epw.stem, "facing": orientation, "system": name, "inputs": kind,
@@ -210,11 +210,13 @@ def _apart(hours: pd.DataFrame, theirs: pd.DataFrame) -> dict[str, float]:
     return row
 
 
-def _loads(hours: pd.DataFrame, theirs: Sequence[float]) -> dict[str, float]:
+def _loads(hours: pd.DataFrame, theirs: pd.DataFrame) -> dict[str, float]:
+    """Heating and cooling of the year [kWh], and the highest hour of cooling [W]."""
     row: dict[str, float] = {}
-    for column, other in zip(("heating_w", "cooling_w"), theirs, strict=True):
-        what = column.removesuffix("_w")
-        row[what], row[f"{what} E+"] = float(hours[column].sum()) / 1e3, other
+    for what, other in zip(("heating", "cooling"), theirs, strict=True):
+        row[what] = float(hours[f"{what}_w"].sum()) / 1e3
+        row[f"{what} E+"] = float(theirs[other].sum())
+    row["peak"], row["peak E+"] = float(hours["cooling_w"].max()), 1e3 * float(theirs[other].max())
     return row
 
 

@@ -57,9 +57,15 @@ def hours(system: str, orientation: str, epw: Path) -> pd.DataFrame:
 
 def loads(patches: Sequence[str], orientation: str, epw: Path) -> dict[str, float]:
     """Heating and cooling of one case's year [kWh]; patches: of its window, see `room_model`."""
+    return {
+        name: float(hours.sum()) for name, hours in load_hours(patches, orientation, epw).items()
+    }
+
+
+def load_hours(patches: Sequence[str], orientation: str, epw: Path) -> pd.DataFrame:
+    """Heating and cooling of every hour [kWh]."""
     model = room_model(orientation, *patches, "ideal_loads_20_26", outputs=LOADS)
-    table = run_energyplus(model, epw, outputs=LOADS)
-    return {name: float(table[name].sum()) / JOULES for name in LOADS.values()}
+    return run_energyplus(model, epw, outputs=LOADS) / JOULES
 
 
 def write_climate(

@@ -15,6 +15,7 @@ from mitsuba_cfs.errors import check_number
 from mitsuba_cfs.matrices.cache import BatchMean, CacheEntry, MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 
+BLOCKS = 8  # of the last axis, whose sums have a covariance
 LEAST_BATCHES = 4  # before an error is believed
 SAVE_SECONDS = 1.0  # a killed run loses this much work, or the batch under way if that is longer
 SAVE_SHARE = 20.0  # ... or so many times what saving takes
@@ -26,9 +27,14 @@ class Estimate:
 
     values: NDArray[np.float64]
     standard_error: NDArray[np.float64]  # same shape; of the mean, from the batches
-    sum_error: NDArray[np.float64]  # of the sum over the last axis, whose entries may go together
+    covariance: NDArray[np.float64]  # [..., R, R] of the sums of R blocks of the last axis
     batches: int
     seconds: float
+
+    @property
+    def sum_error(self) -> NDArray[np.float64]:
+        """Standard error of the sum over the last axis, whose entries may go together."""
+        return np.sqrt(np.maximum(self.covariance.sum(axis=(-2, -1)), 0.0))
 
     def part(self, index: Any) -> Estimate:
         """The estimate of some entries; `index` leaves the last axis whole."""
@@ -36,24 +42,54 @@ class Estimate:
             self,
             values=self.values[index],
             standard_error=self.standard_error[index],
-            sum_error=self.sum_error[index],
+            covariance=self.covariance[index],
         )
 
     def error_of(self, weights: ArrayLike) -> NDArray[np.float64]:
-        """Standard error of the sum over the last axis of `values` times `weights` [..., K].
+        """Standard error of the sum over the last axis of `values` times `weights` [..., K]."""
+        error: NDArray[np.float64] = np.sqrt(self.variance_of(weights)[0])
+        return error
 
-        Exact for equal weights; for others the entries are taken to go together as much as there.
+    def variance_of(self, weights: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Variance v of the sum over the last axis of `values` times `weights` [..., K].
+
+            v = sum m_r C_rs m_s + sum (w_k - m_r)^2 e_k^2
+
+        with the covariance C of the sums of blocks r, m_r the mean weight in the block, and entries
+        that differ from it taken as independent: exact for equal weights in each block.
+
+        Returns: v, and the sum of v_i^2 / degrees of freedom over its independent parts v_i.
         """
-        alone = np.sqrt((self.standard_error**2).sum(axis=-1))
-        together = np.divide(self.sum_error, alone, out=np.ones_like(alone), where=alone > 0)
         weights = np.asarray(weights, dtype=float)
-        return together * np.sqrt((self.standard_error**2 * weights**2).sum(axis=-1))
+        starts, sizes = blocks(self.values.shape[-1], self.covariance.shape[-1])
+        mean = np.add.reduceat(weights, starts, axis=-1) / sizes
+        together = np.einsum("...r,...rs,...s->...", mean, self.covariance, mean, optimize=True)
+        together = np.maximum(together, 0.0)
+        alone = ((weights - np.repeat(mean, sizes, axis=-1)) * self.standard_error) ** 2
+        squares = together**2 + np.einsum("...k,...k->...", alone, alone)
+        return together + alone.sum(axis=-1), squares / max(self.batches - 1, 1)
+
+    def variances_of(self, weights: ArrayLike) -> NDArray[np.float64]:
+        """Squares of `error_of` [n, K] of a matrix [n, P] for several weights at once [P, K]."""
+        weights = np.asarray(weights, dtype=float)
+        starts, sizes = blocks(self.values.shape[-1], self.covariance.shape[-1])
+        mean = np.add.reduceat(weights, starts, axis=0) / sizes[:, None]
+        together = np.einsum("rk,nrs,sk->nk", mean, self.covariance, mean, optimize=True)
+        rest = (weights - np.repeat(mean, sizes, axis=0)) ** 2
+        variance: NDArray[np.float64] = np.maximum(together, 0.0) + self.standard_error**2 @ rest
+        return variance
 
     @property
     def relative_error(self) -> float:
         """Root mean square of the standard error over the root mean square of the values."""
         scale = float(np.sqrt(np.mean(self.values**2)))
         return float(np.sqrt(np.mean(self.standard_error**2))) / scale if scale > 0 else 0.0
+
+
+def blocks(size: int, count: int = BLOCKS) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First entries and sizes of at most so many blocks of an axis, none of them empty."""
+    ends = np.linspace(0, size, min(count, size) + 1).astype(np.int64)
+    return ends[:-1], np.diff(ends)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +117,7 @@ def joined(estimates: Sequence[Estimate]) -> Estimate:
     return Estimate(
         np.concatenate([e.values for e in estimates]),
         np.concatenate([e.standard_error for e in estimates]),
-        np.concatenate([e.sum_error for e in estimates]),
+        np.concatenate([e.covariance for e in estimates]),
         first.batches,
         sum(e.seconds for e in estimates),
     )
@@ -110,19 +146,19 @@ def accumulate(
     if state is not None and state.finished:
         progress(label, 1.0)
         return _estimate(state)
-    mean = spread = sum_spread = np.zeros(())
+    mean = spread = covariance = np.zeros(())
     count, before = 0, 0.0
     if state is not None:
-        mean, spread, sum_spread = state.mean, state.spread, state.sum_spread
+        mean, spread, covariance = state.mean, state.spread, state.covariance
         count, before = state.count, state.seconds
     keeper = _Keeper(entry, count)
     try:
         while True:
             values = batch(count)
-            mean, spread, sum_spread = _with_another(values, mean, spread, sum_spread, count)
+            mean, spread, covariance = _with_another(values, mean, spread, covariance, count)
             count += 1
             state = BatchMean(
-                count, mean, spread, sum_spread, before + time.monotonic() - start, False
+                count, mean, spread, covariance, before + time.monotonic() - start, False
             )
             fraction = _fraction_done(state, stopping)
             progress(label, min(fraction, 1.0))
@@ -177,26 +213,28 @@ class _Keeper:
 
 
 def _with_another(
-    values: NDArray[np.float64], mean: Any, spread: Any, sum_spread: Any, count: int
+    values: NDArray[np.float64], mean: Any, spread: Any, covariance: Any, count: int
 ) -> tuple[Any, Any, Any]:
-    """Mean, sum of squares about it, and that of the last axis' sums, with one more batch."""
+    """Mean, sum of squares about it, and that of products of the blocks, with one more batch."""
+    starts, _ = blocks(values.shape[-1])
     if not count:  # about itself the first has none
-        return np.array(values), np.zeros_like(values), np.zeros(values.shape[:-1])
+        shape = (*values.shape[:-1], len(starts), len(starts))
+        return np.array(values), np.zeros_like(values), np.zeros(shape)
     step = values - mean
     mean = mean + step / (count + 1)
     left = values - mean
-    sum_spread = sum_spread + step.sum(axis=-1) * left.sum(axis=-1)
+    of_blocks = [np.add.reduceat(one, starts, axis=-1) for one in (step, left)]
+    covariance = covariance + of_blocks[0][..., :, None] * of_blocks[1][..., None, :]
     left *= step  # the states given out hold other arrays
     left += spread
-    return mean, left, sum_spread
+    return mean, left, covariance
 
 
 def _estimate(state: BatchMean) -> Estimate:
     """Mean and standard error of the batches so far."""
     pairs = (state.count - 1) * state.count
     error = np.sqrt(np.maximum(state.spread.astype(float), 0) / pairs)
-    sum_error = np.sqrt(np.maximum(state.sum_spread, 0) / pairs)
-    return Estimate(state.mean, error, sum_error, state.count, state.seconds)
+    return Estimate(state.mean, error, state.covariance / pairs, state.count, state.seconds)
 
 
 def _fraction_done(state: BatchMean, stopping: Stopping) -> float:

@@ -103,7 +103,7 @@ def outdoor_exchange(
         found,
         values=found.values[:, patch][:, :, columns],
         standard_error=found.standard_error[:, patch][:, :, columns],
-        sum_error=found.sum_error[:, patch],
+        covariance=found.sum_error[:, patch, None, None] ** 2,  # in one block: columns are moved
     )
 
 
