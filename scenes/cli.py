@@ -83,9 +83,9 @@ COMMANDS = {
 }
 USAGE, FAILED, INTERRUPTED = 2, 1, 130
 # Modules whose calls no signal may end. Trimesh drops any exception, and so do extension modules
-# that try an import
+# that try an import; Numba answers one while it compiles with `RuntimeError`
 IMPORT = ("importlib", "_frozen_importlib", "_frozen_importlib_external")
-FOREIGN = ("ifcopenshell", "mitsuba", "drjit", "trimesh", *IMPORT)
+FOREIGN = ("ifcopenshell", "mitsuba", "drjit", "trimesh", "numba", *IMPORT)
 FILES = "mitsuba_cfs.files"  # whose locks and temporary files it would leave
 AGAIN_S = 0.05  # after which a signal that came in one of their calls is looked at again
 CLEANING_S = 5.0  # after a signal, in which others are ignored
@@ -173,7 +173,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if number is not None and signal.getsignal(number) in own:  # not under nohup
             signal.signal(number, stop)
             handled.append(number)
-    code = run(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = run(sys.argv[1:] if arguments is None else arguments)
+    except KeyboardInterrupt:  # while an error was printed
+        code = _ended(signal.SIGINT)
+    except Terminated as ended:
+        code = _ended(ended.number)
     if handled and hasattr(signal, "SIGALRM"):
         handled.insert(0, signal.SIGALRM)
     for number in handled:

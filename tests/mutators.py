@@ -11,7 +11,7 @@ import io
 import json
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -27,12 +27,6 @@ NUMBERS = (
 TOKEN = re.compile(rb"[-+]?\d[\d.]*(?:[eE][-+]?\d+)?|[A-Za-z_][\w-]*")
 NUMBER = re.compile(r"[-+]?\d[\d.]*(?:[eE][-+]?\d+)?")
 DEEP = 3000
-
-
-def mutated(content: bytes, mutate: Mutator, count: int, seed: int = 0) -> Iterator[bytes]:
-    """`count` mutations of a file, the same ones for the same seed."""
-    for number in range(count):
-        yield mutate(content, np.random.default_rng([seed, number]))
 
 
 def of_text(content: bytes, random: np.random.Generator) -> bytes:

@@ -54,6 +54,7 @@ from bim.surroundings.objects import (
     Foliage,
     SurroundingObject,
     SurroundingsFile,
+    are_coordinates,
     is_number,
     read_bytes,
     read_object,
@@ -220,10 +221,9 @@ def _block(feature: Any, name: str, path: Path) -> list[SurroundingObject]:
         return []
     try:
         shape = shapely.make_valid(shapely.force_2d(shapely.geometry.shape(geometry)))
-        finite = bool(np.isfinite(shapely.get_coordinates(shape)).all())
     except (ValueError, TypeError, LookupError, AttributeError, shapely.errors.ShapelyError):
-        finite = False
-    if not finite:
+        shape = None
+    if shape is None or not are_coordinates(shapely.get_coordinates(shape)):
         raise DataError("is no polygon", file=path, element=name, field="geometry.coordinates")
     label = str(fields.get("name") or fields.get("id") or name)[:60]
     return [
@@ -499,7 +499,7 @@ def _ring(side: Element, name: str, member: _Member) -> NDArray[np.float64]:
     except ValueError:
         message = "expected triples of numbers"
         raise _fault(message, lists[0], name, member) from None
-    if not (np.abs(points) < 1e12).all():
+    if not are_coordinates(points):
         raise _fault("expected finite numbers", lists[0], name, member)
     return points[:-1] if len(points) > 1 and (points[0] == points[-1]).all() else points
 
@@ -559,7 +559,7 @@ def _vertices(content: dict[str, Any], path: Path) -> NDArray[np.float64]:
     except (TypeError, ValueError, KeyError, OverflowError):
         message = "expected triples of numbers, and a transform of scale and translate"
         raise DataError(message, file=path, field="vertices") from None
-    if not np.isfinite(points).all():
+    if not are_coordinates(points):
         raise DataError("expected finite numbers", file=path, field="vertices")
     return points
 

@@ -74,7 +74,7 @@ def read_meshes(path: Path) -> SurroundingsFile:
     for number, (named, triangles) in enumerate(meshes, 1):
         if kind in ("glb", "gltf"):
             triangles = triangles @ UP[:3, :3].T
-        if not np.isfinite(triangles).all():
+        if not are_coordinates(triangles):
             raise DataError("has coordinates that are no numbers", file=path)
         if len(triangles):
             name = str(named or f"{path.stem} {number}")
@@ -100,6 +100,7 @@ def _check_data(content: bytes, path: Path) -> None:
 
 
 MOST_BYTES = 512 << 20
+FARTHEST = 1e12  # of a coordinate: products of larger ones overflow
 BODY, TERRAIN = "IfcBuildingElementProxy", "IfcGeographicElement"
 Foliage = str | tuple[float, ...]  # a kind of tree, or what its crown passes in each month [12]
 
@@ -155,4 +156,9 @@ def read_object(path: Path) -> dict[str, Any]:
 
 def is_number(value: object) -> bool:
     """Whether a JSON value is a finite number."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e12
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < FARTHEST
+
+
+def are_coordinates(values: NDArray[np.float64]) -> bool:
+    """Whether all values are finite numbers that can be coordinates."""
+    return bool((np.abs(values) < FARTHEST).all())

@@ -21,6 +21,7 @@ from bim.surroundings.objects import (
     TERRAIN,
     SurroundingObject,
     SurroundingsFile,
+    are_coordinates,
     read_bytes,
     read_object,
 )
@@ -197,7 +198,7 @@ def _ascii_grid(text: str, path: Path) -> FloatArray:
         fields.get(f"{axis}llcenter", fields.get(f"{axis}llcorner", 0.0) + step / 2)
         for axis in "xy"
     ]
-    if not (0 < step < 1e5 and np.isfinite(place).all()):
+    if not (0 < step < 1e5 and are_coordinates(np.array(place))):
         raise DataError("expected metres", file=path, field="cellsize")
     heights = _numbers(" ".join(words), path)
     if len(heights) != rows * columns:
@@ -239,6 +240,6 @@ def _numbers(text: str, path: Path) -> FloatArray:
         found = np.array(text.split(), dtype=float)
     except ValueError as error:
         raise DataError(f"expected numbers: {str(error)[:60]}", file=path) from None
-    if not (np.abs(found) < 1e12).all():
+    if not are_coordinates(found):
         raise DataError("expected finite numbers", file=path)
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ from scenes.input_options import InputOptions
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from bim.model import Building
+    from bim.model import Building, Space
 
 UNCUT = 100_000  # columns of a table that nobody sees
 
@@ -76,20 +76,21 @@ def command(issues: Path | None, fix: Path | None, bcf: Path | None, **chosen) -
     with ProgressBar() as progress:
         read = building_of(options, progress)
     spaces = named_spaces(read, options.spaces, options.building) if options.spaces else read.spaces
+    windows = [window for space in spaces for window in space.windows]
     known = known_fenestration(spaces, options.building)
     # a file or a program that reads on gets every line whole, however long
     console = Console(width=None if Console().is_terminal else UNCUT)
     head = head_of(read, light_only=True).with_assumptions(known.notes("a run needs --cfs"))
     for line in (*head.model, *(f"assumed: {text}" for text in head.assumed)):
         console.print(line, markup=False, highlight=False)
-    console.print(_rooms(read))
+    console.print(_rooms(read.name, spaces))
     if read.issues:
         console.print("Problems, by the glass that they concern; a repeated one with an example:")
     for line in _issues(read):
         console.print(line, markup=False, highlight=False)
     console.print(
-        f"rooms: {len(read.spaces)} (with windows: {sum(bool(s.windows) for s in read.spaces)}), "
-        f"windows: {len(read.windows)} ({sum(w.area for w in read.windows):.1f} m2 of glass), "
+        f"rooms: {len(spaces)} (with windows: {sum(bool(s.windows) for s in spaces)}), "
+        f"windows: {len(windows)} ({sum(w.area for w in windows):.1f} m2 of glass), "
         f"problems: {len(read.issues)}"
     )
     if fix is not None:
@@ -110,16 +111,16 @@ def command(issues: Path | None, fix: Path | None, bcf: Path | None, **chosen) -
         write_table(pd.DataFrame(rows, columns=list(COLUMNS)), issues, index=False)
 
 
-def _rooms(building: Building) -> Table:
+def _rooms(building: str, spaces: Sequence[Space]) -> Table:
     """One line for each room, drawn figures beside those that the file states."""
     from rich.table import Table
 
-    table = Table(title=f"Rooms of {building.name}", title_justify="left")
+    table = Table(title=f"Rooms of {building}", title_justify="left")
     table.add_column("room", overflow="fold")
     table.add_column("storey", overflow="fold")
     for head in ("floor m2", "stated", "volume m3", "stated", "faces", "windows", "glass m2"):
         table.add_column(head, justify="right")
-    for space in building.spaces:
+    for space in spaces:
         table.add_row(
             space.label, space.storey, f"{space.floor_area:.2f}", _number(space.stated_area),
             f"{space.drawn_volume:.2f}", _number(space.stated_volume), str(len(space.faces)),

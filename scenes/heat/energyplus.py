@@ -15,6 +15,9 @@ def check_twin(study: StudyFile) -> None:
     """Raise `DataError` for a study that EnergyPlus cannot be given."""
     if study.measured is not None:
         raise DataError("EnergyPlus needs an EPW file", file=study.weather, field="measured")
+    if study.air_nodes:
+        message = "the EnergyPlus model has a zone for each room"
+        raise DataError(message, file=study.building, field="air_nodes")
     if study.heat_island is not None:
         message = "EnergyPlus reads the EPW file itself, without a heat island"
         raise DataError(message, file=study.weather, field="heat_island")

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bim.model import Building
+from bim.names import listed
 from bim.report.issue import issue_note
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
@@ -20,6 +21,7 @@ from mitsuba_cfs.progress import Progress, item, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import States
 from scenes.head import Head
+from scenes.heat.air_nodes import with_air_nodes
 from scenes.heat.box import building_or_box
 from scenes.heat.design_days import design_loads
 from scenes.heat.files import HeatFiles, read_files
@@ -106,7 +108,8 @@ def run_study(
     options, trace = study.options, study.trace
     cache = MatrixCache.of_user()
     skies = skies_for(weather, options.sampling, cache, **options.sky)
-    rooms, radiants = [], []
+    rooms: list[RoomZone] = []
+    radiants: dict[str, RadiantRoom | None] = {}
     for i, space in enumerate(spaces):
         steps = item(progress, "room", i + 1, len(spaces), space.label)
         room = room_inputs(
@@ -122,17 +125,16 @@ def run_study(
                 space, zone.room, samples=trace.patch_samples, seed=trace.seed, cache=cache
             )
         rooms.append(zone if radiant is None else zone.with_view_factors(radiant.among))
-        radiants.append(radiant)
+        radiants[space.guid] = radiant
         steps("heat", 1.0)
     found = _balanced(study, building, rooms, weather, progress, in_windows=in_windows)
     if balanced is not None:
         balanced(found)
     notes |= dict.fromkeys(found.notes)
     years = []
-    for room, result, humidity, radiant in zip(
-        found.rooms, found.results, found.humidity, radiants, strict=True
-    ):
-        if radiant is None and trace.view_factors:
+    for room, result, humidity in zip(found.rooms, found.results, found.humidity, strict=True):
+        radiant = radiants.get(room.space.guid)  # none of an air node
+        if room.zone.view_factors is None and trace.view_factors:
             notes[f"{result.name}: is not closed, its longwave goes through a mean star."] = None
         felt_result = _felt(study, room.zone, result, radiant)
         year = _year(study, room, felt_result, humidity, weather)
@@ -169,7 +171,9 @@ def _balanced(
     groups: list[tuple[Sequence[RoomZone], dict[str, Any]]] = [([room], {}) for room in rooms]
     if study.couple:
         rooms, links, notes = coupled(rooms, study.air.door_m3_s)
-        transfers = _transfers(study, building, rooms, weather)
+        nodes = _air_nodes(study, building, rooms)
+        rooms, links, zone_of = with_air_nodes(rooms, links, nodes)
+        transfers = _transfers(study, building, zone_of, weather)
         groups = [(rooms, {"air_links": links, "transfers": transfers})]
     results, moist, design = [], [], []
     for number, (together, air) in enumerate(groups):
@@ -192,14 +196,35 @@ def _balanced(
     )  # fmt: skip
 
 
+def _air_nodes(study: StudyFile, building: Building, rooms: Sequence[RoomZone]) -> dict[str, str]:
+    """Name of the air node of rooms, by GUID.
+
+    Raises: `DataError` for a zone that is not there, and for a room in two.
+    """
+    node_of: dict[str, str] = {}
+    for name in study.air_nodes:
+        place = {"file": study.building, "field": "air_nodes"}
+        guids = {space.guid for space in building.zone(name)}
+        guids &= {room.space.guid for room in rooms}
+        if not guids:
+            zones = listed(name, [zone.name for zone in building.zones]) or "none"
+            raise DataError(f"no zone {name!r} of the study's rooms; zones: {zones}", **place)
+        twice = [room.space.label for room in rooms if room.space.guid in guids & set(node_of)]
+        if twice:
+            raise DataError(f"{twice[0]} is in two of the zones", **place)
+        node_of |= dict.fromkeys(guids, name)
+    return node_of
+
+
 def _transfers(
-    study: StudyFile, building: Building, rooms: Sequence[RoomZone], weather: Weather
+    study: StudyFile, building: Building, names: Mapping[str, str], weather: Weather
 ) -> list[AirTransfer]:
     """The air that flows one way between rooms.
 
+    Args: names: of the zone of each room, by its GUID.
+
     Raises: `DataError` for a room that is not there, or not simulated.
     """
-    names = {room.space.guid: room.zone.name for room in rooms}
     hours, found = OperationHours(study, weather), []
     for number, table in enumerate(study.transfer):
         place = f"transfer.{number}"
@@ -210,6 +235,9 @@ def _transfers(
                 message = f"{getattr(table, key)!r} is not among the study's rooms"
                 raise DataError(message, file=study.building, field=f"{place}.{key}")
             ends.append(names[guid])
+        if ends[0] == ends[1]:
+            message = "source and target are rooms of one air node"
+            raise DataError(message, file=study.building, field=place)
         found.append(AirTransfer(*ends, hours.value(table, "m3_h", place) / 3600.0))
     return found
 

@@ -135,6 +135,7 @@ class StudyFile(OperationTables, ReadTable, OutdoorTable):
     building: Path | None = None
     spaces: tuple[str, ...] = ()
     couple: bool = False  # heat flows through the walls between the rooms
+    air_nodes: tuple[str, ...] = ()  # zones of the building, each with one air
     transfer: tuple[TransferTable, ...] = ()
     design: DesignTable | None = None  # loads of design days too
     box: BoxTable | None = None
@@ -160,11 +161,16 @@ class StudyFile(OperationTables, ReadTable, OutdoorTable):
             raise ValueError("heat_island: measured weather is taken as it is")
         if (self.building is None) == (self.box is None):
             raise ValueError("give either `building` or `[box]`")
-        for key in ("spaces", "join", "couple", "transfer") if self.box is not None else ():
+        for key in (
+            ("spaces", "join", "couple", "air_nodes", "transfer") if self.box is not None else ()
+        ):
             if getattr(self, key):
                 raise ValueError(f"{key}: belongs to a `building`; a box is one room")
-        if self.transfer and not self.couple:
-            raise ValueError("transfer: goes between rooms with `couple = true`")
+        for key in ("transfer", "air_nodes"):
+            if getattr(self, key) and not self.couple:
+                raise ValueError(f"{key}: needs `couple = true`")
+        if self.air_nodes and self.loads.slab is not None:
+            raise ValueError("air_nodes: rooms with a heated slab each cannot have one air")
         for number, one in enumerate(self.transfer):
             if isinstance(one.m3_h, str) and one.m3_h not in self.schedules:
                 fault = unknown_name(one.m3_h, self.schedules)

@@ -22,6 +22,7 @@ from scenes.report import tables
 from scenes.report.method import method_words
 from scenes.report.model3d import model3d
 from scenes.report.names import glossary, option_words, stage_words
+from scenes.report.orientation import orientation
 from scenes.report.page_files import page_files
 from scenes.report.room import room_page
 from scenes.report.storeys import RoomMetric, room_metrics, storey_plans
@@ -63,6 +64,7 @@ def _filled(result: RunResult, page: PageOptions) -> str:
         rooms=rooms,
         verdict=verdict(result, [room.cards for room in rooms]),
         model=model,
+        orientation=orientation(result),
         comparison=comparison(result, rooms),
         metrics=metrics,
         storeys=storey_plans(result) if several else (),

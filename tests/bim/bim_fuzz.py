@@ -92,7 +92,7 @@ def odd_values(content: Any, count: int, seed: int = 0) -> Iterator[Any]:
                 if random.random() < 0.15:
                     del owner[last]
                 else:
-                    owner[last] = ODD[int(random.integers(len(ODD)))]
+                    owner[last] = copy.deepcopy(ODD[int(random.integers(len(ODD)))])
             except (KeyError, IndexError, TypeError):
                 continue  # the first one took it away
         yield spoilt

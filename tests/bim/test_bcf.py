@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import re
 import zipfile
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bim.bcf import write_bcf
+from bim.bcf import NEAREST, write_bcf
 from bim.ifc.building import read_ifc
+from bim.report.ranking import ranked
 from scenes.commands.ifc import command
-from tests.bim.small_ifc import WIDTH, box_model, box_room
+from tests.bim.small_ifc import WALL, WIDTH, box_model, box_room
+from tests.issues import of_code
 
 UUID = re.compile(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")
 
@@ -73,6 +76,28 @@ def test_a_material_selects_the_elements_that_have_it(tmp_path):
     write_bcf(read_ifc(path), out)
     _, view = _topics(out)["material-unknown"]
     assert {one.get("IfcGuid") for one in view.iter("Component")} == {walls["north"].GlobalId}
+
+
+def test_a_leak_is_before_the_camera(tmp_path):
+    path, out = tmp_path / "m.ifc", tmp_path / "m.bcfzip"
+    box_model(space=False, gap=0.4, true_north=(1.0, 0.0))[0].model.write(str(path))
+    building = read_ifc(path)
+    leaks = of_code(building, "room-leaks")
+    assert len([one for one in ranked(building.issues) if one.first.code == "room-leaks"]) == len(
+        leaks
+    )
+    leak = leaks[0]
+    building = replace(building, issues=(leak,))
+    write_bcf(building, out)
+    _, view = _topics(out)["room-leaks"]
+    eye, along = (
+        np.array([float(view.findtext(f"PerspectiveCamera/{name}/{axis}")) for axis in "XYZ"])
+        for name in ("CameraViewPoint", "CameraDirection")
+    )
+    place = np.linalg.solve(building.from_model, [*(leak.values[k] for k in "xyz"), 1.0])[:3]
+    assert eye + NEAREST * along == pytest.approx(place, abs=1e-4)
+    # the slit from floor to roof between the south and the east wall
+    assert place[:2] == pytest.approx([WIDTH + WALL / 2, 0.2], abs=0.5)
 
 
 def test_the_command_writes_topics(tmp_path):

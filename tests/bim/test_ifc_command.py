@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import ifcopenshell.api.group
+import ifcopenshell.api.root
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from mitsuba_cfs.errors import DataError
 from scenes.commands.ifc import command
-from tests.bim.small_ifc import box_room
+from tests.bim.small_ifc import DEPTH, HEIGHT, WALL, WIDTH, box_model, box_room
 
 
 @pytest.fixture
@@ -30,6 +32,25 @@ def test_check_shows_rooms_and_issues(path, tmp_path):
     lines = table.read_text().splitlines()
     assert lines[0] == "where,what,consequence,code,severity"
     assert any("is drawn where" in line for line in lines)
+
+
+def test_check_lists_the_rooms_of_a_zone(tmp_path):
+    small, _ = box_model()
+    low = (0.0, DEPTH + WALL, 0.0)
+    small.box("IfcWall", "back", (0.0, DEPTH + WALL + 2, 0.0), (WIDTH, WALL, HEIGHT))
+    small.box("IfcSpace", "R2", low, (WIDTH, 2.0, HEIGHT), LongName="Bath")
+    zone = ifcopenshell.api.root.create_entity(small.model, ifc_class="IfcZone", name="Home 2")
+    bath = [one for one in small.model.by_type("IfcSpace") if one.Name == "R2"]
+    ifcopenshell.api.group.assign_group(small.model, products=bath, group=zone)
+    path = tmp_path / "m.ifc"
+    small.model.write(str(path))
+    path.with_name("m.corrections.toml").write_text('indoors = ["IfcSpace"]')
+    result = CliRunner().invoke(
+        command, ["check", str(path), "--space", "home 2"], catch_exceptions=False
+    )
+    table = [line for line in result.output.splitlines() if line.startswith("│")]
+    assert ["R2 Bath" in line for line in table] == [True]
+    assert "rooms: 1 (with windows: 0), windows: 0" in result.output
 
 
 def test_export_writes_what_is_asked_for(path, tmp_path):

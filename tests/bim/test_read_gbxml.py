@@ -201,6 +201,19 @@ def test_north_is_turned(tmp_path):
     np.testing.assert_allclose(window.normal, [-1, 0, 0], atol=1e-12)
 
 
+def test_turning_north_keeps_lengths_and_heights(tmp_path):
+    straight, turned = (
+        read_gbxml(written(tmp_path, two_rooms(azimuth=azimuth))).spaces[0] for azimuth in (0, 30)
+    )
+    assert turned.volume == pytest.approx(straight.volume)
+    for before, after in zip(straight.faces, turned.faces, strict=True):
+        assert after.area == pytest.approx(before.area)
+        assert after.normal[2] == pytest.approx(before.normal[2], abs=1e-12)
+        x, y = before.normal[:2]  # turned clockwise, as the azimuth is from north
+        c, s = np.cos(np.radians(30)), np.sin(np.radians(30))
+        np.testing.assert_allclose(after.normal[:2], [c * x + s * y, c * y - s * x], atol=1e-12)
+
+
 def test_feet_are_metres(tmp_path):
     text = two_rooms().replace('lengthUnit="Meters"', 'lengthUnit="Feet"')
     assert read_gbxml(written(tmp_path, text)).spaces[0].volume == pytest.approx(120 * 0.3048**3)

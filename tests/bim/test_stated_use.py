@@ -244,3 +244,16 @@ def test_flows_per_area_have_the_sizes_of_their_units(unit, factor):
     """A foot of air a minute through each area; its units inverted gave 116 times as much."""
     assert SI["InfiltrationFlowPerArea"][unit] == pytest.approx(factor, rel=1e-6)
     assert SI["OAFlowPerArea"][unit] == pytest.approx(factor, rel=1e-6)
+
+
+@pytest.mark.parametrize("changes", [0.0, 0.005, 2.0])
+def test_air_changes_of_gbxml_are_of_the_rooms_volume(tmp_path, changes):
+    """40 m2 of 3 m: so many times 120 m3 an hour, in place of what the zone states by person."""
+    people = '<PeopleNumber unit="SquareMPerPerson">10</PeopleNumber>'
+    path = tmp_path / "used.xml"
+    stated = f"{people}<AirChangesPerHour>{changes}</AirChangesPerHour>"
+    path.write_text(used_gbxml().replace(people, stated))
+    building = read_gbxml(path)
+    (use,) = building.uses.values()
+    assert "value-not-read" not in {one.code for one in building.issues}
+    assert use.ventilation_m3_s.peak == pytest.approx(changes * 120.0 / 3600.0)

@@ -202,6 +202,12 @@ def test_what_cannot_be_placed_is_refused(house, tmp_path):
         ("a.city.json", {"type": "CityJSON", "vertices": [], "CityObjects": {"h": {"geometry": [
             {"type": "MultiSurface", "lod": 2, "boundaries": [[[0, 1, 9]]]}]}}},
          "h: boundaries: expected lists"),
+        ("a.city.json", {"type": "CityJSON", "vertices": [[1, 2, 1e305]]},
+         "vertices: expected finite numbers"),
+        ("a.geojson", {"type": "FeatureCollection", "features": [
+            {"properties": {"height": 9}, "geometry": {"type": "Polygon", "coordinates": [
+                [[0, 0], [1e305, 0], [1e305, 1], [0, 0]]]}}]},
+         "feature 0: geometry.coordinates: is no polygon"),
         ("a.geojson", {"type": "FeatureCollection", "features": []},
          "properties: no polygon states a height"),
         ("a.geojson", {"type": "FeatureCollection", "features": [

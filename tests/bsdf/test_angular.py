@@ -10,7 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.angular import AngularTable, check_specular, roos_table, stack_table
+from mitsuba_cfs.bsdf.angular import (
+    AngularTable,
+    check_specular,
+    glass_table,
+    roos_table,
+    stack_table,
+)
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, pane_values, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.errors import DataError
@@ -57,6 +63,22 @@ def test_a_stack_of_one_is_the_pane_and_of_clear_ones_passes_by_either_polarisat
     p = ((index * np.cos(THETA) - inner) / (index * np.cos(THETA) + inner)) ** 2
     expected = np.mean([1 - 4 * r / (1 + 3 * r) for r in (s, p)], axis=0)
     assert table.transmitted(THETA) == pytest.approx(expected, abs=2e-4)
+
+
+def test_glass_passes_fresnels_shares_and_absorbs_along_its_way():
+    """Of either polarisation (1 - r)^2 a / (1 - r^2 a^2), a of the way inside (Radiance, 3.2)."""
+    for index, through in ((1.52, 0.96), (1.5, 1.0)):
+        cosine = np.cos(THETA)
+        inner = np.sqrt(1 - (np.sin(THETA) / index) ** 2)
+        s = ((cosine - index * inner) / (cosine + index * inner)) ** 2
+        p = ((index * cosine - inner) / (index * cosine + inner)) ** 2
+        a = through ** (1 / inner)
+        passed = np.mean([(1 - r) ** 2 * a / (1 - (r * a) ** 2) for r in (s, p)], axis=0)
+        back = [r + r * (1 - r) ** 2 * a**2 / (1 - (r * a) ** 2) for r in (s, p)]
+        table = glass_table([(through, index)])
+        assert table.transmitted(THETA) == pytest.approx(passed, abs=2e-4)
+        for side in ("front", "back"):
+            assert table.reflected(side, THETA) == pytest.approx(np.mean(back, axis=0), abs=2e-4)
 
 
 def test_a_turned_stack_reflects_its_other_side():
@@ -191,3 +213,46 @@ def test_means_over_patches_are_taken_at_all_of_their_places():
     c1, c2 = 1.0, np.cos(np.radians(5.0))
     by_hand = 2 / 3 * (c1**3 - c2**3) / (c1**2 - c2**2)
     assert table.patch_means(KLEMS_FULL)[0] == pytest.approx(by_hand, rel=1e-4)
+
+
+def test_light_that_meets_two_systems_is_their_mean_by_share():
+    """Shares 0, 1/4 and 1 of tables of 0.8 and 0.4; the back stays that of the first."""
+    theta = np.radians([0.0, 30.0, 60.0])
+    one, other = (
+        AngularTable(theta, *(np.full(3, value) for value in values))
+        for values in ((0.8, 0.1, 0.15), (0.4, 0.5, 0.55))
+    )
+    mixed = one.mixed(other, np.array([0.0, 0.25, 1.0]))
+    assert mixed.transmittance == pytest.approx([0.8, 0.7, 0.4])
+    assert mixed.reflectance_front == pytest.approx([0.1, 0.2, 0.5])
+    assert mixed.reflectance_back == pytest.approx([0.15] * 3)
+    assert (
+        AngularTable(theta, one.transmittance).mixed(other, np.zeros(3)).reflected("front", 0.0)
+        is None
+    )
+
+
+def test_a_table_may_end_at_or_before_grazing():
+    """Values at 90 degrees are the table's own; without them nothing passes, all is reflected."""
+    theta = np.radians([0.0, 45.0, 89.8])
+    short = AngularTable(theta, np.array([0.8, 0.7, 0.1]), np.array([0.1, 0.2, 0.8]))
+    assert short.transmitted(np.pi / 2) == 0
+    assert short.reflected("front", np.pi / 2) == 1
+    whole = AngularTable(np.radians([0.0, 45.0, 90.0]), np.array([0.8, 0.7, 0.1]))
+    assert whole.transmitted(np.pi / 2) == pytest.approx(0.1)
+    assert whole.reflected("front", 0.0) is None
+
+
+@pytest.mark.parametrize(("share", "message"), [(0.048, None), (0.3, "scatters 30 %")])
+def test_scattering_is_measured_against_all_that_passes(share, message):
+    """A share of diffuse light that passes scattered evenly, the rest straight on."""
+    omega, size = KLEMS_FULL.projected_solid_angles(), KLEMS_FULL.size
+    through = np.diag((1 - share) * 0.6 / omega) + share * 0.6 / np.pi
+    dark = np.zeros((size, size))
+    bsdf = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, through, through, dark, dark)
+    table = AngularTable(np.radians([0.0, 90.0]), np.full(2, (1 - share) * 0.6))
+    if message is None:
+        check_specular(bsdf, table, Path("a.xml"))
+    else:
+        with pytest.raises(DataError, match=message):
+            check_specular(bsdf, table, Path("a.xml"))

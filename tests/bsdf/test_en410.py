@@ -43,6 +43,16 @@ def test_a_grey_pane_has_its_value_everywhere():
     assert colour_rendering_index(WHOLE, grey) == pytest.approx(100, abs=1e-9)
 
 
+def test_between_the_data_values_are_linear():
+    """Data at both ends of the spectrum alone: grey is grey, and a ramp has its middle."""
+    ends = np.array([280.0, 2500.0])
+    assert solar_value(ends, np.array([0.42, 0.42])) == pytest.approx(0.42)
+    ramp = visible_value(ends, (ends - 280) / 2220)
+    assert ramp == pytest.approx((560 - 280) / 2220, abs=0.005)  # centre of V(lambda) and D65: 560
+    with pytest.raises(ValueError, match=r"from 280 to 700 nm: expected .* to 2500 nm"):
+        solar_value([280.0, 700.0], [0.42, 0.42])
+
+
 def test_each_band_looks_at_its_wavelengths():
     def only(low, high):
         return ((low <= WHOLE) & (high >= WHOLE)).astype(float)

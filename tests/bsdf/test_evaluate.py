@@ -96,3 +96,11 @@ def test_a_system_turned_round_is_seen_from_its_other_side(kind):
     expected = bsdf_values(bsdf, incident * turned, outgoing * turned)
     found = bsdf_values(bsdf.turned_round(), incident, outgoing)
     assert np.mean(np.isclose(found, expected, rtol=1e-6)) > 0.995  # but on edges of cells
+
+
+def test_the_share_that_is_seen_through_stays_and_is_all_by_default() -> None:
+    rng = np.random.default_rng(1)
+    blocks = rng.uniform(0, 0.1, (4, KLEMS_HALF.size, KLEMS_HALF.size))
+    for stated, share in ((None, 1.0), (0.4, 0.4)):
+        bsdf = KlemsBsdf(KLEMS_HALF, KLEMS_HALF, *blocks, see_through=stated)
+        assert klems_of(bsdf, KLEMS_FULL).see_through == share

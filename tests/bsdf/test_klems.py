@@ -91,6 +91,12 @@ def test_bases_that_cannot_be_are_refused():
         KlemsBsdf(KLEMS_FULL, KLEMS_FULL, transmission_back=np.zeros((145, 144)))
 
 
+def test_a_polar_angle_beyond_the_hemisphere_is_refused():
+    for theta in ([0.1, 1.6], [-0.1, 0.1]):
+        with pytest.raises(ValueError, match="expected 0 to pi / 2"):
+            KLEMS_FULL.index(theta, [0.0, 0.0])
+
+
 def evaluate(system: KlemsBsdf, incident, outgoing):
     """BSDF [N] of a filled system for directions [N, 3] in the window frame."""
     patch_in = system.basis_in.index(np.arccos(abs(incident[:, 2])), incident_azimuth(incident))

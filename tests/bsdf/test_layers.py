@@ -67,6 +67,16 @@ def test_what_is_absorbed_is_the_rest():
         assert absorbed.shape == (4, 41) and absorbed.min() > 0
 
 
+def test_a_system_of_one_layer_is_that_layer():
+    layer = scatterer(9)
+    system = combine_layers([layer])
+    for name, block in layer.blocks().items():
+        np.testing.assert_allclose(getattr(system.bsdf, name), block, atol=1e-14)
+    absorbed = 1 - layer.direct_hemispherical(layer.transmission_front)
+    absorbed -= layer.direct_hemispherical(layer.reflection_front)
+    np.testing.assert_allclose(system.absorptance_front, [absorbed], atol=1e-12)
+
+
 def test_layers_can_be_put_together_in_any_grouping():
     a, b, c = (scatterer(seed) for seed in (4, 5, 6))
     at_once = combine_layers([a, b, c]).bsdf

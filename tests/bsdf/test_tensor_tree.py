@@ -26,6 +26,9 @@ FILES = (
 )
 
 
+MADE = {"made here, rank 3": 3, "made here, rank 4": 4}
+
+
 def random_tree(rank: int, seed: int, depth: int = 3, limit: float = 0.2) -> TensorTree:
     """A tree whose branches end at random."""
     generator = np.random.default_rng(seed)
@@ -146,9 +149,14 @@ def test_random_trees_on_all_sides_are_those_of_radiance(tmp_path, rank):
 
 
 @pytest.mark.peer
-@pytest.mark.parametrize("name", FILES)
-def test_hemispherical_values_are_those_of_radiance(real_data, name):
-    path = real_data / "bsdf" / name
+@pytest.mark.parametrize("name", [*FILES, *MADE])
+def test_hemispherical_values_are_those_of_radiance(request, tmp_path, name):
+    if name in MADE:
+        path = tmp_path / "trees.xml"
+        trees = [random_tree(MADE[name], seed, limit=0.12) for seed in range(10, 14)]
+        write_bsdf_xml(BsdfFile({"Visible": TensorTreeBsdf(*trees)}), path, digits=9)
+    else:
+        path = request.getfixturevalue("real_data") / "bsdf" / name
     incident, _ = radiance.random_directions(300, seed=3)
     incident = incident[abs(incident[:, 2]) > 0.01]  # Radiance loses isotropic light that grazes
     theirs = radiance.direct_hemispherical(path, incident)

@@ -124,6 +124,10 @@ BROKEN = {
     "no basis": (lambda t: t.replace("ColumnAngleBasis", "Kolumn"), "ColumnAngleBasis"),
     "unit": (lambda t: t.replace('unit="meter"', 'unit="ell"'), "ell"),
     "bounds": (lambda t: t.replace("<UpperTheta>27<", "<UpperTheta>99<"), "theta bounds"),
+    "bounds off by little": (
+        lambda t: t.replace("<UpperTheta>27<", "<UpperTheta>27.01<"),
+        "theta bounds disagree",
+    ),
     "no data": (lambda t: t.replace("WavelengthDataBlock", "Block"), "no scattering data"),
 }
 

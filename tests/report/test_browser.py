@@ -29,8 +29,8 @@ def test_page_works_in_a_browser(page, tmp_path, width, flags) -> None:
     found = inspect(page, tmp_path, *flags, width=width)
     assert found["faults"] == []
     assert found["scroll"] <= found["width"], "the page scrolls sideways"
-    # of two rooms, the 3D view, and the second room's year of glare, shading state and loads
-    assert len(found["figures"]) == 2 * (5 + 1 + 5 + 6) + 1 + 3
+    # orientation, two rooms, 3D view; the second room's year of glare, shading state and loads
+    assert len(found["figures"]) == 1 + 2 * (5 + 1 + 5 + 6) + 1 + 3
     for name, *sizes in found["figures"]:
         assert sizes, f"{name} shows nothing"
         assert all(w >= 100 and h >= 90 for w, h in sizes), f"{name}: {sizes}"

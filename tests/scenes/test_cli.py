@@ -269,6 +269,22 @@ def test_a_signal_is_held_back_without_a_thread():
         signal.signal(signal.SIGTERM, before)
 
 
+@pytest.mark.parametrize(("name", "code"), [("SIGTERM", 143), ("SIGINT", 130)])
+def test_a_signal_while_an_error_is_printed_has_its_exit_code(name, code):
+    program = (
+        "import signal\n"
+        "from scenes import cli\n"
+        f"cli._user_line = lambda error: signal.raise_signal(signal.{name})\n"
+        "cli.main(['glare', 'nowhere.hdr'])\n"
+    )
+    process = subprocess.run(
+        [sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True,
+        check=False, preexec_fn=default_signals,
+    )  # fmt: skip
+    assert process.returncode == code and "Traceback" not in process.stderr
+    assert process.stderr.splitlines()[-1] == ("interrupted" if code == 130 else "terminated")
+
+
 def test_a_second_signal_does_not_end_the_cleaning_up():
     """Nor the exit: Python has its own handlers by then."""
     program = (

@@ -12,7 +12,7 @@ import pytest
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, remove_stale, replacing, write_text
-from scenes.result_folder import MARK, ResultFolder
+from scenes.result_folder import MARK, FolderMark, ResultFolder
 from tests.conftest import REPOSITORY
 
 
@@ -47,6 +47,74 @@ def test_an_error_leaves_the_earlier_results(tmp_path):
         (place / "a").write_text("2")
         raise ZeroDivisionError
     assert content(out) == {"a": "1"}
+
+
+def test_results_in_folders_replace_those_in_folders(tmp_path):
+    out = tmp_path / "out"
+    write(out, **{"room/first/a": "1", "room/b": "1"})
+    write(out, **{"room/first/a": "2", "room/first/c": "2", "other/deep/d": "2"})
+    files = {p.relative_to(out).as_posix(): p.read_text() for p in out.rglob("*") if p.is_file()}
+    assert files.pop(MARK)
+    assert files == {"room/first/a": "2", "room/first/c": "2", "other/deep/d": "2"}
+
+
+def test_a_folder_that_another_makes_in_the_meantime_is_used_and_keeps_its_files(tmp_path):
+    out = tmp_path / "out"
+    with ResultFolder(out, "test").replaced() as place:
+        (place / "a").write_text("1")
+        out.mkdir()
+        (out / "mine").write_text("mine")
+    assert content(out) == {"a": "1", "mine": "mine"}
+
+
+def test_folders_have_the_rights_of_every_new_folder(tmp_path):
+    (tmp_path / "plain").mkdir()
+    write(tmp_path / "out", **{"room/a": "1"})
+    for folder in (tmp_path / "out", tmp_path / "out" / "room"):
+        assert folder.stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+@pytest.mark.parametrize(("format_", "program"), [(2, "mitsuba-cfs"), (1, "another")])
+def test_only_a_mark_of_this_program_and_format_is_one(tmp_path, format_, program):
+    mark = {"program": "mitsuba-cfs", "format": 1, "command": "test", "files": [], "removed": []}
+    (tmp_path / MARK).write_text(json.dumps(mark))
+    assert FolderMark.read(tmp_path) == FolderMark("test")
+    (tmp_path / MARK).write_text(json.dumps(mark | {"format": format_, "program": program}))
+    assert FolderMark.read(tmp_path) is None
+
+
+def test_what_a_killed_process_had_not_finished_is_removed(tmp_path):
+    """A temporary folder without a mark, one of a new result beside it, and a file."""
+    out = tmp_path / "out"
+    write(out, a="1")
+    for folder in (out, tmp_path):
+        (folder / ".cfs-0123abcd.part").mkdir()
+        (folder / ".cfs-0123abcd.part" / "b").write_text("half")
+    (out / ".cfs-0123abce.part.csv").write_text("half")
+    (out / ".cfs-0123abc.part").write_text("another program's")
+    ResultFolder(out, "test")
+    assert content(out) == {"a": "1", ".cfs-0123abc.part": "another program's"}
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+
+def test_an_error_names_the_users_folder(tmp_path):
+    """Not the temporary one that the file was in; other files and errors stay."""
+    out = tmp_path / "out"
+    for inside, named in (("a", out / "a"), ("room/a", out / "room" / "a")):
+        with pytest.raises(DataError) as error, ResultFolder(out, "test").replaced() as place:
+            raise DataError("is odd", file=place / inside, element="line 2", field="x")
+        assert str(error.value) == f"{named}: line 2: x: is odd"
+        with pytest.raises(DataError) as error, ResultFolder(out, "test").replaced() as place:
+            (place / inside / "no").read_text()
+        assert str(error.value) == f"{named / 'no'}: cannot be written: No such file or directory"
+    for file in (tmp_path / "input", None):
+        with pytest.raises(DataError) as error, ResultFolder(out, "test").replaced():
+            raise DataError("is odd", file=file)
+        assert error.value.file == file
+    with pytest.raises(FileNotFoundError), ResultFolder(out, "test").replaced():
+        (tmp_path / "input").read_text()
+    with pytest.raises(OSError, match="of a library"), ResultFolder(out, "test").replaced():
+        raise OSError("of a library")
 
 
 CUT = """

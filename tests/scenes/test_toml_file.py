@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 import pytest
 from pydantic import BaseModel
 
 from mitsuba_cfs.errors import DataError
+from scenes import toml_file
 from scenes.fenestration.thermal_file import ThermalFile, ThermalTable
 from scenes.heat.study_file import StudyFile
 from scenes.photovoltaics.study_file import PvStudy
@@ -206,3 +207,35 @@ def test_what_is_no_toml_is_said(tmp_path, content: bytes) -> None:
     path.write_bytes(content)
     with pytest.raises(DataError, match="is not TOML"):
         read_table(path)
+
+
+@pytest.mark.parametrize(
+    ("albedo", "good"),
+    [(0, True), (1.0, True), ([0.2] * 12, True), ("snow", True), (-0.1, False), (1.01, False),
+     ([0.2] * 11, False), ([0.2] * 13, False), ([1.5] * 12, False), ("ice", False)],
+)  # fmt: skip
+def test_the_albedo_is_a_share_twelve_of_them_or_a_word(tmp_path, albedo, good) -> None:
+    if good:
+        table = validated(toml_file.OutdoorTable, {"albedo": albedo}, tmp_path / "s.toml")
+        assert table.albedo == (tuple(albedo) if isinstance(albedo, list) else albedo)
+    else:
+        with pytest.raises(DataError, match=r"s.toml: albedo"):
+            validated(toml_file.OutdoorTable, {"albedo": albedo}, tmp_path / "s.toml")
+
+
+def test_a_type_that_is_no_table_has_no_keys() -> None:
+    for annotation in (float, tuple[int, ...], list[str], dict[str, float], str | None):
+        assert keys_of(annotation) is None
+    assert keys_of(dict[Literal["a", "b"], float] | None) == ("a", "b")
+    assert keys_of(tuple[float, float] | toml_file.OutdoorTable) == (
+        "surroundings", "surroundings_offset", "albedo",
+    )  # fmt: skip
+
+
+def test_reading_options_are_the_keys_that_a_table_has() -> None:
+    room = toml_file.ReadTable(join=("A + B",), furniture=True)
+    assert toml_file.read_options(room) == {
+        "join": ("A + B",), "furniture": True, "apertures": (), "facade_panes": (),
+    }  # fmt: skip
+    both = toml_file.read_options(toml_file.ReadTable(), toml_file.OutdoorTable(albedo="file"))
+    assert both["albedo"] == "file" and both["furniture"] is False and len(both) == 7

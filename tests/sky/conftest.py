@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from weather_files import epw_rows
 
+from scenes.demo import WEATHER
+
 
 @pytest.fixture
 def year() -> list[list[str]]:
@@ -17,14 +19,8 @@ def year() -> list[list[str]]:
 
 @pytest.fixture(scope="session")
 def chicago() -> Path:
-    """Chicago TMY3 (public domain) from the EnergyPlus package; skipped without it."""
-    spec = importlib.util.find_spec("pyenergyplus")
-    places = [] if spec is None else list(spec.submodule_search_locations or [])
-    name = "USA_IL_Chicago-OHare.Intl.AP.725300_TMY3.epw"
-    found = [hit for place in places for hit in Path(place).rglob(name)]
-    if not found:
-        pytest.skip("the EnergyPlus package (pyenergyplus) is not installed")
-    return found[0]
+    """Chicago TMY3 (public domain), which the demo ships."""
+    return WEATHER
 
 
 @pytest.fixture(scope="session")

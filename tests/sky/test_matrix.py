@@ -67,6 +67,19 @@ def test_six_climates_are_those_of_gendaymtx(real_data, radiance, name, output, 
 
 
 @pytest.mark.peer
+@pytest.mark.parametrize(("output", "band"), [("-O0", "visible"), ("-O1", "solar")])
+@pytest.mark.parametrize(
+    ("place", "leap"), [("-34.93,138.60,9.5,48.0", False), ("67.28,14.40,1.0,13.0", True)]
+)
+def test_years_made_here_are_those_of_gendaymtx(tmp_path, radiance, place, leap, output, band):
+    """The southern hemisphere and a half-hour zone; the polar circle and a leap year."""
+    path = write_epw(tmp_path / "a.epw", epw_rows(leap=leap))
+    path.write_text(path.read_text().replace("48.0,8.0,1.0,250.0", place))
+    ours = sky_matrix(read_epw(path), 1, band, sun_model="radiance")
+    assert_same_sky(ours, gendaymtx(radiance, path, 1, output), 1)
+
+
+@pytest.mark.peer
 @pytest.mark.slow
 @pytest.mark.parametrize(("output", "band"), [("-O0", "visible"), ("-O1", "solar")])
 @pytest.mark.parametrize("name", CLIMATES)

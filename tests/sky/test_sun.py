@@ -62,6 +62,44 @@ def test_longitude_and_time_zone():
         np.testing.assert_allclose(sun.sun_directions(other, model="radiance"), expected)
 
 
+@pytest.mark.parametrize(
+    ("latitude", "longitude", "zone"),
+    [(78.22, 15.63, 1.0), (27.70, 85.32, 5.75), (-34.93, 138.60, 9.5), (47.56, -52.71, -3.5),
+     (-54.80, -68.30, -3.0), (-70.67, -8.27, 0.0), (19.09, 72.85, 5.5), (0.0, 179.0, 12.0)],
+)  # fmt: skip
+def test_noon_is_by_longitude_and_zone_on_every_side_of_the_equator(latitude, longitude, zone):
+    """21 March 2023: 7.4 min late by the equation of time; the equinox was 20 March, 21:24 UTC."""
+    minutes = pd.date_range("2023-03-21", periods=24 * 60, freq="min")
+    towards = sun.sun_directions(weather_at(minutes, latitude, longitude, zone))
+    highest = int(np.argmax(towards[:, 2]))
+    assert highest / 60 == pytest.approx(12 + zone - longitude / 15 + 7.4 / 60, abs=0.02)
+    declination = 0.395 * (highest / 60 - zone + 2.6) / 24  # degrees a day near the equinox
+    height = 90 - abs(latitude - declination)
+    assert np.degrees(np.arcsin(towards[highest, 2])) == pytest.approx(height, abs=0.1)
+    if latitude:
+        assert towards[highest, 1] * latitude < 0  # toward the equator
+
+
+@pytest.mark.parametrize(("latitude", "year"), [(78.22, 2023), (-70.67, 2023), (67.0, 2024)])
+def test_polar_night_and_midnight_sun_have_their_days(latitude, year):
+    """The sun stays down where tan(latitude) tan(declination) is below -1 (declination: Spencer
+    1971, 0.05 degrees), give or take refraction (0.6) and the change in half a day (0.2)."""
+    hours = pd.date_range(f"{year}-01-01 00:30", f"{year}-12-31 23:30", freq="10min")
+    up = sun.is_up(sun.sun_directions(weather_at(hours, latitude, 0.0, 0.0)))
+    by_day = pd.Series(up).groupby(hours.day_of_year)
+    g = 2 * np.pi * (np.arange(by_day.ngroups) + 0.5) / by_day.ngroups
+    declination = (
+        0.006918 - 0.399912 * np.cos(g) + 0.070257 * np.sin(g) - 0.006758 * np.cos(2 * g)
+        + 0.000907 * np.sin(2 * g) - 0.002697 * np.cos(3 * g) + 0.00148 * np.sin(3 * g)
+    )  # fmt: skip
+    lowest = np.degrees(np.abs(np.radians(latitude) + declination)) - 90
+    highest = 90 - np.degrees(np.abs(np.radians(latitude) - declination))
+    for days, bound in ((by_day.sum() == 0, -highest), (by_day.mean() == 1, lowest)):
+        assert days.sum() >= np.count_nonzero(bound > 0.85)
+        assert days.sum() <= np.count_nonzero(bound > -0.85)
+    assert (latitude == 67.0) or (by_day.sum() == 0).sum() > 60
+
+
 @pytest.mark.peer
 def test_radiance_model_is_that_of_gendaymtx(tmp_path, chicago, radiance):
     path = tmp_path / "suns.rad"

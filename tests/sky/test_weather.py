@@ -7,9 +7,10 @@ import pytest
 from weather_files import epw_rows, write_epw
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.epw import read_epw, spikes
 from mitsuba_cfs.sky.wea import read_wea, write_wea
 from mitsuba_cfs.sky.weather import relative_humidity
+from mitsuba_cfs.sky.weather_table import EpwColumns, epw_ground, epw_location, year_of
 
 FEBRUARY_3_14H = 24 * (31 + 2) + 13  # row of the hour that ends at 14:00
 DNI, DRY, DEW, HUMIDITY, PRESSURE, INFRARED, COVER, WIND = 14, 6, 7, 8, 9, 12, 23, 21
@@ -167,6 +168,154 @@ def test_values_that_no_weather_has_are_named(tmp_path, year, column, text, word
     weather = read_epw(write_epw(tmp_path / "a.epw", year))
     assert any(words in note for note in weather.notes)
     assert not any("implausible" in note for note in read_epw(path).notes)
+
+
+@pytest.mark.parametrize(
+    ("column", "text"), [(DEW, "10.0"), (HUMIDITY, "1"), (DRY, "24"), (WIND, "55"), (DEW, "-9")]
+)
+def test_fog_a_desert_and_a_storm_are_weather(tmp_path, year, column, text):
+    """Dew point at the temperature, 1 % humidity, 14 K in an hour, a storm of 55 m/s."""
+    year[100][column] = text
+    notes = read_epw(write_epw(tmp_path / "a.epw", year)).notes
+    assert not any("implausible" in note for note in notes)
+
+
+def test_a_spike_is_one_value_far_from_both_of_its_neighbours():
+    assert spikes(np.array([10.0, 10, 40, 10, 10])).tolist() == [False, False, True, False, False]
+    assert spikes(np.array([10.0, 10, -20, 10, 10])).tolist() == [False, False, True, False, False]
+    for sound in ([10.0, 10, 40, 40, 10, 10], [10.0, 24, 10, 10], [-20.0, -6, 8, 22, 22, 8, -6]):
+        assert not spikes(np.array(sound)).any()
+
+
+def test_an_impossible_pressure_is_the_standard_atmospheres(tmp_path, year):
+    """At 250 m 98.36 kPa (ASHRAE's table); what else is missing is derived without a note."""
+    year[100][PRESSURE], year[200][PRESSURE] = "0", "999999"
+    weather = read_epw(write_epw(tmp_path / "a.epw", year))
+    np.testing.assert_allclose(weather.pressure_pa[[100, 200]], 98358, atol=20)
+    assert weather.pressure_pa[99] == 98000
+    notes = [note for note in weather.notes if "pressure" in note]
+    assert len(notes) == 1 and "1 impossible pressure, in line 109; 98358 Pa" in notes[0]
+
+
+# Column, mark of a missing value (EnergyPlus' data dictionary), values that are read and refused
+FIELDS = {
+    "dry bulb temperature": (6, "99.9", ("-90", "70"), ("-90.1", "70.1")),
+    "dew point temperature": (7, "99.9", ("-90", "70"), ("-90.1", "70.1")),
+    "relative humidity": (8, "999", ("0", "110"), ("-1", "111")),
+    "pressure": (9, "999999", ("31000", "120000"), ("30999", "120001")),
+    "horizontal infrared irradiance": (12, "9999", ("0", "1000"), ("-1", "1001")),
+    "global horizontal irradiance": (13, "9999", ("0", "1800"), ("-1", "1801")),
+    "direct normal irradiance": (14, "9999", ("0", "1500"), ("-1", "1501")),
+    "diffuse horizontal irradiance": (15, "9999", ("0", "1500"), ("-1", "1501")),
+    "global horizontal illuminance": (16, "999999", ("0", "250000"), ("-1", "250001")),
+    "direct normal illuminance": (17, "999999", ("0", "250000"), ("-1", "250001")),
+    "diffuse horizontal illuminance": (18, "999900", ("0", "250000"), ("-1", "250001")),
+    "wind direction": (20, "999", ("0", "360"), ("-1", "361")),
+    "wind speed": (21, "999", ("0", "80"), ("-1", "81")),
+    "total sky cover": (22, "99", ("0", "10"), ("-1", "11")),
+    "opaque sky cover": (23, "99", ("0", "10"), ("-1", "11")),
+    "snow depth": (30, "999", ("0", "998"), ("-1", "998.5")),
+    "albedo": (32, "999", ("0.01", "1"), ("0", "1.01")),
+}
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_every_field_has_its_column_its_mark_of_missing_and_its_bounds(field):
+    column, missing, good, bad = FIELDS[field]
+
+    def columns(text: str) -> EpwColumns:
+        rows = [[good[0]] * 35, ["0"] * 35]
+        rows[1][0:4], rows[1][column] = ["1999", "1", "2", "3"], text
+        return EpwColumns("a.epw", 8, [",".join(row) for row in rows])
+
+    for text in good:
+        assert columns(text)._values(field)[1] == float(text)
+        assert columns(text).plausible(field)[0][1] == float(text)
+    assert np.isnan(columns(missing).optional(field)[1])
+    assert np.isnan(columns(" ").optional(field)[1])
+    for text in bad:
+        value, wrong = columns(text).plausible(field)
+        assert np.isnan(value[1]) and wrong[1] and np.isnan(columns(text).unchecked(field)[1])
+        with pytest.raises(DataError, match=rf"a\.epw: line 10: {field}: expected .* got {text}"):
+            columns(text).optional(field)
+    with pytest.raises(DataError, match=rf"{field}: .* got 'x' \(month 1, day 2, hour 3\)"):
+        columns("x").optional(field)
+
+
+@pytest.mark.parametrize("steps", [1, 2])
+def test_a_gap_of_more_than_six_hours_and_one_at_either_end_is_refused(steps):
+    """By steps of an hour or half an hour; the values between are on a line."""
+
+    def columns(missing: slice) -> EpwColumns:
+        rows = [["0"] * 35 for _ in range(24 * 365 * steps)]
+        for row, fields in enumerate(rows):
+            fields[21] = str(row % 60)
+        for fields in rows[missing]:
+            fields[21] = "999"
+        return EpwColumns("a.epw", 8, [",".join(row) for row in rows])
+
+    filled = columns(slice(10, 10 + 6 * steps)).required("wind speed")
+    assert filled[:40] == pytest.approx(np.arange(40))
+    for start, hours in ((10, 6), (0, 1), (24 * 365 * steps - 1, 1)):
+        stop = start + hours * steps + (start == 10)
+        with pytest.raises(DataError, match=f"line {start + 9}: wind speed: missing"):
+            columns(slice(start, stop)).required("wind speed")
+
+
+def test_a_year_is_the_files_own_where_its_days_fit():
+    assert year_of(np.array([1999]), leap=False) == 1999
+    assert year_of(np.array([2000]), leap=True) == 2000
+    for years, leap, stands_for in (
+        ([1999], True, 2012), ([2000], False, 2017), ([1899], False, 2017), ([2101], False, 2017),
+        ([1998, 1999], False, 2017),
+    ):  # fmt: skip
+        assert year_of(np.array(years), leap=leap) == stands_for
+    assert year_of(np.array([1901]), leap=False) == 1901
+    assert year_of(np.array([2099]), leap=False) == 2099
+
+
+@pytest.mark.parametrize(
+    ("number", "name", "most"),
+    [(6, "latitude", 90), (7, "longitude", 180), (8, "time zone", 14), (9, "elevation", 9000)],
+)
+def test_a_place_is_on_earth(number, name, most):
+    def site(value):
+        parts = ["LOCATION", "City", "-", "XYZ", "", "0", "1", "2", "3", "4"]
+        parts[number] = str(value)
+        return epw_location([",".join(parts)], "a.epw")
+
+    for value in (-most, most):
+        assert getattr(site(value), f"{name.replace(' ', '')}_{UNITS[name]}") == value
+    for value in (-most - 0.1, most + 0.1):
+        with pytest.raises(DataError, match=f"a.epw: {name}: expected -{most} to {most}, got"):
+            site(value)
+    assert site(0).name == "City, XYZ"
+
+
+def test_ground_temperatures_are_those_of_each_depth():
+    blocks = [
+        ["0.5", "", "", "", *map(str, range(1, 13))],
+        ["2", "", "", "", *map(str, range(13, 25))],
+    ]
+
+    def ground(*fields: str):
+        return epw_ground(["", "", "", ",".join(["GROUND TEMPERATURES", *fields])], "a.epw")
+
+    depth, months = ground("2", *blocks[0], *blocks[1])
+    assert depth.tolist() == [0.5, 2.0]
+    np.testing.assert_array_equal(months, np.arange(1.0, 25.0).reshape(2, 12))
+    assert ground("0") == ground("") == (None, None)
+    for fields, words in (
+        (("2", *blocks[0]), "expected 32 fields for 2 depths, got 16"),
+        (("x", *blocks[0]), "expected a number, got 'x'"),
+        (("1", "deep", *blocks[0][1:]), "ground depth: expected a number, got 'deep'"),
+        (("1", *blocks[0][:-1], "cold"), "ground temperature: expected a number, got 'cold'"),
+    ):
+        with pytest.raises(DataError, match=f"a.epw: line 4: .*{words}"):
+            ground(*fields)
+
+
+UNITS = {"latitude": "deg", "longitude": "deg", "time zone": "h", "elevation": "m"}
 
 
 @pytest.mark.parametrize("fault", FAULTS)

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from weather_files import epw_rows, write_epw
 
@@ -123,16 +124,7 @@ def test_wea_files_too(tmp_path):
 
 
 def test_measured_radiation_too(tmp_path):
-    weather = read_epw(EPW)
-    path, some = tmp_path / "roof.csv", slice(24 * 150, 24 * 200)
-    rows = zip(
-        weather.midpoints[some],
-        weather.global_horizontal[some],
-        weather.diffuse_horizontal[some],
-        strict=True,
-    )
-    lines = [f"{time.isoformat()},{g},{d}\n" for time, g, d in rows]
-    path.write_text("time,global_horizontal,diffuse_horizontal\n" + "".join(lines))
+    path = roof(tmp_path / "roof.csv", 50)
     place = {"latitude_deg": 41.98, "longitude_deg": -87.92}
     assert read_measured(path, **place, timezone_h=-6).notes == ()
     (note,) = read_measured(path, **place, timezone_h=-5).notes  # summer time taken for the zone
@@ -170,3 +162,37 @@ def test_a_file_of_pvgis_is_read(changed):
     path = changed()
     path.write_text(path.read_text(encoding="latin-1").replace("SAVINGS", "SAVING"))
     assert read_epw(path).site
+
+
+def roof(path: Path, days: int, later_h: int = 0) -> Path:
+    """A file of measured radiation: the demo's from 31 May on, with later times."""
+    weather = read_epw(EPW)
+    some = slice(24 * 150, 24 * (150 + days))
+    rows = zip(
+        weather.midpoints[some] + pd.Timedelta(hours=later_h),
+        weather.global_horizontal[some],
+        weather.diffuse_horizontal[some],
+        strict=True,
+    )
+    lines = [f"{time.isoformat()},{g},{d}\n" for time, g, d in rows]
+    path.write_text("time,global_horizontal,diffuse_horizontal\n" + "".join(lines))
+    return path
+
+
+def test_six_hours_are_refused_from_five_days_on_and_one_is_noted_from_thirty(tmp_path):
+    place = {"latitude_deg": 41.98, "longitude_deg": -87.92}
+    assert not read_measured(roof(tmp_path / "four.csv", 4), **place, timezone_h=0).notes
+    with pytest.raises(DataError, match=r"centred 6\.2 h before"):
+        read_measured(roof(tmp_path / "five.csv", 5), **place, timezone_h=0)
+    assert not read_measured(roof(tmp_path / "29.csv", 29), **place, timezone_h=-5).notes
+    assert read_measured(roof(tmp_path / "31.csv", 31), **place, timezone_h=-5).notes
+
+
+@pytest.mark.parametrize(("later_h", "noted"), [(3, False), (4, True)])
+def test_a_clock_far_from_its_longitude_is_noted_though_the_sun_agrees(tmp_path, later_h, noted):
+    """15 degrees west for each hour later; O'Hare's clock is 0.14 h before its longitude."""
+    place = {"latitude_deg": 41.98, "longitude_deg": -87.92 - 15.0 * later_h}
+    path = roof(tmp_path / "west.csv", 40, later_h)
+    notes = read_measured(path, **place, timezone_h=-6).notes
+    expected = "time zone -6 differs by 3.9 h from longitude -147.92"
+    assert len(notes) == noted and all(expected in note for note in notes)

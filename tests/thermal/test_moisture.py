@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -48,6 +50,16 @@ def test_ventilated_room_goes_exponentially_to_its_steady_state():
     expected = steady + (0.004 - steady) * np.exp(-k * h) * -np.expm1(-k) / k
     np.testing.assert_allclose(found.ratio, expected, rtol=1e-12)
     assert (found.humidify == 0).all() and (found.dehumidify == 0).all()
+
+
+def test_a_nearly_closed_room_follows_the_same_exponential():
+    """Air change k below 1e-4 an hour, where the closed form loses its digits: its series by k."""
+    k = 9e-5
+    flow = np.full(HOURS, k * VOLUME / 3600.0)
+    (found,) = zone_humidity([zone(outdoor_air=flow)], OUT_W, OUT_C, P)
+    steady = 0.004 + SOURCE / (DENSITY * flow[0])
+    gone = sum((-1) ** n * k**n / math.factorial(n + 1) for n in range(1, 6))
+    assert found.ratio[0] - 0.004 == pytest.approx((0.004 - steady) * gone, rel=1e-8)
 
 
 def test_limits_are_held_and_their_latent_loads_are_the_difference():

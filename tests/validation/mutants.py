@@ -14,6 +14,7 @@ import ast
 import copy
 import inspect
 import json
+import logging
 import os
 import random
 import resource
@@ -32,7 +33,9 @@ from _pytest import main as pytest_main
 from mitsuba_cfs.source_code import OWN
 from tests.conftest import REPOSITORY
 
-MODULES = {  # files, and their quick tests; none that numba compiles, whose code is cached on disk
+# Files, and their quick tests: none that numba compiles, whose code is cached on disk, and no test
+# that traces in this process, whose threads a fork does not have
+MODULES = {
     "thermal/comfort": ["thermal/test_comfort"],
     "thermal/conduction": ["thermal/test_conduction"],
     "thermal/climate": ["thermal/test_climate"],
@@ -41,6 +44,7 @@ MODULES = {  # files, and their quick tests; none that numba compiles, whose cod
     "thermal/network": ["thermal/test_network"],
     "thermal/ground": ["thermal/test_ground"],
     "thermal/blackbox": ["thermal/test_blackbox"],
+    "thermal/ventilation": ["thermal/test_ventilation"],
     "mitsuba_cfs/glare/indices": ["glare/test_indices"],
     "mitsuba_cfs/glare/position_index": ["glare/test_indices"],
     "mitsuba_cfs/glare/classes": ["glare/test_indices"],
@@ -49,9 +53,9 @@ MODULES = {  # files, and their quick tests; none that numba compiles, whose cod
     "mitsuba_cfs/sky/cie": ["sky/test_cie"],
     "mitsuba_cfs/sky/patches": ["sky/test_patches"],
     "mitsuba_cfs/sky/annual": ["sky/test_albedo"],
-    "mitsuba_cfs/sky/weather": ["sky/test_heat_island"],
-    "mitsuba_cfs/sky/weather_table": ["sky/test_weather_table"],
+    "mitsuba_cfs/sky/weather_table": ["sky/test_weather_table", "sky/test_weather"],
     "mitsuba_cfs/sky/epw": ["sky/test_weather"],
+    "mitsuba_cfs/sky/weather": ["sky/test_weather", "sky/test_heat_island"],
     "mitsuba_cfs/metrics/room": ["metrics/test_metrics"],
     "mitsuba_cfs/metrics/autonomy": ["metrics/test_autonomy_error", "metrics/test_metrics"],
     "mitsuba_cfs/metrics/lm83": ["metrics/test_autonomy_error", "metrics/test_metrics"],
@@ -69,7 +73,8 @@ MODULES = {  # files, and their quick tests; none that numba compiles, whose cod
     "bim/gbxml/constructions": ["bim/test_read_gbxml"],
     "bim/gbxml/document": ["bim/test_read_gbxml"],
     "bim/gbxml/use": ["bim/test_read_gbxml", "bim/test_stated_use"],
-    "scenes/result_folder": ["scenes/test_result_folder", "scenes/test_folders_of_results"],
+    "mitsuba_cfs/files": ["scenes/test_result_folder", "scenes/test_csv_text", "test_finite"],
+    "scenes/result_folder": ["scenes/test_result_folder"],
     "scenes/toml_file": ["scenes/test_toml_file"],
 }
 SWAPPED = {
@@ -240,6 +245,7 @@ def noticed(module: str, sources: list[str], tests: list[str]) -> list[bool]:
         child = os.fork()
         if child == 0:
             code = 1
+            logging.getLogger().setLevel(logging.WARNING)  # as in a run of pytest alone
             try:
                 sink = os.open(Path(folder) / "output", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
                 os.dup2(sink, 1)
