@@ -37,6 +37,30 @@ UNREADABLE = (
 )  # fmt: skip
 
 log = logging.getLogger(__name__)
+T = TypeVar("T")
+Inputs = tuple[object, ...]
+
+
+class RecentResults:
+    """The last results of functions of immutable objects, by the identity of these, in memory."""
+
+    def __init__(self, most: int = 4) -> None:
+        """Empty; `most`: number of results."""
+        self._most = most
+        # with their inputs, so that no other object gets the ids in the key
+        self._results: OrderedDict[Inputs, tuple[Inputs, Any]] = OrderedDict()
+
+    def of(self, function: Callable[..., T], *inputs: object) -> T:
+        """The result of a function of these inputs, computed if it is not among the last ones."""
+        key = (function, *map(id, inputs))
+        if key not in self._results:
+            self._results[key] = inputs, function(*inputs)
+        self._results.move_to_end(key)
+        while len(self._results) > self._most:
+            self._results.popitem(last=False)
+        result: T = self._results[key][1]
+        return result
+
 
 T = TypeVar("T")
 

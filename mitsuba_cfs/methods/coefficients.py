@@ -31,7 +31,6 @@ from mitsuba_cfs.methods.window_reflection import (
     reflects,
     reflects_outdoors,
     sensor_reflection,
-    shares_before_windows,
     through,
     with_exchange_of,
 )
@@ -184,34 +183,51 @@ def _straight_view(
     return StraightView(values, traced(1).values if reflecting else values.values)
 
 
-def reflection_shares(
-    matrices: PhaseMatrices, optics: Sequence[SystemOptics]
-) -> tuple[NDArray[np.floating] | None, Array | None]:
-    """Shares [S, Q * K] of the luminance outside the windows that sensors get by their reflection.
+@dataclass(frozen=True, slots=True)
+class ReflectedShares:
+    """Light of the sensors per unit luminance outside the windows, by reflection in these.
 
-    All of them, and those by way of the outdoors; None where there are none.
+    None where there is none.
+    """
+
+    before: Array | None  # [S, Q * K] light by the room alone, of windows that reflect outdoors
+    outwards: Array | None  # [S, Q * K] by way of the outdoors
+    coefficients: Array | None  # [S, P] of the sky: by both, the room's and the outdoors' light
+
+
+def reflected_shares(matrices: PhaseMatrices, optics: Sequence[SystemOptics]) -> ReflectedShares:
+    """Light of the sensors by reflection in the windows, computed once for the same systems.
 
     Args: optics: of the window parts [Q].
     """
-    view = sensor_matrix(matrices)
     matrices = with_exchange_of(matrices, optics)
-    shares: NDArray[np.floating] | None = None
-    outwards = None
-    if matrices.exchange is not None and reflects(optics):
-        inwards = sensor_reflection(view.values, matrices.exchange.values, optics)
-        shares = through(optics, inwards).astype(float)
-    if matrices.outdoor_exchange is not None and reflects_outdoors(matrices, optics):
-        before = shares_before_windows(matrices, view.values, optics)
-        outwards = by_way_of_outdoors(matrices.outdoor_exchange.values, optics, before)
+    inwards = matrices.exchange if reflects(optics) else None
+    outdoors = matrices.outdoor_exchange if reflects_outdoors(matrices, optics) else None
+    of = sensor_matrix(matrices), matrices.daylight, inwards, outdoors
+    return matrices.recent.of(_reflected_shares, *of, *optics)
+
+
+def _reflected_shares(
+    view: Estimate,
+    daylight: Estimate,
+    exchange: Estimate | None,
+    outdoors: Estimate | None,
+    *optics: SystemOptics,
+) -> ReflectedShares:
+    """Of V, D, W and X."""
+    shares: Array | None = None
+    whole, before, outwards = view.values.reshape(len(view.values), -1), None, None
+    if exchange is not None:
+        inwards = sensor_reflection(view.values, exchange.values, optics)
+        shares, whole = through(optics, inwards).astype(float), whole + inwards
+    if outdoors is not None:
+        before = through(optics, whole)
+        outwards = by_way_of_outdoors(outdoors.values, optics, before)
         shares = outwards if shares is None else shares + outwards
-    return shares, outwards
-
-
-def coefficients_of(matrices: PhaseMatrices, shares: NDArray[np.floating]) -> Array:
-    """Shares [n, Q * K] of the luminance outside the windows as coefficients [n, P] of the sky."""
-    daylight = matrices.daylight.values
-    coefficients: Array = shares @ daylight.reshape(shares.shape[1], -1)
-    return coefficients
+    of_sky = None
+    if shares is not None:
+        of_sky = shares @ daylight.values.reshape(shares.shape[1], -1)
+    return ReflectedShares(before, outwards, of_sky)
 
 
 def sensor_matrix(matrices: PhaseMatrices) -> Estimate:

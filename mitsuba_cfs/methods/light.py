@@ -19,6 +19,7 @@ from mitsuba_cfs.methods import METHODS, UnknownMethodError
 from mitsuba_cfs.methods import phase_light as phases
 from mitsuba_cfs.methods.optics import States, hourly_states
 from mitsuba_cfs.methods.phase_light import (
+    EYE,
     PhaseLight,
     coefficients_in_state,
     illuminance_of_all,
@@ -228,7 +229,7 @@ def eye_illuminance(light: Light, state: State | None = None) -> Array:
         return _by_season(light, state, lambda one, rows: eye_illuminance(one, rows))
     if isinstance(light, PathLight):
         return path_eye_illuminance(light, np.arange(len(light.sky.lit)), state)
-    return illuminance_of_all(with_sensor_light(light), state)[-1]
+    return illuminance_of_all(with_sensor_light(light), state, EYE)[0]
 
 
 def direct_sun(light: ByPhases, state: State | None = None) -> Array | None:

@@ -26,11 +26,10 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.coefficients import (
     GroupCoefficients,
     beam_matrix,
-    coefficients_of,
     direct_daylight,
     direct_sensor_matrix,
     group_coefficients,
-    reflection_shares,
+    reflected_shares,
     sensor_matrix,
 )
 from mitsuba_cfs.methods.optics import (
@@ -66,6 +65,7 @@ from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
 from mitsuba_cfs.trace.sun.specular_paths import shining
 
 SUN_BATCHES = 4  # of C_ds
+ALL_SENSORS, EYE = slice(None), slice(-1, None)
 State = NDArray[np.int64]  # [G, L] state of each window group in each hour, or [L] of all groups
 Array = NDArray[np.float64]
 
@@ -206,15 +206,15 @@ def sensor_light(light: PhaseLight) -> tuple[tuple[SensorLight, ...], ...]:
     return light.sensors
 
 
-def illuminance_of_all(light: PhaseLight, state: State | None) -> Array:
-    """Illuminance of the sensors, the eye last [S + 1, L] [lx]."""
+def illuminance_of_all(light: PhaseLight, state: State | None, some: slice = ALL_SENSORS) -> Array:
+    """Illuminance of the sensors, the eye last [S + 1, L] [lx], or of some of them."""
     sensors, rows = sensor_light(light), states_of(light, state)
-    illuminance = np.zeros((len(light.scene.sensors()[0]), rows.shape[1]))
+    illuminance = np.zeros((len(light.scene.sensors()[0][some]), rows.shape[1]))
     for kind, hours in combinations(rows):
-        illuminance[:, hours] = _without_direct_sun(light, kind, hours)
+        illuminance[:, hours] = _without_direct_sun(light, kind, hours, some)
     if not light.matrices.five_phase:
         return illuminance
-    suns = (_in_states([one.sun for one in sensors[g]], row) for g, row in enumerate(rows))
+    suns = (_in_states([one.sun for one in sensors[g]], row)[some] for g, row in enumerate(rows))
     return np.maximum(illuminance, 0.0, out=illuminance) + sum(suns)
 
 
@@ -258,9 +258,9 @@ def coefficients_in_state(light: PhaseLight, state: int) -> Array:
     kind = [min(state, len(states) - 1) for states in light.systems]
     sensors = sensor_light(light)
     coefficients = _total([sensors[g][j].coefficients.whole for g, j in enumerate(kind)])
-    shares, _ = reflection_shares(light.matrices, light.optics(kind))
-    if shares is not None:
-        coefficients = coefficients + coefficients_of(light.matrices, shares)
+    reflected = reflected_shares(light.matrices, light.optics(kind))
+    if reflected.coefficients is not None:
+        coefficients = coefficients + reflected.coefficients
     return coefficients[: len(light.scene.points)]
 
 
@@ -311,28 +311,30 @@ def sky_in(light: PhaseLight, hours: NDArray[np.int64]) -> NDArray[np.floating]:
     return light.sky.whole if all_hours(light, hours) else light.sky.whole[:, hours]
 
 
-def _without_direct_sun(light: PhaseLight, kind: Sequence[int], hours: NDArray[np.int64]) -> Array:
-    """Illuminance [S, h] but for the direct sun, in hours with each group in a state [G].
+def _without_direct_sun(
+    light: PhaseLight, kind: Sequence[int], hours: NDArray[np.int64], some: slice
+) -> Array:
+    """Illuminance [s, h] but for the direct sun, in hours with each group in a state [G].
 
     Few sensors before many hours, and the groups as one.
     """
     sensors, sky = sensor_light(light), sky_in(light, hours)
     chosen = [sensors[g][j] for g, j in enumerate(kind)]
-    shares, outwards = reflection_shares(light.matrices, light.optics(kind))
-    whole = _total([one.coefficients.whole for one in chosen])
-    if shares is not None:
-        whole = whole + coefficients_of(light.matrices, shares)
+    reflected = reflected_shares(light.matrices, light.optics(kind))
+    whole, outwards = _total([one.coefficients.whole for one in chosen]), reflected.outwards
+    if reflected.coefficients is not None:
+        whole = whole + reflected.coefficients
     # in the sky's single precision: the noise of the sums is ten thousand times its rounding
-    values = (whole.astype(sky.dtype) @ sky).astype(float)
+    values = (whole[some].astype(sky.dtype) @ sky).astype(float)
     if not light.matrices.five_phase:
         return values
-    by_sun = _total([one.coefficients.by_sun for one in chosen])
+    by_sun = _total([one.coefficients.by_sun for one in chosen])[some]
     values -= phases.times_sky(by_sun, _sun_in(light, hours))
     for one in chosen:
         if one.added is not None:
-            values += one.added if all_hours(light, hours) else one.added[:, hours]
+            values += one.added[some] if all_hours(light, hours) else one.added[some][:, hours]
     if outwards is not None and light.reflected is not None:
-        values += replaced_before(light.reflected, outwards, hours)
+        values += replaced_before(light.reflected, outwards[some], hours)
     return values
 
 

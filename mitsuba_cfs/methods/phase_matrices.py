@@ -21,7 +21,7 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.glare.annual import PictureMatrix
 from mitsuba_cfs.images.view import View
-from mitsuba_cfs.matrices.cache import CacheEntry, MatrixCache
+from mitsuba_cfs.matrices.cache import CacheEntry, MatrixCache, RecentResults
 from mitsuba_cfs.methods import METRICS, UnknownMethodError
 from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene, Sampling
 from mitsuba_cfs.methods.subdivision import CellLight, Parts, allowed, subdivided
@@ -169,6 +169,7 @@ class PhaseMatrices:
     sunlit: SunlitShares | None = None  # sunlit surfaces of the room that the windows see [Q * K]
     adjacent_shown: tuple[RoomShown, ...] | None = None  # adjacent rooms in the view's pixels
     scenes: SceneCache = field(default_factory=SceneCache, compare=False, repr=False)
+    recent: RecentResults = field(default_factory=RecentResults, compare=False, repr=False)
 
     @property
     def outdoor_parts(self) -> int:
@@ -356,7 +357,6 @@ def with_sunlit(matrices: PhaseMatrices) -> PhaseMatrices:
     interior, parts = matrices.scene.interior, matrices.parts.groups
     sunlit = window_sunlit_shares(
         matrices.scenes.scene(interior, parts),
-        interior,
         samples=_exchange_samples(matrices.sampling, parts, EXCHANGE_SHARE),
         seed=matrices.sampling.seed,
     )

@@ -52,6 +52,7 @@ from mitsuba_cfs.trace.pictures.outdoors import outdoors
 from mitsuba_cfs.trace.sun.picture_beam import BeamLight, beam_light
 from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
+BEAM_SAMPLES = 16  # rays of a tile to the windows, for each path of a pixel of the view
 T = TypeVar("T")
 
 
@@ -223,8 +224,9 @@ def _beam_light(matrices: PhaseMatrices, optics: Sequence[SystemOptics]) -> Beam
         return None
     return beam_light(
         scene.interior, scene.exterior, parts.groups, scattering, np.stack(beams), scene.eye,
-        subdivision=matrices.sampling.subdivision, seed=matrices.sampling.seed,
-        scenes=matrices.scenes,
+        subdivision=matrices.sampling.subdivision,
+        samples=BEAM_SAMPLES * matrices.sampling.view_samples,
+        seed=matrices.sampling.seed, scenes=matrices.scenes,
     )  # fmt: skip
 
 

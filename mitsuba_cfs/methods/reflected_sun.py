@@ -95,7 +95,7 @@ def sunlit_room(matrices: PhaseMatrices, sun: ReflectedSun) -> SunlitRoom | None
     if not (interior.reflectance > 0).any():
         return None
     samples = _sensor_samples(matrices, ROOM_SHARE)
-    cells = room_cells(sun.inside, interior, samples=samples)
+    cells = room_cells(sun.inside, samples=samples)
     shares = tuple(
         room_shares(
             cells,

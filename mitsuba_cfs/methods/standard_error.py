@@ -11,6 +11,7 @@ from mitsuba_cfs.methods.coefficients import (
     GroupCoefficients,
     beam_matrix,
     direct_daylight,
+    reflected_shares,
     sensor_matrix,
     without_straight,
 )
@@ -27,7 +28,6 @@ from mitsuba_cfs.methods.subdivision import coarse_sky
 from mitsuba_cfs.methods.window_reflection import (
     reflects,
     reflects_outdoors,
-    shares_before_windows,
     variance_by_outdoors,
     variance_by_room,
     with_exchange_of,
@@ -178,12 +178,12 @@ def _exchange_variance(
         pairs = zip(optics, before, strict=True)
         luminance = np.stack([one.transmission @ values for one, values in pairs])
         variance += variance_by_room(view.values, matrices.exchange, optics, luminance)
-    if outwards and matrices.outdoor_exchange is not None:
+    shares = reflected_shares(matrices, optics).before
+    if shares is not None and matrices.outdoor_exchange is not None:
         if light.reflected is not None:
             sun = sky.totals(some)[1][:, None]
             replaced = replaced_luminance(light.reflected, some[:, None], sun)[..., 0]
             before = before + replaced / len(sky.lit)
-        shares = shares_before_windows(matrices, view.values, optics)
         variance += variance_by_outdoors(shares, matrices.outdoor_exchange, optics, before)
     return variance
 

@@ -142,19 +142,6 @@ def returned_from_outdoors(
     return total
 
 
-def shares_before_windows(
-    matrices: PhaseMatrices, view: NDArray[np.float64], optics: Sequence[SystemOptics]
-) -> NDArray[np.float64]:
-    """Light of the sensors per unit luminance outside the windows, by patches [S, Q * K].
-
-    Args: view: V [S, Q, K].
-    """
-    shares = view.reshape(len(view), -1)
-    if matrices.exchange is not None and reflects(optics):
-        shares = shares + sensor_reflection(view, matrices.exchange.values, optics)
-    return through(optics, shares)
-
-
 def through(optics: Sequence[SystemOptics], shares: Array) -> Array:
     """Shares [n, Q * K] of the windows' luminance as shares of the luminance before them."""
     return _by_part(optics, lambda one: one.transmission, shares)
@@ -186,7 +173,7 @@ def variance_by_outdoors(
 ) -> NDArray[np.float64]:
     """Variance of the sensors' light [S] by the noise of X, that of its first order.
 
-    Args: shares: `shares_before_windows` [S, Q * K]; exchange: X; before: I [Q, K].
+    Args: shares: `ReflectedShares.before` [S, Q * K]; exchange: X; before: I [Q, K].
     """
     sent = np.zeros((len(exchange.values), KLEMS_FULL.size))
     for q, one in enumerate(optics[: len(sent)]):

@@ -36,7 +36,7 @@ def main(
     """Print a line for each room."""
     room = RoomOptions.of(**ROOM, picture_hours=("06-21 12",))
     options = JobOptions(building, weather, cfs, spaces=tuple(space), quick=True, room=room)
-    inputs = read_inputs(options, lambda stage, fraction: None)
+    inputs = read_inputs(options)
     variants.activate()
     skies = skies_for(inputs.weather, room.sampling, **room.sky)
     kept = {}

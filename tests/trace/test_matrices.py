@@ -11,6 +11,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
+from mitsuba_cfs.window_parts import cut_group, even_regions
 
 from . import rooms
 
@@ -376,3 +377,29 @@ def test_batches_of_few_paths_go_on_to_the_next_places(variant):
         roof, places, [UP], subdivision=1, samples=1, stopping=Stopping(batches=32)
     )
     assert found.values.sum() == pytest.approx(np.pi / 2, rel=0.01)
+
+
+def test_groups_and_batches_traced_together_equal_those_traced_apart(monkeypatch):
+    """The random numbers of a group in a batch are its own; one launch has as many as fit."""
+    import drjit as dr
+
+    from mitsuba_cfs.trace.kernels import window_paths
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
+
+    whole = rooms.test_room()[1][0]
+    groups = cut_group(whole, even_regions(whole, 0.8))
+
+    def traced() -> tuple[np.ndarray, int]:
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            values = daylight_matrix(
+                rooms.obstruction(), groups, subdivision=1, samples=16, stopping=Stopping(3), seed=5
+            ).values
+            return values, len(dr.kernel_history([dr.KernelType.JIT]))
+
+    together, launches = traced()
+    monkeypatch.setattr(window_paths, "LANES", 1)
+    apart, more = traced()
+    assert len(groups) > 3
+    assert np.array_equal(together, apart)
+    assert more - launches >= 3 * len(groups) - 3  # all of them in 3 launches at most

@@ -76,7 +76,7 @@ def test_cells_hold_the_places_that_their_rays_start_from_and_others_do_not_matt
 
     room, groups = rooms.test_room()
     inside = TracedScene(room, groups)
-    narrow, wide = sunlit_sensors.room_cells(inside, room)
+    narrow, wide = sunlit_sensors.room_cells(inside)
     starts, whole = wide.starts, dr.full(type(dr.llvm.Bool(True)), True, wide.starts.size)
     holder = np.repeat(np.arange(wide.cells.size), sunlit_sensors.CELL_RAYS)
     # at a cube's side the kernel's single precision decides for the next one

@@ -179,7 +179,7 @@ def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
     room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
     group = hole()
     inside, outside = TracedScene(room, [group]), TracedScene(rooms.NOTHING, [group])
-    cells, rng = room_cells(inside, room), np.random.default_rng(1)
+    cells, rng = room_cells(inside), np.random.default_rng(1)
     assert cells[1].starts.size == cells[1].cells.size * CELL_RAYS
     for part in (cells[0], cells[1].cells):
         assert part.area.sum() == pytest.approx(2 * 54, rel=1e-3)  # either side
@@ -210,7 +210,7 @@ def test_few_rays_of_a_sensor_ask_for_few_from_the_cells_with_the_same_light():
     sensors = np.array([[x, 1.5, 0.8] for x in (0.5, 1.5, 2.5)]), np.tile([0.0, 0.0, 1.0], (3, 1))
     found = []
     for samples, rays in ((128, CELL_LEAST), (32 * CELL_RAYS, CELL_RAYS)):
-        cells = room_cells(inside, room, samples=samples)
+        cells = room_cells(inside, samples=samples)
         assert cells[1].rays == rays and cells[1].starts.size == rays * cells[1].cells.size
         found.append(room_shares(cells, inside, sensors, samples=4096) @ cells[0].area)
     np.testing.assert_allclose(*found, rtol=0.005)
@@ -238,7 +238,7 @@ def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
     cosines = np.maximum(way[:, 2], 0) * -way[:, 0] / distance**2
     expected = 0.8 * LUX * -sun[1] * 0.5 / np.pi * np.mean(cosines / distance**2)
 
-    cells, beam = room_cells(inside, room), BsdfOptics(clear_glass()).scattering
+    cells, beam = room_cells(inside), BsdfOptics(clear_glass()).scattering
     found = []
     for seed in range(3):
         sensor = place[None], np.array([[0.0, 0.0, 1.0]])

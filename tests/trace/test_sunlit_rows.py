@@ -57,7 +57,7 @@ def test_a_strip_of_sun_at_a_walls_foot_lights_the_floor_beside_it_evenly() -> N
     tracer = TracedScene(interior, box.window_groups())
     rows = PictureRows.of_view(tracer, view, tile_size(view))
     times = np.ones(len(rows.pixels), dtype=np.int64)
-    sunlit, _ = picture_sunlit_shares(tracer, interior, view, rows, times)
+    sunlit, _ = picture_sunlit_shares(tracer, view, rows, times)
     point = sunlit.places.point + tracer.centre
     lit = (point[:, 0] < 0.01) & (point[:, 2] < STRIP) & (sunlit.places.normal[:, 0] > 0.9)
     on_cells = strip_on_cells(sunlit.cells, tracer)
@@ -83,7 +83,7 @@ def test_a_window_low_above_a_wide_floor_sees_the_sun_on_it_in_half_of_its_view(
     interior = rooms.surfaces([(floor, 0.4)])
     pane = rooms.quad((-0.1, 0, 0.1), (0.1, 0, 0.1), (0.1, 0, 0.3), (-0.1, 0, 0.3))
     groups = [WindowGroup("low", (WindowSurface("low", pane),))]
-    found = window_sunlit_shares(TracedScene(interior, groups), interior, samples=64)
+    found = window_sunlit_shares(TracedScene(interior, groups), samples=64)
     luminance = found.far_rows(np.ones((found.cells.size, 1), dtype=np.float32))[:, 0]
     # E = rho / pi * pi * the floor's half of the view
     lux = KLEMS_FULL.projected_solid_angles() @ luminance
@@ -129,7 +129,7 @@ def test_sun_near_by_is_what_all_places_of_each_element_say(monkeypatch) -> None
     tracer = TracedScene(interior, groups)
     rows = PictureRows.of_view(tracer, view, 4)
     times = np.ones(len(rows.pixels), dtype=np.int64)
-    sunlit, _ = picture_sunlit_shares(tracer, interior, view, rows, times)
+    sunlit, _ = picture_sunlit_shares(tracer, view, rows, times)
     sunlit = replace(sunlit, share=sparse.csr_array(sunlit.share.shape, dtype=np.float32))
     clear = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.ones(145))
     sun = PictureSun(interior, box.NOTHING, groups, [clear], view)
@@ -211,14 +211,41 @@ def test_grazing_sun_lights_a_picture_by_its_flux() -> None:
     mean, _ = rows.of_halves(np.ones(len(rows.pixels), dtype=np.float32), 0.01)
     found = []
     for seed in range(4):
-        shares, _ = picture_sunlit_shares(
-            tracer, interior, view, rows, rows.times(smoothed=True), seed=seed
-        )
+        shares, _ = picture_sunlit_shares(tracer, view, rows, rows.times(smoothed=True), seed=seed)
         luminance = mean @ sun.sunlit_luminance(shares, *hours)
         found.append(np.average(luminance, axis=0, weights=np.bincount(rows.row)))
     noise = np.std(found, axis=0, ddof=1) / np.mean(found, axis=0)
     # 0.01 in each hour; four shadow rays to each of 1,024 parts of the surfaces gave 0.04 to 0.13
     assert noise.max() < 0.03
+
+
+def test_the_sun_on_cells_is_followed_once_for_the_same_hours(monkeypatch) -> None:
+    """A picture, its noise and the windows have the cells of one scene and equal hours."""
+    from mitsuba_cfs.trace.sun.sunlit_cells import Beam
+
+    interior, groups = box.room(), box.window_groups()
+    view = cfs.fisheye((1.8, 2.0, 1.5), (0.0, -1.0, 0.0), 40)
+    tracer = TracedScene(interior, groups)
+    rows = PictureRows.of_view(tracer, view, tile_size(view))
+    of_rows, _ = picture_sunlit_shares(tracer, view, rows, rows.times(smoothed=True))
+    of_windows = window_sunlit_shares(tracer, samples=4)
+    clear = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.ones(145))
+    sun, followed, flux = PictureSun(interior, box.NOTHING, groups, [clear], view), [], Beam.flux
+
+    def counted(self, cells, suns):
+        followed.append(suns)
+        return flux(self, cells, suns)
+
+    monkeypatch.setattr(Beam, "flux", counted)
+    towards = np.array([[0.0, -0.6, 0.8], [0.6, -0.64, 0.48]])
+    first = sun.sunlit_luminance(of_rows, towards[:1].copy(), np.full(1, 1e5))
+    sun.sunlit_luminance(of_windows, towards[:1].copy(), np.full(1, 1e5))
+    assert len(followed) == 1
+    other = sun.sunlit_luminance(of_rows, towards[1:], np.full(1, 1e5))
+    dimmed = sun.sunlit_luminance(of_rows, towards[:1], np.full(1, 5e4))
+    assert len(followed) == 3
+    assert first.sum() > 0 and not np.allclose(first, other)
+    np.testing.assert_allclose(dimmed, first / 2, rtol=1e-5)
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 30.0, 45.0])
@@ -231,7 +258,7 @@ def test_a_skin_behind_a_wall_takes_no_area_from_its_cells(gap: float, turn_deg:
     skin = wall - np.array([0.0, gap, 0.0])
     far = wall + np.array([0.0, 6.0, 0.0])
     interior = rooms.surfaces([(one @ turned, 0.5) for one in (wall, skin, far)])
-    cells = surface_cells(TracedScene(interior, box.window_groups()), interior).cells
+    cells = surface_cells(TracedScene(interior, box.window_groups())).cells
     for chosen in (cells, cells.joined()[0]):
         inside = TracedScene(interior, box.window_groups())
         x, z = np.meshgrid(np.linspace(1e-3, 3.999, 801), np.linspace(1e-3, 2.999, 601))

@@ -10,13 +10,14 @@ from scipy import stats
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.methods.coefficients import reflected_shares
 from mitsuba_cfs.methods.light import (
     daylight_coefficients,
     eye_illuminance,
     illuminance,
     illuminance_with_error,
 )
-from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_light import illuminance_of_all, phase_light
 from mitsuba_cfs.methods.phase_matrices import phase_matrices
 from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.methods.point_in_time import PathLight
@@ -28,7 +29,6 @@ from mitsuba_cfs.methods.reflected_sun import (
 from mitsuba_cfs.methods.window_reflection import (
     by_way_of_outdoors,
     returned_from_outdoors,
-    shares_before_windows,
 )
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -192,11 +192,38 @@ def test_an_hour_alone_is_what_it_is_among_others() -> None:
         np.testing.assert_allclose(found, whole[some], rtol=1e-4, atol=1e-3 * whole.mean())
     optics, sky = light.optics([0]), np.random.default_rng(0).random((2 * K, 3))
     exchange = light.matrices.outdoor_exchange.values
-    shares = shares_before_windows(light.matrices, light.matrices.sensors.values, optics)
+    shares = reflected_shares(light.matrices, optics).before
     expected = by_way_of_outdoors(exchange, optics, shares) @ sky
     assert expected.min() > 0
     returned = returned_from_outdoors(exchange, optics, sky)
     np.testing.assert_allclose(shares @ returned, expected, rtol=1e-9)
+
+
+def test_the_reflection_in_windows_is_computed_once_for_a_state(monkeypatch) -> None:
+    """For the hours, their error, the daylight factor and the eye, of all sensors or of one."""
+    from mitsuba_cfs.methods import coefficients
+    from mitsuba_cfs.methods.light import (
+        daylight_coefficients,
+        eye_illuminance,
+        illuminance_with_error,
+    )
+    from mitsuba_cfs.methods.scene import Sampling
+
+    few = Sampling(sensor_samples=256, patch_samples=256, subdivision=1, window_parts=2)
+    light = phase_light(phase_matrices(between_fins(), few), [[mirroring(0.4, 0.1)]], hours(1))
+    calls, reflection = [], coefficients.sensor_reflection
+
+    def counted(*inputs):
+        calls.append(inputs)
+        return reflection(*inputs)
+
+    monkeypatch.setattr(coefficients, "sensor_reflection", counted)
+    lit, _ = illuminance_with_error(light)
+    daylight_coefficients(light)
+    eye = eye_illuminance(light)
+    assert len(calls) == 1
+    whole = illuminance_of_all(light, None)
+    np.testing.assert_allclose(whole, np.concatenate([lit, eye[None]]), rtol=1e-5)
 
 
 def test_each_hour_has_the_reflection_of_its_own_state() -> None:

@@ -108,6 +108,11 @@ class Stopping:
             if getattr(self, name) is not None:
                 check_number(name, getattr(self, name), 0.0)
 
+    def ahead(self, count: int) -> int:
+        """How many more batches are certain to follow the first `count`, the next included."""
+        known = self.target_error is None and self.time_limit is None
+        return max(min(self.batches, self.max_batches) - count, 1) if known else 1
+
 
 def joined(estimates: Sequence[Estimate]) -> Estimate:
     """One estimate from several, stacked along the first axis."""

@@ -140,31 +140,57 @@ def sums_of(sums: mi.Float64, shape: Sequence[int]) -> NDArray[np.float64]:
 
 
 class DiscreteDistribution:
-    """Discrete sampling by weights; unlike `mi.DiscreteDistribution`, its kernels know no count."""
+    """Discrete sampling by weights; unlike `mi.DiscreteDistribution`, its kernels know no count.
+
+    Weights may be those of several groups, of which each lane samples one.
+    """
 
     STEPS = 4  # of the search: kernels differ by so many halvings of the table
 
-    def __init__(self, weights: NDArray[np.float64]) -> None:
-        """From weights [n], not all zero."""
+    def __init__(
+        self, weights: NDArray[np.float64], group: NDArray[np.integer] | None = None
+    ) -> None:
+        """From weights [n], not all zero in any group, and their groups [n], rising from 0."""
         weights = np.asarray(weights, dtype=np.float32)
-        climbed = np.cumsum(weights, dtype=float)
+        group = np.zeros(len(weights), dtype=np.int64) if group is None else np.asarray(group, int)
+        starts = np.flatnonzero(np.diff(group, prepend=-1))
+        climbed = np.concatenate(
+            [np.cumsum(part, dtype=float) for part in np.split(weights, starts[1:])]
+        )
         some = np.flatnonzero(weights > 0)
-        self._first, self._last = (opaque(end, mi.UInt32) for end in (some[0], some[-1]))
+        if len(np.unique(group[some])) < len(starts):
+            raise ValueError("weights: expected one above 0 in each group")
+        first = some[np.searchsorted(group[some], np.arange(len(starts)))]
+        last = some[np.searchsorted(group[some], np.arange(len(starts)), side="right") - 1]
+        total = climbed[np.append(starts[1:], len(weights)) - 1].astype(np.float32)
         self._weight, self._climbed = mi.Float(weights), mi.Float(climbed.astype(np.float32))
-        self._sum = opaque(climbed[-1])
-        self._norm = opaque(np.float32(1) / np.float32(climbed[-1]))
-        self._steps = -(-int(some[-1] - some[0] + 1).bit_length() // self.STEPS) * self.STEPS
+        ends = (first, last, starts)
+        self._first, self._last, self._start = (column(table, mi.UInt32) for table in ends)
+        self._sum, self._norm = column(total), column(np.float32(1) / total)
+        most = int((last - first).max()) + 1
+        self._steps = -(-most.bit_length() // self.STEPS) * self.STEPS
 
-    def sample_reuse(self, u: mi.Float, active: mi.Bool = True) -> tuple[mi.UInt32, mi.Float]:
-        """The sampled number for u in [0, 1), and u rescaled to [0, 1) within its share."""
-        mark, low, high = u * self._sum, mi.UInt32(self._first), mi.UInt32(self._last)
+    def sample_reuse(
+        self, u: mi.Float, active: mi.Bool = True, group: mi.UInt32 | None = None
+    ) -> tuple[mi.UInt32, mi.Float]:
+        """The sampled number for u in [0, 1), and u rescaled to [0, 1) within its share.
+
+        Args: group: of each lane; all lanes sample the first group by default.
+        """
+
+        def of_group(table: Any) -> Any:
+            return table if group is None else dr.gather(type(table), table, group, active)
+
+        low, high, start = map(of_group, (self._first, self._last, self._start))
+        mark, norm = u * of_group(self._sum), of_group(self._norm)
+        low, high = mi.UInt32(low), mi.UInt32(high)
         for _ in range(self._steps):
             middle = (low + high) >> 1
             above = dr.gather(mi.Float, self._climbed, middle, active) < mark
             low = dr.select(above, dr.minimum(middle + 1, high), low)
             high = dr.select(above, high, middle)
-        share = dr.gather(mi.Float, self._weight, low, active) * self._norm
-        before = dr.gather(mi.Float, self._climbed, low - 1, active & (low > 0)) * self._norm
+        share = dr.gather(mi.Float, self._weight, low, active) * norm
+        before = dr.gather(mi.Float, self._climbed, low - 1, active & (low > start)) * norm
         return low, (u - before) / share
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import weakref
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
+from typing import Any, TypeVar
 
 import drjit as dr
 import mitsuba as mi
@@ -30,6 +31,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     vectors,
 )
 
+T = TypeVar("T")
 SCENES = 8  # kept: what one room is traced by, indoors and outdoors
 MESHES = 4  # kept: surroundings of a room, by season, and of its neighbours
 OPAQUE = -1  # window index of a triangle that is not glazed
@@ -72,7 +74,8 @@ class TracedScene:
         glazed = np.concatenate([np.empty((0, 3, 3)), *(w.triangles for _, w in windows)])
         glazed_group = np.concatenate([np.full(len(w.triangles), g) for g, w in windows] or [[]])
 
-        self.groups = tuple(groups)
+        self.surfaces, self.groups = surfaces, tuple(groups)
+        self._derived: dict[Callable[[TracedScene], Any], Any] = {}
         self._panes = windows_block and bool(windows)
         self.centre = _middle(groups) if centre is None else np.asarray(centre, float)
         self.surface_count = int(surfaces.surface.max()) + 1 if len(surfaces.surface) else 0
@@ -137,10 +140,14 @@ class TracedScene:
         frames = np.stack([g.frame for g in groups])  # [G, 3, 3]
         self._frame_rows = [vectors(frames[:, i]) for i in range(3)]
         self._axes = [tuple(map(opaque_vector, g.frame)) for g in groups]
-        self._group_first = np.searchsorted(window_group, np.arange(len(groups)))
-        self._group_choice = [
-            DiscreteDistribution(areas[window_group == g]) for g in range(len(groups))
-        ]
+        self._glazed_by_group = DiscreteDistribution(areas, window_group)
+
+    def derived(self, function: Callable[[TracedScene], T]) -> T:
+        """The result of a function of the scene alone, computed at the first call."""
+        if function not in self._derived:
+            self._derived[function] = function(self)
+        result: T = self._derived[function]
+        return result
 
     def sample_window(self, u: mi.Point2f, active: mi.Bool) -> tuple[mi.Point3f, mi.Int32]:
         """A point uniform over the area of all windows, and its group."""
@@ -149,11 +156,11 @@ class TracedScene:
             mi.Int32, self._glazed_group, triangle, active
         )
 
-    def sample_group(self, group: int, u: mi.Point2f) -> mi.Point3f:
-        """A point uniform over the area of one group's windows."""
-        triangle, reused = self._group_choice[group].sample_reuse(u.x)
-        first = dr.opaque(mi.UInt32, int(self._group_first[group]))
-        return self._point(triangle + first, mi.Point2f(reused, u.y), mi.Bool(True))
+    def sample_group(self, group: int | mi.UInt32, u: mi.Point2f) -> mi.Point3f:
+        """A point uniform over the area of one group's windows, or of each lane's group."""
+        group = opaque(group, mi.UInt32) if isinstance(group, int) else group
+        triangle, reused = self._glazed_by_group.sample_reuse(u.x, mi.Bool(True), group)
+        return self._point(triangle, mi.Point2f(reused, u.y), mi.Bool(True))
 
     def window_triangle(
         self, triangle: mi.UInt32, origin: mi.Point3f
@@ -294,9 +301,11 @@ class TracedScene:
         x, y, z = self._axes[group]
         return mi.Vector3f(dr.dot(x, v), dr.dot(y, v), dr.dot(z, v))
 
-    def exterior_normal(self, group: int) -> mi.Vector3f:
-        """World direction outdoors of one window group."""
-        return self._axes[group][2]
+    def exterior_normal(self, group: int | mi.UInt32) -> mi.Vector3f:
+        """World direction outdoors of one window group, or of each lane's group."""
+        if isinstance(group, int):
+            return self._axes[group][2]
+        return dr.gather(mi.Vector3f, self._frame_rows[2], group)
 
     def place(self, point: ArrayLike) -> mi.Point3f:
         """A point of the world [m] in the scene's coordinates."""

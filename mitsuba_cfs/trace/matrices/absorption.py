@@ -96,12 +96,12 @@ def absorption_matrix(
         position = mi.Point3f(paths.position - normal * tracer.epsilon)
         depth = dr.opaque(mi.UInt32, max_depth)
         starts = PathStarts(
-            paths.patch, position, -paths.outward, paths.generator, depth, mi.Bool(True)
+            paths.row, position, -paths.outward, paths.generator, depth, mi.Bool(True)
         )
         _absorption_kernel(tracer, matrix, starts)
 
     return accumulate(
-        window_batches(tracer, bins, width, n, seed, follow),
+        window_batches(tracer, bins, width, n, seed, follow, stopping=stopping or Stopping()),
         stopping=stopping,
         label="absorption matrix",
         progress=progress,

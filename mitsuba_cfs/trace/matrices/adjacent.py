@@ -69,7 +69,6 @@ def adjacent_daylight(
     flat = luminance.reshape(-1, luminance.shape[-1])
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
-        path = dr.arange(mi.UInt32, dr.width(paths.patch))
         add_seen_and_reflected(
             tracer,
             bins,
@@ -77,10 +76,10 @@ def adjacent_daylight(
             mi.Point3f(paths.position + starts.exterior_normal(paths.group) * tracer.epsilon),
             paths.outward,
             mi.Bool(True),
-            row=paths.patch,
+            row=paths.row,
             beta=mi.Float(1),
             stream=paths.stream,
-            sample=path - paths.patch * dr.opaque(mi.UInt32, n),
+            sample=paths.sample,
             generator=paths.generator,
             max_depth=dr.opaque(mi.UInt32, max_depth),
         )

@@ -26,7 +26,6 @@ from mitsuba_cfs.trace.kernels.sampling import (
     batch_key,
     empty_sums,
     lattice_2d,
-    opaque,
     path_generator,
     sums_of,
     vectors,
@@ -156,15 +155,13 @@ def daylight_matrix(
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
         depth = dr.opaque(mi.UInt32, max_depth)
-        clear = tracer.outward(opaque(paths.group, mi.Int32), mi.Bool(True)) if something else 0.0
+        clear = tracer.exterior_normal(paths.group) * tracer.epsilon if something else 0.0
         place = mi.Point3f(paths.position + clear)
-        starts = PathStarts(
-            paths.patch, place, paths.outward, paths.generator, depth, mi.Bool(True)
-        )
+        starts = PathStarts(paths.row, place, paths.outward, paths.generator, depth, mi.Bool(True))
         add_daylight_paths(tracer, sky, matrix, starts)
 
     return accumulate(
-        window_batches(tracer, bins, sky.size, n, seed, follow),
+        window_batches(tracer, bins, sky.size, n, seed, follow, stopping=stopping or Stopping()),
         stopping=stopping,
         label="daylight matrix",
         progress=progress,

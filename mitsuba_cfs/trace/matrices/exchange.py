@@ -48,7 +48,6 @@ def window_exchange(
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
         normal = tracer.exterior_normal(paths.group)
-        path = dr.arange(mi.UInt32, dr.width(paths.patch))
         add_seen_and_reflected(
             tracer,
             bins,
@@ -56,16 +55,16 @@ def window_exchange(
             mi.Point3f(paths.position - normal * tracer.epsilon),
             paths.inward(tracer),
             mi.Bool(True),
-            row=paths.patch,
+            row=paths.row,
             beta=mi.Float(1),
             stream=paths.stream,
-            sample=path - paths.patch * dr.opaque(mi.UInt32, n),
+            sample=paths.sample,
             generator=paths.generator,
             max_depth=dr.opaque(mi.UInt32, max_depth),
         )
 
     return accumulate(
-        window_batches(tracer, bins, columns, n, seed, follow),
+        window_batches(tracer, bins, columns, n, seed, follow, stopping=stopping or Stopping()),
         stopping=stopping,
         label="window exchange",
         entry=cache_entry(

@@ -128,7 +128,7 @@ def view_matrices(
     if sunlit is None and options.get("max_depth", 2) > 1:
         seed = options.get("seed", 0)
         paths = {"samples": options.get("samples", 32), "seed": seed}
-        found, close = picture_sunlit_shares(tracer, surfaces, view, shared, times, **paths)
+        found, close = picture_sunlit_shares(tracer, view, shared, times, **paths)
     mean, noise, smooth = _smooth(sums, shared, share, 0.5 / options.get("samples", 32), close)
     if found is not None:
         sunlit = SunlitRows(*(found.of_rows(a, smooth) for a in (mean, noise)), close)

@@ -31,9 +31,9 @@ from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, streams, tabl
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 
-SAMPLES = 128  # of each tile, each with a ray to a point of the windows and one by the cosine
+SAMPLES = 128  # of each tile by default, with a ray to a point of the windows and one by the cosine
 PATHS = 2**22  # of a view at most, but one of each pixel
-FEW, MORE = 16, 8  # rays to the sky below which a row has more of them; times as many
+FEW, MORE = 1 / 8, 8  # share of rays to the sky below which a row has more of them; times as many
 RAYS = 2**19  # at once
 LEAST_SHARE = 0.02  # of a window patch that surfaces fill, below which few paths know their light
 
@@ -79,6 +79,7 @@ def beam_light(
     subdivision: int = 4,
     basis: KlemsBasis = KLEMS_FULL,
     tile: int | None = None,
+    samples: int = SAMPLES,
     seed: int = 0,
     scenes: SceneCache | None = None,
 ) -> BeamLight:
@@ -89,25 +90,28 @@ def beam_light(
         transmittance: [G, K] of the beams in the matrices T; 0 for groups left out.
         subdivision: Reinhart's MF of the sky.
         tile: as of `view_matrices`.
+        samples: rays of each tile; of all pixels at most `PATHS`.
     """
     scenes = SceneCache() if scenes is None else scenes
     inside, outside = scenes.scene(interior, groups), scenes.scene(exterior, groups)
     tile = tile_size(view) if tile is None else tile
     rows = PictureRows.of_view(inside, view, tile)
-    samples = int(np.clip(PATHS // max(len(rows.pixels), 1), 1, -(-SAMPLES // tile**2)))
+    of_pixel = int(np.clip(PATHS // max(len(rows.pixels), 1), 1, -(-samples // tile**2)))
     bins = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     shape = 2 * len(rows.keys), bins[1].size + len(groups) * basis.size
-    look = _Look(inside, outside, scattering, bins, view, samples)
+    look = _Look(inside, outside, scattering, bins, view, of_pixel)
     found, seen, carrying = look.rows(rows, np.arange(len(rows.pixels)), shape, seed)
     # a slit of sky beside or below obstructions may carry most of a row's light, and a
     # sliver of a face has the rays of one pixel
     lit = np.diff(found.indptr).reshape(-1, 2).any(axis=1)
-    sliver = np.bincount(rows.row, minlength=len(rows.keys)) * samples < SAMPLES / 2
-    few = np.repeat(lit & ((carrying < FEW) | sliver), 2)
+    # each half by the rays of the other: chosen by its own, it would keep those that met more light
+    carrying = 2 * carrying.reshape(-1, 2)[:, ::-1]
+    sliver = np.bincount(rows.row, minlength=len(rows.keys)) * of_pixel < samples / 2
+    few = (lit[:, None] & ((carrying < FEW * samples) | sliver[:, None])).ravel()
     again = np.flatnonzero(few[rows.half])
-    look = _Look(inside, outside, scattering, bins, view, MORE * samples)
+    look = _Look(inside, outside, scattering, bins, view, MORE * of_pixel)
     more, seen[again], _ = look.rows(rows, again, shape, seed)
-    found, least = sparse.diags_array((~few).astype(np.float32)) @ found + more, 0.5 / samples
+    found, least = sparse.diags_array((~few).astype(np.float32)) @ found + more, 0.5 / of_pixel
     # rays enough and no smoothing: beside a window and below an overhang's edge a tile may have
     # half the light of the next
     mean, noise = (sparse.csr_array(a @ found) for a in rows.of_halves(seen, least))
@@ -140,11 +144,11 @@ class _Look:
     ) -> tuple[sparse.csr_array, NDArray[np.float32], NDArray[np.float64]]:
         """Sums of some pixels over the halves of rows, and the pixels' share without windows [n].
 
-        And the effective number of rays of sky light in each row [m].
+        And the effective number of rays of sky light in each half [2 m].
         """
         half, number = rows.half, rows.number
         found, share = sparse.csr_array(shape, dtype=np.float32), [np.empty(0, np.float32)]
-        sums = np.zeros((2, shape[0] // 2))
+        sums = np.zeros((2, shape[0]))
         block = max(1, RAYS // self._samples)
         for start in range(0, len(chosen), block):
             part = chosen[start : start + block]
@@ -153,7 +157,7 @@ class _Look:
             share.append(opaque)
             sky = (place[1] > 0) & (place[1] < self._sky.size)  # 0: the ground
             for power, total in enumerate(sums, start=1):
-                total += np.bincount(place[0][sky] // 2, value[sky] ** power, len(total))
+                total += np.bincount(place[0][sky], value[sky] ** power, len(total))
         equal = sums[0] ** 2 / np.maximum(sums[1], 1e-300)
         return found, np.concatenate(share), equal
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import partial
 
@@ -70,25 +71,18 @@ class PictureSun:
         view: View,
         *,
         basis: KlemsBasis = KLEMS_FULL,
-        way: SpecularPath | None = None,
         scenes: SceneCache | None = None,
     ) -> None:
-        """Trace the first hit of each pixel; arguments as for `direct_sun_matrix`.
-
-        Args: way: specular path to the sun; by default the direct one and all mirrors outdoors.
-        """
+        """Trace the first hit of each pixel; arguments as for `direct_sun_matrix`."""
         scenes = SceneCache() if scenes is None else scenes
         if len(scattering) != len(groups):
             raise ValueError(f"{len(scattering)} systems for {len(groups)} window groups")
         self._inside = scenes.scene(interior, groups)
         self._outside = scenes.scene(exterior, groups, windows_block=False)
-        self._way = SpecularPath(self._outside) if way is None else way
+        self._way, *mirrors = specular_sun_paths(self._outside)
         self._free = self._way.free
-        around = interior, exterior, groups, scattering, view
-        mirrors = specular_sun_paths(self._outside)[1:] if way is None else []
-        self._mirrors = [
-            PictureSun(*around, basis=basis, way=mirror, scenes=scenes) for mirror in mirrors
-        ]
+        self._mirrors: list[PictureSun] = []
+        self._last: tuple[RoomCells, bytes, sparse.csr_array] | None = None
         self._scattering, self._bins = tuple(scattering), DirectionBins(basis)
         self.view = view
         directions, counts = pixel_directions(view)
@@ -99,6 +93,13 @@ class PictureSun:
         self._size = float(np.sqrt(pixel_solid_angles(view).max()))  # of a pixel [rad]
         self._eye = self._inside.place(view.position)
         self._look()
+        self._mirrors = [self._in_mirror(path) for path in mirrors]
+
+    def _in_mirror(self, path: SpecularPath) -> PictureSun:
+        """The same pixels for the sun by another specular path."""
+        other = copy(self)
+        other._way, other._free = path, path.free
+        return other
 
     def _look(self) -> None:
         """Trace the centre of every pixel: its window group, point, normal and reflectance."""
@@ -159,7 +160,18 @@ class PictureSun:
         return found
 
     def _on_cells(self, cells: RoomCells, suns: NDArray, illuminance: NDArray) -> sparse.csr_array:
-        """Irradiance of the room's cells by the windows' straight beams [c, h] [lx]."""
+        """Irradiance of the room's cells by the windows' straight beams [c, h] [lx].
+
+        That of the last hours is stored: a picture, its noise and the windows ask for it in turn.
+        """
+        hours = suns.tobytes() + illuminance.tobytes()
+        if self._last is None or self._last[0] is not cells or self._last[1] != hours:
+            self._last = cells, hours, self._traced_on_cells(cells, suns, illuminance)
+        return self._last[2]
+
+    def _traced_on_cells(
+        self, cells: RoomCells, suns: NDArray, illuminance: NDArray
+    ) -> sparse.csr_array:
         groups, scenes = self._inside.groups, (self._inside, self._outside)
         whole, flux = sum(group.area for group in groups), sparse.csr_array((cells.size, len(suns)))
         for g, (group, scattering) in enumerate(zip(groups, self._scattering, strict=True)):

@@ -107,22 +107,18 @@ def window_shares(
 
     Args: samples: paths of each patch; places: largest number of points that represent the hits.
     """
-    bins, starts = DirectionBins(KLEMS_FULL), []
-    K, count = bins.size, len(outside.groups) * bins.size
-    for q in range(len(outside.groups)):
-        path = dr.arange(mi.UInt32, K * samples)
-        patch = path // dr.opaque(mi.UInt32, samples)
-        sample = path - patch * dr.opaque(mi.UInt32, samples)
-        key = batch_key(seed, q)
-        stream = mi.sample_tea_32(patch, key)[0]
-        way = outside.to_world(q, bins.sample(patch, lattice_2d(sample, stream, 0)))
-        position = outside.sample_group(q, lattice_2d(sample, stream, 2))
-        starts.append(tables(position, way))
-    # the paths of all parts at once: each bounce is a launch
-    position, way = (np.concatenate(part) for part in zip(*starts, strict=True))
-    row = column(np.repeat(np.arange(count), samples), mi.UInt32)
+    bins = DirectionBins(KLEMS_FULL)
+    count = len(outside.groups) * bins.size
+    lane = dr.arange(mi.UInt32, count * samples)
+    row = lane // dr.opaque(mi.UInt32, samples)
+    sample = lane - row * dr.opaque(mi.UInt32, samples)
+    group = row // bins.size
+    patch = row - group * bins.size
+    stream = mi.sample_tea_32(patch, batch_key(seed, 0) + group)[0]
+    way = outside.to_world_any(group, bins.sample(patch, lattice_2d(sample, stream, 0)))
+    position = outside.sample_group(group, lattice_2d(sample, stream, 2))
     weight = opaque(1.0 / samples) + dr.zeros(mi.Float, count * samples)
-    met = _met(outside, row, weight, vectors(position, mi.Point3f), vectors(way), seed)
+    met = _met(outside, row, weight, position, way, seed)
     return SunShares.of([met], count, seed, most=places)
 
 

@@ -120,8 +120,13 @@ class CellPoints:
     count: NDArray[np.int64]  # [c]
 
 
-def surface_cells(inside: TracedScene, interior: Surfaces) -> CellPoints:
+def surface_cells(inside: TracedScene) -> CellPoints:
     """The cells of a room's surfaces, with points on each."""
+    return inside.derived(_surface_cells)
+
+
+def _surface_cells(inside: TracedScene) -> CellPoints:
+    interior = inside.surfaces
     none, area = np.empty(0, dtype=np.int64), float(interior.areas.sum())
     if not area > 0:
         cells = RoomCells(1.0, np.zeros(3), 0, none, np.empty(0))

@@ -299,7 +299,6 @@ class _Look:
 
 def picture_sunlit_shares(
     tracer: TracedScene,
-    interior: Surfaces,
     view: View,
     rows: PictureRows,
     times: NDArray[np.int64],
@@ -313,13 +312,12 @@ def picture_sunlit_shares(
     the sum of its pixels.  And the rows [m] that show a surface close to another.
 
     Args:
-        interior: the room's surfaces.
         rows: of the picture's pixels; times: [n] repetitions of each pixel.
         samples: paths of a pixel for the rest of the picture.
     """
     every, tile, share = np.arange(len(rows.pixels)), rows.tiles.size, min(samples / SAMPLES, 1.0)
     samples = int(np.clip(PATHS * share // max(int(times.sum()), 1), 1, MOST_PATHS))
-    cells, edge = _far_cells(tracer, interior), _widest(interior)
+    cells, edge = _far_cells(tracer), _widest(tracer.surfaces)
     look = _Look(tracer, cells, view, tile, edge, seed)
     shape = 2 * len(rows.keys), cells.size
     far, close = sparse.csr_array(shape, dtype=np.float32), np.zeros(len(rows.keys), dtype=bool)
@@ -334,16 +332,14 @@ def picture_sunlit_shares(
     return _with_pieces(cells, far, near, edge, seed), close
 
 
-def window_sunlit_shares(
-    tracer: TracedScene, interior: Surfaces, *, samples: int, seed: int = 0
-) -> SunlitShares:
+def window_sunlit_shares(tracer: TracedScene, *, samples: int, seed: int = 0) -> SunlitShares:
     """Share of the sunlit surfaces in the light on the windows; rows [G * K]: incident radiance.
 
     The mean over a group and over an incident patch of its back.
 
-    Args: interior: the room's surfaces; samples: paths of each patch.
+    Args: samples: paths of each patch.
     """
-    bins, cells = DirectionBins(KLEMS_FULL), _far_cells(tracer, interior)
+    bins, cells = DirectionBins(KLEMS_FULL), _far_cells(tracer)
     shape = len(tracer.groups) * bins.size, cells.size
     found = [sparse.csr_array(shape, dtype=np.float32)]
 
@@ -352,11 +348,11 @@ def window_sunlit_shares(
         start = mi.Point3f(paths.position - tracer.exterior_normal(paths.group) * tracer.epsilon)
         hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(start, inward), coherent=False)
         met = hit.is_valid()
-        rho, of = tracer.whole(hit.prim_index, inward, met), paths.patch + paths.group * bins.size
+        rho, of = tracer.whole(hit.prim_index, inward, met), paths.group * bins.size + paths.patch
         places, met, rho, of = hit_points(tracer, start, inward, hit, met, met, rho, of)
         kept = np.flatnonzero(met & (rho > 0))
         value, row, first = rho[kept] / (np.pi * samples), of[kept].astype(int), places.some(kept)
-        later = reflecting_points(tracer, first, seed * 1_000_003 + paths.group)
+        later = reflecting_points(tracer, first, seed * 1_000_003 + len(found) - 1)
         rows = np.concatenate([row, row[later.path]])
         weight = np.concatenate([value, value[later.path] * later.weight])
         both = SurfacePoints.joined([first, later.places])
@@ -366,9 +362,13 @@ def window_sunlit_shares(
     return _with_pieces(cells, sum(found[1:], found[0]), _Hits.joined([]), 1.0, seed)
 
 
-def _far_cells(tracer: TracedScene, interior: Surfaces) -> RoomCells:
+def _far_cells(tracer: TracedScene) -> RoomCells:
     """The room's cells, joined: far away the wider ones are as sharp, with less noise."""
-    return surface_cells(tracer, interior).cells.joined()[0]
+    return tracer.derived(_joined_cells)
+
+
+def _joined_cells(tracer: TracedScene) -> RoomCells:
+    return surface_cells(tracer).cells.joined()[0]
 
 
 def _cell_shares(

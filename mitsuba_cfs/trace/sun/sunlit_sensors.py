@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.sampling import (
     column,
     lattice_2d,
@@ -55,14 +54,14 @@ class ReflectingCells:
 
 
 def room_cells(
-    inside: TracedScene, interior: Surfaces, *, samples: int = CELL_RAYS * CELL_SHARE
+    inside: TracedScene, *, samples: int = CELL_RAYS * CELL_SHARE
 ) -> tuple[RoomCells, ReflectingCells]:
     """The cells of a room's surfaces, and the wider ones that these lie in.
 
     Args: samples: rays of each sensor; with few of them cells have fewer, their noise far below.
     """
     rays = min(max(samples // CELL_SHARE, CELL_LEAST), CELL_RAYS)
-    points = surface_cells(inside, interior)
+    points = surface_cells(inside)
     narrow, first, count = points.cells, points.first, points.count
     # the wider cells have the points of one narrower cell after the other
     wide, holder = narrow.joined()
