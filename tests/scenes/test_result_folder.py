@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import check_file, remove_stale, replacing, write_text
+from mitsuba_cfs.files import TEMPORARY, check_file, remove_stale, replacing, write_text
 from scenes.result_folder import MARK, FolderMark, ResultFolder
 from tests.conftest import REPOSITORY
 
@@ -187,6 +187,14 @@ def test_a_file_is_the_old_one_until_the_new_one_is_whole(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"] and path.read_text() == "old"
     write_text(path, "new")
     assert path.read_text() == "new" and path.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_temporary_file_has_a_name_that_the_next_run_removes(tmp_path):
+    with replacing(tmp_path / "a.csv") as part:
+        assert TEMPORARY.fullmatch(part.name) and part.suffix == ".csv"
+    with pytest.raises(DataError, match="is odd"), replacing(tmp_path / "a.csv") as part:
+        part.unlink()  # a writer that clears away before it gives up
+        raise DataError("is odd", file=part)
 
 
 def test_a_device_is_written_to_as_it_is():

@@ -13,8 +13,10 @@ from thermal.blackbox import Fenestration
 from thermal.climate import no_sun
 from thermal.convection import local_wind_factor
 from thermal.emitters import HeatedSlab, IdealLoads
+from thermal.errors import ThermalInputError
 from thermal.records import AIR_HEAT
 from thermal.ventilation import (
+    BLAST,
     DOE2,
     AirTransfer,
     Leakage,
@@ -231,6 +233,37 @@ def test_windows_that_are_open_while_heated_only_where_asked():
     fought = aired_week(600.0, close_below_c=15.0, heating_while_open=True)
     assert fought.heating.sum() > 2.0 * shut.heating.sum()
     assert fought.heating.max() > 1000.0
+
+
+def test_coefficients_of_leaks_are_those_published():
+    """EnergyPlus' Input Output Reference; a leakage area at 20 K and 4 m/s, by hand."""
+    assert DOE2 == (0.0, 0.0, 0.224, 0.0) and BLAST == (0.606, 0.03636, 0.1177, 0.0)
+    assert Leakage() == Leakage((1.0, 0.0, 0.0, 0.0), 0.0, 0.5, 0.0, 1.0)
+    leak = sherman_grimsrud(500.0, stack=0.000145, wind=0.000319)
+    flow = np.hypot(leak.stack * 20.0**leak.stack_exponent, leak.wind * 4.0**leak.wind_exponent)
+    assert flow == pytest.approx(0.5 * np.sqrt(0.000145 * 20 + 0.000319 * 16))
+    sealed = aim2(0.01, 0.67, stack=0.054, wind=0.156, shelter=0.5)
+    flow = np.hypot(sealed.stack * 20.0**0.67, sealed.wind * 4.0**1.34)
+    assert flow == pytest.approx(np.hypot(0.00054 * 20**0.67, 0.00156 * 2.0**1.34))
+
+
+def test_cross_flow_is_between_facades():
+    """EN 16798-7: A_cros of 2 and 3 m2 opposite each other; none between windows 45 degrees apart,
+    which one way of dividing the facades takes for one."""
+    wind, stack = cross_flow([2.0, 3.0], [0.0, 180.0], 1.5)
+    assert wind == pytest.approx((0.67 * 0.5 / np.sqrt(1 / 4 + 1 / 9)) ** 2 * 0.75)
+    assert stack == pytest.approx(0.25 * 25.0 * 0.0035 * 1.5)
+    assert cross_flow([2.0, 3.0], [0.0, 315.0], 1.5) == (0.0, pytest.approx(stack))
+    assert cross_flow([2.0, 3.0], [10.0, 280.0], 1.5)[0] == pytest.approx(wind)
+
+
+def test_air_that_cannot_be_is_refused():
+    assert SupplyAir(1.0).recovery == 0.0
+    for wind, flow in ((-1.0, 1.0), (1.0, -1.0)):
+        with pytest.raises(ThermalInputError, match="negative flow"):
+            WindowAiring(wind, flow)
+        with pytest.raises(ThermalInputError, match="negative"):
+            Leakage(stack=flow, wind=wind)
 
 
 def test_one_way_air_from_room_to_room():
