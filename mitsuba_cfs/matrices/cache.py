@@ -62,9 +62,6 @@ class RecentResults:
         return result
 
 
-T = TypeVar("T")
-
-
 @dataclass(frozen=True, slots=True)
 class BatchMean:
     """The running mean of batches: enough to go on with the next one."""
