@@ -354,6 +354,6 @@ def summary(result: Compliance) -> tuple[tuple[str, str], ...]:
         ),
         (gettext("Rules"), semicolons([rule.edition for rule in result.rules.values()])),
     ]
-    if median is not None:
+    if median is not None and any("open" in rule.parts for rule in result.rules.values()):
         rows.append((gettext("Median diffuse illuminance"), f"{rounded(median, 0)} lx"))
     return tuple(rows)

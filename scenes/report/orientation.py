@@ -94,7 +94,7 @@ def _words(building: Building, angle: float | None) -> str:
         return north
     codes = {issue.code for issue in building.issues}
     source = next((text for code, text in SOURCES.items() if code in codes), N_("by TrueNorth"))
-    side = gettext("{angle}° east of north") if angle >= 0 else gettext("{angle}° west of north")
+    side = gettext("{angle}° east of north") if angle > -0.05 else gettext("{angle}° west of north")
     axis = gettext(
         "The model's +y axis points {direction} ({source}). If the building does not lie so, set "
         "north in the corrections file.",

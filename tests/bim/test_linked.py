@@ -239,7 +239,13 @@ def test_folders_and_zips_hold_several_files(tmp_path, file, whole) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["Duplex_A_20110907.ifc", "AC20-FZK-Haus.ifc"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "Duplex_A_20110907.ifc", "AC20-FZK-Haus.ifc", "SampleHouse4_Revit_IFC4.ifc",
+        "ExampleHOM.ifc",
+    ],
+)  # fmt: skip
 def test_a_real_building_cut_in_three_is_the_whole(tmp_path, real_data, name) -> None:
     path = real_data / "ifc/buildings" / name
     assert figures(read(write_parts(path, tmp_path))) == figures(read_ifc(path))

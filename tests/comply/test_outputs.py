@@ -21,7 +21,15 @@ from scenes.comply.files import ComplyFiles, least_altitude, read_files
 from scenes.comply.findings import SeatGlare
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outputs import write_compliance, write_into_ifc
-from scenes.comply.page import dossier_html, glare_words, plans, shortened, sun_bars, tied
+from scenes.comply.page import (
+    dossier_html,
+    glare_words,
+    plans,
+    shortened,
+    summary,
+    sun_bars,
+    tied,
+)
 from scenes.comply.results import GridSummary, RoomLights
 from scenes.comply.rules import read_rule
 from scenes.comply.tables import beside_limit, shown
@@ -98,6 +106,12 @@ def verdicts(result):
         room.space.name: {v.criterion.key: v.reached for v in room.verdicts}
         for room in result.rooms
     }
+
+
+def test_the_masthead_has_the_median_of_daylight_where_a_rule_judges_daylight(result):
+    assert "Median diffuse illuminance" not in dict(summary(result))
+    daylight = replace(result, rules={"en17037": read_rule("en17037")})
+    assert dict(summary(daylight))["Median diffuse illuminance"].endswith(" lx")
 
 
 def test_rooms_are_checked(result):
