@@ -17,8 +17,7 @@ from bim.account import NOT_USABLE
 from bim.model import Building, Space
 from bim.report.issue import Audience, Issue, issue_note
 from bim.report.ranking import Ranked, ranked
-from mitsuba_cfs.bsdf.evaluate import UNRESOLVED
-from mitsuba_cfs.bsdf.klems_peak import HIDDEN, SPECULAR, SPILL, peak_spill, through_peak
+from mitsuba_cfs.bsdf.evaluate import HIDDEN, SPECULAR, SPILL, UNRESOLVED, peak_spill, through_peak
 from mitsuba_cfs.glare.sun_disc import spread_sun_dgp
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.weather import Weather
