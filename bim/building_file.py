@@ -1,11 +1,13 @@
 """A building from a file of any format that is read: its name's ending tells which.
 
 One entry of `FORMATS` is all that a new format adds here; what fills the windows of a building
-that is no IFC lies in its `Window.states`.
+that is no IFC is in its `Window.states`.  Rooms are chosen by name; a missing one, or one without
+windows, has its reason.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -14,9 +16,65 @@ from pathlib import Path
 from bim.fenestration import ShadingState
 from bim.ifc.corrections import corrections_beside, corrections_file
 from bim.ifc.head import check_head
-from bim.model import Building, Window
-from bim.outdoor_model import selected
+from bim.model import Building, Element, Space, Window
+from bim.names import AmbiguousName, UnknownName, listed
+from bim.report.issue import Issue, issue_text
 from mitsuba_cfs.errors import DataError
+
+# Properties of an element that a selector names, by its keys
+KEYS = {
+    "name": "name", "material": "material", "layer": "layer", "storey": "storey",
+    "location": "storey", "class": "ifc_class",
+}  # fmt: skip
+FACET = re.compile(r'\s*(\w+)\s*(!?=)\s*("[^"]*"|/[^/]*/|[^,+]+)')
+
+
+def selected(elements: Iterable[Element], selector: str, file: str | Path = "") -> frozenset[str]:
+    """GUIDs of the elements that a selector chooses.
+
+    A selector has facets with commas between them that all hold: a GUID, or `name=`, `material=`,
+    `layer=`, `storey=` or `class=` with a text or a regular expression (`name=/PV.*/`), `!=` for
+    the others; `+` joins groups.
+
+    Raises: `DataError` for a text that is no selector.
+    """
+    elements = list(elements)
+    guids = {element.guid for element in elements}
+    found: set[str] = set()
+    for group in re.split(r'\+(?=(?:[^"/]|"[^"]*"|/[^/]*/)*$)', selector):
+        rest = FACET.sub("", group).strip(" ,")
+        named = {text.strip() for text in rest.split(",") if text.strip()}
+        if not group.strip() or not named <= guids:
+            wrong = ", ".join(sorted(named - guids)) or "nothing"
+            message = f"expected a GUID, or {', '.join(KEYS)} with = and a value, got {wrong}"
+            raise DataError(message, file=file or None, field=selector)
+        facets = [_facet(*match.groups(), selector, file) for match in FACET.finditer(group)]
+        found |= {
+            element.guid
+            for element in elements
+            if (not named or element.guid in named) and all(holds(element) for holds in facets)
+        }
+    return frozenset(found)
+
+
+def _facet(
+    key: str, sign: str, value: str, selector: str, file: str | Path
+) -> Callable[[Element], bool]:
+    """Whether an element has a property."""
+    field, value = KEYS.get(key.lower()), value.strip()
+    if field is None:
+        message = f"expected one of {', '.join(KEYS)}, got {key!r}"
+        raise DataError(message, file=file or None, field=selector)
+    if value.startswith("/") and value.endswith("/"):
+        try:
+            pattern = re.compile(value[1:-1])
+        except re.error as error:
+            message = f"{value} is no regular expression: {error}"
+            raise DataError(message, file=file or None, field=selector) from None
+        return lambda element: bool(pattern.match(getattr(element, field))) == (sign == "=")
+    text = value.strip('"')
+    return lambda element: (getattr(element, field) == text) == (sign == "=")
+
 
 Progress = Callable[[str, float], None]
 STAGES = {"opening": 0.4, "geometry": 0.3, "rooms": 0.2, "surroundings": 0.1}  # shares of the time
@@ -42,7 +100,7 @@ class BuildingFormat:
     name: str
     suffixes: tuple[str, ...]
     check: Callable[[Path], None]  # what can be said at once, before anything heavy is loaded
-    read: Callable[[Path, ReadOptions, Progress], Building]
+    reader: Callable[[Path, ReadOptions, Progress], Building]
     has: tuple[str, ...] = ()  # fields of `ReadOptions` that it knows
 
 
@@ -65,7 +123,7 @@ def read_building_file(
     for field in FLAGS:
         if getattr(options, field) and field not in kind.has:
             raise DataError(f"not for {kind.name} files", file=path, field=f"--{FLAGS[field]}")
-    building = kind.read(path, options, progress or (lambda stage, fraction: None))
+    building = kind.reader(path, options, progress or (lambda stage, fraction: None))
     return surrounded(building, options.surroundings, options.surroundings_offset)
 
 
@@ -281,3 +339,95 @@ RADIANCE = BuildingFormat(
 HONEYBEE = BuildingFormat("honeybee", (".hbjson",), _check_honeybee, _read_honeybee, ("join",))
 GBXML = BuildingFormat("gbXML", (".gbxml", ".xml"), _check_gbxml, _read_gbxml, ("join",))
 FORMATS: tuple[BuildingFormat, ...] = (IFC, RADIANCE, HONEYBEE, GBXML)
+
+
+QUOTED = 3  # problems of the model that one message quotes
+
+
+def chosen_spaces(
+    building: Building,
+    names: Sequence[str],
+    path: Path,
+    lit: Callable[[Space], bool] = lambda space: bool(space.windows),
+) -> list[Space]:
+    """The spaces of those names or GUIDs, or every space with a window.
+
+    Args: lit: whether a space has one, or what counts as one.
+
+    Raises: `DataError` that quotes what the model's problems say about a room that is not there.
+    """
+    chosen = named_spaces(building, names, path)
+    if names:
+        zoned = {space.guid for name in names for space in building.zone(name)}
+        chosen = [space for space in chosen if lit(space) or space.guid not in zoned]
+        for space in chosen:
+            if not lit(space):
+                about = [p for p in _lost(building, "window") if _names(p, space.name)]
+                why = f": {_quoted(about)}" if about else ""
+                raise DataError(f"has no window{why}", file=path, element=f"space {space.label}")
+        return chosen
+    chosen = [space for space in chosen if lit(space)]
+    if not chosen:
+        raise no_window(building, path)
+    return chosen
+
+
+def no_window(building: Building, path: Path) -> DataError:
+    """That no space has a window, with what the model's problems say of it."""
+    why = _because(building, "window") or _because(building, "room")
+    what = f"no space has a window to the outside{why}"
+    return DataError(what, file=path, element="IfcWindow")
+
+
+def named_spaces(building: Building, names: Sequence[str], path: Path) -> list[Space]:
+    """The spaces of those names or GUIDs, or of zones, each once, or all; with windows or not."""
+    if not building.spaces:
+        raise DataError(f"has no rooms (IfcSpace){_because(building, 'room')}", file=path)
+    if not names:
+        return list(building.spaces)
+    chosen = (space for name in names for space in _spaces(building, name, path))
+    return list({space.guid: space for space in chosen}.values())
+
+
+def _spaces(building: Building, name: str, path: Path) -> Sequence[Space]:
+    """The space of a name, else those of the zone of that name."""
+    try:
+        return (building.space(name),)
+    except (UnknownName, AmbiguousName) as error:
+        zone = building.zone(name)
+        if zone and isinstance(error, UnknownName):
+            return zone
+        lost = [p for p in _lost(building, "room") if p.where == name or _names(p, name)]
+        if isinstance(error, UnknownName) and lost:
+            message = f"space {name!r} was left out: {_quoted(lost)}"
+        else:
+            message = str(error.args[0])
+            if building.zones:
+                message += f"; zones: {listed(name, (zone.name for zone in building.zones))}"
+        raise DataError(message, file=path, field="space") from error
+
+
+def _lost(building: Building, kind: str) -> list[Issue]:
+    """The problems for which a "room" or "window" is not there."""
+    return [issue for issue in building.issues if issue.effect.lost == kind]
+
+
+def _names(issue: Issue, name: str) -> bool:
+    """Whether an issue concerns rooms of that name, or with that name as whole words in theirs."""
+    rooms = issue.values.get("rooms", issue.values.get("room", ""))
+    text = " + ".join(map(str, rooms)) if isinstance(rooms, tuple) else str(rooms)
+    return re.search(rf"(?<!\w){re.escape(name)}(?!\w)", text, re.IGNORECASE) is not None
+
+
+def _because(building: Building, kind: str) -> str:
+    cut_off = [issue for issue in building.issues if issue.code == "file-cut-off"]
+    lost = [*cut_off, *_lost(building, kind)]
+    return f": {_quoted(lost)}" if lost else ""
+
+
+def _quoted(issues: Sequence[Issue]) -> str:
+    """The first problems in one line, and how many more there are."""
+    texts = [issue_text(issue, "command") for issue in issues[:QUOTED]]
+    shown = "; ".join(f"{text.what} ({text.effect})" for text in texts)
+    more = len(issues) - QUOTED
+    return f"{shown}; and {more} more, see cfs check" if more > 0 else shown

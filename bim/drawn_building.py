@@ -9,10 +9,9 @@ from pathlib import Path
 
 from bim.account import Account, StoreyAccount
 from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE
-from bim.mesh_simplification import simplified
 from bim.model import Building, Element, Space
 from bim.names import JOINT, AmbiguousName, UnknownName, item_named, label_of
-from bim.outdoors import shut_in_area, unblinded
+from bim.outdoors import shut_in_area, simplified, unblinded
 from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, space_of
 from bim.report.issue import Effect, Issue
 from bim.shell import open_edges

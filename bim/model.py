@@ -4,14 +4,15 @@ SI units; world x east, y north, z up, true north applied.  Face and window norm
 the room: from its air towards what lies beyond.  The faces of a space and its windows together are
 one closed surface round the room's air: the room and the recesses of its windows up to the glass.
 
-`Georeference` leads from map coordinates to the building's world.
+`Georeference` leads from map coordinates to the building's world; `seasons` are
+its surroundings by month, with and without leaves.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -400,3 +401,46 @@ def centroid(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Area-weighted centre [3] [m] of triangles [T, 3, 3]."""
     edges = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     return np.average(triangles.mean(axis=1), axis=0, weights=np.linalg.norm(edges, axis=1))
+
+
+MONTHS = range(1, 13)
+
+
+@dataclass(frozen=True, slots=True)
+class Season:
+    """Months in which the same stands outdoors."""
+
+    months: tuple[int, ...]  # 1 to 12
+    building: Building  # with the surroundings of these months
+
+
+def seasons(building: Building) -> tuple[Season, ...]:
+    """The seasons of a building, that with most leaves first; one where nothing changes."""
+    stands: dict[tuple[bool, ...], list[int]] = {}
+    for month in MONTHS:
+        kind = tuple(not e.months or month in e.months for e in building.elements)
+        stands.setdefault(kind, []).append(month)
+    if len(stands) == 1:
+        return (Season(tuple(MONTHS), building),)
+    found = [Season(tuple(months), in_month(building, months[0])) for months in stands.values()]
+    return tuple(sorted(found, key=lambda season: -_triangles(season.building)))
+
+
+def in_month(building: Building, month: int) -> Building:
+    """The building with the surroundings of a month, 1 to 12, as if they were there all year."""
+    if not any(element.months for element in building.elements):
+        return building
+    kept = (e for e in building.elements if not e.months or month in e.months)
+    return replace(building, elements=tuple(replace(e, months=()) for e in kept))
+
+
+def season_of(seasons: tuple[Season, ...], month: NDArray[np.integer]) -> NDArray[np.int64]:
+    """The number of the season [n] of each month [n]."""
+    of_month = np.zeros(13, dtype=np.int64)
+    for number, season in enumerate(seasons):
+        of_month[list(season.months)] = number
+    return of_month[np.asarray(month)]
+
+
+def _triangles(building: Building) -> int:
+    return sum(len(element.triangles) for element in building.elements)

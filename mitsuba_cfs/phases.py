@@ -90,7 +90,7 @@ def sun_beams(
 
     Args:
         beams: for each group the direct part of its T, T_b [K, K],
-            `mitsuba_cfs.bsdf.klems_peak.held_beams`.
+            `mitsuba_cfs.bsdf.evaluate.held_beams`.
         through_sun: [G, H] tau(sun), `mitsuba_cfs.trace.sun.direct.through_beams`.
         direct_daylight: D_d [G, K, P].
         sun: s_d [P, H], the sun alone on the sky's patches.

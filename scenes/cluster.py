@@ -17,12 +17,11 @@ from collections import Counter, deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
-from hashlib import file_digest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from mitsuba_cfs.errors import DataError, RoomError
-from mitsuba_cfs.files import reason
+from mitsuba_cfs.files import reason, sha256
 from mitsuba_cfs.source_code import code_version
 from scenes.user_errors import one_line
 
@@ -63,10 +62,9 @@ class Requirements:
         """
         if self.module and code_version(self.module) != self.version:
             return "has another version of the program or of its packages"
-        for path, sha256 in self.files:
+        for path, expected in self.files:
             try:
-                with open(path, "rb") as file:
-                    same = file_digest(file, "sha256").hexdigest() == sha256
+                same = sha256(Path(path)) == expected
             except OSError as error:
                 return f"cannot read {path}: {reason(error)}"
             if not same:

@@ -12,14 +12,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from bim.building_file import read_elements
+from bim.building_file import chosen_spaces, named_spaces, read_elements
 from bim.doorways import opened, source_rooms
 from bim.model import Building, Space
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import with_albedo
 from mitsuba_cfs.sky.weather import Weather
-from scenes.chosen_rooms import chosen_spaces, named_spaces
 from scenes.fenestration.resolver import fill_windows, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.head import Head, head_of

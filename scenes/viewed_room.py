@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from bim.model import COLOURS, Building, Space
-from bim.seasons import Season, in_month, seasons
+from bim.model import COLOURS, Building, Season, Space, in_month, seasons
 from bim.to_tracer import band_scenes
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import MatrixCache

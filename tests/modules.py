@@ -1,9 +1,17 @@
-"""The modules of the product as source: their files, their names, and what each of them imports."""
+"""The modules of the product as source: their files, their names, and what each of them imports.
+
+    python -m tests.modules
+
+prints the measures of docs/architecture.md: modules, lines, single importers, lines of imports and
+the longest chain of imports.
+"""
 
 from __future__ import annotations
 
 import ast
+from collections import defaultdict
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 REPOSITORY = Path(__file__).parent.parent
@@ -36,3 +44,38 @@ def imports(tree: ast.AST) -> Iterator[tuple[str, int]]:
             called = ast.unparse(node.func).rpartition(".")[2]
             if called in {"import_module", "find_spec", "__import__"}:
                 yield str(node.args[0].value), node.lineno
+
+
+def measures() -> dict[str, int]:
+    """Size of the product and of its imports."""
+    sources = {dotted(file_name(path)): path.read_text(encoding="utf-8") for path in MODULES}
+    imported: dict[str, set[str]] = {}
+    statements = 0
+    for name, source in sources.items():
+        tree = ast.parse(source)
+        either = {t if t in sources else t.rpartition(".")[0] for t, _ in imports(tree)}
+        imported[name] = either & set(sources) - {name}
+        nodes = (n for n in ast.walk(tree) if isinstance(n, ast.Import | ast.ImportFrom))
+        statements += sum(node.end_lineno - node.lineno + 1 for node in nodes)
+    importers: dict[str, set[str]] = defaultdict(set)
+    for name, others in imported.items():
+        for other in others:
+            importers[other].add(name)
+    depth: dict[str, int] = {}
+    for name in TopologicalSorter(imported).static_order():
+        depth[name] = 1 + max((depth[other] for other in imported[name]), default=0)
+    packages = {dotted(file_name(path)) for path in MODULES if path.name == "__init__.py"}
+    return {
+        "modules": len(sources),
+        "lines": sum(len(source.splitlines()) for source in sources.values()),
+        "modules with a single importer": sum(
+            len(of) == 1 for name, of in importers.items() if name not in packages
+        ),
+        "lines of imports": statements,
+        "modules in the longest chain of imports": max(depth.values()),
+    }
+
+
+if __name__ == "__main__":
+    for name, value in measures().items():
+        print(f"{value:8,}  {name}")

@@ -34,7 +34,7 @@ RANKS = {
         {"cluster", "page_options", "provision_levels"},
         {"workers"},
         {"fenestration", "cost"},
-        {"head", "chosen_rooms", "input_options"},
+        {"head", "input_options"},
         {"results"},
         {"report", "plots"},
         {"room"},

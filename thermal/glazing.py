@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal.blackbox import LayerResistance, fit_conductance_surface
 from thermal.errors import require, require_range
 
 SIGMA = 5.67e-8  # [W/(m2 K4)]
@@ -110,24 +109,6 @@ def en673_u_value(
     resistance += sum(panes) / conductivity
     resistance += float(np.sum(1.0 / gap_conductances(gaps, position)))
     return 1.0 / resistance
-
-
-def double_glazing_resistance(
-    panes: tuple[float, float], gap: Gap, *, conductivity: float = GLASS_CONDUCTIVITY
-) -> LayerResistance:
-    """R(T_m, dT) between the faces of a double glazing, fitted to EN 673's gap over temperatures.
-
-    Args: panes: thicknesses [m], outside and inside.
-    """
-    mean, difference = (
-        a.ravel() for a in np.meshgrid(np.linspace(-15.0, 50.0, 14), np.linspace(1.0, 45.0, 12))
-    )
-    solid = sum(panes) / conductivity
-    resistance = [
-        solid + 1.0 / gap.conductance(d, mean_temperature=m + 273.15)
-        for m, d in zip(mean, difference, strict=True)
-    ]
-    return fit_conductance_surface(mean, difference, np.array(resistance))
 
 
 def en410_g_value(

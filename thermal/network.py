@@ -80,16 +80,6 @@ def exchange_star(area: ArrayLike, emissivity: ArrayLike) -> NDArray[np.float64]
     return g[:, None] * g[None, :] / g.sum()
 
 
-def area_view_factors(area: ArrayLike, normals: ArrayLike) -> NDArray[np.float64]:
-    """View factors [N, N] by area among surfaces that do not face the same way (EnergyPlus)."""
-    a, n = np.asarray(area, dtype=float), np.asarray(normals, dtype=float)
-    apart = (n @ n.T) < np.cos(np.radians(10.0))
-    seen = apart * a[None, :]
-    total = seen.sum(axis=1, keepdims=True)
-    require(bool(np.all(total > 0)), "view factors", "a surface sees no other")
-    return seen / total
-
-
 def outside_factors(normal_z: float, sky_seen: float = 1.0) -> tuple[float, float, float]:
     """Shares (sky, air, ground) of the longwave exchange of an outside face.
 

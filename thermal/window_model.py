@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermal.closure import Closure
 from thermal.errors import require
 from thermal.glazing import Gap
-from thermal.glazing_unit import AIR, GasGap, GlazingLayer, GlazingUnit
+from thermal.glazing_unit import AIR, GasGap, GlazingLayer, GlazingUnit, sheet_layer
 from thermal.gvalue import ThermalData, inward_share, position_of_share, thermal_data
 from thermal.iso15099 import (
     STATED_G,
@@ -30,7 +30,6 @@ from thermal.iso15099 import (
     yearly_g_values,
 )
 from thermal.notes import ThermalNote
-from thermal.shade_layers import sheet_layer
 
 ARGON = GasGap(0.016, (("argon", 0.9), ("air", 0.1)))
 AIR_GAP = GasGap(0.016, AIR)

@@ -40,10 +40,9 @@ from bim.ifc.source import Progress, Source, read_source
 from bim.ifc.space_boundaries import boundary_issues
 from bim.ifc.spaces import SpaceRecord, read_spaces
 from bim.isolated_solids import RoomBoundary, room_boundaries
-from bim.mesh_simplification import simplified
 from bim.model import Building, Element, Space, SpaceGroup
 from bim.neighbours import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
-from bim.outdoors import lifted_sites, mirrors_in_view, unblinded
+from bim.outdoors import lifted_sites, mirrors_in_view, simplified, unblinded
 from bim.rays import RayMesh, ray_mesh
 from bim.report.issue import Effect, Issue
 from bim.solids import triangles_of

@@ -19,8 +19,8 @@ from bim.defaults import FURNITURE_REFLECTANCE
 from bim.drawn_shades import hangs_at, is_named_shade
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source, painted
-from bim.mesh_simplification import simplified
 from bim.model import Element, Space
+from bim.outdoors import simplified
 from bim.planes import area_vectors
 from bim.rays import RayMesh, ray_mesh
 from bim.report.issue import Issue

@@ -13,9 +13,8 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.defaults import FACADE_REFLECTANCE, SITE_REFLECTANCE
-from bim.mesh_simplification import simplified_mesh
 from bim.model import LONGITUDE_LATITUDE, Building, Element, local_metres, transformed
-from bim.outdoors import lifted_sites, shut_in_area, unblinded
+from bim.outdoors import lifted_sites, shut_in_area, simplified_mesh, unblinded
 from bim.report.issue import Issue, Phrase
 from bim.surroundings.city_models import SUFFIXES as CITYGML
 from bim.surroundings.city_models import (

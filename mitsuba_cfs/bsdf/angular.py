@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.bsdf.evaluate import through_peak
 from mitsuba_cfs.bsdf.glazing import (
     Glazing,
     Pane,
@@ -19,7 +20,6 @@ from mitsuba_cfs.bsdf.glazing import (
     stack,
 )
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
-from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, spectral_glazing
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import polarised_shares

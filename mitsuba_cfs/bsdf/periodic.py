@@ -133,18 +133,6 @@ class PeriodicLayer:
         return copies, np.tile(self.material, len(shifts))
 
 
-def clear_pane(
-    index: float, thickness: float, period: tuple[float, float], *, channels: int = 1
-) -> PeriodicLayer:
-    """A pane of clear glass on a cell of any size: its two faces."""
-    width, height = period
-    outside = np.array([[0, 0, 0], [width, 0, 0], [width, height, 0], [0, height, 0]], dtype=float)
-    inside = outside[::-1] - [0, 0, thickness]
-    triangles = np.array([face[[0, a, a + 1]] for face in (outside, inside) for a in (1, 2)])
-    material = clear_body("glass", index, channels=channels)
-    return PeriodicLayer(triangles, np.zeros(4, dtype=np.int64), (material,), period)
-
-
 def stacked(layers: list[PeriodicLayer], gaps: list[float]) -> PeriodicLayer:
     """Layers in series as one layer, the exterior one first, all on cells of one size.
 

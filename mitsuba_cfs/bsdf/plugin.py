@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.colour import relative_rgb
+from mitsuba_cfs.bsdf.evaluate import through_peak
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
-from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.bsdf.plugin_base import window_bsdf
 from mitsuba_cfs.bsdf.plugin_data import PREFIXES, read_band
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.colour import leaf_means, relative_rgb
-from mitsuba_cfs.bsdf.evaluate import through_peak
+from mitsuba_cfs.bsdf.evaluate import tree_peak
 from mitsuba_cfs.bsdf.plugin_base import window_bsdf
 from mitsuba_cfs.bsdf.plugin_data import PREFIXES, read_band
 from mitsuba_cfs.bsdf.tensor_sampling import SamplingTree, joined, sampling_tree
@@ -75,9 +75,9 @@ def _without_peaks(
         share = np.zeros((1,) * (tree.rank - 2))
         if own is not None and name.startswith("transmission"):
             if tree.rank == 4:
-                tree, share = through_peak(tree, bsdf.see_through)
+                tree, share = tree_peak(tree, bsdf.see_through)
             else:  # the beam of the other side is equal
-                tree, share = through_peak(own, bsdf.see_through)
+                tree, share = tree_peak(own, bsdf.see_through)
                 tree = tree.reversed() if turned else tree
         rest.append(tree)
         shares.append(share)

@@ -36,6 +36,13 @@ def hour_not_exceeded(dgp: ArrayLike, share: float = EXCEEDED_SHARE) -> float:
     return float(dgp[dgp.size - 1 - allowed])
 
 
+def mean_error(errors: ArrayLike) -> float | None:
+    """Root mean square of the hours' standard errors of DGP; None where none is known (NaN)."""
+    known = np.asarray(errors, dtype=float)
+    known = known[~np.isnan(known)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else None
+
+
 def protection_level(dgp: ArrayLike) -> str:
     """EN 17037's protection from glare: the strictest limit exceeded in at most 5 % of the hours.
 

@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike
-from pathlib import Path
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mitsuba_cfs import variants
-from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import write_bytes
-from mitsuba_cfs.images.view import View, format_view, parse_view
+from mitsuba_cfs.images.view import View, format_view
 
 
 def write_exr(
@@ -39,30 +37,13 @@ def write_exr(
     if comment:
         about["COMMENT"] = comment
     stream = mi.MemoryStream()  # Mitsuba's own file says nothing of a full disk
-    with _a_second_thread():
+    with a_second_thread():
         bitmap.write(stream, mi.Bitmap.FileFormat.OpenEXR)
     write_bytes(path, stream.raw_buffer())
 
 
-def read_exr(path: str | PathLike[str]) -> tuple[NDArray[np.float32], View | None]:
-    """Pixels [ny, nx] or [ny, nx, 3] of an EXR file, and the view that it was written with."""
-    variants.activate()
-    if not Path(path).is_file():
-        raise DataError("cannot be read (no such file)", file=path)
-    try:
-        with _a_second_thread():
-            bitmap = mi.Bitmap(str(path), mi.Bitmap.FileFormat.OpenEXR)
-    except RuntimeError as error:
-        raise DataError(f"not an EXR picture ({error})", file=path) from None
-    values = np.array(bitmap.convert(component_format=mi.Struct.Type.Float32))
-    height, width = values.shape[:2]
-    about = bitmap.metadata()
-    view = parse_view(str(about["VIEW"]), width, height) if "VIEW" in about else None
-    return (values[..., 0] if values.shape[2:] == (1,) else values), view
-
-
 @contextmanager
-def _a_second_thread() -> Iterator[None]:
+def a_second_thread() -> Iterator[None]:
     """OpenEXR, in Mitsuba, waits forever for a second thread on a single core; provide one."""
     count = dr.thread_count()
     if count < 2:

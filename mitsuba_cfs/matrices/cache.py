@@ -1,7 +1,8 @@
 """Matrices cached on disk by the hash of everything they depend on, finished or half done.
 
-A file holds the state of `mitsuba_cfs.trace.kernels.estimate.accumulate`: a finished matrix is read
-back, a killed run goes on after the last batch that was saved.
+A file holds the matrices of a view, or the state of batches of
+`mitsuba_cfs.trace.kernels.estimate.accumulate`: a finished matrix is read back, a killed run goes
+on after the last batch that was saved.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import time
 import zipfile
 import zlib
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -155,50 +156,52 @@ class CacheEntry:
     cache: MatrixCache
     path: Path
 
-    def load(self) -> BatchMean | None:
-        """The stored state; None if there is none, or none that can be read."""
+    def read(self, content: Callable[[Mapping[str, NDArray[Any]]], T | None]) -> T | None:
+        """What `content` makes of the stored arrays; None if there are none that can be read."""
         try:
             with opened_arrays(self.path) as data:
-                state = BatchMean(
-                    int(data["count"]),
-                    data["mean"].astype(float),
-                    data["spread"].astype(float),
-                    data["covariance"].astype(float),
-                    float(data["seconds"]),
-                    bool(data["finished"]),
-                )
+                result = content(data)
             os.utime(self.path)  # used now
         except FileNotFoundError:
             return None
         except UNREADABLE as error:
             log.info("%s: ignored, cannot be read: %s", self.path, error)
             return None
-        shape = state.mean.shape
-        whole = state.count > 0 and state.spread.shape == shape
-        whole = whole and state.covariance.shape[:-2] == shape[:-1]
-        return state if whole else None
+        return result
 
-    def save(self, state: BatchMean) -> None:
-        """Write the state; the file is the old one or the new one at any time.
+    def write(self, arrays: Mapping[str, object], *, finished: bool = True) -> bool:
+        """Write arrays by name; the file is the old one or the new one at any time.
 
         A folder that cannot be written to costs a warning, not the run.
         """
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with replacing(self.path) as part:
-                np.savez(
-                    part,
-                    count=state.count,
-                    mean=state.mean,
-                    spread=state.spread,
-                    covariance=state.covariance,
-                    seconds=state.seconds,
-                    finished=state.finished,
-                )
-            if state.finished:
+                np.savez(part, **arrays)  # type: ignore[arg-type] # its stub takes a flag by name
+            if finished:
                 self.cache.trim(keep=self.path)
         except (OSError, DataError) as error:
             log.warning("the matrix is not cached: %s", error)
+            return False
+        return True
+
+    def load(self) -> BatchMean | None:
+        """The stored state of batches; None if there is none, or none that can be read."""
+        return self.read(_batch_mean)
+
+    def save(self, state: BatchMean) -> None:
+        """Write the state of batches."""
+        arrays = {one.name: getattr(state, one.name) for one in fields(state)}
+        self.write(arrays, finished=state.finished)
+
+
+def _batch_mean(data: Mapping[str, NDArray[Any]]) -> BatchMean | None:
+    """None where the shapes do not go together."""
+    mean, spread, covariance = (data[n].astype(float) for n in ("mean", "spread", "covariance"))
+    count, seconds, finished = int(data["count"]), float(data["seconds"]), bool(data["finished"])
+    shape = mean.shape
+    whole = count > 0 and spread.shape == shape and covariance.shape[:-2] == shape[:-1]
+    return BatchMean(count, mean, spread, covariance, seconds, finished) if whole else None
 
 
 def cached_or_computed(

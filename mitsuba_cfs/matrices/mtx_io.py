@@ -46,7 +46,7 @@ def read_matrix(path: str | PathLike[str]) -> NDArray[np.float64]:
     """
     try:
         with open(path, "rb") as file:
-            header = _read_header(file, path)
+            header = read_header(file, path)
             data = file.read()
     except OSError as error:
         raise DataError(f"cannot be read: {reason(error)}", file=path) from error
@@ -62,15 +62,6 @@ def read_matrix(path: str | PathLike[str]) -> NDArray[np.float64]:
         row, column, _ = np.unravel_index(np.argmin(np.isfinite(values)), shape)
         raise DataError("is not finite", file=path, element=f"row {row}, column {column}")
     return values.reshape(shape).astype(np.float64) / header.exposure
-
-
-def read_header(path: str | PathLike[str]) -> MatrixHeader:
-    """Read the header of a Radiance matrix file."""
-    try:
-        with open(path, "rb") as file:
-            return _read_header(file, path)
-    except OSError as error:
-        raise DataError(f"cannot be read: {reason(error)}", file=path) from error
 
 
 def write_matrix(
@@ -125,7 +116,8 @@ def luminance(
     return matrix[..., 0] if matrix.shape[-1] == 1 else matrix @ np.array(weights)
 
 
-def _read_header(file: BinaryIO, path: str | PathLike[str]) -> MatrixHeader:
+def read_header(file: BinaryIO, path: str | PathLike[str]) -> MatrixHeader:
+    """Read the header of a Radiance matrix file up to its data."""
     if not file.readline().startswith(b"#?"):
         raise DataError("is not a Radiance matrix: expected a first line #?RADIANCE", file=path)
     fields: dict[str, str] = {}

@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.bsdf.evaluate import held_beams
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.klems_peak import held_beams
 from mitsuba_cfs.methods.optics import States, SystemOptics, straight_transmittance
 from mitsuba_cfs.methods.phase_matrices import (
     INDOOR_DEPTH,

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs import phases
+from mitsuba_cfs.bsdf.evaluate import held_beams
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.klems_peak import held_beams
 from mitsuba_cfs.methods.coefficients import (
     GroupCoefficients,
     beam_matrix,

@@ -3,11 +3,13 @@
 They hold for all systems that may fill the windows.  `phase_matrices` traces what some metrics
 need; `with_*` gives the matrices of another eye, other outdoors or another metric, and takes over
 what does not change.
+
+The matrices of a view's pixels are in the cache beside the others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -17,12 +19,12 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.glare.annual import PictureMatrix
 from mitsuba_cfs.images.view import View
-from mitsuba_cfs.matrices.cache import MatrixCache, RecentResults
+from mitsuba_cfs.matrices.cache import CacheEntry, MatrixCache, RecentResults
 from mitsuba_cfs.methods import METRICS, UnknownMethodError
 from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene, Sampling
 from mitsuba_cfs.methods.subdivision import CellLight, Parts, allowed, subdivided
-from mitsuba_cfs.methods.view_cache import cached_view, view_is_cached
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
@@ -36,9 +38,98 @@ from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 from mitsuba_cfs.trace.matrices.exchange import outdoor_exchange, window_exchange
 from mitsuba_cfs.trace.matrices.view import view_matrix
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown, adjacent_picture
-from mitsuba_cfs.trace.pictures.annual import ViewMatrices, view_matrices
-from mitsuba_cfs.trace.sun.sunlit_rows import SunlitShares, window_sunlit_shares
+from mitsuba_cfs.trace.pictures.annual import ViewMatrices, ViewNoise, view_matrices
+from mitsuba_cfs.trace.sun.sunlit_rows import (
+    SunlitRows,
+    SunlitShares,
+    sparse_arrays,
+    sparse_matrix,
+    window_sunlit_shares,
+)
 from mitsuba_cfs.window_parts import cut_group, even_regions, window_cells
+
+LARGEST = 256 << 20  # [bytes] of a file; larger ones would push out all the others
+
+
+def cached_view(
+    cache: MatrixCache | None,
+    view: View,
+    inputs: tuple[object, ...],
+    trace: Callable[..., ViewMatrices],
+    *,
+    light: PatchLight | None = None,
+) -> ViewMatrices:
+    """The matrices of a view from the cache; traced and stored where they are not in it.
+
+    Their shares of the sunlit surfaces have a file of their own, which serves every light.
+
+    Args:
+        inputs: all that they depend on besides the view and the light.
+        trace: called with `light` and the cached `sunlit`, None where there are none.
+    """
+    if cache is None:
+        return trace(light=light, sunlit=None)
+    entry, beside = _view_entries(cache, view, inputs, light)
+    sunlit = beside.read(SunlitRows.of_arrays)
+    matrices = entry.read(lambda data: _stored_view(data, view, sunlit))
+    if matrices is None:
+        matrices = trace(light=light, sunlit=sunlit)
+        traced = matrices.sunlit
+        # the file of the view is of no use without that of its sunlit surfaces
+        if traced is sunlit or (traced is not None and _write(beside, traced.arrays())):
+            _write(entry, _of_view(matrices))
+    return matrices
+
+
+def view_is_cached(cache: MatrixCache | None, view: View, inputs: tuple[object, ...]) -> bool:
+    """Whether the cache has the matrices of a view; arguments as of `cached_view`."""
+    if cache is None:
+        return False
+    return all(entry.path.is_file() for entry in _view_entries(cache, view, inputs))
+
+
+def _view_entries(
+    cache: MatrixCache, view: View, inputs: tuple[object, ...], light: PatchLight | None = None
+) -> tuple[CacheEntry, CacheEntry]:
+    """The entries of a view by its pixels, and of its sunlit surfaces."""
+    of_hours = () if light is None else (light.lit, light.later)
+    by = ViewMatrices.__module__
+    pictures = cache.entry("view pictures", view, *inputs, *of_hours, by=by)
+    return pictures, cache.entry("view sunlit", view, *inputs, by=by)
+
+
+def _stored_view(
+    data: Mapping[str, NDArray[Any]], view: View, sunlit: SunlitRows | None
+) -> ViewMatrices | None:
+    """None where their shares of the sunlit surfaces are missing from the cache."""
+    if data["sunlit"] and sunlit is None:
+        return None
+    row, share = data["row"], data["share"]
+    indirect, lit = (PictureMatrix(data[name], row, share) for name in ("indirect", "lit"))
+    noise = ViewNoise(data["indirect_noise"], data["lit_noise"])
+    seen = sparse_matrix(data, "seen")
+    return ViewMatrices(view, data["pixels"], indirect, lit, seen, noise, sunlit)
+
+
+def _write(entry: CacheEntry, arrays: dict[str, NDArray[Any]]) -> bool:
+    """Store arrays that are not too large."""
+    return sum(array.nbytes for array in arrays.values()) <= LARGEST and entry.write(arrays)
+
+
+def _of_view(matrices: ViewMatrices) -> dict[str, NDArray[Any]]:
+    """The matrices without their shares of the sunlit surfaces."""
+    return {
+        "pixels": matrices.pixels,
+        "indirect": matrices.indirect.rows,
+        "lit": matrices.lit.rows,
+        "indirect_noise": matrices.noise.indirect,
+        "lit_noise": matrices.noise.lit,
+        "row": matrices.lit.row,
+        "share": matrices.lit.share,
+        "sunlit": np.array(matrices.sunlit is not None),
+        **sparse_arrays("seen", matrices.seen),
+    }
+
 
 BATCHES = 8  # independent repetitions that the standard errors come from
 INDOOR_DEPTH, OUTDOOR_DEPTH = 32, 16  # segments of a path

@@ -25,9 +25,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
-from mitsuba_cfs.bsdf.evaluate import klems_of
+from mitsuba_cfs.bsdf.evaluate import klems_of, through_peak
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
-from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason

@@ -67,7 +67,7 @@ def command(issues: Path | None, fix: Path | None, bcf: Path | None, **chosen) -
         check_file(bcf, field="--bcf", inputs=options.building_files)
     from rich.console import Console
 
-    from scenes.chosen_rooms import named_spaces
+    from bim.building_file import named_spaces
     from scenes.commands.progress_bar import ProgressBar
     from scenes.fenestration_exports import known_fenestration
     from scenes.head import head_of

@@ -102,7 +102,7 @@ def command(
             check_file(path, field=field, inputs=options.building_files)
     folders = result_folders({"--radiance": radiance, "--mitsuba": mitsuba})
 
-    from scenes.chosen_rooms import named_spaces
+    from bim.building_file import named_spaces
     from scenes.commands.progress_bar import ProgressBar
     from scenes.fenestration_exports import known_fenestration
     from scenes.head import head_of

@@ -1,57 +1,218 @@
-"""The rooms of a building against rules: light, view and sun of each, then every criterion."""
+"""The rooms of a building against rules: light, view and sun of each, then every criterion.
+
+The grids of several rules share one V and one D.  Glare of the seats and temperatures are computed
+where a rule limits them.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.building_file import is_ifc
-from bim.model import Building, Space
+from bim.building_file import is_ifc, no_window
+from bim.model import Building, Space, in_month
 from bim.report.issue import Effect, Issue
-from bim.seasons import in_month
+from bim.sensors import plane_sides
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods.glare import hourly_glare
+from mitsuba_cfs.methods.light import direct_sun_by_group, illuminance, with_view
 from mitsuba_cfs.metrics.autonomy import daylight_autonomy
-from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded
-from mitsuba_cfs.metrics.lm83 import sunlit_hours
+from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded, greatest_cell
+from mitsuba_cfs.metrics.lm83 import blinds_operated, sunlit_hours
+from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
-from scenes.chosen_rooms import no_window
 from scenes.comply.assess import asked_of, assess_room, values_of
-from scenes.comply.blinds import open_and_closed
+from scenes.comply.blinds import DEFAULT_NAME, open_and_closed
 from scenes.comply.dwellings import dwelling_words, dwellings_of, judged
 from scenes.comply.files import ComplyFiles, read_files
-from scenes.comply.findings import Findings, GridLight, RoomHeat, calendar_of
-from scenes.comply.glare import seat_glare
-from scenes.comply.glass import windows_without_view
-from scenes.comply.heat import room_heat
-from scenes.comply.light import lights_of, sensor_grid_of
+from scenes.comply.findings import Findings, GridLight, RoomHeat, SeatGlare, calendar_of
+from scenes.comply.glass import sight_through, windows_without_view
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outdoors import OutdoorMesh, outdoors_of
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLights
-from scenes.comply.solar import solar_sentences
+from scenes.comply.rules import GridTable
 from scenes.comply.sunlight import SunExposure, sun_day, sun_exposure
 from scenes.comply.tables import USE_WORDS
 from scenes.comply.uses import UNKNOWN, RoomUse
 from scenes.comply.view_out import ViewOut, view_out
-from scenes.fenestration.systems import States
+from scenes.fenestration.ratings import system_ratings
+from scenes.fenestration.systems import FenestrationSystem, States
+from scenes.fenestration.thermal_system import thermal_system
 from scenes.head import Head, unused_notes
 from scenes.input_files import building_of
 from scenes.inputs import first_states, inputs_of
 from scenes.language.catalogue import N_
 from scenes.report.method import METHODS
-from scenes.room.inputs import room_inputs, skies_for
-from scenes.room.light import room_light
+from scenes.room.daylight import overcast_factor
+from scenes.room.glare import rating_of
+from scenes.room.heat import heat_alone
+from scenes.room.inputs import RoomInputs, room_inputs, skies_for
+from scenes.room.light import RoomLight, grid_points, room_light
 from scenes.room.operation_tables import OperationTables
-from scenes.room.options import RoomOptions
+from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.room import StageTimes
 from scenes.room.series import RoomSeries, corner
+from scenes.room.solar import seasonal_outdoors
+from scenes.room.zone import room_zone, zone_surfaces
+from scenes.room_views import eyes_of
+from thermal.errors import ThermalInputError
+from thermal.ratings import CLASSES, ThermalRating
+
+STANDARD = "ISO 52022-3, reference"  # the method that is named where a system's layers are known
+
+
+def solar_sentences(systems: Mapping[str, States]) -> Iterator[str]:
+    """Of each state of the windows' systems: g_tot at normal incidence and EN 14501's class.
+
+    LM-83's default shade is a figure for light alone: it has no heat to be rated.
+    """
+    distinct = {id(state): state for states in systems.values() for state in states}
+    for system in distinct.values():
+        if DEFAULT_NAME in system.name:
+            continue
+        try:
+            yield solar_sentence(system)
+            yield from thermal_system(system).notes
+        except ThermalInputError as error:
+            yield Note(
+                "{system}: g_tot is unknown: {reason}.", system=system.name, reason=error.message
+            )
+
+
+def solar_sentence(system: FenestrationSystem) -> str:
+    """A system's g_tot, the method that gives it, and EN 14501's class of it.
+
+    Raises: `ThermalInputError` where U, g and the BSDF do not go together.
+    """
+    heat = thermal_system(system)
+    found = {rating.method: rating for rating in system_ratings(system, heat)}
+    rating: ThermalRating = found.get(STANDARD) or found["heat balance"]
+    limits = ", ".join(f"{limit:.2f}" for limit in CLASSES["g"])
+    source = Note("as in the heat balance") if rating.method == "heat balance" else rating.method
+    return Note(
+        "{system}: g_tot {g:.2f} at normal incidence ({source}), class {solar_class} for the "
+        "limits {limits} of EN 14501 (not verified).",
+        system=system.name,
+        g=rating.g_value,
+        source=source,
+        solar_class=rating.solar_class("g"),
+        limits=limits,
+    )
+
+
+def sensor_grid_of(space: Space, table: GridTable) -> SensorGrid:
+    """The grid of a rule in a room; where it has no spacing, whole cells no wider than p."""
+    spacing = table.spacing
+    if spacing is None:
+        sides = plane_sides(space, table.height, table.margin)
+        longer = max(sides)
+        spacing = longer / np.ceil(longer / greatest_cell(*sides) - 1e-9)
+    return SensorGrid(spacing=float(spacing), height=table.height, margin=table.margin)
+
+
+def lights_of(room: RoomInputs, traced: RoomLight, operated: Iterable[int]) -> list[GridLight]:
+    """The light on each grid of a room.
+
+    The windows' first state is open, their second closed; LM-83's rule moves them by group.
+
+    Args: operated: numbers of the grids whose light with operated blinds is wanted.
+    """
+    light, sky = traced.light, room.skies
+
+    def year(values: NDArray[np.float64]) -> NDArray[np.float32]:
+        return sky.whole_year(values.astype(np.float32)).T
+
+    opened, factor = illuminance(light), overcast_factor(light)
+    through = direct_sun_by_group(light) or []
+    points = traced.scene.points
+    seen = [[sight_through(one).is_view for one in room.windows.in_state(j)] for j in (0, 1)]
+    found, first = [], 0
+    for number, grid in enumerate(room.grids):
+        count = len(grid_points(room.space, grid))
+        own = slice(first, first + count)
+        first += count
+        direct = [part[own] for part in through]
+        blinds = closed = free = None
+        if number in operated:
+            state = blinds_operated([part.T for part in direct]).astype(np.int64)  # [G, L]
+            blinds, closed = year(illuminance(light, state)[own]), sky.whole_year(state).T > 0
+            free = np.where(closed, seen[1], seen[0])
+        sun = np.sum(direct, axis=0) if direct else np.zeros_like(opened[own])
+        found.append(
+            GridLight(points[own], year(opened[own]), year(sun), factor[own], blinds, closed, free)
+        )
+    return found
+
+
+def seat_glare(
+    room: RoomInputs,
+    light: RoomLight,
+    state: NDArray[np.int64] | None,
+    *,
+    grid: float | None,
+    directions: int,
+    eye_height: float,
+    progress: Progress = silent,
+) -> SeatGlare:
+    """DGP of every hour of use at each seat of a room.
+
+    Args:
+        state: [G, L] of the window groups in each lit hour; None: the first all year.
+        grid, directions, eye_height: of the eyes, see `scenes.room_views.eyes_of`.
+    """
+    used = working_hours(room.weather, *room.options.occupancy.hours)
+    lit = np.flatnonzero(used[room.skies.lit])
+    views = eyes_of(room.space, grid, directions, eye_height, room.options.outputs.picture_size)
+    rows = []
+    for number, each in enumerate(views):
+        steps = part(progress, number / len(views), (number + 1) / len(views), "annual glare")
+        rated = hourly_glare(
+            with_view(light.light, each.view), "DGP", state, hours=lit,
+            options=rating_of(room.options.outputs), progress=steps,
+        )  # fmt: skip
+        whole = np.zeros(room.skies.hours)
+        whole[room.skies.lit[lit]] = rated.dgp
+        rows.append(whole[used])
+    return SeatGlare(
+        np.array([each.view.position for each in views]),
+        np.array([each.view.direction for each in views]),
+        np.stack(rows),
+        state is not None,
+    )
+
+
+def room_heat(
+    room: RoomInputs,
+    light: RoomLight,
+    closed: NDArray[np.bool_] | None,
+    *,
+    progress: Progress = silent,
+) -> RoomHeat:
+    """Operative temperatures of a room that neither heats nor cools.
+
+    Args:
+        closed: [H, G] when the blinds of each window group are closed. None: open all year.
+    """
+    state = np.zeros((room.skies.hours, len(room.windows.groups)), dtype=np.int64)
+    if closed is not None:
+        state = closed[:, : state.shape[1]].astype(np.int64)
+    outdoors = seasonal_outdoors(room, light, progress=progress)
+    zone = room_zone(room, zone_surfaces(room), outdoors, state, progress=progress)
+    thermal, _ = heat_alone(zone, room.weather, room.options.heat_step_s, progress)
+    return RoomHeat(
+        thermal.temperatures["operative_c"].to_numpy(),
+        np.asarray(room.weather.dry_bulb_c),
+        room.occupied,
+    )
+
 
 # the parts of a room's light, as the dossier's last line names their seconds
 PARTS = TRACING, SUMS, GLARE, HEAT = (

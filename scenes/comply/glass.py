@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from bim.model import Window
-from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.bsdf.evaluate import through_peak
 from mitsuba_cfs.notes import Note
 from scenes.fenestration.systems import FenestrationSystem, States
 

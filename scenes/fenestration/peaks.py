@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.bsdf.evaluate import UNRESOLVED
-from mitsuba_cfs.bsdf.klems_peak import HIDDEN, SPECULAR, SPILL, peak_spill, through_peak
+from mitsuba_cfs.bsdf.evaluate import HIDDEN, SPECULAR, SPILL, UNRESOLVED, peak_spill, through_peak
 from mitsuba_cfs.glare.sun_disc import spread_sun_dgp
 from mitsuba_cfs.notes import Note
 from scenes.fenestration.systems import FenestrationSystem, States, with_see_through

@@ -36,9 +36,9 @@ from thermal.closure import Closure
 Panes = tuple[SpectralPane, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class FenestrationSystem:
-    """A fenestration system: glazing and shade as one, in both bands."""
+    """A fenestration system: glazing and shade as one, in both bands; equal to itself alone."""
 
     name: str
     visible: KlemsBsdf  # Klems full, all blocks

@@ -50,9 +50,16 @@ from thermal.closure import U_MODELS, Closure
 from thermal.errors import ThermalInputError
 from thermal.gases import GAS_NAMES
 from thermal.glazing import GASES, Gap
-from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
+from thermal.glazing_unit import (
+    GasGap,
+    GlazingLayer,
+    GlazingUnit,
+    perforated_layer,
+    sheet_layer,
+    venetian_layer,
+    woven_layer,
+)
 from thermal.gvalue import TYPICAL_SYSTEMS
-from thermal.shade_layers import perforated_layer, sheet_layer, venetian_layer, woven_layer
 
 ANGULAR_COLUMNS = ("theta_deg", "transmittance")
 ANGULAR_OPTIONAL = ("reflectance_front", "reflectance_back")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +82,7 @@ class ThermalSystem:
         )
 
 
+@lru_cache(maxsize=32)  # each room of a building asks for it again
 def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     """U, g and layer absorptances by direction of a system."""
     solar = system.solar

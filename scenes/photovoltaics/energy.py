@@ -1,4 +1,8 @@
-"""Yield of photovoltaic subsystems: temperature, mismatch, inverter."""
+"""Yield of photovoltaic subsystems: temperature, mismatch, inverter.
+
+`diode_voltage` inverts I(V) of `two_diode`; it is compiled, and is here so that a datasheet is
+checked before a compiler is loaded.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +19,35 @@ from scipy.interpolate import RegularGridInterpolator
 from mitsuba_cfs.compiled import compiled
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
-from scenes.photovoltaics.diode import diode_voltage
 from scenes.photovoltaics.irradiance import CellIrradiance
 from scenes.photovoltaics.modules import PvModule
 from scenes.photovoltaics.two_diode import Cell, Datasheet, cell_currents
+
+NEWTON_STEPS = 60
+CONVERGED = 1e-10  # [V]
+
+
+@compiled(numba.vectorize, ["f8(f8,f8,f8,f8,f8,f8)"], nopython=True)
+def diode_voltage(photo, first, second, thermal, shunt, current):
+    """V_d [V] at a current [A], from I_ph, I_01, I_02 [A], V_t [V] and R_p [Ohm].
+
+    The current falls with V_d and is concave in it, so that Newton's method from above the root
+    comes down to it without overshooting.
+    """
+    spare = max(photo - current, 0.0)
+    inner = thermal * np.log1p(spare / first)
+    if second > 0:
+        inner = min(inner, 2 * thermal * np.log1p(spare / second))
+    for _ in range(NEWTON_STEPS):
+        root = np.exp(inner / (2 * thermal))
+        one, two = first * root * root, second * root
+        value = photo - (one - first) - (two - second) - inner / shunt - current
+        step = value / (one / thermal + two / (2 * thermal) + 1 / shunt)
+        inner += step
+        if abs(step) < CONVERGED:
+            break
+    return inner
+
 
 BYPASS_VOLTAGE = 0.5  # across a bypass diode that carries the current (Schottky) [V]
 EVEN = 12  # currents, evenly spread, at which a string's power is looked at first

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from scenes.language.catalogue import gettext, ngettext
 from scenes.language.numbers import inside, listed, rounded, semicolons
-from scenes.report.headline import POOR, Card
+from scenes.report.headline import GLARE_OF_PICTURES, GLARE_OF_YEAR, POOR, Card
 
 MOST_NAMED = 4  # rooms or systems that are named in one sentence
 
@@ -38,8 +38,8 @@ def judged(name: str, cards: Sequence[Card]) -> Judged:
     The highest DGP of some pictures counts only where the protection from glare is unknown.
     """
     limited = [card for card in cards if card.verdict]
-    if any(card.label == gettext("Protection from glare") for card in limited):
-        limited = [card for card in limited if card.label != gettext("Highest glare")]
+    if any(card.code == GLARE_OF_YEAR for card in limited):
+        limited = [card for card in limited if card.code != GLARE_OF_PICTURES]
     return Judged(name, tuple(limited))
 
 

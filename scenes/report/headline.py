@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from mitsuba_cfs.glare.classes import hour_not_exceeded, protection_level
+from mitsuba_cfs.glare.classes import hour_not_exceeded, mean_error, protection_level
 from scenes.language.catalogue import N_, decimal, gettext, ngettext
 from scenes.language.numbers import percent, rounded, semicolons, significant, spoken
 from scenes.provision_levels import provision_levels
@@ -31,6 +31,7 @@ LEVEL_WORDS = {
     "none": N_("none"),
 }
 GOOD, FAIR, POOR, PLAIN = "good", "fair", "poor", "plain"
+GLARE_OF_PICTURES, GLARE_OF_YEAR = "glare of pictures", "glare of the year"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +49,7 @@ class Card:
     traced: bool = False  # its error is that of the illuminances
     error: str = ""  # standard error of this figure, where it is known
     worth: float = 0.0  # orders rooms by this figure: the more the better
+    code: str = ""  # GLARE_OF_PICTURES, GLARE_OF_YEAR: figures of the same matter
 
 
 def cards(result: RunResult, room: RoomYear) -> tuple[Card, ...]:
@@ -250,6 +252,7 @@ def _glare(result: RunResult, room: RoomYear) -> Card | None:
         quantity("dgp").meaning,
         min(100 * dgp, 100),
         worth=-dgp,
+        code=GLARE_OF_PICTURES,
     )
 
 
@@ -262,8 +265,7 @@ def _protection(room: RoomYear) -> Card | None:
         "protection from glare (EN 17037): DGP exceeds {dgp} in at most 5 % of the occupied hours",
         dgp=rounded(hour_not_exceeded(dgp), 2),
     )
-    errors = room.annual_glare.get("dgp_standard_error", pd.Series(dtype=float)).dropna()
-    noise = float(np.sqrt(np.mean(errors**2))) if len(errors) else None
+    noise = mean_error(room.annual_glare.get("dgp_standard_error", ()))
     return protection_card(protection_level(dgp), noise, words, -hour_not_exceeded(dgp))
 
 
@@ -285,6 +287,7 @@ def protection_card(
         quantity("dgp").meaning,
         error="" if noise is None else gettext("{error} of an hour's DGP", error=dgp_error(noise)),
         worth=float(order) if worth is None else worth,
+        code=GLARE_OF_YEAR,
     )
 
 

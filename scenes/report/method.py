@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from mitsuba_cfs.glare.classes import mean_error
 from scenes.language.catalogue import N_, gettext, translated
 from scenes.language.numbers import rounded, share
 from scenes.results import RunResult
@@ -156,14 +157,14 @@ def _glare_error(result: RunResult) -> str:
         float(error)
         for room in result.spaces
         if room.annual_glare is not None
-        for error in room.annual_glare["dgp_standard_error"].dropna()
+        for error in room.annual_glare["dgp_standard_error"]
     ]
-    known = np.array([error for error in errors if not np.isnan(error)])
-    if not len(known):
+    mean = mean_error(errors)
+    if mean is None:
         return ""
     typical, most = (
         rounded(error, 4) if error >= 5e-5 else gettext("below {limit}", limit=rounded(1e-4, 4))
-        for error in (np.sqrt(np.mean(known**2)), known.max())
+        for error in (mean, np.nanmax(errors))
     )
     return " " + gettext(
         "The standard error of DGP, from pictures with half of the paths each, is {typical} (root "

@@ -17,10 +17,9 @@ from mitsuba_cfs.methods.phase_light import PhaseLight, with_sensor_light
 from mitsuba_cfs.methods.standard_error import relative_error_under
 from mitsuba_cfs.methods.sun_by_patches import sunny_hour_error
 from mitsuba_cfs.metrics.autonomy import daylight_autonomy_noise
-from mitsuba_cfs.metrics.daylight_factor import daylight_factor
 from mitsuba_cfs.metrics.lm83 import spatial_daylight_autonomy_error
 from mitsuba_cfs.metrics.noise import Noise
-from mitsuba_cfs.metrics.room import room_metrics
+from mitsuba_cfs.metrics.room import daylight_factor, room_metrics
 from mitsuba_cfs.metrics.schedules import lm83_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.cie import cie_patches

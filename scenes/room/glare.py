@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.seasons import in_month
+from bim.model import in_month
 from bim.to_tracer import band_scenes
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.glare.evaluation import GlareOptions

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.held_sensors import ModelGrid
-from bim.model import Building, Space
-from bim.seasons import Season, season_of, seasons
+from bim.model import Building, Season, Space, season_of, seasons
 from bim.sensors import model_grids, model_views
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import MatrixCache, cached_or_computed

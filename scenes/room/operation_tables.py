@@ -12,8 +12,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from bim.model import Building, Space
 from bim.to_tracer import COMPASS
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.sky.heat_island import in_city
-from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.sky.weather import Weather, in_city
 from scenes import plausible
 from scenes.fenestration.thermal_file import StateTable
 from scenes.room.schedules import (
@@ -35,7 +34,7 @@ from thermal.zone import OUTSIDE_ABSORPTANCE, ROUGHNESS
 
 
 class HeatIslandTable(TomlTable):
-    """Urban heat island: the street of the room, see `mitsuba_cfs.sky.heat_island`."""
+    """Urban heat island: the street of the room, see `mitsuba_cfs.sky.weather`."""
 
     sky_view: Share
     vegetation: Share

@@ -12,9 +12,8 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.model import Building, Space
+from bim.model import Building, Space, seasons
 from bim.report.issue import Effect, Issue
-from bim.seasons import seasons
 from bim.templates import template_rooms
 from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs.errors import DataError, RoomError

@@ -38,7 +38,6 @@ from scenes.room.windows import RoomWindows
 from thermal.balance import BalanceOptions, ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
 from thermal.errors import ThermalInputError
-from thermal.gains import dimmed_share, split_gains
 from thermal.ground import (
     SOILS,
     Footprint,
@@ -52,7 +51,7 @@ from thermal.ground import (
 )
 from thermal.kernel import advance
 from thermal.ventilation import AirTransfer
-from thermal.zone import Gains, Layer, OpaqueSurface, Zone
+from thermal.zone import Gains, Layer, OpaqueSurface, Zone, dimmed_share, split_gains
 
 FILMS = 0.17  # [m2 K/W] both films of a frame, ISO 10077-1
 DOWNWARDS = -0.7  # z of a floor's normal
@@ -356,9 +355,7 @@ def zone_surfaces(room: RoomInputs) -> ZoneSurfaces:
 
 def thermal_systems(windows: RoomWindows) -> list[list[ThermalSystem]]:
     """Thermal data of the window groups in each state [G][J]."""
-    distinct = {id(system): system for states in windows.systems for system in states}
-    known = {number: thermal_system(system) for number, system in distinct.items()}
-    return [[known[id(system)] for system in states] for states in windows.systems]
+    return [[thermal_system(system) for system in states] for states in windows.systems]
 
 
 def work_plane(room: RoomInputs, daylight: DaylightResult | None) -> FloatArray | None:

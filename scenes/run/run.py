@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import platform
 import time
 from collections.abc import Callable, Generator, Sequence
@@ -22,7 +21,7 @@ from bim.to_thermal import same_surfaces, shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import sha256
-from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.matrices.cache import MatrixCache, digest
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
@@ -242,9 +241,8 @@ def _failed(guid: str, error: BaseException) -> tuple[str, BaseException]:
 
 def _identity(options: JobOptions, inputs: Inputs) -> str:
     """Hash of options, program and contents of the files, before the keys of a run's rooms."""
-    parts = [repr(options), code_version(__name__)]
-    parts += map(sha256, inputs.files.values())
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16] + "-"
+    files = [sha256(path) for path in inputs.files.values()]
+    return digest(repr(options), code_version(__name__), files)[:16] + "-"
 
 
 def _requirements(inputs: Inputs) -> Requirements:

@@ -15,12 +15,18 @@ from numpy.typing import NDArray
 
 from bim.model import Building, Window
 from mitsuba_cfs import variants
+from mitsuba_cfs.bsdf.evaluate import through_peak
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import sha256
 from mitsuba_cfs.glare.annual import AnnualGlare
-from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, protection_level
+from mitsuba_cfs.glare.classes import (
+    CLASSES,
+    class_hours,
+    hour_not_exceeded,
+    mean_error,
+    protection_level,
+)
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.metrics.schedules import working_hours
@@ -215,8 +221,9 @@ def rating_figures(rated: AnnualGlare) -> dict[str, float | str]:
     """What a glare source is, and the standard error of DGP: root mean square, and of the worst."""
     dgp, error = rated.dgp, rated.dgp_standard_error
     result: dict[str, float | str] = {"glare_rule": rated.rule}
-    if len(dgp) and not np.isnan(error).any():
-        result["dgp_standard_error"] = float(np.sqrt(np.mean(error**2)))
+    mean = mean_error(error)
+    if mean is not None and not np.isnan(error).any():
+        result["dgp_standard_error"] = mean
         result["dgp_max_standard_error"] = float(error[np.argmax(dgp)])
     return result
 

@@ -8,13 +8,12 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from bim.building_file import held_states
+from bim.building_file import chosen_spaces, held_states
 from bim.model import Building, Space
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import sha256
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.source_code import code_version
-from scenes.chosen_rooms import chosen_spaces
 from scenes.cluster import Requirements
 from scenes.fenestration.thermal_file import files_beside
 from scenes.heat.box import building_or_box

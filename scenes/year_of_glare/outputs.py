@@ -18,6 +18,7 @@ from mitsuba_cfs.glare.classes import (
     class_hours,
     exceeded_share,
     hour_not_exceeded,
+    mean_error,
     protection_level,
 )
 from mitsuba_cfs.images.hdr import write_hdr
@@ -77,7 +78,7 @@ def view_row(year: GlareYear, rated: ViewYear) -> dict[str, object]:
         "protection_en17037": protection_level(dgp),
         "highest_dgp": float(rated.ratings.dgp.max()),
         "highest_dgp_standard_error": float(errors[rated.ratings.dgp.idxmax()]),
-        "dgp_standard_error": float(np.sqrt(np.mean(errors**2))),
+        "dgp_standard_error": mean_error(errors),
         DGP_SUNNY_HOUR_ERROR: rated.sunny_hour_error,
         **rated.as_lobe,
         "worst_hour": str(rated.ratings.dgp.idxmax()),

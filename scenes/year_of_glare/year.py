@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -15,15 +13,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bim.building_file import files_beside
-from bim.model import Building, Space
-from bim.seasons import season_of
+from bim.model import Building, Space, season_of
 from mitsuba_cfs import variants
 from mitsuba_cfs.files import sha256
 from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, finished_glare
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
 from mitsuba_cfs.images.view import View, format_view
-from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.matrices.cache import digest as content_digest
+from mitsuba_cfs.matrices.cache import MatrixCache, digest
 from mitsuba_cfs.methods.glare import bright_hours, glare_with, hourly_glare, rated_pictures
 from mitsuba_cfs.methods.light import SeasonalLight, seasonal_light
 from mitsuba_cfs.methods.optics import States
@@ -123,9 +119,8 @@ def read_year(
     files_read += (*options.linked, *options.surroundings)
     hashes = [sha256(path) for path in files_read]
     # not of files: the model may name others, which change by themselves
-    hashes.append(content_digest(*([s.visible, s.fine, s.angular] for s in inputs.used_systems)))
-    chosen = [code_version(__name__), *chosen, *hashes]
-    digest = hashlib.sha256(json.dumps([*chosen, viewed.space.guid]).encode()).hexdigest()
+    optics = [[s.visible, s.fine, s.angular] for s in inputs.used_systems]
+    key = digest(code_version(__name__), *chosen, *hashes, optics, viewed.space.guid)
     variants.activate()
     leaks = tuple(viewed.leaks())
     sampling = sampling_of(options)
@@ -138,7 +133,7 @@ def read_year(
     progress("inputs", 1.0)
     used = working_hours(weather, *options.occupied)
     return GlareYear(
-        options, viewed.space.label, views, viewed.scene, viewed.optics, weather, sky, used, digest,
+        options, viewed.space.label, views, viewed.scene, viewed.optics, weather, sky, used, key,
         inputs.head, leaks, inputs.sources, viewed.space, viewed.scenes,
         season_of(viewed.seasons, weather.midpoints[sky.lit].month.to_numpy()), viewed.lobes,
     )  # fmt: skip
@@ -177,8 +172,8 @@ def rate_views(
     for number, named in enumerate(year.views):
         steps = item(progress, "view", number + 1, len(year.views), named.name, whole=True)
         start = time.monotonic()
-        text = f"{year.digest} {format_view(named.view)} {named.view.width}"
-        checkpoint = checkpoints / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.npy"
+        key = digest(year.digest, format_view(named.view), named.view.width)[:24]
+        checkpoint = checkpoints / f"{key}.npy"
         result = finished_glare(checkpoint, len(times)) if checkpoint.is_file() else None
         tracing = summed(part(steps, 0.0, 0.3), named.name, TRACING)
         matrices = [with_eye(season, named.view) for season in seasons]

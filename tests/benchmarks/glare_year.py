@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs import phases, variants
+from mitsuba_cfs.bsdf.evaluate import through_peak
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.glare.annual import annual_glare, full_picture
 from mitsuba_cfs.glare.glare_view import GlareView

@@ -7,8 +7,7 @@ import pytest
 
 from bim.colours import GREY, TO_RADIANCE, hue_of, luminance, radiance_colour
 from bim.ifc.building import read_ifc
-from bim.radiance_script import LUMINANCE
-from bim.to_radiance import write_radiance
+from bim.to_radiance import LUMINANCE, write_radiance
 from tests.bim.small_ifc import box_room
 
 BRICK = (0.5, 0.2, 0.1)  # linear red, green, blue

@@ -25,7 +25,7 @@ from tests.conftest import REPOSITORY
 from tests.modules import MODULES
 
 FLAG = re.compile(r"\bcfs [a-z]|(?<![\w-])--[a-z]")
-WITHOUT_FLAGS = ("bim/bonsai/", "bim/report/__main__.py", "bim/radiance_script.py")
+WITHOUT_FLAGS = ("bim/bonsai/", "bim/report/__main__.py", "bim/to_radiance.py")
 GLASS = Issue("glass-between-rooms", "W1", {"element": "IfcWindow W1", "rooms": ("A", "B")})
 
 

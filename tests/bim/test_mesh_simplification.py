@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from bim.mesh_simplification import FINE, STEPS, simplified, simplified_mesh
 from bim.model import Element
+from bim.outdoors import FINE, STEPS, simplified, simplified_mesh
 from bim.planes import area_vectors
 
 

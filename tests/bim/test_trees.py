@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from bim.model import in_month, season_of, seasons
 from bim.rays import ray_mesh
 from bim.report.issue import issue_text
-from bim.seasons import in_month, season_of, seasons
 from bim.shoebox import WindowRectangle, shoebox
 from bim.surroundings.city_models import BARE, LEAFED, monthly_transmittance, tree_of
 from bim.surroundings.crowns import crown_elements

@@ -8,10 +8,10 @@ import ifcopenshell.api.group
 import ifcopenshell.api.root
 import pytest
 
+from bim.building_file import chosen_spaces, named_spaces
 from bim.ifc.building import read_ifc
 from bim.model import Building
 from mitsuba_cfs.errors import DataError
-from scenes.chosen_rooms import chosen_spaces, named_spaces
 from tests.bim.small_ifc import DEPTH, HEIGHT, WALL, WIDTH, box_model
 
 

@@ -5,10 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.evaluate import UNRESOLVED, bsdf_values, direct_hemispherical
-from mitsuba_cfs.bsdf.evaluate import through_peak as tree_peak
+from mitsuba_cfs.bsdf.evaluate import (
+    HIDDEN,
+    SPILL,
+    UNRESOLVED,
+    bsdf_values,
+    direct_hemispherical,
+    peak_spill,
+    through_peak,
+    tree_peak,
+)
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.bsdf.klems_peak import HIDDEN, SPILL, peak_spill, through_peak
 from mitsuba_cfs.bsdf.lobe import NARROWEST, lobe_tree
 from mitsuba_cfs.bsdf.tensor_merge import merged_tree
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf, disk_to_square

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from plugin_setup import UP, context, interaction, random_directions, sampled, to_mitsuba
 
-from mitsuba_cfs.bsdf.evaluate import direct_hemispherical, through_peak
+from mitsuba_cfs.bsdf.evaluate import direct_hemispherical, tree_peak
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf, morton
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 
@@ -97,7 +97,7 @@ def test_eval_leaves_the_beam_out(variant, real_data):
 
 def test_peaks_of_a_tree_are_its_straight_leaves(real_data):
     tree = read_bsdf_xml(real_data / "bsdf" / TREE_BLIND).band("Visible").transmission_back
-    rest, beams = through_peak(tree)
+    rest, beams = tree_peak(tree)
     lost = tree.hemispherical() - rest.hemispherical()
     np.testing.assert_allclose(beams, lost, atol=1e-12)
     assert (rest.values >= 0).all() and (rest.values <= tree.values + 1e-12).all()
@@ -116,13 +116,13 @@ def isotropic_glass(straight: float = 0.8, diffuse: float = 0.05, depth: int = 5
 
 def test_the_peak_of_an_isotropic_tree_is_taken_out_whole():
     tree = isotropic_glass()
-    rest, beams = through_peak(tree)
+    rest, beams = tree_peak(tree)
     assert beams.shape == (16,)
     np.testing.assert_allclose(beams, 0.8, rtol=1e-9)
     np.testing.assert_allclose(rest.values, 0.05 / np.pi, rtol=1e-9)
     np.testing.assert_allclose(tree.hemispherical() - rest.hemispherical(), beams, rtol=1e-9)
-    assert through_peak(rest)[1].max() == 0
-    np.testing.assert_array_equal(through_peak(isotropic_glass(depth=2))[1], 0)  # cells too wide
+    assert tree_peak(rest)[1].max() == 0
+    np.testing.assert_array_equal(tree_peak(isotropic_glass(depth=2))[1], 0)  # cells too wide
 
 
 def tree_of(grid: np.ndarray) -> TensorTree:
@@ -143,7 +143,7 @@ def test_a_peak_is_more_than_eight_times_what_surrounds_it(rank, times, share):
             grid[i, range(cells), i, range(cells)] = times * level
         elif i < cells // 2:
             grid[i, cells - 1 - i, cells // 2 - 1 : cells // 2 + 1] = times * level
-    rest, beams = through_peak(tree_of(grid))
+    rest, beams = tree_peak(tree_of(grid))
     leaves = 1 if rank == 4 else 2
     assert beams.max() == pytest.approx(leaves * share * level * np.pi / cells**2)
     assert rest.values.max() == pytest.approx(level if share else times * level)
@@ -156,7 +156,7 @@ def test_a_peak_of_several_leaves_is_a_beam_of_all_of_them():
     a, b = np.meshgrid(np.arange(cells), np.arange(cells - 1), indexing="ij")
     grid[a, b, a, b] = 5.0
     grid[a, b, a, b + 1] = 3.0  # to one side
-    rest, beams = through_peak(tree_of(grid))
+    rest, beams = tree_peak(tree_of(grid))
     assert beams[:, :-1] == pytest.approx((8.0 - 2 * level) * np.pi / cells**2)
     assert rest.values.max() == pytest.approx(level)
 
@@ -177,8 +177,8 @@ def coarse_blind(bright: float, dark: float) -> TensorTree:
 
 def test_scattering_that_is_known_in_small_leaves_is_no_beam():
     """Radiance's aBSDF makes one of it: 1.6 times what surrounds it (a blind in 256 cells)."""
-    assert through_peak(coarse_blind(0.033, 0.02))[1].max() == 0
-    assert through_peak(coarse_blind(0.066, 0.02))[1].max() > 5e-4
+    assert tree_peak(coarse_blind(0.033, 0.02))[1].max() == 0
+    assert tree_peak(coarse_blind(0.066, 0.02))[1].max() > 5e-4
 
 
 @pytest.mark.parametrize("mode", ["Radiance", "Importance"])

@@ -10,7 +10,7 @@ from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.glazing import uncoated_values
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_QUARTER
 from mitsuba_cfs.bsdf.layers import combine_layers
-from mitsuba_cfs.bsdf.periodic import SlatMaterial, clear_body, clear_pane, plastic, stacked
+from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial, clear_body, plastic, stacked
 from mitsuba_cfs.bsdf.screens import prism_panel
 
 INDEX = 1.5
@@ -86,6 +86,18 @@ def test_a_prism_bends_as_snell_says(variant):
     # light bends to where the glass is thicker: upwards
     assert np.degrees(np.arctan2(out[1], -out[2])) == pytest.approx(np.degrees(bend), abs=6)
     assert abs(out[0]) < 1e-9
+
+
+def clear_pane(
+    index: float, thickness: float, period: tuple[float, float], *, channels: int = 1
+) -> PeriodicLayer:
+    """A pane of clear glass on a cell of any size: its two faces."""
+    width, height = period
+    outside = np.array([[0, 0, 0], [width, 0, 0], [width, height, 0], [0, height, 0]], dtype=float)
+    inside = outside[::-1] - [0, 0, thickness]
+    triangles = np.array([face[[0, a, a + 1]] for face in (outside, inside) for a in (1, 2)])
+    material = clear_body("glass", index, channels=channels)
+    return PeriodicLayer(triangles, np.zeros(4, dtype=np.int64), (material,), period)
 
 
 def test_a_blind_before_glass_traced_at_once_and_by_layer_algebra(variant):

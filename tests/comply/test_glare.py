@@ -11,8 +11,8 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.comply.blinds import open_and_closed
+from scenes.comply.comply import seat_glare
 from scenes.comply.findings import SeatGlare
-from scenes.comply.glare import seat_glare
 from scenes.comply.needs import DgpExceeded
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem

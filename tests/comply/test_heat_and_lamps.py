@@ -10,8 +10,7 @@ import pytest
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.comply.comply import free_shares
 from scenes.comply.findings import Findings, GridLight, RoomHeat, calendar_of
-from scenes.comply.heat_needs import ComfortShare, DegreeHours
-from scenes.comply.needs import LightingEnergy, ViewFree
+from scenes.comply.needs import ComfortShare, DegreeHours, LightingEnergy, ViewFree
 from scenes.comply.rules import read_rule
 from scenes.demo import WEATHER
 

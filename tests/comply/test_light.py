@@ -14,8 +14,8 @@ from mitsuba_cfs.methods.light import direct_sun_by_group, illuminance
 from mitsuba_cfs.metrics import lm83
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.comply.blinds import diffuse_shade, open_and_closed, with_default_shade
+from scenes.comply.comply import lights_of, sensor_grid_of
 from scenes.comply.glass import sight_through, windows_without_view
-from scenes.comply.light import lights_of, sensor_grid_of
 from scenes.comply.outdoors import outdoors_of
 from scenes.comply.rules import GridTable, read_rule
 from scenes.comply.view_out import view_out

@@ -12,7 +12,7 @@ from bim.shoebox import shoebox
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.comply.assess import NOT_COMPUTED, assess_room, values_of
 from scenes.comply.findings import Findings, RoomHeat, calendar_of
-from scenes.comply.heat_needs import LimitTable
+from scenes.comply.needs import LimitTable
 from scenes.comply.rules import NOT_MET, read_rule, rule_names
 from scenes.comply.uses import RoomUse
 from scenes.demo import WEATHER

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import scenes.demo
 from scenes.comply.blinds import open_and_closed
-from scenes.comply.solar import solar_sentence, solar_sentences
+from scenes.comply.comply import solar_sentence, solar_sentences
 from scenes.fenestration.ratings import rated_state
 from scenes.fenestration.systems import read_system
 

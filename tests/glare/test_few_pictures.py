@@ -233,7 +233,7 @@ def test_elements_of_another_view_are_not_taken(tmp_path, elements_traced, name)
 def test_what_is_lost_or_too_large_is_traced_anew(tmp_path, elements_traced, monkeypatch) -> None:
     """Pictures without their sunlit are none; what cannot be kept leaves no file behind."""
     from mitsuba_cfs.matrices.cache import MatrixCache
-    from mitsuba_cfs.methods import view_cache
+    from mitsuba_cfs.methods import phase_matrices
 
     kept = MatrixCache(tmp_path)
     view_of_light(matrices_of(cache=kept), luminance(1))
@@ -247,7 +247,7 @@ def test_what_is_lost_or_too_large_is_traced_anew(tmp_path, elements_traced, mon
         assert file.stat().st_size == len(whole)
     for other in tmp_path.glob("view-*"):
         other.unlink()
-    monkeypatch.setattr(view_cache, "LARGEST", len(whole) // 2)
+    monkeypatch.setattr(phase_matrices, "LARGEST", len(whole) // 2)
     view_of_light(matrices_of(cache=kept), luminance(1))
     assert not list(tmp_path.glob("view-*"))
 

@@ -215,3 +215,8 @@ def test_shares_and_quantiles_refuse_what_is_no_year():
     assert classes.exceeded_share(tenths, 0.8) == pytest.approx(0.1)
     hours = classes.class_hours([0.35, 0.36, 0.40, 0.45, 0.46, 0.47])
     assert list(hours) == [1, 2, 1, 2] and len(classes.class_hours([0.1])) == 4
+
+
+def test_the_error_of_a_year_is_the_root_mean_square_of_the_known_hours():
+    assert classes.mean_error([3e-3, float("nan"), 4e-3]) == pytest.approx(3.5355e-3, rel=1e-4)
+    assert classes.mean_error([float("nan")]) is None and classes.mean_error([]) is None

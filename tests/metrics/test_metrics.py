@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 
 from mitsuba_cfs.metrics import autonomy, en17037, lm83, schedules
-from mitsuba_cfs.metrics.daylight_factor import daylight_factor
-from mitsuba_cfs.metrics.room import room_metrics
+from mitsuba_cfs.metrics.room import daylight_factor, room_metrics
 from mitsuba_cfs.sky.weather import Weather
 
 ALL = np.ones(10, dtype=bool)

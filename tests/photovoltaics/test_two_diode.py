@@ -8,8 +8,7 @@ import numpy as np
 import pvlib
 import pytest
 
-from scenes.photovoltaics.diode import cell_voltage
-from scenes.photovoltaics.energy import string_power, string_voltage
+from scenes.photovoltaics.energy import diode_voltage, string_power, string_voltage
 from scenes.photovoltaics.two_diode import (
     BOLTZMANN,
     ICE,
@@ -19,6 +18,13 @@ from scenes.photovoltaics.two_diode import (
 )
 
 SHEET = Datasheet(9.2, 39.5, 8.7, 32.0, 60, 0.0005)
+
+
+def cell_voltage(cell, current, irradiance, temperature):
+    """Voltage of one cell that carries a current [A]; negative where it is shaded and driven."""
+    photo, first, second, thermal = cell_currents(cell, irradiance, temperature)
+    inner = diode_voltage(photo, first, second, thermal, cell.shunt, current)
+    return inner - np.asarray(current, dtype=float) * cell.series
 
 
 def test_fitted_cell_meets_every_point_of_the_datasheet():

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from scenes.language.catalogue import in_language
 from scenes.report.answer import judged, met_cell, rooms_answer, summary_answer, systems_answer
-from scenes.report.headline import GOOD, POOR, Card, cards
+from scenes.report.headline import GLARE_OF_PICTURES, GLARE_OF_YEAR, GOOD, POOR, Card, cards
 from scenes.report.page import report_html
 from scenes.report.verdict import verdict
-from scenes.study_report.verdict import study_verdict
+from scenes.study_report.page import study_verdict
 from tests.report.building_page import building
 from tests.report.synthetic import run_result
 from tests.report.test_study_report import study
@@ -66,8 +68,8 @@ def test_rooms_that_fail_are_named_or_counted() -> None:
 
 def test_a_picture_counts_only_without_the_glare_of_the_year() -> None:
     """A picture at sunrise, before anybody works, is no failure where the year's glare is rated."""
-    picture = Card("Highest glare", "0.70", "DGP", "", "intolerable glare", POOR)
-    rated = limited("Protection from glare", "High")
+    picture = Card("A", "0.70", "DGP", "", "intolerable", POOR, code=GLARE_OF_PICTURES)
+    rated = replace(limited("B", "High"), code=GLARE_OF_YEAR)
     assert judged("R", [picture, rated]).failed == ()
     assert judged("R", [picture]).failed == (picture,)
 

@@ -19,8 +19,7 @@ from scenes.study.plan import Case, InputFile, StudyPlan
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
 from scenes.study_report.comparison import finished, glare_share, pareto_front
-from scenes.study_report.page import study_report_html
-from scenes.study_report.verdict import study_verdict
+from scenes.study_report.page import study_report_html, study_verdict
 from tests.report.browser import chromium, inspect
 from tests.report.synthetic import run_result
 

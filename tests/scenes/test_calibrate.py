@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.errors import DataError
-from scenes.calibration.choice import Demand, choose
 from scenes.calibration.costs import HEAT, Calibration, Workload, calibration_file
 from scenes.calibration.shipped import scaled_costs, shipped_costs
 from scenes.calibration.speed import Speed, measured_speed
 from scenes.cost.measure import Cost
+from scenes.study.automatic import Demand, choose
 
 MINUTE, DAY = 60.0, 86400.0
 # Its Tables 5, 8 and 11 [min]; the five-phase sDGP is left out there

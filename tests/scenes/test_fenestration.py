@@ -19,7 +19,6 @@ from mitsuba_cfs.bsdf.glazing import solar_transmittance
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import write_text
-from mitsuba_cfs.images.exr import read_exr
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
@@ -29,6 +28,7 @@ from scenes.fenestration.thermal_system import checked_system, thermal_system
 from tests.bim.honeybee_models import two_rooms, write
 from tests.bim.small_ifc import box_room
 from tests.conftest import REPOSITORY
+from tests.images.exr_reader import read_exr
 from tests.scenes.fenestration_models import (
     COMMON,
     GLAZING,

@@ -107,8 +107,8 @@ def test_directions_turn_counter_clockwise():
     ],
 )
 def test_views_that_mean_nothing_are_refused(view, message):
+    from bim.building_file import chosen_spaces
     from bim.ifc.building import read_ifc
-    from scenes.chosen_rooms import chosen_spaces
     from scenes.year_of_glare.views import chosen_views
 
     building = read_ifc(OFFICE)

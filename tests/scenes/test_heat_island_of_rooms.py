@@ -7,8 +7,7 @@ import pytest
 
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.sky.heat_island import in_city
-from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.sky.weather import Weather, in_city
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import WindowOverrides

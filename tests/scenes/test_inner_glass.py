@@ -11,8 +11,8 @@ from click.testing import CliRunner
 from bim import read_ifc
 from bim.doorways import opened, source_rooms
 from bim.model import Building
+from mitsuba_cfs.bsdf.evaluate import through_peak
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.klems_peak import through_peak
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system, with_see_through
 from scenes.room.inner_glass import CLEAR, inner_glass

@@ -17,7 +17,7 @@ from mitsuba_cfs.methods.phase_matrices import PhaseMatrices
 from mitsuba_cfs.methods.point_in_time import PathLight
 from mitsuba_cfs.methods.reflected_sun import ReflectedSun
 from mitsuba_cfs.trace.kernels.scene import TracedScene
-from scenes.comply.light import lights_of
+from scenes.comply.comply import lights_of
 from scenes.room.inputs import room_inputs
 from scenes.room.light import RoomLight, room_light
 from scenes.room.options import SensorGrid

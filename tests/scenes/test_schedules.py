@@ -9,12 +9,12 @@ import ifcopenshell
 import numpy as np
 import pytest
 
+from bim.building_file import chosen_spaces
 from bim.ifc.building import read_ifc
 from bim.shoebox import shoebox
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
-from scenes.chosen_rooms import chosen_spaces
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.room.operation import OperationHours, check_schedules, read_operation
 from scenes.room.operation_tables import OperationTables

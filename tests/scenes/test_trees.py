@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bim.model import Building
+from bim.model import Building, seasons
 from bim.rays import ray_mesh
-from bim.seasons import seasons
 from bim.surroundings.city_models import read_trees
 from bim.surroundings.crowns import _attenuations
 from bim.surroundings.placement import with_surroundings

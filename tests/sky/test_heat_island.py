@@ -9,8 +9,7 @@ import pandas as pd
 import pytest
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.sky.heat_island import in_city, maximum_heat_island
-from mitsuba_cfs.sky.weather import Weather, dew_point
+from mitsuba_cfs.sky.weather import Weather, dew_point, in_city, maximum_heat_island
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.heat.energyplus import check_twin
 from scenes.heat.files import read_files

@@ -36,7 +36,8 @@ def test_round_trip(tmp_path, kind, components):
     back = read_matrix(path)
     assert back.dtype == np.float64
     np.testing.assert_allclose(back, matrix, rtol=ROUNDING[kind])
-    header = read_header(path)
+    with path.open("rb") as file:
+        header = read_header(file, path)
     assert (header.rows, header.columns, header.components) == matrix.shape
     assert header.format == kind and header.lines == ("made for a test",)
     assert list(tmp_path.iterdir()) == [path]

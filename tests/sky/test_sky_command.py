@@ -66,7 +66,8 @@ def test_dctimestep_takes_our_sky(epw, tmp_path, radiance):
     (tmp_path / "e.mtx").write_bytes(product)
     expected = read_matrix(out).sum(axis=0)[:, 0]
     np.testing.assert_allclose(read_matrix(tmp_path / "e.mtx")[0, :, 0], expected, rtol=1e-5)
-    assert any("cfs" in line for line in read_header(out).lines)
+    with out.open("rb") as file:
+        assert any("cfs" in line for line in read_header(file, out).lines)
 
 
 def test_wea_and_positions(epw, tmp_path):

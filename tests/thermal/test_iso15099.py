@@ -16,7 +16,17 @@ from thermal.climate import no_sun
 from thermal.closure import Closure
 from thermal.emitters import IdealLoads
 from thermal.errors import ThermalInputError
-from thermal.glazing_unit import Environment, GasGap, GlazingLayer, GlazingUnit, Openings
+from thermal.glazing_unit import (
+    Environment,
+    GasGap,
+    GlazingLayer,
+    GlazingUnit,
+    Openings,
+    perforated_layer,
+    sheet_layer,
+    venetian_layer,
+    woven_layer,
+)
 from thermal.iso15099 import (
     NFRC,
     Conditions,
@@ -27,7 +37,6 @@ from thermal.iso15099 import (
     unit_balance,
 )
 from thermal.layer_balance import SIGMA
-from thermal.shade_layers import perforated_layer, sheet_layer, venetian_layer, woven_layer
 
 ARGON = (("argon", 0.9), ("air", 0.1))
 CLEAR = GlazingLayer(0.006, 0.9)

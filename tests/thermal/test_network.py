@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.validation.room_exchange import (
+    absorbed_after_reflections,
+    area_view_factors,
+    layer_absorption,
+    spread_evenly,
+    window_share,
+)
 from thermal.blackbox import LayerAbsorptances
 from thermal.convection import doe2_outside, iso15099_inside, local_wind_factor, tarp_inside
 from thermal.errors import ThermalInputError
 from thermal.network import (
-    area_view_factors,
     closed_exchange,
     exchange_from_view_factors,
     exchange_star,
     outside_factors,
-)
-from thermal.shortwave import (
-    absorbed_after_reflections,
-    layer_absorption,
-    spread_evenly,
-    window_share,
 )
 
 

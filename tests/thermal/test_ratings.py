@@ -14,7 +14,7 @@ from scenes import cli
 from scenes.fenestration.thermal_file import ThermalFile
 from scenes.fenestration.thermal_system import sun_in_layers
 from thermal.glazing import Gap, en410_g_value, en673_u_value, gap_conductances
-from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
+from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit, sheet_layer
 from thermal.ratings import (
     REFERENCE_GLAZINGS,
     ThermalRating,
@@ -22,7 +22,6 @@ from thermal.ratings import (
     layered_ratings,
     shade_ratings,
 )
-from thermal.shade_layers import sheet_layer
 
 
 def rated(tau: float, g: float) -> ThermalRating:

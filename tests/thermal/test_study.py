@@ -12,7 +12,7 @@ import pytest
 from scenes.cli import run as main
 from scenes.heat.study_file import read_study
 from thermal.errors import ThermalInputError
-from thermal.gains import dimmed_share, split_gains
+from thermal.zone import dimmed_share, split_gains
 
 DEMO = Path(__file__).parents[2] / "scenes" / "demo"
 WEATHER = DEMO / "USA_IL_Chicago-OHare.Intl.AP.725300_TMY3.epw"

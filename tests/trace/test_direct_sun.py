@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mitsuba_cfs.bsdf.evaluate import neighbours, through_peak
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.klems_peak import neighbours, through_peak
 
 from . import rooms
 

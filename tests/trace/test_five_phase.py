@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs import phases
+from mitsuba_cfs.bsdf.evaluate import held_beams
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.klems_peak import held_beams
 from mitsuba_cfs.methods.coefficients import (
     GroupCoefficients,
     direct_transmittance,

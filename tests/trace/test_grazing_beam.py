@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from mitsuba_cfs.bsdf.evaluate import specular_exponent, through_peak
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane, pane_values, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.bsdf.klems_peak import specular_exponent, through_peak
 
 pytestmark = pytest.mark.usefixtures("variant")
 

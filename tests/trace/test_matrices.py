@@ -141,13 +141,14 @@ def test_picture_does_not_depend_on_the_block_and_its_illuminance_is_the_view_ma
     from mitsuba_cfs.images.view import fisheye, pixel_directions, pixel_solid_angles
     from mitsuba_cfs.trace.matrices import pixel_view
     from mitsuba_cfs.trace.matrices.view import view_matrix
+    from tests.trace.pixel_pictures import luminance_pictures
 
     room, groups = rooms.test_room()
     view = fisheye((1.8, 2.5, 1.2), (0, -1, 0), 64)
     luminance = np.linspace(500, 5000, 145)[None, :, None]
-    whole = pixel_view.luminance_pictures(room, groups, view, luminance, samples=16)
+    whole = luminance_pictures(room, groups, view, luminance, samples=16)
     monkeypatch.setattr(pixel_view, "BLOCK_BYTES", 8 * 145 * 1000)
-    blocks = pixel_view.luminance_pictures(room, groups, view, luminance, samples=16)
+    blocks = luminance_pictures(room, groups, view, luminance, samples=16)
     np.testing.assert_allclose(whole, blocks, rtol=1e-5)
 
     directions, counts = pixel_directions(view)

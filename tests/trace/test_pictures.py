@@ -235,9 +235,9 @@ def test_windows_reflect_the_rooms_light_in_the_phase_methods():
     """A white back of the window: V's picture is the path-traced one of a Lambertian window."""
     from mitsuba_cfs import phases
     from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
-    from mitsuba_cfs.trace.matrices.pixel_view import luminance_pictures
     from mitsuba_cfs.trace.paths.scene import Sky
     from mitsuba_cfs.trace.pictures.annual import view_matrices
+    from tests.trace.pixel_pictures import luminance_pictures
 
     tau, back = 0.3, 0.6
     interior, groups = rooms.test_room()

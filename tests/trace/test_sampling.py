@@ -68,8 +68,8 @@ def test_generators_of_paths_are_even():
 def test_every_seed_has_paths_of_its_own():
     """The first bounce of a picture's paths was the same with every seed."""
     from mitsuba_cfs.images.view import fisheye
-    from mitsuba_cfs.trace.matrices.pixel_view import picture_matrix_blocks
     from tests.trace import rooms
+    from tests.trace.pixel_pictures import picture_matrix_blocks
 
     room, groups = rooms.test_room()
     view = fisheye((1.8, 2.5, 1.2), (0.5, 1.0, 0.0), 8)  # of walls alone

@@ -15,7 +15,6 @@ from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
 from mitsuba_cfs.trace.kernels.pixel_rows import MOST_TIMES, PictureRows, tile_size
 from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
-from mitsuba_cfs.trace.matrices.pixel_view import picture_matrix_blocks
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints
 from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 from mitsuba_cfs.trace.sun.sunlit_cells import RoomCells, surface_cells
@@ -30,6 +29,7 @@ from mitsuba_cfs.trace.sun.sunlit_rows import (
     window_sunlit_shares,
 )
 from scenes.cost import room as box
+from tests.trace.pixel_pictures import picture_matrix_blocks
 
 from . import rooms
 

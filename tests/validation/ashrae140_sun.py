@@ -10,12 +10,19 @@ from numpy.typing import NDArray
 from mitsuba_cfs.bsdf.glazing import Pane, hemispherical_mean, pane_optics, stack
 from tests.validation.ashrae140_cases import NORMALS, SEEN_FROM, Opening, opening_rooms
 from tests.validation.facade_sun import FacadeSun, SunSteps, facade_sun
+from tests.validation.room_exchange import spread_evenly
 from tests.validation.sunlit_facade import diffuse_lit_share, lit_share
 from tests.validation.sunlit_room import BeamTable, diffuse_hits
-from thermal.blackbox import R_INNER, R_OUTER, Fenestration, layer_absorptances
+from thermal.blackbox import (
+    R_INNER,
+    R_OUTER,
+    Fenestration,
+    LayerResistance,
+    fit_conductance_surface,
+    layer_absorptances,
+)
 from thermal.climate import Solar
-from thermal.glazing import Gap, double_glazing_resistance, en410_g_value, en673_u_value
-from thermal.shortwave import spread_evenly
+from thermal.glazing import GLASS_CONDUCTIVITY, Gap, en410_g_value, en673_u_value
 from thermal.zone import Zone
 
 FloatArray = NDArray[np.float64]
@@ -160,3 +167,21 @@ def box_irradiance(steps: SunSteps) -> dict[str, FacadeSun]:
         for name, normal in NORMALS.items()
         if name != "floor"
     }
+
+
+def double_glazing_resistance(
+    panes: tuple[float, float], gap: Gap, *, conductivity: float = GLASS_CONDUCTIVITY
+) -> LayerResistance:
+    """R(T_m, dT) between the faces of a double glazing, fitted to EN 673's gap over temperatures.
+
+    Args: panes: thicknesses [m], outside and inside.
+    """
+    mean, difference = (
+        a.ravel() for a in np.meshgrid(np.linspace(-15.0, 50.0, 14), np.linspace(1.0, 45.0, 12))
+    )
+    solid = sum(panes) / conductivity
+    resistance = [
+        solid + 1.0 / gap.conductance(d, mean_temperature=m + 273.15)
+        for m, d in zip(mean, difference, strict=True)
+    ]
+    return fit_conductance_surface(mean, difference, np.array(resistance))

@@ -31,8 +31,8 @@ from mitsuba_cfs.metrics.autonomy import area_share
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.sun import SUN_RADIUS
+from scenes.comply.comply import lights_of
 from scenes.comply.findings import Calendar, Findings, GridLight, calendar_of
-from scenes.comply.light import lights_of
 from scenes.comply.needs import Equinox, SunlightExposure
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem

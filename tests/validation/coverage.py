@@ -27,8 +27,8 @@ from mitsuba_cfs.methods.light import illuminance_noise
 from mitsuba_cfs.methods.phase_light import with_sensor_light
 from mitsuba_cfs.methods.standard_error import relative_error_under
 from mitsuba_cfs.metrics.autonomy import daylight_autonomy, daylight_autonomy_noise
-from mitsuba_cfs.metrics.daylight_factor import daylight_factor
 from mitsuba_cfs.metrics.lm83 import spatial_daylight_autonomy_error
+from mitsuba_cfs.metrics.room import daylight_factor
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from scenes import demo

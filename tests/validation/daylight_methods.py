@@ -24,7 +24,6 @@ from mitsuba_cfs import phases, variants
 from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
-from mitsuba_cfs.matrices.fine_basis import fine_basis
 from mitsuba_cfs.methods.light import illuminance, illuminance_with_error
 from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics
 from mitsuba_cfs.methods.phase_light import phase_light
@@ -52,6 +51,7 @@ from tests.validation.blind_room import (
     slats,
     test_room,
 )
+from tests.validation.fine_basis import fine_basis
 from tests.validation.glare_room import (
     glazing,
     known_system,

@@ -19,7 +19,7 @@ from scenes.room.operation_tables import OperationTables
 from tests.validation.differences import rmse_and_bias
 from tests.validation.energyplus_cases import clear_double_year
 from tests.validation.energyplus_program import room_model, run_energyplus
-from thermal.gains import split_gains
+from thermal.zone import split_gains
 
 FLOOR_AREA = 20.0  # [m2]
 OFFICE = """

@@ -21,9 +21,9 @@ from tests.validation.energyplus_cases import STEPS
 from tests.validation.energyplus_program import room_model, run_energyplus
 from tests.validation.facade_sun import facade_sun, sun_steps
 from tests.validation.reference_systems import clear_double
+from tests.validation.room_exchange import area_view_factors
 from thermal.balance import ZoneResult, simulate_zones
 from thermal.climate import Solar
-from thermal.network import area_view_factors
 from thermal.zone import Zone
 
 OUTPUTS = {

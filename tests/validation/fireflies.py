@@ -31,13 +31,13 @@ from numpy.typing import NDArray
 
 import bim
 import mitsuba_cfs as cfs
+from bim.building_file import chosen_spaces
 from bim.sensors import view_point
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs.glare.annual import full_picture
 from mitsuba_cfs.methods.coefficients import group_coefficients
 from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.methods.point_in_time import path_picture
-from scenes.chosen_rooms import chosen_spaces
 from scenes.cost import room as box
 from scenes.input_files import read_building
 from tests.validation import geneva_scene as geneva

@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 from mitsuba_cfs.sky.weather import Weather
 from tests.validation.facade_sun import FacadeSun
 from tests.validation.reference_systems import Optics, ReferenceSystem, at_directions
+from tests.validation.room_exchange import area_view_factors, spread_evenly
 from tests.validation.sunlit_room import BeamTable, BoxRoom, diffuse_hits, first_hits
 from thermal.blackbox import Fenestration
 from thermal.climate import Climate, Solar, sky_temperature
 from thermal.emitters import IdealLoads
-from thermal.network import area_view_factors
-from thermal.shortwave import spread_evenly
 from thermal.zone import Gains, Layer, OpaqueSurface, WindowElement, Zone, work_hours
 
 FloatArray = NDArray[np.float64]

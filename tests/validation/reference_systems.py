@@ -40,8 +40,7 @@ from thermal.blackbox import (
 )
 from thermal.closure import Closure
 from thermal.glazing import Gap
-from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
-from thermal.shade_layers import sheet_layer, venetian_layer
+from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit, sheet_layer, venetian_layer
 from thermal.window_model import WindowModel, window_model
 
 FloatArray = NDArray[np.float64]

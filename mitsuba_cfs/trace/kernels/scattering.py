@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
+from mitsuba_cfs.bsdf.evaluate import ring_falls, specular_exponent, specular_fall, through_peak
 from mitsuba_cfs.bsdf.klems import KlemsBasis
-from mitsuba_cfs.bsdf.klems_peak import ring_falls, specular_exponent, specular_fall, through_peak
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.traced_klems import cell

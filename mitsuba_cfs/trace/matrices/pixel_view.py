@@ -1,4 +1,4 @@
-"""View matrices of the pixels of a picture, and luminance pictures by them."""
+"""View matrices of the pixels of a picture."""
 
 from __future__ import annotations
 
@@ -37,49 +37,6 @@ from mitsuba_cfs.trace.kernels.view_paths import add_mirrored, add_view_paths
 
 BLOCK_BYTES = 128 * 2**20  # of the matrix that is held at a time
 NO_PATCH = -1  # of a ray that meets none
-
-
-def luminance_pictures(
-    surfaces: Surfaces,
-    groups: Sequence[WindowGroup],
-    view: View,
-    window_luminance: ArrayLike,
-    *,
-    samples: int = 32,
-    **options: Any,
-) -> NDArray[np.float32]:
-    """Pictures [H, ny, nx]: luminance of each pixel for every hour's window luminance.
-
-        L[pixel, h] = sum over g, k of V[pixel, g, k] L_window[g, k, h]
-
-    Args:
-        window_luminance: [G, K, H] of the windows towards the room, T D s [cd/m2].
-        samples, options: see `picture_part_blocks`.
-    """
-    window_luminance = np.asarray(window_luminance, dtype=np.float32)
-    G, K, H = window_luminance.shape
-    flat = window_luminance.reshape(G * K, H)
-    pictures = np.zeros((H, view.height * view.width), dtype=np.float32)
-    blocks = picture_matrix_blocks(surfaces, groups, view, samples=samples, **options)
-    for pixels, matrix in blocks:
-        pictures[:, pixels] = (matrix.reshape(len(pixels), G * K) @ flat).T
-    return pictures.reshape(H, view.height, view.width)
-
-
-def picture_matrix_blocks(
-    surfaces: Surfaces, groups: Sequence[WindowGroup], view: View, **options: Any
-) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float32]]]:
-    """Blocks of the view matrix of a picture: pixel numbers [n] and their rows [n, G, K].
-
-    The rows of a pixel hold its radiance per unit radiance of each window patch: 1 shared among the
-    patches that it sees directly, and what the surfaces it sees reflect.
-
-    Args: options: of `picture_part_blocks`.
-    """
-    for block in picture_part_blocks(surfaces, groups, view, **options):
-        reflected = block.lit + block.later
-        whole = block.seen.toarray() + reflected
-        yield block.pixels, whole.reshape(len(whole), len(groups), -1)
 
 
 @dataclass(frozen=True, slots=True)

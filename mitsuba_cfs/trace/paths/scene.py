@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike
 
 from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
-from mitsuba_cfs.bsdf.evaluate import without_beam
+from mitsuba_cfs.bsdf.evaluate import specular_exponent, through_peak, without_beam
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
-from mitsuba_cfs.bsdf.klems_peak import specular_exponent, through_peak
 from mitsuba_cfs.bsdf.plugin import klems_plugin
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf

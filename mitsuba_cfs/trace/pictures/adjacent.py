@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from mitsuba_cfs.bsdf.evaluate import ThroughPeak, specular_exponent
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.klems_peak import ThroughPeak, specular_exponent
 from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup

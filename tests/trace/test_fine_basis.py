@@ -7,8 +7,8 @@ import pytest
 
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_HALF, KlemsBasis
-from mitsuba_cfs.matrices.fine_basis import fine_basis
 from tests.trace import rooms
+from tests.validation.fine_basis import fine_basis
 
 
 @pytest.mark.parametrize("basis", [KLEMS_FULL, KLEMS_HALF])

@@ -1,4 +1,4 @@
-"""Sun inside a room and in its windows: from irradiance per direction to watts per surface."""
+"""Shares of light among the surfaces of a room by closed forms, as EnergyPlus has them."""
 
 from __future__ import annotations
 
@@ -73,3 +73,13 @@ def window_share(
     fits = alpha_back_inner + tau_back <= whole + 1e-6
     require(fits, "window", "room-side absorptance and transmittance exceed 1 - reflectance")
     return np.asarray(absorbed, dtype=float) * (alpha_back_inner / whole)
+
+
+def area_view_factors(area: ArrayLike, normals: ArrayLike) -> NDArray[np.float64]:
+    """View factors [N, N] by area among surfaces that do not face the same way (EnergyPlus)."""
+    a, n = np.asarray(area, dtype=float), np.asarray(normals, dtype=float)
+    apart = (n @ n.T) < np.cos(np.radians(10.0))
+    seen = apart * a[None, :]
+    total = seen.sum(axis=1, keepdims=True)
+    require(bool(np.all(total > 0)), "view factors", "a surface sees no other")
+    return seen / total
