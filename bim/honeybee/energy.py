@@ -83,6 +83,10 @@ class EnergyLibrary:
             material = one if isinstance(one, dict) else self.objects.find("materials", str(one))
             if material is None:
                 raise self.objects.fault(f"no material {one!r:.60}", construction, "materials")
+            if not isinstance(material.get("identifier"), str):
+                raise self.objects.fault(
+                    "expected materials with an identifier", construction, "materials"
+                )
             found.append(material)
         return found
 

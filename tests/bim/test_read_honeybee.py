@@ -254,6 +254,9 @@ def test_the_glass_of_a_modifier_goes_before_the_construction(tmp_path):
             density=-1), "Brick: density: expected a number of at least"),
         (lambda m: m["properties"]["energy"]["global_construction_set"]["constructions"][0].update(
             materials=["Straw"]), "Wall: materials: no material 'Straw'"),
+        (lambda m: m["properties"]["energy"]["global_construction_set"]["constructions"][0].update(
+            materials=[{"type": "EnergyMaterialNoMass", "r_value": 1.0}]),
+         "Wall: materials: expected materials with an identifier"),
         (lambda m: m["properties"]["radiance"]["modifiers"][0].update(r_reflectance="red"),
          "paint: r_reflectance"),
     ],
