@@ -10,17 +10,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydantic import BaseModel
 
 from bim.account import NOT_USABLE
 from bim.model import Building, Space
 from bim.report.issue import Audience, Issue, issue_note
 from bim.report.ranking import Ranked, ranked
-from mitsuba_cfs.bsdf.evaluate import HIDDEN, SPECULAR, SPILL, UNRESOLVED, peak_spill, through_peak
-from mitsuba_cfs.glare.sun_disc import spread_sun_dgp
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration.peaks import peak_note
 from scenes.fenestration.resolver import source_notes, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.fenestration.thermal_system import thermal_system
@@ -37,7 +35,6 @@ TREES = "trees-by-month"
 NOTED = ("rooms-joined-by-size", TREES)  # codes of issues that are notes of a result's pages
 SHOWN = 8  # kinds of issues of a severity that a head lists
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
-LEAST_PEAK = 0.01  # transmittance at normal incidence below which a peak is not noted
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,66 +254,10 @@ def system_notes(
 ) -> tuple[str, ...]:
     """What was assumed of fenestration systems: bands, see-through peaks, U, g and window model."""
     systems = list(systems)
-    notes = [note for system in systems for note in (*system.notes, *_peak_note(system))]
+    notes = [note for system in systems for note in (*system.notes, *peak_note(system))]
     for heat in [] if light_only else map(thermal_system, systems):
         notes += [*heat.notes, heat.named_model]
     return tuple(dict.fromkeys(notes))
-
-
-def _peak_note(system: FenestrationSystem) -> tuple[str, ...]:
-    """A sentence on whether a transmission peak passes straight on, and on the error of that."""
-    bsdf, tree = system.visible.filled(), system.tree
-    basis, omega = bsdf.basis_in, bsdf.basis_in.projected_solid_angles()
-    share = bsdf.see_through if tree is None else tree.see_through
-    is_stated = (tree is None and share is not None) or (tree is not None and share != 1.0)
-    beam = through_peak(bsdf.transmission_front, basis, 1.0).transmittance
-    if system.angular is not None or beam[0] < LEAST_PEAK:
-        return ()
-    passed = omega @ bsdf.direct_hemispherical(bsdf.transmission_front)
-    spill = peak_spill(bsdf.transmission_front, basis) if tree is None else 0.0
-    width = HIDDEN
-    if tree is not None:
-        width = UNRESOLVED * np.sqrt(np.pi) / (1 << max(t.depth for t in tree.blocks().values()))
-    values = {
-        "system": system.name,
-        "peak": float(beam[0]),
-        "file": system.file.name if system.file else system.name,
-    }
-    if is_stated:
-        note = Note(
-            "{system}: {share:.0f} % of the transmission peak ({peak:.2f} at normal incidence) "
-            "passes straight on, as stated; the rest is a lobe.",
-            share=100 * share,
-            **values,
-        )
-    elif spill > SPILL:
-        peaked = beam >= LEAST_PEAK
-        widest = float((omega / np.cos(basis.centres()[0]))[peaked].max())
-        note = Note(
-            "{system}: the transmission peak ({peak:.2f} at normal incidence) is a lobe, as it "
-            "spreads into the neighbouring Klems patches: no sun or view passes straight on. In "
-            "patches it is wider: DGP is up to {error:.2f} too low where the sun is seen through "
-            "it. If it is specular: --see-through {file}=specular.",
-            error=max(spread_sun_dgp(HIDDEN) - spread_sun_dgp((widest / 2 / np.pi) ** 0.5), 0.0),
-            **values,
-        )
-    elif omega @ beam >= SPECULAR * passed:
-        note = Note(
-            "{system}: the transmission peak ({peak:.2f} at normal incidence) is specular, as "
-            "hardly any light is scattered; direct sun and view out use it.",
-            **values,
-        )
-    else:
-        note = Note(
-            "{system}: the data do not show whether the transmission peak ({peak:.2f} at normal "
-            "incidence) is specular or a lobe of less than {width:.1f} degrees; it is taken as "
-            "specular. As a lobe, DGP is up to {error:.2f} lower where the sun is seen through "
-            "it: --see-through {file}=lobe.",
-            width=float(np.degrees(width)),
-            error=-spread_sun_dgp(width),
-            **values,
-        )
-    return (note,)
 
 
 def site_notes(building: Building, weather: Weather) -> tuple[str, ...]:

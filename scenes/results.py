@@ -14,11 +14,13 @@ from bim.model import Building, Space
 from bim.report.issue import Issue
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.images.view import View
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.picture_year.year import PictureYear
 from scenes.head import NO_HEAD, Head
 
-# [%] column of the sensors with three phases: `mitsuba_cfs.methods.sun_by_patches`
-SUNNY_HOUR_ERROR = "sunny_hour_error"
+# Columns with three phases, see `mitsuba_cfs.methods.sun_by_patches`
+SUNNY_HOUR_ERROR = "sunny_hour_error"  # [%] of sensors
+DGP_SUNNY_HOUR_ERROR = "dgp_sunny_hour_error"  # of pictures and hours
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,3 +243,44 @@ class RunResult:
 
     def __repr__(self) -> str:
         return f"<RunResult {self.building.name!r}: {len(self.spaces)} rooms, {self.method}>"
+
+
+def sunny_hour_notes(rooms: Sequence[RoomYear]) -> tuple[str, ...]:
+    """How far the patches of three phases put hours with sun off; none with other methods."""
+    tables = [room.daylight.sensor_metrics for room in rooms]
+    errors = [table[SUNNY_HOUR_ERROR] for table in tables if SUNNY_HOUR_ERROR in table]
+    glare = [
+        picture.glare.get(DGP_SUNNY_HOUR_ERROR, 0.0)
+        for room in rooms
+        for picture in room.glare.pictures
+    ]
+    glare += [
+        float(room.annual_glare[DGP_SUNNY_HOUR_ERROR].max())
+        for room in rooms
+        if room.annual_glare is not None and DGP_SUNNY_HOUR_ERROR in room.annual_glare
+    ]
+    if not errors:
+        return sunny_hour_dgp_notes(max(glare, default=0.0))
+    every = np.concatenate(errors)
+    note = Note(
+        "The three-phase method blurs the sun: in hours with sun on the windows the illuminance of "
+        "a sensor deviates by {mean:.0f} % on average over the sensors, {worst:.0f} % at most, "
+        "from that with the sun at its true position (root mean square of a sample of these "
+        "hours, relative to their mean illuminance).",
+        mean=float(every.mean()),
+        worst=float(every.max()),
+    )
+    return (note, *sunny_hour_dgp_notes(max(glare, default=0.0)))
+
+
+def sunny_hour_dgp_notes(error: float) -> tuple[str, ...]:
+    """The error of three-phase DGP in hours with sun; none where it is 0."""
+    if not error:
+        return ()
+    note = Note(
+        "The three-phase method blurs the sun: in hours with sun on the windows DGP deviates by "
+        "{error:.3f} from that with the sun at its true position (root mean square of a sample of "
+        "these hours).",
+        error=error,
+    )
+    return (note,)

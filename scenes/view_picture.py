@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,18 +17,21 @@ from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import View, fisheye, fitted, pixel_directions
 from mitsuba_cfs.methods.colour_view import coloured_picture
-from mitsuba_cfs.methods.glare import rated_pictures
+from mitsuba_cfs.methods.glare import glare_with, rated_pictures
 from mitsuba_cfs.methods.point_in_time import PathLight, path_picture
 from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import annual_sky
+from scenes.fenestration.peaks import lobe_effect, lobe_note
 from scenes.head import NO_HEAD, Head
 from scenes.inputs import first_states, read_inputs
 from scenes.picture_files import PictureFiles, read_files
 from scenes.picture_options import SUFFIXES, PictureOptions
 from scenes.pictures import write_falsecolour, write_tone_mapped
 from scenes.room_views import check_eye, held_view
-from scenes.viewed_room import viewed_room
+from scenes.viewed_room import ViewedRoom, viewed_room
+
+BOTH_WAYS = 200  # [px] of the pictures that compare a beam with a lobe
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +43,7 @@ class RoomPicture:
     room: str
     time: pd.Timestamp  # middle of the hour
     head: Head = NO_HEAD  # what was left out, what was assumed
-    notes: tuple[str, ...] = ()  # light that is lost through leaks of the model
+    notes: tuple[str, ...] = ()  # lost light, and what an undecided transmission peak does
     glare: GlareResult | None = None  # of a fisheye of the whole hemisphere
     radiance: NDArray[np.float32] | None = None  # [ny, nx, 3] [W/m2/sr] in colour
 
@@ -92,10 +95,20 @@ def room_picture(
             luminance, viewed.bands, viewed.optics, sky, 0, sampling=sampling, progress=steps
         )
     middle = weather.midpoints[hour]
+    notes = (*viewed.leaks(), *([] if rated is None else _as_lobe(light, viewed)))
     return RoomPicture(
-        luminance, view, viewed.space.label, middle, inputs.head, tuple(viewed.leaks()), rated,
-        radiance,
-    )  # fmt: skip
+        luminance, view, viewed.space.label, middle, inputs.head, notes, rated, radiance
+    )
+
+
+def _as_lobe(light: PathLight, viewed: ViewedRoom) -> tuple[str, ...]:
+    """What an undecided transmission peak does to the picture's glare, in a small picture."""
+    if viewed.lobes is None:
+        return ()
+    small = fitted(light.scene.eye, min(light.scene.eye.width, BOTH_WAYS))
+    light, hour = replace(light, scene=replace(light.scene, view=small)), np.zeros(1, dtype=int)
+    both = [glare_with(light, systems, hour) for systems in (light.systems, viewed.lobes)]
+    return (lobe_note(lobe_effect(*both)),)
 
 
 def write_picture(picture: RoomPicture, path: Path, *, print_like: bool = False) -> None:

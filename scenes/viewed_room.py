@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bim.model import COLOURS, Building, Season, Space, in_month, seasons
 from bim.to_tracer import band_scenes
@@ -11,6 +11,7 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.scene import DaylightScene
+from scenes.fenestration.peaks import as_lobes
 from scenes.inputs import Inputs
 from scenes.room.leaks import leak_notes
 from scenes.room.windows import room_windows
@@ -22,6 +23,8 @@ class ViewedRoom:
 
     space: Space
     optics: list[list[BsdfOptics]]  # [G][1]
+    # the same with lobes where the data do not show whether a peak is specular; None: nowhere
+    lobes: list[list[BsdfOptics]] | None
     seasons: tuple[Season, ...]  # surroundings outdoors by months
     scenes: tuple[DaylightScene, ...]  # of each season
     bands: tuple[DaylightScene, ...] = ()  # the first scene by red, green and blue
@@ -63,4 +66,6 @@ def viewed_room(
         band_scenes(season.building, room, windows.groups, view, ("visible",))[0]
         for season in times[1:]
     )
-    return ViewedRoom(room, windows.optics(), times, (visible, *others), tuple(bands))
+    changed = as_lobes(windows.systems)
+    lobes = None if changed is None else replace(windows, systems=changed).optics()
+    return ViewedRoom(room, windows.optics(), lobes, times, (visible, *others), tuple(bands))

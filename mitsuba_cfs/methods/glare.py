@@ -10,7 +10,7 @@ whose equation (20) has the sun twice if its s_d holds it: here s_sky is the sky
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -33,8 +33,8 @@ from mitsuba_cfs.methods.light import (
     eye_illuminance,
     illuminance,
 )
-from mitsuba_cfs.methods.optics import hourly_states
-from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.optics import States, hourly_states
+from mitsuba_cfs.methods.phase_light import PhaseLight, phase_light
 from mitsuba_cfs.methods.phase_pictures import (
     pictures_by_state,
     pictures_in_state,
@@ -118,6 +118,50 @@ def hourly_glare(
             stored = None if entry is None else entry.load()
             table[:, columns] = rated(i, columns) if stored is None else stored.mean[:, columns]
     return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)
+
+
+def glare_with(
+    light: Light,
+    systems: Sequence[States],
+    hours: NDArray[np.int64],
+    metric: str = "DGP",
+    *,
+    options: GlareOptions | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """DGP and illuminance at the eye [lx] of some hours [n] of the light, in the first states.
+
+    Args: systems: [G][J] optics of each window group, as of the light.
+    """
+    dgp, eye = np.zeros(len(hours)), np.zeros(len(hours))
+    for changed, columns in _with_systems(light, systems, hours):
+        rated = hourly_glare(changed, metric, options=options)
+        dgp[columns], eye[columns] = rated.dgp, rated.Ev
+    return dgp, eye
+
+
+def bright_hours(dgp: NDArray[np.float64], count: int) -> NDArray[np.int64]:
+    """Hours [n] to try a change on: half of them of the highest DGP, the rest evenly below."""
+    order = np.argsort(-dgp, kind="stable")
+    top, rest = order[: count // 2], order[count // 2 :]
+    steps = np.unique(np.linspace(0, len(rest) - 1, count // 2).astype(np.int64))
+    return np.sort(np.concatenate([top, rest[steps] if len(rest) else rest]))
+
+
+def _with_systems(
+    light: Light, systems: Sequence[States], hours: NDArray[np.int64]
+) -> Iterator[tuple[PhaseLight | PathLight, NDArray[np.int64]]]:
+    """The light of hours [n] with the systems, season by season, and which of the hours it has."""
+    every = np.arange(len(light.sky.lit))
+    seasons = light.seasons() if isinstance(light, SeasonalLight) else [(light, every)]
+    for one, of_season in seasons:
+        columns = np.flatnonzero(np.isin(hours, of_season))
+        if not len(columns):
+            continue
+        sky = one.sky.part(np.searchsorted(of_season, hours[columns]))
+        if isinstance(one, PhaseLight):
+            yield phase_light(one.matrices, systems, sky, needs=()), columns
+        else:
+            yield replace(one, systems=systems, sky=sky), columns
 
 
 def metric_values(light: Light, metric: str) -> NDArray[np.float64]:

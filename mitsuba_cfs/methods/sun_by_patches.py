@@ -6,9 +6,11 @@ Some of these hours are computed again by the five-phase method, from the same V
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.methods.light import ByPhases, SeasonalLight
+from mitsuba_cfs.glare.evaluation import GlareOptions
+from mitsuba_cfs.methods.glare import hourly_glare
+from mitsuba_cfs.methods.light import ByPhases, Light, SeasonalLight
 from mitsuba_cfs.methods.optics import hourly_states
 from mitsuba_cfs.methods.phase_light import (
     PhaseLight,
@@ -20,6 +22,7 @@ from mitsuba_cfs.methods.phase_light import (
 from mitsuba_cfs.methods.phase_matrices import as_five_phase
 
 HOURS = 64  # of those with sun on a window, evenly spread
+RATED = 16  # of these hours, for glare
 Array = NDArray[np.float64]
 
 
@@ -51,10 +54,56 @@ def _of_season(
     if not len(sunny):
         nothing = np.zeros(len(illuminance))
         return nothing, nothing, 0
-    count = min(HOURS, len(sunny))
-    some = sunny[np.round(np.linspace(0, len(sunny) - 1, count)).astype(np.int64)]
-    matrices = as_five_phase(light.matrices)
-    sharp = with_sensor_light(phase_light(matrices, light.systems, light.sky.part(some), needs=()))
+    some = _sample(sunny, HOURS)
+    sharp = with_sensor_light(_by_five_phases(light, some))
     by_patches = illuminance[:, some]
     at_sun = illuminance_of_all(sharp, rows[:, some])[: len(illuminance)]
     return np.mean((by_patches - at_sun) ** 2, axis=1), by_patches.mean(axis=1), len(sunny)
+
+
+def sunny_hour_dgp_error(
+    light: Light,
+    rated: ArrayLike,
+    metric: str = "DGP",
+    state: ArrayLike | None = None,
+    *,
+    hours: NDArray[np.int64] | None = None,
+    options: GlareOptions | None = None,
+) -> float:
+    """Root mean square error of the DGP of an hour with sun on a window.
+
+    0 without such an hour, and with methods that take the sun at its position.
+
+    Args:
+        rated: [n] DGP of some hours by `hourly_glare`, whose other arguments are the rest.
+    """
+    rows = hourly_states(state, light.systems, light.sky)
+    every = np.full(rows.shape[1], np.nan)
+    every[slice(None) if hours is None else hours] = rated
+    seasons = light.seasons() if isinstance(light, SeasonalLight) else [(light, slice(None))]
+    square, count = 0.0, 0
+    for one, of_season in seasons:
+        if not isinstance(one, PhaseLight) or one.matrices.five_phase:
+            continue
+        by_patches, sunny = every[of_season], shining_hours(one)
+        sunny = sunny[~np.isnan(by_patches[sunny])]
+        if not len(sunny):
+            continue
+        some = _sample(sunny, RATED)
+        sharp = _by_five_phases(one, some)
+        at_sun = hourly_glare(sharp, metric, rows[:, of_season][:, some], options=options)
+        square += len(sunny) * float(np.mean((by_patches[some] - at_sun.dgp) ** 2))
+        count += len(sunny)
+    return float(np.sqrt(square / max(count, 1)))
+
+
+def _sample(hours: NDArray[np.int64], most: int) -> NDArray[np.int64]:
+    """Some of the hours, evenly spread, the first and the last among them."""
+    count = min(most, len(hours))
+    return hours[np.round(np.linspace(0, len(hours) - 1, count)).astype(np.int64)]
+
+
+def _by_five_phases(light: PhaseLight, hours: NDArray[np.int64]) -> PhaseLight:
+    """The light of some hours with the sun at its position, from the same V and D."""
+    matrices = as_five_phase(light.matrices)
+    return phase_light(matrices, light.systems, light.sky.part(hours), needs=())

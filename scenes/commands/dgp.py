@@ -131,7 +131,7 @@ def command(out: Path, page: Path | None, **chosen) -> None:
     for level, count in table["protection_en17037"].value_counts().items():
         views = ngettext("{count} view", "{count} views", count)
         click.echo(f"protection {level}: {views}")
-    head.notes(year.notes)
+    head.notes(outputs.all_notes(year, table))
     click.echo(f"{out / 'views.csv'}")
     click.echo(f"report: {out / 'report.html'}")
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from mitsuba_cfs.glare.classes import mean_error
 from scenes.language.catalogue import N_, gettext, translated
 from scenes.language.numbers import rounded, share
-from scenes.results import SUNNY_HOUR_ERROR, RoomYear, RunResult
+from scenes.results import RunResult
 
 METHODS = {
     "three-phase": N_("three-phase"),
@@ -117,7 +115,7 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
     )
     found = [
         (gettext("Light"), " ".join(gettext(sentence) for sentence in LIGHT[result.method])),
-        (gettext("Error bars"), bars + sun_error_words(rooms) + _glare_error(result)),
+        (gettext("Error bars"), bars + _glare_error(result)),
     ]
     if any("ase1000_250" in room.daylight.room_metrics for room in rooms):
         sun = gettext(
@@ -150,23 +148,6 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
         )
         found.append((gettext("Equal rooms"), text))
     return found
-
-
-def sun_error_words(rooms: Sequence[RoomYear]) -> str:
-    """What the patches of three phases do to hours with sun, after a space; empty otherwise."""
-    tables = [room.daylight.sensor_metrics for room in rooms]
-    errors = [one[SUNNY_HOUR_ERROR] for one in tables if SUNNY_HOUR_ERROR in one]
-    if not errors:
-        return ""
-    error = np.concatenate(errors)
-    return " " + gettext(
-        "The three-phase method blurs the sun: in hours with sun on the windows the illuminance of "
-        "a sensor deviates by {mean} % on average over the sensors, {worst} % at most, from that "
-        "with the sun at its true position (root mean square of a sample of these hours, "
-        "relative to their mean illuminance).",
-        mean=rounded(float(error.mean()), 0),
-        worst=rounded(float(error.max()), 0),
-    )
 
 
 def _glare_error(result: RunResult) -> str:

@@ -13,7 +13,7 @@ from scenes.figures.carpet import carpet, class_carpet
 from scenes.figures.chart import Chart, ChartMark, box
 from scenes.figures.plan import FloorPlan
 from scenes.figures.scale import ColourScale, round_limits
-from scenes.language.catalogue import N_, gettext, ngettext
+from scenes.language.catalogue import N_, gettext, ngettext, translated
 from scenes.language.numbers import percent, rounded, share
 from scenes.report import (
     daylight_figures,
@@ -23,11 +23,10 @@ from scenes.report import (
 )
 from scenes.report.glare_figures import compass
 from scenes.report.headline import Card, cards, occupied
-from scenes.report.method import sun_error_words
 from scenes.report.names import quantity
 from scenes.report.tables import monthly_gains
 from scenes.report.thermal_figures import month_chart
-from scenes.results import RoomYear, RunResult
+from scenes.results import RoomYear, RunResult, sunny_hour_notes
 
 STATE_COLOURS = ("#f0e7c8", "#c9b458", "#8f9d3d", "#4f7f4f", "#2c5f66", "#23395b")
 LOADS = {"heating_w": "part0", "cooling_w": "part1", "lighting_w": "part2"}
@@ -252,4 +251,4 @@ def error_words(room: RoomYear) -> str:
         mean=share(float(error.mean())),
         worst=share(float(error.max())),
     )
-    return noise + sun_error_words([room])
+    return " ".join((noise, *map(translated, sunny_hour_notes([room]))))

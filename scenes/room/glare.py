@@ -21,9 +21,10 @@ from mitsuba_cfs.methods.glare import hourly_glare, rated_pictures
 from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+from mitsuba_cfs.methods.sun_by_patches import sunny_hour_dgp_error
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
-from scenes.results import ColourPicture, GlareResults, LuminancePicture
+from scenes.results import DGP_SUNNY_HOUR_ERROR, ColourPicture, GlareResults, LuminancePicture
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight, picture_light
 from scenes.room.options import Outputs
@@ -57,6 +58,14 @@ def annual_glare(
     table = np.full((room.skies.hours, len(COLUMNS)), np.nan)
     table[room.skies.lit] = np.stack([getattr(rated, name) for name in COLUMNS.values()], axis=1)
     frame = pd.DataFrame(table, index=room.weather.midpoints, columns=list(COLUMNS))
+    if room.options.method == "three-phase":
+        error = sunny_hour_dgp_error(
+            light.light,
+            rated.dgp,
+            state=light.states(state),
+            options=rating_of(room.options.outputs),
+        )
+        frame[DGP_SUNNY_HOUR_ERROR] = np.where(np.isnan(table[:, 0]), np.nan, error)
     return frame.rename_axis("time")
 
 
@@ -175,6 +184,12 @@ def room_glare(
     made = rated_pictures(
         picture_light(room, light), columns, lit_state, options=rating, progress=progress
     )
+    of_all = {}
+    if room.options.method == "three-phase":
+        of_all[DGP_SUNNY_HOUR_ERROR] = sunny_hour_dgp_error(
+            light.light, [result.dgp for _, result in made], state=lit_state, hours=columns,
+            options=rating,
+        )  # fmt: skip
     pictures = []
     for hour, (luminance, result) in zip(hours, made, strict=True):
         glare = {
@@ -188,6 +203,7 @@ def room_glare(
             "cgi": result.cgi,
             "sources": float(result.count),
             "background_luminance": result.background_luminance,
+            **of_all,
         }
         pictures.append(LuminancePicture(hour, luminance, glare, result.labels > 0))
     progress("pictures", 1.0)

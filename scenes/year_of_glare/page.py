@@ -27,6 +27,7 @@ from scenes.report.page import FILES as SHARED
 from scenes.report.page import environment, head_lines
 from scenes.report.page_files import page_files
 from scenes.report.tables import Column, Table
+from scenes.year_of_glare.outputs import all_notes
 from scenes.year_of_glare.year import GlareYear, rating_of
 
 FILES = page_files("scenes.year_of_glare")
@@ -49,7 +50,7 @@ def write_page(
                 year=year,
                 page=page,
                 title=page.title or year.room,
-                head=head_lines(year.head, year.notes),
+                head=head_lines(year.head, all_notes(year, table)),
                 facts=(*_facts(year, table), *page.facts),
                 plan=_plan(year, table),
                 limits=[rounded(limit, 2) for limit in LIMITS],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, finished_glare
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
 from mitsuba_cfs.images.view import View, format_view
 from mitsuba_cfs.matrices.cache import MatrixCache, digest
-from mitsuba_cfs.methods.glare import hourly_glare, rated_pictures
+from mitsuba_cfs.methods.glare import bright_hours, glare_with, hourly_glare, rated_pictures
 from mitsuba_cfs.methods.light import SeasonalLight, seasonal_light
 from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_light import PhaseLight, phase_light
@@ -31,11 +31,13 @@ from mitsuba_cfs.methods.phase_matrices import (
     with_outdoors,
 )
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+from mitsuba_cfs.methods.sun_by_patches import sunny_hour_dgp_error
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, item, part, silent, summed
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.source_code import code_version
+from scenes.fenestration.peaks import lobe_effect
 from scenes.head import NO_HEAD, Head
 from scenes.input_files import InputFiles
 from scenes.inputs import first_states, read_inputs
@@ -44,6 +46,7 @@ from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.views import NamedView, chosen_views, read_files
 
 TRACING = {"daylight": 1.0, "view matrices": 2.0}  # shares of the time
+BOTH_WAYS = 16  # hours that compare a beam with a lobe
 DARK = 0.0  # DGP of the hours of use without sun, for the share of hours
 
 
@@ -55,6 +58,8 @@ class ViewYear:
     ratings: pd.DataFrame  # [L, figures] by the time of each lit hour
     pictures: dict[pd.Timestamp, tuple[NDArray[np.float32], GlareResult]]  # none for sDGP
     seconds: float
+    sunny_hour_error: float = 0.0  # of three-phase DGP, see `sunny_hour_dgp_error`
+    as_lobe: dict[str, float] = field(default_factory=dict)  # of `lobe_effect`
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +83,7 @@ class GlareYear:
     space: Space | None = None  # the room, for its plan
     scenes: Sequence[DaylightScene] = ()  # of each season; none where it is always the same
     season: NDArray[np.int64] | None = None  # [L] of each hour of the sky
+    lobes: Sequence[States] | None = None  # of `ViewedRoom`
 
 
 def read_year(
@@ -121,7 +127,6 @@ def read_year(
     sky = annual_sky(
         weather,
         sampling.subdivision,
-        sun=options.method == "five-phase",
         sun_model=options.sun_model,
         ground=options.sky_ground,
     )
@@ -130,7 +135,7 @@ def read_year(
     return GlareYear(
         options, viewed.space.label, views, viewed.scene, viewed.optics, weather, sky, used, key,
         inputs.head, leaks, inputs.sources, viewed.space, viewed.scenes,
-        season_of(viewed.seasons, weather.midpoints[sky.lit].month.to_numpy()),
+        season_of(viewed.seasons, weather.midpoints[sky.lit].month.to_numpy()), viewed.lobes,
     )  # fmt: skip
 
 
@@ -184,8 +189,15 @@ def rate_views(
             {name: getattr(result, name) for name in FIGURES}, index=times.rename("time")
         )
         shown = _pictures(light, year, result)
+        rating = rating_of(options)
+        error = sunny_hour_dgp_error(light, result.dgp, options.metric, options=rating)
+        as_lobe = {}
+        if year.lobes is not None:
+            hours = bright_hours(result.dgp, BOTH_WAYS)
+            changed = glare_with(light, year.lobes, hours, options.metric, options=rating)
+            as_lobe = lobe_effect((result.dgp[hours], result.Ev[hours]), changed)
         steps("", 1.0)
-        yield ViewYear(named, table, shown, time.monotonic() - start)
+        yield ViewYear(named, table, shown, time.monotonic() - start, error, as_lobe)
 
 
 def _light(

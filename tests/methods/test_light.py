@@ -24,7 +24,7 @@ from mitsuba_cfs.methods.light import (
 from mitsuba_cfs.methods.optics import AngularOptics, BsdfOptics
 from mitsuba_cfs.methods.phase_matrices import phase_matrices, with_outdoors
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
-from mitsuba_cfs.methods.sun_by_patches import sunny_hour_error
+from mitsuba_cfs.methods.sun_by_patches import sunny_hour_dgp_error, sunny_hour_error
 from mitsuba_cfs.sky.annual import given_sky
 from scenes.demo import VENETIAN_BLIND
 from tests.trace import rooms
@@ -106,6 +106,18 @@ def test_three_phases_say_how_far_their_blurred_sun_is_off() -> None:
     assert expected.max() > 0.2  # a spot of sun lies or does not lie on the sensor
     np.testing.assert_allclose(sunny_hour_error(light, None, blurred), expected, rtol=1e-6)
     assert not sunny_hour_error(sharp, None, at_sun).any()
+
+
+def test_three_phases_say_how_far_their_dgp_is_off() -> None:
+    light, sharp = (
+        daylight(scene(), glass(), SKY, method=method, sampling=FEW)
+        for method in ("three-phase", "five-phase")
+    )
+    blurred, at_sun = (hourly_glare(one).dgp for one in (light, sharp))
+    off = abs(blurred - at_sun)[0]
+    assert off > 0.01
+    assert sunny_hour_dgp_error(light, blurred) == pytest.approx(off, rel=1e-6)
+    assert sunny_hour_dgp_error(sharp, at_sun) == 0.0
 
 
 @pytest.mark.parametrize("method", ["three-phase", "five-phase", "point-in-time"])

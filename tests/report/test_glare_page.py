@@ -44,7 +44,7 @@ def table() -> pd.DataFrame:
                  "hours_of_use": 3650, "share_above_0.35": much, "share_above_0.40": 0.6 * much,
                  "share_above_0.45": 0.3 * much, "dgp_exceeded_in_5_percent": 0.3 + much / 2,
                  "protection_en17037": protection, "highest_dgp": 0.3 + much,
-                 "worst_hour": "2017-12-21 12:30:00"}
+                 "worst_hour": "2017-12-21 12:30:00", "dgp_sunny_hour_error": 0.0}
             )  # fmt: skip
     return pd.DataFrame(rows)
 

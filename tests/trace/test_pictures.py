@@ -50,6 +50,39 @@ def random_tree_system(seed: int) -> TensorTreeBsdf:
     return TensorTreeBsdf(transmission_front=tree, transmission_back=tree)
 
 
+def test_panes_before_a_fabric_do_not_hide_the_sun_that_it_scatters():
+    """Pictures were 10 % below rtrace where panes are free beside a fabric."""
+    from mitsuba_cfs.trace.paths.scene import Sky
+
+    from .test_matrices import panes_before_a_screen
+
+    room, sky = black(rooms.test_room()[0]), Sky(DARK, SUN, SUN_LUMINANCE)
+    alone, (screen, panes) = panes_before_a_screen(0.1)
+    by_itself, behind = (
+        eye_illuminance(picture(systems, sky, (room, groups, rooms.NOTHING)))
+        for groups, systems in (
+            ([alone], [diffuser(0.3)]),
+            ([screen, panes], [diffuser(0.3), glass()]),
+        )
+    )
+    assert behind == pytest.approx(by_itself, rel=0.01)
+
+
+def test_paths_that_aim_at_panes_behind_a_fabric_add_no_sun_that_it_scatters():
+    """They were dropped only after that: sensors had up to twice the scattered sun."""
+    from mitsuba_cfs.trace.paths.scene import Sky
+
+    from .test_matrices import panes_before_a_screen
+    from .test_point_in_time import traced
+
+    room, sky = rooms.test_room()[0], Sky(DARK, SUN, SUN_LUMINANCE)
+    alone, (screen, panes) = panes_before_a_screen(0.1)
+    by_itself = traced([diffuser(0.3)], sky, scene=(room, [alone], rooms.NOTHING))
+    scene = (room, [screen, panes], rooms.NOTHING)
+    behind = traced([diffuser(0.3), glass(0.0)], sky, scene=scene)
+    np.testing.assert_allclose(behind.values, by_itself.values, rtol=0.03)
+
+
 def test_no_light_of_a_picture_comes_through_the_room_from_behind():
     """A box closed round the window's outside: no sky or sun may light it through the window."""
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering

@@ -46,7 +46,6 @@ class TreeBehind:
     def __init__(self, tree: TensorTreeBsdf, glass: AngularBeam, between: KlemsBsdf) -> None:
         """From the layer's tree of rank 4, whose through peak is a beam."""
         self._local = mi.load_dict(tensor_tree_plugin(tree, up=(0, 1, 0), peak=True))
-        self._tree = mi.load_dict(tensor_tree_plugin(tree, peak=True))  # in world axes
         self._between = mi.load_dict(klems_plugin(between))
         nothing = between.transmission_front.sum(axis=0) * 0
         self._sun_between = KlemsScattering(KLEMS_FULL, between.transmission_front, nothing)
@@ -79,14 +78,14 @@ class TreeBehind:
 
     def eval(self, context, si, wo, active=True):
         """As a BSDF's: value times cosine, in the interaction's frame."""
-        layer = self._tree.eval(self._scatter, si, wo, active) * self._passed(si.wi, wo)
+        layer = self._local.eval(self._scatter, si, wo, active) * self._passed(si.wi, wo)
         return layer + self._between.eval(context, si, wo, active)
 
     def sample(self, context, si, choice, u, active=True):
         """As a BSDF's: one of the two parts, each half the time."""
         first = choice < 0.5
         choice = 2 * choice - dr.select(first, 0.0, 1.0)
-        drawn, weight = self._tree.sample(self._scatter, si, choice, u, active)
+        drawn, weight = self._local.sample(self._scatter, si, choice, u, active)
         other, other_weight = self._between.sample(context, si, choice, u, active)
         weight = 2 * dr.select(first, weight * self._passed(si.wi, drawn.wo), other_weight)
         drawn.wo = dr.select(first, drawn.wo, other.wo)

@@ -1,11 +1,15 @@
 r"""Radiance scenes of others and of our own, as they are: `cfs picture scene.rad` beside `rtrace`.
 
-    python -m tests.validation radiance_scenes [FOLDER] [--runs 2] [--samples 64] [--size 300]
+    python -m tests.validation radiance_scenes [FOLDER] [--points 4] [--samples 64] [--size 300]
 
 Illuminance at an eye in the room's middle that looks at the window, under one overcast and one
 sunny hour of the EPW, whose dew point is that of gendaylit.  The scenes of FOLDER and those of
-`OURS`: panes in series, a fabric, frosted panels, louvres on their side, a facade opposite.
-A scene that is refused has the message in its row.
+`ours` and `further`: panes in series, fabrics, frosted panels, louvres on their side, a facade
+opposite.  A scene that is refused has the message in its row.
+
+Both programs have the sky on the same patches, as `perezlum.cal` mixes the ground into the sky at
+the horizon.  Radiance spreads the straight beam of a `BSDF` over its patch, as `--see-through
+FILE=lobe` does here; by default it is specular, which is the row without "lobe".
 """
 
 from __future__ import annotations
@@ -21,16 +25,23 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
+from mitsuba_cfs.images.view import parse_view
+from mitsuba_cfs.sky.annual import annual_sky
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import DEFAULT_DEW_POINT_C
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from scenes.demo import VENETIAN_BLIND, WEATHER
-from tests.benchmarks.radiance import environment, eye_illuminance
+from tests.benchmarks.radiance import environment
 from tests.validation.geneva import with_dew_point
+from tests.validation.rendered_scene import RenderedScene
 
 FOLDER = Path(__file__).parents[3] / "shared" / "cases" / "radiance"
 OFFICE = Path(__file__).parents[2] / "docs" / "tutorials" / "office.rad"
 HOURS = {"overcast": "12-21 09:00", "sunny": "03-21 12:00"}  # [month-day hour] of the EPW
-EYE, DIRECTION = (2.0, 4.0, 1.2), (0.0, -1.0, 0.0)
+VIEW = "-vta -vp 2 4 1.2 -vd 0 -1 0 -vu 0 0 1 -vh 180 -vv 180"
+RTRACE = "-ab 12 -aa 0 -ad 20000 -as 0 -lw 1e-8 -lr 16"
+SUBDIVISION = 4
+LOBE = ["--see-through", f"{VENETIAN_BLIND.name}=lobe"]
 
 
 def _pane(material: str, y: float, x: Sequence[float] = (0, 4), z: Sequence[float] = (0, 3)) -> str:
@@ -93,15 +104,57 @@ def ours() -> dict[str, tuple[str, list[str]]]:
         "louvres on their side, pane turned": _turned(_glazed(louvres.format("1 0 0"))),
     }
     scenes: dict[str, tuple[str, list[str]]] = {name: (text, []) for name, text in own.items()}
+    scenes |= {f"{name}, lobe": (own[name], LOBE) for name in own if name.startswith("louvres")}
     scenes["glass facade 6 m opposite"] = office + facade, ["--facade-pane", "facade"]
     return scenes
 
 
+ROOM = """
+void plastic grey 0 0 5 .45 .45 .45 0 0
+void plastic white 0 0 5 .8 .8 .8 0 0
+void plastic ground 0 0 5 .2 .2 .2 0 0
+grey polygon floor 0 0 12 0 0 0 5 0 0 5 7 0 0 7 0
+white polygon ceiling 0 0 12 0 0 2.8 0 7 2.8 5 7 2.8 5 0 2.8
+white polygon north 0 0 12 0 7 0 5 7 0 5 7 2.8 0 7 2.8
+grey polygon west 0 0 12 0 0 0 0 7 0 0 7 2.8 0 0 2.8
+white polygon east 0 0 12 5 0 0 5 0 2.8 5 7 2.8 5 7 0
+grey polygon south 0 0 30 0 0 0 0 0 2.8 5 0 2.8 5 0 0 0 0 0
+ 1 0 0.7 4 0 0.7 4 0 2.3 1 0 2.3 1 0 0.7
+ground polygon plain 0 0 12 -40 -60 -0.1 45 -60 -0.1 45 0 -0.1 -40 0 -0.1
+"""
+WINDOW = (1, 4), (0.7, 2.3)  # x and z of its opening [m]
+
+
+def further() -> dict[str, tuple[str, list[str]]]:
+    """Scenes of another room, made after the readers and not tuned to."""
+    clear, bronze, grey_glass = (
+        f"\nvoid glass {name}\n0\n0\n3 {value} {value} {value}\n"
+        for name, value in (("clear", 0.9), ("bronze", 0.55), ("smoke", 0.7))
+    )
+    three = clear + bronze + grey_glass
+    for name, y in (("clear", 0.0), ("bronze", -0.02), ("smoke", -0.14)):
+        three += _pane(name, y, (0.6, 4.4) if y else WINDOW[0], (0.4, 2.6) if y else WINDOW[1])
+    outside = clear + _pane("clear", 0, *WINDOW) + _cloth(0.12)
+    outside += _pane("cloth", -0.08, (0.7, 4.3), (0.4, 2.6))
+    slanted = f"\nvoid BSDF slats\n6 0 {VENETIAN_BLIND} 0.6 0 0.8 .\n0\n0\n"
+    slanted += clear + _pane("clear", 0, *WINDOW) + _pane("slats", -0.1, (0.6, 4.4), (0.3, 2.7))
+    tower = (
+        "\nvoid glass tower\n0\n0\n3 .5 .5 .5\nvoid plastic core\n0\n0\n5 .02 .02 .02 0 0\n"
+        "!genbox core block 20 6 30 | xform -t -12 -18.02 0\n"
+    ) + _pane("tower", -12, (-12, 8), (0, 30))
+    tower += clear + _pane("clear", 0, *WINDOW)
+    return {
+        "further: three panes, 2 and 12 cm apart": (ROOM + three, []),
+        "further: fabric of 12 %, 8 cm outside": (ROOM + outside, []),
+        "further: louvres at 37 degrees before a pane, lobe": (ROOM + slanted, LOBE),
+        "further: glass tower 12 m opposite": (ROOM + tower, ["--facade-pane", "tower"]),
+    }
+
+
 def by_command(scene: Path, weather: Path, at: str, options: Sequence[str]) -> float | str:
     """Illuminance at the eye [lx] by `cfs picture`, or its refusal."""
-    view = f"-vta -vp {_words(EYE)} -vd {_words(DIRECTION)} -vu 0 0 1 -vh 180 -vv 180"
     words = [
-        "picture", scene, "--weather", weather, "--at", at, "--view", view,
+        "picture", scene, "--weather", weather, "--at", at, "--view", VIEW,
         "--sun-model", "radiance", "--sky-ground", "gendaylit", "--out", scene.with_suffix(".png"),
     ]  # fmt: skip
     done = subprocess.run(
@@ -114,31 +167,26 @@ def by_command(scene: Path, weather: Path, at: str, options: Sequence[str]) -> f
     return float(value.replace(",", ""))
 
 
-def by_rtrace(scene: Path, weather: Path, at: str, runs: int) -> tuple[float, float]:
-    """The same by `rtrace` under gendaylit's sky, and the standard error of its mean."""
+def by_rtrace(scene: Path, weather: Path, at: str, points: int) -> tuple[float, float]:
+    """The same by `rtrace` under the same sky, and the standard error of its mean."""
     hours = read_epw(weather)
     date, _, time = at.partition(" ")
     month, day, hour = (int(part) for part in (*date.split("-"), time[:2]))
     midpoints = pd.DatetimeIndex(hours.midpoints)
-    (row,) = np.flatnonzero(
-        (midpoints.month == month) & (midpoints.day == day) & (midpoints.hour == hour)
+    chosen = (midpoints.month == month) & (midpoints.day == day) & (midpoints.hour == hour)
+    sky = annual_sky(
+        hours, SUBDIVISION, hours=np.flatnonzero(chosen), sun_model="radiance", ground="gendaylit"
     )
-    place = f"-a {hours.latitude_deg} -o {-hours.longitude_deg} -m {-15 * hours.timezone_h}"
-    beam, diffuse = hours.direct_normal[row], hours.diffuse_horizontal[row]
-    sky = f"{month} {day} {hour + 0.5} {place} -W {beam:g} {diffuse:g}"
-    eye = f"{_words(EYE)} {_words(DIRECTION)}"
-    values = [eye_illuminance(scene.parent, [scene.name], sky, eye) for _ in range(runs)]
-    return float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(runs))
-
-
-def _words(numbers: Sequence[float]) -> str:
-    return " ".join(f"{number:g}" for number in numbers)
+    rendered = RenderedScene(scene.parent, scene.name, "", RTRACE)
+    luminance = float(sky.illuminance[0]) / SUN_SOLID_ANGLE
+    rendered.set_sky(sky.without_sun()[:, 0], SUBDIVISION, sky.direction[0], luminance)
+    return rendered.eye_illuminance(parse_view(VIEW), points)
 
 
 def main(
     folder: Path = FOLDER,
     *,
-    runs: Annotated[int, "of rtrace"] = 2,
+    points: Annotated[int, "eyes of rtrace at one place"] = 4,
     samples: Annotated[int, "paths per pixel"] = 64,
     size: Annotated[int, "[px]"] = 300,
     weather: Path = WEATHER,
@@ -147,7 +195,9 @@ def main(
     """A row for each scene and hour [lx]."""
     environment()  # says at once where there is no Radiance
     files = {path.name: path.read_text() for path in sorted(folder.glob("*.rad"))}
-    scenes = {name: (text, []) for name, text in files.items() if "polygon" in text} | ours()
+    scenes = (
+        {name: (text, []) for name, text in files.items() if "polygon" in text} | ours() | further()
+    )
     rows = []
     with tempfile.TemporaryDirectory() as temporary:
         epw = with_dew_point(weather, Path(temporary), DEFAULT_DEW_POINT_C)
@@ -159,7 +209,7 @@ def main(
             for sky, at in HOURS.items():
                 more = [*options, "--samples", str(samples), "--size", str(size)]
                 here = by_command(scene, epw, at, more)
-                there, error = by_rtrace(scene, epw, at, runs)
+                there, error = by_rtrace(scene, epw, at, points)
                 row = {"scene": name, "sky": sky, "rtrace": round(there), "+-": round(error, 1)}
                 deviation = 100 * (here / there - 1) if isinstance(here, float) else None
                 rows.append(row | {"cfs picture": here, "%": deviation and round(deviation, 1)})

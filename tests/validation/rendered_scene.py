@@ -75,7 +75,7 @@ class RenderedScene:
         command = f"rtrace -h -I+ {QUALITY} {self.of_points} scene.oct"
         given = radiance.sensors_text([view.position] * points, [view.direction] * points)
         lines = radiance.run(command, self.folder, given).decode().split()
-        values = np.array(lines, dtype=float).reshape(points, -1)[:, 0] * EFFICACY
+        values = np.array(lines, dtype=float).reshape(points, -1)[:, :3] @ radiance.LUX
         return float(values.mean()), float(values.std(ddof=1) / np.sqrt(points))
 
 

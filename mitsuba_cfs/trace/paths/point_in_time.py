@@ -37,12 +37,11 @@ TO_WINDOW, TO_SUN = (0.5, 0.2), (0.15, 0.05)  # (first, later)
 def _interaction(
     room: PathTracingScene, group: int, direction: mi.Vector3f
 ) -> mi.SurfaceInteraction3f:
-    """Interaction record of a ray along `direction` that meets a window from the room."""
+    """Interaction record, in a window's frame, of a ray along `direction` that meets the window."""
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(direction))
-    normal = mi.Normal3f(*map(float, room.inside.groups[group].frame[2]))
-    si.n = normal
-    si.sh_frame = mi.Frame3f(normal)
-    si.wi = si.to_local(-direction)
+    si.n = mi.Normal3f(0, 0, 1)
+    si.sh_frame = mi.Frame3f(mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0), mi.Vector3f(0, 0, 1))
+    si.wi = -room.inside.to_group(group, direction)
     return si
 
 
@@ -131,7 +130,7 @@ def window_parts(
             si, context = _interaction(room, g, direction), mi.BSDFContext()
             sample, weight = system.bsdf.sample(context, si, choice, u, mine)
             rest = dr.select(mine, weight[0], rest)
-            away = dr.select(mine, si.to_world(sample.wo), away)
+            away = dr.select(mine, room.inside.to_world(g, sample.wo), away)
     return scattered, straight, mirrored, mirror, rest, away
 
 
@@ -146,9 +145,10 @@ def scattered_at(
     scattered = mi.Float(0)
     for g, system in enumerate(room.systems):
         if system.bsdf is not None:
-            sunny = glazed & (group == g) & (room.inside.to_group(g, towards).z > 0)
+            local = room.inside.to_group(g, towards)
+            sunny = glazed & (group == g) & (local.z > 0)
             si = _interaction(room, g, direction)
-            value = system.bsdf.eval(mi.BSDFContext(), si, si.to_local(towards), sunny)
+            value = system.bsdf.eval(mi.BSDFContext(), si, local, sunny)
             scattered = dr.select(sunny, value[0], scattered)
     return scattered
 
@@ -242,7 +242,7 @@ def add_paths(
         local = room.inside.to_local(group, direction, glazed)
         facing = dr.select(outdoors, -local.z, local.z) > 1e-4  # windows are one-sided
         active &= ~glazed | facing
-        glazed &= facing
+        glazed &= active
         glass_cosine = dr.select(glazed & ~outdoors, local.z, 0.0)
         density = _density(
             room, sky, cosine, direction, t, glass_cosine=glass_cosine, later=depth > 0

@@ -21,7 +21,13 @@ from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import SkyBins
-from mitsuba_cfs.trace.kernels.scattering import AngularBeam, PatchBeam, TreeBeam, loaded
+from mitsuba_cfs.trace.kernels.scattering import (
+    WINDOW_UP,
+    AngularBeam,
+    PatchBeam,
+    TreeBeam,
+    loaded,
+)
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.specular_paths import SpecularPath, mirror_sequences
 
@@ -35,7 +41,7 @@ class PathOptics:
         beam: AngularBeam | PatchBeam | None = None,
         mirrors: tuple[AngularBeam | None, AngularBeam | None] = (None, None),
     ) -> None:
-        """From the plugin of the scattered light, without the straight `beam`.
+        """From the plugin of the scattered light in window axes, without the straight `beam`.
 
         Args: mirrors: specular reflectance of the front (outdoors) and of the back.
         """
@@ -123,10 +129,12 @@ def path_optics(bsdf: Bsdf, angular: AngularTable | None = None) -> PathOptics:
     if angular is not None:
         return _specular_system(replace(bsdf, see_through=1.0), angular)
     if isinstance(bsdf, TensorTreeBsdf):
-        return PathOptics(loaded(tensor_tree_plugin(without_beam(bsdf))), TreeBeam(bsdf))
+        return PathOptics(
+            loaded(tensor_tree_plugin(without_beam(bsdf), up=WINDOW_UP)), TreeBeam(bsdf)
+        )
     front = through_peak(bsdf.filled().transmission_front, bsdf.basis_in, bsdf.see_through)
     beam = PatchBeam(bsdf.basis_in, front.transmittance, specular_exponent(front, bsdf.basis_in))
-    return PathOptics(loaded(klems_plugin(without_peaks(bsdf, "transmission"))), beam)
+    return PathOptics(loaded(klems_plugin(without_peaks(bsdf, "transmission"), up=WINDOW_UP)), beam)
 
 
 def without_peaks(bsdf: KlemsBsdf, *kinds: str) -> KlemsBsdf:
@@ -158,8 +166,8 @@ def _specular_system(bsdf: Bsdf, angular: AngularTable) -> PathOptics:
                 transmission_front=trees.transmission_front,
                 transmission_back=trees.transmission_back,
             )
-        return PathOptics(loaded(tensor_tree_plugin(trees)), beam, tuple(mirrors))
+        return PathOptics(loaded(tensor_tree_plugin(trees, up=WINDOW_UP)), beam, tuple(mirrors))
     rest = without_peaks(bsdf, *kinds)
     if not any(block is not None and block.any() for block in rest.blocks().values()):
         return PathOptics(None, beam, tuple(mirrors))
-    return PathOptics(loaded(klems_plugin(rest)), beam, tuple(mirrors))
+    return PathOptics(loaded(klems_plugin(rest, up=WINDOW_UP)), beam, tuple(mirrors))

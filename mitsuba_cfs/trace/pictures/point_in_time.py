@@ -313,7 +313,7 @@ class _Kernel:
         step = inside.outward(group, glazed)
         outer, inner = mi.Point3f(point + step), mi.Point3f(point - step)
         sunlit = glazed & (scattered > 0) & (sky.sun_radiance > 0)
-        sunlit &= ~room.outside.scene.ray_test(mi.Ray3f(outer, towards), False, sunlit)
+        sunlit &= ~room.outside.hides(mi.Ray3f(outer, towards), sunlit)
         sun = scattered * float(SUN_SOLID_ANGLE) * sky.sun_radiance
         sharp += dr.select(sunlit, mi.Float64(sun), 0.0)
         if room.glossy:
@@ -380,8 +380,7 @@ class _Kernel:
         outside = room.outside
         lane, outdoors = dr.arange(mi.UInt32, dr.width(direction)), mi.Bool(True)
         active = active & (straight > 0)
-        ray = mi.Ray3f(origin, direction)
-        hit = outside.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+        hit, before = outside.met_outdoors(origin, direction, active)
         free = active & ~hit.is_valid()
         radiance = dr.gather(mi.Float, sky.radiance, sky.bins.index(direction), free)
         sharp = dr.select(free, mi.Float64(straight * radiance), 0.0)
@@ -391,7 +390,7 @@ class _Kernel:
         normal = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, opaque)
         behind = dr.dot(normal, direction) > 0
         normal = dr.select(behind, -normal, normal)
-        place = mi.Point3f(origin + direction * hit.t + normal * room.inside.epsilon)
+        place = mi.Point3f(before + direction * hit.t + normal * room.inside.epsilon)
         vertex = Vertex(place, normal, outdoors)
         rho = outside.diffuse(hit.prim_index, -dr.dot(normal, direction), opaque)
         u_sun = mi.Point2f(generator.next_float32(), generator.next_float32())
