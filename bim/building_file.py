@@ -430,4 +430,4 @@ def _quoted(issues: Sequence[Issue]) -> str:
     texts = [issue_text(issue, "command") for issue in issues[:QUOTED]]
     shown = "; ".join(f"{text.what} ({text.effect})" for text in texts)
     more = len(issues) - QUOTED
-    return f"{shown}; and {more} more, see cfs check" if more > 0 else shown
+    return f"{shown}; and {more} more" if more > 0 else shown

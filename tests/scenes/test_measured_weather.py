@@ -160,7 +160,11 @@ def test_energyplus_is_not_given_measured_weather(tmp_path) -> None:
     with pytest.raises(DataError, match="EnergyPlus needs an EPW file") as found:
         check_twin(study)
     assert found.value.file == study.weather and found.value.field == "measured"
-    check_twin(SimpleNamespace(measured=None, heat_island=None, weather=tmp_path / "city.epw"))
+    check_twin(
+        SimpleNamespace(
+            measured=None, heat_island=None, air_nodes=(), weather=tmp_path / "city.epw"
+        )
+    )
 
 
 def test_a_few_days_say_nothing_of_the_ground(tmp_path) -> None:

@@ -60,6 +60,12 @@ def _goniophotometer(inputs: Path, out: Path) -> list[object]:
     return ["bsdf", "interpolate", inputs / "sample.txt", *words]
 
 
+def _corrected(inputs: Path, out: Path) -> list[object]:
+    (inputs / "office.ifc").write_bytes(OFFICE.read_bytes())
+    (inputs / "office.corrections.toml").write_text("north = 30.0\n")
+    return ["ifc", "correct", inputs / "office.ifc", "--out", out]
+
+
 def _measured(inputs: Path, out: Path) -> list[object]:
     rows = "time,global_horizontal,diffuse_horizontal\n2020-06-21 12:00,500,200\n"
     (inputs / "m.csv").write_text(rows + "2020-06-21 13:00,500,200\n")
@@ -102,6 +108,8 @@ JOBS = {
         ], "out.ifc",
     ),
     "check": Job(lambda _, out: ["check", OFFICE, "--csv", out], "out.csv"),
+    "check --bcf": Job(lambda _, out: ["check", OFFICE, "--bcf", out], "out.bcfzip"),
+    "ifc correct": Job(_corrected, "out.ifc"),
     "ifc attach": Job(lambda _, out: ["ifc", "attach", OFFICE, "--all", "--u", 1.1, "-o", out],
                       "out.ifc"),
     "export --radiance": Job(lambda _, out: ["export", OFFICE, "--radiance", out],
