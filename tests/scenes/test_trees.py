@@ -192,7 +192,7 @@ def test_a_year_of_glare_behind_trees(variant, tmp_path, capfd):
         assert cli.run([str(word) for word in words]) == 0, capfd.readouterr().err
         manifest = json.loads((out / "glare_year.json").read_text())
         assert manifest["options"]["surroundings"] == [str(trees)]
-        assert "trees" in " ".join(manifest["notes"]) or "tree(s)" in " ".join(manifest["notes"])
+        assert "crown transmits" in " ".join(manifest["notes"])
         (table,) = out.glob("*.parquet")
         year = pd.read_parquet(table)
         found[kind] = year["Ev"].groupby(year.index.month).mean()

@@ -142,7 +142,7 @@ def write_rooms(scene: DaylightScene, folder: Path) -> None:
 def _all_behind(rooms) -> Iterator[DaylightScene]:
     for room in rooms:
         yield room
-        yield from _all_behind({id(one.scene): one.scene for one in room.beyond}.values())
+        yield from _all_behind({id(one.scene): one.scene for one in room.adjacent}.values())
 
 
 def _without_panes(room: DaylightScene, before: DaylightScene) -> Surfaces:
