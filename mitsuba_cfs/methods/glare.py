@@ -32,6 +32,7 @@ from mitsuba_cfs.methods.light import (
     SeasonalLight,
     eye_illuminance,
     illuminance,
+    seasons_of,
 )
 from mitsuba_cfs.methods.optics import States, hourly_states
 from mitsuba_cfs.methods.phase_light import PhaseLight, phase_light
@@ -151,9 +152,7 @@ def _with_systems(
     light: Light, systems: Sequence[States], hours: NDArray[np.int64]
 ) -> Iterator[tuple[PhaseLight | PathLight, NDArray[np.int64]]]:
     """The light of hours [n] with the systems, season by season, and which of the hours it has."""
-    every = np.arange(len(light.sky.lit))
-    seasons = light.seasons() if isinstance(light, SeasonalLight) else [(light, every)]
-    for one, of_season in seasons:
+    for one, of_season in seasons_of(light):
         columns = np.flatnonzero(np.isin(hours, of_season))
         if not len(columns):
             continue

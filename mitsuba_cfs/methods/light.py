@@ -91,6 +91,13 @@ Light: TypeAlias = PhaseLight | PathLight | SeasonalLight
 ByPhases: TypeAlias = PhaseLight | SeasonalLight
 
 
+def seasons_of(light: Light) -> list[tuple[PhaseLight | PathLight, NDArray[np.int64]]]:
+    """The light of each season and its hours; without seasons the light itself and all hours."""
+    if isinstance(light, SeasonalLight):
+        return light.seasons()
+    return [(light, np.arange(len(light.sky.lit)))]
+
+
 def daylight(
     scene: DaylightScene,
     systems: Sequence[States],

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.glare.evaluation import GlareOptions
 from mitsuba_cfs.methods.glare import hourly_glare
-from mitsuba_cfs.methods.light import ByPhases, Light, SeasonalLight
+from mitsuba_cfs.methods.light import ByPhases, Light, seasons_of
 from mitsuba_cfs.methods.optics import hourly_states
 from mitsuba_cfs.methods.phase_light import (
     PhaseLight,
@@ -36,9 +36,8 @@ def sunny_hour_error(light: ByPhases, state: NDArray[np.int64] | None, illuminan
         illuminance: that of the sensors in this state [S, L] [lx].
     """
     rows = hourly_states(state, light.systems, light.sky)
-    seasons = light.seasons() if isinstance(light, SeasonalLight) else [(light, slice(None))]
     square, total, count = np.zeros(len(illuminance)), np.zeros(len(illuminance)), 0
-    for one, hours in seasons:
+    for one, hours in seasons_of(light):
         if isinstance(one, PhaseLight) and not one.matrices.five_phase:
             off, lit, n = _of_season(one, rows[:, hours], illuminance[:, hours])
             square, total, count = square + n * off, total + n * lit, count + n
@@ -80,9 +79,8 @@ def sunny_hour_dgp_error(
     rows = hourly_states(state, light.systems, light.sky)
     every = np.full(rows.shape[1], np.nan)
     every[slice(None) if hours is None else hours] = rated
-    seasons = light.seasons() if isinstance(light, SeasonalLight) else [(light, slice(None))]
     square, count = 0.0, 0
-    for one, of_season in seasons:
+    for one, of_season in seasons_of(light):
         if not isinstance(one, PhaseLight) or one.matrices.five_phase:
             continue
         by_patches, sunny = every[of_season], shining_hours(one)

@@ -63,8 +63,8 @@ def daylight_autonomy_noise(
     """
     values, of_schedule = scheduled(illuminance, hours), np.asarray(hours)
     distance = np.abs(values / threshold - 1)
-    few = np.partition(distance, min(NEAR_HOURS, len(distance)) - 1, axis=0)
-    few = few[min(NEAR_HOURS, len(distance)) - 1]
+    last = min(NEAR_HOURS, len(distance)) - 1
+    few = np.partition(distance, last, axis=0)[last]
     width = np.maximum(ERROR_STEP * np.asarray(relative_error), few)
     width = np.clip(width, LEAST_WIDTH, MOST_WIDTH)
     near = distance <= width

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -20,8 +19,13 @@ from scenes.commands.room_options import (
 )
 from scenes.result_folder import ResultFolder
 
-if TYPE_CHECKING:
-    pass
+out_option = click.option(
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="IFC file to write.",
+)
 
 
 @click.command()
@@ -107,13 +111,7 @@ for _name, _current in (("check", check), ("export", export)):
 @click.option(
     "--reference", is_flag=True, help="Store a reference to the BSDF file instead of its contents."
 )
-@click.option(
-    "-o",
-    "--out",
-    required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="IFC file to write.",
-)
+@out_option
 def attach(
     building: Path,
     *,
@@ -151,13 +149,7 @@ def attach(
 
 @command.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@click.option(
-    "-o",
-    "--out",
-    required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="IFC file to write.",
-)
+@out_option
 def correct(building: Path, out: Path) -> None:
     """Write the corrections beside an IFC file into a copy of it.
 
