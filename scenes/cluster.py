@@ -215,7 +215,7 @@ class Cluster(Generic[T, R]):
 
         try:
             return Client(self._address, timeout=seconds, set_as_default=False)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, TypeError, RuntimeError) as error:  # the last two: of TLS
             message = f"no Dask scheduler answers there: {one_line(str(error))}"
             raise DataError(message, element=self._address, field="--scheduler") from error
 
