@@ -1,6 +1,6 @@
 """The same run and study again: other numbers of processes and threads, other states of the cache.
 
-    python -m tests.validation repeated [MODEL] [--processes 1 2 4]
+    python -m tests.validation repeated
 
 `cfs run --quick` of two rooms and `cfs study` of two orientations, each variant in a folder of its
 own; every file is compared with that of the first variant, tables by column.
@@ -13,17 +13,17 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 import pandas as pd
-from cyclopts import Parameter
 
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from tests.conftest import REPOSITORY
 from tests.scenes.study_files import BOX, FEW_RAYS
 from tests.validation.places import STUDY
 
+MODEL = REPOSITORY / "docs" / "tutorials" / "two_rooms.hbjson"
+PROCESSES = (1, 2, 4)
 TABLES = {".csv": pd.read_csv, ".parquet": pd.read_parquet}
 
 
@@ -59,11 +59,7 @@ def compared(first: Path, other: Path) -> str:
     return f"{len(files) - len(differ)} of {len(files)} | {', '.join(others) or '-'} | {worst}"
 
 
-def main(
-    model: Annotated[Path, Parameter()] = REPOSITORY / "docs" / "tutorials" / "two_rooms.hbjson",
-    *,
-    processes: Annotated[tuple[int, ...], Parameter(consume_multiple=True)] = (1, 2, 4),
-) -> None:
+def main() -> None:
     """One row for each variant."""
     print(
         "| command | variant | files of the same bytes | others | largest difference in a table |"
@@ -76,14 +72,14 @@ def main(
         text = STUDY.format(box=BOX, blind=VENETIAN_BLIND, rest=FEW_RAYS, climates=climate)
         study.write_text(f"orientations_deg = [0, 90]\n{text}", encoding="utf-8")
         commands = {
-            "run": ["run", model, "--weather", WEATHER, "--quick"],
+            "run": ["run", MODEL, "--weather", WEATHER, "--quick"],
             "study": ["study", study],
         }
         for command, words in commands.items():
             first: Path | None = None
             variants: list[tuple[str, str, dict[str, str]]] = [
                 (f"{count} processes, empty cache", f"--processes={count}", {})
-                for count in processes
+                for count in PROCESSES
             ]
             variants.insert(1, ("the same, cache of the first", "", {}))
             variants.append(("1 process, one thread of BLAS", "", {"OPENBLAS_NUM_THREADS": "1"}))
