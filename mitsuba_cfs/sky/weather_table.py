@@ -251,6 +251,7 @@ EPW_FIELDS: dict[str, tuple[int, float, float, float]] = {
     "opaque sky cover": (23, 99.0, 0.0, 10.0),
     "snow depth": (30, 999.0, 0.0, 998.0),
     "albedo": (32, 999.0, 0.01, 1.0),
+    "liquid precipitation depth": (33, 999.0, 0.0, 400.0),
 }
 EPW_HEADER = (
     "LOCATION",

@@ -36,6 +36,9 @@ RULES = {
     "irradiance": N_("by irradiance on the windows"),
     "glare": N_("most open state without glare at the view point"),
     "cut-off": N_("most open slats that block the direct sun (cut-off)"),
+    "outdoor temperature": N_("closed above an outdoor temperature"),
+    "wind": N_("open in strong wind"),
+    "rain": N_("open in rain"),
     "any": N_("several rules, the most closed state"),
     "all": N_("several rules, the most open state"),
 }
