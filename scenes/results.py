@@ -196,7 +196,7 @@ class RoomYear:
     operation: OperationResult | None = None  # None: first shading state all year, floating freely
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
     dgp: AnnualGlare | None = None  # [n] by the metric and in the hours of `rate`
-    dgp_sunny_hour_error: float = 0.0  # of `dgp` by three phases
+    dgp_sunny_hour_error: float = 0.0  # of three-phase `dgp`
     as_lobe: dict[str, float] = field(default_factory=dict)  # of `scenes.room.lobes`
     issues: tuple[Issue, ...] = ()  # of the traced model
     explored: ExploredRoom | None = None  # for the explorer
