@@ -76,6 +76,8 @@ def lobe_notes(effects: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
             Note(
                 "As a lobe, an undecided transmission peak changes the illuminance of a sensor by "
                 "{least:+.1f} to {most:+.1f} % (mean of {count} hours with sun).",
+                "As a lobe, an undecided transmission peak changes the illuminance of a sensor by "
+                "{least:+.1f} to {most:+.1f} % (in an hour with sun).",
                 count=int(lit[0]["sensor_hours_both_ways"]),
                 least=min(one["sensor_change_least"] for one in lit),
                 most=max(one["sensor_change_most"] for one in lit),
