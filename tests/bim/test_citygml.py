@@ -319,7 +319,7 @@ def test_a_file_that_is_read_leaves_no_parser(tmp_path):
     gc.disable()
     try:
         read_surroundings(path)
-        assert not [x for x in gc.get_objects() if isinstance(x, xml_elements._Reader)]
+        assert not [x for x in gc.get_objects() if type(x) is xml_elements._Reader]
     finally:
         gc.enable()
 
