@@ -168,7 +168,7 @@ def by_command(
         if code:
             line = refusal.getvalue().strip().splitlines()[-1]
             return f"refused: line {line.rpartition(f'{scene}:')[2].partition(';')[0]}"
-        (value,) = re.findall(r"Ev ([\d,]+) lx", shown.getvalue())
+        (value,) = re.findall(r"Ev ([\d,.]+) lx", shown.getvalue())
         values.append(float(value.replace(",", "")))
     return float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(seeds))
 
