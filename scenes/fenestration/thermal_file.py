@@ -157,7 +157,7 @@ def read_angular_table(path: Path) -> AngularTable:
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             rows = list(csv.DictReader(line for line in stream if line.strip()))
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DataError(f"cannot be read: {reason(error)}", file=path) from None
     if not rows or not set(ANGULAR_COLUMNS) <= set(rows[0]):
         raise DataError(f"expected the columns {', '.join(ANGULAR_COLUMNS)}", file=path)

@@ -122,10 +122,12 @@ def test_options_of_other_formats_are_refused(tmp_path):
 
 
 def test_a_room_without_its_floor_names_the_surfaces_that_are_not_read(tmp_path):
-    mixed = "\nvoid mixfunc mixed\n4 plaster carpet .5 .\n0\n0\n\nmixed polygon floor"
+    mixed = (
+        "\nvoid mixpict mixed\n7 plaster carpet grey a.hdr b.cal u v\n0\n0\n\nmixed polygon floor"
+    )
     path = tmp_path / "scene.rad"
     path.write_text(OFFICE.read_text().replace("\ncarpet polygon floor", mixed))
-    with pytest.raises(RoomError, match=r"has no floor; .* 1 of type mixfunc \(.*scene\.rad:\d+\)"):
+    with pytest.raises(RoomError, match=r"has no floor; .* 1 of type mixpict \(.*scene\.rad:\d+\)"):
         read_building_file(path)
 
 
