@@ -122,10 +122,12 @@ def test_options_of_other_formats_are_refused(tmp_path):
 
 
 def test_a_room_without_its_floor_names_the_surfaces_that_are_not_read(tmp_path):
-    mixed = "\nvoid mixfunc mixed\n4 plaster carpet .5 .\n0\n0\n\nmixed polygon floor"
+    mixed = (
+        "\nvoid mixpict mixed\n7 plaster carpet grey a.hdr b.cal u v\n0\n0\n\nmixed polygon floor"
+    )
     path = tmp_path / "scene.rad"
     path.write_text(OFFICE.read_text().replace("\ncarpet polygon floor", mixed))
-    with pytest.raises(RoomError, match=r"has no floor; .* 1 of type mixfunc \(.*scene\.rad:\d+\)"):
+    with pytest.raises(RoomError, match=r"has no floor; .* 1 of type mixpict \(.*scene\.rad:\d+\)"):
         read_building_file(path)
 
 
@@ -377,3 +379,8 @@ def test_a_pane_beside_whose_fabric_light_passes_is_a_window_too(tmp_path, left,
     assert sum(window.area for window in building.windows) == pytest.approx(
         2.8 * 1.6 + (0.6 - left) * 1.6, abs=0.04
     )
+    fronts = [part for part in building.spaces[0].furniture if part.name == "blind"]
+    assert len(fronts) == panes - 1
+    for front in fronts:  # the cloth's outdoor side, lit by the panes
+        assert front.reflectance_visible == pytest.approx(0.4, abs=1e-3)
+        assert 0 < 0.08 - front.triangles[..., 1].max() < 0.001
