@@ -131,6 +131,19 @@ def layered_window(
     return LayeredWindow(state, ups[0] if ups else None, tuple(issues))
 
 
+def front_reflectance(thing: RadianceObject, outward: bool) -> float:
+    """Reflectance of a layer's outdoor side for diffuse light.
+
+    Args: outward: whether its front is outdoors.
+    """
+    is_system = thing.material.kind in SYSTEMS
+    layer = _bsdf_layer(thing, outward) if is_system else _layer(thing, outward, [])
+    klems = layer.klems if isinstance(layer, WindowLayer) else klems_of(layer)
+    block = klems.filled().reflection_front
+    omega = klems.basis_in.projected_solid_angles()
+    return 0.0 if block is None else float(omega @ klems.direct_hemispherical(block) / omega.sum())
+
+
 def _beam_table(layers: Sequence[WindowLayer]) -> AngularTable:
     whole = stack([layer.specular for layer in layers])
     values = (whole.tau, whole.rho_front, whole.rho_back)

@@ -379,3 +379,8 @@ def test_a_pane_beside_whose_fabric_light_passes_is_a_window_too(tmp_path, left,
     assert sum(window.area for window in building.windows) == pytest.approx(
         2.8 * 1.6 + (0.6 - left) * 1.6, abs=0.04
     )
+    fronts = [part for part in building.spaces[0].furniture if part.name == "blind"]
+    assert len(fronts) == panes - 1
+    for front in fronts:  # the cloth's outdoor side, lit by the panes
+        assert front.reflectance_visible == pytest.approx(0.4, abs=1e-3)
+        assert 0 < 0.08 - front.triangles[..., 1].max() < 0.001
