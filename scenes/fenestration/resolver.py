@@ -97,9 +97,11 @@ def _system(state: ShadingState, window: Window, path: Path, source: str) -> Fen
     named = "" if state.file is None else f" as {state.file.name}"
     thermal = held_thermal(state)
     angular = thermal.pop("angular") if state.angular is not None else None
+    share = thermal.pop("see_through")
     thermal |= {"source": f"{source}{named}", "file": state.file}
     system = system_of(state.bands, name, path=path, **thermal)
-    return system if angular is None else replace(system, angular=angular)
+    system = system if angular is None else replace(system, angular=angular)
+    return system if share is None else with_see_through(system, share)
 
 
 def _source(states: Iterable[ShadingState], path: Path) -> str:
@@ -128,6 +130,7 @@ def held_thermal(state: ShadingState) -> dict[str, Any]:
         "closure": state.closure or beside.closure,
         "shading_position": state.shading_position or beside.shading_position,
         "angular": state.angular or beside.angular,
+        "see_through": beside.see_through,
     }
 
 
