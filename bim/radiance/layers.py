@@ -243,9 +243,9 @@ def _layer(
                   "least": float(scale.min()), "greatest": float(scale.max())}  # fmt: skip
         issues.append(Issue("glass-pattern-averaged", f"{first.file}:{first.line}", values))
     if material.kind == "glass":
-        passed = np.clip(material.transmissivity * scale, 0.0, 1.0)
-        tau, rho = polarised_shares(np.cos(ANGLES)[:, None], material.index, passed)
-        tau, rho = tau.mean(axis=2), rho.mean(axis=2)
+        passed = np.full(len(ANGLES), material.transmissivity)
+        tau, rho = polarised_shares(np.cos(ANGLES), material.index, passed)
+        tau = np.minimum(tau * scale.mean(axis=1), 1 - rho)  # `glass.c`: not the transmissivity
         return WindowLayer(PaneOptics(tau, rho, rho), zero, zero, zero)
     colour = np.minimum(scale, 1.0).mean(axis=1)
     if material.kind.startswith("trans"):

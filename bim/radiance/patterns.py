@@ -18,7 +18,7 @@ from bim.radiance.primitives import Definition
 from bim.radiance.xform import read_xform
 from mitsuba_cfs.surfaces import even_numbers, points_on_triangles
 
-POINTS = 2048  # on a surface, for the mean of a pattern
+POINTS = 8192  # on a surface, for the mean of a pattern
 TURNS = 16  # azimuths of a function by the angle of incidence
 COMPUTED_PATTERNS = ("brightfunc", "colorfunc")
 EXPRESSIONS = {"brightfunc": slice(1), "colorfunc": slice(3), MIXTURE: slice(2, 3)}  # in strings
