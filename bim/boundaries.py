@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from bim.defaults import (
     air_layer,
     default_construction,
 )
+from bim.material_names import NamedMaterial
 from bim.model import Construction, Face, MaterialLayer, Window
 from bim.neighbours import THICKEST_SPAN, Beyond
 from bim.planes import area_vectors
@@ -35,15 +36,15 @@ class ElementRecord:
     guid: str
     name: str
     ifc_class: str
-    material: MaterialLayer  # of unit thickness: for elements without layers
+    material: NamedMaterial  # of elements without layers
     layers: tuple[MaterialLayer, ...] = ()
     axis: NDArray[np.float64] | None = None  # [3] world: from the first layer to the last
     is_roof: bool = False
     stated: bool = False  # whether the thermal properties come from the file
-    # of unit thickness, of the bodies that the element is made of, by their representation items
-    of_items: Mapping[int, MaterialLayer] = field(default_factory=dict)
-    # listed without thicknesses, of a single body: layers whose thicknesses are shares of 1
-    shares: tuple[MaterialLayer, ...] = ()
+    # of the bodies that the element is made of, by their representation items
+    of_items: Mapping[int, NamedMaterial] = field(default_factory=dict)
+    # listed without thicknesses, of a single body: materials and their shares of the thickness
+    shares: tuple[tuple[NamedMaterial, float], ...] = ()
     named_mm: tuple[float, ...] = ()  # numbers in its name, which may be their thicknesses
 
 
@@ -198,17 +199,17 @@ def _layers(
         return list(record.layers if along else record.layers[::-1])
     if record.shares and length <= THICKEST_SPAN:
         return _shared(record, length)[::-1]
-    found: list[MaterialLayer] = []
+    bodies: list[tuple[NamedMaterial, float]] = []  # materials and thicknesses
     for part in span.parts:
         material = record.of_items.get(part.item, record.material)
-        if found and part.stop <= start + 1e-3:
+        if bodies and part.stop <= start + 1e-3:
             continue  # inside one that is already counted
         thickness = min(part.stop - max(part.start, start), THICKEST_SPAN)
         start = max(start, part.stop)
-        if found and replace(found[-1], thickness=material.thickness) == material:
-            thickness += found.pop().thickness
-        found.append(replace(material, thickness=max(thickness, 1e-3)))
-    return found
+        if bodies and bodies[-1][0] == material:
+            thickness += bodies.pop()[1]
+        bodies.append((material, thickness))
+    return [material.of_thickness(max(thickness, 1e-3)) for material, thickness in bodies]
 
 
 def _shared(record: ElementRecord, length: float) -> list[MaterialLayer]:
@@ -222,8 +223,8 @@ def _shared(record: ElementRecord, length: float) -> list[MaterialLayer]:
         some = record.named_mm[start : start + count]
         if min(some) > 0 and abs(sum(some) / (1000 * length) - 1) < 0.03:
             pairs = zip(record.shares, some, strict=True)
-            return [replace(one, thickness=length * mm / sum(some)) for one, mm in pairs]
-    return [replace(one, thickness=length * one.thickness) for one in record.shares]
+            return [one.of_thickness(length * mm / sum(some)) for (one, _), mm in pairs]
+    return [one.of_thickness(length * share) for one, share in record.shares]
 
 
 def _window(parts: Sequence[tuple[Piece, NDArray[np.float64]]]) -> Window:

@@ -321,6 +321,7 @@ UNREAD = {  # by suffix: what it is, and the file to give instead
     ".ifcxml": "is ifcXML; export the model as IFC (.ifc), or convert it with IfcConvert",
     ".dfjson": "is a dragonfly model; write honeybee's HBJSON of it (Model.to_honeybee)",
     ".idf": "is an EnergyPlus input; give the building as gbXML or HBJSON",
+    ".epjson": "is an EnergyPlus input; give the building as gbXML or HBJSON",
     ".osm": "is an OpenStudio model; export it as gbXML",
     ".rvt": "is a Revit model; export it as IFC or gbXML",
     ".skp": "is a SketchUp model; export it as IFC, gbXML or HBJSON",

@@ -92,7 +92,7 @@ def read_g_table(path: str | Path) -> AngularGValue:
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             rows = list(csv.DictReader(line for line in stream if line.strip()))
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DataError(f"cannot be read: {reason(error)}", file=path) from None
     if not rows or not {"polar_deg", "g"} <= set(rows[0]):
         raise DataError("expected the columns polar_deg, g (and azimuth_deg)", file=path)

@@ -26,7 +26,7 @@ from bim.defaults import GAP_RESISTANCE, UNKNOWN_MATERIAL
 from bim.model import MaterialLayer
 from bim.names import plain_text
 
-THICKEST = 0.9  # m: thicker layers of air are none; a body of unknown thickness is read as 1 m
+THICKEST = 0.9  # m: thicker layers of air are none
 # of air layers in walls: thickness [m] up to which the resistance holds [m2 K/W]; EN ISO 6946, t. 8
 AIR_RESISTANCE = (
     (0.005, 0.11), (0.007, 0.13), (0.010, 0.15), (0.015, 0.17), (math.inf, GAP_RESISTANCE),
@@ -69,10 +69,13 @@ CAMEL = re.compile(r"(?<=[a-z]{3})(?=[A-Z][a-z]{2})")
 
 @dataclass(frozen=True, slots=True)
 class NamedMaterial:
-    """What a name tells: properties, and whether they are of something that it names."""
+    """A material of no thickness yet, by its name and what the file and corrections state."""
 
     layer: MaterialLayer
-    group: str  # of its row; "unknown" where the name does not tell, "mixed" where it tells two
+    # row of the table that its conductivity is of; "unknown" where the name does not tell, "mixed"
+    # where it tells two, "" where the conductivity is stated
+    group: str
+    resistance: float | None = None  # whatever its thickness [m2 K/W]; of a stated U-value
 
     @property
     def is_known(self) -> bool:
@@ -81,9 +84,11 @@ class NamedMaterial:
 
     def of_thickness(self, thickness: float) -> MaterialLayer:
         """The layer of a thickness [m]; of air one with the resistance of such a gap."""
-        if self.group not in ("air", "frame") or thickness > THICKEST:
-            return replace(self.layer, thickness=thickness)
-        resistance = next(r for limit, r in AIR_RESISTANCE if thickness <= limit)
+        resistance = self.resistance
+        if resistance is None:
+            if self.group not in ("air", "frame") or thickness > THICKEST:
+                return replace(self.layer, thickness=thickness)
+            resistance = next(r for limit, r in AIR_RESISTANCE if thickness <= limit)
         return replace(self.layer, thickness=thickness, conductivity=thickness / resistance)
 
 

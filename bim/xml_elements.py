@@ -44,6 +44,8 @@ def xml_elements(
             raise
         message = wrong_encoding(path.read_bytes()) or f"is no XML: {error}"
         raise DataError(message, file=path) from None
+    finally:
+        del reader.parser  # which holds the reader: both would stay until garbage is collected
 
 
 class _Reader:

@@ -54,6 +54,12 @@ def check_number(
     raise ValueError(f"{name}: expected {noun} {limits}, got {value!r:.60}")
 
 
+def check_type(name: str, value: Any, kind: type) -> None:
+    """Raise `ValueError` that names an argument unless it is of a type."""
+    if not isinstance(value, kind):
+        raise ValueError(f"{name}: expected {kind.__name__}, got {value!r:.60}")
+
+
 def no_such_key(key: str, known: Iterable[str]) -> str:
     """Message for an unknown key: the known key that resembles it most, or all known keys."""
     folded = {one.casefold(): one for one in known}

@@ -26,6 +26,8 @@ class Surfaces:
     gloss: tuple[Gloss | None, ...] = ()  # [F] of each surface; none of any where empty
 
     def __post_init__(self) -> None:
+        for name, kind in (("triangles", float), ("reflectance", float), ("surface", None)):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=kind))
         n = len(self.triangles)
         if self.triangles.shape != (n, 3, 3):
             raise ValueError(f"triangles: expected [N, 3, 3], got {self.triangles.shape}")

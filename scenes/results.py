@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,6 +16,7 @@ from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.picture_year.year import PictureYear
+from scenes.fenestration.peaks import lobe_notes
 from scenes.head import NO_HEAD, Head
 
 # Columns with three phases, see `mitsuba_cfs.methods.sun_by_patches`
@@ -195,6 +196,8 @@ class RoomYear:
     operation: OperationResult | None = None  # None: first shading state all year, floating freely
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
     dgp: AnnualGlare | None = None  # [n] by the metric and in the hours of `rate`
+    dgp_sunny_hour_error: float = 0.0  # of three-phase `dgp`
+    as_lobe: dict[str, float] = field(default_factory=dict)  # of `scenes.room.lobes`
     issues: tuple[Issue, ...] = ()  # of the traced model
     explored: ExploredRoom | None = None  # for the explorer
     template: str = ""  # name of the equal room that was computed; "": this room
@@ -245,42 +248,44 @@ class RunResult:
         return f"<RunResult {self.building.name!r}: {len(self.spaces)} rooms, {self.method}>"
 
 
-def sunny_hour_notes(rooms: Sequence[RoomYear]) -> tuple[str, ...]:
-    """How far the patches of three phases put hours with sun off; none with other methods."""
-    tables = [room.daylight.sensor_metrics for room in rooms]
-    errors = [table[SUNNY_HOUR_ERROR] for table in tables if SUNNY_HOUR_ERROR in table]
-    glare = [
-        picture.glare.get(DGP_SUNNY_HOUR_ERROR, 0.0)
-        for room in rooms
-        for picture in room.glare.pictures
-    ]
-    glare += [
-        float(room.annual_glare[DGP_SUNNY_HOUR_ERROR].max())
-        for room in rooms
-        if room.annual_glare is not None and DGP_SUNNY_HOUR_ERROR in room.annual_glare
-    ]
-    if not errors:
-        return sunny_hour_dgp_notes(max(glare, default=0.0))
-    every = np.concatenate(errors)
-    note = Note(
-        "The three-phase method blurs the sun: in hours with sun on the windows the illuminance of "
-        "a sensor deviates by {mean:.0f} % on average over the sensors, {worst:.0f} % at most, "
-        "from that with the sun at its true position (root mean square of a sample of these "
-        "hours, relative to their mean illuminance).",
-        mean=float(every.mean()),
-        worst=float(every.max()),
-    )
-    return (note, *sunny_hour_dgp_notes(max(glare, default=0.0)))
+def method_figures(room: RoomYear) -> dict[str, float]:
+    """What the method and undecided transmission peaks do to a room's results."""
+    figures, table = dict(room.as_lobe), room.daylight.sensor_metrics
+    if SUNNY_HOUR_ERROR in table:
+        figures[f"{SUNNY_HOUR_ERROR}_mean"] = float(table[SUNNY_HOUR_ERROR].mean())
+        figures[f"{SUNNY_HOUR_ERROR}_max"] = float(table[SUNNY_HOUR_ERROR].max())
+    glare = [picture.glare.get(DGP_SUNNY_HOUR_ERROR, 0.0) for picture in room.glare.pictures]
+    if room.annual_glare is not None and DGP_SUNNY_HOUR_ERROR in room.annual_glare:
+        glare.append(float(room.annual_glare[DGP_SUNNY_HOUR_ERROR].max()))
+    glare.append(room.dgp_sunny_hour_error)
+    if max(glare):
+        figures[DGP_SUNNY_HOUR_ERROR] = max(glare)
+    return figures
 
 
-def sunny_hour_dgp_notes(error: float) -> tuple[str, ...]:
-    """The error of three-phase DGP in hours with sun; none where it is 0."""
-    if not error:
-        return ()
-    note = Note(
-        "The three-phase method blurs the sun: in hours with sun on the windows DGP deviates by "
-        "{error:.3f} from that with the sun at its true position (root mean square of a sample of "
-        "these hours).",
-        error=error,
-    )
-    return (note,)
+def method_notes(figures: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
+    """Sentences on `method_figures` of several rooms, cases or views; none without any."""
+    figures, notes = list(figures), []
+    lit = [one for one in figures if f"{SUNNY_HOUR_ERROR}_max" in one]
+    if lit:
+        notes.append(
+            Note(
+                "The three-phase method blurs the sun: in hours with sun on the windows the "
+                "illuminance of a sensor deviates by {mean:.0f} % on average, {worst:.0f} % at "
+                "most, from that with the sun at its true position (root mean square of a sample "
+                "of these hours, relative to their mean illuminance).",
+                mean=float(np.mean([one[f"{SUNNY_HOUR_ERROR}_mean"] for one in lit])),
+                worst=max(one[f"{SUNNY_HOUR_ERROR}_max"] for one in lit),
+            )
+        )
+    error = max((one.get(DGP_SUNNY_HOUR_ERROR, 0.0) for one in figures), default=0.0)
+    if error:
+        notes.append(
+            Note(
+                "The three-phase method blurs the sun: in hours with sun on the windows DGP "
+                "deviates by {error:.3f} from that with the sun at its true position (root mean "
+                "square of a sample of these hours).",
+                error=error,
+            )
+        )
+    return (*notes, *lobe_notes(figures))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bim.model import Room
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.errors import DataError, check_type
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes import plots
@@ -117,6 +117,7 @@ def simulate(
 
     Raises: `DataError` for a room that cannot be computed, a window without a system.
     """
+    check_type("room", room, Room)
     building = room.building
     if isinstance(operation, str | PathLike):
         operation = read_operation(operation)
@@ -124,6 +125,12 @@ def simulate(
         weather = read_weather(weather)
     if isinstance(system, str | PathLike):
         system = read_system(system)
+    check_type("weather", weather, Weather)
+    for name, value, kind in (
+        ("system", system, FenestrationSystem), ("operation", operation, Operation),
+    ):  # fmt: skip
+        if value is not None:
+            check_type(name, value, kind)
     if system is None and building.file is None:
         raise DataError("a building that is not from a file needs a system", element="simulate")
     if system is not None:

@@ -22,7 +22,7 @@ from mitsuba_cfs.methods.point_in_time import PathLight, path_picture
 from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import annual_sky
-from scenes.fenestration.peaks import lobe_effect, lobe_note
+from scenes.fenestration.peaks import lobe_effect, lobe_notes
 from scenes.head import NO_HEAD, Head
 from scenes.inputs import first_states, read_inputs
 from scenes.picture_files import PictureFiles, read_files
@@ -108,7 +108,7 @@ def _as_lobe(light: PathLight, viewed: ViewedRoom) -> tuple[str, ...]:
     small = fitted(light.scene.eye, min(light.scene.eye.width, BOTH_WAYS))
     light, hour = replace(light, scene=replace(light.scene, view=small)), np.zeros(1, dtype=int)
     both = [glare_with(light, systems, hour) for systems in (light.systems, viewed.lobes)]
-    return (lobe_note(lobe_effect(*both)),)
+    return lobe_notes([lobe_effect(*both)])
 
 
 def write_picture(picture: RoomPicture, path: Path, *, print_like: bool = False) -> None:

@@ -27,6 +27,8 @@ NUMBERS = (
 TOKEN = re.compile(rb"[-+]?\d[\d.]*(?:[eE][-+]?\d+)?|[A-Za-z_][\w-]*")
 NUMBER = re.compile(r"[-+]?\d[\d.]*(?:[eE][-+]?\d+)?")
 DEEP = 3000
+HEADER = 8  # lines of an EPW
+MISSING = ("99.9", "999", "9999", "99999", "999999", "-60", "69", "100", "0.1")  # and bounds
 
 
 def of_text(content: bytes, random: np.random.Generator) -> bytes:
@@ -58,6 +60,25 @@ def _other_token(content: bytes, random: np.random.Generator) -> bytes:
     else:
         other = NUMBERS[int(random.integers(len(NUMBERS)))].encode()
     return content[: token.start()] + other + content[token.end() :]
+
+
+def of_weather(content: bytes, random: np.random.Generator) -> bytes:
+    """EPW: its header or a day as text, or a field marked as missing, or odd, for some hours."""
+    lines = content.splitlines(keepends=True)
+    if random.random() < 0.4:
+        return of_text(b"".join(lines[:HEADER]), random) + b"".join(lines[HEADER:])
+    first = int(random.integers(HEADER, len(lines)))
+    hours = slice(first, first + int(random.choice([1, 2, 6, 7, 24])))
+    if random.random() < 0.5:
+        lines[hours] = [of_text(b"".join(lines[hours]), random)]
+        return b"".join(lines)
+    column = int(random.integers(1, lines[first].count(b",") + 1))
+    odd = str(random.choice([*MISSING, *NUMBERS])).encode()
+    for hour in range(*hours.indices(len(lines))):
+        fields = lines[hour].rstrip().split(b",")
+        fields[column : column + 1] = [odd]
+        lines[hour] = b",".join(fields) + b"\n"
+    return b"".join(lines)
 
 
 def of_toml(content: bytes, random: np.random.Generator) -> bytes:
@@ -112,7 +133,7 @@ def of_xml(content: bytes, random: np.random.Generator) -> bytes:
             case 1:
                 parent.append(copy.deepcopy(child))
             case 2:
-                other.append(copy.deepcopy(child) if len(list(child.iter())) < 200 else child[0])
+                other.append(copy.deepcopy(child if len(list(child.iter())) < 200 else child[0]))
             case 3 if child.attrib:
                 key = list(child.attrib)[int(random.integers(len(child.attrib)))]
                 child.attrib[key] = str(random.choice([*NUMBERS, other.text or "", "meter"]))

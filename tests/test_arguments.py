@@ -15,6 +15,7 @@ import scenes
 import thermal
 from mitsuba_cfs.bsdf.blinds import vertical_louvre
 from mitsuba_cfs.bsdf.periodic import plastic
+from mitsuba_cfs.methods.optics import check_systems
 
 NONE = (math.nan, math.inf, -math.inf, "x", None)  # of any number
 NEGATIVE = (*NONE, -1)
@@ -110,3 +111,30 @@ CASES: list[tuple[str, Callable, str, tuple]] = [
 def test_an_impossible_value_is_refused_by_its_name(make, name, value):
     with pytest.raises(ValueError, match=name):
         make(**{name: value})
+
+
+@pytest.mark.parametrize("hours", [[3], [-1], [0, 2]])
+def test_an_hour_that_a_sky_has_not_is_refused(hours):
+    sky = cfs.given_sky([[0, -0.6, 0.8]] * 2, [500] * 2, [100] * 2, 1, day_of_year=1)
+    assert len(sky.part([1]).illuminance) == len(sky.part([True, False]).illuminance) == 1
+    with pytest.raises(ValueError, match="hours: expected 0 to 1"):
+        sky.part(hours)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: scenes.simulate("house.ifc", None, "city.epw"), "room: expected Room"),
+        (lambda: cfs.venetian_blind(0.5, depth=0.08, spacing=0.06, tilt=0.0), "material: expected"),
+        (lambda: cfs.SlatMaterial("white", 0.5, 0.5), "reflectance_front: expected Sequence"),
+        (lambda: check_systems([[0.5]], [None]), "expected BsdfOptics or AngularOptics, got 0.5"),
+    ],
+)
+def test_an_argument_of_another_type_is_refused_by_its_name(call, words):
+    with pytest.raises(ValueError, match=words):
+        call()
+
+
+def test_lists_are_surfaces_too():
+    triangle = [[[0, 0, 0], [1, 0, 0], [0, 1, 0]]]
+    assert cfs.Surfaces(triangle, [0.5], [0]).areas == pytest.approx([0.5])

@@ -8,6 +8,9 @@ import sys
 
 from tests.conftest import REPOSITORY
 from tests.left_out import UNKNOWN, brings_in, left_out_lines
+from tests.twins import TWINS
+
+SHARED = {"real_data", "reference_data"}  # fixtures of ../shared
 
 
 def skip_reasons() -> set[str]:
@@ -74,3 +77,34 @@ def test_a_run_ends_with_them(tmp_path):
     assert "1 left out (could not import 'pyradiance_of_nobody'" in run.stdout, run.stdout
     assert "1 left out by -m or -k" in run.stdout
     assert "1 left out (" in "\n".join(run.stdout.splitlines()[-5:])
+
+
+def needs_shared() -> dict[str, dict[str, bool]]:
+    """By file below tests/: each test, and whether it is skipped without ../shared."""
+    found = {}
+    for path in (REPOSITORY / "tests").rglob("test_*.py"):
+        functions = {
+            node.name: node for node in ast.parse(path.read_text("utf-8")).body
+            if isinstance(node, ast.FunctionDef)
+        }  # fmt: skip
+
+        def needs(node: ast.FunctionDef, functions: dict = functions) -> bool:
+            names = {argument.arg for argument in node.args.args}
+            return bool(names & SHARED) or any(
+                needs(functions[name]) for name in names & set(functions)
+            )
+
+        found[path.relative_to(REPOSITORY / "tests").as_posix()] = {
+            name: needs(node) for name, node in functions.items() if name.startswith("test_")
+        }
+    return found
+
+
+def test_every_test_that_needs_shared_has_a_twin_that_does_not():
+    tests = needs_shared()
+    named = {(file, name) for file, pairs in TWINS.items() for name in pairs}
+    assert named == {(file, name) for file in tests for name, needs in tests[file].items() if needs}
+    for file, pairs in TWINS.items():
+        for twin in pairs.values():
+            place, _, name = twin.rpartition("::")
+            assert tests[place or file][name] is False, twin

@@ -30,7 +30,7 @@ from .comfort import (
 from .control import (
     by_cut_off as by_cut_off,
     by_glare as by_glare,
-    by_irradiance as by_irradiance,
+    by_threshold as by_threshold,
     by_schedule as by_schedule,
     switched as switched,
 )

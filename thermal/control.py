@@ -31,16 +31,16 @@ def by_schedule(day: ArrayLike, hours: int) -> StateArray:
     return np.resize(profile, hours)
 
 
-def by_irradiance(
-    irradiance: ArrayLike, close_above: float, open_below: float | None = None, *, closed: int = 1
+def by_threshold(
+    values: ArrayLike, close_above: float, open_below: float | None = None, *, closed: int = 1
 ) -> StateArray:
-    """Closed [H] when the facade receives more than a threshold [W/m2], with hysteresis.
+    """Closed [H] when a value, such as the facade's irradiance, is above a threshold.
 
     Once closed it opens below `open_below` (default: the same threshold).
     """
-    e = np.asarray(irradiance, dtype=float)
+    e = np.asarray(values, dtype=float)
     lower = close_above if open_below is None else open_below
-    require(lower <= close_above, "shading control", "opens at more light than it closes at")
+    require(lower <= close_above, "shading control", "opens at a greater value than it closes at")
     state = np.zeros(len(e), dtype=np.int64)
     shut = False
     for hour, value in enumerate(e):

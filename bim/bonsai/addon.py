@@ -78,7 +78,9 @@ def room_values(results: str, quantity: str) -> dict[str, float]:
             values = [float(cell) for cell in cells if cell]
             if values:
                 found[guid] = max(values)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (
+        OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, csv.Error,
+    ) as error:  # fmt: skip
         raise ValueError(f"cfs: {folder} holds no results of cfs run ({error})") from None
     return found
 

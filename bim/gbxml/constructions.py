@@ -90,11 +90,15 @@ class Constructions:
                 values = {"material": name}
                 self.issues.append(Issue("resistance-missing", material.get("id", ""), values))
                 return []
-            layer = resistance_layer(name, resistance, thickness)
-        else:
-            layer = replace(EPS, name=name, thickness=thickness, conductivity=conductivity)
-        heavy = density or layer.density, capacity or layer.heat_capacity
-        return [replace(layer, density=heavy[0], heat_capacity=heavy[1])]
+        try:
+            if thickness and conductivity:
+                layer = replace(EPS, name=name, thickness=thickness, conductivity=conductivity)
+            else:
+                layer = resistance_layer(name, resistance, thickness)
+            heavy = density or layer.density, capacity or layer.heat_capacity
+            return [replace(layer, density=heavy[0], heat_capacity=heavy[1])]
+        except ValueError as error:
+            raise self.document.fault(str(error), material) from None
 
     def window(self, opening: ElementTree.Element) -> GlazingValues:
         """What an opening's window type, else its construction states."""

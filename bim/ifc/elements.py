@@ -23,7 +23,7 @@ from bim.ifc.damage import Damage, entities
 from bim.ifc.materials import MaterialReader, materials_of
 from bim.ifc.project import storey_of
 from bim.ifc.shapes import Shape
-from bim.material_names import MaterialCorrection
+from bim.material_names import MaterialCorrection, NamedMaterial
 from bim.model import Element
 from bim.report.issue import Issue
 from mitsuba_cfs.gloss import Gloss
@@ -90,9 +90,9 @@ def _record(
     layers = reader.layers_of(element)
     of_items, known = reader.of_items(element, np.unique(shape.item).tolist())
     if layers is None:
-        material, stated = reader.layer(reader.single_material(element), 1.0)
+        material, stated = reader.material(reader.single_material(element))
     else:
-        material, stated = layers.layers[0], layers.stated
+        material, stated = NamedMaterial(layers.layers[0], ""), layers.stated
     predefined = getattr(element, "PredefinedType", None)
     is_built_up = element.is_a().startswith(BUILT_UP) and len(np.unique(shape.item)) == 1
     shares = reader.shares_of(element) if layers is None and is_built_up else ()

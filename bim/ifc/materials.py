@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import ifcopenshell
@@ -32,7 +32,6 @@ OPTICAL = {
 }
 
 SURFACES = 0.17  # resistances of both surfaces of an outer wall: EN ISO 6946:2017 [m2 K/W]
-USUAL_WALL = 0.3  # thickness of a wall whose layers are listed without theirs [m]
 INSULATING = ("insulation", "insulating")  # groups of materials
 DEEPEST = 20  # parts of parts of a whole
 
@@ -126,8 +125,8 @@ class MaterialReader:
             thickness = float(layer.LayerThickness or 0.0) * self.scale
             if thickness <= 1e-6:
                 continue
-            one, known = self.layer(layer.Material, thickness)
-            layers.append(one)
+            one, known = self.material(layer.Material)
+            layers.append(one.of_thickness(thickness))
             stated &= known
         if not layers:
             return None
@@ -140,8 +139,8 @@ class MaterialReader:
 
     def of_items(
         self, element: ifcopenshell.entity_instance, items: Iterable[int]
-    ) -> tuple[dict[int, MaterialLayer], bool]:
-        """Materials of unit thickness of an element's bodies, and whether the file states them all.
+    ) -> tuple[dict[int, NamedMaterial], bool]:
+        """Materials of an element's bodies, and whether the file states them all.
 
         Files without layer sets draw a wall as a body for each layer, and name their materials as
         a list or as constituents.  A body is of the material that its surface style has the name
@@ -161,15 +160,17 @@ class MaterialReader:
             if material is None:
                 continue
             self._contradicting += of_aspect is not None and of_aspect.Name != material.Name
-            layers[item], known = self.layer(material, 1.0)
+            layers[item], known = self.material(material)
             stated &= known
         if self._contradicting:
             values = {"count": self._contradicting}
             self.issues["shape aspects"] = Issue("aspect-contradicts-style", "", values)
         return layers, stated
 
-    def shares_of(self, element: ifcopenshell.entity_instance) -> tuple[MaterialLayer, ...]:
-        """Materials listed without thicknesses, if insulation is one: layers as shares of 1.
+    def shares_of(
+        self, element: ifcopenshell.entity_instance
+    ) -> tuple[tuple[NamedMaterial, float], ...]:
+        """Materials listed without thicknesses, if insulation is one, and their shares of 1.
 
         By IfcMaterialConstituent.Fraction where each has one, else in equal parts.  A list without
         insulation is no build-up that matters: the first material holds.
@@ -184,10 +185,9 @@ class MaterialReader:
         materials = [getattr(one, "Material", one) for one in parts]
         if not any(named_material(one).group in INSULATING for one in materials):
             return ()
-        layers = [
-            self.layer(one, USUAL_WALL * f)[0] for one, f in zip(materials, fractions, strict=True)
-        ]
-        return tuple(replace(one, thickness=f) for one, f in zip(layers, fractions, strict=True))
+        return tuple(
+            (self.material(one)[0], f) for one, f in zip(materials, fractions, strict=True)
+        )
 
     def _constituents(self, element: ifcopenshell.entity_instance) -> dict[str, Any]:
         """Materials of an element without layers, by the names of constituents or their own."""
@@ -213,8 +213,8 @@ class MaterialReader:
                 names |= {name for one in styles if (name := getattr(one, "Name", None))}
         return names
 
-    def layer(self, material, thickness: float) -> tuple[MaterialLayer, bool]:
-        """A layer of that material; missing or impossible values from the table by its name."""
+    def material(self, material) -> tuple[NamedMaterial, bool]:
+        """A material with its missing or impossible values by its name, and if the file has all."""
         name = (material.Name or "unnamed") if material is not None else "unnamed"
         stated = self._properties.get(material.id(), {}) if material is not None else {}
         values = {k: v for k, v in stated.items() if _is_physical(k, v)}
@@ -226,19 +226,17 @@ class MaterialReader:
             )
             self.issues.setdefault(f"{name} kJ", issue)
         wrong = sorted(set(stated) - set(values))
-        values |= self._corrected(name, thickness)
-        missing = sorted(set(NAMES) - set(values))
+        values |= self._corrected(name)
+        resistance = values.pop("resistance", None)
+        missing = sorted(set(NAMES) - set(values) - ({"conductivity"} if resistance else set()))
+        default, group = named_material(material), ""
         if missing:
-            default = named_material(material).of_thickness(thickness)
-            unknown = (
-                material is not None
-                and "conductivity" in missing
-                and not named_material(material).is_known
-            )
+            group = default.group if "conductivity" in missing else ""
+            unknown = material is not None and "conductivity" in missing and not default.is_known
             known: dict[str, Any] = {
                 "material": name,
                 "missing": tuple(map(Phrase, missing)),
-                "default": default.name,
+                "default": default.layer.name,
                 "impossible": tuple(
                     Phrase("impossible-value", {"name": Phrase(k), "value": stated[k]})
                     for k in wrong
@@ -247,18 +245,17 @@ class MaterialReader:
             code = "material-unknown" if unknown else "material-incomplete"
             code = "material-impossible" if wrong else code
             self.issues.setdefault(name, Issue(code, name, known))
-            values = {k: values.get(k, getattr(default, k)) for k in NAMES}
-        return MaterialLayer(name, thickness, **values), not missing
+        values = {k: values.get(k, getattr(default.layer, k)) for k in NAMES}
+        return NamedMaterial(MaterialLayer(name, 1.0, **values), group, resistance), not missing
 
-    def _corrected(self, name: str, thickness: float) -> dict[str, float]:
-        """Properties of a material that the corrections state."""
+    def _corrected(self, name: str) -> dict[str, float]:
+        """Properties of a material that the corrections state; of a U-value the resistance."""
         correction = next((one for one in self.corrections if one.matches(name)), None)
         if correction is None:
             return {}
         values = dict(correction.values)
         if "u" in values:
-            resistance = max(1 / values.pop("u") - SURFACES, 1e-3)
-            values["conductivity"] = thickness / resistance
+            values["resistance"] = max(1 / values.pop("u") - SURFACES, 1e-3)
         return values
 
 

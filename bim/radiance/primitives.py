@@ -91,7 +91,7 @@ def number_of(word: str) -> float:
     except ValueError:
         value = float("nan")
     if not abs(value) < MOST:
-        raise ValueError(f"a number is expected, got {word!r:.60}")
+        raise ValueError(f"a number below {MOST:g} is expected, got {word!r:.60}")
     return value if abs(value) >= LEAST else 0.0
 
 

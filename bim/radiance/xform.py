@@ -106,5 +106,5 @@ def _value(words: tuple[str, ...], at: int) -> str:
 def _number(word: str, option: str) -> float:
     try:
         return number_of(word)
-    except ValueError:
-        raise ValueError(f"{option} takes numbers, got {word!r:.60}") from None
+    except ValueError as error:
+        raise ValueError(f"{option}: {error}") from None

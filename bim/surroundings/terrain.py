@@ -26,6 +26,7 @@ from bim.surroundings.objects import (
     read_object,
 )
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 
 WIDTHS_AWAY = 100.0  # distance of the wall in sizes of the building: 0.6 degrees of parallax
 NEAREST = 1000.0  # [m]
@@ -63,10 +64,11 @@ def _json_rows(path: Path) -> list[tuple[str, str]]:
 
 def _csv_rows(path: Path) -> list[tuple[str, str]]:
     text = read_bytes(path).decode("utf-8", errors="replace")
-    rows = [
-        [cell.strip() for cell in row] for row in csv.reader(text.replace("\t", ",").split("\n"))
-    ]
-    rows = [[cell for cell in row if cell] for row in rows]
+    try:
+        rows = list(csv.reader(text.replace("\t", ",").split("\n")))
+    except csv.Error as error:
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
+    rows = [[cell.strip() for cell in row if cell.strip()] for row in rows]
     start = next((i for i, row in enumerate(rows) if row[:2] == ["A", "H_hor"]), None)
     if start is None:
         raise DataError("expected columns A and H_hor (PVGIS printhorizon)", file=path)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial
-from mitsuba_cfs.errors import check_number
+from mitsuba_cfs.errors import check_number, check_type
 
 LEAST_SIZE = 1e-6  # of a slat and of the distance of slats [m]
 
@@ -35,6 +35,7 @@ def venetian_blind(
         segments: number of flat strips that a curved slat is made of.
         width: width of the cell, along the slats; does not affect the result [m].
     """
+    check_type("material", material, SlatMaterial)
     for name, value in (("depth", depth), ("spacing", spacing)):
         check_number(name, value, LEAST_SIZE)
     check_number("thickness", thickness, 0.0)

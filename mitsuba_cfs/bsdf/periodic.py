@@ -6,14 +6,14 @@ In the window frame: x to the right seen from outside, y up, z outwards [m].  On
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.errors import check_number
+from mitsuba_cfs.errors import check_number, check_type
 from mitsuba_cfs.files import replacing
 
 
@@ -37,6 +37,8 @@ class SlatMaterial:
     pane: float = 0.0  # transmissivity of a thin pane of glass of that index; 0: a body or a sheet
 
     def __post_init__(self) -> None:
+        for name in ("reflectance_front", "reflectance_back", "transmittance"):
+            check_type(f"material {self.name}: {name}", getattr(self, name), Sequence)
         if len(self.reflectance_back) != self.channels:
             raise ValueError(f"material {self.name}: front and back have different channels")
         if self.transmittance and len(self.transmittance) != self.channels:

@@ -32,10 +32,10 @@ from mitsuba_cfs.methods.light import (
     SeasonalLight,
     eye_illuminance,
     illuminance,
-    seasons_of,
+    with_systems,
 )
 from mitsuba_cfs.methods.optics import States, hourly_states
-from mitsuba_cfs.methods.phase_light import PhaseLight, phase_light
+from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.phase_pictures import (
     pictures_by_state,
     pictures_in_state,
@@ -126,16 +126,17 @@ def glare_with(
     systems: Sequence[States],
     hours: NDArray[np.int64],
     metric: str = "DGP",
+    state: NDArray[np.int64] | None = None,
     *,
     options: GlareOptions | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """DGP and illuminance at the eye [lx] of some hours [n] of the light, in the first states.
+    """DGP and illuminance at the eye [lx] of some hours [n] of the light with other systems.
 
-    Args: systems: [G][J] optics of each window group, as of the light.
+    Args: systems, state: as of `with_systems`.
     """
     dgp, eye = np.zeros(len(hours)), np.zeros(len(hours))
-    for changed, columns in _with_systems(light, systems, hours):
-        rated = hourly_glare(changed, metric, options=options)
+    for changed, rows, columns in with_systems(light, systems, hours, state):
+        rated = hourly_glare(changed, metric, rows, options=options)
         dgp[columns], eye[columns] = rated.dgp, rated.Ev
     return dgp, eye
 
@@ -146,21 +147,6 @@ def bright_hours(dgp: NDArray[np.float64], count: int) -> NDArray[np.int64]:
     top, rest = order[: count // 2], order[count // 2 :]
     steps = np.unique(np.linspace(0, len(rest) - 1, count // 2).astype(np.int64))
     return np.sort(np.concatenate([top, rest[steps] if len(rest) else rest]))
-
-
-def _with_systems(
-    light: Light, systems: Sequence[States], hours: NDArray[np.int64]
-) -> Iterator[tuple[PhaseLight | PathLight, NDArray[np.int64]]]:
-    """The light of hours [n] with the systems, season by season, and which of the hours it has."""
-    for one, of_season in seasons_of(light):
-        columns = np.flatnonzero(np.isin(hours, of_season))
-        if not len(columns):
-            continue
-        sky = one.sky.part(np.searchsorted(of_season, hours[columns]))
-        if isinstance(one, PhaseLight):
-            yield phase_light(one.matrices, systems, sky, needs=()), columns
-        else:
-            yield replace(one, systems=systems, sky=sky), columns
 
 
 def metric_values(light: Light, metric: str) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ of `daylight` names the metrics that several calls ask for.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias, TypeVar
 
@@ -170,6 +170,41 @@ def illuminance(light: Light, state: State | None = None, *, progress: Progress 
         return path_illuminance(light, state, progress=progress)[0]
     light = with_sensor_light(light, progress=progress)
     return illuminance_of_all(light, state)[: len(light.scene.points)]
+
+
+def with_systems(
+    light: Light, systems: Sequence[States], hours: NDArray[np.int64], state: State | None = None
+) -> Iterator[tuple[PhaseLight | PathLight, State, NDArray[np.int64]]]:
+    """The light of some hours [n] with other systems, season by season.
+
+    Each season has its light, the states [G, m] of its hours, and which [m] of the n they are.
+
+    Args: systems: [G][J] optics of each window group; state: of the light's own hours.
+    """
+    rows = hourly_states(state, light.systems, light.sky)[:, hours]
+    for one, of_season in seasons_of(light):
+        columns = np.flatnonzero(np.isin(hours, of_season))
+        if not len(columns):
+            continue
+        sky = one.sky.part(np.searchsorted(of_season, hours[columns]))
+        if isinstance(one, PhaseLight):
+            changed: PhaseLight | PathLight = phase_light(one.matrices, systems, sky, needs=())
+        else:
+            changed = replace(one, systems=systems, sky=sky)
+        yield changed, rows[:, columns], columns
+
+
+def illuminance_with_systems(
+    light: Light, systems: Sequence[States], hours: NDArray[np.int64], state: State | None = None
+) -> Array:
+    """Illuminance of the sensors in some hours with other systems [S, n] [lx].
+
+    Args: as of `with_systems`.
+    """
+    values = np.zeros((len(light.scene.points), len(hours)))
+    for changed, rows, columns in with_systems(light, systems, hours, state):
+        values[:, columns] = illuminance(changed, rows)
+    return values
 
 
 def illuminance_with_error(

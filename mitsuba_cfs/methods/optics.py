@@ -235,6 +235,11 @@ def check_systems(systems: Sequence[States], scene_groups: Sequence[object]) -> 
     for number, states in enumerate(systems):
         if not isinstance(states, Sequence) or not states:
             raise ValueError(f"systems[{number}]: expected a list of states, got {states!r:.60}")
+        for state in states:
+            if not hasattr(type(state), "paths"):  # of every `SystemOptics`
+                raise ValueError(
+                    f"systems[{number}]: expected BsdfOptics or AngularOptics, got {state!r:.60}"
+                )
 
 
 def straight_transmittance(optics: SystemOptics) -> NDArray[np.float64]:

@@ -27,6 +27,7 @@ from mitsuba_cfs.sky.matrix import (
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.three_part import three_part
 from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.sky.weather_table import LONGEST_GAP_H, interpolated
 
 FROM_FILE = ("file", "snow")
 # Reflectance of ground under snow, and 0.2 without: Liu and Jordan 1963, "The long-term average
@@ -34,6 +35,7 @@ FROM_FILE = ("file", "snow")
 SNOW = 0.7
 SNOW_CM = 1.0  # depth that covers the ground
 TOO_WARM_C = 10.0  # daily mean outdoors above which a file's snow is not credible
+BRIGHTEST = 0.95  # new snow: Oke 1987, "Boundary layer climates", table 1.1
 MANY_HOURS = 100  # in daylight, of snow that the results leave out
 
 
@@ -67,6 +69,7 @@ def _from_file(weather: Weather, source: str) -> Weather:
         depth = weather.snow_depth_cm
         if depth is None or np.isnan(depth).all():
             raise DataError("has no snow depth", file=weather.file, field="albedo")
+        depth, notes = _without_gaps(weather, depth, "snow depth", 0.0)
         snow = depth >= SNOW_CM
         warm = int(np.count_nonzero(snow & (_daily_means(weather) > TOO_WARM_C)))
         if warm:
@@ -74,22 +77,56 @@ def _from_file(weather: Weather, source: str) -> Weather:
             raise DataError(
                 f"{message}; state the albedo by month", file=weather.file, field="albedo"
             )
-        return replace(weather, albedo=np.where(snow, SNOW, weather.albedo))
+        return replace(weather, albedo=np.where(snow, SNOW, weather.albedo), notes=notes)
     stated = weather.stated_albedo
     if stated is None or np.isnan(stated).all():
         raise DataError("has no albedo", file=weather.file, field="albedo")
-    missing = np.isnan(stated)
-    notes = weather.notes
-    if missing.any():
+    values, notes = _without_gaps(weather, stated, "albedo", weather.albedo)
+    too_bright = int(np.count_nonzero(values > BRIGHTEST))
+    if too_bright:
         note = Note(
-            "{file}: the albedo is missing in {count} hours; {albedo:g} is used there.",
-            "{file}: the albedo is missing in {count} hour; {albedo:g} is used there.",
+            "{file}: the albedo is above {most:g} in {count} hours, which no ground reflects; it "
+            "is used as it is.",
+            "{file}: the albedo is above {most:g} in {count} hour, which no ground reflects; it is "
+            "used as it is.",
             file=_name(weather),
-            count=int(missing.sum()),
-            albedo=float(np.mean(weather.albedo)),
+            count=too_bright,
+            most=BRIGHTEST,
         )
         notes = (*notes, note)
-    return replace(weather, albedo=np.where(missing, weather.albedo, stated), notes=notes)
+    return replace(weather, albedo=values, notes=notes)
+
+
+def _without_gaps(
+    weather: Weather,
+    values: NDArray[np.float64],
+    field: str,
+    otherwise: float | NDArray[np.float64],
+) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Values [H] with short gaps (NaN) interpolated and long ones filled, and the notes of that."""
+    between = interpolated(values, round(LONGEST_GAP_H / weather.step_h))
+    filled, missing = np.isnan(values) & ~np.isnan(between), np.isnan(between)
+    notes = weather.notes
+    if filled.any():
+        note = Note(
+            "{file}: {field}: {count} missing values are interpolated.",
+            "{file}: {field}: {count} missing value is interpolated.",
+            file=_name(weather),
+            field=field,
+            count=int(filled.sum()),
+        )
+        notes = (*notes, note)
+    if missing.any():
+        note = Note(
+            "{file}: {field}: missing or impossible in {count} hours; {value:g} is used there.",
+            "{file}: {field}: missing or impossible in {count} hour; {value:g} is used there.",
+            file=_name(weather),
+            field=field,
+            count=int(missing.sum()),
+            value=float(np.mean(otherwise)),
+        )
+        notes = (*notes, note)
+    return np.where(missing, otherwise, between), notes
 
 
 def _noted(weather: Weather) -> Weather:
@@ -185,6 +222,9 @@ class AnnualSky:
     def part(self, hours: ArrayLike) -> AnnualSky:
         """Some of the hours L, given by their numbers among them."""
         hours = np.asarray(hours)
+        last = len(self.illuminance) - 1
+        if hours.dtype != bool and hours.size and not 0 <= hours.min() <= hours.max() <= last:
+            raise ValueError(f"hours: expected 0 to {last}, got {hours.min()} to {hours.max()}")
         return replace(
             self,
             whole=self.whole[:, hours],

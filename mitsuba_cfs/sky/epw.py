@@ -80,6 +80,7 @@ def read_epw(path: str | PathLike[str]) -> Weather:
         horizontal_infrared=infrared,
         stated_albedo=column.unchecked("albedo"),
         snow_depth_cm=column.unchecked("snow depth"),
+        rain_mm=column.unchecked("liquid precipitation depth"),
         ground_depth_m=depth,
         ground_temperature_c=ground,
         first_weekday=weather_table.epw_first_weekday(head),

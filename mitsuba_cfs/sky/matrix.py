@@ -14,6 +14,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky import sun as sun_module
@@ -283,36 +284,33 @@ def series_matrix(
     lit = np.flatnonzero((series.diffuse_horizontal + series.direct_normal)[hours] > 0)
     result: NDArray[np.floating] = np.zeros((sky.size, len(hours)), dtype=dtype)
     size = max(1, CHUNK_BYTES // (8 * sky.size))
-    for start in range(0, len(lit), size):
+    for start in range(0, 0 if parts == "sun" else len(lit), size):
         columns = lit[start : start + size]
         h = hours[columns]
-        block = np.zeros((sky.size, len(h)))
-        if parts != "sun":
-            block[0] = series.ground(h, reflectance[h], ground)
-            block[1:] = series.patches(sky, h)
-        if parts != "sky":
-            add_sun(block, sky, series.sun[h], series.direct_normal[h], sun_patches)
-        result[:, columns] = block
+        result[0, columns] = series.ground(h, reflectance[h], ground)
+        result[1:, columns] = series.patches(sky, h)
         progress("sky matrix", (start + len(columns)) / len(lit))
+    if parts != "sky":
+        h = hours[lit]
+        patch, share = sun_on_patches(sky, series.sun[h], series.direct_normal[h], sun_patches)
+        result[patch, lit[:, None]] += share
     return result
 
 
-def add_sun(
-    block: FloatArray,
-    sky: ReinhartSky,
-    sun: FloatArray,
-    direct: FloatArray,
-    count: int = SUN_PATCHES,
-) -> None:
-    """Add light [h] normal to the sun to its `count` nearest patches of `block` [P, h]."""
+def sun_on_patches(
+    sky: ReinhartSky, sun: FloatArray, direct: FloatArray, count: int = SUN_PATCHES
+) -> tuple[NDArray[np.int64], FloatArray]:
+    """The `count` patches nearest to the sun [h, count], and the luminance or radiance of each.
+
+    Args: direct: [h] illuminance or irradiance normal to the sun.
+    """
     if not 1 <= count < sky.size:
         raise ValueError(f"sun_patches: expected 1 or more, got {count}")
-    cosine = sky.directions[1:] @ sun.T
-    nearest = np.argpartition(-cosine, count - 1, axis=0)[:count]
-    weight = 1.0 / (1.002 - np.take_along_axis(cosine, nearest, axis=0))
-    weight *= direct / weight.sum(axis=0)
+    distance, nearest = cKDTree(sky.directions[1:]).query(sun, range(1, count + 1))
+    weight = 1.0 / (0.002 + distance**2 / 2.0)  # 1.002 less the cosine, of unit vectors
+    weight *= (direct / weight.sum(axis=1))[:, None]
     patch = nearest + 1
-    block[patch, np.arange(len(sun))] += weight / sky.solid_angles[patch]
+    return patch, weight / sky.solid_angles[patch]
 
 
 def sun_up(weather: Weather, *, sun_model: str = "spa") -> NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.sky.matrix import SkySeries, add_sun
+from mitsuba_cfs.sky.matrix import SkySeries, sun_on_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.perez import CLEARNESS_BINS
 
@@ -69,12 +69,12 @@ class ThreePartSeries(SkySeries):
         level, whole = omega[band] @ up[band], omega @ up
         extra = diffuse * horizon / (upright[band].sum() - level / whole * upright.sum())
         dome = (diffuse * (1.0 - around) - extra * level) / whole
-        block = np.zeros((sky.size, len(hours)))
-        block[1:] = np.maximum(dome + np.outer(band, extra), 0.0)
+        block = np.maximum(dome + np.outer(band, extra), 0.0)
         sun = self.sun[hours]
         normal = diffuse * around / np.maximum(sun[:, 2], LOWEST_COSINE)
-        add_sun(block, sky, sun, normal)
-        return block[1:]
+        patch, share = sun_on_patches(sky, sun, normal)
+        block[patch - 1, np.arange(len(hours))[:, None]] += share
+        return block
 
 
 def three_part(series: SkySeries) -> ThreePartSeries:

@@ -52,6 +52,7 @@ class Weather:
     albedo: float | FloatArray = 0.2
     stated_albedo: FloatArray | None = None  # [H] of the file, NaN where missing
     snow_depth_cm: FloatArray | None = None  # [H] of the file, NaN where missing
+    rain_mm: FloatArray | None = None  # [H] in each interval, NaN where missing
     ground_depth_m: FloatArray | None = None  # [G]
     ground_temperature_c: FloatArray | None = None  # [G, 12] monthly, January first
     turned_deg: float = 0.0  # north is so far counter-clockwise of +y, see `turned`

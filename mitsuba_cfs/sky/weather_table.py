@@ -251,6 +251,7 @@ EPW_FIELDS: dict[str, tuple[int, float, float, float]] = {
     "opaque sky cover": (23, 99.0, 0.0, 10.0),
     "snow depth": (30, 999.0, 0.0, 998.0),
     "albedo": (32, 999.0, 0.01, 1.0),
+    "liquid precipitation depth": (33, 999.0, 0.0, 400.0),
 }
 EPW_HEADER = (
     "LOCATION",
@@ -387,6 +388,19 @@ def epw_ground(
     return np.array(depths), np.array(months)
 
 
+def interpolated(values: NDArray[np.float64], longest: int) -> NDArray[np.float64]:
+    """Values [H] whose gaps (NaN) of at most `longest` are interpolated; others, and ends, stay."""
+    missing = np.isnan(values)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], missing, [0]])))
+    for start, end in edges.reshape(-1, 2):
+        if end - start <= longest and start > 0 and end < len(values):
+            missing[start:end] = False
+    rows, known = np.arange(len(values)), ~np.isnan(values)
+    if not known.any():
+        return values
+    return np.where(missing, np.nan, np.interp(rows, rows[known], values[known]))
+
+
 class EpwColumns:
     """The data lines of an EPW file, read column by column."""
 
@@ -466,17 +480,16 @@ class EpwColumns:
         if not missing.any():
             return values
         steps = max(1, len(values) // (STEPS_PER_DAY * 365))  # in an hour
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], missing, [0]])))
-        for start, end in edges.reshape(-1, 2):
-            at_end = start == 0 or end == len(values)
-            if at_end or end - start > LONGEST_GAP_H * steps:
-                found = self.rows[start][EPW_FIELDS[field][0]]
-                most = f"between others up to {LONGEST_GAP_H} hours are filled"
-                message = f"missing (the file has {found}; {(end - start) / steps:g} hours; {most})"
-                raise self.error(field, int(start), message)
-        rows = np.arange(len(values))
+        result = interpolated(values, LONGEST_GAP_H * steps)
+        if np.isnan(result).any():
+            start = int(np.argmax(np.isnan(result)))
+            length = int(np.argmin(np.append(missing[start:], False)))
+            found = self.rows[start][EPW_FIELDS[field][0]]
+            most = f"between others up to {LONGEST_GAP_H} hours are filled"
+            message = f"missing (the file has {found}; {length / steps:g} hours; {most})"
+            raise self.error(field, start, message)
         self.gaps[field] = np.flatnonzero(missing)
-        return np.where(missing, np.interp(rows, rows[~missing], values[~missing]), values)
+        return result
 
     def whole(self, field: str) -> NDArray[np.float64] | None:
         """The field's values [H], or None where any is missing."""

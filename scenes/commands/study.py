@@ -116,12 +116,13 @@ def study_to_folder(
         click.echo(quick_run.NOTE)
     plan = settled(parsed, plan_of(parsed))
     chosen: dict[int, Case] = {}
+    head = PrintedHead()
     _check_explorable(plan, explore)
     _print_plan(plan)
     with ProgressBar() as progress, compiled_beside():
         result = run_study(
             parsed, store, plan=plan, processes=processes, scheduler=scheduler,
-            progress=progress, on_case=_print_case, on_head=PrintedHead(),
+            progress=progress, on_case=_print_case, on_head=head,
         )  # fmt: skip
         nothing = result.failed == len(result.results)
         if explore and not nothing:
@@ -136,6 +137,7 @@ def study_to_folder(
     )
     write_study(parsed, result, store, report, page_of_cases)
     _print_outcome(result, out)
+    head.notes(result.notes)
     if write_ifc is not None and not nothing:
         for issue in write_study_ifc(result, write_ifc):
             click.echo(f"note: {issue.where}: {issue_text(issue, 'command').what}")

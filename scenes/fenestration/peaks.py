@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +49,48 @@ def lobe_effect(
     }
 
 
-def lobe_note(effect: Mapping[str, float]) -> str:
-    """The sentence on a `lobe_effect`."""
+def lobe_effect_on_sensors(
+    beam: NDArray[np.float64], lobe: NDArray[np.float64]
+) -> dict[str, float]:
+    """What an undecided peak does to the mean illuminance of some hours, as figures.
+
+    Args: beam, lobe: illuminance of the sensors [S, n] [lx] with the peak as a beam, as a lobe.
+    """
+    change = 100 * (lobe - beam).mean(axis=1) / np.maximum(beam.mean(axis=1), DIM)
+    return {
+        "sensor_hours_both_ways": float(beam.shape[1]),
+        "sensor_change_least": float(change.min()),  # [%]
+        "sensor_change_most": float(change.max()),  # [%]
+    }
+
+
+def lobe_notes(effects: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
+    """Sentences on several `lobe_effect` and `lobe_effect_on_sensors`; none without any."""
+    effects, notes = list(effects), []
+    rated = [one for one in effects if "dgp_as_lobe" in one]
+    if rated:
+        notes.append(_lobe_note(max(rated, key=_dgp_change)))
+    lit = [one for one in effects if "sensor_change_most" in one]
+    if lit:
+        notes.append(
+            Note(
+                "As a lobe, an undecided transmission peak changes the illuminance of a sensor by "
+                "{least:+.1f} to {most:+.1f} % (mean of {count} hours with sun).",
+                "As a lobe, an undecided transmission peak changes the illuminance of a sensor by "
+                "{least:+.1f} to {most:+.1f} % (in an hour with sun).",
+                count=int(lit[0]["sensor_hours_both_ways"]),
+                least=min(one["sensor_change_least"] for one in lit),
+                most=max(one["sensor_change_most"] for one in lit),
+            )
+        )
+    return tuple(notes)
+
+
+def _dgp_change(effect: Mapping[str, Any]) -> float:
+    return abs(float(effect["dgp_as_lobe"] - effect["dgp_as_beam"]))
+
+
+def _lobe_note(effect: Mapping[str, Any]) -> str:
     return Note(
         "The data do not show whether the transmission peak is specular. Computed both ways in "
         "{count} hours: as a lobe, DGP is {lobe:.3f} instead of {beam:.3f} where it differs most, "
@@ -115,7 +156,7 @@ def peak_note(system: FenestrationSystem) -> tuple[str, ...]:
             "{system}: the transmission peak ({peak:.2f} at normal incidence) is a lobe, as it "
             "spreads into the neighbouring Klems patches: no sun or view passes straight on. In "
             "patches it is wider: DGP is up to {error:.2f} too low where the sun is seen through "
-            "it. If it is specular: --see-through {file}=specular.",
+            "it. If it is specular: --see-through {file}=specular, or see_through in its table.",
             error=max(spread_sun_dgp(HIDDEN) - spread_sun_dgp((widest / 2 / np.pi) ** 0.5), 0.0),
             **values,
         )
@@ -134,7 +175,7 @@ def peak_note(system: FenestrationSystem) -> tuple[str, ...]:
             "{system}: the data do not show whether the transmission peak ({peak:.2f} at normal "
             "incidence) is specular or a lobe of less than {width:.1f} degrees; it is taken as "
             "specular. As a lobe, DGP is up to {error:.2f} lower where the sun is seen through "
-            "it: --see-through {file}=lobe.",
+            "it: --see-through {file}=lobe, or see_through in its table.",
             width=float(np.degrees(width)),
             error=-spread_sun_dgp(width),
             **values,

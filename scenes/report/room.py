@@ -26,7 +26,7 @@ from scenes.report.headline import Card, cards, occupied
 from scenes.report.names import quantity
 from scenes.report.tables import monthly_gains
 from scenes.report.thermal_figures import month_chart
-from scenes.results import RoomYear, RunResult, sunny_hour_notes
+from scenes.results import RoomYear, RunResult, method_figures, method_notes
 
 STATE_COLOURS = ("#f0e7c8", "#c9b458", "#8f9d3d", "#4f7f4f", "#2c5f66", "#23395b")
 LOADS = {"heating_w": "part0", "cooling_w": "part1", "lighting_w": "part2"}
@@ -36,6 +36,9 @@ RULES = {
     "irradiance": N_("by irradiance on the windows"),
     "glare": N_("most open state without glare at the view point"),
     "cut-off": N_("most open slats that block the direct sun (cut-off)"),
+    "outdoor temperature": N_("closed above an outdoor temperature"),
+    "wind": N_("open in strong wind"),
+    "rain": N_("open in rain"),
     "any": N_("several rules, the most closed state"),
     "all": N_("several rules, the most open state"),
 }
@@ -251,4 +254,4 @@ def error_words(room: RoomYear) -> str:
         mean=share(float(error.mean())),
         worst=share(float(error.max())),
     )
-    return " ".join((noise, *map(translated, sunny_hour_notes([room]))))
+    return " ".join((noise, *map(translated, method_notes([method_figures(room)]))))

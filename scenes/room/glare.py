@@ -89,6 +89,26 @@ def rated_hours(
     )  # fmt: skip
 
 
+def rated_hours_error(
+    room: RoomInputs,
+    light: RoomLight,
+    state: NDArray[np.int64],
+    metric: str,
+    hours: NDArray[np.int64],
+    rated: AnnualGlare,
+) -> float:
+    """Root mean square error of three-phase DGP in hours with sun; 0 by another method.
+
+    Args: as of `rated_hours`, whose result is `rated`.
+    """
+    if room.options.method != "three-phase":
+        return 0.0
+    return sunny_hour_dgp_error(
+        light.light, rated.dgp, metric, light.states(state),
+        hours=np.searchsorted(room.skies.lit, hours), options=rating_of(room.options.outputs),
+    )  # fmt: skip
+
+
 def worst_hours(year: pd.DataFrame, count: int) -> list[int]:
     """The hours of the year [indices] of the highest DGP, one a day, the worst first."""
     order = np.argsort(-year["dgp"].fillna(-1).to_numpy(), kind="stable")

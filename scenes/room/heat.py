@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -204,6 +204,8 @@ class DaylitRoom:
     seconds: dict[str, float]  # by stage
     annual_glare: pd.DataFrame | None = None
     dgp: AnnualGlare | None = None
+    dgp_sunny_hour_error: float = 0.0
+    as_lobe: dict[str, float] = field(default_factory=dict)
     issues: tuple[Issue, ...] = ()
     explored: ExploredRoom | None = None
     template: str = ""
@@ -212,7 +214,7 @@ class DaylitRoom:
     def with_heat(self, heat: Heat) -> RoomYear:
         """The room's year, with temperatures and operation."""
         thermal, operation = heat
-        names = (field.name for field in fields(self) if field.name not in {"zone", "issues"})
+        names = (one.name for one in fields(self) if one.name not in {"zone", "issues"})
         return RoomYear(
             heat=thermal,
             operation=operation,

@@ -24,6 +24,7 @@ from scenes.fenestration.thermal_file import StateTable
 from scenes.fenestration.thermal_system import checked_system
 from scenes.room.operation_tables import (
     PARTS,
+    WEATHER_RULES,
     OperationTables,
     RoomsTable,
     ShadingRule,
@@ -31,7 +32,7 @@ from scenes.room.operation_tables import (
 )
 from scenes.room.schedules import WEEK, ScheduleTable, scheduled_fields
 from scenes.toml_file import TomlTable, read_table, validated
-from thermal.control import by_schedule
+from thermal.control import by_schedule, by_threshold
 from thermal.emitters import HeatedSlab, IdealLoads
 from thermal.errors import ThermalInputError
 from thermal.ventilation import (
@@ -161,7 +162,9 @@ class OperationHours:
             return None
         share = self.value(table, "share", "air.windows")
         if not isinstance(share, np.ndarray) and table.when == "occupied":
-            share = share * (self.present > 0)
+            share = np.where(self.present > 0, share, table.absent_share)
+        if table.closed_in_rain:
+            share = np.where(self.rain("air.windows.closed_in_rain"), 0.0, share)
         half = np.array([0.5 * w.glazing_height for w in windows])
         middle, areas = np.array([w.height for w in windows]), [w.area for w in windows]
         height = stack_height(middle - half, middle + half)
@@ -186,11 +189,39 @@ class OperationHours:
             flow=(table.ach or 0.0) * volume / 3600.0,
         )
 
-    def states(self, rule: ShadingRule, place: str, count: int) -> NDArray[np.int64]:
-        """Shading states of the rule "schedule" [H] for windows with `count` states.
+    def rain(self, place: str) -> NDArray[np.bool_]:
+        """Whether it rains in each interval [H]; dry where the weather has no value.
 
-        Args: place: path of the rule's table.
+        Args: place: path of the key that asks. Raises: `DataError` for weather without rain.
         """
+        fallen = np.nan_to_num(self._weather("rain_mm", "rain", place))
+        if not fallen.any():  # files whose makers had no rain state zeros
+            raise DataError(f"the weather of {self.weather.site} has no rain", field=place)
+        return fallen > 0
+
+    def _weather(self, key: str, name: str, place: str) -> FloatArray:
+        """Values of the weather [H]; `DataError` where it has none."""
+        values: FloatArray | None = getattr(self.weather, key)
+        if values is None:
+            raise DataError(f"the weather of {self.weather.site} has no {name}", field=place)
+        return values
+
+    def states(
+        self, rule: ShadingRule, place: str, count: int, closed: int = 1
+    ) -> NDArray[np.int64]:
+        """Shading states [H] of a rule by schedule or weather for windows with `count` states.
+
+        Args: place: path of the rule's table; closed: the state of rules that name none.
+        """
+        closed = rule.state or closed
+        if rule.rule == "outdoor temperature":
+            outdoors = self._weather("dry_bulb_c", "temperature", f"{place}.rule")
+            return by_threshold(outdoors, rule.close_above_c, rule.open_below_c, closed=closed)
+        if rule.rule == "wind":
+            wind = self._weather("wind_speed", "wind", f"{place}.rule")
+            return closed - by_threshold(wind, rule.open_above_m_s, closed=closed)
+        if rule.rule == "rain":
+            return np.where(self.rain(f"{place}.rule"), 0, closed)
         if not isinstance(rule.schedule, str):
             return by_schedule(rule.schedule, len(self.weather.times))
         values = self.value(rule, "schedule", place)
@@ -234,6 +265,12 @@ class OperationHours:
         for place, table in operated_tables(self.tables):
             for key in scheduled_fields(table):
                 self.value(table, key, place)
+        for place, rule in self.tables.control.rules:
+            for leaf in rule.leaves:
+                if leaf.rule in WEATHER_RULES:
+                    self.states(leaf, place, 2)
+        if self.tables.air.windows is not None and self.tables.air.windows.closed_in_rain:
+            self.rain("air.windows.closed_in_rain")
         try:
             self.loads()
         except ThermalInputError as error:
@@ -323,7 +360,13 @@ def read_state(table: StateTable, path: Path | None, *, by: str = "") -> Fenestr
     if path is None:
         system = replace(system_of_panes(table.layers), source=f"{by} layers".strip())
     else:
-        system = read_system(path, u_value=table.u_value, g_value=table.g_value, by=by)
+        system = read_system(
+            path,
+            u_value=table.u_value,
+            g_value=table.g_value,
+            see_through=table.straight_share,
+            by=by,
+        )
     if table.layers:  # their U and g come before those of the BSDF's thermal file
         system = replace(system, u_value=table.u_value, g_value=table.g_value, g_by_patch=None)
     by_patch = table.g_by_patch()

@@ -97,6 +97,8 @@ class OpenedTable(TomlTable):
     share: Annotated[float | str, OrSchedule(plausible.SHARE)] = 0.1
     flow: Literal["single-sided", "cross"] = "single-sided"
     when: Literal["always", "occupied"] = "occupied"  # a share that is a number
+    absent_share: Share = 0.0  # "occupied": of the glass while nobody is there, such as tilted
+    closed_in_rain: bool = False
     open_above_c: Annotated[float, plausible.TEMPERATURE] = 24.0
     close_below_c: Annotated[float, plausible.TEMPERATURE] = 22.0
     least_difference: Annotated[float, Field(ge=-20, le=20)] = 0.0  # above outdoors [K]
@@ -310,21 +312,31 @@ class EnvelopeTable(TomlTable):
     frame_psi: Annotated[float, plausible.PSI] = 0.0  # along the edges of the glass [W/(m K)]
 
 
+WEATHER_RULES = ("outdoor temperature", "wind", "rain")  # that need nothing computed
+
+
 class ShadingRule(TomlTable):
     """The rule by which a group of windows changes its state.
 
     States are numbered from 0 in the order of the file.
     """
 
-    rule: Literal["always", "schedule", "irradiance", "glare", "cut-off", "any", "all"] = "always"
+    rule: Literal[
+        "always", "schedule", "irradiance", "glare", "cut-off", "outdoor temperature", "wind",
+        "rain", "any", "all",
+    ] = "always"  # fmt: skip
     parts: tuple[ShadingRule, ...] = ()  # of "any", the most closed state, and "all", the most open
     open_delay_h: Annotated[float, plausible.HOURS] = 0.0  # opens after more light for so long [h]
     hold_h: Annotated[float, plausible.HOURS] = 0.0  # least time between two moves [h]
-    state: Annotated[int, Field(ge=0)] = 0  # "always"; and the closed one of "irradiance"
+    # "always"; the closed one of "irradiance", "outdoor temperature", "wind" and "rain"
+    state: Annotated[int, Field(ge=0)] = 0
     # "schedule": 24 states, or the name of a schedule of states
     schedule: Annotated[tuple[int, ...] | str, OrSchedule(plausible.STATE, states_or_name)] = ()
     close_above: Annotated[Positive, plausible.SUN] = 200.0  # "irradiance" on the windows [W/m2]
     open_below: Annotated[float, plausible.SUN] | None = None
+    close_above_c: Annotated[float, plausible.OUTDOOR] = 20.0  # "outdoor temperature"
+    open_below_c: Annotated[float, plausible.OUTDOOR] | None = None
+    open_above_m_s: Annotated[Positive, plausible.WIND] = 10.0  # "wind": closed in less wind
     # "irradiance" and "cut-off": sun and sky that reach the windows, or those of a weather station
     # on the roof, without surroundings
     sensor: Literal["window", "roof"] = "window"

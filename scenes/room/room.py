@@ -47,6 +47,7 @@ from scenes.room.glare import (
     annual_glare,
     coloured,
     rated_hours,
+    rated_hours_error,
     rating_of,
     room_glare,
 )
@@ -55,6 +56,7 @@ from scenes.room.inner_glass import borrowed_share
 from scenes.room.inputs import FileSensors, RoomInputs, room_inputs
 from scenes.room.leaks import leak_issues
 from scenes.room.light import RoomLight, room_light
+from scenes.room.lobes import lobe_figures
 from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
@@ -169,7 +171,8 @@ def lit_room(
         message = "the explorer knows one state of the trees: give them one transmittance"
         raise DataError(message, file=building.file, field="--explore")
     hours = wanted_hours(options.outputs.picture_hours, weather.midpoints, room.skies.lit)
-    outdoors = year = dgp = explored = None
+    outdoors = year = dgp = rated = explored = None
+    dgp_error = 0.0
     times = StageTimes()
 
     with times.stage("daylight"):
@@ -194,6 +197,10 @@ def lit_room(
     if rate is not None:
         with times.stage("glare"):
             dgp = rated_hours(room, light, state, *rate, progress=progress)
+            dgp_error = rated_hours_error(room, light, state, *rate, dgp)
+            rated = (*rate, dgp)
+    with times.stage("glare"):
+        as_lobe = lobe_figures(room, light, state, rated=rated, year=year, glare=glare)
     if explore:
         with times.stage("explorer"):
             explored = explored_room(
@@ -205,8 +212,9 @@ def lit_room(
             outdoors = seasonal_outdoors(room, light, progress=progress)
         zone = room_zone(room, surfaces, outdoors, state, daylight, progress=progress)
     return DaylitRoom(
-        space, daylight, glare, zone, times.seconds, year, dgp=dgp, issues=leaks,
-        explored=explored, borrowed=borrowed_share(space, light.light, light.inner),
+        space, daylight, glare, zone, times.seconds, year, dgp=dgp,
+        dgp_sunny_hour_error=dgp_error, as_lobe=as_lobe, issues=leaks, explored=explored,
+        borrowed=borrowed_share(space, light.light, light.inner),
     )  # fmt: skip
 
 

@@ -24,9 +24,9 @@ from scenes.room.glare import rating_of
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
 from scenes.room.operation import OperationHours
-from scenes.room.operation_tables import ShadingRule
+from scenes.room.operation_tables import WEATHER_RULES, ShadingRule
 from scenes.room.solar import SeasonalOutdoors, window_irradiance
-from thermal.control import always, by_cut_off, by_glare, by_irradiance, delayed, held
+from thermal.control import always, by_cut_off, by_glare, by_threshold, delayed, held
 
 FloatArray = NDArray[np.float64]
 StateArray = NDArray[np.int64]
@@ -99,13 +99,13 @@ def _by_rule(
     def plain(rule: ShadingRule, place: str) -> StateArray:
         if rule.rule == "glare" and without_glare is not None:
             return without_glare
-        if rule.rule == "schedule" and operation is not None:
+        closed = rule.state or group_states(room, c) - 1
+        if rule.rule in ("schedule", *WEATHER_RULES) and operation is not None:
             hours = OperationHours(operation, room.weather)
-            return hours.states(rule, place, room.windows.states)
+            return hours.states(rule, place, room.windows.states, closed)
         if rule.rule == "irradiance":
-            closed = rule.state or group_states(room, c) - 1
             brightest = signals.irradiance(rule.sensor)[:, groups].max(axis=1)
-            return by_irradiance(brightest, rule.close_above, rule.open_below, closed=closed)
+            return by_threshold(brightest, rule.close_above, rule.open_below, closed=closed)
         if rule.rule == "cut-off":
             return _by_cut_off(room, rule, groups, signals.beam(rule.sensor))
         return always(rule.state, room.skies.hours)

@@ -220,7 +220,7 @@ def facade_irradiance(
             scene.scene.exterior, outer.points, outer.normals,
             subdivision=scene.sampling.subdivision, progress=progress, **_sampled(outdoors.first),
         ).values  # [n, P] irradiance per unit radiance of each sky patch [sr]  # fmt: skip
-        return coefficients @ sky
+        return coefficients.astype(sky.dtype) @ sky
 
     if len(outer.surfaces):
         lit = outdoors.by_season(of_season, skies.solar)

@@ -33,7 +33,7 @@ from scenes.input_files import InputFiles
 from scenes.inputs import Inputs, read_inputs
 from scenes.language.catalogue import N_
 from scenes.quick import NOTE
-from scenes.results import RoomYear, RunResult, sunny_hour_notes
+from scenes.results import RoomYear, RunResult, method_figures, method_notes
 from scenes.room.heat import DaylitRoom, coupled_years
 from scenes.room.inputs import skies_for
 from scenes.room.operation_tables import OperationTables
@@ -320,7 +320,7 @@ def run_inputs(
         *([NOTE] if options.quick else []),
         *head.notes,
         *notes,
-        *sunny_hour_notes(results),
+        *method_notes(map(method_figures, results)),
         *(result.borrowed for result in results if result.borrowed),
         *map(issue_note, leaks),
     ]

@@ -42,7 +42,7 @@ from scenes.heat.box import building_or_box
 from scenes.input_files import building_of, read_files, read_weather
 from scenes.input_options import InputOptions
 from scenes.inputs import Inputs, inputs_of
-from scenes.results import RoomYear
+from scenes.results import RoomYear, method_figures
 from scenes.room.inputs import skies_for
 from scenes.room.options import RoomOptions
 from scenes.room.room import RoomChoices, compute_room
@@ -236,6 +236,7 @@ def room_figures(room: RoomYear) -> tuple[dict[str, float | str], dict[str, NDAr
     figures["illuminance_error_max"] = 100.0 * float(daylight.relative_error.max())
     figures |= heat_figures(heat.temperatures, heat.comfort)
     figures |= {k: float(v) for k, v in heat.comfort_summary.items()}
+    figures |= method_figures(room)
     window = heat.fenestration[0]
     figures |= {k: float(v) for k, v in window.items() if not isinstance(v, str)}
     if room.operation is not None:

@@ -19,6 +19,7 @@ from mitsuba_cfs.progress import Progress, Stage, silent
 from scenes.calibration.durations import spoken_time
 from scenes.head import NO_HEAD, Head
 from scenes.report.glare_figures import compass
+from scenes.results import method_notes
 from scenes.study.automatic import settled
 from scenes.study.explored import ExploredCase, explorer_key, explorers
 from scenes.study.one_case import compute_case, plan_head
@@ -62,6 +63,11 @@ class StudyResult:
             f"predicted {spoken_time(predicted)}, took {spoken_time(taken)}: "
             f"{taken / predicted:.2f} times the prediction"
         )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the methods and undecided transmission peaks do to the cases' results."""
+        return method_notes(result.figures for result in self.results)
 
     @property
     def issues(self) -> tuple[Issue, ...]:
@@ -243,4 +249,5 @@ def manifest(study: Study, result: StudyResult) -> dict[str, Any]:
         "fenestration": {case.system: source_of(case) for case in plan.cases},
         "cases": [case.key for case in plan.cases],
         "head": result.head.record,
+        "notes": list(result.notes),
     }

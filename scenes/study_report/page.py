@@ -273,7 +273,7 @@ def _filled(
         parallel=parallel(study),
         bars=bars(study),
         table=comparison_table(study),
-        head=run_page.head_lines(study.head),
+        head=run_page.head_lines(study.head, study.notes),
         failures=failures_table(study),
         clock=clock_table(study),
         choices=tuple(dict.fromkeys(case.chosen for case in study.plan.cases if case.chosen)),
@@ -584,5 +584,5 @@ def write_study_explorer(study: StudyResult, folder: Path, page: PageOptions = O
             entries.append(moved_entry(entry, explored.key, name) | about)
     title = study.title or first["title"]
     with in_language(page.language):
-        head = run_page.head_lines(study.head)
+        head = run_page.head_lines(study.head, study.notes)
         write_joined(first | {"title": title, "head": head, "rooms": entries}, folder)

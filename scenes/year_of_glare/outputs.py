@@ -23,14 +23,13 @@ from mitsuba_cfs.glare.classes import (
 )
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import format_view
-from scenes.fenestration.peaks import lobe_note
 from scenes.figures.carpet import day_grid
 from scenes.language.catalogue import gettext
 from scenes.language.numbers import rounded, short_month, spoken
 from scenes.pictures import write_check_picture, write_falsecolour
 from scenes.report.headline import LEVEL_WORDS
 from scenes.report.method import METHODS
-from scenes.results import DGP_SUNNY_HOUR_ERROR, sunny_hour_dgp_notes
+from scenes.results import method_notes
 from scenes.year_of_glare.year import GlareYear, ViewYear, rating_of, used_dgp
 
 KEPT = "ratings"  # folder of the finished ratings, inside that of the results
@@ -79,8 +78,7 @@ def view_row(year: GlareYear, rated: ViewYear) -> dict[str, object]:
         "highest_dgp": float(rated.ratings.dgp.max()),
         "highest_dgp_standard_error": float(errors[rated.ratings.dgp.idxmax()]),
         "dgp_standard_error": mean_error(errors),
-        DGP_SUNNY_HOUR_ERROR: rated.sunny_hour_error,
-        **rated.as_lobe,
+        **rated.effects,
         "worst_hour": str(rated.ratings.dgp.idxmax()),
         "seconds": round(rated.seconds, 1),
         "VIEW": format_view(view),
@@ -159,11 +157,7 @@ def write_summary(year: GlareYear, rows: list[dict[str, object]], folder: Path) 
 
 def all_notes(year: GlareYear, table: pd.DataFrame) -> tuple[str, ...]:
     """Notes on the year besides those of its head; table: a row for each view."""
-    notes = (*year.notes, *sunny_hour_dgp_notes(float(table[DGP_SUNNY_HOUR_ERROR].max())))
-    if "dgp_as_lobe" not in table:
-        return notes
-    most = (table["dgp_as_lobe"] - table["dgp_as_beam"]).abs().idxmax()
-    return (*notes, lobe_note(table.loc[most]))
+    return (*year.notes, *method_notes(table.to_dict("records")))
 
 
 def _plain(value: object) -> object:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from bim.building_file import files_beside
 from bim.model import Building, Space, season_of
 from mitsuba_cfs import variants
-from mitsuba_cfs.files import sha256
+from mitsuba_cfs.files import json_text, sha256, write_text
 from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, finished_glare
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
 from mitsuba_cfs.images.view import View, format_view
@@ -41,6 +42,7 @@ from scenes.fenestration.peaks import lobe_effect
 from scenes.head import NO_HEAD, Head
 from scenes.input_files import InputFiles
 from scenes.inputs import first_states, read_inputs
+from scenes.results import DGP_SUNNY_HOUR_ERROR
 from scenes.viewed_room import viewed_room
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.views import NamedView, chosen_views, read_files
@@ -58,8 +60,8 @@ class ViewYear:
     ratings: pd.DataFrame  # [L, figures] by the time of each lit hour
     pictures: dict[pd.Timestamp, tuple[NDArray[np.float32], GlareResult]]  # none for sDGP
     seconds: float
-    sunny_hour_error: float = 0.0  # of three-phase DGP, see `sunny_hour_dgp_error`
-    as_lobe: dict[str, float] = field(default_factory=dict)  # of `lobe_effect`
+    # what the method and an undecided peak do to DGP: `DGP_SUNNY_HOUR_ERROR`, `lobe_effect`
+    effects: dict[str, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,15 +191,36 @@ def rate_views(
             {name: getattr(result, name) for name in FIGURES}, index=times.rename("time")
         )
         shown = _pictures(light, year, result)
-        rating = rating_of(options)
-        error = sunny_hour_dgp_error(light, result.dgp, options.metric, options=rating)
-        as_lobe = {}
-        if year.lobes is not None:
-            hours = bright_hours(result.dgp, BOTH_WAYS)
-            changed = glare_with(light, year.lobes, hours, options.metric, options=rating)
-            as_lobe = lobe_effect((result.dgp[hours], result.Ev[hours]), changed)
+        stored = checkpoint.with_suffix(".json")
+        effects = _stored_effects(stored)
+        if effects is None:
+            effects = _effects(light, year, result)
+            write_text(stored, json_text(effects))
         steps("", 1.0)
-        yield ViewYear(named, table, shown, time.monotonic() - start, error, as_lobe)
+        yield ViewYear(named, table, shown, time.monotonic() - start, effects)
+
+
+def _effects(
+    light: PhaseLight | SeasonalLight, year: GlareYear, result: AnnualGlare
+) -> dict[str, float]:
+    """`ViewYear.effects` of a rated view."""
+    metric, rating = year.options.metric, rating_of(year.options)
+    error = sunny_hour_dgp_error(light, result.dgp, metric, options=rating)
+    effects = {DGP_SUNNY_HOUR_ERROR: error}
+    if year.lobes is not None:
+        hours = bright_hours(result.dgp, BOTH_WAYS)
+        changed = glare_with(light, year.lobes, hours, metric, options=rating)
+        effects |= lobe_effect((result.dgp[hours], result.Ev[hours]), changed)
+    return effects
+
+
+def _stored_effects(file: Path) -> dict[str, float] | None:
+    """`ViewYear.effects` beside the ratings of a view; None where they are not stored there."""
+    try:
+        stored = json.loads(file.read_text("utf-8"))
+        return {str(name): float(value) for name, value in stored.items()}
+    except (OSError, ValueError, AttributeError, TypeError):
+        return None
 
 
 def _light(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 from dataclasses import replace
 
@@ -308,6 +309,19 @@ def test_a_big_file_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(city_models, "MOST_BYTES", path.stat().st_size - 1)
     with pytest.raises(DataError, match="too big: at most"):
         read_surroundings(path)
+
+
+def test_a_file_that_is_read_leaves_no_parser(tmp_path):
+    """In a circle of references it stayed until garbage was collected: 50 kB a file."""
+    path = tmp_path / "city.gml"
+    path.write_text(model(WHOLE))
+    gc.collect()
+    gc.disable()
+    try:
+        read_surroundings(path)
+        assert not [x for x in gc.get_objects() if type(x) is xml_elements._Reader]
+    finally:
+        gc.enable()
 
 
 def test_pieces_of_a_file_are_put_together(tmp_path, monkeypatch):

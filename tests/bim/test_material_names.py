@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import csv
+from itertools import pairwise
 from pathlib import Path
 
 import ifcopenshell.api.material
+import ifcopenshell.guid
 import pytest
 
 from bim.ifc.building import read_ifc
 from bim.material_names import material_named
 from mitsuba_cfs.errors import DataError
-from tests.bim.small_ifc import add_material, box_model
+from tests.bim.small_ifc import WALLS, add_material, box_model
 from tests.issues import of_code
 
 with (Path(__file__).parent / "material_names.csv").open(encoding="utf-8") as stream:
@@ -109,3 +111,40 @@ def test_one_material_of_a_wall_is_read(tmp_path):
     path = tmp_path / "m.ifc"
     small.model.write(str(path))
     assert _south(read_ifc(path)).layers[0].conductivity == 0.13
+
+
+def test_a_stated_u_is_that_of_the_whole_body(tmp_path):
+    """Of a wall that is one body of one material; the U held for a body of 1 m."""
+    small, walls = box_model()
+    add_material(small.model, walls["south"], "Panel X")
+    path = tmp_path / "m.ifc"
+    small.model.write(str(path))
+    path.with_name("m.corrections.toml").write_text('[[material]]\nname = "Panel X"\nu = 0.2\n')
+    assert _south(read_ifc(path)).resistance == pytest.approx(1 / 0.2 - 0.17)
+
+
+@pytest.mark.parametrize("thickness", [0.01, 0.06])
+def test_a_body_that_is_an_air_layer_has_its_resistance(tmp_path, thickness):
+    """Files that draw a body for each layer; air had 0.28 W/(m K) at any thickness."""
+    small, walls = box_model("IFC4")
+    (x, y, z), (width, depth, height) = WALLS["north"]
+    ends = {"Brick": 0.1, "Air Space": 0.1 + thickness, "Concrete": depth}
+    at = pairwise([0.0, *ends.values()])
+    small.show(
+        walls["north"],
+        [
+            ((x, y + depth - b, z), (width, b - a, height), small.style(name, 0.5))
+            for name, (a, b) in zip(ends, at, strict=True)
+        ],
+    )
+    create = small.model.create_entity
+    materials = create("IfcMaterialList", [create("IfcMaterial", name) for name in ends])
+    create("IfcRelAssociatesMaterial", ifcopenshell.guid.new(), walls["north"].OwnerHistory,
+           RelatedObjects=[walls["north"]], RelatingMaterial=materials)  # fmt: skip
+    path = tmp_path / "m.ifc"
+    small.model.write(str(path))
+    faces = read_ifc(path).spaces[0].faces
+    north = next(f.construction for f in faces if f.kind == "wall" and f.normal[1] > 0.9)
+    assert [layer.name for layer in north.layers] == [*ends]
+    assert north.layers[1].thickness == pytest.approx(thickness, abs=1e-6)
+    assert north.layers[1].resistance == pytest.approx({0.01: 0.15, 0.06: 0.18}[thickness])

@@ -253,6 +253,9 @@ def test_faults_are_one_line_with_element_and_field(tmp_path, old, new, said):
     ("old", "new", "where", "reason"),
     [
         ('unit="WPerMeterK"', 'unit="x"', "Material brick", "unit 'x'"),
+        (">1900</Density>", ">1e-320</Density>", "Material brick", "density: expected a number of"),
+        (">0.9</Conductivity>", ">1e-320</Conductivity>", "Material brick", "conductivity: "),
+        ('SquareMeterKPerW">3<', 'SquareMeterKPerW">1e-320<', "Material wool", "thickness: "),
         ('materialIdRef="wool"', 'materialIdRef="straw"', "Layer l1", "no Material 'straw'"),
         ('areaUnit="SquareMeters"', 'areaUnit="Acres"', "gbXML", "'Acres'"),
         ("<Latitude>50", "<Latitude>north", "Latitude", "expected a number"),

@@ -72,6 +72,13 @@ def test_info_lists_bands_and_angles(real_data):
     assert normal[2:] == ["0.6477", "0.1225", "0.6623", "0.0980"]  # the file inventory's figures
 
 
+def test_info_of_an_even_sheet(shade):
+    """Rows of normal incidence: tau and rho of the front, then of the back."""
+    text = run("info", shade).stdout
+    normal = next(line for line in text.splitlines() if "normal" in line).split()
+    assert normal[2:] == ["0.1000", "0.5000", "0.1000", "0.5000"]
+
+
 def test_a_missing_band_is_stated_wherever_its_values_are_printed(tmp_path, dummy_back):
     """tau_e and g_tot of a file with a Visible band alone are those of light."""
     assert (

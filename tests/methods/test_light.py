@@ -11,7 +11,7 @@ import pytest
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.images.view import fisheye
-from mitsuba_cfs.methods.glare import hourly_glare, pictures, rated_pictures
+from mitsuba_cfs.methods.glare import glare_with, hourly_glare, pictures, rated_pictures
 from mitsuba_cfs.methods.light import (
     SeasonalLight,
     daylight,
@@ -19,6 +19,7 @@ from mitsuba_cfs.methods.light import (
     illuminance,
     illuminance_noise,
     illuminance_with_error,
+    illuminance_with_systems,
     with_view,
 )
 from mitsuba_cfs.methods.optics import AngularOptics, BsdfOptics
@@ -194,3 +195,20 @@ def test_states_of_all_hours_are_those_of_the_lit_hours() -> None:
         illuminance(light, np.full(len(sky.lit), np.nan))
     with pytest.raises(ValueError, match="of the year"):
         illuminance(light, np.zeros(sky.hours + 1, dtype=int))
+
+
+def test_other_systems_keep_each_hours_state() -> None:
+    sky = given_sky(
+        [[0.0, -0.8, 0.6], [0.3, -0.7, 0.6]], [800.0] * 2, [90.0] * 2, 1, day_of_year=172
+    )
+    one, other = (
+        [[AngularOptics([0.0, first, first]), AngularOptics([0.0, second, second])]]
+        for first, second in ((0.7, 0.3), (0.5, 0.1))
+    )
+    light, changed = (daylight(scene(), each, sky, sampling=FEW) for each in (one, other))
+    state, hours = np.array([[0, 1]]), np.array([1])
+    lit = illuminance_with_systems(light, other, hours, state)
+    np.testing.assert_allclose(lit, illuminance(changed, state)[:, hours], rtol=1e-6)
+    dgp, eye = glare_with(light, other, hours, state=state)
+    expected = hourly_glare(changed, "DGP", state, hours=hours)
+    assert (dgp, eye) == (pytest.approx(expected.dgp), pytest.approx(expected.Ev))

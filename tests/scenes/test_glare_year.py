@@ -66,10 +66,13 @@ def test_views_are_rated_and_written_and_a_second_run_takes_them_up(year, tmp_pa
     def never(*_arguments, **_options):
         raise AssertionError("rated again")
 
-    monkeypatch.setattr(module, "hourly_glare", never)
+    for rating in ("hourly_glare", "sunny_hour_dgp_error", "glare_with"):
+        monkeypatch.setattr(module, rating, never)
     quick = replace(year, options=replace(year.options, worst=0))
     again = list(module.rate_views(quick, kept))
     assert np.array_equal(again[0].ratings.dgp.to_numpy(), towards)
+    assert [each.effects for each in again] == [each.effects for each in found]
+    assert found[0].effects["hours_both_ways"] == 16
     other = replace(quick, digest="another input")
     with pytest.raises(AssertionError, match="rated again"):
         list(module.rate_views(other, kept))

@@ -204,7 +204,7 @@ def office(
 def test_heat_is_computed_in_one_place() -> None:
     """One module of `scenes` calls each function that a year of heat is made of."""
     called: dict[str, list[str]] = {}
-    once = ("absorption_matrix", "by_irradiance", "split_gains", "simulate_zones", "switched")
+    once = ("absorption_matrix", "by_glare", "split_gains", "simulate_zones", "switched")
     for path in SCENES.rglob("*.py"):
         # design days are single days that repeat themselves, no year
         if path.name != "design_days.py":

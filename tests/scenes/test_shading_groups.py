@@ -21,7 +21,7 @@ from mitsuba_cfs.sky.sun import is_up, sun_directions
 from scenes.room.control_groups import control_groups
 from scenes.room.inputs import RoomInputs, room_inputs, skies_for
 from scenes.room.light import room_light
-from scenes.room.operation import Operation
+from scenes.room.operation import Operation, OperationHours, check_schedules
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import compute_room, explored_combinations
 from scenes.room.shading import control_signals, shading_states, window_beam
@@ -255,6 +255,52 @@ def test_rules_are_combined(inputs) -> None:
         assert np.all(waiting[name] >= by_sun)
         moves = np.flatnonzero(np.diff(resting[name]))
         assert len(moves) < np.count_nonzero(np.diff(by_sun)) and np.diff(moves).min() >= 4
+
+
+def test_rules_by_weather(inputs, weather) -> None:
+    """Closed in warm hours; an exterior blind that is raised in strong wind and in rain."""
+    warm = {"rule": "outdoor temperature", "close_above_c": 20.0, "open_below_c": 17.0}
+    calm, dry = {"rule": "wind", "open_above_m_s": 8.0}, {"rule": "rain", "state": 1}
+    together = by_group(inputs({"rule": "all", "parts": [warm, calm, dry | {"state": 2}]}))["S"]
+    single = [by_group(inputs(one))["S"] for one in (warm, calm, dry)]
+    air, rains = weather.dry_bulb_c, np.nan_to_num(weather.rain_mm) > 0
+    assert 20 < rains.sum() < 40
+    assert (single[0][air > 20] == 2).all() and not single[0][air < 17].any()
+    between = (air[1:] >= 17) & (air[1:] <= 20)
+    assert np.array_equal(single[0][1:][between], single[0][:-1][between])
+    assert np.array_equal(single[1], np.where(weather.wind_speed > 8.0, 0, 2))
+    assert np.array_equal(single[2], np.where(rains, 0, 1))
+    shut = single[0] * (single[1] > 0) * (single[2] > 0)
+    assert np.array_equal(together, shut) and 0 < np.count_nonzero(shut)
+
+
+def test_a_rule_that_the_weather_cannot_answer_is_refused_first(weather) -> None:
+    tables = OperationTables.model_validate(
+        {"control": {"rule": "any", "parts": [{"rule": "rain"}]}}
+    )
+    airing = OperationTables.model_validate({"air": {"windows": {"closed_in_rain": True}}})
+    check_schedules(tables, weather)
+    for rain in (None, np.zeros_like(weather.dry_bulb_c)):
+        dry = replace(weather, rain_mm=rain)
+        for table, field in ((tables, "control.rule"), (airing, "air.windows.closed_in_rain")):
+            with pytest.raises(DataError, match="has no rain") as error:
+                check_schedules(table, dry)
+            assert error.value.field == field
+    windy = OperationTables.model_validate({"control": {"rule": "wind"}})
+    with pytest.raises(DataError, match="has no wind"):
+        check_schedules(windy, replace(weather, wind_speed=None))
+
+
+def test_windows_are_tilted_while_nobody_is_there_and_shut_in_rain(weather) -> None:
+    air = {"windows": {"share": 0.3, "absent_share": 0.02, "closed_in_rain": True}}
+    tables = OperationTables.model_validate({"air": air, "gains": {"occupied": [8, 18]}})
+    window = SimpleNamespace(
+        glazing_height=1.5, height=1.6, area=3.0, normal=np.array([0.0, 1.0, 0.0])
+    )
+    share = OperationHours(tables, weather).airing([window], 60.0).share
+    clock, rains = weather.midpoints.hour.to_numpy(), np.nan_to_num(weather.rain_mm) > 0
+    expected = np.where((clock >= 8) & (clock < 18), 0.3, 0.02)
+    assert np.array_equal(share, np.where(rains, 0.0, expected))
 
 
 def test_a_rule_against_glare_is_combined_with_others(inputs, skies) -> None:

@@ -48,10 +48,33 @@ def test_snow_and_the_files_albedo(weather):
     stated = np.where(weather.dry_bulb_c < 0, np.nan, 0.31)
     filed = with_albedo(replace(weather, stated_albedo=stated), "file")
     assert set(np.unique(filed.albedo)) == {0.2, 0.31}
-    assert "albedo is missing in" in str(filed.notes[-1])
+    assert "albedo: missing or impossible in" in str(filed.notes[-1])
     (note,) = set(with_albedo(snow, None).notes) - set(weather.notes)
     assert "snow lies in" in str(note)
     assert with_albedo(weather, None).notes == weather.notes
+
+
+def test_gaps_of_six_hours_are_interpolated_and_named(weather):
+    """Longer ones are bare ground of 0.2, and are named too."""
+    depth = np.full(8760, 12.0)
+    depth[100:106] = depth[200:207] = np.nan
+    cold = replace(weather, dry_bulb_c=np.full(8760, -5.0), snow_depth_cm=depth)
+    snow = with_albedo(cold, "snow")
+    assert (snow.albedo != SNOW).sum() == 7 and (snow.albedo[200:207] == 0.2).all()
+    stated = np.linspace(0.1, 0.97, 8760)
+    gaps = stated.copy()
+    gaps[100:106] = gaps[-1] = np.nan
+    filed = with_albedo(replace(weather, stated_albedo=gaps), "file")
+    np.testing.assert_allclose(filed.albedo[:-1], stated[:-1])
+    assert filed.albedo[-1] == 0.2
+    bright = np.count_nonzero(stated[:-1] > 0.95)
+    for year, words in (
+        (snow, ["snow depth: 6 missing values", "snow depth: missing or impossible in 7 hours"]),
+        (filed, ["albedo: 6 missing values", "impossible in 1 hour; 0.2",
+                 f"above 0.95 in {bright} hours"]),
+    ):  # fmt: skip
+        notes = [str(note) for note in year.notes[len(weather.notes) :]]
+        assert all(word in note for word, note in zip(words, notes, strict=True)), notes
 
 
 def test_what_cannot_be_is_refused(weather):

@@ -14,8 +14,8 @@ from thermal.control import (
     always,
     by_cut_off,
     by_glare,
-    by_irradiance,
     by_schedule,
+    by_threshold,
     cut_off_angle,
     delayed,
     held,
@@ -28,8 +28,8 @@ from thermal.zone import WindowElement, Zone
 
 def test_irradiance_control_has_hysteresis():
     light = np.array([0, 150, 250, 180, 120, 90, 180, 250], dtype=float)
-    assert by_irradiance(light, 200.0).tolist() == [0, 0, 1, 0, 0, 0, 0, 1]
-    assert by_irradiance(light, 200.0, 100.0).tolist() == [0, 0, 1, 1, 1, 0, 0, 1]
+    assert by_threshold(light, 200.0).tolist() == [0, 0, 1, 0, 0, 0, 0, 1]
+    assert by_threshold(light, 200.0, 100.0).tolist() == [0, 0, 1, 1, 1, 0, 0, 1]
 
 
 def test_schedule_and_always():

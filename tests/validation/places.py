@@ -30,6 +30,7 @@ PLACES = {  # name: latitude, longitude, time zone, year
     "Mumbai": (19.09, 72.85, 5.5, 2023),
     "Kathmandu": (27.70, 85.32, 5.75, 2023),
     "Adelaide": (-34.93, 138.60, 9.5, 2023),
+    "Adelaide, mirrored": (34.93, 138.60, 9.5, 2023),  # the same half a year later
     "St. John's": (47.56, -52.71, -3.5, 2023),
     "Ushuaia": (-54.80, -68.30, -3.0, 2023),
     "Neumayer": (-70.67, -8.27, 0.0, 2023),

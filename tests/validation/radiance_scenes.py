@@ -1,11 +1,12 @@
 r"""Radiance scenes of others and of our own, as they are: `cfs picture scene.rad` beside `rtrace`.
 
-    python -m tests.validation radiance_scenes [FOLDER] [--points 4] [--samples 64] [--size 300]
+    python -m tests.validation radiance_scenes [FOLDER] [--points 8] [--seeds 4] [--samples 16]
 
 Illuminance at an eye in the room's middle that looks at the window, under one overcast and one
 sunny hour of the EPW, whose dew point is that of gendaylit.  The scenes of FOLDER and those of
 `ours` and `further`: panes in series, fabrics, frosted panels, louvres on their side, a facade
-opposite.  A scene that is refused has the message in its row.
+opposite.  A scene that is refused has the message in its row.  The table is that of
+docs/evidence_buildings.md.
 
 Both programs have the sky on the same patches, as `perezlum.cal` mixes the ground into the sky at
 the horizon.  Radiance spreads the straight beam of a `BSDF` over its patch, as `--see-through
@@ -14,11 +15,11 @@ FILE=lobe` does here; by default it is specular, which is the row without "lobe"
 
 from __future__ import annotations
 
+import io
 import re
-import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Annotated
 
@@ -30,6 +31,7 @@ from mitsuba_cfs.sky.annual import annual_sky
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import DEFAULT_DEW_POINT_C
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+from scenes.cli import run
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from tests.benchmarks.radiance import environment
 from tests.validation.geneva import with_dew_point
@@ -151,20 +153,24 @@ def further() -> dict[str, tuple[str, list[str]]]:
     }
 
 
-def by_command(scene: Path, weather: Path, at: str, options: Sequence[str]) -> float | str:
-    """Illuminance at the eye [lx] by `cfs picture`, or its refusal."""
+def by_command(
+    scene: Path, weather: Path, at: str, seeds: int, options: Sequence[str]
+) -> tuple[float, float] | str:
+    """Illuminance at the eye [lx] by `cfs picture` and its standard error, or its refusal."""
     words = [
         "picture", scene, "--weather", weather, "--at", at, "--view", VIEW,
         "--sun-model", "radiance", "--sky-ground", "gendaylit", "--out", scene.with_suffix(".png"),
     ]  # fmt: skip
-    done = subprocess.run(
-        [sys.executable, "-m", "scenes.cli", *map(str, words), *options],
-        check=False, capture_output=True, text=True,
-    )  # fmt: skip
-    if done.returncode:
-        return "refused: " + done.stderr.strip().splitlines()[-1].rpartition(f"{scene}:")[2]
-    (value,) = re.findall(r"Ev ([\d,]+) lx", done.stdout)
-    return float(value.replace(",", ""))
+    values = []
+    for seed in range(seeds):
+        with redirect_stdout(io.StringIO()) as shown, redirect_stderr(io.StringIO()) as refusal:
+            code = run([*map(str, words), *options, "--seed", str(seed)])
+        if code:
+            line = refusal.getvalue().strip().splitlines()[-1]
+            return f"refused: line {line.rpartition(f'{scene}:')[2].partition(';')[0]}"
+        (value,) = re.findall(r"Ev ([\d,.]+) lx", shown.getvalue())
+        values.append(float(value.replace(",", "")))
+    return float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(seeds))
 
 
 def by_rtrace(scene: Path, weather: Path, at: str, points: int) -> tuple[float, float]:
@@ -183,35 +189,50 @@ def by_rtrace(scene: Path, weather: Path, at: str, points: int) -> tuple[float, 
     return rendered.eye_illuminance(parse_view(VIEW), points)
 
 
+def cells(there: tuple[float, float], here: tuple[float, float] | str) -> list[str]:
+    """Both illuminances and their difference [%] with standard errors, as cells of the table.
+
+    A difference of more than 2 % and three of its standard errors is bold.
+    """
+    ours = here if isinstance(here, str) else f"{here[0]:,.0f} ± {here[1]:,.1f}"
+    shown = [f"{there[0]:,.0f} ± {there[1]:,.1f}", ours]
+    if isinstance(here, str):
+        return [*shown, ""]
+    ratio = here[0] / there[0]
+    noise = 100 * ratio * float(np.hypot(here[1] / here[0], there[1] / there[0]))
+    off = 100 * (ratio - 1)
+    text = f"{off:+.1f} ± {noise:.1f}"
+    return [*shown, f"**{text}**" if abs(off) > max(2.0, 3 * noise) else text]
+
+
 def main(
     folder: Path = FOLDER,
     *,
-    points: Annotated[int, "eyes of rtrace at one place"] = 4,
-    samples: Annotated[int, "paths per pixel"] = 64,
-    size: Annotated[int, "[px]"] = 300,
+    points: Annotated[int, "eyes of rtrace at one place"] = 8,
+    seeds: Annotated[int, "runs of the command"] = 4,
+    samples: Annotated[int, "paths per pixel"] = 16,
+    size: Annotated[int, "[px]"] = 200,
     weather: Path = WEATHER,
     only: Annotated[Sequence[str], "names of scenes; all by default"] = (),
-) -> pd.DataFrame:
-    """A row for each scene and hour [lx]."""
+) -> None:
+    """Print a row for each scene [lx] as soon as it is computed."""
     environment()  # says at once where there is no Radiance
     files = {path.name: path.read_text() for path in sorted(folder.glob("*.rad"))}
-    scenes = (
-        {name: (text, []) for name, text in files.items() if "polygon" in text} | ours() | further()
-    )
-    rows = []
+    scenes: dict[str, tuple[str, list[str]]] = {
+        name: (text, []) for name, text in files.items() if "polygon" in text
+    }
+    scenes |= ours() | further()
+    columns = [f" {sky}: `rtrace` | `cfs picture` | % |" for sky in HOURS]
+    print(f"| scene |{''.join(columns)}\n{'|---' * (1 + 3 * len(HOURS))}|", flush=True)
     with tempfile.TemporaryDirectory() as temporary:
         epw = with_dew_point(weather, Path(temporary), DEFAULT_DEW_POINT_C)
         for number, (name, (text, options)) in enumerate(scenes.items()):
             if only and name not in only:
                 continue
-            scene = Path(temporary) / f"scene_{number}.rad"
+            scene, row = Path(temporary) / f"scene_{number}.rad", [name]
             scene.write_text(text)
-            for sky, at in HOURS.items():
-                more = [*options, "--samples", str(samples), "--size", str(size)]
-                here = by_command(scene, epw, at, more)
-                there, error = by_rtrace(scene, epw, at, points)
-                row = {"scene": name, "sky": sky, "rtrace": round(there), "+-": round(error, 1)}
-                deviation = 100 * (here / there - 1) if isinstance(here, float) else None
-                rows.append(row | {"cfs picture": here, "%": deviation and round(deviation, 1)})
-                print(rows[-1], file=sys.stderr)
-    return pd.DataFrame(rows)
+            more = [*options, "--samples", str(samples), "--size", str(size)]
+            for at in HOURS.values():
+                here = by_command(scene, epw, at, seeds, more)
+                row += cells(by_rtrace(scene, epw, at, points), here)
+            print(f"| {' | '.join(row)} |", flush=True)
