@@ -25,7 +25,7 @@ from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
 from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system
-from scenes.fenestration.thermal_file import files_beside
+from scenes.fenestration.thermal_file import PEAK_SHARES, files_beside
 from scenes.fenestration.thermal_system import checked_system
 from scenes.input_options import InputOptions
 from scenes.room.operation import (
@@ -183,9 +183,8 @@ def peak_share(text: str) -> tuple[str, float]:
     Raises: `DataError` for another text.
     """
     name, _, kind = text.rpartition("=")
-    known = {"specular": 1.0, "lobe": 0.0}
     try:
-        share = known[kind] if kind in known else float(kind)
+        share = PEAK_SHARES[kind] if kind in PEAK_SHARES else float(kind)
     except ValueError:
         share = -1.0
     if not name or not 0 <= share <= 1:

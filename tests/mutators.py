@@ -133,7 +133,7 @@ def of_xml(content: bytes, random: np.random.Generator) -> bytes:
             case 1:
                 parent.append(copy.deepcopy(child))
             case 2:
-                other.append(copy.deepcopy(child) if len(list(child.iter())) < 200 else child[0])
+                other.append(copy.deepcopy(child if len(list(child.iter())) < 200 else child[0]))
             case 3 if child.attrib:
                 key = list(child.attrib)[int(random.integers(len(child.attrib)))]
                 child.attrib[key] = str(random.choice([*NUMBERS, other.text or "", "meter"]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from bim.model import Building, Element, Face, Space, Window
 from bim.names import numbered
 from bim.radiance.daylight import opaque_objects, plain_glass
 from bim.radiance.indoors import THICK, Indoors, indoors_of
-from bim.radiance.layers import layered_window
+from bim.radiance.layers import front_reflectance, layered_window
 from bim.radiance.panes import PanedWindow, is_pane, panes_of
 from bim.radiance.scene import RadianceObject, RadianceScene, read_radiance
 from bim.report.issue import Issue
@@ -22,6 +22,7 @@ from mitsuba_cfs.errors import DataError, RoomError
 
 NEAR = 0.3  # of the floor's level, for its other parts [m]
 FLAT = 0.5  # cosine from which a surface is floor or ceiling
+BEFORE = 5e-4  # distance of a layer's outdoor side from the layer [m]
 LIKELY = (0.5, 2.0)  # enclosed volume over that of floor and height, where the shell is sound
 
 
@@ -58,7 +59,8 @@ def read_radiance_building(
     if not indoors.bounds.any():
         message = f"no surface is indoors: is the room closed?{_not_read(scene)}"
         raise DataError(message, file=path, field="aperture")
-    space, issues = _space(path.stem, objects, indoors, windows, _not_read(scene))
+    pieces = (*_furniture(objects, indoors), *_gap_sides(panes.windows))
+    space, issues = _space(path.stem, objects, indoors, windows, pieces, _not_read(scene))
     elements = tuple(
         _element(f"{path.stem}-{i}", thing, thing.triangles)
         for i, thing in enumerate(objects)
@@ -142,9 +144,9 @@ def _space(
     objects: Sequence[RadianceObject],
     indoors: Indoors,
     windows: tuple[Window, ...],
+    furniture: tuple[Element, ...],
     not_read: str,
 ) -> tuple[Space, list[Issue]]:
-    pieces = _furniture(objects, indoors)
     seen = indoors.bounds.any(axis=0) & ~indoors.furniture
     faces = _faces(objects, indoors.outward(seen), indoors.owner[seen], windows)
     floor = sum(face.area for face in faces if face.kind == "floor")
@@ -162,7 +164,7 @@ def _space(
     if leaks:
         issues.append(Issue("room-with-open-edges", name, {"room": name, "count": leaks}))
     return Space(
-        f"{name}-room", name, "", volume, floor, faces, windows, volume, furniture=pieces
+        f"{name}-room", name, "", volume, floor, faces, windows, volume, furniture=furniture
     ), issues
 
 
@@ -211,6 +213,20 @@ def _furniture(objects: Sequence[RadianceObject], indoors: Indoors) -> tuple[Ele
         triangles = indoors.outward(own)[:, ::-1]
         pieces.append(_element(guid, objects[i], triangles))
     return tuple(pieces)
+
+
+def _gap_sides(windows: Sequence[PanedWindow]) -> Iterator[Element]:
+    """The outdoor sides of layers, where light in the gap before them gets past their rims."""
+    free = {id(window.panes[-1]) for window in windows if window.covered}
+    for window in windows:
+        *outer, layer = window.panes
+        if any(id(pane) in free for pane in outer):
+            rho = front_reflectance(layer, window.outwards[-1])
+            triangles = window.surface.triangles + BEFORE * window.surface.normal
+            yield Element(
+                f"cavity-{layer.name}", layer.name, layer.material.kind, triangles, rho, rho,
+                material=layer.material.name,
+            )  # fmt: skip
 
 
 def _floor_level(

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ from bim.radiance.patterns import (
     pattern_values,
     ray_variables,
 )
+from bim.radiance.primitives import VOID
 from bim.radiance.scene import RadianceObject
 from bim.report.issue import Issue
 from mitsuba_cfs.bsdf.angular import ANGLES, AngularTable
@@ -129,6 +131,19 @@ def layered_window(
     return LayeredWindow(state, ups[0] if ups else None, tuple(issues))
 
 
+def front_reflectance(thing: RadianceObject, outward: bool) -> float:
+    """Reflectance of a layer's outdoor side for diffuse light.
+
+    Args: outward: whether its front is outdoors.
+    """
+    is_system = thing.material.kind in SYSTEMS
+    layer = _bsdf_layer(thing, outward) if is_system else _layer(thing, outward, [])
+    klems = layer.klems if isinstance(layer, WindowLayer) else klems_of(layer)
+    block = klems.filled().reflection_front
+    omega = klems.basis_in.projected_solid_angles()
+    return 0.0 if block is None else float(omega @ klems.direct_hemispherical(block) / omega.sum())
+
+
 def _beam_table(layers: Sequence[WindowLayer]) -> AngularTable:
     whole = stack([layer.specular for layer in layers])
     values = (whole.tau, whole.rho_front, whole.rho_back)
@@ -202,6 +217,16 @@ def _layer(
     thing: RadianceObject, outward: bool, issues: list[Issue]
 ) -> WindowLayer | TensorTreeBsdf:
     material, zero = thing.material, np.zeros(len(ANGLES))
+    if thing.parts:
+        return _mixed_layer(thing, outward, issues)
+    if material.is_opaque and not material.is_translucent:  # of a mixture
+        gloss = zero if material.gloss is None else material.gloss.reflectance(np.cos(ANGLES))
+        mirrored = np.stack([gloss, gloss])
+        diffuse = zero + material.diffuse
+        return WindowLayer(PaneOptics(0 * mirrored, mirrored, mirrored), zero, diffuse, diffuse)
+    if material.kind == VOID:
+        one = np.ones((2, len(ANGLES)))
+        return WindowLayer(PaneOptics(one, 0 * one, 0 * one), zero, zero, zero)
     patterns = thing.definitions[:-1]
     for one in patterns:
         if one.primitive.kind not in COMPUTED_PATTERNS:
@@ -218,9 +243,9 @@ def _layer(
                   "least": float(scale.min()), "greatest": float(scale.max())}  # fmt: skip
         issues.append(Issue("glass-pattern-averaged", f"{first.file}:{first.line}", values))
     if material.kind == "glass":
-        passed = np.clip(material.transmissivity * scale, 0.0, 1.0)
-        tau, rho = polarised_shares(np.cos(ANGLES)[:, None], material.index, passed)
-        tau, rho = tau.mean(axis=2), rho.mean(axis=2)
+        passed = np.full(len(ANGLES), material.transmissivity)
+        tau, rho = polarised_shares(np.cos(ANGLES), material.index, passed)
+        tau = np.minimum(tau * scale.mean(axis=1), 1 - rho)  # `glass.c`: not the transmissivity
         return WindowLayer(PaneOptics(tau, rho, rho), zero, zero, zero)
     colour = np.minimum(scale, 1.0).mean(axis=1)
     if material.kind.startswith("trans"):
@@ -228,6 +253,44 @@ def _layer(
     if material.kind == "BRTDfunc":
         return _function_layer(thing, outward, colour)
     raise thing.primitive.fault(f"{material.kind} is not computed as a layer of a window")
+
+
+def _mixed_layer(thing: RadianceObject, outward: bool, issues: list[Issue]) -> WindowLayer:
+    """A `mixfunc`: what its two materials pass and reflect, by the mean share of the first."""
+    definition = thing.definitions[-1]
+    values = pattern_values(thing.triangles, thing.normal, [definition], ANGLES)
+    share = np.clip(values, 0.0, 1.0)
+    layers = [_layer(part, outward, issues) for part in thing.parts]
+    smooth = [layer for layer in layers if isinstance(layer, WindowLayer)]
+    if len(smooth) < len(layers):
+        raise definition.primitive.fault("mixes a rough trans, which is not computed")
+    where = f"{definition.primitive.file}:{definition.primitive.line}"
+    names = [part.material.name for part in thing.parts]
+    issues.append(
+        Issue(
+            "glass-mixture-averaged",
+            where,
+            {
+                "surface": thing.name,
+                "mixture": definition.primitive.name,
+                "foreground": names[0],
+                "background": names[1],
+                "mean": 100 * float(share.mean()),
+                "least": 100 * float(share.min()),
+                "greatest": 100 * float(share.max()),
+            },
+        )
+    )
+    mean = share.mean(axis=1)
+
+    def mixed(name: str) -> NDArray[np.float64]:
+        one, other = (attrgetter(name)(layer) for layer in smooth)
+        return mean * one + (1.0 - mean) * other
+
+    specular = PaneOptics(*(mixed(f"specular.{name}") for name in ("tau", "rho_front", "rho_back")))
+    return WindowLayer(
+        specular, *(mixed(name) for name in ("scattered", "reflected_front", "reflected_back"))
+    )
 
 
 def _trans_layer(

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bim.radiance.primitives import VOID, Primitive
-from mitsuba_cfs.gloss import ROUGHEST, Gloss, radiance_gloss
+from mitsuba_cfs.gloss import ROUGHEST, STEPS, Gloss, radiance_gloss
 
 LUMINANCE = (0.265, 0.670, 0.065)  # of red, green, blue [1]
+MIXTURE = "mixfunc"
 OPAQUE = ("plastic", "metal", "plastic2", "metal2", "trans", "trans2")
 CLEAR = ("glass", "dielectric", "interface")
 SYSTEMS = ("BSDF", "aBSDF")
@@ -44,13 +45,13 @@ class RadianceMaterial:
 
     @property
     def is_translucent(self) -> bool:
-        """Whether it is a `trans` that transmits light."""
+        """Whether it is a `trans` or a mixture that transmits light."""
         return self.transmitted + self.straight > 0
 
     @property
     def is_opaque(self) -> bool:
         """Whether it obstructs light, as the tracer takes it."""
-        return self.kind in OPAQUE or self.kind in BLACK or self.kind == "mirror"
+        return self.kind in (*OPAQUE, *BLACK, "mirror", MIXTURE)
 
 
 def material_of(primitive: Primitive) -> RadianceMaterial:
@@ -81,6 +82,31 @@ def material_of(primitive: Primitive) -> RadianceMaterial:
     if kind in OPAQUE:
         return _opaque(primitive)
     return RadianceMaterial(name, kind)
+
+
+def mixed_material(
+    name: str, share: float, foreground: RadianceMaterial, background: RadianceMaterial
+) -> RadianceMaterial:
+    """A mixture with a share of its foreground: means of what both reflect and transmit.
+
+    Its gloss has the roughness of the stronger one.
+    """
+    parts = ((share, foreground), (1.0 - share, background))
+    shiny = [(s, one.gloss) for s, one in parts if one.gloss is not None and s > 0]
+    gloss = None
+    if shiny:
+        cosine = np.linspace(0.0, 1.0, STEPS)
+        specular = np.clip(sum(s * one.reflectance(cosine) for s, one in shiny), 0, 1)
+        strongest = max(shiny, key=lambda pair: pair[0] * pair[1].at_normal)[1]
+        gloss = Gloss(tuple(specular.tolist()), strongest.roughness)
+    return RadianceMaterial(
+        name,
+        MIXTURE,
+        diffuse=sum(s * one.diffuse for s, one in parts),
+        gloss=gloss,
+        transmitted=sum(s * one.transmitted for s, one in parts),
+        straight=sum(s * (one.straight if one.is_opaque else 1.0) for s, one in parts),
+    )
 
 
 def _opaque(primitive: Primitive) -> RadianceMaterial:

@@ -336,7 +336,8 @@ def diffuse_mean(shares: NDArray[np.float64]) -> float:
 
 def _optics(thing: RadianceObject) -> object:
     """A key that layers of equal optics share."""
-    return replace(thing.material, name=""), tuple(id(one) for one in thing.definitions[:-1])
+    definitions = thing.definitions if thing.parts else thing.definitions[:-1]
+    return replace(thing.material, name=""), tuple(map(id, definitions))
 
 
 def _is_wide(thing: RadianceObject) -> bool:

@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.radiance.functions import FunctionFile, find_functions, read_functions
-from bim.radiance.materials import LUMINANCE
+from bim.radiance.materials import LUMINANCE, MIXTURE
 from bim.radiance.primitives import Definition
 from bim.radiance.xform import read_xform
 from mitsuba_cfs.surfaces import even_numbers, points_on_triangles
 
-POINTS = 2048  # on a surface, for the mean of a pattern
+POINTS = 8192  # on a surface, for the mean of a pattern
 TURNS = 16  # azimuths of a function by the angle of incidence
-COMPUTED_PATTERNS = {"brightfunc": 1, "colorfunc": 3}  # and the number of their expressions
+COMPUTED_PATTERNS = ("brightfunc", "colorfunc")
+EXPRESSIONS = {"brightfunc": slice(1), "colorfunc": slice(3), MIXTURE: slice(2, 3)}  # in strings
 
 
 def pattern_values(
@@ -31,17 +32,21 @@ def pattern_values(
 ) -> NDArray[np.float64]:
     """Product of patterns [N, POINTS] at angles of incidence [N], at points of a surface.
 
+    Of a mixture it is the share of its foreground.
+
     Raises: `DataError` for a function that cannot be evaluated.
     """
     points = points_on_triangles(triangles, even_numbers(POINTS))[0]
     result = np.ones((len(angles), POINTS))
     for one in patterns:
-        count = COMPUTED_PATTERNS[one.primitive.kind]
-        functions, frame = functions_of(one, one.primitive.strings[count:])
+        place = EXPRESSIONS[one.primitive.kind]
+        texts = one.primitive.strings[place]
+        if not texts:
+            raise one.primitive.fault("names no function")
+        functions, frame = functions_of(one, one.primitive.strings[place.stop :])
         names = ray_variables(points, frame, normal, normal, angles)
-        texts = one.primitive.strings[:count]
         values = [np.asarray(evaluated(one, functions, text, names)) for text in texts]
-        weights = LUMINANCE if count == 3 else (1.0,)
+        weights = LUMINANCE if len(texts) == 3 else (1.0,)
         grey = sum(w * v for w, v in zip(weights, values, strict=True))
         if not np.isfinite(grey).all():
             raise one.primitive.fault("is no number somewhere on the surface")

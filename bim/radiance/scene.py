@@ -16,15 +16,18 @@ from bim.radiance import shapes
 from bim.radiance.generators import GENERATORS, Polygon
 from bim.radiance.materials import (
     MATERIALS,
+    MIXTURE,
     PATTERNS,
     RadianceMaterial,
     material_of,
+    mixed_material,
 )
 from bim.radiance.patterns import COMPUTED_PATTERNS, pattern_values
 from bim.radiance.primitives import VOID, Command, Definition, Primitive, read_statements
 from bim.radiance.xform import Xform, read_xform
 from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.surfaces import triangle_areas
 
 DEEPEST = 32  # files that call each other
 MOST_OBJECTS = 5_000_000
@@ -44,12 +47,12 @@ class RadianceObject:
     triangles: NDArray[np.float64]  # [T, 3, 3] [m], counter-clockwise seen from the front
     primitive: Primitive
     definitions: tuple[Definition, ...] = ()  # patterns and, last, the material
+    parts: tuple[RadianceObject, ...] = ()  # of a mixture: of the foreground and background alone
 
     @property
     def normal(self) -> NDArray[np.float64]:
         """Unit normal [3] of the front."""
-        area = np.cross(*np.diff(self.triangles, axis=1).transpose(1, 0, 2)).sum(axis=0)
-        return area / np.linalg.norm(area)
+        return normal_of(self.triangles)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +105,16 @@ def read_radiance(
     return RadianceScene(tuple(reader.objects), tuple(reader.files), tuple(reader.issues()))
 
 
+@dataclass(frozen=True, slots=True)
+class _Modifier:
+    """Material, names and definitions of a surface's modifier; of a mixture those of both."""
+
+    material: RadianceMaterial
+    names: tuple[str, ...]
+    definitions: tuple[Definition, ...]
+    parts: tuple[_Modifier, ...] = ()
+
+
 class _Reader:
     """State of one reading: the definitions so far, as later files use those of earlier ones."""
 
@@ -113,6 +126,7 @@ class _Reader:
         self.objects: list[RadianceObject] = []
         self.files: list[Path] = []
         self.left_out: Counter[tuple[str, str]] = Counter()  # by code and type
+        self.areas: Counter[tuple[str, str]] = Counter()  # [m2] of surfaces that are left out
         self.first: dict[tuple[str, str], Primitive] = {}
 
     def read(self, path: Path, outer: tuple[Xform, ...], above: tuple[Path, ...]) -> None:
@@ -166,7 +180,7 @@ class _Reader:
         kind = primitive.kind
         if kind in shapes.KINDS:
             self._add(primitive, outer)
-        elif kind == "alias" or kind in MATERIALS or kind in PATTERNS:
+        elif kind in ("alias", MIXTURE) or kind in MATERIALS or kind in PATTERNS:
             self.defined[primitive.name] = Definition(primitive, _places(outer)[0])
         else:
             if kind not in ("source", "instance", "mesh"):
@@ -176,39 +190,60 @@ class _Reader:
 
     def _add(self, primitive: Primitive, outer: tuple[Xform, ...]) -> None:
         modifier = next((x.modifier for x in outer if x.modifier is not None), primitive.modifier)
-        known = self._material(modifier, primitive)
-        if known is None:
-            return
-        material, modifiers, definitions = known
         triangles = shapes.triangles_of(primitive)
         if not len(triangles):
             self._leave_out("surfaces-without-area", primitive)
             return
-        for place in _places(outer):
-            moved = triangles @ place[:3, :3].T + place[:3, 3]
+        copies = [triangles @ place[:3, :3].T + place[:3, 3] for place in _places(outer)]
+        area = sum(float(triangle_areas(copy).sum()) for copy in copies)
+        known = self._material(modifier, primitive, area)
+        if known is None:
+            return
+        is_inverted = sum(x.is_inverted for x in outer) % 2 == 1
+        for place, moved in zip(_places(outer), copies, strict=True):
             if not np.abs(moved).max() <= FARTHEST:
                 raise primitive.fault(f"lies farther than {FARTHEST:g} m from the origin")
-            if np.linalg.det(place[:3, :3]) < 0:
-                moved = moved[:, ::-1]
-            if sum(x.is_inverted for x in outer) % 2:
+            if (np.linalg.det(place[:3, :3]) < 0) != is_inverted:
                 moved = moved[:, ::-1]
             if len(self.objects) >= MOST_OBJECTS:
                 raise primitive.fault(f"more than {MOST_OBJECTS} surfaces")
-            shown = self._with_patterns(material, definitions, moved)
-            sides = [(shown, moved)]
-            if material.kind == "mirror":  # black behind, as in Radiance
-                sides.append((replace(shown, gloss=None), _behind(moved)))
-            self.objects += [
-                RadianceObject(
-                    _name(primitive, outer), seen, modifiers, triangles, primitive, definitions
-                )
-                for seen, triangles in sides
-            ]
+            thing = self._object(_name(primitive, outer), known, moved, primitive)
+            if thing is None:
+                return
+            self.objects.append(thing)
+            if thing.material.kind == "mirror":  # black behind, as in Radiance
+                dark = replace(thing.material, gloss=None)
+                self.objects.append(replace(thing, material=dark, triangles=_behind(moved)))
 
-    def _material(
-        self, modifier: str, surface: Primitive
-    ) -> tuple[RadianceMaterial, tuple[str, ...], tuple[Definition, ...]] | None:
-        """The material of a surface, its modifiers and definitions; None where none is read."""
+    def _object(
+        self, name: str, known: _Modifier, triangles: NDArray[np.float64], surface: Primitive
+    ) -> RadianceObject | None:
+        """A surface of a material; None for a mixture of parts or functions that are not read."""
+        parts = []
+        for part in known.parts:
+            thing = self._object(name, part, triangles, surface)
+            if thing is None:
+                return None
+            parts.append(thing)
+        material = self._with_patterns(known.material, known.definitions, triangles)
+        if parts:
+            mixture = known.definitions[-1]
+            try:
+                values = pattern_values(triangles, normal_of(triangles), [mixture], np.zeros(1))
+            except DataError:
+                area = float(triangle_areas(triangles).sum())
+                self._leave_out("surfaces-not-read", surface, MIXTURE, area)
+                return None
+            share = float(np.clip(values, 0.0, 1.0).mean())
+            material = mixed_material(material.name, share, *(part.material for part in parts))
+            if not material.is_translucent:
+                self._leave_out("material-mixture-averaged", mixture.primitive)
+        return RadianceObject(
+            name, material, known.names, triangles, surface, known.definitions, tuple(parts)
+        )
+
+    def _material(self, modifier: str, surface: Primitive, area: float) -> _Modifier | None:
+        """The material of a surface of that area [m2]; None where none is read."""
         names: list[str] = []
         patterns: list[Definition] = []
         above: Primitive | None = None  # the outermost alias
@@ -233,15 +268,42 @@ class _Reader:
                 is_alias = above is not None and above.modifier != INHERITED
                 patterns += self._patterns(above if is_alias else definition, surface)
                 material = replace(material_of(definition), name=definition.name)
-                return material, tuple(names), (*patterns, known)
+                return _Modifier(material, tuple(names), (*patterns, known))
+            elif definition.kind == MIXTURE:
+                return self._mixture(known, tuple(names), tuple(patterns), surface, area)
             elif definition.kind in PATTERNS:
                 patterns.append(known)
                 modifier = definition.modifier
             else:
-                self._leave_out("surfaces-not-read", surface, definition.kind)
+                self._leave_out("surfaces-not-read", surface, definition.kind, area)
                 return None
-        self._leave_out("surfaces-without-material", surface)
+        self._leave_out("surfaces-without-material", surface, area=area)
         return None
+
+    def _mixture(
+        self,
+        mixture: Definition,
+        names: tuple[str, ...],
+        patterns: tuple[Definition, ...],
+        surface: Primitive,
+        area: float,
+    ) -> _Modifier | None:
+        """A mixture of two modifiers; None where one of them is not read."""
+        parts = []
+        for name in mixture.primitive.strings[:2]:
+            if name in names:
+                raise surface.fault(f"its modifier {name} modifies itself")
+            part = _Modifier(PLAIN, (), ())
+            if name != VOID:
+                known = self._material(name, surface, area)
+                if known is None:
+                    return None
+                part = replace(known, definitions=(*patterns, *known.definitions))
+            parts.append(part)
+        if len(parts) < 2:
+            raise mixture.primitive.fault("names no two modifiers")
+        material = RadianceMaterial(mixture.primitive.name, MIXTURE)
+        return _Modifier(material, names, (mixture,), tuple(parts))
 
     def _with_patterns(
         self,
@@ -261,10 +323,9 @@ class _Reader:
             self._leave_out("material-patterns-left-out", first, first.kind)
         if not patterns or material.diffuse == 0:
             return material
-        normal = np.cross(*np.diff(triangles, axis=1).transpose(1, 0, 2)).sum(axis=0)
-        normal /= np.linalg.norm(normal)
         try:
-            mean = float(pattern_values(triangles, normal, patterns, np.zeros(1)).mean())
+            values = pattern_values(triangles, normal_of(triangles), patterns, np.zeros(1))
+            mean = float(values.mean())
         except DataError:
             self._leave_out("material-patterns-left-out", patterns[0].primitive)
             return material
@@ -289,8 +350,11 @@ class _Reader:
             modifier = known.primitive.modifier
         return patterns
 
-    def _leave_out(self, code: str, primitive: Primitive, kind: str = "") -> None:
+    def _leave_out(
+        self, code: str, primitive: Primitive, kind: str = "", area: float = 0.0
+    ) -> None:
         self.left_out[code, kind] += 1
+        self.areas[code, kind] += area
         self.first.setdefault((code, kind), primitive)
 
     def issues(self) -> Iterator[Issue]:
@@ -298,7 +362,15 @@ class _Reader:
         for (code, kind), count in self.left_out.items():
             first = self.first[code, kind]
             values = {"count": count, "type": kind, "first": first.name}
+            if area := self.areas[code, kind]:
+                values["area"] = area
             yield Issue(code, f"{first.file}:{first.line}", values)
+
+
+def normal_of(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit normal [3] of triangles [T, 3, 3]: of their area vector."""
+    area = np.cross(*np.diff(triangles, axis=1).transpose(1, 0, 2)).sum(axis=0)
+    return area / np.linalg.norm(area)
 
 
 def _is_xform(program: Sequence[str]) -> bool:

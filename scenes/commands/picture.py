@@ -73,6 +73,7 @@ def command(out: tuple[Path, ...], tone: bool, **chosen) -> None:
     view, rated = result.view, result.glare
     says = f"{result.room}, {result.time:%d %B %H:%M}: {view.width} x {view.height} pixels"
     if rated is not None:
-        says += f", Ev {rated.Ev:,.0f} lx, DGP {rated.dgp:.3f}, {rated.count} glare source(s)"
+        eye = f"{rated.Ev:,.0f}" if rated.Ev >= 100 else f"{rated.Ev:.1f}"
+        says += f", Ev {eye} lx, DGP {rated.dgp:.3f}, {rated.count} glare source(s)"
     click.echo(f"{says}; {time.perf_counter() - start:.1f} s")
     head.notes(result.notes)

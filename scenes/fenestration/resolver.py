@@ -15,7 +15,7 @@ what to do.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -97,9 +97,11 @@ def _system(state: ShadingState, window: Window, path: Path, source: str) -> Fen
     named = "" if state.file is None else f" as {state.file.name}"
     thermal = held_thermal(state)
     angular = thermal.pop("angular") if state.angular is not None else None
+    share = thermal.pop("see_through")
     thermal |= {"source": f"{source}{named}", "file": state.file}
     system = system_of(state.bands, name, path=path, **thermal)
-    return system if angular is None else replace(system, angular=angular)
+    system = system if angular is None else replace(system, angular=angular)
+    return system if share is None else with_see_through(system, share)
 
 
 def _source(states: Iterable[ShadingState], path: Path) -> str:
@@ -128,6 +130,7 @@ def held_thermal(state: ShadingState) -> dict[str, Any]:
         "closure": state.closure or beside.closure,
         "shading_position": state.shading_position or beside.shading_position,
         "angular": state.angular or beside.angular,
+        "see_through": beside.see_through,
     }
 
 
@@ -289,7 +292,7 @@ def source_notes(sources: Iterable[dict[str, Any]]) -> tuple[str, ...]:
     )
 
 
-def windows_named(names: list[str]) -> str:
+def windows_named(names: Sequence[str]) -> str:
     """Windows in words, the first few by name; the noun where their names have it not."""
     listed = _listed(names)
     if all(name.casefold().startswith("window") for name in names):
@@ -299,7 +302,7 @@ def windows_named(names: list[str]) -> str:
     return Note("Windows {names}", names=listed)
 
 
-def _listed(names: list[str]) -> str:
+def _listed(names: Sequence[str]) -> str:
     """The first few names, each once with how many have it, and how many windows there are more."""
     counts = list(Counter(names).items())
     shown = [name if count == 1 else f"{name} ({count})" for name, count in counts[:NAMED]]

@@ -102,4 +102,6 @@ def _origins(
         notes.append(f"closure of the thermal model ({state.closure.u_model} U) from {file}")
     if state.shading_position is not None:
         notes.append(f"shading position {state.shading_position} from {file}")
+    if beside.see_through is not None:
+        notes.append(f"see_through in {file} is not attached: give --see-through at every run")
     return notes

@@ -95,7 +95,7 @@ def read_system(
     The `.toml` file has the name of the XML file; see `ThermalFile`.
 
     Args:
-        see_through: as of `with_see_through`; None: by the data.
+        see_through: as of `with_see_through`; None: by the `.toml` file, or by the data.
         by: what names the file, such as "--cfs"; goes before its name in the system's source.
 
     Raises: `DataError` for a file that cannot be used.
@@ -118,6 +118,7 @@ def read_system(
         file=path,
         source=f"{by} {path.name}".strip(),
     )
+    see_through = beside.see_through if see_through is None else see_through
     return system if see_through is None else with_see_through(system, see_through)
 
 

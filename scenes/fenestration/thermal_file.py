@@ -380,6 +380,9 @@ class ClosureTable(TomlTable):
         )  # fmt: skip
 
 
+PEAK_SHARES = {"specular": 1.0, "lobe": 0.0}  # that pass straight on
+
+
 class WindowHeatTable(ClosureTable):
     """What else is known of a system: in a study, and beside a BSDF file."""
 
@@ -388,6 +391,7 @@ class WindowHeatTable(ClosureTable):
     g_value_by_angle: tuple[tuple[float, Share], ...] = ()  # angle of incidence [degrees] and g
     g_value_by_patch: ByPatch | None = None  # for each incident patch of the Klems full basis
     shading_position: Literal[tuple(TYPICAL_SYSTEMS)] | None = None  # of the shade
+    see_through: Literal["specular", "lobe"] | Share | None = None  # of the transmission peak
 
     @model_validator(mode="after")
     def _has_one_g(self) -> WindowHeatTable:
@@ -408,6 +412,13 @@ class WindowHeatTable(ClosureTable):
         angles, values = np.array(self.g_value_by_angle, dtype=float).T
         return np.interp(KLEMS_FULL.centres()[0], np.radians(angles), values)
 
+    @property
+    def straight_share(self) -> float | None:
+        """Share of the transmission peak that passes straight on; None: by the data."""
+        if isinstance(self.see_through, str):
+            return PEAK_SHARES[self.see_through]
+        return self.see_through
+
 
 class StateTable(WindowHeatTable):
     """One shading state: a BSDF file, or `layers` of panes alone, and what else was measured."""
@@ -418,6 +429,8 @@ class StateTable(WindowHeatTable):
     def _has_optics(self) -> StateTable:
         if self.bsdf is None and not self.layers:
             raise ValueError("bsdf: is missing; only panes, as `layers`, go without one")
+        if self.bsdf is None and self.see_through is not None:
+            raise ValueError("see_through: panes are specular")
         for number, layer in enumerate(self.layers if self.bsdf is None else ()):
             if layer.is_shade:
                 raise ValueError(f"layers.{number}: a shade's light needs a `bsdf` of the system")
@@ -465,6 +478,7 @@ class ThermalFile:
     shading_position: str | None = None
     angular: AngularTable | None = None  # visible, of a specular system
     panes: tuple[SpectralPane, ...] = ()  # all layers, where each is a file of spectra
+    see_through: float | None = None  # share of the transmission peak that passes straight on
 
     @classmethod
     def read(cls, path: Path) -> ThermalFile:
@@ -485,4 +499,5 @@ class ThermalFile:
             table.shading_position,
             None if table.angular is None else table.angular.read(path),
             spectral_panes(placed.layers),
+            table.straight_share,
         )

@@ -360,7 +360,13 @@ def read_state(table: StateTable, path: Path | None, *, by: str = "") -> Fenestr
     if path is None:
         system = replace(system_of_panes(table.layers), source=f"{by} layers".strip())
     else:
-        system = read_system(path, u_value=table.u_value, g_value=table.g_value, by=by)
+        system = read_system(
+            path,
+            u_value=table.u_value,
+            g_value=table.g_value,
+            see_through=table.straight_share,
+            by=by,
+        )
     if table.layers:  # their U and g come before those of the BSDF's thermal file
         system = replace(system, u_value=table.u_value, g_value=table.g_value, g_by_patch=None)
     by_patch = table.g_by_patch()

@@ -122,10 +122,12 @@ def test_options_of_other_formats_are_refused(tmp_path):
 
 
 def test_a_room_without_its_floor_names_the_surfaces_that_are_not_read(tmp_path):
-    mixed = "\nvoid mixfunc mixed\n4 plaster carpet .5 .\n0\n0\n\nmixed polygon floor"
+    mixed = (
+        "\nvoid mixpict mixed\n7 plaster carpet grey a.hdr b.cal u v\n0\n0\n\nmixed polygon floor"
+    )
     path = tmp_path / "scene.rad"
     path.write_text(OFFICE.read_text().replace("\ncarpet polygon floor", mixed))
-    with pytest.raises(RoomError, match=r"has no floor; .* 1 of type mixfunc \(.*scene\.rad:\d+\)"):
+    with pytest.raises(RoomError, match=r"has no floor; .* 1 of type mixpict \(.*scene\.rad:\d+\)"):
         read_building_file(path)
 
 
@@ -214,9 +216,12 @@ def test_a_pattern_on_glass_counts_by_its_mean(tmp_path):
     (issue,) = issue_of(building, "glass-pattern-averaged")
     assert (issue.values["least"], issue.values["greatest"]) == (0.1, 1.0)
     (state,) = building.windows[0].states
-    # half of the pane has a tenth of the transmissivity; 2,048 points
-    halves = [PlainGlass(((0.87 * share, 1.52),)).transmittance for share in (1.0, 0.1)]
-    assert state.angular.transmittance[0] == pytest.approx(np.mean(halves), rel=0.02)
+    # half of the pane has a tenth of the transmittance and all of the reflectance (`rtrace`); 8,192
+    # points
+    bare = glass_table([(0.87, 1.52)])
+    angular = state.angular
+    assert angular.transmittance == pytest.approx(0.55 * bare.transmittance, rel=1e-3, abs=1e-6)
+    assert angular.reflectance_front == pytest.approx(bare.reflectance_front, abs=1e-6)
 
 
 def test_a_pattern_on_glass_that_is_not_computed_is_refused(tmp_path):
@@ -377,3 +382,8 @@ def test_a_pane_beside_whose_fabric_light_passes_is_a_window_too(tmp_path, left,
     assert sum(window.area for window in building.windows) == pytest.approx(
         2.8 * 1.6 + (0.6 - left) * 1.6, abs=0.04
     )
+    fronts = [part for part in building.spaces[0].furniture if part.name == "blind"]
+    assert len(fronts) == panes - 1
+    for front in fronts:  # the cloth's outdoor side, lit by the panes
+        assert front.reflectance_visible == pytest.approx(0.4, abs=1e-3)
+        assert 0 < 0.08 - front.triangles[..., 1].max() < 0.001

@@ -16,6 +16,7 @@ from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.surfaces import triangle_areas
 from mitsuba_cfs.trace.paths.scene import without_peaks
+from tests.radiance import run
 
 DOCS = Path(__file__).parents[2] / "docs"
 OFFICE = (DOCS / "tutorials/office.rad").read_text()
@@ -32,6 +33,7 @@ NUMBERS = {
 STRINGS = {"BRTDfunc": "10 0 0 0 .1 .1 .1 0 0 0 .", "BSDF": "6 0 shade.xml 0 0 1 .",
            "aBSDF": "5 shade.xml 0 0 1 .", "brightfunc": "2 .5+.1*Px .",
            "colorfunc": "4 .5 .4 .3 ."}  # fmt: skip
+MIXED = {"window": "4 carpet void .5+.1*Px .", "surface": "4 carpet plaster .5+.1*Px ."}
 SHAPES = {
     "polygon": SHEET, "ring": "8  1 1 1  0 0 1  0 .5", "cylinder": "7  1 1 0  1 1 1  .2",
     "tube": "7  1 1 0  1 1 1  .2",
@@ -57,6 +59,7 @@ EXPECTED: dict[tuple[str, str], tuple[float, ...]] = {
     **{(kind, "window"): (0.8 * 0.6, 0.8 * 0.6 * 0.2) for kind in ("trans", "trans2")},
     ("glass", "window"): (PANE_PASSES, PANE_PASSES), ("BRTDfunc", "window"): (0.12, 0.1),
     **{(kind, "window"): (0.2, 0.1) for kind in ("BSDF", "aBSDF")},
+    ("mixfunc", "window"): (0.3, 0.3), ("mixfunc", "surface"): (0.65 * 0.25 + 0.35 * 0.7, 0.0),
     **{(kind, "pattern on glass"): (0.917 * 0.87 * mean,) * 2 for kind, mean in PATTERN.items()},
 }  # fmt: skip
 
@@ -96,7 +99,7 @@ def figures(building: Building, use: str) -> list[tuple[float, ...]]:
 
 
 def scene_of(kind: str, use: str) -> str:
-    strings = STRINGS.get(kind, "0")
+    strings = MIXED[use] if kind == "mixfunc" else STRINGS.get(kind, "0")
     if kind in SHAPES:
         return OFFICE + f"\nplaster {kind} thing\n0\n0\n{SHAPES[kind]}\n"
     definition = f"\nvoid {kind} subject\n{strings}\n0\n{NUMBERS.get(kind, '0')}\n"
@@ -156,8 +159,59 @@ def test_an_illum_is_its_other_material_or_is_not_there(tmp_path):
     assert {window.name for window in read_building_file(path).windows} <= {"window", "thing"}
 
 
+MIXED_PANE = """
+void plastic enamel
+0
+0
+5 .8 .6 .4 .05 0
+void mixfunc frit
+4 glazing enamel if(mod(Pz*20,1)-.6,1,0) .
+0
+0
+"""
+
+
+def test_a_mixture_of_glass_and_enamel_transmits_what_rtrace_sees_through_it(tmp_path):
+    pane = OFFICE.replace("glazing polygon window", "frit polygon window")
+    (tmp_path / "scene.rad").write_text(pane.replace(PANE, PANE + MIXED_PANE))
+    (window,) = read_building_file(tmp_path / "scene.rad").windows
+    table, count = window.states[0].angular, 4000
+    sky = "void glow sky\n0\n0\n4 1 1 1 0\nsky source all\n0\n0\n4 0 1 0 180\n"
+    sheet = "frit polygon window\n0\n0\n12  0 0 0  1 0 0  1 0 1  0 0 1\n"
+    (tmp_path / "pane.rad").write_text(sky + PANE + MIXED_PANE + sheet)
+    points = np.insert(np.random.default_rng(0).uniform(0, 1, (count, 2)), 1, 0.0, axis=1)
+    for angle in np.radians([0.0, 40.0, 70.0]):
+        way = np.array([np.sin(angle), np.cos(angle), 0.0])
+        np.savetxt(tmp_path / "rays", np.hstack([points - 0.01 * way, np.tile(way, (count, 1))]))
+        command = "oconv pane.rad > pane.oct && rtrace -h -ab 0 pane.oct < rays"
+        seen = np.array(run(command, tmp_path).split(), dtype=float)[1::3]  # all channels are grey
+        passed = np.interp(angle, table.theta, table.transmittance)
+        # four standard errors of the share 0.4 of the points that are glass
+        assert seen.mean() == pytest.approx(passed, abs=4 * np.sqrt(0.24 / count))
+
+
+def test_mixtures_that_are_not_computed_are_left_out_with_their_area(tmp_path):
+    wall = "\nvoid mixfunc mixed\n4 plaster carpet noise_of(P) .\n0\n0\n"
+    for text, kind in ((wall, "mixfunc"), (wall.replace("carpet", "odd"), "ashik2")):
+        odd = "\nvoid ashik2 odd\n4 0 0 1 .\n0\n8 .5 .5 .5 .1 .1 .1 9 9\n"
+        path = tmp_path / "scene.rad"
+        path.write_text(OFFICE + odd + text + f"\nmixed polygon thing\n0\n0\n{SHEET}\n")
+        issue = next(i for i in read_building_file(path).issues if i.code == "surfaces-not-read")
+        assert issue.values == {"count": 1, "type": kind, "first": "thing", "area": 1.0}
+
+
+def test_a_mixture_of_itself_is_refused(tmp_path):
+    path = tmp_path / "scene.rad"
+    path.write_text(
+        OFFICE + "\nvoid mixfunc a\n4 plaster b .5 .\n0\n0\nvoid alias b a\n"
+        f"a polygon thing\n0\n0\n{SHEET}\n"
+    )
+    with pytest.raises(DataError, match="modifies itself"):
+        read_building_file(path)
+
+
 def test_the_table_has_all_types_that_are_known():
-    from bim.radiance.materials import MATERIALS, PATTERNS
+    from bim.radiance.materials import MATERIALS, MIXTURE, PATTERNS
     from bim.radiance.shapes import KINDS
 
-    assert {*MATERIALS, *PATTERNS, *KINDS} <= {kind for kind, _, _ in rows()}
+    assert {*MATERIALS, *PATTERNS, *KINDS, MIXTURE} <= {kind for kind, _, _ in rows()}

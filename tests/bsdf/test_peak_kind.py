@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.evaluate import (
     HIDDEN,
     SPILL,
@@ -19,15 +20,22 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.lobe import NARROWEST, lobe_tree
 from mitsuba_cfs.bsdf.tensor_merge import merged_tree
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf, disk_to_square
+from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.indices import contrast_term, daylight_glare_probability
 from mitsuba_cfs.glare.sun_disc import spread_sun_dgp
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from scenes.fenestration.resolver import fill_windows
-from scenes.fenestration.systems import WindowOverrides, system_of, with_see_through
+from scenes.fenestration.systems import (
+    WindowOverrides,
+    read_system,
+    system_of,
+    with_see_through,
+)
 from scenes.head import system_notes
 from scenes.input_files import overrides_of, peak_share
 from scenes.input_options import InputOptions
+from scenes.room.operation import read_operation
 
 OMEGA = KLEMS_FULL.projected_solid_angles()
 PASSED = 0.3
@@ -136,6 +144,19 @@ def test_the_user_says_what_a_peak_is(tmp_path):
         assert f"{100 * share:.0f} % of the transmission peak" in note
     with pytest.raises(DataError, match=r"no system is .other\.xml.; there are shade\.xml"):
         fill_windows(windows, WindowOverrides((beam,), see_through=(("other.xml", 1.0),)), None)
+
+
+@pytest.mark.parametrize(("text", "share"), [('"lobe"', 0.0), ('"specular"', 1.0), ("0.25", 0.25)])
+def test_a_table_or_the_file_beside_a_bsdf_says_what_a_peak_is(tmp_path, text, share):
+    path = tmp_path / "shade.xml"
+    bsdf = system(np.diag(PASSED / OMEGA) + 0.05, tmp_path).visible
+    write_bsdf_xml(BsdfFile({"Visible": bsdf, "Solar": bsdf}), path)
+    (tmp_path / "study.toml").write_text(f'[[system]]\nbsdf = "shade.xml"\nsee_through = {text}\n')
+    (state,) = read_operation(tmp_path / "study.toml").systems
+    assert state.visible.see_through == share
+    path.with_suffix(".toml").write_text(f"see_through = {text}\n")
+    assert read_system(path).visible.see_through == share
+    assert read_system(path, see_through=0.5).visible.see_through == 0.5
 
 
 @pytest.mark.parametrize("text", ["shade.xml", "=lobe", "shade.xml=sharp", "shade.xml=1.5"])

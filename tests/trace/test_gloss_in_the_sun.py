@@ -252,3 +252,31 @@ def test_a_picture_shows_the_sun_by_two_mirrors():
     for (disc,) in (by_phases, by_paths):
         assert disc.luminance * SUN_SOLID_ANGLE == pytest.approx(0.4, rel=1e-3)
         np.testing.assert_allclose(disc.direction, sun, atol=1e-3)
+
+
+@pytest.mark.parametrize("method", ["five-phase", "point-in-time"])
+def test_the_sun_in_a_mirror_is_a_glare_source_whatever_the_pixel(method):
+    from mitsuba_cfs.images.view import fisheye
+    from mitsuba_cfs.methods.glare import rated_pictures
+    from mitsuba_cfs.methods.light import daylight
+    from mitsuba_cfs.methods.optics import AngularOptics
+    from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+    from mitsuba_cfs.sky.annual import given_sky
+
+    sky = given_sky(SUN[None], [800.0], [90.0], 1, day_of_year=172)
+    few = Sampling(
+        patch_samples=256, sun_points=16, view_samples=1, outdoor_samples=1, picture_samples=1,
+        subdivision=1, window_parts=1,
+    )  # fmt: skip
+    room, groups = rooms.test_room()
+    dgp = []
+    for size in (40, 160):
+        view = fisheye(EYE, (0.0, -1.0, 0.0), size)
+        scene = DaylightScene(room, facade(mirror(0.1)), groups, POINTS[:1], UP[:1], view)
+        light = daylight(
+            scene, [[AngularOptics([0.0, 0.7, 0.7])]], sky, method=method, sampling=few
+        )
+        [(_, rated)] = rated_pictures(light, [0])
+        assert rated.dgp > 0.35  # 0.25 without the sun's image
+        dgp.append(rated.dgp)
+    assert dgp[0] == pytest.approx(dgp[1], abs=0.01)

@@ -68,7 +68,8 @@ def test_panes_before_a_fabric_do_not_hide_the_sun_that_it_scatters():
     assert behind == pytest.approx(by_itself, rel=0.01)
 
 
-def test_paths_that_aim_at_panes_behind_a_fabric_add_no_sun_that_it_scatters():
+@pytest.mark.parametrize("gap", [0.1, 0.002])
+def test_paths_that_aim_at_panes_behind_a_fabric_add_no_sun_that_it_scatters(gap):
     """They were dropped only after that: sensors had up to twice the scattered sun."""
     from mitsuba_cfs.trace.paths.scene import Sky
 
@@ -76,7 +77,7 @@ def test_paths_that_aim_at_panes_behind_a_fabric_add_no_sun_that_it_scatters():
     from .test_point_in_time import traced
 
     room, sky = rooms.test_room()[0], Sky(DARK, SUN, SUN_LUMINANCE)
-    alone, (screen, panes) = panes_before_a_screen(0.1)
+    alone, (screen, panes) = panes_before_a_screen(gap)
     by_itself = traced([diffuser(0.3)], sky, scene=(room, [alone], rooms.NOTHING))
     scene = (room, [screen, panes], rooms.NOTHING)
     behind = traced([diffuser(0.3), glass(0.0)], sky, scene=scene)

@@ -9,6 +9,7 @@ year; illuminance of eight sensors by both methods.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated
 
 import numpy as np
@@ -16,6 +17,8 @@ import pandas as pd
 
 import mitsuba_cfs as cfs
 from mitsuba_cfs.gloss import mirror
+from mitsuba_cfs.methods.light import illuminance_noise, illuminance_with_error
+from mitsuba_cfs.metrics.noise import Noise
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.demo import WEATHER
 from tests.trace import rooms
@@ -51,7 +54,7 @@ def main(
     *,
     hours: Annotated[int, "with sun"] = 53,
     share: Annotated[float, "that the facades mirror"] = 0.15,
-    paths: Annotated[int, "of a sensor in an hour"] = 8192,
+    paths: Annotated[int, "of a sensor in an hour"] = 65536,
 ) -> pd.DataFrame:
     """A row for the mean of the sensors and for single sensors: deviations from path tracing."""
     room, groups = rooms.test_room()
@@ -60,26 +63,46 @@ def main(
     year = cfs.annual_sky(cfs.read_epw(WEATHER))
     sunny = np.flatnonzero(year.illuminance > SUNNY_LX)
     sky = year.part(sunny[np.linspace(0, len(sunny) - 1, hours).astype(np.int64)])
-    lux = []
+    lux, errors = [], []
     for method in ("five-phase", "point-in-time"):
         sampling = cfs.Sampling(hour_samples=paths)
         light = cfs.daylight(
             scene, [[cfs.AngularOptics(GLASS)]], sky, method=method, sampling=sampling
         )
-        lux.append(cfs.illuminance(light))
+        values, error = illuminance_with_error(light)
+        lux.append(values)
+        errors.append(hourly_errors(illuminance_noise(light, values, error), values.shape))
+    stated = np.hypot(*errors)
     rows = []
     for name, (five, by_paths) in (
         ("mean of the sensors", [values.mean(axis=0) for values in lux]),
         ("single sensors", lux),
     ):
-        off = np.abs(five / by_paths - 1)
-        rows.append(
-            {
-                "illuminance": name,
-                "values": off.size,
-                "beyond 10 %": int((off > BEYOND).sum()),
-                "median %": 100 * float(np.median(off)),
-                "most %": 100 * float(off.max()),
-            }
-        )
+        off = five / by_paths - 1
+        row = {
+            "illuminance": name,
+            "values": off.size,
+            "beyond 10 %": int((np.abs(off) > BEYOND).sum()),
+            "mean %": 100 * float(off.mean()),
+            "median %": 100 * float(np.median(np.abs(off))),
+            "most %": 100 * float(np.abs(off).max()),
+        }
+        if five.ndim == 2:
+            within, far = np.abs(five - by_paths) < 2 * stated, np.abs(off) > BEYOND
+            row["within 2 standard errors %"] = 100 * float(within.mean())
+            row["of those beyond 10 %"] = 100 * float(within[far].mean())
+            row["error of five phases %"], row["error of paths %"] = (
+                100 * float(np.median(one / by_paths)) for one in errors
+            )
+        rows.append(row)
     return pd.DataFrame(rows).round(1)
+
+
+def hourly_errors(noise: Callable[[np.ndarray], Noise], shape: tuple[int, ...]) -> np.ndarray:
+    """Standard error of each hour of each sensor [S, L] [lx] by `illuminance_noise`."""
+    found = np.zeros(shape)
+    for hour in range(shape[1]):
+        weights = np.zeros(shape)
+        weights[:, hour] = 1.0
+        found[:, hour] = noise(weights).standard_error()
+    return found

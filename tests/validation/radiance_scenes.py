@@ -167,8 +167,8 @@ def by_command(
             code = run([*map(str, words), *options, "--seed", str(seed)])
         if code:
             line = refusal.getvalue().strip().splitlines()[-1]
-            return f"refused: {line.rpartition(f'{scene}: ')[2].partition(';')[0]}"
-        (value,) = re.findall(r"Ev ([\d,]+) lx", shown.getvalue())
+            return f"refused: line {line.rpartition(f'{scene}:')[2].partition(';')[0]}"
+        (value,) = re.findall(r"Ev ([\d,.]+) lx", shown.getvalue())
         values.append(float(value.replace(",", "")))
     return float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(seeds))
 

@@ -9,6 +9,7 @@ own; every file is compared with that of the first variant, tables by column.
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -24,46 +25,66 @@ from tests.validation.places import STUDY
 
 MODEL = REPOSITORY / "docs" / "tutorials" / "two_rooms.hbjson"
 PROCESSES = (1, 2, 4)
-TABLES = {".csv": pd.read_csv, ".parquet": pd.read_parquet}
+TIME = re.compile("^seconds$|_s$")  # columns of computing times
 
 
-def largest_difference(one: Path, other: Path) -> tuple[float, str]:
-    """Of two tables: the largest difference by the largest value of its column, and the column."""
-    pair = [TABLES[path.suffix](path) for path in (one, other)]
-    if list(pair[0]) != list(pair[1]) or len(pair[0]) != len(pair[1]):
-        return np.inf, "columns or rows"
+def columns_of(path: Path) -> dict[str, np.ndarray] | None:
+    """The columns of a table, or the arrays of a case; None for another file."""
+    if path.suffix == ".npz":
+        with np.load(path) as data:
+            return {name: data[name] for name in data.files if name != "record"}  # holds times
+    readers = {".csv": pd.read_csv, ".parquet": pd.read_parquet}
+    if path.suffix not in readers:
+        return None
+    table = readers[path.suffix](path)
+    return {name: table[name].to_numpy() for name in table if not TIME.search(name)}
+
+
+def largest_difference(one: dict, other: dict) -> tuple[float, str]:
+    """The largest difference by the largest value of its column, and that column."""
+    if list(one) != list(other):
+        return np.inf, "columns"
     worst = (0.0, "")
-    for column in pair[0]:
-        a, b = (table[column] for table in pair)
-        if not pd.api.types.is_float_dtype(a):
-            same = a.equals(b)
-            worst = max(worst, (0.0 if same else np.inf, str(column)))
-        elif (gap := np.nanmax(abs(a - b), initial=0.0)) > 0 or (a.isna() != b.isna()).any():
-            largest = max(np.nanmax(abs(a)), np.nanmax(abs(b)))
-            worst = max(worst, (float(gap / largest) if gap > 0 else np.inf, str(column)))
+    for name, a in one.items():
+        b = other[name]
+        if a.shape != b.shape:
+            return np.inf, name
+        if a.dtype.kind != "f":
+            gap = 0.0 if pd.Series(a.ravel()).equals(pd.Series(b.ravel())) else np.inf
+        elif (np.isnan(a) != np.isnan(b)).any():
+            gap = np.inf
+        else:
+            a, b = (x[~np.isnan(x)].astype(float) for x in (a, b))
+            gap = abs(a - b).max(initial=0.0) / max(abs(a).max(initial=0.0), 1e-300)
+        worst = max(worst, (float(gap), name))
     return worst
 
 
 def compared(first: Path, other: Path) -> str:
-    """Files, those that differ, and the largest difference of a table with its column."""
+    """Files of the same content, others than tables, and the largest difference of a table."""
     files = sorted(path.relative_to(first) for path in first.rglob("*") if path.is_file())
     extra = {path.relative_to(other) for path in other.rglob("*") if path.is_file()} ^ set(files)
     differ = [
         file for file in files
         if file not in extra and (first / file).read_bytes() != (other / file).read_bytes()
     ]  # fmt: skip
-    tables = [file for file in differ if file.suffix in TABLES]
-    gaps = [(*largest_difference(first / file, other / file), file) for file in tables]
+    gaps, others = [], [str(file) for file in extra]
+    for file in differ:
+        pair = columns_of(first / file), columns_of(other / file)
+        if pair[0] is None or pair[1] is None:
+            others.append(str(file))
+        elif (gap := largest_difference(pair[0], pair[1]))[0] > 0:
+            gaps.append((*gap, str(file)))
     worst = f"{max(gaps)[0]:.1e} ({max(gaps)[2]}, {max(gaps)[1]})" if gaps else "-"
-    others = [str(file) for file in [*differ, *extra] if file not in tables]
-    return f"{len(files) - len(differ)} of {len(files)} | {', '.join(others) or '-'} | {worst}"
+    same = len(files) - len(gaps) - len(others)
+    return f"{same} of {len(files)} | {', '.join(others) or '-'} | {worst}"
 
 
 def main() -> None:
     """One row for each variant."""
-    print(
-        "| command | variant | files of the same bytes | others | largest difference in a table |"
-    )
+    columns = ("command", "variant", "files of the same content, times apart",
+               "others that differ", "largest difference in a table")  # fmt: skip
+    print("| " + " | ".join(columns) + " |")
     print("|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -78,11 +99,13 @@ def main() -> None:
         for command, words in commands.items():
             first: Path | None = None
             variants: list[tuple[str, str, dict[str, str]]] = [
-                (f"{count} processes, empty cache", f"--processes={count}", {})
+                (f"--processes {count}, empty cache", f"--processes={count}", {})
                 for count in PROCESSES
             ]
             variants.insert(1, ("the same, cache of the first", "", {}))
-            variants.append(("1 process, one thread of BLAS", "", {"OPENBLAS_NUM_THREADS": "1"}))
+            variants.append(
+                ("--processes 1, one thread of BLAS", "", {"OPENBLAS_NUM_THREADS": "1"})
+            )
             for number, (label, option, environment) in enumerate(variants):
                 warm = label.startswith("the same")
                 cache = folder / f"cache_{command}_{number - warm}"
