@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from bim.energyplus_windows import WindowOptics
@@ -39,6 +39,17 @@ def glazing_of(window: Window, glazings: Glazings) -> ExportedGlazing:
         solar = normal_transmittance(bands["Solar"]) if solar is None else solar
     return ExportedGlazing(
         window.u_value, window.g_value, visible, solar, BsdfFile(bands) if bands else None
+    )
+
+
+def without_bsdf(windows: Iterable[Window], glazings: Glazings, model: str) -> tuple[str, ...]:
+    """A sentence on windows whose BSDF a format, or a part of it, cannot hold; none without."""
+    scattering = {w.guid: w.area for w in windows if glazing_of(w, glazings).bsdf is not None}
+    if not scattering:
+        return ()
+    return (
+        f"{model} holds no BSDF: windows of {sum(scattering.values()):.1f} m2 have U, g and "
+        "transmittance at normal incidence there",
     )
 
 

@@ -35,6 +35,7 @@ class KnownFenestration:
     systems: dict[str, FenestrationSystem]  # by window GUID
     unfilled: dict[str, list[str]]  # names of the other windows, by what is missing of them
     overrides: WindowOverrides = LIGHT_ONLY
+    several: tuple[str, ...] = ()  # names of windows with further shading states
 
     def notes(self, without: str = "written without") -> tuple[str, ...]:
         """Where each window's optics come from, and which windows have none, as `without` says."""
@@ -44,7 +45,12 @@ class KnownFenestration:
             f"{windows_named(names)}: no BSDF is attached {missing}: {without}."
             for missing, names in self.unfilled.items()
         )
-        return (*source_notes(window_sources(filled, states)), *none)
+        further = f"{windows_named(self.several)}: only the first shading state is written."
+        return (
+            *source_notes(window_sources(filled, states)),
+            *none,
+            *([further] if self.several else []),
+        )
 
     def glazings(self) -> tuple[dict[str, ExportedGlazing], tuple[str, ...]]:
         """Data of each window by GUID as a run uses them, and a sentence on each assumption.
@@ -125,4 +131,5 @@ def known_fenestration(
     windows = tuple(window for space in spaces for window in space.windows)
     systems, unfilled = held_systems(windows, overrides, file)
     first = {guid: states[0] for guid, states in systems.items()}
-    return KnownFenestration(file, windows, first, unfilled, overrides)
+    several = tuple(w.name or w.guid for w in windows if len(systems.get(w.guid, ())) > 1)
+    return KnownFenestration(file, windows, first, unfilled, overrides, several)

@@ -14,7 +14,7 @@ import shapely
 from bim.defaults import WINDOW_FRAME
 from bim.doorways import Key, touching
 from bim.energyplus_parts import at_most_layers
-from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of
+from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of, without_bsdf
 from bim.hosted_windows import HostedPolygon, hosted_polygons
 from bim.model import Building, Element, Face, MaterialLayer, Space, Window
 from bim.planes import Plane, planar_facets, rings_of, without_holes
@@ -27,7 +27,7 @@ LEAST_PART = 1e-4  # [m2] smaller parts of shades are left out
 
 def write_gbxml(
     building: Building, path: str | PathLike[str], *, glazing: Glazings | None = None
-) -> None:
+) -> tuple[str, ...]:
     """Write rooms, windows, constructions, reflectances and obstructions as gbXML 6.01.
 
     Not written: BSDF data (their transmittances are), shading states, gloss, furniture, the space
@@ -35,6 +35,8 @@ def write_gbxml(
     surface of air of two spaces; the wall's thickness belongs to the first of them.
 
     Args: glazing: of windows by GUID, in place of what the building states.
+
+    Returns: a sentence on the BSDF that are left out.
     """
     units = {
         "temperatureUnit": "C", "lengthUnit": "Meters", "areaUnit": "SquareMeters",
@@ -75,6 +77,7 @@ def write_gbxml(
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     write_text(Path(path), f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
+    return without_bsdf(building.windows, glazing or {}, "gbXML")
 
 
 class _Writer:

@@ -17,7 +17,7 @@ import shapely
 
 from bim.doorways import Key, touching
 from bim.energyplus_parts import at_most_layers
-from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of
+from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of, without_bsdf
 from bim.fenestration import pane_transmissivity
 from bim.hosted_windows import HostedPolygon, hosted_polygons
 from bim.model import Building, Construction, Element, Face, Space, Window
@@ -35,7 +35,7 @@ GLASS_INDEX = 1.52  # refractive index of a pane
 
 def write_honeybee(
     building: Building, path: str | PathLike[str], *, glazing: Glazings | None = None
-) -> None:
+) -> tuple[str, ...]:
     """Write rooms, windows, constructions, reflectances and obstructions as HBJSON.
 
     A window with U and g gets a construction (its visible transmittance is that of the BSDF where
@@ -43,6 +43,8 @@ def write_honeybee(
     written: further shading states, gloss, furniture. What is not known is honeybee's default.
 
     Args: glazing: of windows by GUID, in place of what the building states.
+
+    Returns: a sentence on the windows whose BSDF only the light has.
     """
     library = _Library(glazing or {})
     names = _Names()
@@ -60,6 +62,7 @@ def write_honeybee(
                        "radiance": library.radiance()},
     }  # fmt: skip
     write_text(Path(path), json_text(model, indent=1) + "\n")
+    return without_bsdf(building.windows, glazing or {}, "Honeybee's energy model")
 
 
 class _Names:

@@ -217,7 +217,7 @@ def export_files(
     for name, write in writers.items():
         path = files.get(name)
         if path is not None:
-            assumed += tuple(f"{note}." for note in write(building, path, glazing=glazing) or ())
+            assumed += tuple(f"{note}." for note in write(building, path, glazing=glazing))
             click.echo(path)
     return assumed
 

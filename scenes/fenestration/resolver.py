@@ -15,7 +15,7 @@ what to do.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -292,7 +292,7 @@ def source_notes(sources: Iterable[dict[str, Any]]) -> tuple[str, ...]:
     )
 
 
-def windows_named(names: list[str]) -> str:
+def windows_named(names: Sequence[str]) -> str:
     """Windows in words, the first few by name; the noun where their names have it not."""
     listed = _listed(names)
     if all(name.casefold().startswith("window") for name in names):
@@ -302,7 +302,7 @@ def windows_named(names: list[str]) -> str:
     return Note("Windows {names}", names=listed)
 
 
-def _listed(names: list[str]) -> str:
+def _listed(names: Sequence[str]) -> str:
     """The first few names, each once with how many have it, and how many windows there are more."""
     counts = list(Counter(names).items())
     shown = [name if count == 1 else f"{name} ({count})" for name, count in counts[:NAMED]]

@@ -29,6 +29,7 @@ from mitsuba_cfs.sky.matrix import sky_matrix
 from mitsuba_cfs.sky.patches import ReinhartSky
 from scenes.demo import VENETIAN_BLIND
 from scenes.fenestration.state_to_attach import state_to_attach
+from scenes.fenestration.systems import WindowOverrides, read_system
 from scenes.fenestration_exports import known_fenestration
 from tests.bim.small_ifc import box_room
 
@@ -235,8 +236,10 @@ def test_a_bsdf_and_its_u_g_and_tau_go_to_honeybee_and_gbxml(tmp_path):
     building = read_ifc(attached(tmp_path))
     glazing, _ = known_fenestration(building.spaces, tmp_path / "attached.ifc").glazings()
     (first, *_) = glazing.values()
-    write_honeybee(building, tmp_path / "a.hbjson", glazing=glazing)
-    write_gbxml(building, tmp_path / "a.gbxml", glazing=glazing)
+    for write, name in ((write_honeybee, "a.hbjson"), (write_gbxml, "a.gbxml")):
+        (note,) = write(building, tmp_path / name, glazing=glazing)
+        assert "holds no BSDF: windows of" in note
+        assert write(shoebox(4, 5, 3, windows=WINDOWS), tmp_path / f"plain {name}") == ()
     model = json.loads((tmp_path / "a.hbjson").read_text())
     (material,) = [m for m in model["properties"]["energy"]["materials"]
                    if m["type"] == "EnergyWindowMaterialSimpleGlazSys"]  # fmt: skip
@@ -252,6 +255,18 @@ def test_a_bsdf_and_its_u_g_and_tau_go_to_honeybee_and_gbxml(tmp_path):
     window = read_gbxml(tmp_path / "a.gbxml").windows[0]
     found = [window.u_value, window.g_value, window.visible_transmittance]
     assert found == pytest.approx(values, abs=1e-5)
+
+
+def test_the_notes_name_windows_whose_further_states_are_not_written(tmp_path):
+    file = attached(tmp_path)
+    spaces = read_ifc(file).spaces
+    assert "first shading state" not in " ".join(known_fenestration(spaces, file).notes())
+    states = WindowOverrides(2 * (read_system(VENETIAN_BLIND),), light_only=True)
+    assert (
+        known_fenestration(spaces, file, states)
+        .notes()[-1]
+        .endswith(": only the first shading state is written.")
+    )
 
 
 def attached(folder: Path) -> Path:
