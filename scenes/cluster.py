@@ -33,6 +33,7 @@ R = TypeVar("R")
 CONNECT_SECONDS = 10.0
 POLL_SECONDS = 1.0  # between two looks at the scheduler's workers
 WAIT_SECONDS = 60.0  # for a scheduler or a worker, after the last one has ended
+ANSWER_SECONDS = 600.0  # for the first answer of a worker, which imports the program for it
 AHEAD = 2  # tasks sent for each thread of a worker: one that runs and one that waits
 MOST_LOST = 2  # workers that end, or run out of memory, with one task before it has failed
 SLOW = 3.0  # times the longest finished task: then an idle worker computes a task too
@@ -214,7 +215,7 @@ class Cluster(Generic[T, R]):
 
         try:
             return Client(self._address, timeout=seconds, set_as_default=False)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, TypeError, RuntimeError) as error:  # the last two: of TLS
             message = f"no Dask scheduler answers there: {one_line(str(error))}"
             raise DataError(message, element=self._address, field="--scheduler") from error
 
@@ -246,14 +247,19 @@ class Cluster(Generic[T, R]):
 
     def _patience(self) -> float:
         """Seconds without a worker that can compute: short where none has ended."""
+        if self._questioned():
+            return ANSWER_SECONDS
         return CONNECT_SECONDS if set(self._names) <= set(self._left_out) else WAIT_SECONDS
 
+    def _questioned(self) -> set[str]:
+        """Addresses of the workers that have not answered yet whether they can compute."""
+        return {attempt.worker for attempt in self._attempts if attempt.item is None}
+
     def _no_worker(self) -> DataError:
-        reasons = [
-            f"{name} {self._left_out.get(worker, 'has ended')}"
-            for worker, name in self._names.items()
-        ]
-        message = f"no worker of this scheduler can compute: {'; '.join(reasons)}"
+        reasons = dict.fromkeys(self._names, "has ended")
+        reasons |= dict.fromkeys(self._questioned(), "has not answered") | self._left_out
+        named = "; ".join(f"{name} {reasons[worker]}" for worker, name in self._names.items())
+        message = f"no worker of this scheduler can compute: {named}"
         return DataError(message, element=self._address, field="--scheduler")
 
     def _look(self) -> list[tuple[T, R]]:

@@ -30,10 +30,16 @@ def noted(case: Case, *, progress: Progress = silent) -> CaseResult:
 
 
 def held_up(case: Case, *, progress: Progress = silent) -> CaseResult:
-    """The same; a case of another angle than 0 waits until a file beside the log lets it go."""
-    go = Path(f"{case.room}.go")
+    """The same; a case of 90 degrees or more waits until a file beside the log lets it continue.
+
+    Its line in the log holds the number of its process.
+    """
+    log, go = Path(case.room), Path(f"{case.room}.go")
+    if case.orientation_deg >= 90:
+        with log.open("a") as file:
+            file.write(f"held {os.getpid()}\n")
     end = time.monotonic() + 20.0
-    while case.orientation_deg and not go.exists() and time.monotonic() < end:
+    while case.orientation_deg >= 90 and not go.exists() and time.monotonic() < end:
         time.sleep(0.05)
     return noted(case, progress=progress)
 

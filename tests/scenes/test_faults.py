@@ -201,6 +201,16 @@ def test_closed_pipes_do_not_stop_the_work(name, place):
         assert not here.temporaries()
 
 
+def test_standard_output_on_a_full_disk_is_one_line():
+    with open("/dev/full", "w") as full:
+        process = subprocess.run(
+            [sys.executable, "-m", "scenes.cli", "--help"],
+            cwd=REPOSITORY, stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert process.returncode == 1
+    assert process.stderr.splitlines() == ["error: standard output: the disk is full"]
+
+
 @pytest.mark.parametrize("name", ["thermal", pytest.param("study", marks=pytest.mark.slow)])
 def test_the_second_of_two_runs_into_a_folder_is_refused_before_its_work(
     name, place, tmp_path, capsys, monkeypatch

@@ -264,6 +264,31 @@ def test_one_failed_case_leaves_the_others(tmp_path):
     assert len(list((tmp_path / "out" / "cases").iterdir())) == 2  # a failure is tried again
 
 
+def test_table_manifest_and_report_of_a_study_are_replaced_together(tmp_path):
+    """An interrupted write leaves all of the earlier ones; without a report there is no old one."""
+
+    def interrupted(path):
+        path.write_text("new")
+        raise KeyboardInterrupt
+
+    def contents():
+        names = [one for one in out.iterdir() if one.name != "cfs-results.json" and one.is_file()]
+        return {one.name: one.read_bytes() for one in names}
+
+    out = tmp_path / "out"
+    store = Store(out)
+    store.write([{"case": 1}], {"cases": 1}, lambda path: path.write_text("old"))
+    before = contents()
+    assert {"results.csv", "results.parquet", "study.json", "report.html"} == set(before)
+    with pytest.raises(KeyboardInterrupt):
+        Store(out).write([{"case": 2}], {"cases": 2}, interrupted)
+    assert contents() == before
+    Store(out).write([{"case": 2}], {"cases": 2})
+    after = contents()
+    assert set(after) == set(before) - {"report.html"}
+    assert all(after[name] != before[name] for name in after)
+
+
 def _failing(case, *, progress=None):
     """A case of which one orientation cannot be computed."""
     from thermal.errors import ThermalInputError

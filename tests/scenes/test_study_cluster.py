@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -30,11 +31,17 @@ pytest.importorskip("distributed")
 pytestmark = pytest.mark.early
 
 
-class Cluster:
-    """A scheduler and its workers, each a process of its own."""
+LOOPBACK = ("--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0")  # as SECURITY.md has it
 
-    def __init__(self, folder: Path, workers: int) -> None:
-        self._folder = folder
+
+class Cluster:
+    """A scheduler and its workers, each a process of its own.
+
+    Args: options: of both, beside those that let them listen on the loopback address alone.
+    """
+
+    def __init__(self, folder: Path, workers: int, options: Sequence[str] = ()) -> None:
+        self._folder, self._options = folder, (*LOOPBACK, *options)
         self.processes: list[subprocess.Popen] = []
         self.workers: list[subprocess.Popen] = []
         self.begin_scheduler("0")
@@ -45,15 +52,14 @@ class Cluster:
     def begin_scheduler(self, port: str) -> None:
         """Start the scheduler."""
         self.scheduler = self._start(
-            "scheduler", "--port", port, "--host", "127.0.0.1", "--no-dashboard",
-            "--idle-timeout", "120 s",
+            "scheduler", "--port", port, *self._options, "--idle-timeout", "120 s",
         )  # fmt: skip
-        self.address = self._said(self.scheduler, r"Scheduler at:\s+(tcp://\S+)")
+        self.address = self._said(self.scheduler, r"Scheduler at:\s+(t\w+://\S+)")
 
     def add_worker(self, *options: str, cwd: Path = REPOSITORY) -> None:
         """Start a worker; w0 is the first."""
         worker = self._start(
-            "worker", self.address, "--nthreads", "1", "--no-nanny", "--no-dashboard",
+            "worker", self.address, *self._options, "--nthreads", "1", "--no-nanny",
             "--death-timeout", "60", "--local-directory", str(self._folder),
             "--name", f"w{len(self.workers)}", *options, cwd=cwd,
         )  # fmt: skip
@@ -79,22 +85,17 @@ class Cluster:
         """What the process says, waited for."""
         return until(lambda: (m := re.search(pattern, process.log.read_text())) and m[1], 60)
 
+    def holding(self, log: Path) -> subprocess.Popen:
+        """The worker whose case is the first to wait in `held_up`; waited for."""
+        pid = until(lambda: (m := re.search(r"held (\d+)\n", log.read_text())) and m[1], 20)
+        return next(one for one in self.workers if one.pid == int(pid))
+
     def stop(self) -> None:
         """End all processes that are still there."""
         for process in reversed(self.processes):
             process.send_signal(signal.SIGCONT)
             process.kill()
             process.wait()
-
-
-def another_begun(log: Path) -> Callable[[], bool]:
-    """Whether one more case was begun since now."""
-
-    def begun() -> int:
-        return log.read_text().count("begin")
-
-    before = begun()
-    return lambda: begun() > before
 
 
 def until(condition: Callable, seconds: float):
@@ -120,9 +121,9 @@ def started():
     """Starts clusters, which end with the test."""
     clusters = []
 
-    def start(folder: Path, workers: int) -> Cluster:
+    def start(folder: Path, workers: int, options: Sequence[str] = ()) -> Cluster:
         folder.mkdir()
-        clusters.append(Cluster(folder, workers))
+        clusters.append(Cluster(folder, workers, options))
         return clusters[-1]
 
     yield start
@@ -142,21 +143,21 @@ def cases(folder: Path, angles: list[int]) -> tuple[list[Case], Path]:
 def test_a_worker_killed_midway_loses_and_doubles_nothing(cluster, tmp_path):
     wanted, log = cases(tmp_path, [10 * i for i in range(12)])
     wanted.append(wanted[3])  # asked for twice: computed once
-    found, killed = [], None
-    for result in computed(wanted, noted, scheduler=cluster.address):
+    found = []
+    for result in computed(wanted, held_up, scheduler=cluster.address):
         found.append(result)
-        if len(found) == 2 and killed is None:
-            killed = cluster.workers[0]
+        if len(found) == 2:
             until(lambda: log.read_text().count("end") >= 8, 20)  # while a result is looked at
-            until(another_begun(log), 20)  # in the midst of a case
-            killed.send_signal(signal.SIGKILL)
+            killed = cluster.holding(log)  # in the midst of a case
+            killed.kill()
             killed.wait()
+            Path(f"{log}.go").touch()
     keys = [result.key for result in found]
     assert sorted(keys) == sorted({case.key for case in wanted})
     assert not [result.error for result in found if result.error]
     angle = {case.key: case.orientation_deg for case in wanted}
     assert all(result.figures["angle"] == angle[result.key] for result in found)
-    lines = log.read_text().splitlines()
+    lines = [line for line in log.read_text().splitlines() if not line.startswith("held")]
     ends = [line for line in lines if line.startswith("end")]
     assert sorted(set(ends)) == sorted(f"end {case.orientation_deg:g}" for case in wanted[:-1])
     lost = len(lines) - 2 * len(ends)
@@ -171,7 +172,7 @@ def test_a_case_that_fails_on_a_worker_leaves_the_others(cluster, tmp_path):
 
 
 def test_who_stops_early_waits_for_nothing_and_leaves_no_work_behind(cluster, tmp_path):
-    wanted, log = cases(tmp_path, [10 * i for i in range(12)])
+    wanted, log = cases(tmp_path, [0, *(10 * i for i in range(9, 20))])
     with closing(computed(wanted, held_up, scheduler=cluster.address)) as results:
         next(results)
     assert log.read_text().count("begin") == 1  # the others are held up still
@@ -179,6 +180,56 @@ def test_who_stops_early_waits_for_nothing_and_leaves_no_work_behind(cluster, tm
     until(lambda: log.read_text().count("end") > 1, 20)  # what a worker had in hand
     time.sleep(4 * SECONDS)
     assert log.read_text().count("begin") <= 3
+
+
+def test_only_the_loopback_address_is_listened_on(cluster, tmp_path):
+    """By the scheduler and the workers with the options of SECURITY.md, and by the command."""
+    import psutil
+
+    wanted, _ = cases(tmp_path, [0])
+    with closing(computed(wanted, noted, scheduler=cluster.address)) as results:
+        assert next(results).error == ""
+        listening = {}
+        for pid in (os.getpid(), *(one.pid for one in cluster.processes if one.poll() is None)):
+            process = psutil.Process(pid)
+            listening[pid] = {one.laddr.ip for one in process.net_connections() if
+                              one.status == psutil.CONN_LISTEN}  # fmt: skip
+    assert listening.pop(os.getpid()) == set()
+    assert len(listening) >= 2 and set(map(frozenset, listening.values())) == {
+        frozenset({"127.0.0.1"})
+    }
+
+
+@pytest.mark.slow
+def test_a_cluster_with_tls_computes_for_those_with_its_certificate_alone(
+    started, tmp_path, monkeypatch
+):
+    """The options and variables that SECURITY.md names."""
+    import dask
+
+    certificate, key = tmp_path / "me.pem", tmp_path / "me.key"
+    request = "openssl req -x509 -newkey rsa:2048 -nodes -days 1 -subj /CN=localhost".split()
+    subprocess.run([*request, "-keyout", key, "-out", certificate], check=True, capture_output=True)
+    options = ["--tls-ca-file", certificate, "--tls-cert", certificate, "--tls-key", key]
+    cluster = started(tmp_path / "dask", 1, ["--protocol", "tls", *map(str, options)])
+    plain = cluster.address.replace("tls", "tcp")
+    wanted, _ = cases(tmp_path, [0, 20])
+    try:
+        with monkeypatch.context() as patch:
+            patch.setenv("DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION", "true")
+            patch.setenv("DASK_DISTRIBUTED__COMM__TLS__CA_FILE", str(certificate))
+            patch.setenv("DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT", str(certificate))
+            patch.setenv("DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY", str(key))
+            dask.config.refresh()
+            results = list(computed(wanted, noted, scheduler=cluster.address))
+            with pytest.raises(DataError, match="refusing communication"):
+                list(computed(wanted, noted, scheduler=plain))
+    finally:
+        dask.config.refresh()
+    assert [result.error for result in results] == ["", ""]
+    for address in (cluster.address, plain):
+        with pytest.raises(DataError, match="no Dask scheduler answers there"):
+            list(computed(wanted, noted, scheduler=address))
 
 
 def test_no_scheduler_is_one_clear_line(tmp_path, monkeypatch):
@@ -189,14 +240,17 @@ def test_no_scheduler_is_one_clear_line(tmp_path, monkeypatch):
     assert "\n" not in str(error.value)
 
 
-def blind(folder: Path) -> str:
-    """A script for a worker that does not find the weather file."""
+NOT_THERE = "raise FileNotFoundError(2, 'No such file or directory', names[0])"
+
+
+def blind(folder: Path, instead: str = NOT_THERE) -> str:
+    """A script for a worker that does not find the weather file, or does something else."""
     script = folder / "blind.py"
     script.write_text(
         "import sys\n"
         "def hide(event, names):\n"
         f"    if event == 'open' and str(names[0]) == {str(WEATHER)!r}:\n"
-        "        raise FileNotFoundError(2, 'No such file or directory', names[0])\n"
+        f"        {instead}\n"
         "sys.addaudithook(hide)\n"
     )
     return str(script)
@@ -222,14 +276,15 @@ def test_a_blind_a_dying_and_an_old_worker_lose_nothing(started, tmp_path, caplo
     cluster.add_worker("--preload", blind(tmp_path))
     cluster.add_worker(cwd=another_version(tmp_path))
     cluster.wait_for_workers()
-    wanted, log = cases(tmp_path, list(range(20, 20 + number)))
+    wanted, log = cases(tmp_path, [0, 20, *range(90, 88 + number)])
     results = []
-    for result in computed(wanted, noted, scheduler=cluster.address):
+    for result in computed(wanted, held_up, scheduler=cluster.address):
         results.append(result)
         if len(results) == 2:
-            until(another_begun(log), 20)
+            assert cluster.holding(log) is cluster.workers[0]
             cluster.workers[0].kill()
             cluster.add_worker()
+            Path(f"{log}.go").touch()
     assert sorted(result.key for result in results) == sorted(case.key for case in wanted)
     assert not [result.error for result in results if result.error]
     warnings = [one for one in caplog.records if one.levelname == "WARNING"]
@@ -256,6 +311,21 @@ def test_without_a_worker_that_can_compute_the_reasons_are_named(started, tmp_pa
         assert f"cannot read {WEATHER}" in error
 
 
+@pytest.mark.parametrize(("answer", "error"), [(600.0, ""), (1.0, "has not answered")])
+def test_a_worker_that_reads_its_files_slowly_is_waited_for(
+    started, tmp_path, monkeypatch, answer, error
+):
+    """The first import of the program from a cluster's disks takes longer than the start."""
+    monkeypatch.setattr("scenes.cluster.WAIT_SECONDS", 0.5)
+    monkeypatch.setattr("scenes.cluster.ANSWER_SECONDS", answer)
+    cluster = started(tmp_path / "dask", 0)
+    cluster.add_worker("--preload", blind(tmp_path, "__import__('time').sleep(4)"))
+    cluster.wait_for_workers()
+    wanted, _ = cases(tmp_path, [0])
+    (result,) = computed(wanted, noted, scheduler=cluster.address)
+    assert error in result.error and bool(error) == bool(result.error)
+
+
 @pytest.mark.slow
 def test_a_scheduler_that_is_killed_and_started_again_goes_on(started, tmp_path):
     cluster = started(tmp_path / "dask", 1)
@@ -275,13 +345,13 @@ def test_a_scheduler_that_is_killed_and_started_again_goes_on(started, tmp_path)
 @pytest.mark.slow
 def test_the_tasks_of_a_worker_that_stands_still_are_computed_by_another(started, tmp_path):
     cluster = started(tmp_path / "dask", 2)
-    wanted, log = cases(tmp_path, [10 * i for i in range(10)])
+    wanted, log = cases(tmp_path, [0, *(10 * i for i in range(9, 18))])
     results, begin = [], time.monotonic()
-    for result in computed(wanted, noted, scheduler=cluster.address):
+    for result in computed(wanted, held_up, scheduler=cluster.address):
         results.append(result)
-        if len(results) == 3:
-            until(another_begun(log), 20)
-            cluster.workers[0].send_signal(signal.SIGSTOP)
+        if len(results) == 1:
+            cluster.holding(log).send_signal(signal.SIGSTOP)
+            Path(f"{log}.go").touch()
     assert sorted(result.key for result in results) == sorted(case.key for case in wanted)
     assert not [result.error for result in results if result.error]
     assert time.monotonic() - begin < 60.0  # Dask gives such a worker up after 300 s

@@ -7,6 +7,7 @@ import logging
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from tests.conftest import WINDOW_GLAZING
 from thermal.blackbox import (
@@ -105,3 +106,40 @@ def test_fenestration_refuses_what_cannot_be():
         Fenestration("x", 6.5)
     with pytest.raises(ThermalInputError, match=r"coefficients"):
         LayerResistance("surface", (1.0,))
+
+
+def test_an_interior_shade_shares_heat_by_its_three_paths():
+    """The resistance that gives U, sought numerically; heat of each layer by the nodes' balance."""
+    u, across = 1.4, 0.8
+    window = Fenestration("shade", u, extra_inner=1.5, room_to_outer=across)
+    outer, inner = 1 / window.r_outer, 1 / window.r_inner + window.extra_inner
+
+    def to_room(through, room, heat):  # [W/m2] and temperatures, outdoors at 0
+        network = [[outer + across + through, -through], [-through, inner + through]]
+        nodes = np.linalg.solve(network, np.add(heat, [across * room, inner * room]))
+        return across * (nodes[0] - room) + inner * (nodes[1] - room)
+
+    through = brentq(lambda one: -to_room(one, 1.0, [0.0, 0.0]) - u, 1e-6, 1e3, xtol=1e-14)
+    shares = [to_room(through, 0.0, heat) for heat in ([1.0, 0.0], [0.0, 1.0])]
+    np.testing.assert_allclose(window.inward_shares(), shares, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "allowed"),
+    [
+        ({"u_value": 7.0}, True),
+        ({"u_value": 7.05}, False),
+        ({"extra_inner": 200.0}, True),
+        ({"extra_inner": 201.0}, False),
+        ({"emissivity_in": 0.0, "emissivity_out": 0.0}, True),
+        ({"emissivity_in": 1.0, "emissivity_out": 1.0}, True),
+        ({"emissivity_in": 1.01}, False),
+    ],
+)
+def test_bounds_of_a_fenestration(changes, allowed):
+    values = {"name": "x", "u_value": 1.2, "r_outer": 0.04, "r_inner": 0.1} | changes
+    if allowed:
+        Fenestration(**values)
+    else:
+        with pytest.raises(ThermalInputError, match="fenestration x"):
+            Fenestration(**values)

@@ -7,6 +7,7 @@ import pytest
 
 from tests.thermal.rooms import CONCRETE, INSULATION, PLASTER
 from thermal.conduction import u_value, wall_grid
+from thermal.errors import ThermalInputError
 from thermal.zone import Layer
 
 AIR = Layer(0.02, 0.1, 0.0, 0.0)  # two cells without any heat, and beside another such layer one
@@ -52,3 +53,12 @@ def test_the_cells_of_a_wall_hold_its_heat_and_resistance():
     # five cells of 20 mm, half of each at its ends; two of the layer without heat
     np.testing.assert_allclose(grid.width, [0.02] * 5 + [0.025] * 2)
     np.testing.assert_allclose(grid.capacity, np.array([9, 18, 18, 18, 18, 9, 0, 0]) * 1e3)
+
+
+def test_the_node_of_a_pipe_is_the_nearest_inner_one_below_the_inside_face():
+    grid = wall_grid((Layer(0.1, 0.5, 1000.0, 900.0), Layer(0.06, 1.0, 2000.0, 900.0)), cell=0.02)
+    # inner nodes 20 mm apart, the outermost at 0.14 m below the inside face
+    for depth, node in ((0.141, 0), (0.119, 1), (0.051, 4), (0.02, 6), (0.001, 6)):
+        assert grid.node_at(depth, "pipe") == node
+    with pytest.raises(ThermalInputError, match=r"pipe.*0.161 m lies below its layers"):
+        grid.node_at(0.161, "pipe")

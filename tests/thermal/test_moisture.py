@@ -94,3 +94,14 @@ def test_air_from_the_next_room_brings_its_vapour():
     assert b.ratio[-1] == pytest.approx(a.ratio[-1] + SOURCE / (DENSITY * FLOW), rel=1e-6)
     turned = zone_humidity(rooms, OUT_W, OUT_C, P, between.T)
     assert turned[1].relative[-1] == pytest.approx(1.0)  # nothing flows into b then
+
+
+def test_air_from_a_room_held_dry_brings_its_held_ratio():
+    """a is held at a limit, so that b's steady ratio is that limit and its own source's more."""
+    between = np.zeros((2, 2))
+    between[1, 0] = FLOW
+    rooms = [zone(dehumidify_to=0.35), zone(outdoor_air=np.zeros(HOURS))]
+    a, b = zone_humidity(rooms, OUT_W, OUT_C, P, between)
+    high = humidity_ratio(0.35, 21.0, 101325.0)
+    assert a.ratio[-1] == pytest.approx(high, rel=1e-9)
+    assert b.ratio[-1] == pytest.approx(high + SOURCE / (DENSITY * FLOW), rel=1e-6)

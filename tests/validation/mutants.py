@@ -52,7 +52,7 @@ MODULES = {
     "mitsuba_cfs/sky/perez": ["sky/test_perez"],
     "mitsuba_cfs/sky/cie": ["sky/test_cie"],
     "mitsuba_cfs/sky/patches": ["sky/test_patches"],
-    "mitsuba_cfs/sky/annual": ["sky/test_albedo"],
+    "mitsuba_cfs/sky/annual": ["sky/test_annual_sky", "sky/test_albedo"],
     "mitsuba_cfs/sky/weather_table": ["sky/test_weather_table", "sky/test_weather"],
     "mitsuba_cfs/sky/epw": ["sky/test_weather"],
     "mitsuba_cfs/sky/weather": ["sky/test_weather", "sky/test_heat_island"],
