@@ -43,4 +43,4 @@ def command(size: int, out: Path | None) -> None:
             f"{c.per_step:10.4f}"
         )
     result.write(target)
-    click.echo(f"kept: {target}")
+    click.echo(f"results: {target}")

@@ -89,8 +89,9 @@ def command(
         click.echo(
             f"{room.name}: operative {summary['operative_min_c']:.1f} to "
             f"{summary['operative_max_c']:.1f} C, heating {summary['heat_kwh']:.0f} kWh, "
-            f"cooling {summary['cold_kwh']:.0f} kWh, comfortable "
-            f"{summary['comfortable_h ASHRAE 55 80 %']:.0f} of the occupied hours"
+            f"cooling {summary['cold_kwh']:.0f} kWh, comfortable in "
+            f"{summary['comfortable_h ASHRAE 55 80 %']:.0f} of {summary['occupied_h']:.0f} "
+            "occupied hours"
         )
     head.notes(notes[quick:])
     click.echo(f"results: {out}")

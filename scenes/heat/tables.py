@@ -171,6 +171,7 @@ def year_summary(
         "peak_cooling_w": result.cooling.max(),
         "operative_min_c": result.operative_c.min(),
         "operative_max_c": result.operative_c.max(),
+        "occupied_h": np.count_nonzero(occupied) * weather.step_h,
     }
     months = {}
     for band in ADAPTIVE_BANDS:

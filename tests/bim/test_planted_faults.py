@@ -86,7 +86,7 @@ PLACES: list[tuple[Callable[[Path], object], str]] = [
     (ifc, "ifcopenshell.util.unit:calculate_unit_scale"),
     (ifc, "ifcopenshell.util.placement:get_local_placement"),
     (ifc, "bim.ifc.materials:_material_of"),
-    (ifc, "bim.ifc.materials:MaterialReader.layer"),
+    (ifc, "bim.ifc.materials:MaterialReader.material"),
     (ifc, "bim.ifc.materials:own_materials"),
     (ifc, "bim.ifc.project:definitions_of"),
     (ifc, "bim.ifc.project:_unit_scale"),

@@ -38,7 +38,7 @@ def _thermal(_study, *_others, **_options):
     hours = pd.DataFrame({"air_c": np.linspace(15.0, 30.0, 8760)})
     summary = dict.fromkeys(
         ("operative_min_c", "operative_max_c", "heat_kwh", "cold_kwh",
-         "comfortable_h ASHRAE 55 80 %"), 1.0,
+         "comfortable_h ASHRAE 55 80 %", "occupied_h"), 1.0,
     )  # fmt: skip
     room = SimpleNamespace(
         name="A", floor_area=10.0, hours=hours, summary=summary,
@@ -108,7 +108,9 @@ def _rate_views(year, kept, _progress):
     picture = np.full((64, 64), 500.0, np.float32)
     rated = evaluate(picture, year.views[0].view)
     worst = year.sky.lit[0 if year.options.seed == 0 else 1]  # other hours with another seed
-    yield ViewYear(year.views[0], ratings, {year.weather.midpoints[worst]: (picture, rated)}, 1.0)
+    yield ViewYear(
+        year.views[0], ratings, {year.weather.midpoints[worst]: (picture, rated)}, 1.0, {}
+    )
 
 
 def _room_picture(_options, *_others):

@@ -16,6 +16,7 @@ from mitsuba_cfs.methods.colour_view import (
     sun_colour,
     with_luminance,
 )
+from mitsuba_cfs.methods.optics import MatrixOptics
 from mitsuba_cfs.methods.point_in_time import PathLight, path_picture
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import given_sky
@@ -96,7 +97,7 @@ def test_walls_colour_a_room_under_a_grey_sky() -> None:
             interior, groups = rooms.test_room(scale)
             scene = DaylightScene(interior, rooms.NOTHING, groups, view=view)
             found.append(scene)
-        systems = [[_Glass(glass(0.7))]]
+        systems = [[MatrixOptics(paths=glass(0.7))]]
         lit = path_picture(PathLight(found[1], systems, sky, sampling), 0)
         return lit, coloured_picture(lit, found, systems, sky, 0, sampling=sampling)
 
@@ -107,10 +108,3 @@ def test_walls_colour_a_room_under_a_grey_sky() -> None:
     _, red = pictured(1.0, 0.5)
     ratio = red[shown][:, 0] / red[shown][:, 1]
     assert np.median(ratio) > 2.0, "light that comes back once more is redder than the surface"
-
-
-class _Glass:
-    """Optics of paths alone."""
-
-    def __init__(self, paths) -> None:
-        self.paths = paths
