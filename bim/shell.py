@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -45,17 +47,21 @@ def _with_touching(
     indices: list[int] = []
     for start, end in zip(corners, np.roll(corners, -1), strict=True):
         indices.append(int(start))
-        if start == end:
-            continue
-        a, edge = vertices[start], vertices[end] - vertices[start]
-        length = np.linalg.norm(edge)
-        near = np.array(tree.query_ball_point(a + edge / 2, length / 2 + WELD))
-        along = (vertices[near] - a) @ edge / length
-        off = np.linalg.norm(vertices[near] - a - np.outer(along / length, edge), axis=1)
-        between = (off < 2 * WELD) & (along > WELD) & (along < length - WELD)
-        order = np.argsort(along[between])
-        indices += [int(i) for i in near[between][order]]
+        if start != end:
+            indices += _between(int(start), int(end), vertices, tree)
     return [i for i, before in zip(indices, [indices[-1], *indices], strict=False) if i != before]
+
+
+def _between(start: int, end: int, vertices: NDArray[np.float64], tree: cKDTree) -> list[int]:
+    """Indices of the vertices on an edge, from its start to its end, without these."""
+    a, edge = vertices[start], vertices[end] - vertices[start]
+    length = np.linalg.norm(edge)
+    near = np.array(tree.query_ball_point(a + edge / 2, length / 2 + WELD))
+    along = (vertices[near] - a) @ edge / length
+    off = np.linalg.norm(vertices[near] - a - np.outer(along / length, edge), axis=1)
+    between = (off < 2 * WELD) & (along > WELD) & (along < length - WELD)
+    order = np.argsort(along[between])
+    return [int(i) for i in near[between][order]]
 
 
 def _triangles(
@@ -81,19 +87,29 @@ def _triangles(
 
 
 def open_edges(triangles: NDArray[np.float64]) -> int:
-    """Number of directed edges without their reverse: 0 for a closed, evenly wound surface."""
+    """Number of directed edges without their reverse: 0 for a closed, evenly wound surface.
+
+    An edge may be closed by several shorter ones, where corners of a neighbour lie on it.
+    """
     corners = triangles.reshape(-1, 3)
     vertices = welded(corners)
     index = cKDTree(vertices).query(corners)[1].reshape(-1, 3)
-    edges = np.concatenate([index[:, [0, 1]], index[:, [1, 2]], index[:, [2, 0]]])
-    key = edges[:, 0] * len(vertices) + edges[:, 1]
-    back = edges[:, 1] * len(vertices) + edges[:, 0]
-    there, counts = np.unique(key, return_counts=True)
-    reverse, reverse_counts = np.unique(back, return_counts=True)
-    balance = dict(zip(there.tolist(), counts.tolist(), strict=True))
-    for edge, count in zip(reverse.tolist(), reverse_counts.tolist(), strict=True):
-        balance[edge] = balance.get(edge, 0) - count
-    return int(sum(abs(count) for count in balance.values()) // 2)
+    edges = _unmatched(np.concatenate([index[:, [0, 1]], index[:, [1, 2]], index[:, [2, 0]]]))
+    if not len(edges):
+        return 0
+    tree = cKDTree(vertices)
+    chains = [[a, *_between(a, b, vertices, tree), b] for a, b in edges.tolist()]
+    return len(_unmatched(np.array([pair for chain in chains for pair in pairwise(chain)])))
+
+
+def _unmatched(edges: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The directed edges [E, 2] that remain when each has taken away a reverse one."""
+    edges = edges[edges[:, 0] != edges[:, 1]]
+    ordered, sign = np.sort(edges, axis=1), np.where(edges[:, 0] < edges[:, 1], 1, -1)
+    pairs, which = np.unique(ordered, axis=0, return_inverse=True)
+    net = np.bincount(which.reshape(-1), weights=sign, minlength=len(pairs)).astype(np.int64)
+    turned = np.where((net < 0)[:, None], pairs[:, ::-1], pairs)
+    return np.repeat(turned, np.abs(net), axis=0)
 
 
 def enclosed_volume(triangles: NDArray[np.float64]) -> float:

@@ -145,6 +145,20 @@ def issue_of(building, code: str):
     return [issue for issue in building.issues if issue.code == code]
 
 
+@pytest.mark.parametrize(("end", "count"), [(2.4, 0), (2.3, 4)])
+def test_panes_side_by_side_close_their_hole(tmp_path, end, count):
+    """Corners of panes lie on the edges of the hole; a slot of 10 cm between them is reported."""
+    whole = "12  0.6 0 0.9   3.4 0 0.9   3.4 0 2.5   0.6 0 2.5\n"
+    scene = OFFICE.read_text()
+    assert whole in scene
+    steps = ((0.6, 1.5), (1.5, end), (2.4, 3.4))
+    first, *others = (pane("p", 0.0, x, (0.9, 2.5), "glazing") for x in steps)
+    path = tmp_path / "scene.rad"
+    path.write_text(scene.replace(whole, first.splitlines()[-1] + "\n") + "".join(others))
+    issues = issue_of(read_building_file(path), "room-with-open-edges")
+    assert [issue.values["count"] for issue in issues] == [count] * (count > 0)
+
+
 def test_panes_behind_each_other_are_one_glazing(tmp_path):
     """Closed form of two panes at normal incidence: t1 t2 / (1 - r1 r2)."""
     from mitsuba_cfs.gloss import pane_shares

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.thermal.rooms import CONCRETE, INSULATION
 from tests.validation.room_exchange import (
     absorbed_after_reflections,
     area_view_factors,
@@ -12,15 +13,19 @@ from tests.validation.room_exchange import (
     spread_evenly,
     window_share,
 )
-from thermal.blackbox import LayerAbsorptances
+from thermal.blackbox import Fenestration, LayerAbsorptances
 from thermal.convection import doe2_outside, iso15099_inside, local_wind_factor, tarp_inside
 from thermal.errors import ThermalInputError
 from thermal.network import (
     closed_exchange,
     exchange_from_view_factors,
     exchange_star,
+    frame_surface,
+    network,
     outside_factors,
+    window_mix,
 )
+from thermal.zone import OpaqueSurface, WindowElement, Zone
 
 
 def test_parallel_plates_exchange_by_the_closed_form():
@@ -174,3 +179,48 @@ def test_sun_in_the_layers_and_the_windows_share_by_hand():
         window_share([8.0], 0.5, 0.3 + 2e-6, 0.2)
     with pytest.raises(ThermalInputError, match="reflects all light"):
         window_share([8.0], 0.0, 0.0, 1.0)
+
+
+def _two_windows() -> Zone:
+    """An opaque wall of insulation outside and concrete inside, and two windows beside it."""
+    south = np.array([0.0, -1.0, 0.0])
+    glass = Fenestration("pane", 1.1)
+    windows = tuple(WindowElement(name, 2.0, south, (glass,)) for name in ("left", "right"))
+    wall = OpaqueSurface("wall", 10.0, (INSULATION, CONCRETE), south, emissivity_in=0.6)
+    return Zone("room", 60.0, (wall,), windows)
+
+
+def test_a_network_numbers_windows_and_shares_radiant_gains():
+    zone = _two_windows()
+    net = network([zone], [window_mix(zone, None, 1)], step_s=600.0, terrain="suburbs",
+                  cell=0.02, link=np.zeros((1, 1)))  # fmt: skip
+    assert net.faces.window.tolist() == [-1, 0, 1]
+    weight = np.array([10.0 * 0.6, 2.0 * 0.84, 2.0 * 0.84])
+    np.testing.assert_allclose(net.radiation.shares(0), [weight / weight.sum()])
+
+
+def test_the_faces_of_a_wall_keep_their_sides():
+    """Half of the outermost and of the innermost cell, 7 cells of insulation and 10 of concrete."""
+    zone = _two_windows()
+    net = network([zone], [window_mix(zone, None, 1)], step_s=600.0, terrain="suburbs",
+                  cell=0.02, link=np.zeros((1, 1)))  # fmt: skip
+    halves = [0.5 * one.thickness / n * one.density * one.heat_capacity
+              for one, n in ((INSULATION, 7), (CONCRETE, 10))]  # fmt: skip
+    assert net.faces.port[0, :2] * 600.0 == pytest.approx(halves)
+
+
+def test_a_frame_is_massless_and_has_its_u():
+    window = WindowElement(
+        "w", 2.0, np.array([0.0, -1.0, 0.0]), _two_windows().windows[0].states,
+        frame_area=0.4, frame_u=1.6,
+    )  # fmt: skip
+    (layer,) = frame_surface(window).layers
+    assert layer.thickness / layer.conductivity == pytest.approx(1 / 1.6 - 0.17)
+    assert layer.density * layer.heat_capacity == 0.0
+
+
+def test_closed_exchange_areas_sum_to_the_areas():
+    rng = np.random.default_rng(3)
+    area = rng.uniform(0.01, 200.0, 9)
+    closed = closed_exchange(rng.uniform(0.2, 2.0, (9, 9)) * area, area)
+    np.testing.assert_allclose(closed.sum(axis=1), area, rtol=1e-7)

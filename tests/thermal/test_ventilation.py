@@ -73,6 +73,12 @@ def test_leaks_by_their_formulas(leakage, flow):
     assert load(zone) == pytest.approx(HEAT * flow * 18.0, rel=1e-9)
 
 
+def test_leaks_of_a_pressure_test_leave_the_infiltration_as_it_is():
+    one = (1.0, 0.0, 0.0, 0.0)
+    assert sherman_grimsrud(500.0, stack=0.000145, wind=0.000174).factors == one
+    assert aim2(0.05, 0.67, stack=0.054, wind=0.156).factors == one
+
+
 @pytest.mark.parametrize(
     ("fan", "expected"),
     [
