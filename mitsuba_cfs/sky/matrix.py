@@ -9,6 +9,7 @@ Luminance of the ground up to the horizon, without modelled surroundings:
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
@@ -297,6 +298,12 @@ def series_matrix(
     return result
 
 
+@cache
+def _patch_tree(subdivision: int) -> cKDTree:
+    """The patches above the horizon by their directions, for their neighbours."""
+    return cKDTree(ReinhartSky(subdivision).directions[1:])
+
+
 def sun_on_patches(
     sky: ReinhartSky, sun: FloatArray, direct: FloatArray, count: int = SUN_PATCHES
 ) -> tuple[NDArray[np.int64], FloatArray]:
@@ -306,7 +313,7 @@ def sun_on_patches(
     """
     if not 1 <= count < sky.size:
         raise ValueError(f"sun_patches: expected 1 or more, got {count}")
-    distance, nearest = cKDTree(sky.directions[1:]).query(sun, range(1, count + 1))
+    distance, nearest = _patch_tree(sky.subdivision).query(sun, range(1, count + 1))
     weight = 1.0 / (0.002 + distance**2 / 2.0)  # 1.002 less the cosine, of unit vectors
     weight *= (direct / weight.sum(axis=1))[:, None]
     patch = nearest + 1

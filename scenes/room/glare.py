@@ -48,23 +48,16 @@ def annual_glare(
     room: RoomInputs, light: RoomLight, state: NDArray[np.int64], *, progress: Progress = silent
 ) -> pd.DataFrame:
     """Glare of every hour with the shading states of that hour [H, G]; NaN in the dark."""
+    rows, rating = light.states(state), rating_of(room.options.outputs)
     rated = hourly_glare(
-        light.light,
-        "DGP",
-        light.states(state),
-        options=rating_of(room.options.outputs),
+        light.light, "DGP", rows, options=rating,
         progress=part(progress, 0.0, 1.0, "annual glare"),
-    )
+    )  # fmt: skip
     table = np.full((room.skies.hours, len(COLUMNS)), np.nan)
     table[room.skies.lit] = np.stack([getattr(rated, name) for name in COLUMNS.values()], axis=1)
     frame = pd.DataFrame(table, index=room.weather.midpoints, columns=list(COLUMNS))
     if room.options.method == "three-phase":
-        error = sunny_hour_dgp_error(
-            light.light,
-            rated.dgp,
-            state=light.states(state),
-            options=rating_of(room.options.outputs),
-        )
+        error = sunny_hour_dgp_error(light.light, rated.dgp, state=rows, options=rating)
         frame[DGP_SUNNY_HOUR_ERROR] = np.where(np.isnan(table[:, 0]), np.nan, error)
     return frame.rename_axis("time")
 
@@ -101,8 +94,6 @@ def rated_hours_error(
 
     Args: as of `rated_hours`, whose result is `rated`.
     """
-    if room.options.method != "three-phase":
-        return 0.0
     return sunny_hour_dgp_error(
         light.light, rated.dgp, metric, light.states(state),
         hours=np.searchsorted(room.skies.lit, hours), options=rating_of(room.options.outputs),

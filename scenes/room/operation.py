@@ -211,9 +211,8 @@ class OperationHours:
     ) -> NDArray[np.int64]:
         """Shading states [H] of a rule by schedule or weather for windows with `count` states.
 
-        Args: place: path of the rule's table; closed: the state of rules that name none.
+        Args: place: path of the rule's table; closed: the state that a rule by weather closes to.
         """
-        closed = rule.state or closed
         if rule.rule == "outdoor temperature":
             outdoors = self._weather("dry_bulb_c", "temperature", f"{place}.rule")
             return by_threshold(outdoors, rule.close_above_c, rule.open_below_c, closed=closed)
