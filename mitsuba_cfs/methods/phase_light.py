@@ -147,6 +147,7 @@ def phase_light(
     sky: AnnualSky,
     *,
     needs: Collection[str] = DEFAULT_NEEDS,
+    reflected: ReflectedSun | None = None,
     progress: Progress = silent,
 ) -> PhaseLight:
     """The light of a scene with systems in its windows, in the hours of a sky.
@@ -154,13 +155,14 @@ def phase_light(
     Args:
         systems: the states of each window group [G].
         needs: metrics that several calls ask for, as of `phase_matrices`.
+        reflected: of these matrices and hours, where it has been traced for other systems.
     """
     check_systems(systems, matrices.scene.groups)
     if matrices.five_phase and sky.sun is None:
         raise ValueError("the five-phase method needs the sky's sun: annual_sky(..., sun=True)")
     of_all = [optics for states in systems for optics in states]
     matrices = with_exchange_of(with_needs(matrices, needs, progress=progress), of_all)
-    light = PhaseLight(matrices, systems, sky)
+    light = PhaseLight(matrices, systems, sky, reflected=reflected)
     if set(needs) - {"DGP"}:
         return with_sensor_light(light, progress=progress)
     return with_reflected_sun(light) if reflects_outdoors(matrices, of_all) else light

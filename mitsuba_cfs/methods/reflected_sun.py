@@ -15,7 +15,7 @@ the five-phase method computes this light at points that represent the outdoor s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,13 @@ class ReflectedSun:
     def suns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Directions [h, 3] and normal illuminance [h] [lx] of the sun."""
         return self.sky.direction[self.shining], self.sky.illuminance[self.shining]
+
+    def part(self, hours: NDArray[np.int64]) -> ReflectedSun:
+        """The same in some of the hours L, given by their numbers among them."""
+        number = np.searchsorted(self.shining, hours)
+        up = np.isin(hours, self.shining)
+        before = tuple(values[..., number[up]] for values in self.before)
+        return replace(self, sky=self.sky.part(hours), shining=np.flatnonzero(up), before=before)
 
 
 @dataclass(frozen=True)
