@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from bim.account import Account, StoreyAccount
 from bim.ifc.defects import DRAWN_TWICE
 from bim.ifc.glass_of_rooms import GlassAccount, GlassOfRooms
-from bim.ifc.project import storey_of
+from bim.ifc.project import storey_of, storeys_in
 from bim.ifc.source import Source
 from bim.ifc.spaces import OVERLAPPING, SpaceRecord
 from bim.ifc.transparent import NO_GLASS
@@ -101,7 +101,7 @@ def _storeys(
     for one in panes:
         out[one.storey] += one.out
         lit[one.storey] += min(used[one.guid], one.out)
-    names = [storey.Name or "" for storey in source.model.by_type("IfcBuildingStorey")]
+    names = [storey.Name or "" for storey in storeys_in(source.model)]
     held = [*dict.fromkeys([*names, *spaces, *out])]
     return tuple(
         StoreyAccount(name, count[name], spaces[name], float(out[name]), float(lit[name]))

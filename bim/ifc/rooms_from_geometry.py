@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bim.enclosure import GAP, LIMIT_S, Enclosed, first_rooms_enclosed
 from bim.ifc.damage import placement_of
-from bim.ifc.project import length_scale
+from bim.ifc.project import length_scale, storeys_in
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
@@ -201,7 +201,7 @@ def _storeys(source: Source) -> list[tuple[float, str]]:
     """Height in the world and name of each storey, rising."""
     unit = length_scale(source.model)
     levels = []
-    for storey in source.model.by_type("IfcBuildingStorey"):
+    for storey in storeys_in(source.model):
         matrix = placement_of(storey, source.damage)
         if matrix is None:
             continue
