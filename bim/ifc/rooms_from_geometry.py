@@ -68,13 +68,19 @@ def rooms_from_geometry(source: Source, tell: Tell) -> tuple[list[SpaceRecord], 
     attempts = [
         ([], GAP, Phrase("joined-by-openings")),
         ([], wider, closed),
-        ([floor], GAP, Phrase("floor-added")),
-        ([floor, roof], GAP, Phrase("floor-and-roof-added")),
     ]
-    if source.corrections.close_gaps:
+    if upright:  # a roof alone is no building that lacks its floor
+        attempts += [
+            ([floor], GAP, Phrase("floor-added")),
+            ([floor, roof], GAP, Phrase("floor-and-roof-added")),
+        ]
+    if upright and source.corrections.close_gaps:
         attempts.append(([floor, roof], wider, closed))
     number, rooms = search.rooms([(more, gap) for more, gap, _ in attempts])
     repair = attempts[number][2]
+    if not rooms and not upright:
+        issue = Issue("no-walls-for-rooms", where, {"lack": lacks}, Effect("room"))
+        return [], [*search.issues, issue]
     if not rooms:
         values = {"lack": lacks, "gap": wider}
         issue = Issue("walls-enclose-nothing", where, values, Effect("room"))
