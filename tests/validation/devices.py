@@ -3,9 +3,9 @@
     python -m tests.validation devices --keep out/devices
     python -m tests.validation devices cie171 gloss --keep out/devices
 
-Each runner runs as a user would start it, once with `CFS_DEVICE=cpu` and once with `CFS_DEVICE=cuda`;
-every number that it prints is compared. `FOLDER/NAME.cpu.txt` and `FOLDER/NAME.cuda.txt` keep
-what each printed.  The same seeds draw the same random numbers on both devices, so that rounding
+Each runner runs as a user would start it, once with `CFS_DEVICE=cpu` and once with
+`CFS_DEVICE=cuda`; every number that it prints is compared.  `FOLDER/NAME.cpu.txt` and
+`FOLDER/NAME.cuda.txt` keep what each printed.  The same seeds draw the same random numbers on both devices, so that rounding
 is all that may differ.
 """
 
@@ -25,11 +25,8 @@ import pandas as pd
 
 from mitsuba_cfs.variants import DEVICE, DEVICES
 
-RUNNERS = ("cie171", "gloss", "vertical_sun", "dark_windows", "sunny_overhangs", "clear_equinox")
-BENCHMARKS = (
-    "view-matrix", "daylight-matrix-shaded-c1000", "direct-sun", "annual-product", "bsdf-klems",
-    "glare-rating",
-)  # fmt: skip
+RUNNERS = ("cie171", "gloss")
+BENCHMARKS = ("view-matrix", "daylight-matrix-shaded-c1000", "direct-sun", "annual-product")
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 SAME = 0.01  # of the larger of two figures
 
@@ -49,9 +46,11 @@ class Printed:
 
 
 def main(
-    names: Annotated[Sequence[str], "runners of tests.validation; default: six of them"] = RUNNERS,
+    names: Annotated[
+        Sequence[str], "runners of tests.validation; default: those of `RUNNERS`"
+    ] = RUNNERS,
     *,
-    benchmarks: Annotated[Sequence[str], "benchmarks; default: six of them"] = BENCHMARKS,
+    benchmarks: Annotated[Sequence[str], "benchmarks; default: those of `BENCHMARKS`"] = BENCHMARKS,
     keep: Annotated[Path, "folder for what the runners print"] = Path("devices"),
 ) -> dict[str, pd.DataFrame]:
     """Figures of each runner on both devices, and the seconds that each took."""
