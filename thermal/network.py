@@ -106,8 +106,9 @@ class AirPaths(NamedTuple):
     leak: NDArray[np.float64]  # [Z, 8] a, b, c, d, s, m, w, n of `Leakage`
     wind: NDArray[np.float64]  # [Z] of the weather's, at the zone's height
     airing: NDArray[np.float64]  # [Z, 4] w, s, 1 where both are added, constant flow
-    # [Z, 6] opened above, closed below [degC], least difference [K], greatest wind, least outdoor,
-    # 1 where the zone may be heated while they are open
+    # [Z, 8] opened above, closed below [degC], least difference [K], greatest wind, least outdoor;
+    # 1 where the zone may be heated while they are open, for limits of the operative temperature,
+    # for hybrid ventilation
     opens: NDArray[np.float64]
     site: float  # wind on the site, of the weather's
     fan: NDArray[np.float64]  # [Z, 3] recovery, bypass above, least temperature
@@ -143,7 +144,8 @@ def air_paths(zones: Sequence[Zone], transfers: Sequence[AirTransfer], terrain: 
         airing=np.array([(x.wind, x.stack, float(x.both), x.flow) for x in airings]),
         opens=np.array(
             [(x.open_above_c, x.close_below_c, x.least_difference, x.greatest_wind,
-              x.least_outdoor_c, float(x.heating_while_open)) for x in airings]
+              x.least_outdoor_c, x.heating_while_open, x.operative, x.hybrid) for x in airings],
+            dtype=np.float64,
         ),
         site=local_wind_factor(SITE_HEIGHT, terrain),
         fan=np.array([(x.recovery, x.bypass_above_c, x.least_c) for x in fans]),

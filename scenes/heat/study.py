@@ -175,13 +175,17 @@ def _balanced(
         rooms, links, zone_of = with_air_nodes(rooms, links, nodes)
         transfers = _transfers(study, building, zone_of, weather)
         groups = [(rooms, {"air_links": links, "transfers": transfers})]
-    results, moist, design = [], [], []
+    results, moist, design, moved = [], [], [], []
     for number, (together, air) in enumerate(groups):
         place = {"terrain": study.terrain}
         found = balances(together, weather, step_s, progress=progress, **air, **place)
         results += found
         for issues in step_issues(together, found, weather, step_s, **air, **place):
             notes += tuple(map(issue_note, issues))
+        moved += [
+            room.in_alternatives(result.alternative)
+            for room, result in zip(together, found, strict=True)
+        ]
         moist += room_humidity(together, found, weather, **air)
         if study.design is not None:
             cold = study.design.outdoor_c
@@ -191,7 +195,7 @@ def _balanced(
         progress("heat balance", (number + 1) / len(groups))
     table = pd.concat(design, ignore_index=True) if design else None
     return BalancedRooms(
-        building, rooms, weather, in_windows, results, moist, notes, table,
+        building, moved, weather, in_windows, results, moist, notes, table,
         **(groups[0][1] if study.couple else {}),
     )  # fmt: skip
 

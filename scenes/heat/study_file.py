@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -105,6 +106,9 @@ class TraceTable(TomlTable):
     picture_samples: Annotated[int, Field(ge=1)] = RUN.sampling.view_samples
     seed: int = RUN.sampling.seed
     view_factors: bool = True  # of the room's surfaces, for longwave and the person
+    # what windows do with light of sky and ground: by its directions, or one hemispherical value,
+    # as EnergyPlus, to show what that changes; the sun keeps its direction
+    sky_light: Literal["by direction", "hemispherical"] = "by direction"
 
 
 class TransferTable(TomlTable):
@@ -151,9 +155,9 @@ class StudyFile(OperationTables, ReadTable, OutdoorTable):
     @property
     def options(self) -> RoomOptions:
         """How a room of the study is computed."""
-        return RoomOptions.of(
-            **self.trace.model_dump(exclude={"view_factors"}), heat_step_s=60.0 * self.step_minutes
-        )
+        light = self.trace.model_dump(exclude={"view_factors", "sky_light"})
+        options = RoomOptions.of(**light, heat_step_s=60.0 * self.step_minutes)
+        return replace(options, hemispherical_sky=self.trace.sky_light == "hemispherical")
 
     @model_validator(mode="after")
     def _fits(self) -> StudyFile:

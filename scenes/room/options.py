@@ -63,6 +63,8 @@ class RoomOptions:
     infiltration_ach: float = 0.5  # [1/h]
     sun_model: str = "spa"  # of the sun's position, see `mitsuba_cfs.sky.sun`
     sky_ground: str = "reflected"  # luminance of the ground, see `mitsuba_cfs.sky.matrix`
+    # heat: sky and ground light by one hemispherical value of the window, as EnergyPlus has them
+    hemispherical_sky: bool = False
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
