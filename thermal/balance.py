@@ -62,6 +62,7 @@ def drive_of(
     solar: Sequence[Solar],
     stretch: Stretch,
     mixes: Sequence[WindowMix],
+    *,
     transfers: Sequence[AirTransfer] = (),
     controls: Sequence[TemperatureControl | None] = (),
 ) -> tuple[records.Drive, int]:
@@ -448,7 +449,9 @@ def simulate_zones(
     work, years, days = _work(net, state), [], 0
     first_day = min(round(24 * HOUR / row_s), climate.hours)
     for stretch in stretches(climate.hours, steps, max(STRETCH, first_day)):
-        drive, every = drive_of(zones, climate, solar, stretch, mixes, transfers, controls)
+        drive, every = drive_of(
+            zones, climate, solar, stretch, mixes, transfers=transfers, controls=controls
+        )
         method = method._replace(solar_every=every)
         weather = records.OutdoorConditions(*map(stretch.of, outdoors))
         if not stretch.first:

@@ -142,6 +142,7 @@ class StudyFile(OperationTables, ReadTable, OutdoorTable):
     air_nodes: tuple[str, ...] = ()  # zones of the building, each with one air
     transfer: tuple[TransferTable, ...] = ()
     design: DesignTable | None = None  # loads of design days too
+    likely_layers: bool = False  # windows also with the layers most unlike those that are assumed
     box: BoxTable | None = None
     system: tuple[WindowStateTable, ...] = ()  # states; none: what the building's file holds
     trace: TraceTable = TraceTable()
