@@ -185,13 +185,14 @@ def _rooms(
     """The spaces that are rooms; found from geometry where the file has none."""
     stated = source.corrections.stated_outdoors(source.model)
     records, issues = read_spaces(
-        source.model, source.shapes, source.quantity_scales(), source.damage, stated=stated
-    )
+        source.model, source.shapes, source.quantity_scales(), source.damage, stated=stated,
+        removed=source.corrections.removed(source.model),
+    )  # fmt: skip
     records, repeated, more = one_of_each(source.model, records)
     issues += more
-    by_guid = {r.guid: stated[r.step_id] for r in records if r.step_id in stated}
+    indoors = [record.guid for record in records if record.step_id in stated]
     windows = [s.triangles for s in source.elements if s.ifc_class.startswith("IfcWindow")]
-    read, more = open_spaces(records, mesh, by_guid, windows)
+    read, more = open_spaces(records, mesh, indoors, windows)
     issues += more
     covers = room_lids(source)
     fixed = source.corrections.heights_as_drawn(source.model)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +19,8 @@ from bim.rooms import RoomSolid, room_solid
 from mitsuba_cfs.processes import ProcessEnded
 
 SMALLEST_SPACE = 0.2  # smaller spaces are beams or ducts of the wrong class [m3]
-OVERLAPPING = "spaces-overlap"  # code of the issue
+OVERLAPPING, REMOVED = "spaces-overlap", "space-removed"  # codes of issues
+OUTDOORS = "space-outdoors"
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +57,13 @@ def read_spaces(
     damage: Damage | None = None,
     *,
     stated: Mapping[int, bool] | None = None,
+    removed: Collection[int] = (),
 ) -> tuple[list[SpaceRecord], list[Issue]]:
     """Every space that is indoors by the file and has a body; the others are issues.
 
-    Args: stated: whether spaces are outdoors, by STEP id, where the corrections say so.
+    Args:
+        stated: whether spaces are outdoors, by STEP id, where the corrections say so.
+        removed: STEP ids of what the corrections leave out.
     """
     stated = {} if stated is None else stated
     records: list[SpaceRecord] = []
@@ -77,8 +81,11 @@ def read_spaces(
             values = {"room": label, "guid": guid}
             issues.append(Issue("space-guid-repeated", space.GlobalId, values))
         seen.add(guid)
+        if space.id() in removed:
+            issues.append(Issue(REMOVED, guid, {"room": label}, Effect("room")))
+            continue
         psets = psets_of(space, damage)
-        if stated.get(space.id(), is_outdoors(space, psets)):
+        if space.id() not in stated and is_outdoors(space, psets):
             issues.append(Issue("space-external", guid, {"room": label}, Effect("room")))
             continue
         if space.id() not in solids:
@@ -95,6 +102,11 @@ def read_spaces(
         if solid.volume < SMALLEST_SPACE:
             values = {"room": label, "volume": solid.volume}
             issues.append(Issue("space-too-small", guid, values, Effect("room")))
+            continue
+        if stated.get(space.id()):
+            reason = Phrase("outdoors-by-correction")
+            values = {"room": label, "volume": solid.volume, "reason": reason}
+            issues.append(Issue(OUTDOORS, guid, values, Effect("room")))
             continue
         if solid.repair:
             values = {"room": label, "repair": Phrase(solid.repair)}

@@ -74,7 +74,7 @@ def test_a_wide_wall_in_the_sun_has_the_same_luminance_in_all_patches():
     far = rooms.quad((-1e3, -4, -1e3), (1e3, -4, -1e3), (1e3, -4, 1e3), (-1e3, -4, 1e3))
     outside = TracedScene(rooms.surfaces([(far, 0.4)]), rooms.test_room()[1])
     suns = np.array([towards(30, 180), towards(60, 150), towards(30, 0)])  # the last behind it
-    found = outdoor_light(window_shares(outside, samples=64), outside, suns, np.full(3, LUX))
+    [found] = outdoor_light(window_shares(outside, samples=64), outside, suns, np.full(3, LUX))
     expected = 0.4 / np.pi * LUX * np.maximum(suns[:, 1], 0)
     off = found.reshape(K, 3) - expected
     # the window hides the sun from as much of the wall as it is large itself
@@ -96,7 +96,7 @@ def test_each_place_stands_for_those_of_its_own_face():
     outside = TracedScene(surfaces, rooms.test_room()[1])
     sun = np.array([[0.0, 0.0, 1.0]])
     shares = window_shares(outside, samples=256)
-    found = outdoor_light(shares, outside, sun, np.array([LUX]))[:, 0]
+    found = outdoor_light(shares, outside, sun, np.array([LUX]))[0][:, 0]
     down = (KLEMS_FULL.incident_directions() @ rooms.test_room()[1][0].frame)[:, 2]
     sunlit, dark = found[down < -0.75], found[down > 0.3]
     assert sunlit == pytest.approx(0.5 / np.pi * LUX, rel=0.01)
@@ -130,11 +130,29 @@ def test_fewer_points_of_the_sun_are_fewer_places_outdoors_with_the_same_light()
     suns = np.array([towards(40, 180), towards(60, 120)])
     found = []
     for places in (1024, 128):
-        several = [window_shares(outside, samples=32, places=places, seed=s) for s in range(4)]
+        several = window_shares(outside, samples=32, places=places, seeds=range(4))
         assert all(0.8 * places < s.places.size <= places + 26 for s in several)
-        light = [outdoor_light(s, outside, suns, np.full(2, LUX)) for s in several]
+        light = outdoor_light(several, outside, suns, np.full(2, LUX))
         found.append(np.mean(light, axis=(0, 1)))
     np.testing.assert_allclose(*found, rtol=0.02)
+
+
+def test_runs_in_one_launch_have_the_light_that_each_has_alone(monkeypatch):
+    """Batches share launches, as many as fit; the random numbers of each are its own."""
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun import reflected as module
+
+    outside = TracedScene(overhang(2.0), rooms.test_room()[1])
+    suns, lux = np.array([towards(40, 180), towards(60, 120), towards(30, 50)]), np.full(3, LUX)
+    seeds, options = (0, 3, 4), {"samples": 4, "places": 64}
+    alone = [module.window_shares(outside, seeds=[seed], **options)[0] for seed in seeds]
+    each = [module.outdoor_light([one], outside, suns, lux)[0] for one in alone]
+    assert all(one.any() for one in each) and not np.array_equal(*each[:2])
+    for lanes in (module.LANES, 2 * K * 4, 100):  # all, two and one in a launch, hours apart
+        monkeypatch.setattr(module, "LANES", lanes)
+        together = module.window_shares(outside, seeds=seeds, **options)
+        light = module.outdoor_light(together, outside, suns, lux)
+        np.testing.assert_array_equal(light, each)
 
 
 def test_what_stands_before_the_sun_leaves_a_floor_dark():
@@ -146,7 +164,7 @@ def test_what_stands_before_the_sun_leaves_a_floor_dark():
     outside = TracedScene(rooms.surfaces([(floor, 0.5), (roof, 0.0)]), rooms.test_room()[1])
     suns = np.array([[0.0, 0.0, 1.0], towards(1, 0)])  # the second shines in below the roof
     shares = window_shares(outside, samples=16)
-    found = outdoor_light(shares, outside, suns, np.full(2, LUX))
+    [found] = outdoor_light(shares, outside, suns, np.full(2, LUX))
     assert np.all(found[:, 0] == 0) and found[:, 1].max() > 100
 
 
