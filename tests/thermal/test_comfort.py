@@ -92,7 +92,8 @@ def test_summary_counts_add_up():
     assert summary.degree_hours_warm > 0 and summary.degree_hours_cold > 0
 
 
-ANNEX_D = (  # rows of ISO 7730:2005, table D.1, as remembered: air, radiant, speed, humidity, met, clo, PMV, PPD
+# rows of ISO 7730:2005, table D.1, as remembered: air, radiant, speed, humidity, met, clo, PMV, PPD
+ANNEX_D = (
     (22.0, 22.0, 0.10, 60, 1.2, 0.5, -0.75, 17), (27.0, 27.0, 0.10, 60, 1.2, 0.5, 0.77, 17),
     (27.0, 27.0, 0.30, 60, 1.2, 0.5, 0.44, 9), (23.5, 25.5, 0.10, 60, 1.2, 0.5, -0.01, 5),
     (23.5, 25.5, 0.30, 60, 1.2, 0.5, -0.55, 11), (19.0, 19.0, 0.10, 40, 1.2, 1.0, -0.60, 13),
