@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 
@@ -19,7 +20,9 @@ from bim.ifc.head import check_head
 from bim.model import Building, Element, Space, Window
 from bim.names import AmbiguousName, UnknownName, listed
 from bim.report.issue import Issue, issue_text
+from bim.stored_building import read_once
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.matrices.cache import MatrixCache
 
 # Properties of an element that a selector names, by its keys
 KEYS = {
@@ -108,10 +111,14 @@ def read_building_file(
     path: str | PathLike[str],
     options: ReadOptions | None = None,
     progress: Progress | None = None,
+    *,
+    cache: MatrixCache | None = None,
 ) -> Building:
     """The building of an IFC file, with the corrections kept beside it, or of another format.
 
-    Args: progress: called with the stage's name and the fraction of it that is done.
+    Args:
+        progress: called with the stage's name and the fraction of it that is done.
+        cache: of buildings read from IFC files, which are not read again while they are the same.
 
     Raises: `DataError` for a file that cannot be used, or an option that its format has not.
     """
@@ -123,7 +130,12 @@ def read_building_file(
     for field in FLAGS:
         if getattr(options, field) and field not in kind.has:
             raise DataError(f"not for {kind.name} files", file=path, field=f"--{FLAGS[field]}")
-    building = kind.reader(path, options, progress or (lambda stage, fraction: None))
+    read = partial(kind.reader, path, options, progress or (lambda stage, fraction: None))
+    if cache is not None and kind is IFC:
+        chosen = options.join, options.furniture
+        building = read_once(read, (path, *linked), chosen, cache)
+    else:
+        building = read()
     return surrounded(building, options.surroundings, options.surroundings_offset)
 
 
