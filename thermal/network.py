@@ -122,6 +122,7 @@ class Emitters(NamedTuple):
     """Heating and cooling of the zones Z."""
 
     radiant: NDArray[np.float64]  # [Z, 2] share of heating and cooling
+    acts_at: NDArray[np.int64]  # [Z, 2] face that takes these shares, -1: all
     slab: NDArray[np.int64]  # [Z] face, -1 without
     power: NDArray[np.float64]  # [Z, 3] of the slab: heating, cooling [W], band [K]
 
@@ -156,11 +157,11 @@ def air_paths(zones: Sequence[Zone], transfers: Sequence[AirTransfer], terrain: 
     )  # fmt: skip
 
 
-def slab_faces(zones: Sequence[Zone]) -> list[int]:
-    """The face of each zone's heated slab among the faces of all, -1 without one."""
+def named_faces(zones: Sequence[Zone], names: Sequence[str]) -> list[int]:
+    """A surface of each zone by its name among the faces of all zones; "": -1."""
     face, found = 0, []
-    for zone in zones:
-        found.append(-1 if zone.slab is None else face + zone.index_of(zone.slab.surface))
+    for zone, name in zip(zones, names, strict=True):
+        found.append(face + zone.index_of(name) if name else -1)
         frames = sum(window.frame_area > 0 for window in zone.windows)
         face += len(zone.surfaces) + len(zone.windows) + frames
     return found
@@ -182,6 +183,13 @@ def emitters(
     loads = [zone.loads for zone in zones]
     return Emitters(
         radiant=np.array([(x.heating_radiant, x.cooling_radiant) for x in loads]),
+        acts_at=np.stack(
+            [
+                named_faces(zones, [getattr(x, key) for x in loads])
+                for key in ("heating_surface", "cooling_surface")
+            ],
+            axis=1,
+        ),
         slab=np.array(slabs, dtype=np.int64),
         power=np.array(power),
     )
@@ -348,7 +356,7 @@ def network(
     """The network of coupled zones; link: [Z, Z] air exchange [m3/s], symmetric."""
     elements = [(z, e) for z, zone in enumerate(zones) for e in _elements(zone)]
     partners = _partners(zones, elements)
-    slabs = slab_faces(zones)
+    slabs = named_faces(zones, [zone.slab.surface if zone.slab else "" for zone in zones])
     pipes = {face: zones[z].slab.depth for z, face in enumerate(slabs) if face >= 0}
     ports, modes = _walls([e for _, e in elements], partners, step_s, cell, pipes)
     faces = _faces(zones, elements, partners, ports, terrain)

@@ -221,6 +221,16 @@ def radiant_load(net: Network, work: Workspace, drive: Drive, z: int) -> float:
 
 
 @inlined
+def _radiated(net: Network, work: Workspace, drive: Drive, z: int, i: int, share: float) -> float:
+    """What face i takes of the plant's radiant load [W]; share: of one that acts at all faces."""
+    load = radiant_load(net, work, drive, z)
+    face = net.emitters.acts_at[z, 0 if load > 0.0 else 1]
+    if face < 0:
+        return load * share
+    return load if face == i else 0.0
+
+
+@inlined
 def close_air(
     net: Network, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int
 ) -> None:
@@ -603,8 +613,9 @@ def _assemble(
             own, r = _wall_row(net, i, state, work, weather, t, outer, beyond, method)
         work.film[i] = film
         d[k] = area * (own + film)
-        radiant = drive.radiant[hour, z] + radiant_load(net, work, drive, z)
-        b[k] = area * r + drive.inner[sun, i] + radiant * _share(net, drive, hour, z, i)
+        share = _share(net, drive, hour, z, i)
+        b[k] = area * r + drive.inner[sun, i] + drive.radiant[hour, z] * share
+        b[k] += _radiated(net, work, drive, z, i, share)
         work.air[z, 0] += area * film
         if is_held(work.plant[z]):
             b[k] += area * film * set_point(work, drive, t, z)

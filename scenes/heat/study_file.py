@@ -174,8 +174,9 @@ class StudyFile(OperationTables, ReadTable, OutdoorTable):
         for key in ("transfer", "air_nodes"):
             if getattr(self, key) and not self.couple:
                 raise ValueError(f"{key}: needs `couple = true`")
-        if self.air_nodes and self.loads.slab is not None:
-            raise ValueError("air_nodes: rooms with a heated slab each cannot have one air")
+        loads = self.loads
+        if self.air_nodes and (loads.slab or loads.heating_faces or loads.cooling_faces):
+            raise ValueError("air_nodes: rooms with a heated or cooled face cannot have one air")
         for number, one in enumerate(self.transfer):
             if isinstance(one.m3_h, str) and one.m3_h not in self.schedules:
                 fault = unknown_name(one.m3_h, self.schedules)

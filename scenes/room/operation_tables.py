@@ -194,6 +194,10 @@ class LoadsTable(TomlTable):
     cooling_limit_w: Annotated[Positive, plausible.POWER] | None = None
     heating_radiant: Share = 0.0  # radiators 0.3, ceilings 0.6
     cooling_radiant: Share = 0.0
+    # where the radiant share acts: side of the box, or kind of faces, the largest surface of them;
+    # default: all surfaces
+    heating_faces: tuple[str, ...] = ()
+    cooling_faces: tuple[str, ...] = ()
     slab: SlabTable | None = None
     humidify_to: Annotated[float, plausible.PERCENT] | None = None  # relative humidity [%]
     dehumidify_to: Annotated[float, plausible.PERCENT] | None = None

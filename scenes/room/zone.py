@@ -216,21 +216,30 @@ def _next_to(one: OpaqueSurface, table: NeighbourTable, beyond) -> OpaqueSurface
 def _heated(
     zone: Zone, faces: Sequence[Sequence[Face]], hours: OperationHours, space: Space
 ) -> Zone:
-    """The zone with its heated slab, in the largest surface that its table names."""
-    table = hours.tables.loads.slab
-    if table is None:
+    """The zone with the surfaces of its heated slab and of what radiates its loads."""
+    loads, names = hours.tables.loads, {}
+
+    def surface(named: Sequence[str], field: str) -> OpaqueSurface:
+        """The largest surface of some faces."""
+        known = [
+            one
+            for one, own in zip(zone.surfaces, faces, strict=True)
+            if any(face.name in named or face.kind in named for face in own)
+        ]
+        if not known:
+            message = f"has no face {' or '.join(named)}"
+            raise DataError(message, element=space.label, field=f"loads.{field}")
+        return max(known, key=lambda one: one.area)
+
+    for key in ("heating", "cooling"):
+        named = getattr(loads, f"{key}_faces")
+        if named:
+            names[f"{key}_surface"] = surface(named, f"{key}_faces").name
+    zone = replace(zone, loads=replace(zone.loads, **names))
+    if loads.slab is None:
         return zone
-    named = [
-        surface
-        for surface, own in zip(zone.surfaces, faces, strict=True)
-        if any(face.name in table.faces or face.kind in table.faces for face in own)
-    ]
-    if not named:
-        raise DataError(
-            f"has no face {' or '.join(table.faces)}", element=space.label, field="loads.slab.faces"
-        )
-    surface = max(named, key=lambda one: one.area)
-    return replace(zone, slab=hours.slab(surface.name, surface.area))
+    slab = surface(loads.slab.faces, "slab.faces")
+    return replace(zone, slab=hours.slab(slab.name, slab.area))
 
 
 FloatArray = NDArray[np.float64]
