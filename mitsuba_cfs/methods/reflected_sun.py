@@ -33,7 +33,7 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.reflected import Straight, outdoor_light, view_shares, window_shares
-from mitsuba_cfs.trace.sun.sunlit_cells import RoomCells
+from mitsuba_cfs.trace.sun.sunlit_cells import Beam, RoomCells
 from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, room_shares
 
 BATCHES = 4  # each with its own paths and points
@@ -160,8 +160,12 @@ def _to_sensors(
     seen: Sequence[NDArray[np.float32]],
 ) -> tuple[NDArray[np.float64], Estimate]:
     """`reflected_to_sensors` of one group; seen: of `_outdoors_seen`, none without a beam."""
-    parts, beam = matrices.parts.of(g), beam_matrix(group.optics).any()
+    parts, in_room = matrices.parts.of(g), []
     rest = [without_straight(matrices, group, q) for q in parts]
+    if room is not None and beam_matrix(group.optics).any():
+        scenes, points = (sun.inside, sun.outside), matrices.sampling.sun_points
+        beam = Beam(scenes, g, group.optics.scattering, points, tuple(_seeds(matrices)))
+        in_room = room_light(room.cells, room.shares, beam, sun.suns)
 
     def light_of(batch: int) -> NDArray[np.float64]:
         """The light of the sensors in the hours with sun [S, h]."""
@@ -171,12 +175,8 @@ def _to_sensors(
             light += shares @ _flat(sun.before[batch], parts)
         if seen:
             light += seen[batch]
-        if room is not None and beam:
-            light += room_light(
-                room.cells, room.shares[batch], (sun.inside, sun.outside), g,
-                group.optics.scattering, sun.suns,
-                points=matrices.sampling.sun_points, seed=_seed(matrices, batch),
-            )  # fmt: skip
+        if in_room:
+            light += in_room[batch]
         return light
 
     traced = accumulate(light_of, stopping=Stopping(BATCHES))
