@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -21,7 +20,7 @@ from scenes.input_options import InputOptions
 from scenes.quick import HEAT, picks
 from scenes.room.operation import schedules_there
 from scenes.room.operation_tables import OperationTables
-from scenes.room.options import RoomOptions
+from scenes.room.options import SKY_LIGHTS, RoomOptions
 from scenes.room.schedules import OrSchedule, unknown_name
 from scenes.toml_file import (
     OutdoorTable,
@@ -106,9 +105,7 @@ class TraceTable(TomlTable):
     picture_samples: Annotated[int, Field(ge=1)] = RUN.sampling.view_samples
     seed: int = RUN.sampling.seed
     view_factors: bool = True  # of the room's surfaces, for longwave and the person
-    # what windows do with light of sky and ground: by its directions, or one hemispherical value,
-    # as EnergyPlus, to show what that changes; the sun keeps its direction
-    sky_light: Literal["by direction", "hemispherical"] = "by direction"
+    sky_light: Literal[SKY_LIGHTS] = RUN.sky_light  # see `RoomOptions`
 
 
 class TransferTable(TomlTable):
@@ -156,9 +153,9 @@ class StudyFile(OperationTables, ReadTable, OutdoorTable):
     @property
     def options(self) -> RoomOptions:
         """How a room of the study is computed."""
-        light = self.trace.model_dump(exclude={"view_factors", "sky_light"})
-        options = RoomOptions.of(**light, heat_step_s=60.0 * self.step_minutes)
-        return replace(options, hemispherical_sky=self.trace.sky_light == "hemispherical")
+        return RoomOptions.of(
+            **self.trace.model_dump(exclude={"view_factors"}), heat_step_s=60.0 * self.step_minutes
+        )
 
     @model_validator(mode="after")
     def _fits(self) -> StudyFile:

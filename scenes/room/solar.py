@@ -187,7 +187,7 @@ def solar_gains(
         facade_irradiance(
             outdoors, outer, len(zone.zone.surfaces), room.skies, progress=part(steps, 0.4, 0.6)
         ),
-        _sun_alone(room) if room.options.hemispherical_sky else None,
+        _sun_alone(room) if room.options.sky_light == "hemispherical" else None,
     )
     absorption: dict[bytes, FloatArray] = {}  # states with equal back reflectances share it
     suns = []
