@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from bim.leaks import may_enclose
 from bim.mesh_repair import welded_mesh
 from bim.planes import area_vectors, principal_extents
 from bim.rays import ray_mesh
@@ -102,6 +103,8 @@ def first_rooms_enclosed(
 ) -> tuple[int, Enclosed]:
     """Number of the first attempt (elements besides, gap [m]) that finds rooms, and these; -1."""
     for number, (more, gap) in enumerate(attempts):
+        if not may_enclose([*elements, *more], gap):
+            continue
         found = rooms_enclosed_by([*elements, *more], gap, tell)
         if found.rooms:
             return number, found

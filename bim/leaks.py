@@ -23,6 +23,8 @@ SMALLEST = 1.0  # volume of such air [m3]
 OPEN = 0.8  # of a place's own D: it is outdoors, below eaves, if the way out is that wide
 MOST_LEAKS = 6
 STEPS = 9  # halvings of the width
+COARSEST = 0.17  # cubes that tell of every room whether it is enclosed [m]: 4 x 2^0.5 + 1 across
+MOST_FILLED = 50_000_000  # cubes
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,33 @@ def leaks(elements: Sequence[NDArray[np.float64]]) -> tuple[list[Leak], float]:
         found.append(Leak(low + size * (leak.position + 0.5), leak.width, low + size * leak.room))
         solid[cubes] = True
     return found, size
+
+
+def may_enclose(elements: Sequence[NDArray[np.float64]], gap: float) -> bool:
+    """Whether elements, each of triangles [N, 3, 3], may enclose a room once gaps [m] are closed.
+
+    Air outside is filled from a corner on a grid whose solid cubes are widened by one, which
+    closes gaps of two cubes: where no air is left, no room is enclosed.  A room of the smallest
+    size leaves air in cubes of `COARSEST`; where there would be too many of these, it may.
+    """
+    triangles = np.concatenate([*elements, np.empty((0, 3, 3))])
+    if not len(triangles) or not np.isfinite(triangles).all():
+        return bool(len(triangles))
+    low, high = triangles.min((0, 1)) - 1.0, triangles.max((0, 1)) + 1.0
+    size = max(2 * FINEST, gap / 2, float((np.prod(high - low) / MOST_FILLED) ** (1 / 3)))
+    if size > max(COARSEST, gap / 2):
+        return True
+    solid = np.zeros(np.ceil((high - low) / size).astype(int) + 1, dtype=bool)
+    for body in elements:
+        cells = np.floor((_samples(body, 0.7 * size) - low) / size).astype(int)
+        solid[tuple(cells.T)] = True
+    for axis in range(3):
+        inner = np.swapaxes(solid, 0, axis)  # a view
+        before = inner.copy()
+        inner[1:] |= before[:-1]
+        inner[:-1] |= before[1:]
+    labels, count = ndimage.label(~solid)
+    return count > 1 or not labels[0, 0, 0]
 
 
 def _leak(

@@ -193,6 +193,7 @@ def room_pieces(
         else:
             recesses[recess.original_id()] = attachment
             solids.append(recess)
+    painted.sort(key=_from_the_face)
     air = union(solids) if len(solids) > 1 else room.manifold
     triangles, ids = triangles_of(air)
     pieces: list[Piece] = []
@@ -205,6 +206,16 @@ def room_pieces(
         else:
             pieces.append(Piece(facet, "reveal", attachment))
     return pieces, air.volume(), issues
+
+
+def _from_the_face(attachment: Attachment) -> tuple[bool, float, str]:
+    """Order in which openings take a face that several reach: the nearest first.
+
+    The order of the file says nothing: it is another one where the building is in several files.
+    """
+    aperture = attachment.aperture
+    distance = round(abs(attachment.nearest) / OVERLAP) * OVERLAP
+    return aperture.filling.is_open, distance, aperture.filling.guid
 
 
 def _is_cap(facet: Facet, attachment: Attachment) -> bool:

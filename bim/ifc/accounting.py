@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from bim.account import Account, StoreyAccount
 from bim.ifc.defects import DRAWN_TWICE
 from bim.ifc.glass_of_rooms import GlassAccount, GlassOfRooms
-from bim.ifc.project import storey_of
+from bim.ifc.project import storey_of, storeys_in
 from bim.ifc.source import Source
-from bim.ifc.spaces import OVERLAPPING, SpaceRecord
+from bim.ifc.spaces import OVERLAPPING, REMOVED, SpaceRecord
 from bim.ifc.transparent import NO_GLASS
 from bim.model import Space
 from bim.names import label_of
@@ -35,7 +35,8 @@ def account_of(
         built: the finished rooms.
         repeated: GUIDs of spaces that draw a room again: not counted, nor are such windows.
     """
-    drawn = [s for s in source.model.by_type("IfcSpace") if s.GlobalId not in repeated]
+    absent = {*repeated, *(p.where for p in issues if p.code == REMOVED)}
+    drawn = [s for s in source.model.by_type("IfcSpace") if s.GlobalId not in absent]
     failed = {p.where for p in issues if p.effect.lost == "room"}
     kept = [record for record in read if record.guid not in failed]
     guids = {record.guid.split("-")[0] for record in kept}
@@ -101,7 +102,7 @@ def _storeys(
     for one in panes:
         out[one.storey] += one.out
         lit[one.storey] += min(used[one.guid], one.out)
-    names = [storey.Name or "" for storey in source.model.by_type("IfcBuildingStorey")]
+    names = [storey.Name or "" for storey in storeys_in(source.model)]
     held = [*dict.fromkeys([*names, *spaces, *out])]
     return tuple(
         StoreyAccount(name, count[name], spaces[name], float(out[name]), float(lit[name]))

@@ -8,6 +8,7 @@ from typing import Any
 
 import ifcopenshell
 import numpy as np
+from scipy.spatial import cKDTree
 
 from bim.apertures import main_direction
 from bim.ifc.shapes import Shape
@@ -20,6 +21,7 @@ from mitsuba_cfs.processes import ProcessEnded
 DRAWN_TWICE = "element-drawn-twice"  # code of the issue
 SAME_PLACE = 0.002  # boxes that agree to this are one element drawn twice [m]
 SAME_AREA = 0.3  # if their surfaces agree to this share: only one may have its openings cut
+SAME_MIDDLE = 0.2  # of the box's diagonal: both halves of a pane have one box
 FLAT, UPRIGHT = 0.5, 1.5  # a slab is lower than this, a wall higher [m]
 WIDEST_JOINT, CLOSEST = 0.05, 0.001  # walls this far apart were meant to meet [m]
 ACROSS = 0.7  # cosine between the normals of walls that meet at a corner at the most
@@ -65,21 +67,31 @@ def without_body(model: ifcopenshell.file) -> list[Issue]:
 
 
 def drawn_twice(shapes: Sequence[Shape]) -> list[Issue]:
-    """Elements of one class with the same box and about the same surface."""
-    seen: dict[str, list[tuple[Shape, np.ndarray, float]]] = defaultdict(list)
-    issues = []
-    for shape in shapes:
+    """Elements of one class with the same box, about the same surface and the same middle of it."""
+    boxes, middles, areas = np.zeros((len(shapes), 6)), np.zeros((len(shapes), 3)), []
+    by_class: dict[str, list[int]] = defaultdict(list)
+    for number, shape in enumerate(shapes):
         corners = shape.triangles.reshape(-1, 3)
-        area = float(np.linalg.norm(area_vectors(shape.triangles), axis=1).sum())
-        box = np.concatenate([corners.min(axis=0), corners.max(axis=0)])
-        bucket = seen[shape.ifc_class.removesuffix("StandardCase")]
-        for other, other_box, other_area in bucket:
-            same = np.abs(box - other_box).max() < SAME_PLACE
-            if same and abs(area - other_area) < SAME_AREA * area:
-                values = {"element": f"{shape.ifc_class} {shape.name}", "other": other.guid}
-                issues.append(Issue(DRAWN_TWICE, shape.guid, values))
+        sizes = np.linalg.norm(area_vectors(shape.triangles), axis=1)
+        boxes[number] = [*corners.min(axis=0), *corners.max(axis=0)]
+        areas.append(float(sizes.sum()))
+        middles[number] = sizes @ shape.triangles.mean(axis=1) / max(areas[-1], 1e-12)
+        by_class[shape.ifc_class.removesuffix("StandardCase")].append(number)
+    earlier: dict[int, list[int]] = defaultdict(list)
+    for numbers in by_class.values():
+        pairs = cKDTree(boxes[numbers]).query_pairs(SAME_PLACE, p=np.inf)
+        for first, second in pairs:
+            earlier[numbers[second]].append(numbers[first])
+    issues = []
+    for number, others in sorted(earlier.items()):
+        apart = SAME_MIDDLE * float(np.linalg.norm(boxes[number, 3:] - boxes[number, :3]))
+        for other in sorted(others):
+            near = np.linalg.norm(middles[number] - middles[other]) < apart
+            if near and abs(areas[number] - areas[other]) < SAME_AREA * areas[number]:
+                label = f"{shapes[number].ifc_class} {shapes[number].name}"
+                values = {"element": label, "other": shapes[other].guid}
+                issues.append(Issue(DRAWN_TWICE, shapes[number].guid, values))
                 break
-        bucket.append((shape, box, area))
     return issues
 
 

@@ -3,8 +3,9 @@
 Openings that nothing fills, with a room on one side and the open air on the other, are closed by
 one of two rules.  One that its name calls a door, or that reaches down to the room's floor and is
 no wider than 1.3 m, is taken as a door, opaque; any other is taken as a window whose file lost its
-glass, with the default frame.  A room with a hole in its wall has no temperature of its own, so
-none stays open.
+glass, with the default frame.  One that faces up is a rooflight only below the open sky, and where
+no stair or lift goes through it and no shaft stands on it.  A room with a hole in its wall has no
+temperature of its own, so none stays open.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from bim.ifc.spaces import SpaceRecord
 from bim.ifc.transparent import is_phantom
 from bim.model import Space
 from bim.names import plain_text
-from bim.neighbours import is_open
+from bim.neighbours import FAR, is_open
 from bim.planes import plane_through, polygons_of, triangulated
 from bim.rays import RayMesh
 from bim.report.issue import Effect, Issue, Phrase
@@ -38,6 +39,15 @@ CLEAR_WAY = 1.0  # an opening goes through where nothing stands in it this far t
 LEAST_LOST = 0.01  # share of a pane whose loss is reported
 TALLEST_GAP = 30.0  # between the top of a room and glass above it [m]
 DOOR_NAME = re.compile(r"\b(tur|tuer|door|porte?|deur|puerta|porta|ajto|drzwi|dvere|ovi)", re.I)
+SHAFT_NAME = re.compile(
+    r"schacht|kamin|aufzug|treppe|shaft|\bduct|chimney|\blift|elevator|stair|gaine|cheminee|ascens"
+    r"|escalier|escal(a|era)|scala|cavedio|\btrap|sachta|schody|szyb|lepcso",
+    re.I,
+)
+STAIRS = ("IfcStair", "IfcRamp", "IfcTransport")
+UP = 0.7  # cosine to the vertical from which an opening faces up
+OVERHEAD = 0.5  # share of an opening's area below the open sky, for a rooflight
+SHAFT_RAYS = 16  # level rays that all meet a wall in a shaft
 NOT_FILLED = "IfcOpeningElement"
 
 
@@ -291,6 +301,10 @@ def _unfilled(
             continue
         area = sum(a.glass.area for a in attached)
         label = f"opening {opening.Name or ''} in {host.is_a()} {host.Name or ''}"
+        if no_rooflight := _no_rooflight(attached[0], opening.Name or "", source, building):
+            values = {"element": label, "reason": Phrase(no_rooflight)}
+            issues.append(Issue("opening-closed", filling.guid, values))
+            continue
         named = DOOR_NAME.search(plain_text(opening.Name or "")) is not None
         if named or _is_door(attached[0], lows[attached[0].room]):
             closed += area
@@ -348,6 +362,36 @@ def _faces_outdoors(one: Attachment, building: RayMesh) -> bool:
     middle = shapely.get_coordinates(shapely.point_on_surface(one.region))
     plane = one.aperture.plane
     return is_open(plane.to_world(middle)[0] + CLEAR_WAY * plane.normal, plane.normal, building)
+
+
+def _no_rooflight(one: Attachment, name: str, source: Source, building: RayMesh) -> str:
+    """Why an opening that faces up is no rooflight, as a phrase of the catalogue, else ""."""
+    plane = one.aperture.plane
+    if plane.normal[2] < UP:
+        return ""
+    if SHAFT_NAME.search(plain_text(name)):
+        return "called-shaft"
+    corners = plane.to_world(shapely.get_coordinates(one.region))
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    near = np.array([0.0, 0.0, ASIDE])
+    for shape in source.elements:
+        if shape.ifc_class.startswith(STAIRS) and len(shape.triangles):
+            ends = shape.triangles.min(axis=(0, 1)), shape.triangles.max(axis=(0, 1))
+            if np.all(ends[0] < high + near) and np.all(ends[1] > low - near):
+                return "stair-in-opening"
+    parts = np.concatenate([triangulated(p) for p in polygons_of(one.region)])
+    areas = shapely.area(shapely.polygons(parts))
+    middles = plane.to_world(parts.mean(axis=1)) + 0.01 * plane.normal
+    _, hit = building.first_hits(middles, np.tile([0.0, 0.0, 1.0], (len(middles), 1)), FAR)
+    if np.average(hit < 0, weights=areas) < OVERHEAD:
+        return "no-sky-above"
+    turn = 2 * np.pi * np.arange(SHAFT_RAYS) / SHAFT_RAYS
+    level = np.stack([np.cos(turn), np.sin(turn), np.zeros(SHAFT_RAYS)], axis=1)
+    middle = plane.to_world(shapely.get_coordinates(shapely.point_on_surface(one.region)))[0]
+    above = middle + CLEAR_WAY * plane.normal
+    reach = float(np.linalg.norm(high - low))
+    _, hit = building.first_hits(np.tile(above, (SHAFT_RAYS, 1)), level, reach)
+    return "shaft-above" if np.all(hit >= 0) else ""
 
 
 def _is_door(one: Attachment, floor: float) -> bool:

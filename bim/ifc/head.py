@@ -43,7 +43,9 @@ def model_names(archive: zipfile.ZipFile, path: Path) -> list[str]:
     """The names of the models in a zipped file, in order; `DataError` where there is none."""
     names = sorted(name for name in archive.namelist() if name.lower().endswith(".ifc"))
     if not names:
-        raise DataError("expected an .ifc inside, found none", file=path)
+        xml = [name for name in archive.namelist() if name.lower().endswith((".ifcxml", ".xml"))]
+        other = f"{xml[0]}, which is ifcXML: export the model as IFC (.ifc)" if xml else "none"
+        raise DataError(f"expected an .ifc inside, found {other}", file=path)
     # zipfile unpacks no more than it says here
     size = sum(archive.getinfo(name).file_size for name in names)
     if size > LARGEST:

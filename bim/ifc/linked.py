@@ -24,7 +24,13 @@ from numpy.typing import NDArray
 from bim.ifc.damage import entities, placement_of
 from bim.ifc.north import map_conversions, true_north
 from bim.ifc.placing import to_map
-from bim.ifc.project import length_scale, mend_guids, numbered_guid, site_location
+from bim.ifc.project import (
+    length_scale,
+    mend_guids,
+    numbered_guid,
+    site_location,
+    storeys_in,
+)
 from bim.report.issue import Issue, Phrase
 from mitsuba_cfs.errors import DataError
 
@@ -337,11 +343,11 @@ def _same_storeys(
     taken = {one.id() for one in repeated}
     heights = [
         (float(place[2, 3]), storey)
-        for storey in model.by_type("IfcBuildingStorey")
+        for storey in storeys_in(model)
         if (place := placement_of(storey)) is not None
     ]
     pairs = []
-    for storey in other.by_type("IfcBuildingStorey"):
+    for storey in storeys_in(other):
         place = placement_of(storey)
         if storey.id() in taken or place is None or not heights:
             continue

@@ -13,7 +13,7 @@ file, a window between the space and another one must confirm that, or the name 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +21,7 @@ import shapely
 import shapely.affinity
 from numpy.typing import NDArray
 
-from bim.ifc.spaces import SpaceRecord
+from bim.ifc.spaces import OUTDOORS, SpaceRecord
 from bim.names import plain_text
 from bim.neighbours import is_open
 from bim.planes import Facet
@@ -63,24 +63,24 @@ class Openness:
 def open_spaces(
     records: Sequence[SpaceRecord],
     building: RayMesh,
-    stated: Mapping[str, bool],
+    indoors: Collection[str],
     windows: Sequence[NDArray[np.float64]] = (),
 ) -> tuple[list[SpaceRecord], list[Issue]]:
     """The spaces that are rooms; those that are outdoors are issues.
 
     Args:
-        stated: whether spaces are outdoors, by GUID, where the corrections say so.
+        indoors: GUIDs of spaces that are rooms by the corrections.
         windows: triangles [N, 3, 3] of each window of the file.
     """
     shares = {record.guid: _openness(record, records, building) for record in records}
     rooms, issues = [], []
     for record in records:
-        reason = _reason(record, records, shares, windows, stated.get(record.guid))
-        if reason is None:
+        reason = _reason(record, records, shares, windows)
+        if reason is None or record.guid in indoors:
             rooms.append(record)
             continue
         values = {"room": record.solid.name, "volume": record.volume, "reason": reason}
-        issues.append(Issue("space-outdoors", record.guid, values, Effect("room")))
+        issues.append(Issue(OUTDOORS, record.guid, values, Effect("room")))
     return rooms, issues
 
 
@@ -89,11 +89,8 @@ def _reason(
     records: Sequence[SpaceRecord],
     shares: Mapping[str, Openness],
     windows: Sequence[NDArray[np.float64]],
-    stated: bool | None,
 ) -> Phrase | None:
     """Why a space is outdoors; None for a room."""
-    if stated is not None:
-        return Phrase("outdoors-by-correction") if stated else None
     share, named = shares[record.guid], _has_outdoor_name(record)
     values = {"top": 100 * share.top, "sides": 100 * share.sides}
     if share.top > UNCOVERED:

@@ -15,12 +15,13 @@ import ifcopenshell.guid
 import ifcopenshell.util.element
 import ifcopenshell.util.unit
 
-from bim.ifc.damage import Damage, entities, type_of
+from bim.ifc.damage import Damage, entities, instances, type_of
 from bim.ifc.head import SCHEMAS, ZIPPED, check_head, model_names
 from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import scratch_folder
 
+STOREYS = ("IfcBuildingStorey", "IfcFacilityPart")
 END = 4096  # bytes in which the end of a STEP file is looked for
 
 
@@ -203,11 +204,16 @@ def _degrees(parts: tuple[int, ...] | None) -> float | None:
     return sign * (values[0] + values[1] / 60 + (values[2] + values[3] / 1e6) / 3600)
 
 
+def storeys_in(model: ifcopenshell.file) -> list[ifcopenshell.entity_instance]:
+    """The storeys of buildings, and of IFC4X3's other facilities the parts."""
+    return [one for name in STOREYS for one in instances(model, name)]
+
+
 def storey_of(element: ifcopenshell.entity_instance) -> str:
     """Name of the storey that holds the element, "" if none."""
     container = element
     for _ in range(20):  # aggregates may be nested, a damaged file may hold a loop
-        if container is None or container.is_a("IfcBuildingStorey"):
+        if container is None or any(map(container.is_a, STOREYS)):
             break
         container = parent_of(container)
     return (container.Name or "") if container is not None else ""

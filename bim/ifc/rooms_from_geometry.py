@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bim.enclosure import GAP, LIMIT_S, Enclosed, first_rooms_enclosed
 from bim.ifc.damage import placement_of
-from bim.ifc.project import length_scale
+from bim.ifc.project import length_scale, storeys_in
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
@@ -68,13 +68,19 @@ def rooms_from_geometry(source: Source, tell: Tell) -> tuple[list[SpaceRecord], 
     attempts = [
         ([], GAP, Phrase("joined-by-openings")),
         ([], wider, closed),
-        ([floor], GAP, Phrase("floor-added")),
-        ([floor, roof], GAP, Phrase("floor-and-roof-added")),
     ]
-    if source.corrections.close_gaps:
+    if upright:  # a roof alone is no building that lacks its floor
+        attempts += [
+            ([floor], GAP, Phrase("floor-added")),
+            ([floor, roof], GAP, Phrase("floor-and-roof-added")),
+        ]
+    if upright and source.corrections.close_gaps:
         attempts.append(([floor, roof], wider, closed))
     number, rooms = search.rooms([(more, gap) for more, gap, _ in attempts])
     repair = attempts[number][2]
+    if not rooms and not upright:
+        issue = Issue("no-walls-for-rooms", where, {"lack": lacks}, Effect("room"))
+        return [], [*search.issues, issue]
     if not rooms:
         values = {"lack": lacks, "gap": wider}
         issue = Issue("walls-enclose-nothing", where, values, Effect("room"))
@@ -201,7 +207,7 @@ def _storeys(source: Source) -> list[tuple[float, str]]:
     """Height in the world and name of each storey, rising."""
     unit = length_scale(source.model)
     levels = []
-    for storey in source.model.by_type("IfcBuildingStorey"):
+    for storey in storeys_in(source.model):
         matrix = placement_of(storey, source.damage)
         if matrix is None:
             continue

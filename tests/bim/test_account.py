@@ -6,6 +6,7 @@ import zipfile
 
 import ifcopenshell.api.feature
 import ifcopenshell.api.root
+import ifcopenshell.util.schema
 import pytest
 from click.testing import CliRunner
 
@@ -284,3 +285,55 @@ def test_issues_by_their_glass_and_alike_ones_once():
     assert (
         third.count == 19 and third.text().what == "19 times: wall 0: its body is no closed solid"
     )
+
+
+def roof_opening(beside: str):
+    """The room with an opening in its roof, and what stands in it, above it or around it."""
+    small, _ = box_model()
+    roof = next(slab for slab in small.model.by_type("IfcSlab") if slab.Name == "roof")
+    low, size = (1.0, 3.0, HEIGHT - 0.05), (1.2, 2.4, 0.3)
+    name = "Schacht 2" if beside == "name" else "opening"
+    small.opening(roof, low, name, size=size, axes=True)
+    around = {
+        "stair": [("IfcStairFlight", (1.0, 3.0, 0.0), (1.2, 0.8, HEIGHT))],
+        "canopy": [("IfcSlab", (-1.0, -1.0, 2 * HEIGHT), (6.0, 8.0, 0.2))],
+        "shaft": [
+            ("IfcWall", (x, y, HEIGHT + 0.2), (2 * dx + 0.2, 2 * dy + 0.2, 2.5))
+            for x, y, dx, dy in (
+                (0.7, 2.8, 0, 1.3), (2.3, 2.8, 0, 1.3), (0.7, 2.7, 0.8, 0), (0.7, 5.5, 0.8, 0)
+            )
+        ],
+        "kerb": [("IfcWall", (0.8, 2.8, HEIGHT + 0.2), (0.2, 2.8, 0.4))],
+    }  # fmt: skip
+    for ifc_class, corner, extent in around.get(beside, ()):
+        small.box(ifc_class, beside, corner, extent)
+    return small
+
+
+@pytest.mark.parametrize(
+    ("beside", "reason"),
+    [("nothing", ""), ("kerb", ""), ("name", "called-shaft"), ("stair", "stair-in-opening"),
+     ("canopy", "no-sky-above"), ("shaft", "shaft-above")],
+)  # fmt: skip
+def test_an_opening_in_a_slab_is_a_rooflight_only_below_the_open_sky(tmp_path, beside, reason):
+    building = read(tmp_path, roof_opening(beside))
+    (issue,) = (i for i in building.issues if i.code in ("opening-closed", "opening-glazed"))
+    rooflights = [window for window in building.windows if window.normal[2] > 0.9]
+    if reason:
+        assert issue.values["reason"].key == reason and not rooflights
+    else:
+        assert issue.code == "opening-glazed" and len(rooflights) == 1
+    assert building.account.closed == 0.0
+
+
+def test_parts_of_other_facilities_are_storeys(tmp_path):
+    """IFC4X3 has bridges, roads and marine works beside buildings."""
+    small, _ = box_model("IFC4X3")
+    storey = small.model.by_type("IfcBuildingStorey")[0]
+    part = ifcopenshell.util.schema.reassign_class(small.model, storey, "IfcBridgePart")
+    facility = small.model.by_type("IfcBuilding")[0]
+    ifcopenshell.util.schema.reassign_class(small.model, facility, "IfcBridge")
+    part.Name = "control room"
+    building = read(tmp_path, small)
+    assert [space.storey for space in building.spaces] == ["control room"]
+    assert [storey.name for storey in building.account.storeys] == ["control room"]

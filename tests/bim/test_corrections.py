@@ -13,6 +13,7 @@ import ifcopenshell.api.type
 import pytest
 from click.testing import CliRunner
 
+from bim.building_file import named_spaces
 from bim.ifc.building import read_ifc
 from bim.ifc.corrections import Corrections, Paint, read_corrections
 from bim.ifc.corrections_draft import corrections_draft
@@ -182,3 +183,25 @@ def test_the_draft_has_every_doubt_and_reads_back_as_no_correction(tmp_path) -> 
     assert [one.name for one in chosen.materials if "Zeug" in one.name] == ['Zeug "7"']
     (space,) = read_ifc(path).spaces
     assert space.room_volume == pytest.approx(space.drawn_volume) and space.cut == 0.0
+
+
+@pytest.mark.parametrize(
+    ("entry", "code"),
+    [("leave_out", "space-removed"), ("only", "space-removed"), ("outdoors", "space-outdoors")],
+)
+def test_a_space_that_the_user_leaves_out_is_not_said_to_lack_geometry(tmp_path, entry, code):
+    small, _ = box_model()
+    small.box("IfcSpace", "R2", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    path = tmp_path / "m.ifc"
+    small.model.write(str(path))
+    chosen = "['IfcWall', 'IfcSlab', 'IfcWindow', 'IfcSpace, Name=\"R2\"']"
+    chosen = chosen if entry == "only" else "['IfcSpace, Name=\"R1\"']"
+    path.with_name("m.corrections.toml").write_text(f"{entry} = {chosen}", "utf-8")
+    building = read_ifc(path)
+    assert [space.name for space in building.spaces] == ["R2"]
+    (issue,) = [one for one in building.issues if one.effect.lost == "room"]
+    assert (issue.code, issue.values["room"]) == (code, "R1 Room")
+    missing = building.account.missing
+    assert missing == (("R1 Room",) if entry == "outdoors" else ())
+    with pytest.raises(DataError, match=r"'R1' was left out: .* corrections file"):
+        named_spaces(building, ["R1"], path)

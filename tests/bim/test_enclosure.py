@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import bim.leaks
 from bim.enclosure import (
+    LOWEST_ROOM,
+    SMALLEST_ROOM,
     interior_parts,
     main_wall_direction,
     outer_part,
@@ -13,10 +16,20 @@ from bim.enclosure import (
     touching_parts,
 )
 from bim.ifc.building import read_ifc
+from bim.leaks import COARSEST, may_enclose
 from bim.report.issue import Phrase
 from bim.shell import enclosed_volume, open_edges
 from bim.solids import solid_of, triangles_of
-from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, WALL, WALLS, WIDTH, box_room
+from tests.bim.small_ifc import (
+    DEPTH,
+    GLASS_AREA,
+    HEIGHT,
+    WALL,
+    WALLS,
+    WIDTH,
+    box_room,
+    empty_project,
+)
 from tests.issues import of_code
 
 VOLUME = WIDTH * DEPTH * HEIGHT
@@ -129,3 +142,35 @@ def test_a_house_that_leaks_says_where_and_a_wider_tolerance_closes_it(tmp_path)
     path.with_name("m.corrections.toml").write_text("close_gaps = 0.4")
     (space,) = read_ifc(path).spaces
     assert space.volume == pytest.approx(WIDTH * DEPTH * HEIGHT, rel=0.02)
+
+
+@pytest.mark.parametrize("gap", [0.02, 0.1])
+def test_a_room_of_the_smallest_size_is_searched_for_anywhere(gap, monkeypatch) -> None:
+    """With cubes of the greatest size, turned and moved at random."""
+    width = (SMALLEST_ROOM / LOWEST_ROOM) ** 0.5
+    hall = [box((0, 0, -0.2), (width + 0.4, width + 0.4, 0.2))]
+    hall += [box((0, 0, LOWEST_ROOM), (width + 0.4, width + 0.4, 0.2))]
+    hall += [box((x, 0, 0), (0.2, width + 0.4, LOWEST_ROOM)) for x in (0.0, width + 0.2)]
+    hall += [box((0.2, y, 0), (width, 0.2, LOWEST_ROOM)) for y in (0.0, width + 0.2)]
+    random = np.random.default_rng(1)
+    for _ in range(40):
+        c, s = np.cos(angle := random.uniform(0, 6)), np.sin(angle)
+        turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        offset = random.uniform(0, 1, 3)
+        moved = [part @ turn.T + offset for part in hall]
+        box_size = np.ptp(np.concatenate(moved), axis=(0, 1)) + 2.0
+        monkeypatch.setattr(bim.leaks, "MOST_FILLED", np.prod(box_size) / COARSEST**3)
+        assert may_enclose(moved, gap)
+        assert not may_enclose(moved[1:5], gap)  # without a floor and one wall
+
+
+def test_a_roof_without_walls_ends_the_search_early(tmp_path) -> None:
+    """A glazed roof over a court: no room, and no floor is invented below it."""
+    small = empty_project()
+    for x in range(12):
+        small.box("IfcPlate", f"pane {x}", (x, 0.0, 20.0), (0.9, 12.0, 0.03))
+        small.box("IfcMember", f"bar {x}", (x + 0.9, 0.0, 19.9), (0.1, 12.0, 0.2))
+    path = tmp_path / "court.ifc"
+    small.model.write(str(path))
+    building = read_ifc(path)
+    assert not building.spaces and of_code(building, "no-walls-for-rooms")

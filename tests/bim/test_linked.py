@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import ifcopenshell
+import ifcopenshell.api.feature
 import ifcopenshell.api.geometry
 import ifcopenshell.api.georeference
 import ifcopenshell.util.unit
@@ -20,7 +21,7 @@ from bim.ifc.linked import move
 from bim.ifc.project import length_scale
 from bim.model import Building
 from mitsuba_cfs.errors import DataError
-from tests.bim.small_ifc import box_model
+from tests.bim.small_ifc import HEIGHT, WALL, WIDTH, box_model
 
 FACADE = ("IfcWindow", "IfcDoor", "IfcCurtainWall", "IfcPlate", "IfcMember")
 REST = ("IfcWall", "IfcSpace")  # what stays with the architect; else it is structure and site
@@ -243,9 +244,33 @@ def test_folders_and_zips_hold_several_files(tmp_path, file, whole) -> None:
     "name",
     [
         "Duplex_A_20110907.ifc", "AC20-FZK-Haus.ifc", "SampleHouse4_Revit_IFC4.ifc",
-        "ExampleHOM.ifc",
+        "ExampleHOM.ifc", "House_Renga.ifc",
     ],
 )  # fmt: skip
 def test_a_real_building_cut_in_three_is_the_whole(tmp_path, real_data, name) -> None:
     path = real_data / "ifc/buildings" / name
     assert figures(read(write_parts(path, tmp_path))) == figures(read_ifc(path))
+
+
+@pytest.mark.parametrize("outer_first", [False, True])
+def test_two_doors_before_one_wall_are_told_apart_by_nearness(tmp_path, outer_first) -> None:
+    """The room's own door, and that of a porch whose wall is 0.6 m off; the order says nothing."""
+    small, walls = box_model(window=False)
+    outer = small.box("IfcWall", "porch", (-WALL, -1.1, 0.0), (WIDTH + 2 * WALL, 0.2, HEIGHT))
+    doors = [
+        (walls["south"], "own", ((0.5, -WALL - 0.1, 0.0), (0.8, WALL + 0.2, 2.1)), -0.2),
+        (outer, "porch", ((0.3, -1.2, 0.6), (1.4, 0.4, 1.8)), -1.0),
+    ]
+    for wall, name, (low, size), y in doors[::-1] if outer_first else doors:
+        opening = small.opening(wall, low, size=size, axes=True)
+        leaf = small.box("IfcDoor", name, (low[0], y, low[2]), (size[0], 0.05, size[2]))
+        ifcopenshell.api.feature.add_filling(small.model, opening=opening, element=leaf)
+    small.model.write(str(tmp_path / "porch.ifc"))
+    (space,) = read_ifc(tmp_path / "porch.ifc").spaces
+    guids = {door.Name: door.GlobalId for door in small.model.by_type("IfcDoor")}
+    areas = {
+        name: sum(f.area for f in space.faces if f.kind == "door" and f.element == guid)
+        for name, guid in guids.items()
+    }
+    assert areas["own"] == pytest.approx(0.8 * 2.1, rel=1e-5)
+    assert areas["porch"] == pytest.approx(1.4 * 1.8 - 0.8 * 1.5, rel=1e-5)
