@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,12 @@ class ReflectedSun:
     def suns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Directions [h, 3] and normal illuminance [h] [lx] of the sun."""
         return self.sky.direction[self.shining], self.sky.illuminance[self.shining]
+
+    @cached_property
+    def mean(self) -> NDArray[np.float32]:
+        """Luminance outside the windows [Q * K, h], the mean of the batches."""
+        first, *others = map(_flat, self.before)
+        return np.asarray(sum(others, start=first) / np.float32(BATCHES), dtype=np.float32)
 
     def part(self, hours: NDArray[np.int64]) -> ReflectedSun:
         """The same in some of the hours L, given by their numbers among them."""
@@ -191,9 +198,8 @@ def replaced_luminance(sun: ReflectedSun, weights: NDArray[Any], on_patches: NDA
     """
     if not sun.before:
         return np.zeros((*sun.by_patches.shape[:2], weights.shape[1]))
-    some = weights[sun.shining].astype(np.float32)
-    mean = np.sum([before @ some for before in sun.before], axis=0) / BATCHES
-    return np.asarray(mean - sun.by_patches @ on_patches)
+    mean = sun.mean @ weights[sun.shining].astype(np.float32)
+    return np.asarray(mean.reshape(*sun.by_patches.shape[:2], -1) - sun.by_patches @ on_patches)
 
 
 def replaced_before(sun: ReflectedSun, shares: Array | None, hours: NDArray[np.int64]) -> Array:
@@ -209,7 +215,7 @@ def replaced_before(sun: ReflectedSun, shares: Array | None, hours: NDArray[np.i
     some = number[hours][number[hours] >= 0]
     if not sun.before or not len(some):
         return values
-    light = sum(_flat(before)[:, some] for before in sun.before) / np.float32(BATCHES)
+    light = sun.mean[:, some]
     if shares is not None:  # in single precision, as the windows' light is
         light = shares.astype(np.float32) @ light
     values[:, number[hours] >= 0] = light
