@@ -1,7 +1,7 @@
 """Choose and activate the Mitsuba variant: LLVM, or CUDA where the user asks for it, else scalar.
 
-The validation tables were made with LLVM; none of them has been repeated on a GPU, so that CUDA
-is never chosen without being asked for (`CFS_DEVICE=cuda`, `cfs --device cuda`).
+The validation tables were made with LLVM; on a GPU only a part of the tests and one building have
+run, so that CUDA is never chosen without being asked for (`CFS_DEVICE=cuda`, `cfs --device cuda`).
 
 Mitsuba and Dr.Jit are imported inside the functions, after the LLVM library has been chosen.
 """

@@ -5,8 +5,8 @@
 
 Each runner runs as a user would start it, once with `CFS_DEVICE=cpu` and once with
 `CFS_DEVICE=cuda`; every number that it prints is compared.  `FOLDER/NAME.cpu.txt` and
-`FOLDER/NAME.cuda.txt` keep what each printed.  The same seeds draw the same random numbers on both devices, so that rounding
-is all that may differ.
+`FOLDER/NAME.cuda.txt` keep what each printed.  The same seeds draw the same random numbers on
+both devices, so that rounding is all that may differ.
 """
 
 from __future__ import annotations
