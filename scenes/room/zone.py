@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from bim.to_thermal import (
 from mitsuba_cfs.compiled import must_compile
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache, cached_or_computed
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.stored_arrays import StoredArrays
@@ -33,7 +34,7 @@ from scenes.room.inputs import RoomInputs
 from scenes.room.operation import OperationHours
 from scenes.room.operation_tables import GroundTable, NeighbourTable, OperationTables
 from scenes.room.options import Occupancy
-from scenes.room.solar import SeasonalOutdoors, solar_gains
+from scenes.room.solar import SeasonalOutdoors, SunBeyond, solar_gains
 from scenes.room.windows import RoomWindows
 from thermal.balance import BalanceOptions, ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
@@ -265,6 +266,7 @@ class RoomZone:
     fenestration: tuple[dict[str, float | str], ...] = ()  # `fenestration_table` of its windows
     states: tuple[str, ...] = ()  # names of the shading states
     operation: OperationTables | None = None
+    sun_beyond: SunBeyond = field(default_factory=dict)  # of its windows, in rooms beyond glass
 
     @property
     def zone(self) -> Zone:
@@ -319,10 +321,49 @@ def coupled(
     Returns: the rooms, the air between them [Z, Z] [m3/s], and a sentence for every wall without
         another face.
     """
+    rooms = with_sun_of_others(rooms)
     spaces = [room.space for room in rooms]
     joined, notes = coupled_rooms(spaces, [room.room for room in rooms])
     zones = [replace(room, room=one) for room, one in zip(rooms, joined, strict=True)]
     return zones, door_links(spaces, door_m3_s), notes
+
+
+def with_sun_of_others(rooms: Sequence[RoomZone]) -> list[RoomZone]:
+    """The rooms with the sun that reaches them through the windows of others and inner glass."""
+    index = {room.space.guid: number for number, room in enumerate(rooms)}
+    inside: dict[int, FloatArray] = {}
+    for room in rooms:
+        for (guid, face), absorbed in room.sun_beyond.items():
+            number = index.get(guid, -1)
+            if number < 0:
+                continue
+            if number not in inside:
+                inside[number] = rooms[number].solar.inside.copy()
+            surface = rooms[number].room.surface_of_face[face]
+            inside[number][:, surface] += absorbed
+    return [
+        room if n not in inside else replace(room, solar=replace(room.solar, inside=inside[n]))
+        for n, room in enumerate(rooms)
+    ]
+
+
+def inner_sun_note(rooms: Sequence[RoomZone], step_h: float) -> tuple[str, ...]:
+    """A sentence on the sun that enters by one room and is absorbed in another; none without."""
+    passed = sum(
+        float(absorbed.sum())
+        for room in rooms
+        for (guid, _), absorbed in room.sun_beyond.items()
+        if guid != room.space.guid
+    )
+    if not passed:
+        return ()
+    return (
+        Note(
+            "Sun through glass and open doorways between rooms: {energy:.0f} kWh in the year enter "
+            "by the windows of one room and are absorbed in another.",
+            energy=passed * step_h / 1000.0,
+        ),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -413,7 +454,7 @@ def room_zone(
         seed=room.options.sampling.seed,
         cache=room.cache,
     )
-    solar, gains = solar_gains(
+    solar, gains, beyond = solar_gains(
         room, outdoors, surfaces.room, surfaces.outer, state,
         thermals=surfaces.thermals, progress=progress,
     )  # fmt: skip
@@ -421,7 +462,7 @@ def room_zone(
         room.space, zone, solar, gains, room.shading(state), lamps, room.occupied, plane, services,
         fenestration=tuple(fenestration_table(room.windows, surfaces.thermals)),
         states=tuple(system.name for system in max(room.windows.systems, key=len, default=())),
-        operation=room.operation,
+        operation=room.operation, sun_beyond=beyond,
     )  # fmt: skip
 
 
