@@ -8,6 +8,7 @@ from typing import Any
 
 import ifcopenshell
 
+from bim.ifc.corrections import RoomName
 from bim.ifc.damage import Damage, type_of
 from bim.ifc.project import psets_of, storey_of
 from bim.ifc.quantities import QuantityScales, checked_volume, stated_quantities
@@ -21,6 +22,7 @@ from mitsuba_cfs.processes import ProcessEnded
 SMALLEST_SPACE = 0.2  # smaller spaces are beams or ducts of the wrong class [m3]
 OVERLAPPING, REMOVED = "spaces-overlap", "space-removed"  # codes of issues
 OUTDOORS = "space-outdoors"
+FILE_NAMES = RoomName("", None, None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +60,14 @@ def read_spaces(
     *,
     stated: Mapping[int, bool] | None = None,
     removed: Collection[int] = (),
+    names: Mapping[int, RoomName] | None = None,
 ) -> tuple[list[SpaceRecord], list[Issue]]:
     """Every space that is indoors by the file and has a body; the others are issues.
 
     Args:
         stated: whether spaces are outdoors, by STEP id, where the corrections say so.
         removed: STEP ids of what the corrections leave out.
+        names: by STEP id, where the corrections state any.
     """
     stated = {} if stated is None else stated
     records: list[SpaceRecord] = []
@@ -74,8 +78,11 @@ def read_spaces(
     bodies = spaces_of([shape.triangles for shape in drawn.values()])
     solids = dict(zip(drawn, bodies, strict=True))
     for space in spaces:
-        label = label_of(space.Name or "", space.LongName or "", space.GlobalId)
         guid = space.GlobalId
+        stated_name = (names or {}).get(space.id(), FILE_NAMES)
+        name = space.Name if stated_name.name is None else stated_name.name
+        long_name = space.LongName if stated_name.long_name is None else stated_name.long_name
+        label = label_of(name or "", long_name or "", guid)
         if guid in seen:
             guid = f"{guid}-{space.id()}"
             values = {"room": label, "guid": guid}
@@ -119,8 +126,8 @@ def read_spaces(
         records.append(
             SpaceRecord(
                 room_solid(guid, label, solid.manifold),
-                space.Name or space.LongName or space.GlobalId,
-                space.LongName or "",
+                name or long_name or guid,
+                long_name or "",
                 storey_of(space),
                 solid.volume,
                 area,

@@ -2,10 +2,11 @@
 
     python -m tests.validation inner_sun
 
-Table 15's room with clear double glazing to the south; in its back wall a pane of 6 mm float, 3.0 m
-by 2.4 m, to a second room of the same size without a window.  EnergyPlus runs here and now, with
-full interior and exterior distribution.  The year's sums [kWh], and their share [%] of what the
-window transmits; the sun of each room is what its opaque surfaces absorb.
+A room of 4 m by 3 m with clear double glazing to the south; in its back wall a pane of 6 mm float
+to a second room, 5 m deep, without a window: Table 15's room, a winter garden and a double skin.
+EnergyPlus runs here and now, with full interior and exterior distribution.  The year's sums [kWh],
+and their share [%] of what the window transmits; the sun of each room is what its opaque surfaces
+absorb.
 """
 
 from __future__ import annotations
@@ -30,9 +31,13 @@ from scenes.room.windows import in_all_windows
 from scenes.room.zone import zone_surfaces
 from tests.validation.energyplus_program import Model, merged, room_model, run_energyplus
 
-WINDOW = WindowRectangle(0.5, 1.0, 3.0, 1.5)
-PANE = (0.5, 0.3, 3.0, 2.4)  # x, sill, width, height of the inner pane [m]
-DEPTH = 5.0
+Rectangle = tuple[float, float, float, float]  # x, sill, width, height [m]
+CASES: dict[str, tuple[float, Rectangle, Rectangle]] = {  # depth [m], window, inner pane
+    "room": (5.0, (0.5, 1.0, 3.0, 1.5), (0.5, 0.3, 3.0, 2.4)),
+    "winter garden": (2.5, (0.1, 0.1, 3.8, 2.8), (0.5, 0.1, 3.0, 2.4)),
+    "double skin": (0.6, (0.1, 0.1, 3.8, 2.8), (0.1, 0.1, 3.8, 2.8)),
+}
+REAR_DEPTH = TABLE_DEPTH = 5.0  # of the room behind, and of Table 15's room [m]
 REFLECTANCE = {"wall": 0.5, "floor": 0.2, "ceiling": 0.7}  # as in the models' materials
 FRONT = ("FACADE", "X0", "X4", "BACK", "FLOOR", "CEILING")
 REAR = ("FRONT", "R0", "R4", "NORTH", "REAR FLOOR", "REAR CEILING")
@@ -40,19 +45,19 @@ ABSORBED = "Surface Inside Face Solar Radiation Heat Gain Rate"
 ENTERING = "Surface Window Transmitted Solar Radiation Rate"
 
 
-def two_rooms(reflectance: dict[str, float]) -> Building:
+def two_rooms(reflectance: dict[str, float], case: str = "room") -> Building:
     """The two rooms, joined by the pane."""
-    x, sill, width, height = PANE
+    depth, window, pane = CASES[case]
     lit = shoebox(
-        4.0, DEPTH, 3.0, windows=(WINDOW, WindowRectangle(x, sill, width, height, "back")),
+        4.0, depth, 3.0, windows=(WindowRectangle(*window), WindowRectangle(*pane, "back")),
         reflectance=reflectance, name="front",
     )  # fmt: skip
     dark = shoebox(
-        4.0, DEPTH, 3.0, windows=(WindowRectangle(x, sill, width, height, "front"),),
+        4.0, REAR_DEPTH, 3.0, windows=(WindowRectangle(*pane, "front"),),
         reflectance=reflectance, name="rear",
     )  # fmt: skip
     (front,), (rear,) = lit.spaces, dark.spaces
-    rear = _moved(rear)
+    rear = _moved(rear, depth)
     front = replace(
         front, windows=front.windows[:1],
         faces=(*front.faces, _pane(front.windows[1], rear.guid, reflectance)),
@@ -63,8 +68,8 @@ def two_rooms(reflectance: dict[str, float]) -> Building:
     return replace(lit, spaces=(front, rear))
 
 
-def _moved(space: Space) -> Space:
-    step = np.array([0.0, DEPTH, 0.0])
+def _moved(space: Space, north: float) -> Space:
+    step = np.array([0.0, north, 0.0])
     return replace(
         space, guid="rear", name="rear",
         faces=tuple(replace(f, triangles=f.triangles + step) for f in space.faces),
@@ -80,9 +85,9 @@ def _pane(window: Window, beyond: str, reflectance: dict[str, float]) -> Face:
     )  # fmt: skip
 
 
-def ours(reflectance: dict[str, float], patch_samples: int) -> dict[str, float]:
+def ours(case: str, patch_samples: int) -> dict[str, float]:
     """Sun through the window, in both rooms' opaque surfaces and on the rear floor [kWh]."""
-    weather, building = read_epw(WEATHER), two_rooms(reflectance)
+    weather, building = read_epw(WEATHER), two_rooms(REFLECTANCE, case)
     front, rear = building.spaces
     glazing = glazing_system(StatedValues(0.81, 0.70, 0.76, 2.7, 2), "clear double")
     sampling = replace(RoomOptions().sampling, patch_samples=patch_samples)
@@ -107,11 +112,11 @@ def ours(reflectance: dict[str, float], patch_samples: int) -> dict[str, float]:
     return {name: float(values.sum()) / 1000.0 for name, values in sums.items()}
 
 
-def energyplus() -> dict[str, float]:
+def energyplus(case: str) -> dict[str, float]:
     """The same by EnergyPlus [kWh]."""
     outputs = {f"{name}:{ABSORBED}": name for name in (*FRONT, *REAR)}
     outputs[f"WINDOW:{ENTERING}"] = "WINDOW"
-    hours = run_energyplus(energyplus_model(outputs), WEATHER, outputs=outputs)
+    hours = run_energyplus(energyplus_model(case, outputs), WEATHER, outputs=outputs)
     sums = hours.sum() / 1000.0
     return {
         "through the window": float(sums["WINDOW"]),
@@ -121,8 +126,9 @@ def energyplus() -> dict[str, float]:
     }
 
 
-def energyplus_model(outputs: dict[str, str]) -> Model:
+def energyplus_model(case: str, outputs: dict[str, str]) -> Model:
     """The two rooms with an interior window."""
+    depth, window, inner_pane = CASES[case]
     cosine = np.ones(1)
     inner = transmissivity(SOLAR_CLEAR, GLASS_INDEX)
     rho = float(pane_shares(cosine, GLASS_INDEX, inner)[1][0])
@@ -135,38 +141,71 @@ def energyplus_model(outputs: dict[str, str]) -> Model:
         for side in ("front", "back")
         for band in ("solar", "visible")
     }
-    x, sill, width, height = PANE
-    corners = [(x, sill + height), (x, sill), (x + width, sill), (x + width, sill + height)]
+    corners = _corners(inner_pane)
     patch = {
         "WindowMaterial:Glazing": {"INNER PANE": glass},
         "Construction": {"INNER GLASS": {"outside_layer": "INNER PANE"}},
         "FenestrationSurface:Detailed": {
-            "INNER BACK": _interior_window("BACK", "INNER FRONT", corners[::-1]),
-            "INNER FRONT": _interior_window("FRONT", "INNER BACK", corners),
+            "INNER BACK": _interior_window("BACK", "INNER FRONT")
+            | _vertices(corners[::-1], TABLE_DEPTH),
+            "INNER FRONT": _interior_window("FRONT", "INNER BACK")
+            | _vertices(corners, TABLE_DEPTH),
+            "WINDOW": _vertices(_corners(window), 0.0),
         },
+        "Zone": {"ROOM": {"volume": 12.0 * depth}},
     }
-    return merged(room_model("S", "clear_double", "second_room", outputs=outputs), patch)
+    model = merged(room_model("S", "clear_double", "second_room", outputs=outputs), patch)
+    return {
+        kind: {name: _deep(one, depth) for name, one in objects.items()}
+        for kind, objects in model.items()
+    }
 
 
-def _interior_window(wall: str, other: str, corners: list[tuple[float, float]]) -> dict:
-    places = {
+def _deep(one: dict, depth: float) -> dict:
+    """An object whose y coordinates are those of a front room of another depth."""
+    moved = {
+        key: value + (depth - TABLE_DEPTH if value >= TABLE_DEPTH else 0.0)
+        for key, value in one.items()
+        if key.endswith("y_coordinate")
+    }
+    for key in ("vertices",) if "vertices" in one else ():
+        moved[key] = [_deep(vertex, depth) for vertex in one[key]]
+    return one | moved
+
+
+def _corners(rectangle: Rectangle) -> list[tuple[float, float]]:
+    """Upper left, lower left, lower right, upper right: x and z [m], seen from the south."""
+    x, sill, width, height = rectangle
+    return [(x, sill + height), (x, sill), (x + width, sill), (x + width, sill + height)]
+
+
+def _vertices(corners: list[tuple[float, float]], y: float) -> dict:
+    return {
         f"vertex_{i}_{axis}_coordinate": value
         for i, (x, z) in enumerate(corners, 1)
-        for axis, value in zip("xyz", (x, DEPTH, z), strict=True)
+        for axis, value in zip("xyz", (x, y, z), strict=True)
     }
+
+
+def _interior_window(wall: str, other: str) -> dict:
     return {
         "surface_type": "Window", "construction_name": "INNER GLASS",
         "building_surface_name": wall, "outside_boundary_condition_object": other,
-        "number_of_vertices": 4, **places,
+        "number_of_vertices": 4,
     }  # fmt: skip
 
 
 def compare(patch_samples: int = 4096) -> pd.DataFrame:
-    """The sums of both programs [kWh], and ours over EnergyPlus' [%]."""
-    table = pd.DataFrame({"ours": ours(REFLECTANCE, patch_samples), "EnergyPlus": energyplus()})
-    share = table / table.loc["through the window"] * 100.0
-    table["ours %"], table["EnergyPlus %"] = share["ours"], share["EnergyPlus"]
-    return table
+    """The sums of both programs [kWh], and their share [%] of what the window transmits."""
+    tables = []
+    for case in CASES:
+        table = pd.DataFrame({"ours": ours(case, patch_samples), "EnergyPlus": energyplus(case)})
+        share = table / table.loc["through the window"] * 100.0
+        table["ours %"], table["EnergyPlus %"] = share["ours"], share["EnergyPlus"]
+        table.insert(0, "sun", table.index)
+        table.insert(0, "case", case)
+        tables.append(table)
+    return pd.concat(tables, ignore_index=True)
 
 
 def main() -> pd.DataFrame:
