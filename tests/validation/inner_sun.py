@@ -42,11 +42,20 @@ REFLECTANCE = {"wall": 0.5, "floor": 0.2, "ceiling": 0.7}  # as in the models' m
 FRONT = ("FACADE", "X0", "X4", "BACK", "FLOOR", "CEILING")
 REAR = ("FRONT", "R0", "R4", "NORTH", "REAR FLOOR", "REAR CEILING")
 ABSORBED = "Surface Inside Face Solar Radiation Heat Gain Rate"
+PASSING = tuple(
+    f"Enclosure Interior Windows Total Transmitted {kind} Solar Radiation Rate"
+    for kind in ("Beam", "Diffuse")
+)
 ENTERING = "Surface Window Transmitted Solar Radiation Rate"
 
 
-def two_rooms(reflectance: dict[str, float], case: str = "room") -> Building:
-    """The two rooms, joined by the pane."""
+def two_rooms(
+    reflectance: dict[str, float], case: str = "room", rear: dict[str, float] | None = None
+) -> Building:
+    """The two rooms, joined by the pane.
+
+    Args: rear: reflectances of the room behind; those of the front room without.
+    """
     depth, window, pane = CASES[case]
     lit = shoebox(
         4.0, depth, 3.0, windows=(WindowRectangle(*window), WindowRectangle(*pane, "back")),
@@ -54,18 +63,18 @@ def two_rooms(reflectance: dict[str, float], case: str = "room") -> Building:
     )  # fmt: skip
     dark = shoebox(
         4.0, REAR_DEPTH, 3.0, windows=(WindowRectangle(*pane, "front"),),
-        reflectance=reflectance, name="rear",
+        reflectance=reflectance if rear is None else rear, name="rear",
     )  # fmt: skip
-    (front,), (rear,) = lit.spaces, dark.spaces
-    rear = _moved(rear, depth)
+    (front,) = lit.spaces
+    behind = _moved(dark.spaces[0], depth)
     front = replace(
         front, windows=front.windows[:1],
-        faces=(*front.faces, _pane(front.windows[1], rear.guid, reflectance)),
+        faces=(*front.faces, _pane(front.windows[1], behind.guid)),
     )  # fmt: skip
-    rear = replace(
-        rear, windows=(), faces=(*rear.faces, _pane(rear.windows[0], front.guid, reflectance))
+    behind = replace(
+        behind, windows=(), faces=(*behind.faces, _pane(behind.windows[0], front.guid))
     )
-    return replace(lit, spaces=(front, rear))
+    return replace(lit, spaces=(front, behind))
 
 
 def _moved(space: Space, north: float) -> Space:
@@ -77,7 +86,7 @@ def _moved(space: Space, north: float) -> Space:
     )  # fmt: skip
 
 
-def _pane(window: Window, beyond: str, reflectance: dict[str, float]) -> Face:
+def _pane(window: Window, beyond: str) -> Face:
     same = replace(window, guid="inner", solar_transmittance=SOLAR_CLEAR)
     return Face(
         "inner pane", "wall", window.triangles, "space", default_construction("wall", "space"),
@@ -86,8 +95,18 @@ def _pane(window: Window, beyond: str, reflectance: dict[str, float]) -> Face:
 
 
 def ours(case: str, patch_samples: int) -> dict[str, float]:
-    """Sun through the window, in both rooms' opaque surfaces and on the rear floor [kWh]."""
-    weather, building = read_epw(WEATHER), two_rooms(REFLECTANCE, case)
+    """Sun through window and pane, in both rooms' opaque surfaces and on the rear floor [kWh].
+
+    What enters by the pane is what a black room behind it absorbs.
+    """
+    black = _sums(two_rooms(REFLECTANCE, case, dict.fromkeys(REFLECTANCE, 0.0)), patch_samples)
+    sums = _sums(two_rooms(REFLECTANCE, case), patch_samples)
+    return {"through the window": sums.pop("through the window"),
+            "through the pane": black["rear room"], **sums}  # fmt: skip
+
+
+def _sums(building: Building, patch_samples: int) -> dict[str, float]:
+    weather = read_epw(WEATHER)
     front, rear = building.spaces
     glazing = glazing_system(StatedValues(0.81, 0.70, 0.76, 2.7, 2), "clear double")
     sampling = replace(RoomOptions().sampling, patch_samples=patch_samples)
@@ -116,10 +135,12 @@ def energyplus(case: str) -> dict[str, float]:
     """The same by EnergyPlus [kWh]."""
     outputs = {f"{name}:{ABSORBED}": name for name in (*FRONT, *REAR)}
     outputs[f"WINDOW:{ENTERING}"] = "WINDOW"
+    outputs |= {f"REAR:{name}": name for name in PASSING}
     hours = run_energyplus(energyplus_model(case, outputs), WEATHER, outputs=outputs)
     sums = hours.sum() / 1000.0
     return {
         "through the window": float(sums["WINDOW"]),
+        "through the pane": float(sums[list(PASSING)].sum()),
         "front room": float(sums[list(FRONT)].sum()),
         "rear room": float(sums[list(REAR)].sum()),
         "of it floor": float(sums["REAR FLOOR"]),
