@@ -1,17 +1,20 @@
 """Sun through a glazed partition into the room behind, beside EnergyPlus' interior windows.
 
-    python -m tests.validation inner_sun
+    python -m tests.validation inner_sun [--beam]
 
 A room of 4 m by 3 m with clear double glazing to the south; in its back wall a pane of 6 mm float
 to a second room, 5 m deep, without a window: Table 15's room, a winter garden and a double skin.
 EnergyPlus runs here and now, with full interior and exterior distribution.  The year's sums [kWh],
 and their share [%] of what the window transmits; the sun of each room is what its opaque surfaces
-absorb.
+absorb.  With `--beam` the weather has no diffuse light and the ground is black.
 """
 
 from __future__ import annotations
 
+import tempfile
+from calendar import month_name
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -94,19 +97,24 @@ def _pane(window: Window, beyond: str) -> Face:
     )  # fmt: skip
 
 
-def ours(case: str, patch_samples: int) -> dict[str, float]:
+def ours(
+    case: str, patch_samples: int, weather: Path = WEATHER, albedo: float = 0.2
+) -> dict[str, float]:
     """Sun through window and pane, in both rooms' opaque surfaces and on the rear floor [kWh].
 
     What enters by the pane is what a black room behind it absorbs.
     """
-    black = _sums(two_rooms(REFLECTANCE, case, dict.fromkeys(REFLECTANCE, 0.0)), patch_samples)
-    sums = _sums(two_rooms(REFLECTANCE, case), patch_samples)
+    sky = (patch_samples, weather, albedo)
+    black = _sums(two_rooms(REFLECTANCE, case, dict.fromkeys(REFLECTANCE, 0.0)), *sky)
+    sums = _sums(two_rooms(REFLECTANCE, case), *sky)
     return {"through the window": sums.pop("through the window"),
             "through the pane": black["rear room"], **sums}  # fmt: skip
 
 
-def _sums(building: Building, patch_samples: int) -> dict[str, float]:
-    weather = read_epw(WEATHER)
+def _sums(
+    building: Building, patch_samples: int, weather_file: Path, albedo: float
+) -> dict[str, float]:
+    weather = replace(read_epw(weather_file), albedo=albedo)
     front, rear = building.spaces
     glazing = glazing_system(StatedValues(0.81, 0.70, 0.76, 2.7, 2), "clear double")
     sampling = replace(RoomOptions().sampling, patch_samples=patch_samples)
@@ -131,12 +139,14 @@ def _sums(building: Building, patch_samples: int) -> dict[str, float]:
     return {name: float(values.sum()) / 1000.0 for name, values in sums.items()}
 
 
-def energyplus(case: str) -> dict[str, float]:
-    """The same by EnergyPlus [kWh]."""
+def energyplus(case: str, weather: Path = WEATHER, albedo: float = 0.2) -> dict[str, float]:
+    """The same by EnergyPlus [kWh]; by the pane the beam alone."""
     outputs = {f"{name}:{ABSORBED}": name for name in (*FRONT, *REAR)}
     outputs[f"WINDOW:{ENTERING}"] = "WINDOW"
     outputs |= {f"REAR:{name}": name for name in PASSING}
-    hours = run_energyplus(energyplus_model(case, outputs), WEATHER, outputs=outputs)
+    ground = {f"{month.lower()}_ground_reflectance": albedo for month in month_name[1:]}
+    model = energyplus_model(case, outputs) | {"Site:GroundReflectance": {"ground": ground}}
+    hours = run_energyplus(model, weather, outputs=outputs)
     sums = hours.sum() / 1000.0
     return {
         "through the window": float(sums["WINDOW"]),
@@ -216,11 +226,28 @@ def _interior_window(wall: str, other: str) -> dict:
     }  # fmt: skip
 
 
-def compare(patch_samples: int = 4096) -> pd.DataFrame:
+def without_diffuse(folder: Path) -> Path:
+    """The weather file without diffuse radiation (EPW field 16)."""
+    lines = WEATHER.read_text("latin-1").splitlines()
+    hours = [line.split(",") for line in lines[8:]]
+    path = folder / "beam.epw"
+    path.write_text(
+        "\n".join([*lines[:8], *(",".join([*h[:15], "0", *h[16:]]) for h in hours)]) + "\n",
+        "latin-1",
+    )
+    return path
+
+
+def compare(patch_samples: int, weather: Path, albedo: float) -> pd.DataFrame:
     """The sums of both programs [kWh], and their share [%] of what the window transmits."""
     tables = []
     for case in CASES:
-        table = pd.DataFrame({"ours": ours(case, patch_samples), "EnergyPlus": energyplus(case)})
+        table = pd.DataFrame(
+            {
+                "ours": ours(case, patch_samples, weather, albedo),
+                "EnergyPlus": energyplus(case, weather, albedo),
+            }
+        )
         share = table / table.loc["through the window"] * 100.0
         table["ours %"], table["EnergyPlus %"] = share["ours"], share["EnergyPlus"]
         table.insert(0, "sun", table.index)
@@ -229,6 +256,9 @@ def compare(patch_samples: int = 4096) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def main() -> pd.DataFrame:
+def main(*, beam: bool = False, patch_samples: int = 4096) -> pd.DataFrame:
     """The comparison."""
-    return compare()
+    if not beam:
+        return compare(patch_samples, WEATHER, 0.2)
+    with tempfile.TemporaryDirectory() as folder:
+        return compare(patch_samples, without_diffuse(Path(folder)), 0.0)
