@@ -117,7 +117,7 @@ def test_an_impossible_value_is_refused_by_its_name(make, name, value):
 def test_an_hour_that_a_sky_has_not_is_refused(hours):
     sky = cfs.given_sky([[0, -0.6, 0.8]] * 2, [500] * 2, [100] * 2, 1, day_of_year=1)
     assert len(sky.part([1]).illuminance) == len(sky.part([True, False]).illuminance) == 1
-    with pytest.raises(ValueError, match="hours: expected 0 to 1"):
+    with pytest.raises(ValueError, match="hours: expected numbers from 0 to 1"):
         sky.part(hours)
 
 

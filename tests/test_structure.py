@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
 
 import pytest
 
+from tests.conftest import REPOSITORY
 from tests.modules import MODULES, dotted, file_name, imports
 
 # The ranks of what lies directly in a package, lowest first: who imports must stand higher than
@@ -246,3 +249,11 @@ def test_planted_signature_is_found(source: str) -> None:
 )
 def test_sound_signature_is_passed(source: str) -> None:
     assert not list(_long_signatures("bim/x.py", source))
+
+
+def test_no_test_is_timed() -> None:
+    """Speed is a benchmark: a clock in a test makes it fail on a slow or busy machine."""
+    tests = (REPOSITORY / "tests").rglob("test_*.py")
+    clocks = re.compile(r"\b(process_time|perf_counter|thread_time|timeit)\b")
+    timed = {path.name for path in tests if clocks.search(path.read_text(encoding="utf-8"))}
+    assert timed == {Path(__file__).name}

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.glare import indices
-from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, annual_glare, figures, full_picture
+from mitsuba_cfs.glare.annual import (
+    FIGURES,
+    AnnualGlare,
+    Pictures,
+    annual_glare,
+    figures,
+    full_picture,
+)
 from mitsuba_cfs.glare.dgp_error import dgp_error, dgp_errors, hours_by_halves, random_signs
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
@@ -36,6 +43,7 @@ from mitsuba_cfs.methods.light import (
 )
 from mitsuba_cfs.methods.optics import States, hourly_states
 from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.phase_matrices import few_pictures
 from mitsuba_cfs.methods.phase_pictures import (
     pictures_by_state,
     pictures_in_state,
@@ -96,12 +104,22 @@ def hourly_glare(
     geometry = GlareView(light.scene.eye)
     table = np.full((len(FIGURES), len(chosen)), np.nan)
     kinds, kind = np.unique(rows, axis=1, return_inverse=True)
+    few = not direct and few_pictures(light.matrices, len(chosen))
+
+    @cache
+    def of_few() -> list[Pictures]:
+        return [made for _, made in pictures_by_state(phases, chosen, rows)]
+
+    def shown(i: int, columns: NDArray[np.int64]) -> Pictures:
+        nonlocal phases
+        if few:
+            return of_few()[i]
+        phases = with_phase_pictures(phases, direct=direct)  # unless all ratings are in the cache
+        return pictures_in_state(phases, chosen[columns], kinds[:, i].tolist(), direct=direct)
 
     def rated(i: int, columns: NDArray[np.int64]) -> NDArray[np.float64]:
-        nonlocal phases
-        phases = with_phase_pictures(phases, direct=direct)  # unless all ratings are in the cache
         glare = annual_glare(
-            pictures_in_state(phases, chosen[columns], kinds[:, i].tolist(), direct=direct),
+            shown(i, columns),
             geometry=geometry,
             options=options,
             illuminance=None if eye is None else eye[columns],

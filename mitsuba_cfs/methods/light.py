@@ -186,9 +186,13 @@ def with_systems(
         columns = np.flatnonzero(np.isin(hours, of_season))
         if not len(columns):
             continue
-        sky = one.sky.part(np.searchsorted(of_season, hours[columns]))
+        among = np.searchsorted(of_season, hours[columns])
+        sky = one.sky.part(among)
         if isinstance(one, PhaseLight):
-            changed: PhaseLight | PathLight = phase_light(one.matrices, systems, sky, needs=())
+            sun = None if one.reflected is None else one.reflected.part(among)
+            changed: PhaseLight | PathLight = phase_light(
+                one.matrices, systems, sky, needs=(), reflected=sun
+            )
         else:
             changed = replace(one, systems=systems, sky=sky)
         yield changed, rows[:, columns], columns

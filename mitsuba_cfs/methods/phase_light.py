@@ -147,6 +147,7 @@ def phase_light(
     sky: AnnualSky,
     *,
     needs: Collection[str] = DEFAULT_NEEDS,
+    reflected: ReflectedSun | None = None,
     progress: Progress = silent,
 ) -> PhaseLight:
     """The light of a scene with systems in its windows, in the hours of a sky.
@@ -154,13 +155,14 @@ def phase_light(
     Args:
         systems: the states of each window group [G].
         needs: metrics that several calls ask for, as of `phase_matrices`.
+        reflected: of these matrices and hours, where it has been traced for other systems.
     """
     check_systems(systems, matrices.scene.groups)
     if matrices.five_phase and sky.sun is None:
         raise ValueError("the five-phase method needs the sky's sun: annual_sky(..., sun=True)")
     of_all = [optics for states in systems for optics in states]
     matrices = with_exchange_of(with_needs(matrices, needs, progress=progress), of_all)
-    light = PhaseLight(matrices, systems, sky)
+    light = PhaseLight(matrices, systems, sky, reflected=reflected)
     if set(needs) - {"DGP"}:
         return with_sensor_light(light, progress=progress)
     return with_reflected_sun(light) if reflects_outdoors(matrices, of_all) else light
@@ -191,9 +193,12 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
         )
     hours = shining_hours(light)
     suns = _direct_sun(light, hours, progress)
-    room = _sunlit_room(light, coefficients)
+    reflected = _reflected_to_sensors(light, coefficients)
     sensors = tuple(
-        tuple(_sensor_light(light, one, g, room, (suns[j], hours)) for j, one in enumerate(group))
+        tuple(
+            _sensor_light(light, one, g, reflected.get((g, j)), (suns[j], hours))
+            for j, one in enumerate(group)
+        )
         for g, group in enumerate(coefficients)
     )
     return replace(light, sensors=sensors)
@@ -381,6 +386,21 @@ def _sunlit_room(
     return sunlit_room(light.matrices, light.reflected)
 
 
+def _reflected_to_sensors(
+    light: PhaseLight, coefficients: Sequence[Sequence[GroupCoefficients]]
+) -> dict[tuple[int, int], tuple[Array, Estimate]]:
+    """The reflected sun at the sensors through each group that looks outdoors, in each state."""
+    if light.reflected is None:
+        return {}
+    outdoors = coefficients[: len(light.scene.outdoor_groups)]
+    each = {(g, j): one for g, group in enumerate(outdoors) for j, one in enumerate(group)}
+    groups = [(g, one) for (g, _), one in each.items()]
+    room = _sunlit_room(light, coefficients)
+    return dict(
+        zip(each, reflected_to_sensors(light.matrices, light.reflected, room, groups), strict=True)
+    )
+
+
 def _passes_beam(one: GroupCoefficients) -> bool:
     return bool(beam_matrix(one.optics).any())
 
@@ -389,21 +409,21 @@ def _sensor_light(
     light: PhaseLight,
     one: GroupCoefficients,
     g: int,
-    room: SunlitRoom | None,
+    reflected: tuple[Array, Estimate] | None,
     direct: tuple[Estimate | None, NDArray[np.int64]],
 ) -> SensorLight:
     """The light of the sensors through a group in a state, with the five-phase method.
 
-    Args: direct: C_ds [G, S, h], and the hours h that it is of.
+    Args:
+        reflected: of `_reflected_to_sensors`.
+        direct: C_ds [G, S, h], and the hours h that it is of.
     """
-    beam, added = _passes_beam(one), None
+    added = None
     noise: list[SunNoise] = []
     if light.reflected is None:
-        added = _beam_in_room(light, one, g) if beam else None
-    elif g < len(light.scene.outdoor_groups):
-        cells = room if beam else None
-        more, traced = reflected_to_sensors(light.matrices, light.reflected, cells, one, g)
-        added, shining = more, light.reflected.shining
+        added = _beam_in_room(light, one, g) if _passes_beam(one) else None
+    elif reflected is not None:
+        (added, traced), shining = reflected, light.reflected.shining
         noise.append(SunNoise(traced, np.ones(len(shining)), shining))
     sun, (matrix, hours) = np.zeros((len(one.whole), len(light.sky.lit))), direct
     if matrix is not None:

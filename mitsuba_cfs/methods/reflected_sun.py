@@ -15,7 +15,8 @@ the five-phase method computes this light at points that represent the outdoor s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.methods.coefficients import (
     GroupCoefficients,
+    beam_matrix,
     direct_daylight,
     without_straight,
 )
@@ -31,8 +33,8 @@ from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.kernels.scene import TracedScene
-from mitsuba_cfs.trace.sun.reflected import outdoor_light, view_shares, window_shares
-from mitsuba_cfs.trace.sun.sunlit_cells import RoomCells
+from mitsuba_cfs.trace.sun.reflected import Straight, outdoor_light, view_shares, window_shares
+from mitsuba_cfs.trace.sun.sunlit_cells import Beam, RoomCells
 from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, room_shares
 
 BATCHES = 4  # each with its own paths and points
@@ -58,6 +60,19 @@ class ReflectedSun:
         """Directions [h, 3] and normal illuminance [h] [lx] of the sun."""
         return self.sky.direction[self.shining], self.sky.illuminance[self.shining]
 
+    @cached_property
+    def mean(self) -> NDArray[np.float32]:
+        """Luminance outside the windows [Q * K, h], the mean of the batches."""
+        first, *others = map(_flat, self.before)
+        return np.asarray(sum(others, start=first) / np.float32(BATCHES), dtype=np.float32)
+
+    def part(self, hours: NDArray[np.int64]) -> ReflectedSun:
+        """The same in some of the hours L, given by their numbers among them."""
+        number = np.searchsorted(self.shining, hours)
+        up = np.isin(hours, self.shining)
+        before = tuple(values[..., number[up]] for values in self.before)
+        return replace(self, sky=self.sky.part(hours), shining=np.flatnonzero(up), before=before)
+
 
 @dataclass(frozen=True)
 class SunlitRoom:
@@ -79,13 +94,12 @@ def reflected_sun(matrices: PhaseMatrices, sky: AnnualSky) -> ReflectedSun:
     suns = sky.direction[shining], sky.illuminance[shining]
     paths = sampling.patch_samples // WINDOW_SHARE // BATCHES
     samples = max(paths * len(scene.groups) // len(parts), 4)
-    before = []
-    for batch in range(BATCHES):
-        shares = window_shares(
-            outside, samples=samples, places=sampling.sun_points, seed=_seed(matrices, batch)
-        )
-        light = outdoor_light(shares, outside, *suns)
-        before.append(light.reshape(*by_patches.shape[:2], -1))
+    shares = window_shares(
+        outside, samples=samples, places=sampling.sun_points, seeds=_seeds(matrices)
+    )
+    before = (
+        light.reshape(*by_patches.shape[:2], -1) for light in outdoor_light(shares, outside, *suns)
+    )
     return ReflectedSun(sky, shining, inside, outside, tuple(before), by_patches)
 
 
@@ -113,25 +127,52 @@ def reflected_to_sensors(
     matrices: PhaseMatrices,
     sun: ReflectedSun,
     room: SunlitRoom | None,
+    groups: Sequence[tuple[int, GroupCoefficients]],
+) -> list[tuple[NDArray[np.float64], Estimate]]:
+    """Illuminance to add to that of the sensors through groups in a state each [S, L] [lx].
+
+    Args: room: None where no beam of the sun passes any group.
+
+    Returns: of each group what is added, and what was traced of it, in the hours h with sun [S, h].
+    """
+    seen = iter(_outdoors_seen(matrices, sun, groups))
+    return [
+        _to_sensors(matrices, sun, room, one, g, next(seen) if one.straight is not None else ())
+        for g, one in groups
+    ]
+
+
+def _outdoors_seen(
+    matrices: PhaseMatrices, sun: ReflectedSun, groups: Sequence[tuple[int, GroupCoefficients]]
+) -> list[Sequence[NDArray[np.float32]]]:
+    """Light of the sensors from what they see straight through groups [S, h], by batch."""
+    straight = [Straight(g, o.optics.scattering) for g, o in groups if o.straight is not None]
+    if not sun.before:
+        return [()] * len(straight)
+    views = view_shares(
+        sun.inside, sun.outside, straight, matrices.scene.sensors(),
+        samples=_sensor_samples(matrices, SENSOR_SHARE), places=matrices.sampling.sun_points,
+        seeds=_seeds(matrices),
+    )  # fmt: skip
+    light = outdoor_light(views, sun.outside, *sun.suns)
+    return [light[i : i + BATCHES] for i in range(0, len(light), BATCHES)]
+
+
+def _to_sensors(
+    matrices: PhaseMatrices,
+    sun: ReflectedSun,
+    room: SunlitRoom | None,
     group: GroupCoefficients,
     g: int,
+    seen: Sequence[NDArray[np.float32]],
 ) -> tuple[NDArray[np.float64], Estimate]:
-    """Illuminance to add to that of the sensors through a group in a state [S, L] [lx].
-
-    Args: room: None where no beam of the sun passes the group.
-
-    Returns: what is added, and what was traced of it, in the hours h with sun [S, h].
-    """
-    views = [
-        view_shares(
-            sun.inside, sun.outside, g, group.optics.scattering, matrices.scene.sensors(),
-            samples=_sensor_samples(matrices, SENSOR_SHARE), places=matrices.sampling.sun_points,
-            seed=_seed(matrices, batch),
-        )
-        for batch in range(BATCHES if sun.before and group.straight is not None else 0)
-    ]  # fmt: skip
-    parts = matrices.parts.of(g)
+    """`reflected_to_sensors` of one group; seen: of `_outdoors_seen`, none without a beam."""
+    parts, in_room = matrices.parts.of(g), []
     rest = [without_straight(matrices, group, q) for q in parts]
+    if room is not None and beam_matrix(group.optics).any():
+        scenes, points = (sun.inside, sun.outside), matrices.sampling.sun_points
+        beam = Beam(scenes, g, group.optics.scattering, points, tuple(_seeds(matrices)))
+        in_room = room_light(room.cells, room.shares, beam, sun.suns)
 
     def light_of(batch: int) -> NDArray[np.float64]:
         """The light of the sensors in the hours with sun [S, h]."""
@@ -139,14 +180,10 @@ def reflected_to_sensors(
         if sun.before:
             shares = np.concatenate(rest, axis=1).astype(np.float32)
             light += shares @ _flat(sun.before[batch], parts)
-        if views:
-            light += outdoor_light(views[batch], sun.outside, *sun.suns)
-        if room is not None:
-            light += room_light(
-                room.cells, room.shares[batch], (sun.inside, sun.outside), g,
-                group.optics.scattering, sun.suns,
-                points=matrices.sampling.sun_points, seed=_seed(matrices, batch),
-            )  # fmt: skip
+        if seen:
+            light += seen[batch]
+        if in_room:
+            light += in_room[batch]
         return light
 
     traced = accumulate(light_of, stopping=Stopping(BATCHES))
@@ -161,9 +198,8 @@ def replaced_luminance(sun: ReflectedSun, weights: NDArray[Any], on_patches: NDA
     """
     if not sun.before:
         return np.zeros((*sun.by_patches.shape[:2], weights.shape[1]))
-    some = weights[sun.shining].astype(np.float32)
-    mean = np.sum([before @ some for before in sun.before], axis=0) / BATCHES
-    return np.asarray(mean - sun.by_patches @ on_patches)
+    mean = sun.mean @ weights[sun.shining].astype(np.float32)
+    return np.asarray(mean.reshape(*sun.by_patches.shape[:2], -1) - sun.by_patches @ on_patches)
 
 
 def replaced_before(sun: ReflectedSun, shares: Array | None, hours: NDArray[np.int64]) -> Array:
@@ -179,7 +215,7 @@ def replaced_before(sun: ReflectedSun, shares: Array | None, hours: NDArray[np.i
     some = number[hours][number[hours] >= 0]
     if not sun.before or not len(some):
         return values
-    light = sum(_flat(before)[:, some] for before in sun.before) / np.float32(BATCHES)
+    light = sun.mean[:, some]
     if shares is not None:  # in single precision, as the windows' light is
         light = shares.astype(np.float32) @ light
     values[:, number[hours] >= 0] = light
@@ -201,6 +237,10 @@ def _by_patches(
     if group.straight is not None:
         coefficients = coefficients + group.straight.values.values - group.straight.direct
     return times_sky(coefficients, sun.sky.lit_sun)
+
+
+def _seeds(matrices: PhaseMatrices) -> list[int]:
+    return [_seed(matrices, batch) for batch in range(BATCHES)]
 
 
 def _seed(matrices: PhaseMatrices, batch: int) -> int:

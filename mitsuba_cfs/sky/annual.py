@@ -222,9 +222,8 @@ class AnnualSky:
     def part(self, hours: ArrayLike) -> AnnualSky:
         """Some of the hours L, given by their numbers among them."""
         hours = np.asarray(hours)
-        last = len(self.illuminance) - 1
-        if hours.dtype != bool and hours.size and not 0 <= hours.min() <= hours.max() <= last:
-            raise ValueError(f"hours: expected 0 to {last}, got {hours.min()} to {hours.max()}")
+        if hours.dtype != bool:
+            hours = hour_numbers(hours, len(self.illuminance))
         return replace(
             self,
             whole=self.whole[:, hours],

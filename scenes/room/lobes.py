@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.methods.glare import bright_hours, glare_with
-from mitsuba_cfs.methods.light import illuminance_with_systems
+from mitsuba_cfs.methods.light import illuminance, illuminance_with_systems
 from scenes.fenestration.peaks import as_lobes, lobe_effect, lobe_effect_on_sensors
 from scenes.results import GlareResults
 from scenes.room.glare import rating_of
@@ -64,9 +64,7 @@ def lobe_figures(
     if len(sunny):
         some = sunny[np.unique(np.linspace(0, len(sunny) - 1, LIT).astype(np.int64))]
         figures |= lobe_effect_on_sensors(
-            *(
-                illuminance_with_systems(light.light, systems, some, rows)
-                for systems in (light.light.systems, lobes)
-            )
+            illuminance(light.light, rows)[:, some],
+            illuminance_with_systems(light.light, lobes, some, rows),
         )
     return figures

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.benchmarks import harness
+from tests.benchmarks import bsdf_plugin, harness
 from tests.benchmarks.__main__ import main
 
 
@@ -53,6 +54,18 @@ def test_time_is_that_of_the_fastest_repetition_after_a_warm_one():
 
     result, seconds, processor = harness.timed(work, repeat=3)
     assert result == 3 and 0.02 <= seconds < 0.2 and processor < 0.2
+
+
+def test_the_peers_processor_time_is_free_of_waiting(monkeypatch):
+    """It was the sum of elapsed seconds, which other work on the machine makes longer."""
+    slow = bsdf_plugin.PEER[bsdf_plugin.PEER.index("start =") :].replace(
+        "    bsdf.sample(data, theta, phi, drawn, 15)", "    time.sleep(theta)"
+    )
+    begin = "import os, sys, time\nangles = [(0.5, 0.0)]\n"
+    monkeypatch.setattr(bsdf_plugin, "PEER", begin + slow)
+    share = bsdf_plugin.UNITS / (harness.THREADS * bsdf_plugin.DIRECTIONS * bsdf_plugin.DRAWN)
+    elapsed, processor = bsdf_plugin.theirs(Path("none.xml"))
+    assert elapsed >= 0.5 * share and processor < 0.2 * share
 
 
 def test_all_modules_take_part():

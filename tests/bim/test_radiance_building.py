@@ -401,3 +401,17 @@ def test_a_pane_beside_whose_fabric_light_passes_is_a_window_too(tmp_path, left,
     for front in fronts:  # the cloth's outdoor side, lit by the panes
         assert front.reflectance_visible == pytest.approx(0.4, abs=1e-3)
         assert 0 < 0.08 - front.triangles[..., 1].max() < 0.001
+
+
+def test_a_coordinate_that_is_too_small_is_zero_and_its_hole_reported(tmp_path):
+    """1e-320 m, which has three digits left, and 0 m give the same room."""
+    west = "12  0 0 0   0 6 0   0 6 3   0 0 3"
+    text, path = OFFICE.read_text(), tmp_path / "scene.rad"
+    assert text.count(west) == 1
+    rooms = []
+    for number in ("1e-320", "0"):
+        path.write_text(text.replace(west, f"12  0 0 0   0 {number} 0   0 6 3   0 0 3"))
+        building = read_building_file(path, ReadOptions())
+        assert issue_of(building, "room-with-open-edges")
+        rooms.append(np.concatenate([face.triangles for face in building.spaces[0].faces]))
+    np.testing.assert_array_equal(*rooms)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -74,15 +73,14 @@ def test_a_big_file_is_refused_before_it_is_parsed(tmp_path, monkeypatch):
         read_bsdf_xml(path)
 
 
-def test_the_cap_lets_a_sparse_giant_cost_no_time(tmp_path):
+def test_a_sparse_giant_is_refused_before_it_is_parsed(tmp_path, monkeypatch):
     path = tmp_path / "giant.xml"
     with open(path, "wb") as file:
         file.write(b"<WindowElement>")
         file.truncate(505_000_000)
-    start = time.process_time()
+    monkeypatch.setattr(xml.ElementTree, "fromstring", None)  # 86 s
     with pytest.raises(DataError, match=r"giant\.xml: is too big"):
         read_bsdf_xml(path)
-    assert time.process_time() - start < 2  # 86 s before
 
 
 def test_a_matrix_of_far_too_many_numbers_is_refused_before_they_are_read(tmp_path, monkeypatch):
@@ -145,9 +143,3 @@ def test_a_tree_is_turned_and_summed_once(monkeypatch):
     assert len({id(one) for one in calls}) == len(calls)
     assert tree.hemispherical() is tree.hemispherical()
     assert replace(tree).hemispherical() is not tree.hemispherical()
-
-
-def test_a_fine_isotropic_file_loads_in_little_time():
-    start = time.process_time()
-    plugin_trees(TensorTreeBsdf(transmission_front=dense(6)), False)
-    assert time.process_time() - start < 6  # 2.2 s on the machine where it was 14 s before

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 from test_tensor_tree import random_tree
@@ -63,13 +61,11 @@ def test_custom_basis_and_rows(tmp_path):
     np.testing.assert_allclose(rows.reflection_front, block.reshape(5, 7).T)
 
 
-def test_every_real_file_reads_fast_and_survives_a_round_trip(real_data, tmp_path):
+def test_every_real_file_survives_a_round_trip(real_data, tmp_path):
     for path in sorted((real_data / "bsdf").glob("*/*.xml")):
         if path.name == "radiance_testBSDF.xml":
             continue
-        start = time.perf_counter()
         file = read_bsdf_xml(path)
-        assert time.perf_counter() - start < 2, path
         write_bsdf_xml(file, tmp_path / path.name)
         again = read_bsdf_xml(tmp_path / path.name)
         for band, bsdf in file.bands.items():

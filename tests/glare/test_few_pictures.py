@@ -91,6 +91,16 @@ def test_few_pictures_are_those_of_the_matrices() -> None:
     assert len(set(np.round(means, 3))) == len(HOURS)  # the hours differ
 
 
+def test_glare_of_few_hours_needs_no_matrix_of_all_patches(monkeypatch) -> None:
+    """A single hour's glare traced a column for each patch of the windows."""
+    from mitsuba_cfs.methods.glare import hourly_glare
+
+    monkeypatch.setattr("mitsuba_cfs.methods.glare.with_phase_pictures", None)
+    rated = hourly_glare(light_of(), "DGP", STATES, hours=HOURS)
+    expected = [other.dgp for _, other in by_patches()]
+    assert rated.dgp == pytest.approx(expected, abs=1e-6)
+
+
 def test_matrices_at_hand_are_taken_and_many_pictures_get_them() -> None:
     matrices = light_of().matrices
     patches = 145 * len(matrices.parts.groups)

@@ -15,7 +15,7 @@ from mitsuba_cfs.glare.position_index import (
     position_index,
     view_angles,
 )
-from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.images.view import fisheye, frame
 
 ONE = (np.array([1e4]), np.array([0.01]), np.array([2.0]))  # L, omega, P
 CONTRAST = 1e8 * 0.01 / 4
@@ -220,3 +220,17 @@ def test_shares_and_quantiles_refuse_what_is_no_year():
 def test_the_error_of_a_year_is_the_root_mean_square_of_the_known_hours():
     assert classes.mean_error([3e-3, float("nan"), 4e-3]) == pytest.approx(3.5355e-3, rel=1e-4)
     assert classes.mean_error([float("nan")]) is None and classes.mean_error([]) is None
+
+
+def test_the_line_of_sight_itself_and_its_opposite_have_angles():
+    """Cosines of unit vectors round above one, whose arc cosine is no number."""
+    random = np.random.default_rng(2).normal(size=(300, 3))
+    sights = random / np.linalg.norm(random, axis=1, keepdims=True)
+    beyond = 0
+    for forward in sights:
+        view = fisheye((0, 0, 0), forward, 1)
+        beyond += forward @ frame(view)[2] > 1.0
+        sigma, tau, _ = view_angles([forward, -forward, frame(view)[1]], view)
+        np.testing.assert_allclose(sigma, [0.0, np.pi, np.pi / 2], atol=1e-7)
+        assert np.isfinite(tau).all()
+    assert beyond > 10

@@ -24,6 +24,7 @@ from mitsuba_cfs.methods.light import (
 )
 from mitsuba_cfs.methods.optics import AngularOptics, BsdfOptics
 from mitsuba_cfs.methods.phase_matrices import phase_matrices, with_outdoors
+from mitsuba_cfs.methods.reflected_sun import reflected_sun
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.methods.sun_by_patches import sunny_hour_dgp_error, sunny_hour_error
 from mitsuba_cfs.sky.annual import given_sky
@@ -94,7 +95,8 @@ def test_what_is_not_needed_is_not_traced_and_comes_out_the_same_later() -> None
     assert whole.matrices.view is not None
     for one, other in zip(illuminance_with_error(bare), illuminance_with_error(whole), strict=True):
         np.testing.assert_array_equal(one, other)
-    assert hourly_glare(bare).dgp == hourly_glare(whole).dgp
+    # the view's paths carry the hour's luminance, in float32, in place of a column for each patch
+    assert hourly_glare(bare).dgp == pytest.approx(hourly_glare(whole).dgp, abs=1e-6)
 
 
 def test_three_phases_say_how_far_their_blurred_sun_is_off() -> None:
@@ -195,6 +197,25 @@ def test_states_of_all_hours_are_those_of_the_lit_hours() -> None:
         illuminance(light, np.full(len(sky.lit), np.nan))
     with pytest.raises(ValueError, match="of the year"):
         illuminance(light, np.zeros(sky.hours + 1, dtype=int))
+
+
+def test_other_systems_take_the_reflected_sun_of_the_light(monkeypatch) -> None:
+    """It depends on the outdoors alone, and was traced again for each system."""
+    sky = given_sky(
+        [[0.0, -0.8, 0.6], [0.3, -0.7, 0.6], [0.0, 0.6, 0.8]], [800.0, 0.0, 800.0], [90.0] * 3, 1,
+        day_of_year=172,
+    )  # fmt: skip
+    light = daylight(scene(), glass(), sky, sampling=FEW)
+    hours, other = np.array([0, 1, 2]), [[AngularOptics([0.0, 0.4, 0.4])]]
+    expected = illuminance(daylight(light.scene, other, sky, sampling=FEW))
+    traced = reflected_sun(light.matrices, sky.part(hours[1:]))
+    part = light.reflected.part(hours[1:])
+    np.testing.assert_array_equal(part.shining, traced.shining)
+    assert part.shining.tolist() == [1] and part.before[0].any()
+    np.testing.assert_array_equal(part.before, traced.before)
+    monkeypatch.setattr("mitsuba_cfs.methods.phase_light.reflected_sun", None)
+    lit = illuminance_with_systems(light, other, hours[1:])
+    np.testing.assert_allclose(lit, expected[:, hours[1:]], rtol=1e-7)
 
 
 def test_other_systems_keep_each_hours_state() -> None:

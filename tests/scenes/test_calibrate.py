@@ -6,8 +6,6 @@ That the rule is followed, whatever costs and errors are, is judged by random on
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 
@@ -169,12 +167,9 @@ def test_without_a_calibration_the_shipped_costs_are_taken_and_said(tmp_path, mo
     assert "measured on this machine by `cfs calibrate`" in why and "ship" not in why
 
 
-def test_the_machines_speed_is_measured_in_seconds(variant):
-    start = time.process_time()
+def test_the_machines_speed_is_measured(variant):
     found = measured_speed()
     assert 0 < found.rating < found.tracing
-    # all threads, kernels that are compiled the first time among them; 4 s on two busy cores
-    assert time.process_time() - start < 30
 
 
 def test_the_machine_is_tested_once_in_a_process(monkeypatch):

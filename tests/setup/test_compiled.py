@@ -10,6 +10,8 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 REPOSITORY = Path(__file__).parents[2]
 PACKAGES = ("mitsuba_cfs", "bim", "thermal", "scenes")
 
@@ -81,6 +83,8 @@ def test_code_of_another_version_with_other_types_is_compiled_again(tmp_path) ->
 CALL = """
 import sys, time
 from pathlib import Path
+
+import pytest
 import numpy as np
 from numba.core.caching import IndexDataCacheFile
 import increment
@@ -161,3 +165,26 @@ def test_code_is_compiled_anew_when_what_is_inlined_changes(tmp_path) -> None:
         ).stdout.strip()  # fmt: skip
 
     assert [said(step) for step in (1, 1, 2)] == ["True 2 False", "False 2 False", "True 3 False"]
+
+
+BALANCE = """
+from mitsuba_cfs.compiled import must_compile
+from tests.thermal.rooms import box, climate, sun
+from thermal import kernel
+from thermal.balance import simulate
+zone = box()
+before = must_compile(kernel.advance)
+simulate(zone, climate(24), sun(24, zone))
+print(before, must_compile(kernel.advance))
+"""
+
+
+@pytest.mark.slow  # quick: the same of small functions, above
+def test_the_heat_balance_is_compiled_once(tmp_path) -> None:
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    for said in ("True False", "False False"):
+        ran = subprocess.run(
+            [sys.executable, "-c", BALANCE], env=environment, cwd=REPOSITORY,
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        assert ran.stdout.strip() == said

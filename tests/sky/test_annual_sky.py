@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from mitsuba_cfs.sky.annual import AnnualSky, hour_numbers
+from mitsuba_cfs.sky.annual import AnnualSky, annual_sky, given_sky, hour_numbers
+from mitsuba_cfs.sky.weather import Weather
 
 
 @pytest.fixture
@@ -38,6 +40,45 @@ def test_parts_without_the_sun_and_the_whole_year(sky):
     assert sky.whole_year(np.array([[1.0, 2.0, 3.0]])).tolist() == [[0, 1, 2, 0, 3]]
     with pytest.raises(ValueError, match="made without the sun alone"):
         replace(sky, sun=None).without_sun()
+
+
+def test_the_sun_alone_for_the_methods_is_made_once(sky):
+    alone = sky.lit_sun
+    assert (alone.toarray() if hasattr(alone, "toarray") else alone).tolist() == sky.sun.tolist()
+    assert sky.lit_sun is alone
+    assert sky.sun_alone().tolist() == sky.sun.tolist()
+    assert sky.sun_alone([2]).tolist() == [[3], [0]]
+    bare = replace(sky, sun=None)
+    for made in (lambda: bare.lit_sun, bare.sun_alone):
+        with pytest.raises(ValueError, match="made without the sun alone"):
+            made()
+    assert [list(one) for one in bare.totals(np.ones(3, bool))] == [[21, 7], [0, 0], [0, 0]]
+
+
+def test_parts_by_number_or_mask_are_of_the_hours_alone(sky):
+    solar = replace(sky, solar=sky.whole / 100)
+    part = solar.part(np.array([False, True, True]))
+    assert part.whole.tolist() == [[7, 9], [2, 4]] and part.illuminance.tolist() == [1, 2]
+    assert part.solar.tolist() == [[0.07, 0.09], [0.02, 0.04]] and part.hours == 5
+    assert len(solar.part([]).lit) == 0 and solar.part([0, 2]).lit.tolist() == [1, 4]
+    for wrong in ([3], [-1], [0, 3]):
+        with pytest.raises(ValueError, match="hours: expected numbers from 0 to 2"):
+            solar.part(wrong)
+
+
+def test_skies_have_the_sun_alone_and_no_heat_unless_asked():
+    """A sun at 60 degrees and one below the horizon, which is not lit."""
+    suns = [[0.0, 0.5, np.sqrt(0.75)], [0.0, 0.8, -0.6]]
+    given = given_sky(suns, [500.0, 0.0], [100.0, 0.0], 1, day_of_year=[100.0, 100.0])
+    assert given.sun is not None and given.solar is None
+    assert given.lit.tolist() == [0] and given.hours == 2
+    times = pd.date_range("2023-04-10 12:00", periods=2, freq="12h")
+    year = Weather("site", 40.0, 0.0, 0.0, 0.0, 1.0, times, np.array([500.0, 0.0]),
+                   np.array([100.0, 0.0]))  # fmt: skip
+    sky = annual_sky(year, 1)
+    assert sky.sun is not None and sky.solar is None and sky.lit.tolist() == [0]
+    bare = annual_sky(year, 1, sun=False, solar=True)
+    assert bare.sun is None and bare.solar.shape == bare.whole.shape
 
 
 def test_numbers_of_hours():

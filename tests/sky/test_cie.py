@@ -136,6 +136,32 @@ def test_standard_skies_by_the_formula_of_the_standard(row):
         assert relative_luminance(int(number), [towards], sun)[0] == pytest.approx(by_hand)
 
 
+@pytest.mark.parametrize("row", ISO_15469.split(","))
+def test_gradation_of_the_horizon_is_one(row):
+    """exp(b/cos Z) is 0 there; at the sun itself the indicatrix is that of angle 0."""
+    number, a, b, c, d, e = map(float, row.split())
+    sun = sun_at(33.0, 140.0)
+
+    def f(chi):
+        return 1 + c * (np.exp(d * chi) - np.exp(d * np.pi / 2)) + e * np.cos(chi) ** 2
+
+    whole = (1 + a * np.exp(b)) * f(np.radians(57.0))
+    horizon, at_sun = relative_luminance(int(number), [sun_at(0.0, 140.0), sun], sun)
+    assert horizon == pytest.approx(f(np.radians(33.0)) / whole, rel=1e-9)
+    gradation = 1 + a * np.exp(b / np.sin(np.radians(33.0)))
+    assert at_sun == pytest.approx(gradation * f(0.0) / whole, rel=1e-7)
+
+
+def test_the_direction_of_the_sun_itself_is_a_number():
+    """The cosine of the angle to it rounds above one in some directions."""
+    random = np.random.default_rng(4).normal(size=(300, 3))
+    suns = np.abs(random / np.linalg.norm(random, axis=1, keepdims=True))
+    assert any(sun @ sun > 1.0 for sun in suns)
+    for kind in ("clear", "intermediate", 12):
+        for sun in suns:
+            assert np.isfinite(relative_luminance(kind, [sun, -sun], sun)).all()
+
+
 def test_clear_and_intermediate_skies_by_the_formulas_of_gensky():
     """skybright.cal: 0.91 + 10 exp(-3 chi) + 0.45 cos^2 chi; Nakamura's intermediate sky."""
     sun, towards = sun_at(33.0, 140.0), sun_at(55.0, 200.0)

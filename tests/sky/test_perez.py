@@ -176,3 +176,34 @@ def test_limits_of_the_model():
     assert low.brightness[0] == 0.6
     np.testing.assert_allclose(low.sun, [[1.0, 0.0, 0.0]], atol=1e-12)
     assert low.direct_efficacy[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("clearness", "brightness", "counts"),
+    [(1.06, 0.05, 0.05), (1.07, 0.05, 0.2), (1.1, 0.3, 0.3), (2.79, 0.05, 0.2), (2.81, 0.05, 0.05)],
+)
+def test_brightness_counts_as_a_fifth_at_least_between_two_clearnesses(
+    clearness, brightness, counts
+):
+    """1.065 to 2.8, as gendaylit has it: b of category 3 or 5 by its printed row."""
+    category = 2
+    zenith, x = 1.0, perez.LUMINANCE_COEFFICIENTS[category, 1]
+    found = perez.luminance_coefficients(
+        np.array([category]), np.array([clearness]), np.array([brightness]), np.array([zenith])
+    )
+    by_hand = x[0] + x[1] * zenith + counts * (x[2] + x[3] * zenith)
+    assert found[1, 0] == pytest.approx(by_hand)
+
+
+def test_gradation_of_the_horizon_and_the_floor_of_zero():
+    """[1 + a exp(b/cos Z)][1 + c exp(d gamma) + e cos^2 gamma] by hand, never below zero."""
+    coefficients = np.array([[-0.6], [-0.1], [2.0], [-1.5], [0.3]])
+    found = perez.relative_luminance(coefficients, np.array([0.0, 0.5]), np.cos([[0.7], [1.2]]))[
+        :, 0
+    ]
+    around = [1 + 2.0 * np.exp(-1.5 * g) + 0.3 * np.cos(g) ** 2 for g in (0.7, 1.2)]
+    assert found[0] == pytest.approx(around[0], rel=1e-9)
+    assert found[1] == pytest.approx((1 - 0.6 * np.exp(-0.2)) * around[1])
+    negative = coefficients.copy()
+    negative[0] = -5.0
+    assert perez.relative_luminance(negative, np.array([1.0]), np.array([[0.5]])) == 0.0

@@ -62,3 +62,14 @@ def test_the_node_of_a_pipe_is_the_nearest_inner_one_below_the_inside_face():
         assert grid.node_at(depth, "pipe") == node
     with pytest.raises(ThermalInputError, match=r"pipe.*0.161 m lies below its layers"):
         grid.node_at(0.161, "pipe")
+    # cells of 20 mm outside, of 15 mm inside: inner nodes at .11, .09, .07, .05, .03 and .015 m
+    uneven = wall_grid((Layer(0.1, 0.5, 1000.0, 900.0), Layer(0.03, 1.0, 2000.0, 900.0)), cell=0.02)
+    assert [uneven.node_at(depth, "pipe") for depth in (0.068, 0.052, 0.016)] == [2, 3, 5]
+
+
+@pytest.mark.parametrize(("thickness", "cells"), [(0.005, 2), (0.14, 7), (0.1801, 10)])
+def test_cells_are_at_most_as_wide_as_wanted_and_two_at_least(thickness, cells):
+    grid = wall_grid((Layer(thickness, 0.5, 1000.0, 900.0),), cell=0.02)
+    np.testing.assert_allclose(grid.width, [thickness / cells] * cells)
+    with pytest.raises(ThermalInputError, match="has no layers"):
+        wall_grid(())

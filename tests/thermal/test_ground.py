@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,8 +13,14 @@ from thermal.climate import no_sun
 from thermal.emitters import IdealLoads
 from thermal.errors import ThermalInputError
 from thermal.ground import (
+    AIR_WH,
+    CELLAR_AIR,
+    MONTH,
     R_SE,
+    R_SI_ACROSS,
     R_SI_DOWN,
+    SHIELDS,
+    SOIL_LAYER,
     SOILS,
     YEAR,
     Footprint,
@@ -287,6 +295,63 @@ def test_layers_and_temperature_beyond_give_the_heat_flow_of_the_standard():
     floor = suspended_floor(HOUSE, 1.0, height=0.5, wall_u=0.8, vents=0.002, wind=4.0)
     (air, _) = floor.layers((CONCRETE,))
     assert air.resistance == pytest.approx(1.0 / floor.u_value - 1.0 - 0.17)
+
+
+def test_constants_of_the_standard():
+    """ISO 13370, 7.4 and tables 7 and 8; ISO 6946, table 7; ISO 52016-1, 6.5.8.2."""
+    assert (YEAR, MONTH) == (8760.0, 730.0)
+    assert (R_SE, R_SI_DOWN, R_SI_ACROSS, SOIL_LAYER) == (0.04, 0.17, 0.13, 0.5)
+    assert (CELLAR_AIR, AIR_WH) == (0.3, 0.33)
+    assert SHIELDS == {"sheltered": 0.02, "average": 0.05, "exposed": 0.10}
+    soils = {"clay": (1.5, 3.0e6), "sand": (2.0, 2.0e6), "rock": (3.5, 2.0e6)}
+    assert {name: (s.conductivity, s.heat_capacity) for name, s in SOILS.items()} == soils
+
+
+def test_what_is_no_ground_is_refused():
+    for area, perimeter, wall in ((0.0, 40.0, 0.3), (100.0, 0.0, 0.3), (100.0, 40.0, -0.01),
+                                  (100.0, 40.0, 3.01)):  # fmt: skip
+        with pytest.raises(ThermalInputError, match="ground"):
+            Footprint(area, perimeter, wall, SOILS["clay"])
+    for wall in (0.0, 3.0):
+        Footprint(0.5, 0.5, wall, SOILS["clay"])
+    for depth in (0.04, 50.5):
+        with pytest.raises(ThermalInputError, match="depth of the basement"):
+            basement(HOUSE, 0.5, 1.0, depth)
+    basement(HOUSE, 0.5, 1.0, 50.0)
+    better = replace(slab_on_ground(HOUSE, 1.0), resistance=20.0)
+    with pytest.raises(ThermalInputError, match="insulates better than U says"):
+        better.layers((CONCRETE,))
+
+
+def test_thin_ground_leaves_a_tenth_to_the_virtual_layer():
+    """Where half a metre of soil resists more than U says: nine tenths of it are soil."""
+    element = replace(slab_on_ground(HOUSE, 1.0), u_value=1 / (0.17 + 1.0 + 0.2))
+    virtual, soil, _ = element.layers((CONCRETE,))
+    assert (virtual.resistance, soil.resistance) == pytest.approx((0.02, 0.18))
+    assert soil.thickness == pytest.approx(0.18 * 1.5) and virtual.density == 0.0
+
+
+def test_cellar_by_its_printed_swing():
+    """ISO 13370, H.8: ground by 2 - exp(-z/delta), outdoors by walls and air, over all of them."""
+    k, z, reach = 1.5, 2.0, np.sqrt(3.15e7 * 1.5 / (np.pi * 3.0e6))
+    own, air = 1 / (2 * 0.17 + 1.0), 0.33 * 0.3 * 100 * 2.5
+    outdoors = 0.5 * 40 * 1.5 + air
+    d = 0.3 + k * (0.17 + 0.6 + 0.04)
+    ground = 0.37 * 40 * k * (2 - np.exp(-z / reach)) * np.log(reach / d + 1)
+    whole = (100 + z * 40) * k / reach + outdoors + 100 * own
+    cellar = over_unheated_basement(HOUSE, 1.0, depth=z, height=0.5, wall_u=1.5,
+                                    floor_resistance=0.6)  # fmt: skip
+    assert cellar.swing == pytest.approx(own * (ground + outdoors) / whole)
+    assert (cellar.lag, cellar.resistance, cellar.r_si, cellar.soil) == (1.0, 1.0, 0.17, None)
+
+
+def test_slab_as_thick_as_its_dimension_is_an_insulated_one():
+    """(4) holds below B' = 5 m, (5) from it on."""
+    for thickness, u in (
+        (4.999, 2 * 1.5 / (np.pi * 5 + 4.999) * np.log(np.pi * 5 / 4.999 + 1)),
+        (5.0, 1.5 / (0.457 * 5 + 5.0)),
+    ):
+        assert slab_u(HOUSE, thickness) == pytest.approx(u, rel=1e-12)
 
 
 def test_harmonic_of_a_cosine():

@@ -207,6 +207,30 @@ def test_the_faces_of_a_wall_keep_their_sides():
     halves = [0.5 * one.thickness / n * one.density * one.heat_capacity
               for one, n in ((INSULATION, 7), (CONCRETE, 10))]  # fmt: skip
     assert net.faces.port[0, :2] * 600.0 == pytest.approx(halves)
+    between = [one.conductivity * n / one.thickness for one, n in ((INSULATION, 7), (CONCRETE, 10))]
+    assert net.faces.port[0, 2:4] == pytest.approx(between)
+
+
+@pytest.mark.parametrize("emissivity", [(0.001, 0.5), (0.0, 0.0)])
+def test_radiant_gains_go_by_area_and_emissivity_or_by_area_alone(emissivity):
+    """By A eps; where no face takes any longwave, by A."""
+    south = np.array([0.0, -1.0, 0.0])
+    walls = tuple(
+        OpaqueSurface(str(area), area, (CONCRETE,), sign * south, "adiabatic", emissivity_in=eps)
+        for area, sign, eps in zip((10.0, 30.0), (1, -1), emissivity, strict=True)
+    )
+    zone = Zone("room", 60.0, walls)
+    net = network([zone], [window_mix(zone, None, 1)], step_s=600.0, terrain="suburbs",
+                  cell=0.02, link=np.zeros((1, 1)))  # fmt: skip
+    weight = np.array([10.0, 30.0]) * (emissivity if any(emissivity) else 1.0)
+    np.testing.assert_allclose(net.radiation.shares(0)[0], weight / weight.sum(), rtol=1e-9)
+
+
+def test_star_of_a_face_larger_than_all_others():
+    """Its F has no bound: the small face sees it alone, to 0.1 %."""
+    x = exchange_star([30.0, 2.0], [0.9, 0.4])
+    exact = 1 / (0.1 / (0.9 * 30.0) + 1 / 2.0 + 0.6 / (0.4 * 2.0))
+    assert x[0, 1] == pytest.approx(exact, rel=1e-3)
 
 
 def test_a_frame_is_massless_and_has_its_u():

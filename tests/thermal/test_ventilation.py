@@ -261,6 +261,38 @@ def test_cross_flow_is_between_facades():
     assert stack == pytest.approx(0.25 * 25.0 * 0.0035 * 1.5)
     assert cross_flow([2.0, 3.0], [0.0, 315.0], 1.5) == (0.0, pytest.approx(stack))
     assert cross_flow([2.0, 3.0], [10.0, 280.0], 1.5)[0] == pytest.approx(wind)
+    # three facades: each against all others together, two and two added
+    areas = {180.0: 2.0, 90.0: 3.0, 270.0: 1.0}
+    sides = [0.25 / np.sqrt(1 / a**2 + 1 / (6.0 - a) ** 2) for a in areas.values()]
+    wind, stack = cross_flow([*areas.values()], [*areas], 1.5)
+    assert wind == pytest.approx((0.67 * sum(sides)) ** 2 * 0.75)
+    assert stack == pytest.approx(0.25 * 36.0 * 0.0035 * 1.5)
+
+
+@pytest.mark.parametrize(
+    ("make", "wrong", "right"),
+    [
+        (lambda n: aim2(1.0, n, stack=1.0, wind=1.0), (0.49, 1.01), (0.5, 1.0)),
+        (lambda share: SupplyAir(1.0, recovery=share), (-0.01, 1.01), (0.0, 1.0)),
+        (SupplyAir, (-0.01, np.array([1.0, -1.0])), (0.0, np.zeros(2))),
+        (lambda share: WindowAiring(1.0, 1.0, share=share), (-0.01, 1.01, np.array([0.0, 2.0])),
+         (0.0, 1.0)),
+        (lambda c: WindowAiring(1.0, 1.0, open_above_c=22.0, close_below_c=c), (22.1,),
+         (22.0, 20.0)),
+        (lambda flow: AirTransfer("a", "b", flow), (-0.01, np.array([1.0, -1.0])), (0.0,)),
+        (lambda name: AirTransfer("a", name, 1.0), ("a",), ("b",)),
+        (lambda flow: NeighbourAir(20.0, flow=flow), (-0.01, np.array([1.0, -1.0])), (0.0,)),
+        (lambda flow: NeighbourAir(20.0, buoyant=flow), (-0.01,), (0.0,)),
+        (lambda share: NeighbourAir(20.0, share=share), (-0.01, np.array([0.5, -1.0])), (0.0,)),
+        (lambda a: Leakage((1.0, 0.0, 0.0, a)), (-0.01,), (0.0,)),
+    ],
+)  # fmt: skip
+def test_limits_of_air_are_allowed_and_what_lies_beyond_is_refused(make, wrong, right):
+    for value in right:
+        make(value)
+    for value in wrong:
+        with pytest.raises(ThermalInputError):
+            make(value)
 
 
 def test_air_that_cannot_be_is_refused():

@@ -103,8 +103,10 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     groups = [one for (one,) in group_coefficients(matrices, [[one] for one in chosen])]
     sun = reflected_sun(matrices, sky)
     expected -= np.einsum("sgk,gkh->sh", view - direct_view, by_patch)
-    for g, cells in enumerate((sunlit_room(matrices, sun), None)):  # the diffuser has no beam
-        expected += reflected_to_sensors(matrices, sun, cells, groups[g], g)[0]
+    for added, _ in reflected_to_sensors(
+        matrices, sun, sunlit_room(matrices, sun), list(enumerate(groups))
+    ):
+        expected += added
     whole, direct = groups[0].straight.values.values, groups[0].straight.direct
     lost = direct_view[:, 0] * groups[0].beam
     expected += (whole - lost @ matrices.daylight.values[0]) @ sky.whole

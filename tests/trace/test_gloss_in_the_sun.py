@@ -160,7 +160,8 @@ def test_window_patches_have_the_sun_of_a_rough_facade_in_its_lobe(alpha):
 
     outside = TracedScene(facade(mirror(0.6, alpha)), rooms.test_room()[1])
     shares = window_shares(outside, samples=1024)
-    found = outdoor_light(shares, outside, np.stack([SUN, -SUN]), np.full(2, SUN_SOLID_ANGLE))
+    suns = np.stack([SUN, -SUN])
+    [found] = outdoor_light(shares, outside, suns, np.full(2, SUN_SOLID_ANGLE))
     irradiance = KLEMS_FULL.projected_solid_angles() @ found
     # the house itself hides the sun from what of the facade lies right before its window
     assert irradiance[0] == pytest.approx(lobe_irradiance(0.6, alpha), rel=0.02)

@@ -74,7 +74,7 @@ def test_a_wide_wall_in_the_sun_has_the_same_luminance_in_all_patches():
     far = rooms.quad((-1e3, -4, -1e3), (1e3, -4, -1e3), (1e3, -4, 1e3), (-1e3, -4, 1e3))
     outside = TracedScene(rooms.surfaces([(far, 0.4)]), rooms.test_room()[1])
     suns = np.array([towards(30, 180), towards(60, 150), towards(30, 0)])  # the last behind it
-    found = outdoor_light(window_shares(outside, samples=64), outside, suns, np.full(3, LUX))
+    [found] = outdoor_light(window_shares(outside, samples=64), outside, suns, np.full(3, LUX))
     expected = 0.4 / np.pi * LUX * np.maximum(suns[:, 1], 0)
     off = found.reshape(K, 3) - expected
     # the window hides the sun from as much of the wall as it is large itself
@@ -96,7 +96,7 @@ def test_each_place_stands_for_those_of_its_own_face():
     outside = TracedScene(surfaces, rooms.test_room()[1])
     sun = np.array([[0.0, 0.0, 1.0]])
     shares = window_shares(outside, samples=256)
-    found = outdoor_light(shares, outside, sun, np.array([LUX]))[:, 0]
+    found = outdoor_light(shares, outside, sun, np.array([LUX]))[0][:, 0]
     down = (KLEMS_FULL.incident_directions() @ rooms.test_room()[1][0].frame)[:, 2]
     sunlit, dark = found[down < -0.75], found[down > 0.3]
     assert sunlit == pytest.approx(0.5 / np.pi * LUX, rel=0.01)
@@ -130,11 +130,29 @@ def test_fewer_points_of_the_sun_are_fewer_places_outdoors_with_the_same_light()
     suns = np.array([towards(40, 180), towards(60, 120)])
     found = []
     for places in (1024, 128):
-        several = [window_shares(outside, samples=32, places=places, seed=s) for s in range(4)]
+        several = window_shares(outside, samples=32, places=places, seeds=range(4))
         assert all(0.8 * places < s.places.size <= places + 26 for s in several)
-        light = [outdoor_light(s, outside, suns, np.full(2, LUX)) for s in several]
+        light = outdoor_light(several, outside, suns, np.full(2, LUX))
         found.append(np.mean(light, axis=(0, 1)))
     np.testing.assert_allclose(*found, rtol=0.02)
+
+
+def test_runs_in_one_launch_have_the_light_that_each_has_alone(monkeypatch):
+    """Batches share launches, as many as fit; the random numbers of each are its own."""
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun import reflected as module
+
+    outside = TracedScene(overhang(2.0), rooms.test_room()[1])
+    suns, lux = np.array([towards(40, 180), towards(60, 120), towards(30, 50)]), np.full(3, LUX)
+    seeds, options = (0, 3, 4), {"samples": 4, "places": 64}
+    alone = [module.window_shares(outside, seeds=[seed], **options)[0] for seed in seeds]
+    each = [module.outdoor_light([one], outside, suns, lux)[0] for one in alone]
+    assert all(one.any() for one in each) and not np.array_equal(*each[:2])
+    for lanes in (module.LANES, 2 * K * 4, 100):  # all, two and one in a launch, hours apart
+        monkeypatch.setattr(module, "LANES", lanes)
+        together = module.window_shares(outside, seeds=seeds, **options)
+        light = module.outdoor_light(together, outside, suns, lux)
+        np.testing.assert_array_equal(light, each)
 
 
 def test_what_stands_before_the_sun_leaves_a_floor_dark():
@@ -146,7 +164,7 @@ def test_what_stands_before_the_sun_leaves_a_floor_dark():
     outside = TracedScene(rooms.surfaces([(floor, 0.5), (roof, 0.0)]), rooms.test_room()[1])
     suns = np.array([[0.0, 0.0, 1.0], towards(1, 0)])  # the second shines in below the roof
     shares = window_shares(outside, samples=16)
-    found = outdoor_light(shares, outside, suns, np.full(2, LUX))
+    [found] = outdoor_light(shares, outside, suns, np.full(2, LUX))
     assert np.all(found[:, 0] == 0) and found[:, 1].max() > 100
 
 
@@ -174,6 +192,7 @@ def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
     """A closed room of one reflectance: rho / (1 - rho) of the flux over its area, on average."""
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.sunlit_cells import Beam
     from mitsuba_cfs.trace.sun.sunlit_sensors import CELL_RAYS, room_cells, room_light, room_shares
 
     room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
@@ -192,10 +211,11 @@ def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
     share = room_shares(cells, inside, (places, normals), samples=256)
     sun = towards(40, 20)[None]
     way = BsdfOptics(clear_glass()).scattering
-    lux = room_light(cells[0], share, (inside, outside), 0, way, (sun, np.array([LUX])))
+    suns = sun, np.array([LUX])
+    [lux] = room_light(cells[0], [share], Beam((inside, outside), 0, way), suns)
     flux = 0.8 * LUX * -sun[0, 1] * 1.0
     wall = TracedScene(rooms.surfaces([(9 * square(1, 0.0) - 12, 0.0)]), [group])
-    hidden = room_light(cells[0], share, (inside, wall), 0, way, (sun, np.array([LUX])))
+    [hidden] = room_light(cells[0], [share], Beam((inside, wall), 0, way), suns)
     assert np.all(hidden == 0)
     # light that the black hole of 1 m2 in 54 takes: twice, as it hides the wall behind it
     assert lux.mean() == pytest.approx(0.6 / (1 - 0.6 * (1 - 1 / 54)) * flux / 54, rel=0.03)
@@ -216,6 +236,28 @@ def test_few_rays_of_a_sensor_ask_for_few_from_the_cells_with_the_same_light():
     np.testing.assert_allclose(*found, rtol=0.005)
 
 
+def test_batches_of_a_beam_in_one_launch_are_those_of_each_alone(monkeypatch):
+    """Hours of several batches share launches; each batch keeps its points on the window."""
+    from mitsuba_cfs.methods.optics import BsdfOptics
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun import sunlit_cells as module
+
+    room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
+    inside, outside = TracedScene(room, [hole()]), TracedScene(overhang(2.0), [hole()])
+    cells = module.surface_cells(inside).cells
+    suns = np.array([towards(40, 20), towards(30, 60), towards(50, 200), towards(20, -30)])
+    way, seeds, points = BsdfOptics(clear_glass()).scattering, (0, 3, 4), 64
+
+    def flux(*some: int):
+        return module.Beam((inside, outside), 0, way, points, some).flux(cells, suns).toarray()
+
+    each = np.concatenate([flux(seed) for seed in seeds], axis=1)
+    assert each.any() and not np.array_equal(each[:, :4], each[:, 4:8])
+    np.testing.assert_array_equal(flux(*seeds), each)
+    monkeypatch.setattr(module, "RAYS", 5 * points // module.EDGE_SHARE)  # five columns at once
+    np.testing.assert_array_equal(flux(*seeds), each)
+
+
 def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
     """One wall reflects: the flux of points of the hole over their distances, by quadrature.
 
@@ -224,6 +266,7 @@ def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
     """
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.sunlit_cells import Beam
     from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, room_shares
 
     sides = [(k, at) for k in range(3) for at in (0.0, 3.0)]
@@ -244,7 +287,8 @@ def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
         sensor = place[None], np.array([[0.0, 0.0, 1.0]])
         share = room_shares(cells, inside, sensor, samples=65_536, seed=seed)
         suns = sun[None], np.array([LUX])
-        found.append(room_light(cells[0], share, (inside, outside), 0, beam, suns, seed=seed)[0, 0])
+        of_seed = Beam((inside, outside), 0, beam, seeds=(seed,))
+        found.append(room_light(cells[0], [share], of_seed, suns)[0][0, 0])
     assert np.mean(found) == pytest.approx(expected, rel=0.08)  # 0.05, and 0.02 of noise
 
 

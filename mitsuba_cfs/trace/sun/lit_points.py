@@ -28,6 +28,7 @@ grid is even in Lambert's azimuthal equal-area projection (Snyder 1987, "Map pro
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -97,23 +98,30 @@ class ReflectingPoints:
 def reflecting_points(
     tracer: TracedScene,
     start: SurfacePoints,
-    seed: int,
+    seed: int | Sequence[tuple[int, int]],
     bounces: int = BOUNCES,
     *,
     mirrored: bool = False,
 ) -> ReflectingPoints:
     """The points that one path from each start meets, one after the other.
 
-    Args: mirrored: whether E_sun includes the sun in smooth mirrors.
+    Args:
+        seed: or the seed and the number of starts of several runs, one after the other, each of
+            which has the points that it has alone.
+        mirrored: whether E_sun includes the sun in smooth mirrors.
     """
     path, weight, places = np.arange(start.size), np.ones(start.size), start
     paths, weights, met = [np.empty(0, dtype=np.int64)], [np.empty(0)], []
-    key = dr.opaque(mi.UInt32, (seed ^ 0x2545F491) & 0xFFFFFFFF)
+    runs = [(seed, start.size)] if isinstance(seed, int) else seed
+    within = np.concatenate([path[:0], *(np.arange(count) for _, count in runs)])
+    keys = [(one ^ 0x2545F491) & 0xFFFFFFFF for one, _ in runs]
+    key_of = np.repeat(np.array(keys, dtype=np.uint32), [count for _, count in runs])
     for bounce in range(bounces):
         if not len(path):
             break
-        number = column(path * bounces + bounce, mi.UInt32)
-        kept, places, (rho, own), luck = _next(tracer, places, path_generator(number, key))
+        number = column(within[path] * bounces + bounce, mi.UInt32)
+        generator = path_generator(number, column(key_of[path], mi.UInt32))
+        kept, places, (rho, own), luck = _next(tracer, places, generator)
         path, before = path[kept], weight[kept]
         weight, own = before * rho, before * (own if mirrored else rho)
         paths.append(path[own > 0])
@@ -186,15 +194,23 @@ def on_disc_of(centre: mi.Vector3f, number: mi.UInt32) -> mi.Vector3f:
 
 
 def points_and_suns(
-    places: SurfacePoints, suns: NDArray[np.float64], pair: mi.UInt32 | None = None
+    places: SurfacePoints,
+    suns: NDArray[np.float64],
+    pair: mi.UInt32 | None = None,
+    number: mi.UInt32 | None = None,
 ) -> tuple[mi.Point3f, mi.Vector3f, mi.Vector3f]:
-    """Point, normal and direction to the sun of pairs of points and hours, of all [m * h]."""
+    """Point, normal and direction to the sun of pairs of points and hours, of all [m * h].
+
+    Args: number: [m] by which a point's direction on the disc is drawn; by default its place.
+    """
     lane = dr.arange(mi.UInt32, places.size * len(suns)) if pair is None else pair
     count = dr.opaque(mi.UInt32, len(suns))
     place = lane // count
     towards = dr.gather(mi.Vector3f, vectors(suns), lane - place * count)
     point = dr.gather(mi.Point3f, places.points(), place)
-    return point, dr.gather(mi.Vector3f, places.normals(), place), on_disc_of(towards, place)
+    normal = dr.gather(mi.Vector3f, places.normals(), place)
+    drawn = place if number is None else dr.gather(mi.UInt32, number, place)
+    return point, normal, on_disc_of(towards, drawn)
 
 
 def sunlight(
@@ -211,10 +227,14 @@ def sunlight(
 
 
 def sunlight_of_pairs(
-    way: SpecularPath, places: SurfacePoints, suns: NDArray[np.float64], pair: mi.UInt32
+    way: SpecularPath,
+    places: SurfacePoints,
+    suns: NDArray[np.float64],
+    pair: mi.UInt32,
+    number: mi.UInt32,
 ) -> mi.Float:
     """The same of some pairs by one specular path; suns: [h, 3] apparent directions."""
-    point, normal, to_sun = points_and_suns(places, suns, pair)
+    point, normal, to_sun = points_and_suns(places, suns, pair, number)
     middle = dr.gather(mi.Vector3f, vectors(suns), pair % dr.opaque(mi.UInt32, len(suns)))
     return _shone(way, point, normal, to_sun, dr.dot(normal, middle))
 
@@ -276,10 +296,13 @@ class SunGrid:
         mixed = (bits @ np.array([0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D], dtype=np.uint64)) >> 12
         return cls(suns, nodes, corner.reshape(-1, 3), weight, mixed.astype(np.int64) % MIRRORED)
 
-    def light(self, way: SpecularPath, places: SurfacePoints) -> mi.Float:
-        """Irradiance of points by a specular path per unit normal to the suns [m * h]."""
+    def light(self, way: SpecularPath, places: SurfacePoints, number: mi.UInt32) -> mi.Float:
+        """Irradiance of points by a specular path per unit normal to the suns [m * h].
+
+        Args: number: [m] as of `sunlight_of_many`.
+        """
         nodes, suns = way.apparent(self.nodes), way.apparent(self.suns)
-        point, normal, to_node = points_and_suns(places, nodes)
+        point, normal, to_node = points_and_suns(places, nodes, number=number)
         at = way.transmittance(mi.Ray3f(point, to_node), dr.dot(normal, to_node) > 0)
         dr.eval(at)
         count = dr.opaque(mi.UInt32, len(suns))
@@ -288,8 +311,8 @@ class SunGrid:
         each = MIRRORED if way.mirrors else CHECKED
         start, share, lit = place * dr.opaque(mi.UInt32, len(nodes)), mi.Float(0), mi.UInt32(0)
         for corner, weight in zip(self.corner.T, self.weight.T, strict=True):
-            number = dr.gather(mi.UInt32, column(corner, mi.UInt32), hour)
-            value = dr.gather(mi.Float, at, start + number)
+            node = dr.gather(mi.UInt32, column(corner, mi.UInt32), hour)
+            value = dr.gather(mi.Float, at, start + node)
             share += dr.gather(mi.Float, column(weight), hour) * value
             lit += dr.select(value > 0, mi.UInt32(1), mi.UInt32(0))
         cosine = dr.dot(
@@ -298,7 +321,7 @@ class SunGrid:
         )
         differ, level = (lit > 0) & (lit < 3), dr.abs(cosine) <= SPREAD
         first = dr.gather(mi.UInt32, column(self.first, mi.UInt32), hour)
-        checked = (place + first) % each == 0
+        checked = (dr.gather(mi.UInt32, number, place) + first) % each == 0
         own = level | ((cosine > 0) & (differ | checked))
         found = dr.select((cosine > 0) & ~level, cosine * share, 0.0)
         times = dr.select(differ | level, mi.Float(1), mi.Float(each))
@@ -306,15 +329,23 @@ class SunGrid:
         pair = dr.compress(own)
         if dr.width(pair):
             before, more = (dr.gather(mi.Float, of, pair) for of in (found, times))
-            exact = sunlight_of_pairs(way, places, suns, pair)
+            exact = sunlight_of_pairs(way, places, suns, pair, number)
             dr.scatter(found, before + more * (exact - before), pair)
         return found
 
 
 def sunlight_of_many(
-    outside: TracedScene, places: SurfacePoints, suns: NDArray[np.float64]
+    outside: TracedScene,
+    places: SurfacePoints,
+    suns: NDArray[np.float64],
+    number: NDArray[np.int64] | None = None,
 ) -> NDArray[np.float32]:
-    """`sunlight` of many points [m, h] by the grid, unbiased in the sum over the points."""
+    """`sunlight` of many points [m, h] by the grid, unbiased in the sum over the points.
+
+    Args: number: [m] of each point among those of its sum, by default of all points: a point has
+        the light that it has with these alone.
+    """
     grid = SunGrid.about(suns)
-    light = sum(grid.light(way, places) for way in specular_sun_paths(outside))
+    drawn = column(np.arange(places.size) if number is None else number, mi.UInt32)
+    light = sum(grid.light(way, places, drawn) for way in specular_sun_paths(outside))
     return light.numpy().reshape(places.size, len(suns))

@@ -13,8 +13,9 @@ represent others nearby as the virtual lights of Keller 1997, "Instant radiosity
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import drjit as dr
 import mitsuba as mi
@@ -100,92 +101,173 @@ class _Met:
     rough: list[RoughFaces]
 
 
+@dataclass(frozen=True, slots=True)
+class Straight:
+    """The straight beam of a window group, through which sensors see the outdoors."""
+
+    group: int
+    scattering: Scattering
+
+
 def window_shares(
-    outside: TracedScene, *, samples: int, places: int = PLACES, seed: int = 0
-) -> SunShares:
-    """Sunlit outdoor surfaces in the window patches; rows [Q * K], radiance.
+    outside: TracedScene, *, samples: int, places: int = PLACES, seeds: Sequence[int] = (0,)
+) -> list[SunShares]:
+    """Sunlit outdoor surfaces in the window patches, of each seed; rows [Q * K], radiance.
 
     Args: samples: paths of each patch; places: largest number of points that represent the hits.
     """
     bins = DirectionBins(KLEMS_FULL)
     count = len(outside.groups) * bins.size
-    lane = dr.arange(mi.UInt32, count * samples)
-    row = lane // dr.opaque(mi.UInt32, samples)
-    sample = lane - row * dr.opaque(mi.UInt32, samples)
-    group = row // bins.size
-    patch = row - group * bins.size
-    stream = mi.sample_tea_32(patch, batch_key(seed, 0) + group)[0]
-    way = outside.to_world_any(group, bins.sample(patch, lattice_2d(sample, stream, 0)))
-    position = outside.sample_group(group, lattice_2d(sample, stream, 2))
-    weight = opaque(1.0 / samples) + dr.zeros(mi.Float, count * samples)
-    met = _met(outside, row, weight, position, way, seed)
-    return SunShares.of([met], count, seed, most=places)
+
+    def begun(seed: int) -> _Met:
+        lane = dr.arange(mi.UInt32, count * samples)
+        row = lane // dr.opaque(mi.UInt32, samples)
+        sample = lane - row * dr.opaque(mi.UInt32, samples)
+        group = row // bins.size
+        patch = row - group * bins.size
+        stream = mi.sample_tea_32(patch, batch_key(seed, 0) + group)[0]
+        way = outside.to_world_any(group, bins.sample(patch, lattice_2d(sample, stream, 0)))
+        position = outside.sample_group(group, lattice_2d(sample, stream, 2))
+        weight = opaque(1.0 / samples) + dr.zeros(mi.Float, count * samples)
+        return _first_met(outside, row, weight, position, way)
+
+    starts = [partial(begun, seed) for seed in seeds]
+    return _shares_of(outside, starts, seeds, (count, samples), places)
 
 
 def view_shares(
     inside: TracedScene,
     outside: TracedScene,
-    group: int,
-    way: Scattering,
+    beams: Sequence[Straight],
     sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
     *,
     samples: int,
     places: int = PLACES,
-    seed: int = 0,
-) -> SunShares:
-    """Sunlit outdoor surfaces that sensors see through a group's straight beam; rows [S].
+    seeds: Sequence[int] = (0,),
+) -> list[SunShares]:
+    """Sunlit outdoor surfaces that sensors see through straight beams; rows [S].
 
     Args:
         sensors: positions and normals [S, 3].
         samples: points on the group for each sensor; places: as for `window_shares`.
+
+    Returns: of each beam, for each of the seeds.
     """
-    key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
-    sensor, target, omega, weight = straight_rays(inside, group, way, sensors, samples, key)
-    met = _met(outside, sensor, weight / samples, target, omega, seed)
-    return SunShares.of([met], len(sensors[0]), seed, most=places)
+
+    def begun(beam: Straight, seed: int) -> _Met:
+        key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
+        sensor, target, omega, weight = straight_rays(
+            inside, beam.group, beam.scattering, sensors, samples, key
+        )
+        return _first_met(outside, sensor, weight / samples, target, omega)
+
+    starts = [partial(begun, beam, seed) for beam in beams for seed in seeds]
+    shape = len(sensors[0]), samples
+    return _shares_of(outside, starts, [*seeds] * len(beams), shape, places)
 
 
 def outdoor_light(
-    shares: SunShares,
+    sets: Sequence[SunShares],
     outside: TracedScene,
     suns: NDArray[np.float64],
     strength: NDArray[np.float64],
-) -> NDArray[np.float32]:
-    """Light of the rows [rows, h] from sunlit outdoor surfaces.
+) -> list[NDArray[np.float32]]:
+    """Light of the rows of each set [rows, h] from sunlit outdoor surfaces.
+
+    Points of several sets are in one launch as long as these are small.
 
     Args: suns: [h, 3]; strength: [h] irradiance normal to it.
     """
-    found = np.zeros((shares.share.shape[0], len(suns)), dtype=np.float32)
-    share, strength = shares.share.astype(np.float32), strength.astype(np.float32)
-    for hours in _blocks(shares.places.size, len(suns)):
-        light = sunlight_of_many(outside, shares.places, suns[hours])
-        found[:, hours] = share @ light * strength[hours]
-    if shares.rough is None:
-        return found
-    count = len(shares.rough.weight)
-    entries = shares.rough.weight, (shares.rough.pixel, np.arange(count))
-    of_row = sparse.csr_array(entries, shape=(len(found), count), dtype=np.float32)
-    for hours in _blocks(count, len(suns)):
-        found[:, hours] += of_row @ shares.rough.lobes(outside, suns[hours]) * strength[hours]
-    return found
+    strength, light = strength.astype(np.float32), []
+    each = [shares.places.size * len(suns) for shares in sets]
+    for block in _together(each):
+        light += _light_of_block(sets[block], outside, suns, strength)
+    return light
 
 
-def _met(
+def _light_of_block(
+    sets: Sequence[SunShares],
     outside: TracedScene,
-    row: mi.UInt32,
-    weight: mi.Float,
-    origin: mi.Point3f,
-    way: mi.Vector3f,
-    seed: int,
+    suns: NDArray[np.float64],
+    strength: NDArray[np.float32],
+) -> list[NDArray[np.float32]]:
+    """Light of the rows of some sets [rows, h]."""
+    light = [np.zeros((one.share.shape[0], len(suns)), dtype=np.float32) for one in sets]
+    share = [one.share.astype(np.float32) for one in sets]
+    places, counts = SurfacePoints.joined([o.places for o in sets]), [o.places.size for o in sets]
+    number, first = np.concatenate([np.arange(n) for n in counts]), np.cumsum([0, *counts])
+    for hours in _blocks(places.size, len(suns)):
+        at_places = sunlight_of_many(outside, places, suns[hours], number)
+        for i, values in enumerate(light):
+            values[:, hours] = share[i] @ at_places[first[i] : first[i + 1]] * strength[hours]
+    for one, values in zip(sets, light, strict=True):
+        if one.rough is None:
+            continue
+        count = len(one.rough.weight)
+        entries = one.rough.weight, (one.rough.pixel, np.arange(count))
+        of_row = sparse.csr_array(entries, shape=(len(values), count), dtype=np.float32)
+        for hours in _blocks(count, len(suns)):
+            values[:, hours] += of_row @ one.rough.lobes(outside, suns[hours]) * strength[hours]
+    return light
+
+
+def _together(sizes: Sequence[int]) -> Iterator[slice]:
+    """Neighbours whose sizes sum to `LANES` at most, and larger ones alone."""
+    first, total = 0, 0
+    for i, size in enumerate(sizes):
+        if i > first and total + size > LANES:
+            yield slice(first, i)
+            first, total = i, 0
+        total += size
+    if sizes:
+        yield slice(first, len(sizes))
+
+
+def _shares_of(
+    outside: TracedScene,
+    starts: Sequence[Callable[[], _Met]],
+    seeds: Sequence[int],
+    shape: tuple[int, int],
+    most: int,
+) -> list[SunShares]:
+    """Shares of what paths meet after what they meet first, those of several runs in one launch.
+
+    Args: starts: give what the paths of each run meet first; shape: rows, and paths of each.
+    """
+    rows, samples = shape
+    shares = []
+    for block in _together([rows * samples] * len(starts)):
+        begun = [start() for start in starts[block]]
+        runs = [(s, one.places.size) for s, one in zip(seeds[block], begun, strict=True)]
+        joined = SurfacePoints.joined([one.places for one in begun])
+        later = reflecting_points(outside, joined, runs, BOUNCES, mirrored=True)
+        ends = np.cumsum([count for _, count in runs])
+        run = np.searchsorted(ends, later.path, side="right")
+        for i, (one, (seed, count)) in enumerate(zip(begun, runs, strict=True)):
+            some = np.flatnonzero(run == i)
+            path = later.path[some] - (ends[i] - count)
+            met = _Met(
+                np.concatenate([one.row, one.row[path]]),
+                np.concatenate([one.weight, one.weight[path] * later.weight[some]]),
+                SurfacePoints.joined([one.places, later.places.some(some)]),
+                one.rough,
+            )
+            shares.append(SunShares.of([met], rows, seed, most=most))
+    return shares
+
+
+def _first_met(
+    outside: TracedScene, row: mi.UInt32, weight: mi.Float, origin: mi.Point3f, way: mi.Vector3f
 ) -> _Met:
-    """Points that paths from windows meet, with their BRDF rho / pi as weights [1/sr].
+    """Points that paths from windows meet first, with their BRDF rho / pi as weights [1/sr].
 
     Gloss sends a path on to the surfaces that it mirrors; the direct sun has the sun in a mirror.
     """
     start, along, share, of = tables(origin, way, weight, row)
     some = np.flatnonzero(share > 0)
     lanes = PixelRays(of.astype(np.int64), start.T, along.T, share.astype(float)).some(some)
-    rows, values, places, rough = [], [], [], []
+    rows, values = [np.empty(0, dtype=np.int64)], [np.empty(0)]
+    places, rough = [], []
     for bounce in range(MOST_MIRRORS + 1):
         if not len(lanes.row):
             break
@@ -206,20 +288,7 @@ def _met(
         if outside.gloss is not None:
             rough.append(_rough(outside, lanes, there, np.where(met, prim, 0), met))
         lanes = mirrored(outside, lanes, hit, bounce)
-    if not rows:
-        return _Met(np.empty(0, dtype=np.int64), np.empty(0), SurfacePoints.joined([]), [])
-    row_of, value, first = (
-        np.concatenate(rows),
-        np.concatenate(values),
-        SurfacePoints.joined(places),
-    )
-    later = reflecting_points(outside, first, seed, BOUNCES, mirrored=True)
-    return _Met(
-        np.concatenate([row_of, row_of[later.path]]),
-        np.concatenate([value, value[later.path] * later.weight]),
-        SurfacePoints.joined([first, later.places]),
-        rough,
-    )
+    return _Met(np.concatenate(rows), np.concatenate(values), SurfacePoints.joined(places), rough)
 
 
 def _rough(
