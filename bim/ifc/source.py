@@ -108,7 +108,7 @@ def read_source(
     models, damage = open_all(files), Damage()
     lengths = [issue for one in models.values() for issue in length_issues(one)]
     model, issues = one_model(models)
-    check_rooms(model, rooms, path)
+    check_rooms(model, rooms, path, corrections.room_names)
     endings = [issue for file in files for issue in ending_issues(file)]
     names = {"first": Path(path).name}
     endings += [

@@ -186,11 +186,18 @@ class _Drawn:
         return label_of(self.name, self.long_name, self.guid)
 
 
-def check_rooms(model: ifcopenshell.file, rooms: Sequence[str], file: str | PathLike[str]) -> None:
+def check_rooms(
+    model: ifcopenshell.file,
+    rooms: Sequence[str],
+    file: str | PathLike[str],
+    corrected: Iterable[RoomName] = (),
+) -> None:
     """Refuse names of rooms that are like no name of a space or zone; no geometry is read.
 
     A name that has words of one of these, or the reverse, may be that of rooms that are joined, cut
     or left out.
+
+    Args: corrected: names that the corrections state.
 
     Raises: `DataError`.
     """
@@ -200,6 +207,7 @@ def check_rooms(model: ifcopenshell.file, rooms: Sequence[str], file: str | Path
         return
     zones = [zone.name for zone in read_zones(model)]
     names = {*zones, *(text for one in drawn for text in (one.guid, one.name, one.long_name))}
+    names |= {text or "" for one in corrected for text in (one.name, one.long_name)}
     for room in rooms:
         if any(has_words(room, name) or has_words(name, room) for name in names if name.strip()):
             continue

@@ -228,6 +228,7 @@ def test_names_and_areas_of_glass_are_corrected(tmp_path):
     building = read_ifc(path)
     (space,) = building.spaces
     assert (space.name, space.long_name) == ("1.03", "Kitchen")
+    assert [one.name for one in read_ifc(path, rooms=["1.03"]).spaces] == ["1.03"]
     areas = sorted(window.area for window in building.windows)
     assert areas == [pytest.approx(0.3, rel=1e-3), pytest.approx(2.5, rel=1e-3)]
     assert building.account.glass_assumed == 0.0
