@@ -72,7 +72,7 @@ class SeasonalOutdoors:
 
 SOLAR_CLEAR = 0.80  # solar transmittance of inner glass without a value: 6 mm float, EN 410
 GLASS_INDEX = 1.52
-APART = 0.002  # rooms without a wall's thickness between them are moved so far apart [m]
+APART = 0.002  # rooms without a wall's thickness between them are separated by this much [m]
 
 
 @dataclass(frozen=True, slots=True)
