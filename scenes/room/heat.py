@@ -237,12 +237,12 @@ def step_issues(
 ) -> tuple[tuple[Issue, ...], ...]:
     """For each room an issue where half the time step changes its results by more than 2 %.
 
-    Checked where a control depends on the temperatures of the step: opened windows, the bypass of a
-    heat recovery, a heated slab.
+    Checked where a control depends on the room's temperatures: opened windows, the bypass of a heat
+    recovery, a heated slab, shading.
 
     Args: results: of `balances` with the same options.
     """
-    if not any(_is_controlled(room.zone) for room in rooms):
+    if not any(room.alternatives or _is_controlled(room.zone) for room in rooms):
         return ((),) * len(rooms)
     halved = balances(rooms, weather, min(step_s, 3600.0 * weather.step_h) / 2.0, **options)
     issues: list[tuple[Issue, ...]] = []
@@ -309,6 +309,12 @@ def heat_of(
     for room, balance, humidity, found in zip(
         rooms, passed(results), humidities, issues, strict=True
     ):
+        moved = room.in_alternatives(balance.alternative)
+        apart = (moved.shading.states != room.shading.states).any(axis=1)
+        if apart.any():
+            values = {"hours": int(apart.sum()) * weather.step_h, "room": room.zone.name}
+            found += (Issue("shading-by-coupled-temperature", room.space.guid, values),)
+        room = moved
         comfort = (room.operation or OperationTables()).comfort
         felt = felt_by(comfort, balance, humidity)
         thermal = replace(thermal_result(room, balance, weather, felt), issues=found)

@@ -60,9 +60,17 @@ from scenes.room.lobes import lobe_figures
 from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
-from scenes.room.shading import control_signals, shading_states
-from scenes.room.solar import seasonal_outdoors
-from scenes.room.zone import RoomZone, reads_work_plane, room_zone, zone_surfaces
+from scenes.room.shading import control_signals, shading_states, temperature_conditions
+from scenes.room.solar import SeasonalOutdoors, seasonal_outdoors
+from scenes.room.zone import (
+    RoomAlternatives,
+    RoomZone,
+    ZoneSurfaces,
+    balances,
+    reads_work_plane,
+    room_zone,
+    zone_surfaces,
+)
 
 
 class RoomChoices(TypedDict, total=False):
@@ -171,16 +179,22 @@ def lit_room(
         message = "the explorer knows one state of the trees: give them one transmittance"
         raise DataError(message, file=building.file, field="--explore")
     hours = wanted_hours(options.outputs.picture_hours, weather.midpoints, room.skies.lit)
-    outdoors = year = dgp = rated = explored = None
+    outdoors = year = dgp = rated = explored = surfaces = choice = None
     dgp_error = 0.0
     times = StageTimes()
 
     with times.stage("daylight"):
         needs = light_needs(room, annual_glare=options.outputs.annual_glare)
         light = room_light(room, needs=needs, progress=progress)
-        if "irradiance" in control_signals(room):
+        conditions = temperature_conditions(room)
+        if conditions or "irradiance" in control_signals(room):
             outdoors = seasonal_outdoors(room, light, progress=progress)
-        state = shading_states(room, light, outdoors, progress=progress)
+        if conditions and outdoors is not None:
+            surfaces = zone_surfaces(room)
+            choice = controlled_zone(room, surfaces, outdoors, light, progress=progress)
+            state = _states_by_balance(room, choice)
+        else:
+            state = shading_states(room, light, outdoors, progress=progress)
         daylight = room_daylight(room, light, state, progress=progress)
     with times.stage("leaks"):
         leaks = leak_issues(space, light.scene, seed=options.sampling.seed, cache=cache)
@@ -207,10 +221,12 @@ def lit_room(
                 room, light, state, sensors=len(daylight.points), progress=progress
             )
     with times.stage("thermal"):
-        surfaces = zone_surfaces(room)
+        surfaces = surfaces or zone_surfaces(room)
         if outdoors is None:
             outdoors = seasonal_outdoors(room, light, progress=progress)
         zone = room_zone(room, surfaces, outdoors, state, daylight, progress=progress)
+        if choice is not None:
+            zone = replace(zone, alternatives=choice.alternatives)
     return DaylitRoom(
         space, daylight, glare, zone, times.seconds, year, dgp=dgp,
         dgp_sunny_hour_error=dgp_error, as_lobe=as_lobe, issues=leaks, explored=explored,
@@ -230,15 +246,44 @@ def operated_zone(room: RoomInputs, *, progress: Progress = silent) -> RoomZone:
 
     Raises: `RoomError` for a room without a closed zone.
     """
-    surfaces, daylight = zone_surfaces(room), None
-    light = None
+    surfaces, light = zone_surfaces(room), None
     if reads_work_plane(room):
         light = room_light(room, needs=light_needs(room), progress=progress)
     outdoors = seasonal_outdoors(room, light, progress=progress)
-    state = shading_states(room, light, outdoors, progress=progress)
-    if light is not None:
-        daylight = room_daylight(room, light, state, progress=progress)
-    return room_zone(room, surfaces, outdoors, state, daylight, progress=progress)
+    return controlled_zone(room, surfaces, outdoors, light, progress=progress)
+
+
+def controlled_zone(
+    room: RoomInputs,
+    surfaces: ZoneSurfaces,
+    outdoors: SeasonalOutdoors,
+    light: RoomLight | None,
+    *,
+    progress: Progress = silent,
+) -> RoomZone:
+    """The zone of a room by its rules of shading.
+
+    Where these read the room's temperature: with an alternative for each combination of conditions
+    that are met, from which the heat balance chooses in every hour.
+    """
+    conditions, rooms = temperature_conditions(room), []
+    for number in range(2 ** len(conditions)):
+        met = {one: bool(number >> k & 1) for k, one in enumerate(conditions)}
+        state, daylight = shading_states(room, light, outdoors, met=met, progress=progress), None
+        if light is not None and reads_work_plane(room):
+            daylight = room_daylight(room, light, state, progress=progress)
+        rooms.append(room_zone(room, surfaces, outdoors, state, daylight, progress=progress))
+    if not conditions:
+        return rooms[0]
+    return replace(rooms[0], alternatives=RoomAlternatives(conditions, tuple(rooms)))
+
+
+def _states_by_balance(room: RoomInputs, zone: RoomZone) -> NDArray[np.int64]:
+    """States [H, G] that the heat balance of the room alone chooses."""
+    terrain = "suburbs" if room.operation is None else room.operation.terrain
+    (result,) = balances([zone], room.weather, room.options.heat_step_s, terrain=terrain)
+    chosen = zone.in_alternatives(result.alternative).shading.states
+    return chosen[:, room.windows.control]
 
 
 LARGEST = 400  # pixels of a side of its pictures

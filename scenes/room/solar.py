@@ -24,6 +24,7 @@ from mitsuba_cfs.methods.phase_matrices import (
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.sky.matrix import series_matrix, sky_series
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.kernels.scene import SceneCache
@@ -72,6 +73,8 @@ class ZoneInSun:
     windows: RoomWindows
     thermals: Sequence[Sequence[ThermalSystem]]  # [G][J]
     facade: FloatArray  # [H, F] irradiance on the outside [W/m2]
+    # [P, L] the sun alone [W/m2/sr], where all other light meets hemispherical values; else None
+    sun: NDArray[np.floating] | None = None
 
 
 def seasonal_outdoors(
@@ -120,24 +123,37 @@ def window_irradiance(outdoors: SeasonalOutdoors, skies: AnnualSky) -> FloatArra
 
 
 def directional_sums(
-    outdoors: SeasonalOutdoors, skies: AnnualSky, shares: FloatArray
+    outdoors: SeasonalOutdoors,
+    skies: AnnualSky,
+    shares: FloatArray,
+    sun: NDArray[np.floating] | None = None,
 ) -> FloatArray:
     """Weighted sums [n, L] [W/m2] over the directions of the groups' irradiance, in lit hours.
 
     The n sums of D come before the many hours, which are multiplied in the skies' single precision.
 
-    Args: shares: [n, G, K] weights of the irradiance of each group from each patch.
+    Args:
+        shares: [n, G, K] weights of the irradiance of each group from each patch.
+        sun: [P, L] part of the sky beyond which all light has each group's mean weight.
     """
     if not outdoors.first.scene.groups:
         return np.zeros((len(shares), len(skies.lit)))
-    weights = (shares * KLEMS_FULL.projected_solid_angles()).reshape(len(shares), -1)
+    omega = KLEMS_FULL.projected_solid_angles()
 
-    def of_season(scene: PhaseMatrices, sky: FloatArray) -> FloatArray:
-        daylight = scene.parts.of_groups(scene.daylight.values)
-        rows = weights @ daylight.reshape(weights.shape[1], -1)
-        return (rows.astype(sky.dtype) @ sky).astype(float)
+    def sums(weights: FloatArray, light: FloatArray) -> FloatArray:
+        flat = (weights * omega).reshape(len(weights), -1)
 
-    return outdoors.by_season(of_season, skies.solar)
+        def of_season(scene: PhaseMatrices, sky: FloatArray) -> FloatArray:
+            daylight = scene.parts.of_groups(scene.daylight.values)
+            rows = flat @ daylight.reshape(flat.shape[1], -1)
+            return (rows.astype(sky.dtype) @ sky).astype(float)
+
+        return outdoors.by_season(of_season, light)
+
+    if sun is None:
+        return sums(shares, skies.solar)
+    mean = (shares @ (omega / omega.sum()))[..., None] * np.ones(len(omega))
+    return sums(shares, sun) + sums(mean, np.maximum(skies.solar - sun, 0.0))
 
 
 def solar_gains(
@@ -171,6 +187,7 @@ def solar_gains(
         facade_irradiance(
             outdoors, outer, len(zone.zone.surfaces), room.skies, progress=part(steps, 0.4, 0.6)
         ),
+        _sun_alone(room) if room.options.sky_light == "hemispherical" else None,
     )
     absorption: dict[bytes, FloatArray] = {}  # states with equal back reflectances share it
     suns = []
@@ -194,6 +211,12 @@ def solar_gains(
     }
     of_windows = state[:, room.windows.group]
     return switched([solar for solar, _ in suns], kind, of_windows), gains
+
+
+def sun_by_hour(suns: Sequence[Solar], number: NDArray[np.int64]) -> Solar:
+    """The sun and the states of that one of several years which each hour [H] takes."""
+    states = np.stack([np.asarray(sun.state) for sun in suns])
+    return switched(suns, number, states[number, np.arange(len(number))])
 
 
 def combinations_of(state: NDArray[np.int64]) -> tuple[list[tuple[int, ...]], NDArray[np.int64]]:
@@ -280,7 +303,7 @@ def _gains_in_states(
     T = np.stack([s.solar.transmission_matrix() for s in zone.windows.in_states(state)])
     shares = absorbed_shares(heats, T, area, absorption)
     sums = np.split(
-        directional_sums(outdoors, skies, np.concatenate(shares)),
+        directional_sums(outdoors, skies, np.concatenate(shares), zone.sun),
         np.cumsum([len(s) for s in shares[:-1]]),
     )
     taken, outer, inner, air, whole = (rows.T for rows in sums)
@@ -305,6 +328,13 @@ def _gains_in_states(
         "absorbed_room_w": taken[:, :F].sum(axis=1),
     }
     return solar, {name: skies.whole_year(values) for name, values in gains.items()}
+
+
+def _sun_alone(room: RoomInputs) -> NDArray[np.floating]:
+    """Radiance of the sun on the patches of the sky in the lit hours [P, L] [W/m2/sr]."""
+    series = sky_series(room.weather, "solar", sun_model=room.options.sun_model)
+    subdivision, dtype = room.options.sampling.subdivision, room.skies.solar.dtype.type
+    return series_matrix(series, room.skies.lit, subdivision, "sun", dtype=dtype)
 
 
 def absorbed_shares(
