@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 
@@ -17,9 +18,11 @@ from bim.fenestration import ShadingState
 from bim.ifc.corrections import corrections_beside, corrections_file
 from bim.ifc.head import check_head
 from bim.model import Building, Element, Space, Window
-from bim.names import AmbiguousName, UnknownName, listed
+from bim.names import AmbiguousName, UnknownName, has_words, unknown_room
 from bim.report.issue import Issue, issue_text
+from bim.stored_building import read_once
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.matrices.cache import MatrixCache
 
 # Properties of an element that a selector names, by its keys
 KEYS = {
@@ -91,6 +94,7 @@ class ReadOptions:
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     facade_panes: tuple[str, ...] = ()  # materials of panes before dark rooms: they mirror
     linked: tuple[Path, ...] = ()  # further files of the same building: facade, structure, site
+    rooms: tuple[str, ...] = ()  # names that are asked for, to refuse wrong ones at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,10 +112,14 @@ def read_building_file(
     path: str | PathLike[str],
     options: ReadOptions | None = None,
     progress: Progress | None = None,
+    *,
+    cache: MatrixCache | None = None,
 ) -> Building:
     """The building of an IFC file, with the corrections kept beside it, or of another format.
 
-    Args: progress: called with the stage's name and the fraction of it that is done.
+    Args:
+        progress: called with the stage's name and the fraction of it that is done.
+        cache: of buildings read from IFC files, which are not read again while they are the same.
 
     Raises: `DataError` for a file that cannot be used, or an option that its format has not.
     """
@@ -123,7 +131,12 @@ def read_building_file(
     for field in FLAGS:
         if getattr(options, field) and field not in kind.has:
             raise DataError(f"not for {kind.name} files", file=path, field=f"--{FLAGS[field]}")
-    building = kind.reader(path, options, progress or (lambda stage, fraction: None))
+    read = partial(kind.reader, path, options, progress or (lambda stage, fraction: None))
+    if cache is not None and kind is IFC:
+        chosen = options.join, options.furniture
+        building = read_once(read, (path, *linked), chosen, cache)
+    else:
+        building = read()
     return surrounded(building, options.surroundings, options.surroundings_offset)
 
 
@@ -273,6 +286,7 @@ def _read_ifc(path: Path, options: ReadOptions, progress: Progress) -> Building:
         linked=options.linked,
         join=options.join,
         furniture=options.furniture,
+        rooms=options.rooms,
         progress=progress,
     )
 
@@ -402,9 +416,7 @@ def _spaces(building: Building, name: str, path: Path) -> Sequence[Space]:
         if isinstance(error, UnknownName) and lost:
             message = f"space {name!r} was left out: {_quoted(lost)}"
         else:
-            message = str(error.args[0])
-            if building.zones:
-                message += f"; zones: {listed(name, (zone.name for zone in building.zones))}"
+            message = unknown_room(error, name, (zone.name for zone in building.zones))
         raise DataError(message, file=path, field="space") from error
 
 
@@ -417,7 +429,7 @@ def _names(issue: Issue, name: str) -> bool:
     """Whether an issue concerns rooms of that name, or with that name as whole words in theirs."""
     rooms = issue.values.get("rooms", issue.values.get("room", ""))
     text = " + ".join(map(str, rooms)) if isinstance(rooms, tuple) else str(rooms)
-    return re.search(rf"(?<!\w){re.escape(name)}(?!\w)", text, re.IGNORECASE) is not None
+    return has_words(text, name)
 
 
 def _because(building: Building, kind: str) -> str:

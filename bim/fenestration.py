@@ -76,6 +76,7 @@ class ShadingState:
     shading_position: str | None = None  # "none", "external", "internal", "integrated"
     file: Path | None = None  # of the BSDF, where the model names it only
     angular: AngularTable | None = None  # visible, of a specular system: exact at every angle
+    layers: tuple[Path, ...] = ()  # files of the BSDF among the layers that it is computed from
     of_type: str | None = None  # name of the window type that holds it; None: the window itself
 
     @property

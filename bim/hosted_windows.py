@@ -19,6 +19,8 @@ from bim.planes import Plane, merged_polygons, plane_through, polygons_of
 SAME_PLANE = 2e-3  # glass this near the plane of a face lies in it [m]
 WIDER = 1.001  # of a face that is made for a window, in size
 SLIVER = 1.5e-3  # narrower polygons are left out [m]
+LEAST_AREA = 1e-3  # smaller polygons are left out [m2]: honeybee's tolerance, in metres
+RIM = 1e-4  # width of a face around a pane that shares its outline [m]
 INSIDE = 0.01  # share of the glass' border that a face it lies in has to share
 
 
@@ -35,13 +37,14 @@ class HostedPolygon:
 def hosted_polygons(space: Space) -> list[HostedPolygon]:
     """The polygons of a room's faces, in their order, and of glass that lies in none of them.
 
-    Slivers, which other programs refuse, are left out.
+    Slivers, which other programs refuse, are left out.  A pane that shares the outline of its face
+    is smaller by a rim: honeybee takes it as outside where lines meet.
     """
     parts = [
         (face, plane, polygon)
         for face in space.faces
         for plane, polygon in _polygons(face.triangles)
-        if not polygon.buffer(-SLIVER / 2).is_empty
+        if polygon.area > LEAST_AREA and not polygon.buffer(-SLIVER / 2).is_empty
     ]
     panes: list[list[tuple[Window, shapely.Polygon]]] = [[] for _ in parts]
     extra = []
@@ -55,8 +58,17 @@ def hosted_polygons(space: Space) -> list[HostedPolygon]:
             pane = _moved(glass, plane, host_plane)
             parts[at] = face, host_plane, _largest(shapely.union(polygon, pane, grid_size=1e-6))
             panes[at].append((window, pane))
-    found = [HostedPolygon(*part, tuple(own)) for part, own in zip(parts, panes, strict=True)]
+    found = [
+        HostedPolygon(face, plane, polygon, tuple((w, _within(pane, polygon)) for w, pane in own))
+        for (face, plane, polygon), own in zip(parts, panes, strict=True)
+    ]
     return [*found, *extra]
+
+
+def _within(pane: shapely.Polygon, polygon: shapely.Polygon) -> shapely.Polygon:
+    """A pane without the part of it that is on the outline of its face."""
+    inner = polygon.buffer(-RIM, join_style="mitre")
+    return pane if inner.covers(pane) else _largest(pane.intersection(inner))
 
 
 def _smaller(glass: shapely.Polygon) -> shapely.Polygon:

@@ -113,6 +113,18 @@ def item_named(items: Sequence[T], wanted: str, kind: str) -> T:
     return found[0]
 
 
+def has_words(text: str, words: str) -> bool:
+    """Whether a text has words in a row, whatever their capitals."""
+    return re.search(rf"(?<!\w){re.escape(_key(words))}(?!\w)", _key(text)) is not None
+
+
+def unknown_room(error: UnknownName | AmbiguousName, wanted: str, zones: Iterable[str]) -> str:
+    """The message of a room's name that cannot be used, with the nearest zones."""
+    zones = list(zones)
+    message = str(error.args[0])
+    return f"{message}; zones: {listed(wanted, zones)}" if zones else message
+
+
 def _names_of_parts(item: Named) -> set[str]:
     """Names, long names and labels of the rooms that were joined to this one."""
     names, long_names = item.name.split(JOINT), item.long_name.split(JOINT)

@@ -52,6 +52,8 @@ def _closed(edges: NDArray[np.float64]) -> NDArray[np.float64]:
     balance = np.bincount(ends[:, 1], minlength=len(points))
     balance -= np.bincount(ends[:, 0], minlength=len(points))
     last, first = (np.repeat(np.arange(len(points)), np.maximum(s * balance, 0)) for s in (1, -1))
+    if not len(last):
+        return points[ends]
     apart = np.linalg.norm(points[last][:, None] - points[first], axis=-1)
     from scipy.optimize import linear_sum_assignment  # half a second
 

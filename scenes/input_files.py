@@ -20,6 +20,7 @@ from bim.building_file import (
 from bim.building_file import files_beside as building_files_beside
 from bim.model import Building
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent, summed
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
@@ -228,5 +229,6 @@ def read_building(
 
 def building_of(options: InputOptions, progress: Progress = silent) -> Building:
     """The building of a command's options; raises as `read_building`."""
-    read = options.read
-    return read_building_file(options.building, read, summed(progress, "inputs", STAGES))
+    cache = MatrixCache.of_user() if options.cache else None
+    steps = summed(progress, "inputs", STAGES)
+    return read_building_file(options.building, options.read, steps, cache=cache)

@@ -43,7 +43,7 @@ class InputOptions:
         return ReadOptions(
             tuple(self.join), self.furniture, tuple(self.apertures),
             tuple(map(Path, self.surroundings)), self.surroundings_offset, tuple(self.facade_panes),
-            tuple(map(Path, self.linked)),
+            tuple(map(Path, self.linked)), tuple(self.spaces),
         )  # fmt: skip
 
     @property

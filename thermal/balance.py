@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from typing import TypeVar, overload
+from typing import Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,12 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 from thermal import kernel, records
 from thermal.climate import Climate, Solar, to_steps
 from thermal.conduction import CELL
+from thermal.control import TemperatureControl
 from thermal.convection import TERRAIN
 from thermal.emitters import HeatedSlab
 from thermal.errors import require, require_range
 from thermal.network import Network, WindowMix, framed, known_surfaces, network, window_mix
 from thermal.ventilation import AirTransfer, SupplyAir
-from thermal.zone import Zone
+from thermal.zone import Gains, Zone
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T", bound=np.generic)
@@ -61,25 +62,40 @@ def drive_of(
     solar: Sequence[Solar],
     stretch: Stretch,
     mixes: Sequence[WindowMix],
+    *,
     transfers: Sequence[AirTransfer] = (),
+    controls: Sequence[TemperatureControl | None] = (),
 ) -> tuple[records.Drive, int]:
-    """The drive of zones in a stretch, and the steps for which one row of sun holds."""
+    """The drive of zones in a stretch, and the steps for which one row of sun holds.
+
+    Args: mixes: of each zone, in each of its alternatives where it has `controls`.
+    """
+    controls = controls or [None] * len(zones)
     rows, hours, steps = len(solar[0].inside), climate.hours, stretch.steps
     fits = rows in (hours, hours * steps)
     require(fits, "solar", f"expected {hours} or {hours * steps} rows, got {rows}")
-    suns = [_zone_sun(zone, sun, rows, stretch) for zone, sun in zip(zones, solar, strict=True)]
-    states = [_states(zone, sun, stretch) for zone, sun in zip(zones, solar, strict=True)]
+    limits, of_hour = _condition_limits(controls), [m.of_hour.reshape(-1, hours) for m in mixes]
+    every = [
+        _driven(
+            zones,
+            [c.suns[a % len(c.suns)] if c else sun for c, sun in zip(controls, solar, strict=True)],
+            [c.gains[a % len(c.gains)] if c else zone.gains
+             for c, zone in zip(controls, zones, strict=True)],
+            stretch,
+            np.stack([stretch.of(mix[a % len(mix)]) for mix in of_hour], axis=1),
+        )
+        for a in range(2 ** limits.shape[1])
+    ]  # fmt: skip
+    first = every[0]
+    some = {k: np.stack([one[k] for one in every]) for k in first} if limits.shape[1] else {
+        k: values[None, :0] for k, values in first.items()
+    }  # fmt: skip
     fans = [zone.supply or SupplyAir(0.0) for zone in zones]
     slabs = [zone.slab or HeatedSlab("", 1.0) for zone in zones]
     beside = [one for zone in zones for one in zone.beside]
     drive = records.Drive(
-        inner=np.concatenate([part for inner, _ in suns for part in inner], axis=1),
-        outer=np.concatenate([part for _, outer in suns for part in outer], axis=1),
-        air=np.stack([_air_sun(*pair, stretch) for pair in zip(zones, solar, strict=True)], axis=1),
-        state=np.ascontiguousarray(np.concatenate(states, axis=1)),
-        mix=np.stack([stretch.of(mix.of_hour) for mix in mixes], axis=1),
-        convective=_hourly([z.gains.convective for z in zones], stretch, "convective gains"),
-        radiant=_hourly([z.gains.radiant for z in zones], stretch, "radiant gains"),
+        **first,
+        alternatives=records.Alternatives(limits, **some),
         beyond=_beyond(zones, climate, stretch),
         leaks=_flows([z.infiltration_ach for z in zones], zones, stretch, "infiltration"),
         airflow=_flows([z.other_air_ach for z in zones], zones, stretch, "outdoor air"),
@@ -107,6 +123,37 @@ def drive_of(
         ),
     )
     return drive, steps if rows == hours else 1
+
+
+def _driven(
+    zones: Sequence[Zone],
+    solar: Sequence[Solar],
+    gains: Sequence[Gains],
+    stretch: Stretch,
+    mix: NDArray[np.int64],
+) -> dict[str, Any]:
+    """The arrays that `Drive` and `Alternatives` have in common."""
+    rows, pairs = len(solar[0].inside), list(zip(zones, solar, strict=True))
+    suns = [_zone_sun(zone, sun, rows, stretch) for zone, sun in pairs]
+    return {
+        "inner": np.concatenate([part for inner, _ in suns for part in inner], axis=1),
+        "outer": np.concatenate([part for _, outer in suns for part in outer], axis=1),
+        "air": np.stack([_air_sun(*pair, stretch) for pair in pairs], axis=1),
+        "state": np.concatenate([_states(*pair, stretch) for pair in pairs], axis=1),
+        "mix": mix,
+        "convective": _hourly([g.convective for g in gains], stretch, "convective gains"),
+        "radiant": _hourly([g.radiant for g in gains], stretch, "radiant gains"),
+    }
+
+
+def _condition_limits(controls: Sequence[TemperatureControl | None]) -> FloatArray:
+    """Limits of the conditions of all zones [Z, K, 3]; those that a zone lacks are never met."""
+    most = max((len(c.conditions) for c in controls if c is not None), default=0)
+    limits = np.full((len(controls), most, 3), np.inf)
+    for z, control in enumerate(controls):
+        for k, one in enumerate(control.conditions if control else ()):
+            limits[z, k] = one.above_c, one.below_c, one.operative
+    return limits
 
 
 def _zone_sun(
@@ -288,6 +335,8 @@ class ZoneResult:
     fan_air: NDArray[np.float64]  # [H] of it by fans [m3/s]
     coil: NDArray[np.float64]  # [H] heat that brings supply air to its least temperature [W]
     slab: NDArray[np.float64]  # [H] power of the heated (or cooled: negative) slab [W]
+    # [H] alternative of a zone's `TemperatureControl`, 0 without one
+    alternative: NDArray[np.int64]
     warm_up_days: int
 
 
@@ -338,10 +387,13 @@ def simulate(
     step_s: float = 600.0,
     row_s: float = HOUR,
     options: BalanceOptions | None = None,
+    control: TemperatureControl | None = None,
 ) -> ZoneResult:
     """The year of one zone; see `simulate_zones`."""
-    (found,) = simulate_zones([zone], climate, [solar], step_s=step_s, row_s=row_s, options=options)
-    return found
+    (result,) = simulate_zones(
+        [zone], climate, [solar], step_s=step_s, row_s=row_s, options=options, controls=[control]
+    )
+    return result
 
 
 def simulate_zones(
@@ -354,6 +406,7 @@ def simulate_zones(
     options: BalanceOptions | None = None,
     air_links: ArrayLike | None = None,
     transfers: Sequence[AirTransfer] = (),
+    controls: Sequence[TemperatureControl | None] = (),
     progress: Callable[[float], None] | None = None,
     storage: Storage | None = None,
 ) -> Sequence[ZoneResult]:
@@ -365,6 +418,8 @@ def simulate_zones(
         row_s: length [s] of the climate's rows, which other docstrings call hours.
         air_links: [Z, Z] air exchanged between zones through openings [m3/s], symmetric.
         transfers: one-way air flows between zones.
+        controls: of zones whose windows follow their temperature; `solar` and gains of these are
+            not used.
         progress: called with shares of the year, from 0 to 1.
         storage: maps the result of a zone in each stretch to a stored copy, for example on disk;
         the
@@ -379,18 +434,24 @@ def simulate_zones(
     steps, told = _steps_per_row(step_s, row_s), progress or (lambda share: None)
     told(0.0)
     link = _links(air_links, len(zones))
-    pairs = zip(zones, solar, strict=True)
-    mixes = [window_mix(zone, sun.state, climate.hours) for zone, sun in pairs]
+    controls = controls or [None] * len(zones)
+    mixes = [
+        _mixes(zone, control.suns if control else [sun], climate.hours)
+        for zone, sun, control in zip(zones, solar, controls, strict=True)
+    ]
     net = network(
         zones, mixes, step_s=step_s, terrain=options.terrain, cell=options.cell,
         link=link, transfers=transfers,
     )  # fmt: skip
     method = _method(options, steps, step_s)
-    outdoors, state = _weather(climate, steps), _start(net, len(zones), options.start_c)
+    outdoors = _weather(climate, steps)
+    state = _start(net, _condition_limits(controls).shape[:2], options.start_c)
     work, years, days = _work(net, state), [], 0
     first_day = min(round(24 * HOUR / row_s), climate.hours)
     for stretch in stretches(climate.hours, steps, max(STRETCH, first_day)):
-        drive, every = drive_of(zones, climate, solar, stretch, mixes, transfers)
+        drive, every = drive_of(
+            zones, climate, solar, stretch, mixes, transfers=transfers, controls=controls
+        )
         method = method._replace(solar_every=every)
         weather = records.OutdoorConditions(*map(stretch.of, outdoors))
         if not stretch.first:
@@ -407,6 +468,15 @@ def simulate_zones(
         return ZoneYears(years)
     whole = [_joined([zones.pop() for zones in years]) for _ in zones]  # each goes as it is joined
     return tuple(reversed(whole))
+
+
+def _mixes(zone: Zone, suns: Sequence[Solar], hours: int) -> WindowMix:
+    """The emissivities of a zone's windows in all its alternatives, one after the other."""
+    if len(suns) == 1:
+        return window_mix(zone, suns[0].state, hours)
+    states = [np.zeros((hours, len(zone.windows)), np.int64) if s.state is None else s.state
+              for s in suns]  # fmt: skip
+    return window_mix(zone, np.concatenate(states), hours * len(suns))
 
 
 def _method(options: BalanceOptions, steps: int, step_s: float) -> records.Method:
@@ -464,8 +534,8 @@ def _weather(climate: Climate, steps: int) -> records.OutdoorConditions:
     )
 
 
-def _start(net: Network, zones: int, start_c: float) -> records.State:
-    n = net.faces.area.size
+def _start(net: Network, conditions: tuple[int, int], start_c: float) -> records.State:
+    n, zones = net.faces.area.size, conditions[0]
     return records.State(
         inner=np.full(n, start_c),
         outer=np.full(n, start_c),
@@ -473,6 +543,7 @@ def _start(net: Network, zones: int, start_c: float) -> records.State:
         air=np.full(zones, start_c),
         load=np.zeros(zones),
         opened=np.zeros(zones, dtype=np.bool_),
+        met=np.zeros(conditions, dtype=np.bool_),
     )
 
 
@@ -487,9 +558,11 @@ def _work(net: Network, state: records.State) -> records.Workspace:
         plant=np.zeros(zones, dtype=np.int64),
         windows=np.zeros(zones, dtype=np.int64),
         airing=np.zeros((zones, 3)),
+        shut=np.zeros(zones, dtype=np.bool_),
         radiant=np.zeros(zones),
         radiant_seen=np.tile([0.0, 0.0, 0.3], (zones, 1)),
         flow=np.zeros(zones),
+        fan_runs=np.ones(zones, dtype=np.bool_),
         aired=np.zeros(zones),
         supply=np.zeros((zones, 3)),
         bypass=np.zeros(zones, dtype=np.int64),
@@ -550,5 +623,6 @@ def _result(
         fan_air=means.air_flow[:, z, 1],
         coil=means.power[:, z, 0],
         slab=means.power[:, z, 1],
+        alternative=means.alternative[:, z],
         warm_up_days=days,
     )

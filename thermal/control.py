@@ -7,6 +7,7 @@ together: `switched` picks the sun, and hands the state to the heat balance.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal.climate import Solar
 from thermal.errors import require
+from thermal.zone import Gains
 
 StateArray = NDArray[np.int64]
 
@@ -73,6 +75,39 @@ def by_glare(
         if not len(left):
             break
     return chosen
+
+
+@dataclass(frozen=True, slots=True)
+class TemperatureCondition:
+    """Met once a room's temperature at the end of the step before is above a limit.
+
+    Until it is below the other.
+    """
+
+    above_c: float
+    below_c: float
+    operative: bool = False  # else of the air
+
+    def __post_init__(self) -> None:
+        fits = self.below_c <= self.above_c
+        require(fits, "shading control", "opens at a greater value than it closes at")
+
+
+@dataclass(frozen=True, slots=True)
+class TemperatureControl:
+    """Sun and gains of a zone by which of K conditions its temperature meets in each hour.
+
+    The heat balance chooses: of the 2^K alternatives that whose number has bit k set where
+    condition k is met.
+    """
+
+    conditions: tuple[TemperatureCondition, ...]
+    suns: tuple[Solar, ...]
+    gains: tuple[Gains, ...]
+
+    def __post_init__(self) -> None:
+        fits = len(self.suns) == len(self.gains) == 2 ** len(self.conditions) > 1
+        require(fits, "shading control", "expected an alternative for all conditions met or not")
 
 
 def profile_angle(sun_local: ArrayLike) -> NDArray[np.float64]:

@@ -29,6 +29,9 @@ class Elimination(NamedTuple):
     # [M] entry that each product of two entries of a column is taken from, in the order of their
     # making: column by column, the first of the two, the second after it
     target: NDArray[np.uint64]
+    # [E] entry that the first product of each entry is taken from, where its others are the next
+    # ones: in rooms, whose faces all exchange; else -1
+    run: NDArray[np.int64]
 
     def entries(self, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
         """Entry of each pair of unknowns [P, 2]: [P]."""
@@ -68,12 +71,17 @@ def elimination(unknowns: int, pairs: Iterable[tuple[int, int]]) -> Elimination:
     columns = [np.sort(place[list(below[u])]) for u in order]
     start = np.concatenate([[0], np.cumsum([len(column) for column in columns])])
     rows = np.concatenate([np.empty(0, dtype=np.int64), *columns])
-    target = [np.empty(0, dtype=np.int64)]
+    target, run = [np.empty(0, dtype=np.int64)], []
     for column in columns:
         for number, row in enumerate(column):
-            target.append(start[row] + np.searchsorted(columns[row], column[number + 1 :]))
+            products = start[row] + np.searchsorted(columns[row], column[number + 1 :])
+            target.append(products)
+            run.append(products[0] if len(products) and (np.diff(products) == 1).all() else -1)
     targets = np.concatenate(target).astype(np.uint64)
-    return Elimination(place=place, start=start, rows=rows.astype(np.uint64), target=targets)
+    return Elimination(
+        place=place, start=start, rows=rows.astype(np.uint64), target=targets,
+        run=np.array(run, dtype=np.int64),
+    )  # fmt: skip
 
 
 @inlined
@@ -97,9 +105,15 @@ def eliminate(
             i, f = system.rows[m], e[m] * d[k]
             d[i] -= f * e[m]
             b[i] -= f * b[k]
-            for q in range(m + 1, end):
-                e[system.target[at]] -= f * e[q]
-                at += 1
+            first, count = system.run[m], end - m - 1
+            if first >= 0:
+                taken, products = e[first : first + count], e[m + 1 : end]
+                for q in range(count):
+                    taken[q] -= f * products[q]
+            else:
+                for q in range(count):
+                    e[system.target[at + q]] -= f * e[m + 1 + q]
+            at += count
     for j in range(d.size - 1, -1, -1):
         s = b[j]
         for m in range(system.start[j], system.start[j + 1]):

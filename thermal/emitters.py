@@ -15,7 +15,8 @@ class IdealLoads:
     """Ideal heating and cooling; scalars hold for every hour, infinity switches off.
 
     Arrays have a value for every hour H, or for every time step T.  What is not radiant goes to
-    the air; the radiant share is spread over the surfaces by area and emissivity.
+    the air; the radiant share is spread over the surfaces by area and emissivity, or acts at the
+    inside of one of them: a heated floor, a cooled ceiling.
     """
 
     heating_c: NDArray[np.float64] | float = -np.inf  # [H] or [T] [degC] air set point
@@ -24,6 +25,8 @@ class IdealLoads:
     cooling_limit: float = np.inf  # [W], positive
     heating_radiant: float = 0.0  # share of the heat
     cooling_radiant: float = 0.0
+    heating_surface: str = ""  # of the zone, at which its radiant share acts; "": all surfaces
+    cooling_surface: str = ""
 
     def __post_init__(self) -> None:
         crossed = np.max(self.heating_c) > np.min(self.cooling_c) and np.any(

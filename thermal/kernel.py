@@ -21,7 +21,7 @@ from thermal.records import (
     inlined,
     summed,
 )
-from thermal.step import step
+from thermal.step import mean_radiant, step
 
 
 @inlined
@@ -118,6 +118,38 @@ def _end_node(net: Network, i: int, side: int, state: State, work: Workspace) ->
     return work.ends[i, side] + from_faces
 
 
+@inlined
+def _take_alternative(
+    net: Network, state: State, drive: Drive, method: Method, hour: int, taken: NDArray[np.int64]
+) -> None:
+    """Write the alternative of every zone into the drive of an hour, by the temperatures now."""
+    some, per_hour = drive.alternatives, method.steps // method.solar_every
+    for z in range(some.limits.shape[0]):
+        before, now = 0, 0
+        for k in range(some.limits.shape[1]):
+            before += state.met[z, k] << k
+        for k in range(some.limits.shape[1]):
+            above, below, operative = some.limits[z, k]
+            felt = state.air[z]
+            if operative > 0.0:
+                felt = 0.5 * (felt + mean_radiant(net, state, some.mix[before, hour, z], z))
+            state.met[z, k] = felt > above or (state.met[z, k] and felt >= below)
+            now += state.met[z, k] << k
+        taken[z] = now
+        drive.mix[hour, z] = some.mix[now, hour, z]
+        drive.convective[hour, z] = some.convective[now, hour, z]
+        drive.radiant[hour, z] = some.radiant[now, hour, z]
+        for sun in range(hour * per_hour, (hour + 1) * per_hour):
+            drive.air[sun, z] = some.air[now, sun, z]
+        for i in range(net.radiation.first_face[z], net.radiation.first_face[z + 1]):
+            if net.faces.kind[i] == WINDOW:
+                w = net.faces.window[i]
+                drive.state[hour, w] = some.state[now, hour, w]
+            for sun in range(hour * per_hour, (hour + 1) * per_hour):
+                drive.inner[sun, i] = some.inner[now, sun, i]
+                drive.outer[sun, i] = some.outer[now, sun, i]
+
+
 @compiled(**ENTRY)
 def advance(
     net: Network,
@@ -132,6 +164,9 @@ def advance(
     """Run the first `hours` hours from the given state; add their means to `means`."""
     share = 1.0 / method.steps
     for t in range(hours * method.steps):
+        if t % method.steps == 0 and drive.alternatives.limits.shape[1] > 0:
+            hour = t // method.steps
+            _take_alternative(net, state, drive, method, hour, means.alternative[hour])
         step(net, state, work, weather, drive, t, method)
         hour = t // method.steps
         _account(net, state, work, weather, drive, t, method, means.terms[hour])
@@ -140,7 +175,7 @@ def advance(
             means.outer[hour, i] += share * state.outer[i]
         for z in range(state.air.size):
             means.air[hour, z] += share * state.air[z]
-            fan = drive.supply[hour, z]
+            fan = drive.supply[hour, z] if work.fan_runs[z] else 0.0
             means.air_flow[hour, z, 0] += share * (work.flow[z] + work.aired[z] + fan)
             means.air_flow[hour, z, 1] += share * fan
             means.power[hour, z, 0] += share * work.supply[z, 2]
@@ -179,4 +214,5 @@ def hourly_means(hours: int, state: State) -> Means:
         terms=np.zeros(terms),
         air_flow=np.zeros((hours, zones, 2)),
         power=np.zeros((hours, zones, 2)),
+        alternative=np.zeros((hours, zones), dtype=np.int64),
     )

@@ -106,8 +106,9 @@ class AirPaths(NamedTuple):
     leak: NDArray[np.float64]  # [Z, 8] a, b, c, d, s, m, w, n of `Leakage`
     wind: NDArray[np.float64]  # [Z] of the weather's, at the zone's height
     airing: NDArray[np.float64]  # [Z, 4] w, s, 1 where both are added, constant flow
-    # [Z, 6] opened above, closed below [degC], least difference [K], greatest wind, least outdoor,
-    # 1 where the zone may be heated while they are open
+    # [Z, 8] opened above, closed below [degC], least difference [K], greatest wind, least outdoor;
+    # 1 where the zone may be heated while they are open, for limits of the operative temperature,
+    # for hybrid ventilation
     opens: NDArray[np.float64]
     site: float  # wind on the site, of the weather's
     fan: NDArray[np.float64]  # [Z, 3] recovery, bypass above, least temperature
@@ -121,6 +122,7 @@ class Emitters(NamedTuple):
     """Heating and cooling of the zones Z."""
 
     radiant: NDArray[np.float64]  # [Z, 2] share of heating and cooling
+    acts_at: NDArray[np.int64]  # [Z, 2] face that takes these shares, -1: all
     slab: NDArray[np.int64]  # [Z] face, -1 without
     power: NDArray[np.float64]  # [Z, 3] of the slab: heating, cooling [W], band [K]
 
@@ -143,7 +145,8 @@ def air_paths(zones: Sequence[Zone], transfers: Sequence[AirTransfer], terrain: 
         airing=np.array([(x.wind, x.stack, float(x.both), x.flow) for x in airings]),
         opens=np.array(
             [(x.open_above_c, x.close_below_c, x.least_difference, x.greatest_wind,
-              x.least_outdoor_c, float(x.heating_while_open)) for x in airings]
+              x.least_outdoor_c, x.heating_while_open, x.operative, x.hybrid) for x in airings],
+            dtype=np.float64,
         ),
         site=local_wind_factor(SITE_HEIGHT, terrain),
         fan=np.array([(x.recovery, x.bypass_above_c, x.least_c) for x in fans]),
@@ -154,11 +157,11 @@ def air_paths(zones: Sequence[Zone], transfers: Sequence[AirTransfer], terrain: 
     )  # fmt: skip
 
 
-def slab_faces(zones: Sequence[Zone]) -> list[int]:
-    """The face of each zone's heated slab among the faces of all, -1 without one."""
+def named_faces(zones: Sequence[Zone], names: Sequence[str]) -> list[int]:
+    """A surface of each zone by its name among the faces of all zones; "": -1."""
     face, found = 0, []
-    for zone in zones:
-        found.append(-1 if zone.slab is None else face + zone.index_of(zone.slab.surface))
+    for zone, name in zip(zones, names, strict=True):
+        found.append(face + zone.index_of(name) if name else -1)
         frames = sum(window.frame_area > 0 for window in zone.windows)
         face += len(zone.surfaces) + len(zone.windows) + frames
     return found
@@ -180,6 +183,13 @@ def emitters(
     loads = [zone.loads for zone in zones]
     return Emitters(
         radiant=np.array([(x.heating_radiant, x.cooling_radiant) for x in loads]),
+        acts_at=np.stack(
+            [
+                named_faces(zones, [getattr(x, key) for x in loads])
+                for key in ("heating_surface", "cooling_surface")
+            ],
+            axis=1,
+        ),
         slab=np.array(slabs, dtype=np.int64),
         power=np.array(power),
     )
@@ -346,7 +356,7 @@ def network(
     """The network of coupled zones; link: [Z, Z] air exchange [m3/s], symmetric."""
     elements = [(z, e) for z, zone in enumerate(zones) for e in _elements(zone)]
     partners = _partners(zones, elements)
-    slabs = slab_faces(zones)
+    slabs = named_faces(zones, [zone.slab.surface if zone.slab else "" for zone in zones])
     pipes = {face: zones[z].slab.depth for z, face in enumerate(slabs) if face >= 0}
     ports, modes = _walls([e for _, e in elements], partners, step_s, cell, pipes)
     faces = _faces(zones, elements, partners, ports, terrain)

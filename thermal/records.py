@@ -44,6 +44,22 @@ class OutdoorConditions(NamedTuple):
     density: NDArray[np.float64]  # [T] of outdoor air [kg/m3]
 
 
+class Alternatives(NamedTuple):
+    """What `Drive` has of zones in each of A alternatives, from which every hour takes one.
+
+    Bit k of an alternative's number is set where condition K of the zone's temperature is met.
+    """
+
+    limits: NDArray[np.float64]  # [Z, K, 3] met above, until below [degC]; 1: operative, 0: air
+    inner: NDArray[np.float64]  # [A, R, N]
+    outer: NDArray[np.float64]  # [A, R, N]
+    air: NDArray[np.float64]  # [A, R, Z]
+    state: NDArray[np.int64]  # [A, H, W]
+    mix: NDArray[np.int64]  # [A, H, Z]
+    convective: NDArray[np.float64]  # [A, H, Z]
+    radiant: NDArray[np.float64]  # [A, H, Z]
+
+
 class Drive(NamedTuple):
     """Inputs of the zones; R is the solar time axis (hours or steps)."""
 
@@ -67,6 +83,7 @@ class Drive(NamedTuple):
     cooling_c: NDArray[np.float64]  # [T, Z]
     limit: NDArray[np.float64]  # [Z, 2] heating and cooling power [W]
     slab_c: NDArray[np.float64]  # [T, Z, 2] heating and cooling set point of the slab
+    alternatives: Alternatives  # written into the arrays above at the start of every hour
 
 
 class State(NamedTuple):
@@ -78,6 +95,7 @@ class State(NamedTuple):
     air: NDArray[np.float64]  # [Z]
     load: NDArray[np.float64]  # [Z] ideal load of the step [W], heating positive
     opened: NDArray[np.bool_]  # [Z] whether the windows are open
+    met: NDArray[np.bool_]  # [Z, K] conditions of `Alternatives`
 
 
 class Workspace(NamedTuple):
@@ -92,10 +110,12 @@ class Workspace(NamedTuple):
     windows: NDArray[np.int64]  # [Z] SHUT, OPEN; with what was tried in the step
     # [Z, 3] air in which windows close or are partly open, in which they open [degC]; flow [m3/s]
     airing: NDArray[np.float64]
+    shut: NDArray[np.bool_]  # [Z] whether hybrid windows stay shut in the step
     radiant: NDArray[np.float64]  # [Z] radiant part of its load [W]
     # [Z, 3] of that part: its load's other part, itself, both when last solved; less by its watt
     radiant_seen: NDArray[np.float64]
     flow: NDArray[np.float64]  # [Z] outdoor air but that of fans and opened windows [m3/s]
+    fan_runs: NDArray[np.bool_]  # [Z] not where opened windows replace it
     aired: NDArray[np.float64]  # [Z] air through opened windows [m3/s]
     supply: NDArray[np.float64]  # [Z, 3] fans: conductance [W/K], it times temperature, coil [W]
     bypass: NDArray[np.int64]  # [Z] of the heat recovery, as `windows`
@@ -126,6 +146,7 @@ class Means(NamedTuple):
     terms: NDArray[np.float64]  # [H, Z, 14] sums over the steps of the heat flows [W]
     air_flow: NDArray[np.float64]  # [H, Z, 2] outdoor air, of it by fans [m3/s]
     power: NDArray[np.float64]  # [H, Z, 2] of the supply air's coil, of the slab [W]
+    alternative: NDArray[np.int64]  # [H, Z] of `Alternatives`
 
 
 class Method(NamedTuple):

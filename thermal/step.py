@@ -15,8 +15,9 @@ Outdoor air and the slab: leaks, the flow through opened windows and the slab fo
 last iterate. Windows open where the air of the step would rise above their upper limit, and close
 where shut it would not exceed the lower one. Where fully open it would fall below the lower limit,
 they are open in part and hold it. The bypass of a heat recovery likewise holds its temperature (or
-the one above which the room would be cooled); it is shut while the room is heated. So no on and off
-is left that the time step would have to resolve.
+the one above which the room would be cooled); it is shut while the room is heated. Hybrid windows
+replace the fan while they are open; they are shut in a step in which the room would need cooling
+besides. So no on and off is left that the time step would have to resolve.
 """
 
 from __future__ import annotations
@@ -66,9 +67,10 @@ def start_air_flows(
     net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
     t: int, hour: int,
 ) -> None:  # fmt: skip
-    """Set the limits of windows and bypass of every zone for the step."""
+    """Set windows and bypass of every zone to their states of the step before."""
     for z in range(work.flow.size):
-        _set_limits(net, state, work, weather, drive, t, z)
+        work.shut[z] = False
+        work.windows[z] = OPEN if state.opened[z] else SHUT
         above = max(min(net.paths.fan[z, 1], drive.cooling_c[t, z]), drive.heating_c[t, z])
         work.bypass_c[z] = above
         work.bypass[z] = OPEN if state.air[z] > above else SHUT
@@ -84,6 +86,7 @@ def set_air_flows(
         _set_supply(net, state, work, weather, drive, t, hour, z)
         work.flow[z] = drive.airflow[hour, z] + _leaks(net, state, weather, drive, t, hour, z)
         work.airing[z, 2] = 0.0
+        _set_limits(net, state, work, weather, drive, t, hour, z)
         if drive.airing[hour, z] > 0.0:
             work.airing[z, 2] = _airing(net, state, work, weather, drive, t, hour, z)
 
@@ -104,16 +107,18 @@ def _leaks(
 @inlined
 def _set_limits(
     net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
-    t: int, z: int,
+    t: int, hour: int, z: int,
 ) -> None:  # fmt: skip
     """Air temperatures at which the windows close and open."""
     above, below, difference = net.paths.opens[z, 0], net.paths.opens[z, 1], net.paths.opens[z, 2]
+    if net.paths.opens[z, 6] > 0.0:  # limits of the operative temperature
+        radiant = mean_radiant(net, state, drive.mix[hour, z], z)
+        above, below = 2.0 * above - radiant, 2.0 * below - radiant
     lower = max(below, weather.outdoor[t] + difference)
     if net.paths.opens[z, 5] == 0.0:
         lower = max(lower, drive.heating_c[t, z])
     upper = max(above, lower)
     work.airing[z, 0], work.airing[z, 1] = lower, upper
-    work.windows[z] = OPEN if state.opened[z] else SHUT
 
 
 @inlined
@@ -124,13 +129,23 @@ def _airing(
     """Air through the windows when open [m3/s]; 0 where they must stay shut."""
     greatest, least_out = net.paths.opens[z, 3], net.paths.opens[z, 4]
     v, out = weather.speed[t] * net.paths.site, weather.outdoor[t]
-    if v > greatest or out < least_out or work.airing[z, 0] > drive.cooling_c[t, z]:
+    if v > greatest or out < least_out or work.airing[z, 0] > drive.cooling_c[t, z] or work.shut[z]:
         return 0.0
     w, s, both, flow = net.paths.airing[z]
     wind, stack = w * v * v, s * abs(state.air[z] - out)
     squared = wind + stack if both > 0.0 else max(wind, stack)
     flow += REFERENCE_DENSITY / weather.density[t] * np.sqrt(squared)
     return drive.airing[hour, z] * flow
+
+
+@inlined
+def mean_radiant(net: Network, state: State, mix: int, z: int) -> float:
+    """Mean radiant temperature of a zone [degC], weighted as its radiant gains are shared."""
+    first, last = net.radiation.first_face[z], net.radiation.first_face[z + 1]
+    at, mean = net.radiation.at_share[z] + mix * (last - first) - first, 0.0
+    for i in range(first, last):
+        mean += net.radiation.share[at + i] * state.inner[i]
+    return mean
 
 
 @inlined
@@ -206,6 +221,16 @@ def radiant_load(net: Network, work: Workspace, drive: Drive, z: int) -> float:
 
 
 @inlined
+def _radiated(net: Network, work: Workspace, drive: Drive, z: int, i: int, share: float) -> float:
+    """What face i takes of the plant's radiant load [W]; share: of one that acts at all faces."""
+    load = radiant_load(net, work, drive, z)
+    face = net.emitters.acts_at[z, 0 if load > 0.0 else 1]
+    if face < 0:
+        return load * share
+    return load if face == i else 0.0
+
+
+@inlined
 def close_air(
     net: Network, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int
 ) -> None:
@@ -265,6 +290,9 @@ def plants_agree(
         if plant < VENTS:
             work.plant[z] = _plant(plant, air, asked, stiffness * ROUNDING, drive, t, z)
         agree &= work.plant[z] == plant
+        cools = work.plant[z] == COOLS or work.plant[z] == COOLS_FULLY
+        if cools and net.paths.opens[z, 7] > 0.0 and work.windows[z] & OPEN:
+            work.shut[z], work.airing[z, 2] = True, 0.0  # outdoor air does not cool enough
         agree &= _windows_agree(work, z, air)
         agree &= _bypass_agrees(work, z, air)
         if work.plant[z] != HEATS and work.plant[z] != COOLS:
@@ -290,7 +318,7 @@ def _windows_agree(work: Workspace, z: int, air: float) -> bool:
 @inlined
 def _bypass_agrees(work: Workspace, z: int, air: float) -> bool:
     """Whether the bypass does what this air temperature asks, else it changes."""
-    limit, full = work.bypass_c[z], work.bypassed[z, 0]
+    limit, full = work.bypass_c[z], work.bypassed[z, 0] if work.fan_runs[z] else 0.0
     if work.plant[z] == PASSES:
         coldest = work.bypassed[z, 1]
         warmest = work.recovered[z, 1] + (full - work.recovered[z, 0]) * air
@@ -585,8 +613,9 @@ def _assemble(
             own, r = _wall_row(net, i, state, work, weather, t, outer, beyond, method)
         work.film[i] = film
         d[k] = area * (own + film)
-        radiant = drive.radiant[hour, z] + radiant_load(net, work, drive, z)
-        b[k] = area * r + drive.inner[sun, i] + radiant * _share(net, drive, hour, z, i)
+        share = _share(net, drive, hour, z, i)
+        b[k] = area * r + drive.inner[sun, i] + drive.radiant[hour, z] * share
+        b[k] += _radiated(net, work, drive, z, i, share)
         work.air[z, 0] += area * film
         if is_held(work.plant[z]):
             b[k] += area * film * set_point(work, drive, t, z)
@@ -612,7 +641,9 @@ def _choose_supply(work: Workspace, z: int) -> None:
     """The supply air by what the bypass does; partly open, its heat follows from the solution."""
     row, shut, passed = work.supply[z], work.recovered[z], work.bypassed[z]
     row[0], row[1], row[2] = shut[0], shut[1], shut[2]
-    if work.plant[z] == PASSES:
+    if not work.fan_runs[z]:
+        row[0], row[1], row[2] = 0.0, 0.0, 0.0
+    elif work.plant[z] == PASSES:
         row[0], row[1] = passed[0], 0.0
     elif work.bypass[z] & OPEN and passed[0] > 0.0:
         row[0], row[1] = passed[0], passed[1]
@@ -632,8 +663,10 @@ def _assemble_air(
     hour, pairs = t // method.steps, net.couplings
     heat = weather.density[t] * AIR_HEAT
     for z in range(work.plant.size):
-        _choose_supply(work, z)
         through = work.windows[z] & OPEN and work.plant[z] != VENTS
+        replaced = net.paths.opens[z, 7] > 0.0 and (through or work.plant[z] == VENTS)
+        work.fan_runs[z] = not replaced
+        _choose_supply(work, z)
         work.aired[z] = work.airing[z, 2] if through else 0.0
         outdoor = heat * (work.flow[z] + work.aired[z]) + net.paths.bridges[z]
         store = heat * net.air_capacity[z] / method.step_s

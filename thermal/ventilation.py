@@ -102,6 +102,8 @@ class WindowAiring:
     least_outdoor_c: float = -np.inf
     heating_while_open: bool = False
     flow: float = 0.0  # besides wind and stack, of open windows [m3/s]
+    operative: bool = False  # whether the limits are of the operative temperature
+    hybrid: bool = False  # open, they replace the fan; they are shut while the room is cooled
 
     def __post_init__(self) -> None:
         require(self.wind >= 0 and self.stack >= 0, "opened windows", "negative flow")

@@ -9,7 +9,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import ifcopenshell
 import numpy as np
 import shapely
 
@@ -20,7 +19,6 @@ from bim.fenestration import ShadingState
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.cut_rooms import cut_rooms, room_lids
-from bim.ifc.damage import Damage, entities, instances
 from bim.ifc.defects import DRAWN_TWICE, model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.fenestration_read import read_fenestration
@@ -31,16 +29,15 @@ from bim.ifc.materials import SURFACES
 from bim.ifc.open_spaces import open_spaces
 from bim.ifc.passages import Passage, open_apertures
 from bim.ifc.placing import map_georeference
-from bim.ifc.project import psets_of
 from bim.ifc.raised_rooms import raised_rooms
 from bim.ifc.rooms_from_geometry import rooms_from_geometry
 from bim.ifc.schemes import one_of_each
 from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
 from bim.ifc.space_boundaries import boundary_issues
-from bim.ifc.spaces import SpaceRecord, read_spaces
+from bim.ifc.spaces import SpaceRecord, read_spaces, read_zones
 from bim.isolated_solids import RoomBoundary, room_boundaries
-from bim.model import Building, Element, Space, SpaceGroup
+from bim.model import Building, Element, Space
 from bim.neighbours import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
 from bim.outdoors import lifted_sites, mirrors_in_view, simplified, unblinded
 from bim.rays import RayMesh, ray_mesh
@@ -49,38 +46,6 @@ from bim.solids import triangles_of
 from bim.soundness import agree, soundness_issues
 from bim.wall_middles import area_to_wall_middles
 from mitsuba_cfs.errors import RoomError
-
-DEEPEST = 20  # zones of zones
-
-
-def read_zones(model: ifcopenshell.file, damage: Damage | None = None) -> tuple[SpaceGroup, ...]:
-    """The IfcZone with spaces, each with those of its parts; its kind is what its texts say.
-
-    Kind: ObjectType, LongName, Description and Pset_ZoneCommon's Category and Reference.
-    """
-    zones = []
-    for zone in instances(model, "IfcZone"):
-        rooms = tuple(dict.fromkeys(_spaces(zone, DEEPEST)))
-        common = psets_of(zone, damage).get("Pset_ZoneCommon", {})
-        texts = [getattr(zone, key, None) for key in ("ObjectType", "LongName", "Description")]
-        texts += [common.get("Category"), common.get("Reference")]
-        if rooms:
-            kind = ", ".join(str(text) for text in texts if text)
-            zones.append(SpaceGroup(zone.Name or kind or zone.GlobalId, kind, rooms))
-    return tuple(zones)
-
-
-def _spaces(group: ifcopenshell.entity_instance, depth: int) -> list[str]:
-    """GUIDs of the spaces of a zone and of the zones in it."""
-    guids: list[str] = []
-    for relation in getattr(group, "IsGroupedBy", None) or ():
-        for one in entities(relation.RelatedObjects):
-            if one.is_a("IfcSpace"):
-                guids.append(one.GlobalId)
-            elif one.is_a("IfcGroup") and depth:
-                guids += _spaces(one, depth - 1)
-    return guids
-
 
 SEARCH = 0.3  # share of the stage "rooms" in which they are found, where the file has no spaces
 
@@ -92,6 +57,7 @@ def read_ifc(
     corrections: Corrections | None = None,
     join: Sequence[str] = (),
     furniture: bool = False,
+    rooms: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Building:
     """The building in an IFC2X3, IFC4 or IFC4X3 file (.ifc, .ifczip).
@@ -103,6 +69,8 @@ def read_ifc(
         join: further rooms to merge, as "Hall + Living", without `corrections`;
             "open": those connected by an opening larger than a door.
         furniture: whether furniture is part of the light and views of its room.
+        rooms: names that are asked for: where no name in the file is like one of them, it is
+            refused before any geometry is read.
         progress: called with the stage's name and the fraction of it that is done.
 
     Raises: `DataError` where the file is missing or is no readable IFC; faults inside the model are
@@ -110,16 +78,16 @@ def read_ifc(
     """
     tell = progress or (lambda stage, fraction: None)
     corrections = corrections_beside(path, join) if corrections is None else corrections
-    source = read_source(path, corrections, tell, linked)
+    source = read_source(path, corrections, tell, linked, rooms=rooms)
     tell("rooms", 0.0)
     mesh = mesh_of(source.walls)
-    rooms, issues = _rooms(source, mesh, lambda part: tell("rooms", SEARCH * part))
-    records = rooms.records
+    drawn, issues = _rooms(source, mesh, lambda part: tell("rooms", SEARCH * part))
+    records = drawn.records
     issues = [*source.issues, *model_defects(source.model, source.elements), *issues]
     apertures, more = apertures_in(source)
     issues += more
     glass = glass_of_rooms(source, apertures, records, mesh)
-    records, more = raised_rooms(source, records, glass, rooms.covers)
+    records, more = raised_rooms(source, records, glass, drawn.covers)
     issues += more
     if any(record.raised for record in records):
         glass = glass_of_rooms(source, apertures, records, mesh)
@@ -132,7 +100,7 @@ def read_ifc(
     )
     issues += [*glass.issues, *faults]
     around = _surroundings(mesh, source.walls, records, source.ground)
-    attached = [*glass.attachments, *(side for passage in rooms.passages for side in passage.sides)]
+    attached = [*glass.attachments, *(side for passage in drawn.passages for side in passage.sides)]
     by_room = [[a for a in attached if a.room == r.guid] for r in records]
     boundaries = room_boundaries([(r.solid, a) for r, a in zip(records, by_room, strict=True)])
     spaces: list[Space] = []
@@ -159,7 +127,7 @@ def read_ifc(
         source.name, tuple(spaces), outside, tuple(dict.fromkeys(issues)),
         source.latitude_deg, source.longitude_deg, source.elevation, Path(path),
         account_of(
-            source, rooms.read, spaces, glass, issues, repeated=[r.guid for r in rooms.repeated]
+            source, drawn.read, spaces, glass, issues, repeated=[r.guid for r in drawn.repeated]
         ),
         map_georeference(
             source.model, source.placed,
@@ -187,6 +155,7 @@ def _rooms(
     records, issues = read_spaces(
         source.model, source.shapes, source.quantity_scales(), source.damage, stated=stated,
         removed=source.corrections.removed(source.model),
+        names=source.corrections.named(source.model),
     )  # fmt: skip
     records, repeated, more = one_of_each(source.model, records)
     issues += more

@@ -25,6 +25,7 @@ from bim.radiance.functions import find_functions
 from bim.radiance.materials import LUMINANCE, SYSTEMS, luminance
 from bim.radiance.patterns import (
     COMPUTED_PATTERNS,
+    EVEN,
     TURNS,
     evaluated,
     functions_of,
@@ -98,7 +99,7 @@ def layered_window(
     issues = list(dict.fromkeys(issue for thing in things for issue in moved_files(thing)))
     if len(things) == 1 and things[0].material.kind in SYSTEMS:
         thing = things[0]
-        path = thing.primitive.file.parent / thing.material.bsdf
+        path = _bsdf_file(thing)
         bands = dict(read_bsdf_xml(path).bands)
         if outwards[0]:  # the front of its data is on the side that the normal leaves
             bands = {name: band.turned_round() for name, band in bands.items()}
@@ -127,7 +128,8 @@ def layered_window(
     if beside is not None:
         system = _mixed(system, klems[-1], _patch_means(beside))
     system = replace(system, see_through=0.0) if rough else system
-    state = ShadingState(bands={"Visible": system}, angular=angular)
+    files = tuple(_bsdf_file(thing) for thing in things if thing.material.kind in SYSTEMS)
+    state = ShadingState(bands={"Visible": system}, angular=angular, layers=files)
     return LayeredWindow(state, ups[0] if ups else None, tuple(issues))
 
 
@@ -207,8 +209,12 @@ def _is_stated(path: Path, name: str, folder: Path) -> bool:
     return any(place.is_file() and place.samefile(path) for place in (Path(name), folder / name))
 
 
+def _bsdf_file(thing: RadianceObject) -> Path:
+    return thing.primitive.file.parent / thing.material.bsdf
+
+
 def _bsdf_layer(thing: RadianceObject, outward: bool) -> KlemsBsdf:
-    file = read_bsdf_xml(thing.primitive.file.parent / thing.material.bsdf)
+    file = read_bsdf_xml(_bsdf_file(thing))
     bsdf = klems_of(file.bands.get("Visible") or file.bands["Solar"]).filled()
     return bsdf.turned_round() if outward else bsdf
 
@@ -237,7 +243,7 @@ def _layer(
     scale = np.ones((len(ANGLES), 1))
     if patterns:
         scale = pattern_values(thing.triangles, thing.normal, patterns, ANGLES)
-    if patterns:
+    if np.ptp(scale, axis=1).max() > EVEN:
         first = patterns[0].primitive
         values = {"pattern": first.name, "surface": thing.name, "mean": float(scale.mean()),
                   "least": float(scale.min()), "greatest": float(scale.max())}  # fmt: skip
@@ -264,23 +270,14 @@ def _mixed_layer(thing: RadianceObject, outward: bool, issues: list[Issue]) -> W
     smooth = [layer for layer in layers if isinstance(layer, WindowLayer)]
     if len(smooth) < len(layers):
         raise definition.primitive.fault("mixes a rough trans, which is not computed")
-    where = f"{definition.primitive.file}:{definition.primitive.line}"
-    names = [part.material.name for part in thing.parts]
-    issues.append(
-        Issue(
-            "glass-mixture-averaged",
-            where,
-            {
-                "surface": thing.name,
-                "mixture": definition.primitive.name,
-                "foreground": names[0],
-                "background": names[1],
-                "mean": 100 * float(share.mean()),
-                "least": 100 * float(share.min()),
-                "greatest": 100 * float(share.max()),
-            },
-        )
-    )
+    if np.ptp(share, axis=1).max() > EVEN:
+        where = f"{definition.primitive.file}:{definition.primitive.line}"
+        foreground, background = (part.material.name for part in thing.parts)
+        of_pane = {"surface": thing.name, "mixture": definition.primitive.name,
+                   "foreground": foreground, "background": background,
+                   "mean": 100 * float(share.mean()), "least": 100 * float(share.min()),
+                   "greatest": 100 * float(share.max())}  # fmt: skip
+        issues.append(Issue("glass-mixture-averaged", where, of_pane))
     mean = share.mean(axis=1)
 
     def mixed(name: str) -> NDArray[np.float64]:

@@ -20,6 +20,7 @@ from mitsuba_cfs.surfaces import even_numbers, points_on_triangles
 
 POINTS = 8192  # on a surface, for the mean of a pattern
 TURNS = 16  # azimuths of a function by the angle of incidence
+EVEN = 1e-6  # greatest difference over a surface of a pattern that is the same everywhere
 COMPUTED_PATTERNS = ("brightfunc", "colorfunc")
 EXPRESSIONS = {"brightfunc": slice(1), "colorfunc": slice(3), MIXTURE: slice(2, 3)}  # in strings
 

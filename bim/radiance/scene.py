@@ -22,7 +22,7 @@ from bim.radiance.materials import (
     material_of,
     mixed_material,
 )
-from bim.radiance.patterns import COMPUTED_PATTERNS, pattern_values
+from bim.radiance.patterns import COMPUTED_PATTERNS, EVEN, pattern_values
 from bim.radiance.primitives import VOID, Command, Definition, Primitive, read_statements
 from bim.radiance.xform import Xform, read_xform
 from bim.report.issue import Issue
@@ -236,7 +236,7 @@ class _Reader:
                 return None
             share = float(np.clip(values, 0.0, 1.0).mean())
             material = mixed_material(material.name, share, *(part.material for part in parts))
-            if not material.is_translucent:
+            if not material.is_translucent and np.ptp(values) > EVEN:
                 self._leave_out("material-mixture-averaged", mixture.primitive)
         return RadianceObject(
             name, material, known.names, triangles, surface, known.definitions, tuple(parts)
@@ -329,7 +329,8 @@ class _Reader:
         except DataError:
             self._leave_out("material-patterns-left-out", patterns[0].primitive)
             return material
-        self._leave_out("material-pattern-averaged", patterns[0].primitive)
+        if np.ptp(values) > EVEN:
+            self._leave_out("material-pattern-averaged", patterns[0].primitive)
         shine = 0.0 if material.gloss is None else material.gloss.at_normal
         return replace(material, diffuse=min(material.diffuse * mean, 1.0 - shine))
 

@@ -34,13 +34,13 @@ from mitsuba_cfs.methods.phase_matrices import (
 )
 from mitsuba_cfs.methods.phase_pictures import with_phase_pictures
 from mitsuba_cfs.methods.point_in_time import (
+    BATCHES,
     PathLight,
     path_eye_illuminance,
     path_illuminance,
-    relative_error_of_mean,
 )
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
-from mitsuba_cfs.methods.standard_error import noise_of_sums, relative_standard_error
+from mitsuba_cfs.methods.standard_error import NoiseOfSums, noise_of_sums
 from mitsuba_cfs.metrics.noise import Noise
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -216,56 +216,61 @@ def illuminance_with_error(
 ) -> tuple[Array, Array]:
     """Illuminance of the sensors [S, L] [lx], and the relative standard error of its mean [S].
 
-    The error is that of tracing, with Student's factor of its batches.  Seasons are taken as
-    independent.
+    The error is that of tracing, with Student's factor of its batches.
+    """
+    lit, noise = illuminance_with_noise(light, state, progress=progress)
+    return lit, relative_error_of_mean(lit, noise)
+
+
+def relative_error_of_mean(illuminance: Array, noise: NoiseOfSums) -> Array:
+    """Relative standard error [S] of the mean over the hours of the illuminance [S, L]."""
+    total, error = illuminance.sum(axis=1), noise(None).standard_error()
+    return np.divide(error, total, out=np.zeros_like(total), where=total > 0)
+
+
+def illuminance_with_noise(
+    light: Light, state: State | None = None, *, progress: Progress = silent
+) -> tuple[Array, NoiseOfSums]:
+    """Illuminance of the sensors [S, L] [lx], and the noise [S] of its sums over the hours.
+
+    The noise is by weights [S, L] of the hours, each sensor's own, not negative, and 0 in most
+    hours; None: 1 everywhere.  Hours of path tracing and seasons are taken as independent.
     """
     if isinstance(light, PathLight):
-        return path_illuminance(light, state, progress=progress)
+        lit, variance = path_illuminance(light, state, progress=progress)
+        return lit, _noise_of_paths(variance)
     if isinstance(light, PhaseLight):
         light, count = with_sensor_light(light, progress=progress), len(light.scene.points)
         whole = illuminance_of_all(light, state)
-        return whole[:count], relative_standard_error(light, state, whole)[:count]
+        of_all, eye = noise_of_sums(light, state, whole), np.zeros_like(whole[count:])
+
+        def of_phases(weights: Array | None) -> Noise:
+            rows = None if weights is None else np.concatenate([weights, eye])
+            return of_all(rows).part(slice(count))
+
+        return whole[:count], of_phases
     rows = _states(light, state)
     lit = np.zeros((len(light.scene.points), len(light.sky.lit)))
-    variance = np.zeros(len(lit))
+    seasons: list[tuple[NoiseOfSums, NDArray[np.int64]]] = []
     for one, hours in light.seasons():
-        lit[:, hours], error = illuminance_with_error(one, rows[:, hours])
-        variance += (error * lit[:, hours].sum(axis=1)) ** 2
-    return lit, relative_error_of_mean(lit, variance)
+        lit[:, hours], noise = illuminance_with_noise(one, rows[:, hours])
+        seasons.append((noise, hours))
+
+    def of_seasons(weights: Array | None) -> Noise:
+        parts = (n(None if weights is None else weights[:, hours]) for n, hours in seasons)
+        return sum(parts, start=Noise.none(len(lit)))
+
+    return lit, of_seasons
 
 
-def illuminance_noise(
-    light: Light, illuminance: Array, relative_error: Array, state: State | None = None
-) -> Callable[[Array], Noise]:
-    """Noise [S] of each sensor's illuminance times weights, summed over the hours, by weights.
+def _noise_of_paths(variance: Array) -> NoiseOfSums:
+    """From the variance of each hour [S, L]."""
 
-    The weights [S, L] are each sensor's own, not negative, and 0 in most hours.  Path tracing takes
-    the hours as independent and their relative errors as equal.
+    def noise(weights: Array | None) -> Noise:
+        of_hours = variance if weights is None else variance * weights**2
+        return Noise.of(of_hours.sum(axis=1), (of_hours**2).sum(axis=1) / (BATCHES - 1))
 
-    Args: illuminance, relative_error: [S, L], [S] of `illuminance_with_error` in this state.
-    """
-    if isinstance(light, PathLight):
-        total, squares = illuminance.sum(axis=1), (illuminance**2).sum(axis=1)
-        of_hour = np.divide(total**2, squares, out=np.zeros_like(total), where=squares > 0)
-        hourly = illuminance * (np.sqrt(of_hour) * relative_error)[:, None]
-
-        def of_paths(weights: Array) -> Noise:
-            variance = ((weights * hourly) ** 2).sum(axis=1)
-            return Noise.of(variance, np.zeros_like(variance))
-
-        return of_paths
-    if isinstance(light, PhaseLight):
-        light, count = with_sensor_light(light), len(light.scene.points)
-        eye = np.zeros((len(light.scene.sensors()[0]) - count, illuminance.shape[1]))
-        of_all = noise_of_sums(light, state, np.concatenate([illuminance, eye]))
-        return lambda weights: of_all(np.concatenate([weights, eye])).part(slice(count))
-    rows = _states(light, state)
-    seasons = [
-        (illuminance_noise(one, illuminance[:, hours], relative_error, rows[:, hours]), hours)
-        for one, hours in light.seasons()
-    ]
-    none = Noise.none(len(light.scene.points))
-    return lambda weights: sum((noise(weights[:, hours]) for noise, hours in seasons), start=none)
+    return noise
 
 
 def eye_illuminance(light: Light, state: State | None = None) -> Array:

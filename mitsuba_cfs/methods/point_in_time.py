@@ -15,13 +15,12 @@ from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.paths.disc import discs_seen, with_discs
-from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+from mitsuba_cfs.trace.paths.point_in_time import MAX_DEPTH, sensor_batches
 from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
-BATCHES = 4
+BATCHES = 16  # of the paths of a sensor in an hour
 Array = NDArray[np.float64]
 State = NDArray[np.int64]
 
@@ -77,26 +76,18 @@ def rooms_by_state(light: PathLight, rows: State) -> dict[tuple[int, ...], PathT
 def path_illuminance(
     light: PathLight, state: State | None = None, *, progress: Progress = silent
 ) -> tuple[Array, Array]:
-    """Illuminance of the scene's sensors [S, L] [lx], and the relative error [S] of its mean.
+    """Illuminance of the scene's sensors [S, L] [lx], and its variance in each hour [S, L] [lx2].
 
     Args: state: [G, L] of each window group in each hour, or [L] of all; the first by default.
     """
     scene, rows = light.scene, light.states_of(state)
     rooms = rooms_by_state(light, rows)
-    lit, variance = np.zeros((len(scene.points), rows.shape[1])), np.zeros(len(scene.points))
+    lit, variance = np.zeros((2, len(scene.points), rows.shape[1]))
     for hour, now in enumerate(rows.T):
         progress("point in time", hour / rows.shape[1])
         room = rooms[tuple(now.tolist())]
-        estimate = _sensors(light, room, scene.points, scene.normals, hour)
-        lit[:, hour] = estimate.values
-        variance += estimate.standard_error**2
-    return lit, relative_error_of_mean(lit, variance)
-
-
-def relative_error_of_mean(lit: Array, variance: Array) -> Array:
-    """Relative standard error [S] of means over hours [S, L], from the variance [S] of the sums."""
-    total = lit.sum(axis=1)
-    return np.divide(np.sqrt(variance), total, out=np.zeros_like(total), where=total > 0)
+        lit[:, hour], variance[:, hour] = _sensors(light, room, scene.points, scene.normals, hour)
+    return lit, variance
 
 
 def path_eye_illuminance(
@@ -108,7 +99,7 @@ def path_eye_illuminance(
     rooms = rooms_by_state(light, rows)
     return np.array(
         [
-            float(_sensors(light, rooms[tuple(now.tolist())], point, direction, hour).values[0])
+            float(_sensors(light, rooms[tuple(now.tolist())], point, direction, hour)[0][0])
             for hour, now in zip(hours.tolist(), rows.T, strict=True)
         ]
     )
@@ -157,14 +148,17 @@ def path_sky(light: PathLight, hour: int) -> Sky:
 
 def _sensors(
     light: PathLight, room: PathTracingScene, points: Array, directions: Array, hour: int
-) -> Estimate:
+) -> tuple[Array, Array]:
+    """Illuminance [S] of some sensors in one hour and its variance, from batches of paths."""
     chosen = light.sampling
-    return point_in_time(
+    batch = sensor_batches(
         room,
         path_sky(light, hour),
-        points,
-        directions,
+        np.repeat(points, BATCHES, axis=0),  # all batches in one launch
+        np.repeat(directions, BATCHES, axis=0),
         samples=max(chosen.hour_samples // BATCHES, 1),
-        stopping=Stopping(batches=BATCHES),
+        max_depth=MAX_DEPTH,
         seed=chosen.seed * light.sky.hours + int(light.sky.lit[hour]),  # hours differ
     )
+    values = batch(0).reshape(len(points), BATCHES)
+    return values.mean(axis=1), values.var(axis=1, ddof=1) / BATCHES

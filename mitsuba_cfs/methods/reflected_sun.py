@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,7 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.reflected import Straight, outdoor_light, view_shares, window_shares
-from mitsuba_cfs.trace.sun.sunlit_cells import RoomCells
+from mitsuba_cfs.trace.sun.sunlit_cells import Beam, RoomCells
 from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, room_shares
 
 BATCHES = 4  # each with its own paths and points
@@ -58,6 +59,12 @@ class ReflectedSun:
     def suns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Directions [h, 3] and normal illuminance [h] [lx] of the sun."""
         return self.sky.direction[self.shining], self.sky.illuminance[self.shining]
+
+    @cached_property
+    def mean(self) -> NDArray[np.float32]:
+        """Luminance outside the windows [Q * K, h], the mean of the batches."""
+        first, *others = map(_flat, self.before)
+        return np.asarray(sum(others, start=first) / np.float32(BATCHES), dtype=np.float32)
 
     def part(self, hours: NDArray[np.int64]) -> ReflectedSun:
         """The same in some of the hours L, given by their numbers among them."""
@@ -160,8 +167,12 @@ def _to_sensors(
     seen: Sequence[NDArray[np.float32]],
 ) -> tuple[NDArray[np.float64], Estimate]:
     """`reflected_to_sensors` of one group; seen: of `_outdoors_seen`, none without a beam."""
-    parts, beam = matrices.parts.of(g), beam_matrix(group.optics).any()
+    parts, in_room = matrices.parts.of(g), []
     rest = [without_straight(matrices, group, q) for q in parts]
+    if room is not None and beam_matrix(group.optics).any():
+        scenes, points = (sun.inside, sun.outside), matrices.sampling.sun_points
+        beam = Beam(scenes, g, group.optics.scattering, points, tuple(_seeds(matrices)))
+        in_room = room_light(room.cells, room.shares, beam, sun.suns)
 
     def light_of(batch: int) -> NDArray[np.float64]:
         """The light of the sensors in the hours with sun [S, h]."""
@@ -171,12 +182,8 @@ def _to_sensors(
             light += shares @ _flat(sun.before[batch], parts)
         if seen:
             light += seen[batch]
-        if room is not None and beam:
-            light += room_light(
-                room.cells, room.shares[batch], (sun.inside, sun.outside), g,
-                group.optics.scattering, sun.suns,
-                points=matrices.sampling.sun_points, seed=_seed(matrices, batch),
-            )  # fmt: skip
+        if in_room:
+            light += in_room[batch]
         return light
 
     traced = accumulate(light_of, stopping=Stopping(BATCHES))
@@ -191,9 +198,8 @@ def replaced_luminance(sun: ReflectedSun, weights: NDArray[Any], on_patches: NDA
     """
     if not sun.before:
         return np.zeros((*sun.by_patches.shape[:2], weights.shape[1]))
-    some = weights[sun.shining].astype(np.float32)
-    mean = np.sum([before @ some for before in sun.before], axis=0) / BATCHES
-    return np.asarray(mean - sun.by_patches @ on_patches)
+    mean = sun.mean @ weights[sun.shining].astype(np.float32)
+    return np.asarray(mean.reshape(*sun.by_patches.shape[:2], -1) - sun.by_patches @ on_patches)
 
 
 def replaced_before(sun: ReflectedSun, shares: Array | None, hours: NDArray[np.int64]) -> Array:
@@ -209,7 +215,7 @@ def replaced_before(sun: ReflectedSun, shares: Array | None, hours: NDArray[np.i
     some = number[hours][number[hours] >= 0]
     if not sun.before or not len(some):
         return values
-    light = sum(_flat(before)[:, some] for before in sun.before) / np.float32(BATCHES)
+    light = sun.mean[:, some]
     if shares is not None:  # in single precision, as the windows' light is
         light = shares.astype(np.float32) @ light
     values[:, number[hours] >= 0] = light

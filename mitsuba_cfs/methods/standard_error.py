@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,38 +36,26 @@ from mitsuba_cfs.methods.window_reflection import (
 from mitsuba_cfs.metrics.noise import Noise
 
 Array = NDArray[np.float64]
+# by weights of the hours, not negative and 0 in most of them [S, L]; None: 1 everywhere
+NoiseOfSums: TypeAlias = Callable[[Array | None], Noise]
 
 
-def relative_standard_error(light: PhaseLight, state: State | None, illuminance: Array) -> Array:
-    """Relative standard error of each sensor's mean over the hours [S + 1], the eye last.
+def noise_of_sums(light: PhaseLight, state: State | None, illuminance: Array) -> NoiseOfSums:
+    """Noise [S + 1] of each sensor's illuminance times weights, summed over the hours, by weights.
 
     That of V, D, B, C_ds, the reflected sun, and W and X of what windows reflect; those of
     different groups and states are taken as independent.  The error that D leaves as a mean over a
-    part of a group is included (`mitsuba_cfs.methods.subdivision`).
+    part of a group is included (`mitsuba_cfs.methods.subdivision`).  What windows reflect, and D's
+    means, have the same share of the illuminance as in the mean over all hours.
 
     Args: illuminance: that of the sensors in this state, the eye last [S + 1, L] [lx].
-    """
-    rows = states_of(light, state)
-    noise = _of_tracing(light, rows, None) + _of_method(light, rows)
-    error, total = noise.standard_error(), illuminance.sum(axis=1)
-    return np.divide(error, total, out=np.zeros_like(total), where=total > 0)
-
-
-def noise_of_sums(
-    light: PhaseLight, state: State | None, illuminance: Array
-) -> Callable[[Array], Noise]:
-    """Noise [S + 1] of each sensor's illuminance times weights, summed over the hours, by weights.
-
-    The weights [S + 1, L] are not negative, and 0 in most hours.  What windows reflect, and D's
-    means over a part of a group, have the same share of the illuminance as in the mean over all
-    hours.
-
-    Args: illuminance: as of `relative_standard_error`.
     """
     rows, total = states_of(light, state), illuminance.sum(axis=1)
     of_method = _of_method(light, rows)
 
-    def noise(weights: Array) -> Noise:
+    def noise(weights: Array | None) -> Noise:
+        if weights is None:
+            return _of_tracing(light, rows, None) + of_method
         weighted = (weights * illuminance).sum(axis=1)
         share = np.divide(weighted, total, out=np.zeros_like(total), where=total > 0)
         return _of_tracing(light, rows, weights) + of_method.scaled(share)

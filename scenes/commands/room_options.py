@@ -313,7 +313,7 @@ set_option = click.option(
 )
 no_cache_option = click.option(
     "--no-cache", "cache", is_flag=True, flag_value=False, default=True,
-    help="Neither read nor write the cache of traced matrices.",
+    help="Neither read nor write the cache of buildings and traced matrices.",
 )  # fmt: skip
 
 

@@ -139,16 +139,23 @@ def peak_note(system: FenestrationSystem) -> tuple[str, ...]:
     values = {
         "system": system.name,
         "peak": float(beam[0]),
-        "file": system.file.name if system.file else system.name,
+        "file": system.names[0],
     }
     if kind == "stated":
-        share = bsdf.see_through if tree is None else tree.see_through
-        note = Note(
-            "{system}: {share:.0f} % of the transmission peak ({peak:.2f} at normal incidence) "
-            "passes straight on, as stated; the rest is a lobe.",
-            share=100 * (share or 0.0),
-            **values,
-        )
+        share = (bsdf.see_through if tree is None else tree.see_through) or 0.0
+        if share == 1.0:
+            note = Note(
+                "{system}: the transmission peak ({peak:.2f} at normal incidence) passes straight "
+                "on, as stated.",
+                **values,
+            )
+        else:
+            note = Note(
+                "{system}: {share:.0f} % of the transmission peak ({peak:.2f} at normal incidence) "
+                "passes straight on, as stated; the rest is a lobe.",
+                share=100 * share,
+                **values,
+            )
     elif kind == "lobe":
         peaked = beam >= LEAST_PEAK
         widest = float((omega / np.cos(basis.centres()[0]))[peaked].max())

@@ -86,7 +86,7 @@ def _content(state: ShadingState) -> list[Any]:
     thermal = [state.g_value, state.u_value, state.g_normal, state.g_by_patch]
     beside = None if state.file is None else str(state.file)
     held = [*thermal, state.closure, state.shading_position, state.angular]
-    return [state.name, bands, *held, beside]
+    return [state.name, bands, *held, beside, [str(file) for file in state.layers]]
 
 
 def _system(state: ShadingState, window: Window, path: Path, source: str) -> FenestrationSystem:
@@ -98,7 +98,9 @@ def _system(state: ShadingState, window: Window, path: Path, source: str) -> Fen
     thermal = held_thermal(state)
     angular = thermal.pop("angular") if state.angular is not None else None
     share = thermal.pop("see_through")
-    thermal |= {"source": f"{source}{named}", "file": state.file}
+    if state.layers:
+        share = stated_share([_beside(file).see_through for file in state.layers])
+    thermal |= {"source": f"{source}{named}", "file": state.file, "layers": state.layers}
     system = system_of(state.bands, name, path=path, **thermal)
     system = system if angular is None else replace(system, angular=angular)
     return system if share is None else with_see_through(system, share)
@@ -115,9 +117,7 @@ def _source(states: Iterable[ShadingState], path: Path) -> str:
 
 def held_thermal(state: ShadingState) -> dict[str, Any]:
     """U, g, closure and place of the shade: of the model, else of the file beside the BSDF's."""
-    beside = ThermalFile()
-    if state.file is not None:
-        beside = ThermalFile.read(state.file.with_suffix(".toml"))
+    beside = ThermalFile() if state.file is None else _beside(state.file)
     g_normal, by_patch = state.g_normal, state.g_by_patch
     if state.g_value is not None:
         by_patch = g_by_patch(state.g_value)
@@ -185,14 +185,28 @@ def _with_peaks(systems: dict[str, States], overrides: WindowOverrides) -> dict[
     Raises: `DataError` for a name that is of no system.
     """
     known = {id(s): s for states in systems.values() for s in states}
-    for name, share in overrides.see_through:
-        names = {i: (s.name, s.file.name if s.file else s.name) for i, s in known.items()}
-        meant = [i for i, both in names.items() if name in both]
-        if not meant:
-            there = ", ".join(dict.fromkeys(file for _, file in names.values()))
+    for name, _ in overrides.see_through:
+        if not any(name in (s.name, *s.names) for s in known.values()):
+            there = ", ".join(dict.fromkeys(name for s in known.values() for name in s.names))
             raise DataError(f"no system is {name!r}; there are {there}", field="--see-through")
-        known |= {i: with_see_through(known[i], share) for i in meant}
+    for i, system in known.items():
+        stated = dict(overrides.see_through)
+        share = stated_share(
+            [stated.get(name) for name in dict.fromkeys((system.name, *system.names))]
+        )
+        known[i] = system if share is None else with_see_through(system, share)
     return {guid: tuple(known[id(s)] for s in states) for guid, states in systems.items()}
+
+
+def stated_share(shares: Iterable[float | None]) -> float | None:
+    """Share of the peak of layers in series that passes straight on, from those that are stated."""
+    known = [share for share in shares if share is not None]
+    return float(np.prod(known)) if known else None
+
+
+def _beside(file: Path) -> ThermalFile:
+    """What is stated beside a BSDF's file."""
+    return ThermalFile.read(file.with_suffix(".toml"))
 
 
 def held_systems(

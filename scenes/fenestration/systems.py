@@ -51,10 +51,17 @@ class FenestrationSystem:
     notes: tuple[str, ...] = ()
     tree: TensorTreeBsdf | None = None  # visible, where the data are a tree: for sun and pictures
     file: Path | None = None  # that it was read from
+    layers: tuple[Path, ...] = ()  # files of the BSDF among its layers, where it is computed
     source: str = ""  # where the system comes from, in words
     angular: AngularTable | None = None  # visible, of a specular system: exact at every angle
     panes: Panes = ()  # all its layers, where each is known by wavelength
     from_values: bool = False  # modelled from U, g and transmittances, without a BSDF
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """File names by which the user can mean it, its own first; its name without a file."""
+        files = self.layers if self.file is None else (self.file,)
+        return tuple(file.name for file in files) or (self.name,)
 
     @property
     def fine(self) -> Bsdf:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +25,9 @@ from thermal.blackbox import (
 from thermal.closure import Closure
 from thermal.errors import ThermalInputError, require
 from thermal.glazing_unit import GlazingUnit
+from thermal.gvalue import ThermalData
 from thermal.notes import ThermalNote
-from thermal.window_model import WindowModel, likely_diffuse_g, window_model
+from thermal.window_model import WindowModel, g_of_unit, likely_diffuse_g, window_model
 
 
 def sun_in_layers(
@@ -73,6 +75,8 @@ class ThermalSystem:
     back_absorptance: float  # diffuse, from the room
     notes: tuple[str, ...]  # what had to be assumed
     model: str  # the window model by name, and the error to expect
+    # layers as likely as those assumed, with the least and the most g for diffuse light
+    likely: tuple[GlazingUnit, ...] = ()
 
     @property
     def named_model(self) -> str:
@@ -115,14 +119,38 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     layers = None if by_patch or system.from_values else window.typical
     optics = (tau, rho, incidence)
     likely = layers and likely_diffuse_g(window, optics, weight, sun_in_layers, system.name)
+    extremes: tuple[GlazingUnit, ...] = ()
     notes = [*map(_note, data.assumptions), *_position_note(system, window, scatters)]
     if layers is not None and likely is not None:
         used = float(weight @ data.g_value)
         notes.append(_typical_note(system.name, layers, used, likely))
+        by_g = sorted(
+            zip([used, *likely], [layers, *window.likely], strict=True), key=itemgetter(0)
+        )
+        extremes = (by_g[0][1], by_g[-1][1])
     return ThermalSystem(
         fenestration, absorptances, tau, rho, g_value,
         back_rho, max(1.0 - back_rho - back_tau, 0.0), tuple(notes), _note(model),
+        extremes,
     )  # fmt: skip
+
+
+def with_likely_layers(system: FenestrationSystem, number: int) -> FenestrationSystem:
+    """The system with one of its `likely` layers, of equal U and g; else as it is.
+
+    Args: number: 0 for the least g for diffuse light, 1 for the most.
+    """
+    heat = thermal_system(system)
+    if not heat.likely:
+        return system
+    unit, u_value = heat.likely[number], heat.fenestration.u_value
+    optics = heat.transmittance, heat.reflectance, system.solar.basis_in.centres()[0]
+    data = ThermalData(u_value, heat.g_value, ())
+    g_by_patch, _ = g_of_unit(unit, data, optics, sun_in_layers, system.name)
+    closure = Closure("layers", unit=unit)
+    return replace(
+        system, u_value=u_value, g_by_patch=g_by_patch, closure=closure, shading_position=None
+    )
 
 
 def _typical_note(name: str, unit: GlazingUnit, used: float, likely: Sequence[float]) -> Note:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bim.model import Space
 from bim.to_thermal import ThermalRoom
+from mitsuba_cfs.errors import DataError
 from scenes.results import ShadingYear
 from scenes.room.zone import RoomServices, RoomZone
 from thermal.climate import Solar
@@ -85,6 +86,10 @@ def _renamed(room: RoomZone) -> RoomZone:
 
 def _merged(name: str, rooms: Sequence[RoomZone]) -> RoomZone:
     """The rooms as one, their parts in the order of the rooms."""
+    moved = [room.space.label for room in rooms if room.alternatives is not None]
+    if moved:
+        message = "a room of an air node has no temperature by which its shading could move"
+        raise DataError(message, element=moved[0], field="control.rule")
     first, areas = rooms[0], np.array([room.space.floor_area for room in rooms])
     lit = [room.daylight is not None for room in rooms]
     daylight = None

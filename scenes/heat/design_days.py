@@ -68,6 +68,7 @@ def design_loads(
             of_hours(whole, chosen, hours),
             suns,
             transfers=[of_hours(one, chosen, hours) for one in transfers],
+            controls=[of_hours(room.control, chosen, hours) for room in rooms],
             **options,
         )
         outdoor = weather.dry_bulb_c[chosen]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -17,9 +17,12 @@ from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, item, silent
+from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import States
+from scenes.fenestration.thermal_system import with_likely_layers
 from scenes.head import Head
 from scenes.heat.air_nodes import with_air_nodes
 from scenes.heat.box import building_or_box
@@ -42,7 +45,7 @@ from scenes.room.leaks import leak_issues
 from scenes.room.light import visible_scene
 from scenes.room.operation import OperationHours, check_schedules, stated_note, with_stated_uses
 from scenes.room.room import operated_zone
-from scenes.room.zone import RoomZone, balances, coupled
+from scenes.room.zone import RoomZone, balances, coupled, inner_sun_note
 from thermal.balance import ZoneResult
 from thermal.moisture import Humidity
 from thermal.ventilation import AirTransfer
@@ -97,7 +100,7 @@ def run_study(
     files = files or read_files(study)
     inputs = study_inputs(study, files, progress)
     head, weather, in_windows = inputs.head, inputs.weather, inputs.systems
-    building, spaces = inputs.building, inputs.spaces
+    building = inputs.building
     if building.uses:
         study = with_stated_uses(study, building)
         check_schedules(study, weather, study.building)
@@ -105,36 +108,30 @@ def run_study(
     on_head(head)
     notes = dict.fromkeys(head.notes)
     variants.activate()
-    options, trace = study.options, study.trace
     cache = MatrixCache.of_user()
-    skies = skies_for(weather, options.sampling, cache, **options.sky)
-    rooms: list[RoomZone] = []
-    radiants: dict[str, RadiantRoom | None] = {}
-    for i, space in enumerate(spaces):
-        steps = item(progress, "room", i + 1, len(spaces), space.label)
-        room = room_inputs(
-            building, space, in_windows, weather, options,
-            operation=study, skies=skies, cache=cache,
-        )  # fmt: skip
-        if space.windows:
-            leaks = leak_issues(space, visible_scene(room), seed=options.sampling.seed, cache=cache)
-            notes |= dict.fromkeys(map(issue_note, leaks))
-        zone, radiant = operated_zone(room, progress=steps), None
-        if trace.view_factors:
-            radiant = radiant_room(
-                space, zone.room, samples=trace.patch_samples, seed=trace.seed, cache=cache
-            )
-        rooms.append(zone if radiant is None else zone.with_view_factors(radiant.among))
-        radiants[space.guid] = radiant
-        steps("heat", 1.0)
-    found = _balanced(study, building, rooms, weather, progress, in_windows=in_windows)
+    skies = skies_for(weather, study.options.sampling, cache, **study.options.sky)
+
+    def balance(systems: Mapping[str, States]) -> tuple[BalancedRooms, TracedRooms]:
+        traced = _traced_rooms(study, inputs, systems, skies, cache, progress)
+        rooms = _balanced(study, building, traced.rooms, weather, progress, in_windows=systems)
+        return rooms, traced
+
+    found, traced = balance(in_windows)
+    notes |= dict.fromkeys(traced.leaks)
     if balanced is not None:
         balanced(found)
     notes |= dict.fromkeys(found.notes)
+    if study.likely_layers:
+        likely = [
+            balance({guid: tuple(with_likely_layers(system, number) for system in states)
+                     for guid, states in in_windows.items()})[0]
+            for number in (0, 1)
+        ]  # fmt: skip
+        notes |= dict.fromkeys(_likely_notes(found, likely))
     years = []
     for room, result, humidity in zip(found.rooms, found.results, found.humidity, strict=True):
-        radiant = radiants.get(room.space.guid)  # none of an air node
-        if room.zone.view_factors is None and trace.view_factors:
+        radiant = traced.radiants.get(room.space.guid)  # none of an air node
+        if room.zone.view_factors is None and study.trace.view_factors:
             notes[f"{result.name}: is not closed, its longwave goes through a mean star."] = None
         felt_result = _felt(study, room.zone, result, radiant)
         year = _year(study, room, felt_result, humidity, weather)
@@ -143,6 +140,77 @@ def run_study(
             year = replace(year, design=own.reset_index(drop=True))
         years.append(year)
     return years, tuple(notes)
+
+
+class TracedRooms(NamedTuple):
+    """The rooms of a study before their balance."""
+
+    rooms: list[RoomZone]
+    radiants: dict[str, RadiantRoom | None]  # by GUID of the room: its view factors, if traced
+    leaks: list[str]  # notes
+
+
+def _traced_rooms(
+    study: StudyFile,
+    inputs: Inputs,
+    in_windows: Mapping[str, States],
+    skies: AnnualSky,
+    cache: MatrixCache | None,
+    progress: Progress,
+) -> TracedRooms:
+    """The rooms with these systems."""
+    traced = TracedRooms([], {}, [])
+    for i, space in enumerate(inputs.spaces):
+        steps = item(progress, "room", i + 1, len(inputs.spaces), space.label)
+        room = room_inputs(
+            inputs.building, space, in_windows, inputs.weather, study.options,
+            operation=study, skies=skies, cache=cache,
+            together=[one.guid for one in inputs.spaces] if study.couple else (),
+        )  # fmt: skip
+        if space.windows:
+            scene, seed = visible_scene(room), study.options.sampling.seed
+            leaks = leak_issues(space, scene, seed=seed, cache=cache)
+            traced.leaks.extend(map(issue_note, leaks))
+        zone, radiant, trace = operated_zone(room, progress=steps), None, study.trace
+        if trace.view_factors:
+            radiant = radiant_room(
+                space, zone.room, samples=trace.patch_samples, seed=trace.seed, cache=cache
+            )
+        traced.rooms.append(zone if radiant is None else zone.with_view_factors(radiant.among))
+        traced.radiants[space.guid] = radiant
+        steps("heat", 1.0)
+    return traced
+
+
+def _likely_notes(assumed: BalancedRooms, likely: Sequence[BalancedRooms]) -> Iterator[Note]:
+    """For each room with windows what other likely layers of these change [K], [kWh]."""
+    for z, result in enumerate(assumed.results):
+        others = [rooms.results[z] for rooms in likely]
+        if not result.window_inner_c.size:
+            continue
+        apart = [other.operative_c - result.operative_c for other in others]
+        glass = [other.window_inner_c - result.window_inner_c for other in others]
+        kwh = assumed.weather.step_h / 1000.0
+        heat, cold = (
+            [getattr(one, key).sum() * kwh for one in (result, *others)]
+            for key in ("heating", "cooling")
+        )
+        yield Note(
+            "{room}: with other likely layers of its windows (RMS) the operative temperature "
+            "differs by {operative:.2f} K, the inner face of the windows by {glass:.2f} K; heating "
+            "{heat_low:.0f} to {heat_high:.0f} kWh, cooling {cold_low:.0f} to {cold_high:.0f} kWh.",
+            room=result.name,
+            operative=max(_rms(values) for values in apart),
+            glass=max(_rms(values) for values in glass),
+            heat_low=min(heat),
+            heat_high=max(heat),
+            cold_low=min(cold),
+            cold_high=max(cold),
+        )
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _check_states(study: StudyFile, in_windows: Mapping[str, States]) -> None:
@@ -171,17 +239,22 @@ def _balanced(
     groups: list[tuple[Sequence[RoomZone], dict[str, Any]]] = [([room], {}) for room in rooms]
     if study.couple:
         rooms, links, notes = coupled(rooms, study.air.door_m3_s)
+        notes += inner_sun_note(rooms, weather.step_h)
         nodes = _air_nodes(study, building, rooms)
         rooms, links, zone_of = with_air_nodes(rooms, links, nodes)
         transfers = _transfers(study, building, zone_of, weather)
         groups = [(rooms, {"air_links": links, "transfers": transfers})]
-    results, moist, design = [], [], []
+    results, moist, design, moved = [], [], [], []
     for number, (together, air) in enumerate(groups):
         place = {"terrain": study.terrain}
         found = balances(together, weather, step_s, progress=progress, **air, **place)
         results += found
         for issues in step_issues(together, found, weather, step_s, **air, **place):
             notes += tuple(map(issue_note, issues))
+        moved += [
+            room.in_alternatives(result.alternative)
+            for room, result in zip(together, found, strict=True)
+        ]
         moist += room_humidity(together, found, weather, **air)
         if study.design is not None:
             cold = study.design.outdoor_c
@@ -191,7 +264,7 @@ def _balanced(
         progress("heat balance", (number + 1) / len(groups))
     table = pd.concat(design, ignore_index=True) if design else None
     return BalancedRooms(
-        building, rooms, weather, in_windows, results, moist, notes, table,
+        building, moved, weather, in_windows, results, moist, notes, table,
         **(groups[0][1] if study.couple else {}),
     )  # fmt: skip
 

@@ -20,7 +20,7 @@ from scenes.input_options import InputOptions
 from scenes.quick import HEAT, picks
 from scenes.room.operation import schedules_there
 from scenes.room.operation_tables import OperationTables
-from scenes.room.options import RoomOptions
+from scenes.room.options import SKY_LIGHTS, RoomOptions
 from scenes.room.schedules import OrSchedule, unknown_name
 from scenes.toml_file import (
     OutdoorTable,
@@ -105,6 +105,7 @@ class TraceTable(TomlTable):
     picture_samples: Annotated[int, Field(ge=1)] = RUN.sampling.view_samples
     seed: int = RUN.sampling.seed
     view_factors: bool = True  # of the room's surfaces, for longwave and the person
+    sky_light: Literal[SKY_LIGHTS] = RUN.sky_light  # see `RoomOptions`
 
 
 class TransferTable(TomlTable):
@@ -138,6 +139,7 @@ class StudyFile(OperationTables, ReadTable, OutdoorTable):
     air_nodes: tuple[str, ...] = ()  # zones of the building, each with one air
     transfer: tuple[TransferTable, ...] = ()
     design: DesignTable | None = None  # loads of design days too
+    likely_layers: bool = False  # windows also with the layers most unlike those that are assumed
     box: BoxTable | None = None
     system: tuple[WindowStateTable, ...] = ()  # states; none: what the building's file holds
     trace: TraceTable = TraceTable()
@@ -169,8 +171,9 @@ class StudyFile(OperationTables, ReadTable, OutdoorTable):
         for key in ("transfer", "air_nodes"):
             if getattr(self, key) and not self.couple:
                 raise ValueError(f"{key}: needs `couple = true`")
-        if self.air_nodes and self.loads.slab is not None:
-            raise ValueError("air_nodes: rooms with a heated slab each cannot have one air")
+        loads = self.loads
+        if self.air_nodes and (loads.slab or loads.heating_faces or loads.cooling_faces):
+            raise ValueError("air_nodes: rooms with a heated or cooled face cannot have one air")
         for number, one in enumerate(self.transfer):
             if isinstance(one.m3_h, str) and one.m3_h not in self.schedules:
                 fault = unknown_name(one.m3_h, self.schedules)

@@ -37,6 +37,8 @@ RULES = {
     "glare": N_("most open state without glare at the view point"),
     "cut-off": N_("most open slats that block the direct sun (cut-off)"),
     "outdoor temperature": N_("closed above an outdoor temperature"),
+    "air temperature": N_("closed above an air temperature of the room"),
+    "operative temperature": N_("closed above an operative temperature of the room"),
     "wind": N_("open in strong wind"),
     "rain": N_("open in rain"),
     "any": N_("several rules, the most closed state"),

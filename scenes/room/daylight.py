@@ -10,8 +10,8 @@ from mitsuba_cfs.methods.light import (
     SeasonalLight,
     daylight_coefficients,
     direct_sun,
-    illuminance_noise,
-    illuminance_with_error,
+    illuminance_with_noise,
+    relative_error_of_mean,
 )
 from mitsuba_cfs.methods.phase_light import PhaseLight, with_sensor_light
 from mitsuba_cfs.methods.standard_error import relative_error_under
@@ -42,11 +42,11 @@ def room_daylight(
     progress("daylight", 0.0)
     lights, lit_state, points = light.light, light.states(state), light.scene.points
     traced = picture_light(room, light)
-    lit, error = illuminance_with_error(
+    lit, noise = illuminance_with_noise(
         traced, lit_state, progress=part(progress, 0.9, 1.0, "daylight")
     )
     illuminance = room.skies.whole_year(lit.astype(np.float32)).T
-    noise = illuminance_noise(traced, lit, error, lit_state)
+    error = relative_error_of_mean(lit, noise)
     autonomy_noise = daylight_autonomy_noise(
         illuminance,
         lm83_hours(room.weather),

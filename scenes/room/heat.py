@@ -27,7 +27,7 @@ from scenes.results import (
     ThermalResult,
 )
 from scenes.room.operation_tables import ComfortTable, OperationTables
-from scenes.room.zone import RoomZone, balances, coupled
+from scenes.room.zone import RoomZone, balances, coupled, inner_sun_note
 from thermal.balance import ZoneResult
 from thermal.comfort import (
     comfort_by_outdoors,
@@ -237,12 +237,12 @@ def step_issues(
 ) -> tuple[tuple[Issue, ...], ...]:
     """For each room an issue where half the time step changes its results by more than 2 %.
 
-    Checked where a control depends on the temperatures of the step: opened windows, the bypass of a
-    heat recovery, a heated slab.
+    Checked where a control depends on the room's temperatures: opened windows, the bypass of a heat
+    recovery, a heated slab, shading.
 
     Args: results: of `balances` with the same options.
     """
-    if not any(_is_controlled(room.zone) for room in rooms):
+    if not any(room.alternatives or _is_controlled(room.zone) for room in rooms):
         return ((),) * len(rooms)
     halved = balances(rooms, weather, min(step_s, 3600.0 * weather.step_h) / 2.0, **options)
     issues: list[tuple[Issue, ...]] = []
@@ -309,6 +309,12 @@ def heat_of(
     for room, balance, humidity, found in zip(
         rooms, passed(results), humidities, issues, strict=True
     ):
+        moved = room.in_alternatives(balance.alternative)
+        apart = (moved.shading.states != room.shading.states).any(axis=1)
+        if apart.any():
+            values = {"hours": int(apart.sum()) * weather.step_h, "room": room.zone.name}
+            found += (Issue("shading-by-coupled-temperature", room.space.guid, values),)
+        room = moved
         comfort = (room.operation or OperationTables()).comfort
         felt = felt_by(comfort, balance, humidity)
         thermal = replace(thermal_result(room, balance, weather, felt), issues=found)
@@ -336,8 +342,8 @@ def coupled_years(
     progress: Progress = silent,
     *,
     store: StoredArrays | None = None,
-) -> tuple[list[RoomYear], str]:
-    """The years of rooms that exchange heat through the parts between them, and a note on that.
+) -> tuple[list[RoomYear], tuple[str, ...]]:
+    """The years of rooms that exchange heat through the parts between them, and notes on that.
 
     Args:
         tables: of all rooms; terrain of the site, air through open doors.
@@ -351,7 +357,7 @@ def coupled_years(
     )  # fmt: skip
     progress("heat balance", 1.0)
     years = [room.with_heat(heat) for room, heat in zip(rooms, heats, strict=True)]
-    return years, _coupling_note(zones)
+    return years, (_coupling_note(zones), *inner_sun_note(zones, weather.step_h))
 
 
 def _coupling_note(rooms: Sequence[RoomZone]) -> str:

@@ -165,6 +165,9 @@ class OperationHours:
             share = np.where(self.present > 0, share, table.absent_share)
         if table.closed_in_rain:
             share = np.where(self.rain("air.windows.closed_in_rain"), 0.0, share)
+        if table.night_share is not None:
+            night = working_hours(self.weather, *self.tables.air.night)
+            share = np.where(night, np.minimum(share, table.night_share), share)
         half = np.array([0.5 * w.glazing_height for w in windows])
         middle, areas = np.array([w.height for w in windows]), [w.area for w in windows]
         height = stack_height(middle - half, middle + half)
@@ -187,6 +190,8 @@ class OperationHours:
             least_outdoor_c=table.least_outdoor_c,
             heating_while_open=table.heating_while_open,
             flow=(table.ach or 0.0) * volume / 3600.0,
+            operative=table.temperature == "operative",
+            hybrid=table.hybrid,
         )
 
     def rain(self, place: str) -> NDArray[np.bool_]:
@@ -215,7 +220,7 @@ class OperationHours:
         """
         if rule.rule == "outdoor temperature":
             outdoors = self._weather("dry_bulb_c", "temperature", f"{place}.rule")
-            return by_threshold(outdoors, rule.close_above_c, rule.open_below_c, closed=closed)
+            return by_threshold(outdoors, rule.closes_above_c, rule.opens_below_c, closed=closed)
         if rule.rule == "wind":
             wind = self._weather("wind_speed", "wind", f"{place}.rule")
             return closed - by_threshold(wind, rule.open_above_m_s, closed=closed)

@@ -107,6 +107,10 @@ class OpenedTable(TomlTable):
     # air change of open windows where a standard states it, instead of EN 16798-7's flow
     ach: Annotated[Positive, plausible.AIR_CHANGE] | None = None
     heating_while_open: bool = False  # else they close before the air needs heating
+    temperature: Literal["air", "operative"] = "air"  # of the room, of open_above_c, close_below_c
+    night_share: Share | None = None  # of the glass, at most, in the hours of `air.night`: burglary
+    # open, they replace the fan; they are shut while the room needs cooling besides
+    hybrid: bool = False
 
     @model_validator(mode="after")
     def _do_not_cross(self) -> OpenedTable:
@@ -190,6 +194,10 @@ class LoadsTable(TomlTable):
     cooling_limit_w: Annotated[Positive, plausible.POWER] | None = None
     heating_radiant: Share = 0.0  # radiators 0.3, ceilings 0.6
     cooling_radiant: Share = 0.0
+    # where the radiant share acts: side of the box, or kind of faces, the largest surface of them;
+    # default: all surfaces
+    heating_faces: tuple[str, ...] = ()
+    cooling_faces: tuple[str, ...] = ()
     slab: SlabTable | None = None
     humidify_to: Annotated[float, plausible.PERCENT] | None = None  # relative humidity [%]
     dehumidify_to: Annotated[float, plausible.PERCENT] | None = None
@@ -313,6 +321,8 @@ class EnvelopeTable(TomlTable):
 
 
 WEATHER_RULES = ("outdoor temperature", "wind", "rain")  # that need nothing computed
+ROOM_RULES = ("air temperature", "operative temperature")  # that the heat balance decides
+MOST_CONDITIONS = 4  # of a room: the balance chooses from two to their power
 
 
 class ShadingRule(TomlTable):
@@ -323,18 +333,19 @@ class ShadingRule(TomlTable):
 
     rule: Literal[
         "always", "schedule", "irradiance", "glare", "cut-off", "outdoor temperature", "wind",
-        "rain", "any", "all",
+        "rain", "air temperature", "operative temperature", "any", "all",
     ] = "always"  # fmt: skip
     parts: tuple[ShadingRule, ...] = ()  # of "any", the most closed state, and "all", the most open
     open_delay_h: Annotated[float, plausible.HOURS] = 0.0  # opens after more light for so long [h]
     hold_h: Annotated[float, plausible.HOURS] = 0.0  # least time between two moves [h]
-    # "always"; the closed one of "irradiance", "outdoor temperature", "wind" and "rain"
+    # "always"; the closed one of "irradiance", "wind", "rain" and the temperatures
     state: Annotated[int, Field(ge=0)] = 0
     # "schedule": 24 states, or the name of a schedule of states
     schedule: Annotated[tuple[int, ...] | str, OrSchedule(plausible.STATE, states_or_name)] = ()
     close_above: Annotated[Positive, plausible.SUN] = 200.0  # "irradiance" on the windows [W/m2]
     open_below: Annotated[float, plausible.SUN] | None = None
-    close_above_c: Annotated[float, plausible.OUTDOOR] = 20.0  # "outdoor temperature"
+    # temperatures: "outdoor temperature", and those of the room at the end of the step before
+    close_above_c: Annotated[float, plausible.OUTDOOR] | None = None  # 20 outdoors, 24 in the room
     open_below_c: Annotated[float, plausible.OUTDOOR] | None = None
     open_above_m_s: Annotated[Positive, plausible.WIND] = 10.0  # "wind": closed in less wind
     # "irradiance" and "cut-off": sun and sky that reach the windows, or those of a weather station
@@ -352,6 +363,12 @@ class ShadingRule(TomlTable):
 
     def fault(self, states: int, schedules: Mapping[str, ScheduleTable]) -> tuple[str, str] | None:
         """The key that does not fit windows with `states` states, and the fault."""
+        by_room = any(leaf.rule in ROOM_RULES for leaf in self.leaves)
+        if by_room and (self.open_delay_h or self.hold_h):
+            key = "open_delay_h" if self.open_delay_h else "hold_h"
+            return key, "does not act on a rule by the room's temperature: state open_below_c"
+        if self.rule in ROOM_RULES and self.opens_below_c > self.closes_above_c:
+            return "open_below_c", "lies above close_above_c"
         if self.rule in ("any", "all"):
             if not self.parts:
                 return "parts", f'the rule "{self.rule}" needs tables of rules'
@@ -374,6 +391,17 @@ class ShadingRule(TomlTable):
         if self.rule == "cut-off" and len(self.slat_tilts_deg) != states:
             return "slat_tilts_deg", f"expected one for each of {states} states"
         return None
+
+    @property
+    def closes_above_c(self) -> float:
+        """`close_above_c` or its default."""
+        default = 24.0 if self.rule in ROOM_RULES else 20.0
+        return default if self.close_above_c is None else self.close_above_c
+
+    @property
+    def opens_below_c(self) -> float:
+        """`open_below_c` or its default."""
+        return self.closes_above_c if self.open_below_c is None else self.open_below_c
 
     @property
     def leaves(self) -> tuple[ShadingRule, ...]:

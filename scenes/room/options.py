@@ -63,6 +63,9 @@ class RoomOptions:
     infiltration_ach: float = 0.5  # [1/h]
     sun_model: str = "spa"  # of the sun's position, see `mitsuba_cfs.sky.sun`
     sky_ground: str = "reflected"  # luminance of the ground, see `mitsuba_cfs.sky.matrix`
+    # what windows do with light of sky and ground in the heat balance: by its directions, or by one
+    # hemispherical value, as EnergyPlus, to show what that changes; the sun keeps its direction
+    sky_light: str = "by direction"
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -139,6 +142,7 @@ NAMES = {
     "glare_sun": ("outputs", "glare_sun"),
     "sun_model": ("", "sun_model"),
     "sky_ground": ("", "sky_ground"),
+    "sky_light": ("", "sky_light"),
     "path_samples": ("sampling", "hour_samples"),
     "heat_step_s": ("", "heat_step_s"),
     "infiltration_ach": ("", "infiltration_ach"),
@@ -156,12 +160,14 @@ LIMITS = (
     ("picture_size", 1, math.inf, True), ("equipment_w_m2", 0.0, math.inf, False),
     ("person_w", 0.0, math.inf, False), ("floor_per_person", 1e-3, math.inf, False),
 )  # fmt: skip
+SKY_LIGHTS = ("by direction", "hemispherical")
 # Allowed values of the options that are words
 CHOICES = {
     "glare_sources": GLARE_SOURCES,
     "glare_sun": GLARE_SUN,
     "sun_model": SUN_MODELS,
     "sky_ground": GROUNDS,
+    "sky_light": SKY_LIGHTS,
 }
 
 

@@ -20,7 +20,7 @@ No file is read or written:
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TypedDict, Unpack
@@ -60,9 +60,17 @@ from scenes.room.lobes import lobe_figures
 from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
-from scenes.room.shading import control_signals, shading_states
-from scenes.room.solar import seasonal_outdoors
-from scenes.room.zone import RoomZone, reads_work_plane, room_zone, zone_surfaces
+from scenes.room.shading import control_signals, shading_states, temperature_conditions
+from scenes.room.solar import SeasonalOutdoors, seasonal_outdoors
+from scenes.room.zone import (
+    RoomAlternatives,
+    RoomZone,
+    ZoneSurfaces,
+    balances,
+    reads_work_plane,
+    room_zone,
+    zone_surfaces,
+)
 
 
 class RoomChoices(TypedDict, total=False):
@@ -76,6 +84,7 @@ class RoomChoices(TypedDict, total=False):
     explore: bool
     rate: tuple[str, NDArray[np.int64]] | None
     inner: bool
+    together: Collection[str]
     progress: Progress
 
 
@@ -136,6 +145,7 @@ def lit_room(
     explore: bool = False,
     rate: tuple[str, NDArray[np.int64]] | None = None,
     inner: bool = False,
+    together: Collection[str] = (),
     progress: Progress = silent,
 ) -> DaylitRoom:
     """Daylight and glare of one room, and the zone from which its heat is computed.
@@ -155,6 +165,7 @@ def lit_room(
         explore: True adds every hour's picture in every state, for the explorer.
         rate: a glare metric (DGP, eDGP, sDGP) and hours of the year with the sun up to rate.
         inner: True lets light of rooms with windows in through glass; phase methods only.
+        together: GUIDs of the rooms that are balanced with this one, see `room_inputs`.
 
     Raises: `RoomError` for a room that cannot be computed (no work plane, no closed zone),
         `ValueError` for a window without a system, `DataError` for an explorer where the outdoors
@@ -166,21 +177,28 @@ def lit_room(
         building, space, systems, weather, options,
         operation=None if operation is None else operation.tables, skies=skies, cache=cache,
         file_sensors=FileSensors.of(building, space), inner_glass=inner,
+        together=together,
     )  # fmt: skip
     if explore and len(room.seasons) > 1:
         message = "the explorer knows one state of the trees: give them one transmittance"
         raise DataError(message, file=building.file, field="--explore")
     hours = wanted_hours(options.outputs.picture_hours, weather.midpoints, room.skies.lit)
-    outdoors = year = dgp = rated = explored = None
+    outdoors = year = dgp = rated = explored = surfaces = choice = None
     dgp_error = 0.0
     times = StageTimes()
 
     with times.stage("daylight"):
         needs = light_needs(room, annual_glare=options.outputs.annual_glare)
         light = room_light(room, needs=needs, progress=progress)
-        if "irradiance" in control_signals(room):
+        conditions = temperature_conditions(room)
+        if conditions or "irradiance" in control_signals(room):
             outdoors = seasonal_outdoors(room, light, progress=progress)
-        state = shading_states(room, light, outdoors, progress=progress)
+        if conditions and outdoors is not None:
+            surfaces = zone_surfaces(room)
+            choice = controlled_zone(room, surfaces, outdoors, light, progress=progress)
+            state = _states_by_balance(room, choice)
+        else:
+            state = shading_states(room, light, outdoors, progress=progress)
         daylight = room_daylight(room, light, state, progress=progress)
     with times.stage("leaks"):
         leaks = leak_issues(space, light.scene, seed=options.sampling.seed, cache=cache)
@@ -207,10 +225,12 @@ def lit_room(
                 room, light, state, sensors=len(daylight.points), progress=progress
             )
     with times.stage("thermal"):
-        surfaces = zone_surfaces(room)
+        surfaces = surfaces or zone_surfaces(room)
         if outdoors is None:
             outdoors = seasonal_outdoors(room, light, progress=progress)
         zone = room_zone(room, surfaces, outdoors, state, daylight, progress=progress)
+        if choice is not None:
+            zone = replace(zone, alternatives=choice.alternatives)
     return DaylitRoom(
         space, daylight, glare, zone, times.seconds, year, dgp=dgp,
         dgp_sunny_hour_error=dgp_error, as_lobe=as_lobe, issues=leaks, explored=explored,
@@ -230,15 +250,44 @@ def operated_zone(room: RoomInputs, *, progress: Progress = silent) -> RoomZone:
 
     Raises: `RoomError` for a room without a closed zone.
     """
-    surfaces, daylight = zone_surfaces(room), None
-    light = None
+    surfaces, light = zone_surfaces(room), None
     if reads_work_plane(room):
         light = room_light(room, needs=light_needs(room), progress=progress)
     outdoors = seasonal_outdoors(room, light, progress=progress)
-    state = shading_states(room, light, outdoors, progress=progress)
-    if light is not None:
-        daylight = room_daylight(room, light, state, progress=progress)
-    return room_zone(room, surfaces, outdoors, state, daylight, progress=progress)
+    return controlled_zone(room, surfaces, outdoors, light, progress=progress)
+
+
+def controlled_zone(
+    room: RoomInputs,
+    surfaces: ZoneSurfaces,
+    outdoors: SeasonalOutdoors,
+    light: RoomLight | None,
+    *,
+    progress: Progress = silent,
+) -> RoomZone:
+    """The zone of a room by its rules of shading.
+
+    Where these read the room's temperature: with an alternative for each combination of conditions
+    that are met, from which the heat balance chooses in every hour.
+    """
+    conditions, rooms = temperature_conditions(room), []
+    for number in range(2 ** len(conditions)):
+        met = {one: bool(number >> k & 1) for k, one in enumerate(conditions)}
+        state, daylight = shading_states(room, light, outdoors, met=met, progress=progress), None
+        if light is not None and reads_work_plane(room):
+            daylight = room_daylight(room, light, state, progress=progress)
+        rooms.append(room_zone(room, surfaces, outdoors, state, daylight, progress=progress))
+    if not conditions:
+        return rooms[0]
+    return replace(rooms[0], alternatives=RoomAlternatives(conditions, tuple(rooms)))
+
+
+def _states_by_balance(room: RoomInputs, zone: RoomZone) -> NDArray[np.int64]:
+    """States [H, G] that the heat balance of the room alone chooses."""
+    terrain = "suburbs" if room.operation is None else room.operation.terrain
+    (result,) = balances([zone], room.weather, room.options.heat_step_s, terrain=terrain)
+    chosen = zone.in_alternatives(result.alternative).shading.states
+    return chosen[:, room.windows.control]
 
 
 LARGEST = 400  # pixels of a side of its pictures

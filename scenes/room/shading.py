@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import product
 
 import numpy as np
@@ -24,9 +24,17 @@ from scenes.room.glare import rating_of
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
 from scenes.room.operation import OperationHours
-from scenes.room.operation_tables import WEATHER_RULES, ShadingRule
+from scenes.room.operation_tables import MOST_CONDITIONS, ROOM_RULES, WEATHER_RULES, ShadingRule
 from scenes.room.solar import SeasonalOutdoors, window_irradiance
-from thermal.control import always, by_cut_off, by_glare, by_threshold, delayed, held
+from thermal.control import (
+    TemperatureCondition,
+    always,
+    by_cut_off,
+    by_glare,
+    by_threshold,
+    delayed,
+    held,
+)
 
 FloatArray = NDArray[np.float64]
 StateArray = NDArray[np.int64]
@@ -55,22 +63,51 @@ def signal_of(rule: ShadingRule) -> str:
     return {"irradiance": "irradiance", "cut-off": "sun"}.get(rule.rule, "")
 
 
+Conditions = Mapping[TemperatureCondition, bool]
+NO_CONDITIONS: Conditions = {}
+
+
+def temperature_conditions(room: RoomInputs) -> tuple[TemperatureCondition, ...]:
+    """The distinct conditions of a room's temperature that its rules read.
+
+    Raises: `DataError` for more than `MOST_CONDITIONS`.
+    """
+    if room.operation is None or not room.space.windows:
+        return ()
+    leaves = (leaf for rule in room.control.rules for leaf in rule.leaves)
+    by_room = (condition_of(leaf) for leaf in leaves if leaf.rule in ROOM_RULES)
+    conditions = tuple(dict.fromkeys(by_room))
+    if len(conditions) > MOST_CONDITIONS:
+        message = f"{len(conditions)} limits of the room's temperature; at most {MOST_CONDITIONS}"
+        raise DataError(message, element=room.space.label, field="control")
+    return conditions
+
+
+def condition_of(rule: ShadingRule) -> TemperatureCondition:
+    """The condition of a rule by the room's temperature."""
+    operative = rule.rule == "operative temperature"
+    return TemperatureCondition(rule.closes_above_c, rule.opens_below_c, operative)
+
+
 def shading_states(
     room: RoomInputs,
     light: RoomLight | None = None,
     outdoors: SeasonalOutdoors | None = None,
     *,
+    met: Conditions = NO_CONDITIONS,
     progress: Progress = silent,
 ) -> StateArray:
     """The shading state of each window group in every hour [H, G].
 
-    Args: light: for the signals "eye" and "dgp"; outdoors: for the signal "irradiance".
+    Args:
+        light: for the signals "eye" and "dgp"; outdoors: for the signal "irradiance".
+        met: whether the room's temperature meets each of `temperature_conditions`.
     """
     numbers, operation = room.windows.control, room.operation
     states = np.zeros((room.skies.hours, len(room.control.names)), dtype=np.int64)
     if operation is None or not room.space.windows:
         return states[:, numbers]
-    rules, signals = room.control.rules, _Signals(room, outdoors)
+    rules, signals = room.control.rules, _Signals(room, outdoors, met)
     glare = np.array(
         [c for c, rule in enumerate(rules) if any(leaf.rule == "glare" for leaf in rule.leaves)],
         dtype=np.int64,
@@ -103,6 +140,9 @@ def _by_rule(
         if rule.rule in ("schedule", *WEATHER_RULES) and operation is not None:
             hours = OperationHours(operation, room.weather)
             return hours.states(rule, place, room.windows.states, closed)
+        if rule.rule in ROOM_RULES:
+            met = signals.met[condition_of(rule)]
+            return always(closed if met else 0, room.skies.hours)
         if rule.rule == "irradiance":
             brightest = signals.irradiance(rule.sensor)[:, groups].max(axis=1)
             return by_threshold(brightest, rule.close_above, rule.open_below, closed=closed)
@@ -125,8 +165,10 @@ def _by_rule(
 class _Signals:
     """What rules read of the window groups, computed once."""
 
-    def __init__(self, room: RoomInputs, outdoors: SeasonalOutdoors | None) -> None:
-        self._room, self._outdoors = room, outdoors
+    def __init__(
+        self, room: RoomInputs, outdoors: SeasonalOutdoors | None, met: Conditions
+    ) -> None:
+        self._room, self._outdoors, self.met = room, outdoors, met
         self._values: dict[tuple[str, str], FloatArray] = {}
 
     def irradiance(self, sensor: str) -> FloatArray:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from bim.model import Building, Face, Space, Window
 from bim.outer_faces import OuterFaces, outer_faces
@@ -21,6 +22,7 @@ from bim.to_thermal import (
 from mitsuba_cfs.compiled import must_compile
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache, cached_or_computed
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.stored_arrays import StoredArrays
@@ -33,10 +35,11 @@ from scenes.room.inputs import RoomInputs
 from scenes.room.operation import OperationHours
 from scenes.room.operation_tables import GroundTable, NeighbourTable, OperationTables
 from scenes.room.options import Occupancy
-from scenes.room.solar import SeasonalOutdoors, solar_gains
+from scenes.room.solar import SeasonalOutdoors, SunBeyond, solar_gains, sun_by_hour
 from scenes.room.windows import RoomWindows
 from thermal.balance import BalanceOptions, ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
+from thermal.control import TemperatureCondition, TemperatureControl
 from thermal.errors import ThermalInputError
 from thermal.ground import (
     SOILS,
@@ -214,21 +217,30 @@ def _next_to(one: OpaqueSurface, table: NeighbourTable, beyond) -> OpaqueSurface
 def _heated(
     zone: Zone, faces: Sequence[Sequence[Face]], hours: OperationHours, space: Space
 ) -> Zone:
-    """The zone with its heated slab, in the largest surface that its table names."""
-    table = hours.tables.loads.slab
-    if table is None:
+    """The zone with the surfaces of its heated slab and of what radiates its loads."""
+    loads, names = hours.tables.loads, {}
+
+    def surface(named: Sequence[str], field: str) -> OpaqueSurface:
+        """The largest surface of some faces."""
+        known = [
+            one
+            for one, own in zip(zone.surfaces, faces, strict=True)
+            if any(face.name in named or face.kind in named for face in own)
+        ]
+        if not known:
+            message = f"has no face {' or '.join(named)}"
+            raise DataError(message, element=space.label, field=f"loads.{field}")
+        return max(known, key=lambda one: one.area)
+
+    for key in ("heating", "cooling"):
+        named = getattr(loads, f"{key}_faces")
+        if named:
+            names[f"{key}_surface"] = surface(named, f"{key}_faces").name
+    zone = replace(zone, loads=replace(zone.loads, **names))
+    if loads.slab is None:
         return zone
-    named = [
-        surface
-        for surface, own in zip(zone.surfaces, faces, strict=True)
-        if any(face.name in table.faces or face.kind in table.faces for face in own)
-    ]
-    if not named:
-        raise DataError(
-            f"has no face {' or '.join(table.faces)}", element=space.label, field="loads.slab.faces"
-        )
-    surface = max(named, key=lambda one: one.area)
-    return replace(zone, slab=hours.slab(surface.name, surface.area))
+    slab = surface(loads.slab.faces, "slab.faces")
+    return replace(zone, slab=hours.slab(slab.name, slab.area))
 
 
 FloatArray = NDArray[np.float64]
@@ -265,6 +277,51 @@ class RoomZone:
     fenestration: tuple[dict[str, float | str], ...] = ()  # `fenestration_table` of its windows
     states: tuple[str, ...] = ()  # names of the shading states
     operation: OperationTables | None = None
+    sun_beyond: SunBeyond = field(default_factory=dict)  # of its windows, in rooms beyond glass
+    alternatives: RoomAlternatives | None = None  # of shading by the room's temperature
+
+    @property
+    def control(self) -> TemperatureControl | None:
+        """The alternatives from which the heat balance chooses."""
+        if self.alternatives is None:
+            return None
+        rooms = self.alternatives.rooms
+        suns = tuple(per_window(room.solar, room.zone) for room in rooms)
+        gains = tuple(room.zone.gains for room in rooms)
+        return TemperatureControl(self.alternatives.conditions, suns, gains)
+
+    def in_alternatives(self, number: NDArray[np.int64]) -> RoomZone:
+        """The room with that alternative of every hour [H] which the heat balance chose."""
+        if self.alternatives is None:
+            return self
+        rooms, hours = self.alternatives.rooms, np.arange(len(number))
+
+        def chosen(values: Sequence[ArrayLike]) -> NDArray[Any]:
+            every = [np.asarray(value) for value in values]
+            whole = [np.broadcast_to(v, number.shape) if v.ndim == 0 else v for v in every]
+            result: NDArray[Any] = np.stack(whole)[number, hours]
+            return result
+
+        planes = [room.daylight for room in rooms if room.daylight is not None]
+        gains = Gains(
+            chosen([room.zone.gains.convective for room in rooms]),
+            chosen([room.zone.gains.radiant for room in rooms]),
+        )
+        states = chosen([room.shading.states for room in rooms])
+        return replace(
+            self,
+            room=replace(self.room, zone=replace(self.zone, gains=gains)),
+            solar=sun_by_hour([room.solar for room in rooms], number),
+            gains={key: chosen([room.gains[key] for room in rooms]) for key in self.gains},
+            shading=replace(self.shading, states=states),
+            lamps=chosen([room.lamps for room in rooms]),
+            daylight=chosen(planes) if planes else None,
+            sun_beyond={
+                place: chosen([room.sun_beyond[place] for room in rooms])
+                for place in self.sun_beyond
+            },
+            alternatives=None,
+        )
 
     @property
     def zone(self) -> Zone:
@@ -280,6 +337,14 @@ class RoomZone:
     def with_view_factors(self, among: FloatArray) -> RoomZone:
         """The room with view factors [N, N] between its surfaces, then its windows."""
         return replace(self, room=replace(self.room, zone=replace(self.zone, view_factors=among)))
+
+
+@dataclass(frozen=True, slots=True)
+class RoomAlternatives:
+    """A room by which conditions its temperature meets: see `thermal.control`."""
+
+    conditions: tuple[TemperatureCondition, ...]
+    rooms: tuple[RoomZone, ...]
 
 
 def balances(
@@ -305,6 +370,7 @@ def balances(
     return simulate_zones(
         zones, outdoors, suns, step_s=min(step_s, row_s), row_s=row_s,
         air_links=air_links, transfers=transfers, options=BalanceOptions(terrain=terrain),
+        controls=[r.control for r in rooms],
         storage=None if store is None else store.stored,
     )  # fmt: skip
 
@@ -319,10 +385,57 @@ def coupled(
     Returns: the rooms, the air between them [Z, Z] [m3/s], and a sentence for every wall without
         another face.
     """
+    rooms = with_sun_of_others(rooms)
     spaces = [room.space for room in rooms]
     joined, notes = coupled_rooms(spaces, [room.room for room in rooms])
     zones = [replace(room, room=one) for room, one in zip(rooms, joined, strict=True)]
     return zones, door_links(spaces, door_m3_s), notes
+
+
+def with_sun_of_others(rooms: Sequence[RoomZone]) -> list[RoomZone]:
+    """The rooms with the sun that reaches them through the windows of others and inner glass.
+
+    Where the room's temperature chooses the shading, other rooms get the sun of its first state.
+    """
+    return [_with_sun_of(room, rooms) if _has_inner_sun(room, rooms) else room for room in rooms]
+
+
+def _has_inner_sun(room: RoomZone, rooms: Sequence[RoomZone]) -> bool:
+    guid = room.space.guid
+    return any(place == guid for one in rooms for place, _ in one.sun_beyond)
+
+
+def _with_sun_of(room: RoomZone, rooms: Sequence[RoomZone]) -> RoomZone:
+    """The room, and each of its alternatives, with what its faces absorb of the rooms' sun."""
+    inside = room.solar.inside.copy()
+    for one in rooms:
+        source = room if one.space.guid == room.space.guid else one
+        for (guid, face), absorbed in source.sun_beyond.items():
+            if guid == room.space.guid:
+                inside[:, room.room.surface_of_face[face]] += absorbed
+    choices = room.alternatives
+    if choices is not None:
+        choices = replace(choices, rooms=tuple(_with_sun_of(one, rooms) for one in choices.rooms))
+    return replace(room, solar=replace(room.solar, inside=inside), alternatives=choices)
+
+
+def inner_sun_note(rooms: Sequence[RoomZone], step_h: float) -> tuple[str, ...]:
+    """A sentence on the sun that enters by one room and is absorbed in another; none without."""
+    passed = sum(
+        float(absorbed.sum())
+        for room in rooms
+        for (guid, _), absorbed in room.sun_beyond.items()
+        if guid != room.space.guid
+    )
+    if not passed:
+        return ()
+    return (
+        Note(
+            "Sun through glass and open doorways between rooms: {energy:.0f} kWh in the year enter "
+            "by the windows of one room and are absorbed in another.",
+            energy=passed * step_h / 1000.0,
+        ),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -413,7 +526,7 @@ def room_zone(
         seed=room.options.sampling.seed,
         cache=room.cache,
     )
-    solar, gains = solar_gains(
+    solar, gains, beyond = solar_gains(
         room, outdoors, surfaces.room, surfaces.outer, state,
         thermals=surfaces.thermals, progress=progress,
     )  # fmt: skip
@@ -421,7 +534,7 @@ def room_zone(
         room.space, zone, solar, gains, room.shading(state), lamps, room.occupied, plane, services,
         fenestration=tuple(fenestration_table(room.windows, surfaces.thermals)),
         states=tuple(system.name for system in max(room.windows.systems, key=len, default=())),
-        operation=room.operation,
+        operation=room.operation, sun_beyond=beyond,
     )  # fmt: skip
 
 

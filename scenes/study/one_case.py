@@ -52,7 +52,7 @@ from scenes.study.study_file import SYSTEM_TABLE
 
 WARM_C = 26.0  # operative temperature above which hours are counted
 KEPT_TEMPERATURES = ("outdoor_c", "air_c", "operative_c")
-OF_READING = ("building", "surroundings", *OF_ROOM[1:])  # options that a building is read with
+OF_READING = ("building", "surroundings", "cache", *OF_ROOM[1:])  # that a building is read with
 ALONE = threading.Lock()  # Dr.Jit has all cores already, and a worker may have several threads
 
 

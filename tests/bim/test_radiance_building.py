@@ -238,6 +238,20 @@ def test_a_pattern_on_glass_counts_by_its_mean(tmp_path):
     assert angular.reflectance_front == pytest.approx(bare.reflectance_front, abs=1e-6)
 
 
+def test_a_pattern_that_is_the_same_everywhere_is_computed_and_no_assumption(tmp_path):
+    even = "void colorfunc even\n4 .5 .5 .5 .\n0\n0\n\n"
+    text = OFFICE.read_text().replace("void glass glazing", "even glass glazing")
+    path = tmp_path / "even.rad"
+    path.write_text(even + text.replace("void plastic carpet", "even plastic carpet"))
+    building = read_building_file(path)
+    assert not [issue for issue in building.issues if "averaged" in issue.code]
+    (state,) = building.windows[0].states
+    bare = glass_table([(0.87, 1.52)])
+    assert state.angular.transmittance == pytest.approx(0.5 * bare.transmittance, abs=1e-6)
+    (room,) = building.spaces
+    assert any(face.reflectance_visible == pytest.approx(0.5 * 0.25) for face in room.faces)
+
+
 def test_a_pattern_on_glass_that_is_not_computed_is_refused(tmp_path):
     text = OFFICE.read_text().replace("void glass glazing", "frit glass glazing")
     path = tmp_path / "frit.rad"

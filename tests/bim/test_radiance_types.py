@@ -32,7 +32,7 @@ NUMBERS = {
 }  # fmt: skip
 STRINGS = {"BRTDfunc": "10 0 0 0 .1 .1 .1 0 0 0 .", "BSDF": "6 0 shade.xml 0 0 1 .",
            "aBSDF": "5 shade.xml 0 0 1 .", "brightfunc": "2 .5+.1*Px .",
-           "colorfunc": "4 .5 .4 .3 ."}  # fmt: skip
+           "colorfunc": "4 .3+.1*Px .4 .3 ."}  # fmt: skip
 MIXED = {"window": "4 carpet void .5+.1*Px .", "surface": "4 carpet plaster .5+.1*Px ."}
 SHAPES = {
     "polygon": SHEET, "ring": "8  1 1 1  0 0 1  0 .5", "cylinder": "7  1 1 0  1 1 1  .2",

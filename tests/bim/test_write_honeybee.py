@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bim.exported_glazing import ExportedGlazing
 from bim.honeybee.building import read_honeybee
 from bim.honeybee.write import write_honeybee
+from bim.hosted_windows import hosted_polygons
 from bim.model import Element
 from bim.shell import open_edges
 from bim.shoebox import WindowRectangle, shoebox
@@ -39,6 +42,19 @@ def test_a_room_comes_back(tmp_path, recess, frame):
     assert floor.reflectance_solar == pytest.approx(0.35)
     assert floor.construction.resistance == pytest.approx(before.construction.resistance)
     np.testing.assert_allclose(floor.normal, before.normal, atol=1e-6)
+
+
+def test_a_pane_is_within_its_face_and_polygons_of_no_area_for_honeybee_are_left_out():
+    """honeybee 1.64 takes a pane on the outline of its face as outside, and 10 cm2 as nothing."""
+    space = shoebox(4, 5, 3, windows=[WindowRectangle(0.5, 0.0, 3.0, 1.5)]).spaces[0]
+    corner = np.array([[[0, 0, 0], [0.04, 0, 0], [0.04, 0.04, 0]]], dtype=float)
+    small = replace(space, faces=(*space.faces, replace(space.faces[0], triangles=corner)))
+    parts = hosted_polygons(small)
+    assert len(parts) == len(hosted_polygons(space))
+    ((_, pane),) = next(part.panes for part in parts if part.panes)
+    polygon = next(part.polygon for part in parts if part.panes)
+    assert pane.boundary.distance(polygon.boundary) > 0.9e-4
+    assert pane.area == pytest.approx(4.5, rel=1e-4)
 
 
 def test_what_stands_outdoors_comes_back(tmp_path):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from bim.building_file import read_building_file
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.evaluate import (
     HIDDEN,
@@ -25,8 +28,10 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.indices import contrast_term, daylight_glare_probability
 from mitsuba_cfs.glare.sun_disc import spread_sun_dgp
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+from scenes.fenestration.peaks import peak_note
 from scenes.fenestration.resolver import fill_windows
 from scenes.fenestration.systems import (
+    FenestrationSystem,
     WindowOverrides,
     read_system,
     system_of,
@@ -37,6 +42,7 @@ from scenes.input_files import overrides_of, peak_share
 from scenes.input_options import InputOptions
 from scenes.room.operation import read_operation
 
+TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorials" / "office.rad"
 OMEGA = KLEMS_FULL.projected_solid_angles()
 PASSED = 0.3
 
@@ -170,3 +176,32 @@ def test_the_head_names_glass_and_lobes(tmp_path):
     assert "is specular" in note
     (note,) = system_notes([system(lobe(0.1) + 0.02, tmp_path)], light_only=True)
     assert "is a lobe" in note and "--see-through shade.xml=specular" in note
+
+
+def test_the_user_says_what_the_peak_of_a_bsdf_between_panes_is(tmp_path):
+    """By the name of its file, by the name of the system, or in the file's table."""
+    write_bsdf_xml(
+        BsdfFile({"Visible": KlemsBsdf(KLEMS_FULL, KLEMS_FULL, np.diag(PASSED / OMEGA) + 0.05)}),
+        tmp_path / "shade.xml",
+    )
+    scene = tmp_path / "scene.rad"
+    shade = "void BSDF shade\n6 0 shade.xml 0 0 1 .\n0\n0\n\nshade polygon sheet\n0\n0\n12 "
+    corners = "0.5 -0.1 0.8  3.5 -0.1 0.8  3.5 -0.1 2.6  0.5 -0.1 2.6\n"
+    scene.write_text(TUTORIAL.read_text() + shade + corners)
+    building = read_building_file(scene)
+
+    def filled(*see_through: tuple[str, float]) -> FenestrationSystem:
+        overrides = WindowOverrides(see_through=see_through, light_only=True)
+        ((system,),) = fill_windows(building.windows, overrides, scene).values()
+        return system
+
+    (note,) = peak_note(filled())
+    assert "do not show" in note and "--see-through shade.xml=lobe" in note
+    for name in ("shade.xml", "glazing"):
+        changed = filled((name, 0.0))
+        assert changed.visible.see_through == 0.0 and "0 % of the" in peak_note(changed)[0]
+    (tmp_path / "shade.toml").write_text('see_through = "lobe"\n')
+    assert filled().visible.see_through == 0.0
+    assert filled(("shade.xml", 0.5)).visible.see_through == 0.5
+    with pytest.raises(DataError, match=r"no system is .other\.xml.; there are shade\.xml"):
+        filled(("other.xml", 1.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import shutil
 from pathlib import Path
 
@@ -36,6 +37,34 @@ def test_imports_are_followed_wherever_they_stand(tmp_path):
     }  # fmt: skip
     with pytest.raises(ValueError, match=r"no module scenes\.nowhere"):
         import_closure(("scenes.nowhere",), tmp_path)
+
+
+def parsed_imports(file: Path) -> set[str]:
+    """Own modules that a file imports by its syntax tree, those for type checkers left out."""
+    tree = ast.parse(file.read_bytes())
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
+            node.body = [ast.Pass()]
+    result = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            result |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            result |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return {name for name in result if name.partition(".")[0] in OWN and source_of(name)}
+
+
+def source_of(name: str) -> bool:
+    stem = ROOT.joinpath(*name.split("."))
+    return stem.with_suffix(".py").is_file() or (stem / "__init__.py").is_file()
+
+
+def test_imports_are_those_of_the_syntax_tree():
+    for package in OWN:
+        for file in (ROOT / package).rglob("*.py"):
+            name = ".".join(file.relative_to(ROOT).with_suffix("").parts)
+            closure = import_closure((name.removesuffix(".__init__"),))
+            assert parsed_imports(file) <= closure, name
 
 
 @pytest.fixture(scope="module")

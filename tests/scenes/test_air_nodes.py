@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mitsuba_cfs.errors import DataError
 from scenes.heat.air_nodes import with_air_nodes
-from scenes.room.zone import balances, coupled
+from scenes.room.zone import RoomAlternatives, balances, coupled
 from tests.scenes.test_coupled_heat import lit, two_boxes
+from thermal.control import TemperatureCondition
 
 TABLES = {"loads": {"heating_c": 22.0, "cooling_c": 25.0}, "gains": {"equipment_w_m2": 5.0},
           "air": {"infiltration_ach": 0.3}}  # fmt: skip
@@ -82,3 +84,11 @@ def test_a_room_beside_an_air_node_keeps_its_wall_to_it(variant, weather, skies)
     (wall,) = [s for s in found[1].zone.surfaces if s.partner]
     assert wall.outside == "Dwelling" and wall.partner in {s.name for s in found[0].zone.surfaces}
     balances(found, weather, 3600.0, air_links=between)
+
+
+def test_a_room_whose_shading_follows_its_temperature_is_refused(variant, weather, skies) -> None:
+    rooms, links = _rooms(weather, skies, equal=True)
+    alternatives = RoomAlternatives((TemperatureCondition(24.0, 22.0),), (rooms[0],) * 2)
+    moved = [replace(rooms[0], alternatives=alternatives), rooms[1]]
+    with pytest.raises(DataError, match="no temperature by which its shading could move"):
+        _one(moved, links)

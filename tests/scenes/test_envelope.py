@@ -130,6 +130,14 @@ otherwise = 15
         assert sum(x.resistance for x in frame.layers) == pytest.approx(1 / 1.3 - 0.17)
 
 
+def test_cooled_ceiling_is_the_rooms_own(weather) -> None:
+    zone = zone_of(
+        "[loads]\ncooling_c = 24\ncooling_radiant = 0.6\ncooling_faces = ['ceiling']\n", weather
+    )
+    ceiling = zone.surfaces[zone.index_of(zone.loads.cooling_surface)]
+    assert ceiling.normal[2] > 0.9 and zone.loads.heating_surface == ""
+
+
 def test_known_neighbour_is_not_coupled(weather) -> None:
     """A wall whose far side has a stated temperature stays apart from the room that is there."""
     space = BOX.spaces[0]
@@ -148,6 +156,7 @@ def test_known_neighbour_is_not_coupled(weather) -> None:
         ("[envelope.ground]\nperimeter = 9\n", "a wall below ground needs kind = 'basement'"),
         ("[[envelope.neighbour]]\nfaces = ['lft']\ntemperature_c = 1\n", "no face 'lft'; there"),
         ("[loads.slab]\nfaces = ['roof']\n", "has no face roof"),
+        ("[loads]\ncooling_faces = ['roof']\n", "loads.cooling_faces.*has no face roof"),
     ],
 )
 def test_faults_of_the_envelope_name_their_place(weather, text, words) -> None:

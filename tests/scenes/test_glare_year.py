@@ -28,13 +28,13 @@ def own_cache(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def year(variant):
-    """The demo's office with two directions, and 16 of its hours."""
+def year(variant, tmp_path_factory):
+    """The demo's office with two directions, and 16 of its hours; the data of the blind alone."""
     from scenes.year_of_glare.year import read_year
 
-    options = YearOptions(
-        OFFICE, WEATHER, VENETIAN_BLIND, directions=2, size=64, samples=2, worst=1
-    )
+    blind = tmp_path_factory.mktemp("blind") / "blind.xml"
+    blind.write_bytes(VENETIAN_BLIND.read_bytes())
+    options = YearOptions(OFFICE, WEATHER, blind, directions=2, size=64, samples=2, worst=1)
     whole = read_year(options)
     count = len(whole.sky.lit)
     return replace(whole, sky=whole.sky.part(np.arange(5, count, count // 16)[:16]))

@@ -129,6 +129,10 @@ RULES = {
     "irradiance": '"irradiance"\nclose_above = 150',
     "glare": '"glare"\nlimit_lx = 400',
     "cut-off": '"cut-off"\nslat_tilts_deg = [0, 40]',
+    "temperature and sun": (
+        '"all"\nparts = [{ rule = "irradiance", close_above = 100 }, '
+        '{ rule = "operative temperature", close_above_c = 22, open_below_c = 21 }]'
+    ),
     "schedule": f'"schedule"\nschedule = {[0] * 10 + [1] * 14}',
 }
 

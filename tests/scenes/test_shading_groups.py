@@ -19,15 +19,21 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.light import eye_illuminance, illuminance, with_view
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from scenes.room.control_groups import control_groups
+from scenes.room.heat import heat_of, step_issues
 from scenes.room.inputs import RoomInputs, room_inputs, skies_for
 from scenes.room.light import room_light
 from scenes.room.operation import Operation, OperationHours, check_schedules
 from scenes.room.operation_tables import OperationTables
-from scenes.room.room import compute_room, explored_combinations
-from scenes.room.shading import control_signals, shading_states, window_beam
+from scenes.room.room import compute_room, explored_combinations, operated_zone
+from scenes.room.shading import (
+    control_signals,
+    shading_states,
+    temperature_conditions,
+    window_beam,
+)
 from scenes.room.solar import seasonal_outdoors, solar_gains
 from scenes.room.windows import in_all_windows, room_windows
-from scenes.room.zone import zone_surfaces
+from scenes.room.zone import RoomZone, balances, zone_surfaces
 from tests.scenes.small_box import HOURS, SMALL, clear
 
 FEW = SMALL.changed(
@@ -178,7 +184,7 @@ def test_sun_of_a_room_is_the_sum_over_its_groups(inputs, skies) -> None:
 
     def transmitted(*states: int) -> np.ndarray:
         hours = np.tile(states, (skies.hours, 1))
-        solar, gains = solar_gains(
+        solar, gains, _ = solar_gains(
             room, outdoors, surfaces.room, surfaces.outer, hours, thermals=surfaces.thermals
         )
         assert np.array_equal(solar.state, hours[:, room.windows.group])
@@ -301,6 +307,94 @@ def test_windows_are_tilted_while_nobody_is_there_and_shut_in_rain(weather) -> N
     clock, rains = weather.midpoints.hour.to_numpy(), np.nan_to_num(weather.rain_mm) > 0
     expected = np.where((clock >= 8) & (clock < 18), 0.3, 0.02)
     assert np.array_equal(share, np.where(rains, 0.0, expected))
+
+
+def test_little_of_a_window_is_open_by_night(weather) -> None:
+    air = {"night": [22, 6], "windows": {"share": 0.3, "when": "always", "night_share": 0.02}}
+    tables = OperationTables.model_validate({"air": air})
+    window = SimpleNamespace(
+        glazing_height=1.5, height=1.6, area=3.0, normal=np.array([0.0, 1.0, 0.0])
+    )
+    share = OperationHours(tables, weather).airing([window], 60.0).share
+    clock = weather.midpoints.hour.to_numpy()
+    assert np.array_equal(share, np.where((clock >= 22) | (clock < 6), 0.02, 0.3))
+
+
+WARM = {"rule": "operative temperature", "close_above_c": 22.0, "open_below_c": 21.0}
+
+
+def test_rules_by_room_temperature_are_computed_both_ways(inputs) -> None:
+    sun = {"rule": "irradiance", "close_above": 150.0}
+    room = inputs({"rule": "all", "parts": [sun, WARM, WARM]})
+    (condition,) = temperature_conditions(room)
+    assert (condition.above_c, condition.below_c, condition.operative) == (22.0, 21.0, True)
+    outdoors, by_sun = seasonal_outdoors(room), by_group(inputs(sun))["S"]
+    cold, warm = (
+        shading_states(room, None, outdoors, met={condition: met})[:, 0] for met in (False, True)
+    )
+    assert not cold.any() and np.array_equal(warm, by_sun)
+
+
+@pytest.mark.parametrize(
+    ("control", "key"),
+    [
+        (WARM | {"hold_h": 2.0}, "control.hold_h"),
+        ({"rule": "any", "open_delay_h": 1.0, "parts": [WARM]}, "control.open_delay_h"),
+        (WARM | {"open_below_c": 23.0}, "control.open_below_c"),
+        ({"rule": "any", "parts": [WARM, WARM | {"open_below_c": 23.0}]},
+         "control.parts.1.open_below_c"),
+    ],
+)  # fmt: skip
+def test_what_a_rule_by_room_temperature_cannot_do_is_refused(control, key) -> None:
+    fault = OperationTables.model_validate({"control": control}).control_fault(3)
+    assert fault is not None and fault[0] == key
+
+
+def test_coupled_rooms_whose_light_and_heat_have_other_states_say_so(
+    glass, blind, weather, skies, variant
+) -> None:
+    """The states of the balance alone are those of the light; a warm neighbour closes more."""
+    tables = OperationTables.model_validate({"control": WARM | {"state": 1}})
+    space = TWO.spaces[0]
+    room = room_inputs(
+        TWO, space, in_all_windows(space, glass, blind), weather, FEW, operation=tables, skies=skies
+    )
+    zone = operated_zone(room)
+    alone, others = (
+        heat_of([zone_in], weather, 3600.0)[0]
+        for zone_in in (
+            replace(zone, shading=replace(zone.shading, states=chosen(zone, weather))),
+            zone,
+        )
+    )
+    assert [issue.code for issue in alone[0].issues] == []
+    (issue,) = others[0].issues  # its light is that of open blinds
+    assert issue.code == "shading-by-coupled-temperature" and issue.values["hours"] > 100
+    assert np.array_equal(alone[1].shading.states, others[1].shading.states)
+
+
+def test_shading_by_room_temperature_is_checked_by_half_the_step(
+    glass, blind, weather, skies, variant
+) -> None:
+    """The year of a room that stays open is not that which half the step gives."""
+    tables = OperationTables.model_validate({"control": WARM})
+    space = TWO.spaces[0]
+    room = room_inputs(
+        TWO, space, in_all_windows(space, glass, blind), weather, FEW, operation=tables, skies=skies
+    )
+    zone = operated_zone(room)
+    shaded = balances([zone], weather, 3600.0)
+    opened = balances([replace(zone, alternatives=None)], weather, 3600.0)
+    assert step_issues([zone], shaded, weather, 3600.0) == ((),)
+    ((issue,),) = step_issues([zone], opened, weather, 3600.0)
+    assert issue.code == "time-step-too-long"
+    assert step_issues([replace(zone, alternatives=None)], shaded, weather, 3600.0) == ((),)
+
+
+def chosen(zone: RoomZone, weather) -> np.ndarray:
+    """The states that the balance of a room alone chooses."""
+    (result,) = balances([zone], weather, 3600.0)
+    return zone.in_alternatives(result.alternative).shading.states
 
 
 def test_a_rule_against_glare_is_combined_with_others(inputs, skies) -> None:

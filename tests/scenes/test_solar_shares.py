@@ -47,3 +47,19 @@ def test_what_is_asked_of_the_windows_irradiance_is_what_its_directions_give() -
     )
     for shares, values in zip(absorbed_shares(heats, T, AREA, absorbed), expected, strict=True):
         np.testing.assert_allclose(directional_sums(outdoors, skies, shares), values, rtol=1e-5)
+
+
+def test_beside_the_sun_all_light_meets_one_hemispherical_value() -> None:
+    rng = np.random.default_rng(1)
+    outdoors = SeasonalOutdoors([traced(rng)], np.zeros(L, dtype=np.int64))
+    sky, sun = rng.random((P, L)), np.zeros((P, L))
+    sun[2] = rng.random(L)
+    skies = SimpleNamespace(solar=sky + sun, lit=np.arange(L))
+    shares, omega = rng.random((3, G, K)), KLEMS_FULL.projected_solid_angles()
+    daylight = outdoors.first.daylight.values
+    of_sun = np.einsum("ngk,gkl->nl", shares * omega, daylight @ sun)
+    falls = np.einsum("k,gkl->gl", omega, daylight @ sky)
+    expected = of_sun + (shares @ omega / omega.sum()) @ falls
+    np.testing.assert_allclose(directional_sums(outdoors, skies, shares, sun), expected, rtol=1e-5)
+    by_direction = directional_sums(outdoors, skies, shares)
+    assert np.abs(by_direction / expected - 1.0).max() > 0.005

@@ -108,7 +108,7 @@ def test_a_study_says_which_peaks_are_lobes(tmp_path):
     for case in plan_of(read_study(study_file(tmp_path, "", system=SYSTEM + twin))).cases:
         ((state,), *_) = case_inputs(case).systems.values()
         shares[case.system] = state.visible.see_through
-    assert shares == {"blind": None, "lobe": 0.0}
+    assert shares == {"blind": 1.0, "lobe": 0.0}
 
 
 def test_a_case_is_known_by_what_its_numbers_depend_on(tmp_path):

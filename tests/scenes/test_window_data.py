@@ -21,6 +21,7 @@ from scenes.fenestration.thermal_system import (
     scattered_share,
     sun_in_layers,
     thermal_system,
+    with_likely_layers,
 )
 from scenes.room.operation import read_operation
 from tests.scenes.fenestration_models import grey, room
@@ -214,6 +215,20 @@ def test_layers_assumed_are_named_with_the_range_of_g():
     assert "2 panes" in note and "shade internal" in note
     stated = thermal_system(grey_system(closure=Closure("layers", unit=INTERNAL))).notes
     assert not any("layers assumed" in one for one in stated)
+
+
+def test_likely_layers_have_the_same_u_and_g_and_another_diffuse_g():
+    system = grey_system(u_value=1.1, g_value=0.4, shading_position="internal")
+    assumed = thermal_system(system)
+    low, high = (thermal_system(with_likely_layers(system, number)) for number in (0, 1))
+    weight = KLEMS_FULL.projected_solid_angles() / np.pi
+    for heat in (low, high):
+        assert heat.fenestration.u_value == pytest.approx(assumed.fenestration.u_value)
+        assert "layers assumed" not in " ".join(heat.notes) and not heat.likely
+    diffuse = [float(weight @ heat.g_value) for heat in (low, assumed, high)]
+    assert diffuse == sorted(diffuse) and diffuse[2] > diffuse[0] + 0.003
+    stated = grey_system(closure=Closure("layers", unit=INTERNAL))
+    assert with_likely_layers(stated, 0) is stated
 
 
 def test_a_shade_is_not_taken_for_a_pane_by_silence():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -99,6 +100,18 @@ def test_faults_are_one_line(tmp_path, variant, capsys, text, words):
     assert len([line for line in lines if line.startswith("error:")]) == 1
     assert words in lines[-1]
     assert not (tmp_path / "out").exists()
+
+
+def test_band_of_assumed_layers_is_in_kelvin(tmp_path, variant, capsys):
+    text = f"u_value = 1.0\ng_value = 0.25\n{TRACE}view_factors = false\n"
+    path = study_file(tmp_path, text)
+    path.write_text(f"likely_layers = true\nstep_minutes = 60\n{path.read_text()}")
+    assert main(["thermal", str(path), "--out", str(tmp_path / "out")]) == 0
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    (note,) = (note for note in record["notes"] if "other likely layers of its windows" in note)
+    operative, glass = (float(value) for value in re.findall(r"(\d\.\d\d) K", note))
+    assert 0.02 < operative < 1.0 and 0.02 < glass < 2.0
+    assert note in " ".join(capsys.readouterr().out.split())
 
 
 def test_missing_file_is_named(tmp_path, capsys):

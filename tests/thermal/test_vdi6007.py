@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,16 @@ def test_the_norms_results_within_its_tolerance(number):
     unit = "W" if number in POWER else "K"
     difference = apart(number, run(cases()[number]))
     assert np.max(np.abs(difference)) <= TOLERANCE[unit]
+
+
+def test_cooled_ceiling_acts_at_its_surface():
+    """Case 11: 0.9 W rms and 5.3 W where heating turns into cooling; at all faces 22 and 109 W."""
+    case = cases()[11]
+    difference = apart(11, run(case))
+    assert np.sqrt(np.mean(difference**2)) < 1.0 and np.max(np.abs(difference)) < 6.0
+    assert np.sum(np.abs(difference) > TOLERANCE["W"]) == 2
+    spread = replace(case, loads=replace(case.loads, cooling_surface=""))
+    assert np.sqrt(np.mean(apart(11, run(spread)) ** 2)) > 10.0
 
 
 def test_stated_films_belong_to_their_convection():

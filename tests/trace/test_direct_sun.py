@@ -196,3 +196,23 @@ def test_five_phase_of_clear_glass_is_never_negative_and_has_the_exact_sun():
     assert np.all(total > 0)
     in_beam = exact > 0
     assert np.all((total - without_sun)[in_beam] > 0.3)
+
+
+def test_batches_in_one_launch_are_those_of_each_alone(monkeypatch):
+    """The random numbers of a batch do not depend on what is traced with it."""
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.sun import direct
+
+    cover, sun, point = half_hidden()
+    suns = np.concatenate([sun, SUNS])
+    for system in (diffuser(0.3), glass(0.7)):
+        found = []
+        for lanes in (direct.LANES, 2 * 64 * len(suns), 1):  # four, two and one in a launch
+            with monkeypatch.context() as patch:
+                patch.setattr(direct, "LANES", lanes)
+                options = {"stopping": Stopping(batches=4), "window_points": 64}
+                found.append(matrix(system, cover, suns, point, **options))
+        assert (found[0].standard_error > 0).any()
+        for one in found[1:]:
+            np.testing.assert_array_equal(one.values, found[0].values)
+            np.testing.assert_array_equal(one.standard_error, found[0].standard_error)

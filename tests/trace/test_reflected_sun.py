@@ -192,6 +192,7 @@ def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
     """A closed room of one reflectance: rho / (1 - rho) of the flux over its area, on average."""
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.sunlit_cells import Beam
     from mitsuba_cfs.trace.sun.sunlit_sensors import CELL_RAYS, room_cells, room_light, room_shares
 
     room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
@@ -210,10 +211,11 @@ def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
     share = room_shares(cells, inside, (places, normals), samples=256)
     sun = towards(40, 20)[None]
     way = BsdfOptics(clear_glass()).scattering
-    lux = room_light(cells[0], share, (inside, outside), 0, way, (sun, np.array([LUX])))
+    suns = sun, np.array([LUX])
+    [lux] = room_light(cells[0], [share], Beam((inside, outside), 0, way), suns)
     flux = 0.8 * LUX * -sun[0, 1] * 1.0
     wall = TracedScene(rooms.surfaces([(9 * square(1, 0.0) - 12, 0.0)]), [group])
-    hidden = room_light(cells[0], share, (inside, wall), 0, way, (sun, np.array([LUX])))
+    [hidden] = room_light(cells[0], [share], Beam((inside, wall), 0, way), suns)
     assert np.all(hidden == 0)
     # light that the black hole of 1 m2 in 54 takes: twice, as it hides the wall behind it
     assert lux.mean() == pytest.approx(0.6 / (1 - 0.6 * (1 - 1 / 54)) * flux / 54, rel=0.03)
@@ -234,6 +236,28 @@ def test_few_rays_of_a_sensor_ask_for_few_from_the_cells_with_the_same_light():
     np.testing.assert_allclose(*found, rtol=0.005)
 
 
+def test_batches_of_a_beam_in_one_launch_are_those_of_each_alone(monkeypatch):
+    """Hours of several batches share launches; each batch keeps its points on the window."""
+    from mitsuba_cfs.methods.optics import BsdfOptics
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun import sunlit_cells as module
+
+    room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
+    inside, outside = TracedScene(room, [hole()]), TracedScene(overhang(2.0), [hole()])
+    cells = module.surface_cells(inside).cells
+    suns = np.array([towards(40, 20), towards(30, 60), towards(50, 200), towards(20, -30)])
+    way, seeds, points = BsdfOptics(clear_glass()).scattering, (0, 3, 4), 64
+
+    def flux(*some: int):
+        return module.Beam((inside, outside), 0, way, points, some).flux(cells, suns).toarray()
+
+    each = np.concatenate([flux(seed) for seed in seeds], axis=1)
+    assert each.any() and not np.array_equal(each[:, :4], each[:, 4:8])
+    np.testing.assert_array_equal(flux(*seeds), each)
+    monkeypatch.setattr(module, "RAYS", 5 * points // module.EDGE_SHARE)  # five columns at once
+    np.testing.assert_array_equal(flux(*seeds), each)
+
+
 def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
     """One wall reflects: the flux of points of the hole over their distances, by quadrature.
 
@@ -242,6 +266,7 @@ def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
     """
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.sunlit_cells import Beam
     from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, room_shares
 
     sides = [(k, at) for k in range(3) for at in (0.0, 3.0)]
@@ -262,7 +287,8 @@ def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
         sensor = place[None], np.array([[0.0, 0.0, 1.0]])
         share = room_shares(cells, inside, sensor, samples=65_536, seed=seed)
         suns = sun[None], np.array([LUX])
-        found.append(room_light(cells[0], share, (inside, outside), 0, beam, suns, seed=seed)[0, 0])
+        of_seed = Beam((inside, outside), 0, beam, seeds=(seed,))
+        found.append(room_light(cells[0], [share], of_seed, suns)[0][0, 0])
     assert np.mean(found) == pytest.approx(expected, rel=0.08)  # 0.05, and 0.02 of noise
 
 

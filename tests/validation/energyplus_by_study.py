@@ -5,7 +5,8 @@
 
 Writes into FOLDER a BSDF file of each system and a study file for each case: the window by its
 `layers`, or by BSDF, U and g at normal incidence ("plain"), with the position of its shade
-("position"), with position and gas gap ("gap").  Each room floats, and is kept at 20 to 26 degC.
+("position"), with position and gas gap ("gap"); the layers with EnergyPlus' one hemispherical value
+for all light but the sun's.  Each room floats, and is kept at 20 to 26 degC.
 EnergyPlus 25.2 computes the same rooms with its own layers and sun.
 
 Systems: those of the reference set, and the clear double glazing of ASHRAE 140 alone and with the
@@ -65,6 +66,7 @@ conductivity = 0.15
 """
 OUTSIDE = f"{SHEET}edges = [0.1, 0.1, 0.1, 0.1]\ngap = {{ width = 0.1 }}\n"
 INSIDE = f"gap = {{ width = 0.05 }}\n{SHEET}edges = [0.05, 0.05, 0.05, 0.05]\n"
+ONE_DIFFUSE = "layers, one diffuse value"  # of the window, for all light but the sun's
 LAYERS = {
     "dgu": PANES, "ext_blind": BLIND + PANES, "ext_shade": OUTSIDE + PANES,
     "int_shade": PANES + INSIDE, "clear": CLEAR_PANES, "clear int_shade": CLEAR_PANES + INSIDE,
@@ -73,7 +75,7 @@ PATCHES = {"clear": ("clear_double",), "clear int_shade": ("clear_double", "int_
 POSITIONS = PLACES | {"clear": "none", "clear int_shade": "internal"}
 LOW_E_GAP = "gap = { width = 0.016, gas = { argon = 0.9, air = 0.1 }, emissivity = [0.84, 0.05] }\n"
 AIR_GAP = "gap = { width = 0.012, gas = { air = 1.0 }, emissivity = [0.84, 0.84] }\n"
-INPUTS = ("layers", "plain", "position", "gap")
+INPUTS = ("layers", "plain", "position", "gap", ONE_DIFFUSE)
 KEPT = "[loads]\nheating_c = 20\ncooling_c = 26\n"
 SHADE = (0.10, 0.55)  # solar transmittance and reflectance of the sheet
 
@@ -140,7 +142,7 @@ def _optics(tau: np.ndarray, rho: np.ndarray, back: dict[str, float]) -> Optics:
 def window_text(window: KnownWindow, name: str, inputs: str) -> str:
     """The tables of the window in a study file."""
     head = f'[[system]]\nbsdf = "{window.bsdf}"\n'
-    if inputs == "layers":
+    if inputs.startswith("layers"):
         return f"{head}glazing_height = 1.5\nglazing_width = 3.0\n{LAYERS[name]}\n"
     text = f"{head}u_value = {window.u_value:.4g}\ng_value = {window.g_normal:.4g}\n"
     if inputs == "plain":
@@ -191,7 +193,12 @@ def main(
                     window = window_text(known[name], name, kind)
                     for held, more in (("floating", ""), ("kept", KEPT)):
                         study = folder / f"{epw.stem} {orientation} {name} {kind} {held}.toml"
-                        study.write_text(study_text(epw, orientation, window, more), "utf-8")
+                        text = study_text(epw, orientation, window, more)
+                        if kind == ONE_DIFFUSE:
+                            text = text.replace(
+                                "[trace]\n", '[trace]\nsky_light = "hemispherical"\n'
+                            )
+                        study.write_text(text, "utf-8")
                         hours = our_year(study)
                         if held == "floating":
                             row |= _apart(hours, theirs)

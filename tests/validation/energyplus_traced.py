@@ -11,7 +11,7 @@ are the set's own.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,16 +24,14 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.epw import read_epw
-from mitsuba_cfs.sky.matrix import series_matrix, sky_series
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import FenestrationSystem
-from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
 from scenes.heat.box import box_building
 from scenes.heat.study_file import StudyFile, read_study
 from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.room import operated_zone
 from scenes.room.windows import in_all_windows
-from scenes.room.zone import RoomZone, balances
+from scenes.room.zone import balances
 from tests.validation.energyplus_cases import (
     EPW_FILES,
     EnergyPlusCase,
@@ -58,7 +56,6 @@ class Place:
     name: str
     weather: Weather
     skies: AnnualSky
-    sun: NDArray[np.floating]  # [P, L] the sun alone [W/m2/sr]
 
 
 def traced_system(name: str, optics: Optics) -> FenestrationSystem:
@@ -98,26 +95,17 @@ def traced_case(
     orientation: str,
     system: FenestrationSystem,
     cache: MatrixCache | None,
-    *,
-    one_diffuse: bool = False,
 ) -> EnergyPlusCase:
-    """Our hours of a case, traced; one_diffuse: see `with_one_diffuse`."""
+    """Our hours of a case, traced."""
     turned = study.box.model_copy(update={"facing_deg": float(ORIENTATIONS[orientation])})
     building = box_building(turned)
     (space,) = building.spaces
 
-    def under(solar: NDArray[np.floating]) -> RoomZone:
-        room = room_inputs(
-            building, space, in_all_windows(space, system), place.weather, study.options,
-            operation=study, skies=replace(place.skies, solar=solar), cache=cache,
-        )  # fmt: skip
-        return operated_zone(room)
-
-    whole = place.skies.solar
-    room = under(whole)
-    if one_diffuse:
-        rest = under(np.maximum(whole - place.sun, 0.0))
-        room = with_one_diffuse(room, under(place.sun), rest, thermal_system(system))
+    inputs = room_inputs(
+        building, space, in_all_windows(space, system), place.weather, study.options,
+        operation=study, skies=place.skies, cache=cache,
+    )  # fmt: skip
+    room = operated_zone(inputs)
     step_s = study.options.heat_step_s
     (result,) = balances([room], place.weather, step_s, terrain=study.terrain)
     walls, window = result.surface_in_c, result.window_inner_c
@@ -130,38 +118,6 @@ def traced_case(
     )  # fmt: skip
 
 
-def with_one_diffuse(
-    room: RoomZone, beam: RoomZone, rest: RoomZone, system: ThermalSystem
-) -> RoomZone:
-    """A room whose windows pass and absorb light of sky and ground as EnergyPlus' do.
-
-    One hemispherical value holds wherever it comes from; the beam keeps its angle.
-
-    Args: beam, rest: the room under the sun alone, and without it.
-    """
-    omega = KLEMS_FULL.projected_solid_angles()
-    falls, sun, sky = rest.gains["incident_w"], beam.solar, rest.solar
-
-    def scaled(values: FloatArray, name: str, by_patch: FloatArray) -> FloatArray:
-        own = rest.gains[name]
-        share = np.divide(falls * (omega @ by_patch / omega.sum()), own, np.zeros_like(own),
-                          where=own > 0)  # fmt: skip
-        return values * share[:, None]
-
-    outer = system.absorptances.outer
-    inner = system.absorptances.inner + system.absorptances.air
-    passed = ("transmitted_w", system.transmittance)
-    solar = replace(
-        room.solar,
-        absorbed_outer=sun.absorbed_outer + scaled(sky.absorbed_outer, "absorbed_outer_w", outer),
-        absorbed_inner=sun.absorbed_inner + scaled(sky.absorbed_inner, "absorbed_inner_w", inner),
-        absorbed_air=sun.absorbed_air + scaled(sky.absorbed_air, "absorbed_inner_w", inner),
-        inside=sun.inside + scaled(sky.inside, *passed),
-        window_inside=sun.window_inside + scaled(sky.window_inside, *passed),
-    )
-    return replace(room, solar=solar)
-
-
 def compare(
     reference: Path,
     epw: Path,
@@ -171,17 +127,18 @@ def compare(
     *,
     one_diffuse: bool = False,
 ) -> pd.DataFrame:
-    """A row of errors for every case; one_diffuse: see `with_one_diffuse`."""
+    """A row of errors for every case; one_diffuse: `sky_light = "hemispherical"`."""
     variants.activate()
     study, cache, rows = read_study(STUDY), MatrixCache.of_user(), []
+    if one_diffuse:
+        trace = study.trace.model_copy(update={"sky_light": "hemispherical"})
+        study = study.model_copy(update={"trace": trace})
     systems = [traced_system(name, read_optics(reference, name)) for name in names]
     for name in climates:
         weather = read_epw(epw / EPW_FILES[name])
         options = study.options
         skies = skies_for(weather, options.sampling, cache, **options.sky)
-        series = sky_series(weather, "solar")
-        sun = series_matrix(series, skies.lit, options.sampling.subdivision, "sun")
-        place = Place(name, weather, skies, sun.astype(np.float32))
+        place = Place(name, weather, skies)
         hours = pd.read_parquet(reference / f"ep_{name}.parquet")
         tables = dict(list(hours.groupby(["cfs", "ori"], observed=True)))
         for orientation in orientations:
@@ -189,9 +146,7 @@ def compare(
                 theirs = reference_case(
                     name, system.name, orientation, tables[(system.name, orientation)]
                 )
-                ours = traced_case(
-                    study, place, orientation, system, cache, one_diffuse=one_diffuse
-                )
+                ours = traced_case(study, place, orientation, system, cache)
                 rows.append(case_row(ours, theirs))
     return pd.DataFrame(rows)
 
@@ -205,7 +160,7 @@ def main(
     systems: Sequence[str] = SYSTEMS,
     one_diffuse: bool = False,
 ) -> dict[str, pd.DataFrame]:
-    """Errors by system, by orientation and by climate; one_diffuse: see `with_one_diffuse`."""
+    """Errors by system, by orientation and by climate; one_diffuse: as `compare`."""
     cases = compare(reference, epw, climates, orientations, systems, one_diffuse=one_diffuse)
     groups = (["system"], ["system", "orientation"], ["system", "climate"])
     return {" and ".join(by): pooled(cases, by) for by in groups}

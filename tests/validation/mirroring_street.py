@@ -17,7 +17,7 @@ import pandas as pd
 
 import mitsuba_cfs as cfs
 from mitsuba_cfs.gloss import mirror
-from mitsuba_cfs.methods.light import illuminance_noise, illuminance_with_error
+from mitsuba_cfs.methods.light import illuminance_with_noise
 from mitsuba_cfs.metrics.noise import Noise
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.demo import WEATHER
@@ -69,9 +69,9 @@ def main(
         light = cfs.daylight(
             scene, [[cfs.AngularOptics(GLASS)]], sky, method=method, sampling=sampling
         )
-        values, error = illuminance_with_error(light)
+        values, noise = illuminance_with_noise(light)
         lux.append(values)
-        errors.append(hourly_errors(illuminance_noise(light, values, error), values.shape))
+        errors.append(hourly_errors(noise, values.shape))
     stated = np.hypot(*errors)
     rows = []
     for name, (five, by_paths) in (
@@ -99,7 +99,7 @@ def main(
 
 
 def hourly_errors(noise: Callable[[np.ndarray], Noise], shape: tuple[int, ...]) -> np.ndarray:
-    """Standard error of each hour of each sensor [S, L] [lx] by `illuminance_noise`."""
+    """Standard error of each hour of each sensor [S, L] [lx] by `illuminance_with_noise`."""
     found = np.zeros(shape)
     for hour in range(shape[1]):
         weights = np.zeros(shape)

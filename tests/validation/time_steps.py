@@ -62,12 +62,35 @@ SLAB = (
     "cooling_c = 25\ncooling_w_m2 = 40\n"
 )
 WINDOWS = "[air.windows]\nshare = 0.1\nopen_above_c = 24\nclose_below_c = 22\n"
+# a second state: the outer pane tinted (electrochromic)
+SHADED = """
+[[system]]
+[[system.layers]]
+thickness = 0.006
+conductivity = 0.9
+solar = [0.08, 0.07, 0.07]
+gap = {{ width = 0.016, gas = {{ argon = 0.9, air = 0.1 }} }}
+[[system.layers]]
+thickness = 0.006
+conductivity = 0.9
+emissivity = [0.05, 0.84]
+solar = [0.60, 0.22, 0.17]
+[control]
+rule = "all"
+parts = [{{ rule = "irradiance", close_above = 100 }},
+         {{ rule = "{}", close_above_c = 23.5, open_below_c = 22.5 }}]
+"""
 CONTROLS = {
     "none": AIR,
     "set points": AIR + LOADS,
     "set points with limits": f"{AIR}{LOADS}heating_limit_w = 300\ncooling_limit_w = 400\n",
     "radiant heating": f"{AIR}{LOADS}heating_radiant = 0.6\n",
     "opened windows": AIR + WINDOWS + HEATED,
+    "hybrid ventilation": (f"{FAN}{WINDOWS}hybrid = true\nnight_share = 0.03\n{LOADS}"),
+    "opened windows, operative": f'{AIR}{WINDOWS}temperature = "operative"\n{HEATED}',
+    "shading, air": AIR + LOADS + SHADED.format("air temperature"),
+    "shading, operative": AIR + LOADS + SHADED.format("operative temperature"),
+    "shading and windows": AIR + WINDOWS + HEATED + SHADED.format("operative temperature"),
     "air by night": f"{AIR}night_ach = 3\nnight = [22, 6]\n{LOADS}",
     "heat recovery": FAN + LOADS,
     "heat recovery with bypass": f"{FAN}bypass_above_c = 23\n{HEATED}",

@@ -7,8 +7,8 @@ Rooms, loads and results are those of the public Modelica library IBPSA
 layers of the rooms S and L those of TEASER (`examplefiles/VDI6007_Room1.json`, `_Room3.json`).  The
 norm's model has one capacity for all inner and one for all outer walls: "two capacities" has these
 as layers, so that only the balance is compared; "layers" has the walls themselves.  Films and
-longwave exchange are the norm's constants.  Case 11 cools the inner walls alone, which no plant
-here does: it cools all faces.  The norm's tolerance is 0.1 K and 1 W besides the rounding.
+longwave exchange are the norm's constants.  The norm's tolerance is 0.1 K and 1 W besides the
+rounding.
 """
 
 from __future__ import annotations
@@ -184,7 +184,7 @@ def cases() -> dict[int, Case]:
         ),
         11: Case(
             replace(S, films=(2.7, 3.0)), radiant=machines,
-            loads=replace(limited, cooling_radiant=1.0),
+            loads=replace(limited, cooling_radiant=1.0, cooling_surface="inner"),
         ),
         12: replace(fifth, air_m3_h=np.where(used > 0, 50.0, 100.0)),
     }  # fmt: skip

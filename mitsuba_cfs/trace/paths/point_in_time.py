@@ -30,6 +30,7 @@ CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that pa
 # Shares of a room path's directions that aim at windows and near the sun; the rest follows the
 # cosine.  After a reflection they must be few: weights grow by 1 / rest each time, and their mean
 # square stays finite only where rest > reflectance^2
+MAX_DEPTH = 24
 NEAR = 1e-4  # of its distance, within which a path has met the point that it aims at
 TO_WINDOW, TO_SUN = (0.5, 0.2), (0.15, 0.05)  # (first, later)
 
@@ -323,7 +324,7 @@ def point_in_time(
     directions: ArrayLike,
     *,
     samples: int = 4096,
-    max_depth: int = 24,
+    max_depth: int = MAX_DEPTH,
     stopping: Stopping | None = None,
     seed: int = 0,
     progress: Progress = silent,

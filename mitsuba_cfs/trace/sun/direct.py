@@ -104,21 +104,30 @@ class SunDiscs:
             number += 1
         return total, alike
 
-    def light(self, key: mi.UInt32) -> list[NDArray[np.float32]]:
-        """Mean over each disc of cos(sensor) tau(sun) through each group [G][S * Q]."""
-        found = [part.copy() for part in self._whole]
-        step = LANES // EDGE_RAYS
+    def light(self, keys: mi.UInt32) -> list[NDArray[np.float32]]:
+        """Mean over each disc of cos(sensor) tau(sun) through each group [G][B, S * Q].
+
+        Args: keys: of the batches [B].
+        """
+        count = dr.width(keys)
+        found = [np.tile(part, (count, 1)) for part in self._whole]
+        step = max(LANES // EDGE_RAYS // count, 1)
         for start in range(0, len(self._crossed), step):
             crossed = self._crossed[start : start + step]
-            lane = dr.arange(mi.UInt32, len(crossed) * EDGE_RAYS)
-            row = lane // EDGE_RAYS
-            sensor, sun = self._pair(dr.gather(mi.UInt32, column(crossed, mi.UInt32), row))
+            lane = dr.arange(mi.UInt32, count * len(crossed) * EDGE_RAYS)
+            row, each = lane // EDGE_RAYS, dr.opaque(mi.UInt32, len(crossed))
+            batch = row // each
+            number = dr.gather(mi.UInt32, column(crossed, mi.UInt32), row - batch * each)
+            sensor, sun = self._pair(number)
             centre = dr.gather(mi.Vector3f, self._around.towards, sun)
             # the sensor's alone: an hour's light does not depend on those computed with it
-            stream = mi.sample_tea_32(sensor, key)[0]
+            stream = mi.sample_tea_32(sensor, dr.gather(mi.UInt32, keys, batch))[0]
             way = disc_direction(centre, _spiral(lane - row * EDGE_RAYS, EDGE_RAYS, stream))
-            for part, values in zip(found, self._rays(sensor, way)[0], strict=True):
-                part[crossed] = values.numpy().reshape(-1, EDGE_RAYS).mean(axis=1)
+            passed = self._rays(sensor, way)[0]
+            dr.eval(passed)
+            for part, values in zip(found, passed, strict=True):
+                rays = values.numpy().reshape(count, -1, EDGE_RAYS)
+                part[:, crossed] = rays.mean(axis=2)
         return found
 
     def _pair(self, number: mi.UInt32) -> tuple[mi.UInt32, mi.UInt32]:
@@ -204,12 +213,16 @@ def _spiral(number: mi.UInt32, count: int, stream: mi.UInt32) -> mi.Point2f:
 
 @dataclass(frozen=True)
 class _Points:
-    """Points on the windows of one group, the same for all sensors and suns of a batch."""
+    """Points on the windows of one group, the same for all sensors and suns of a batch.
+
+    Axis J of those of batch 0, 1, ...
+    """
 
     position: mi.Point3f  # [J]
-    weight: mi.Float  # [S * J] G V area / J; 0 where hidden
+    weight: mi.Float  # [S * J] G V area / those of a batch; 0 where hidden
     outward: mi.Vector3f  # [S * J] local direction from the sensor through the point
     sunlit: mi.Float  # [J * Q] share of the sun that reaches the point
+    batches: int
 
 
 def direct_sun_matrix(
@@ -269,22 +282,31 @@ def direct_sun_matrix(
     def discs() -> list[SunDiscs]:
         return [SunDiscs(around, scattering, seed) for around in ways]
 
-    def batch(number: int) -> NDArray[np.float64]:
-        key = batch_key(seed, number)
-        found = [np.zeros(len(points) * len(suns), dtype=np.float32) for _ in groups]
+    stopping = stopping or Stopping()
+    pairs_of_batch = max(len(points) * len(suns), window_points * len(suns), 1)
+    ready: dict[int, NDArray[np.float64]] = {}
+
+    def launched(first: int, count: int) -> NDArray[np.float64]:
+        """Batches from number `first` on [B, G, S, Q]."""
+        keys = column([batch_key(seed, first + i)[0] for i in range(count)], mi.UInt32)
+        found = [np.zeros((count, len(points) * len(suns)), dtype=np.float32) for _ in groups]
         for around, straight in zip(ways, discs(), strict=True):
-            found = [a + b for a, b in zip(found, straight.light(key), strict=True)]
+            found = [a + b for a, b in zip(found, straight.light(keys), strict=True)]
             for g, system in enumerate(scattering):
                 if system is None:
                     continue
-                shared = _window_points(around, g, window_points, key)
+                shared = _window_points(around, g, window_points, keys)
                 rest = _scattered(inside, g, system, shared, around.towards, len(points))
-                found[g] = found[g] + rest.numpy()
-        if not by_group:
-            found = [sum(found)]
-        values = np.stack(found).astype(float) * SUN_SOLID_ANGLE
-        values = values.reshape(len(found), len(points), len(suns))
-        return values if by_group else values[0]
+                found[g] = found[g] + rest.numpy().reshape(count, -1)
+        values = np.stack(found, axis=1).astype(float) * SUN_SOLID_ANGLE
+        return values.reshape(count, len(found), len(points), len(suns))
+
+    def batch(number: int) -> NDArray[np.float64]:
+        if number not in ready:
+            together = max(1, min(stopping.ahead(number), LANES // pairs_of_batch))
+            ready.update(enumerate(launched(number, together), number))
+        values = ready.pop(number)
+        return values if by_group else values.sum(axis=0)
 
     keys = [None if system is None else system.key for system in scattering]
     return accumulate(
@@ -299,16 +321,23 @@ def direct_sun_matrix(
     )  # fmt: skip
 
 
-def _window_points(around: SunScene, group: int, count: int, key: mi.UInt32) -> _Points:
-    """Points on a group, their weights at each sensor, and the share of each sun at them."""
+def _window_points(around: SunScene, group: int, count: int, keys: mi.UInt32) -> _Points:
+    """Points on a group, their weights at each sensor, and the share of each sun at them.
+
+    Args: count: of each batch; keys: of the batches.
+    """
     inside, place, towards = around.inside, around.place, around.towards
-    j = dr.arange(mi.UInt32, count)
+    total, each = count * dr.width(keys), dr.opaque(mi.UInt32, count)
+    j = dr.arange(mi.UInt32, total)
+    batch = j // each
+    number, key = j - batch * each, dr.gather(mi.UInt32, keys, batch)
     stream = mi.sample_tea_32(opaque(group, mi.UInt32), key)[0]
-    position = inside.sample_group(group, lattice_2d(j, stream, 0))
+    position = inside.sample_group(group, lattice_2d(number, stream, 0))
     share = opaque(inside.groups[group].area / count)  # of the area, of each point
+    dr.eval(position, number, stream)
 
     S, Q = dr.width(place), dr.width(towards)
-    sensor, point = pairs(S, count)
+    sensor, point = pairs(S, total)
     start = dr.gather(mi.Point3f, place, sensor)
     to_point = dr.gather(mi.Point3f, position, point) - start
     distance2 = dr.squared_norm(to_point)
@@ -321,13 +350,15 @@ def _window_points(around: SunScene, group: int, count: int, key: mi.UInt32) -> 
     seen &= ~inside.scene.ray_test(shadow, coherent=False, active=seen)
     weight = dr.select(seen, cosine * outward.z / distance2 * share, 0.0)
 
-    point, sun = pairs(count, Q)
+    point, sun = pairs(total, Q)
+    drawn, of_batch = (dr.gather(mi.UInt32, one, point) for one in (number, stream))
     ray = mi.Ray3f(
         dr.gather(mi.Point3f, position, point),
-        on_disc(dr.gather(mi.Vector3f, towards, sun), point, stream),
+        on_disc(dr.gather(mi.Vector3f, towards, sun), drawn, of_batch),
     )
     before = dr.dot(ray.d, inside.exterior_normal(group)) > 0
-    result = _Points(position, weight, outward, around.way.transmittance(ray, before))
+    sunlit = around.way.transmittance(ray, before)
+    result = _Points(position, weight, outward, sunlit, dr.width(keys))
     dr.eval(result.position, result.weight, result.outward, result.sunlit)
     return result
 
@@ -341,20 +372,23 @@ def _scattered(
     towards: mi.Vector3f,
     sensors: int,
 ) -> mi.Float:
-    """Sum over the points of f cos(sun) G, for each sensor and sun [S * Q]."""
-    count = dr.opaque(mi.UInt32, dr.width(points.position))
-    suns = dr.opaque(mi.UInt32, dr.width(towards))
-    sensor, sun = pairs(sensors, dr.width(towards))
+    """Sum over the points of f cos(sun) G, for each batch, sensor and sun [B * S * Q]."""
+    total_points, batches = dr.width(points.position), points.batches
+    count = dr.opaque(mi.UInt32, total_points // batches)
+    every, suns = dr.opaque(mi.UInt32, total_points), dr.opaque(mi.UInt32, dr.width(towards))
+    row, sun = pairs(batches * sensors, dr.width(towards))
+    batch = row // dr.opaque(mi.UInt32, sensors)
+    sensor = row - batch * dr.opaque(mi.UInt32, sensors)
     to_sun = dr.gather(mi.Vector3f, towards, sun)
     local = inside.to_local(opaque(group, mi.Int32), to_sun, mi.Bool(True))
     weights, outwards, sunlit = points.weight, points.outward, points.sunlit
-    j = mi.UInt32(0)
+    j, end = batch * count, (batch + 1) * count
     total = mi.Float(0)
-    while (j < count) & (local.z > 0):
+    while (j < end) & (local.z > 0):
         lit = dr.gather(mi.Float, sunlit, j * suns + sun)
-        weight = lit * dr.gather(mi.Float, weights, sensor * count + j)
+        weight = lit * dr.gather(mi.Float, weights, sensor * every + j)
         if weight > 0:
-            outward = dr.gather(mi.Vector3f, outwards, sensor * count + j)
+            outward = dr.gather(mi.Vector3f, outwards, sensor * every + j)
             total += weight * scattering.scattered(local, outward)
         j += 1
     return total * dr.maximum(local.z, 0)

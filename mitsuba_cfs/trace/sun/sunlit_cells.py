@@ -155,7 +155,7 @@ class Beam:
     group: int
     scattering: Scattering
     points: int = POINTS  # on the group, for hours whose sun does not reach all of them
-    seed: int = 0
+    seeds: tuple[int, ...] = (0,)  # of batches B, each with its own points
 
     @property
     def fewer(self) -> int:
@@ -163,55 +163,62 @@ class Beam:
         return max(self.points // EDGE_SHARE, 1)
 
     def flux(self, cells: RoomCells, suns: NDArray[np.float64]) -> sparse.csr_array:
-        """Luminous flux on the cells [c, h], per unit illuminance normal to the sun [m2].
+        """Luminous flux on the cells [c, B * h], per unit illuminance normal to the sun [m2].
 
         Args: suns: [h, 3] directions.
         """
-        step = max(RAYS // self.fewer, 1)
-        blocks = [self._flux(cells, suns[i : i + step]) for i in range(0, len(suns), step)]
+        step, columns = max(RAYS // self.fewer, 1), np.arange(len(self.seeds) * len(suns))
+        blocks = [
+            self._flux(cells, suns, columns[i : i + step]) for i in range(0, len(columns), step)
+        ]
         return sparse.csr_array(sparse.hstack([sparse.csr_array((cells.size, 0)), *blocks]))
 
-    def _flux(self, cells: RoomCells, suns: NDArray[np.float64]) -> sparse.csr_array:
-        found = sparse.csr_array((cells.size, len(suns)))
+    def _flux(
+        self, cells: RoomCells, suns: NDArray[np.float64], columns: NDArray[np.int64]
+    ) -> sparse.csr_array:
+        """Some columns [n] of the flux."""
+        found = sparse.csr_array((cells.size, len(columns)))
         if not cells.size:
             return found
         for by in specular_sun_paths(self.scenes[1]):
             before = by.apparent(suns) @ self.scenes[0].groups[self.group].frame[2] > -SPREAD
-            hours = np.flatnonzero(before)
-            if not len(hours):
+            some = np.flatnonzero(before[columns % len(suns)])
+            if not len(some):
                 continue
-            value, position, to_sun = self._entering(by, suns[hours], self.fewer)
+            value, position, to_sun = self._entering(by, suns, columns[some], self.fewer)
             lit = value > 0
             crossed = lit.any(axis=1) & ~lit.all(axis=1)
             value[crossed] = 0
-            found = found + self._landed(cells, value, position, to_sun, hours, len(suns))
-            hours = hours[crossed]
+            found = found + self._landed(cells, value, position, to_sun, some, len(columns))
+            some = some[crossed]
             step = max(RAYS // self.points, 1)
-            for start in range(0, len(hours), step):
-                some = hours[start : start + step]
-                rays = self._entering(by, suns[some], self.points)
-                found = found + self._landed(cells, *rays, some, len(suns))
+            for start in range(0, len(some), step):
+                part = some[start : start + step]
+                rays = self._entering(by, suns, columns[part], self.points)
+                found = found + self._landed(cells, *rays, part, len(columns))
         return found
 
     def _entering(
-        self, by: SpecularPath, suns: NDArray[np.float64], points: int
+        self, by: SpecularPath, suns: NDArray[np.float64], columns: NDArray[np.int64], points: int
     ) -> tuple[NDArray[np.float32], mi.Point3f, mi.Vector3f]:
-        """Flux of rays through points of the windows [h, points], the points and ways out."""
+        """Flux of rays through points of the windows [n, points], the points and ways out."""
         inside = self.scenes[0]
-        lane = dr.arange(mi.UInt32, points * len(suns))
-        hour = lane // dr.opaque(mi.UInt32, points)
-        point = lane - hour * dr.opaque(mi.UInt32, points)
+        lane = dr.arange(mi.UInt32, points * len(columns))
+        row = lane // dr.opaque(mi.UInt32, points)
+        point = lane - row * dr.opaque(mi.UInt32, points)
         # the same points in all hours: an hour's light does not depend on those computed with it
-        key = dr.opaque(mi.UInt32, self.seed & 0xFFFFFFFF)
+        batch, hour = np.divmod(columns, len(suns))
+        keys = np.array([seed & 0xFFFFFFFF for seed in self.seeds], dtype=np.uint32)[batch]
+        key = dr.gather(mi.UInt32, column(keys, mi.UInt32), row)
         stream = mi.sample_tea_32(opaque(self.group, mi.UInt32), key)[0]
         position = inside.sample_group(self.group, lattice_2d(point, stream, 0))
-        to_sun = on_disc_of(dr.gather(mi.Vector3f, vectors(by.apparent(suns)), hour), point)
+        to_sun = on_disc_of(dr.gather(mi.Vector3f, vectors(by.apparent(suns)[hour]), row), point)
         local = inside.to_group(self.group, to_sun)
         start = mi.Point3f(position + inside.outward(opaque(self.group, mi.Int32), mi.Bool(True)))
         reaching = by.transmittance(mi.Ray3f(start, to_sun), local.z > 0)
         value = dr.select(local.z > 0, local.z * self.scattering.through(local) * reaching, 0.0)
         value *= opaque(inside.groups[self.group].area / points)
-        return value.numpy().reshape(len(suns), points), position, to_sun
+        return value.numpy().reshape(len(columns), points), position, to_sun
 
     def _landed(
         self,
@@ -219,10 +226,10 @@ class Beam:
         value: NDArray[np.float32],
         position: mi.Point3f,
         to_sun: mi.Vector3f,
-        hours: NDArray[np.int64],
+        columns: NDArray[np.int64],
         count: int,
     ) -> sparse.csr_array:
-        """Flux on the cells [c, count] by rays [n, points] of some of the hours [n]."""
+        """Flux on the cells [c, count] by rays [n, points] of some of the columns [n]."""
         inside, flat = self.scenes[0], value.ravel()
         off = inside.outward(opaque(self.group, mi.Int32), mi.Bool(True))
         origin, onwards = mi.Point3f(position - off), mi.Vector3f(-to_sun)
@@ -232,7 +239,7 @@ class Beam:
         cell = cells.of(*hit_faces(inside, origin, onwards, hit, lit), lit).numpy()
         kept = np.flatnonzero(cell >= 0)
         cell = cell[kept]
-        entries = flat[kept].astype(float), (cell, hours[kept // value.shape[1]])
+        entries = flat[kept].astype(float), (cell, columns[kept // value.shape[1]])
         return sparse.csr_array(sparse.coo_array(entries, shape=(cells.size, count)))
 
 

@@ -14,6 +14,7 @@ diffuse surfaces"; the cells' irradiance is a mean over each.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import drjit as dr
@@ -27,10 +28,9 @@ from mitsuba_cfs.trace.kernels.sampling import (
     lattice_2d,
     tables,
 )
-from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_faces
-from mitsuba_cfs.trace.sun.sunlit_cells import POINTS, RAYS, Beam, RoomCells, surface_cells
+from mitsuba_cfs.trace.sun.sunlit_cells import RAYS, Beam, RoomCells, surface_cells
 
 CELL_RAYS = 128  # from each cell, in each batch, at most
 CELL_LEAST = 32  # and at the least: fewer take as long
@@ -130,26 +130,20 @@ def _between(
 
 def room_light(
     cells: RoomCells,
-    share: NDArray[np.float64],
-    scenes: tuple[TracedScene, TracedScene],
-    group: int,
-    way: Scattering,
+    shares: Sequence[NDArray[np.float64]],
+    beam: Beam,
     suns: tuple[NDArray[np.float64], NDArray[np.float64]],
-    *,
-    points: int = POINTS,
-    seed: int = 0,
-) -> NDArray[np.float64]:
-    """Illuminance of sensors [S, h] by what the room reflects of a group's straight beam.
+) -> list[NDArray[np.float64]]:
+    """Illuminance of sensors by what the room reflects of a group's straight beam [B][S, h].
 
     Args:
-        share: [S, c] of `room_shares`.
-        scenes: the room, with its window groups, and the outdoors.
+        shares: [B][S, c] of `room_shares`, one for each seed of the beam.
         suns: [h, 3] directions, and [h] illuminance normal to them.
-        points: on the group, that the sun is followed from where it does not reach all of them.
     """
-    towards, strength = suns
-    beam = Beam(scenes, group, way, points, seed)
-    return (share @ beam.flux(cells, towards)) * strength
+    (towards, strength), count = suns, len(suns[0])
+    flux = beam.flux(cells, towards)
+    parts = (flux[:, b * count : (b + 1) * count] for b in range(len(beam.seeds)))
+    return [(share @ part) * strength for share, part in zip(shares, parts, strict=True)]
 
 
 def _reflected(

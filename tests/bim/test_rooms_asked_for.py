@@ -1,0 +1,59 @@
+"""A wrong name of a room is refused before geometry is read; a name that may be right is not."""
+
+from __future__ import annotations
+
+import pytest
+
+from bim.building_file import ReadOptions, named_spaces, read_building_file
+from mitsuba_cfs.errors import DataError
+from scenes.demo import OFFICE
+
+
+class _Read(Exception):
+    """The reader comes to the geometry."""
+
+
+@pytest.fixture
+def no_geometry(monkeypatch) -> None:
+    def begun(*_, **options) -> None:
+        raise _Read
+
+    monkeypatch.setattr("bim.ifc.source.read_shapes", begun)
+
+
+def asked_for(*rooms: str) -> None:
+    read_building_file(OFFICE, ReadOptions(rooms=rooms))
+
+
+@pytest.mark.parametrize("wrong", ["nowhere", "Southern", "", "AB"])
+@pytest.mark.usefixtures("no_geometry")
+def test_a_wrong_name_is_refused_before_geometry(wrong) -> None:
+    """The command took 18 s to say it of a building of 73 rooms."""
+    with pytest.raises(DataError, match="no space"):
+        asked_for("South office", wrong)
+
+
+@pytest.mark.parametrize(
+    "room",
+    ["A", "south  OFFICE", "20B6FKss9Pix5t4FsUrS_W", "A South office", "A + B", "office",
+     "20B6FKss9Pix5t4FsUrS_W-581"],
+)  # fmt: skip
+@pytest.mark.usefixtures("no_geometry")
+def test_a_name_like_one_of_the_file_is_decided_by_its_rooms(room) -> None:
+    with pytest.raises(_Read):
+        asked_for(room)
+
+
+@pytest.mark.usefixtures("no_geometry")
+def test_without_names_everything_is_read() -> None:
+    with pytest.raises(_Read):
+        asked_for()
+
+
+def test_the_message_is_that_of_the_rooms(no_geometry, monkeypatch) -> None:
+    with pytest.raises(DataError) as early:
+        asked_for("nowhere")
+    monkeypatch.undo()
+    with pytest.raises(DataError) as late:
+        named_spaces(read_building_file(OFFICE), ["nowhere"], OFFICE)
+    assert str(early.value) == str(late.value)
