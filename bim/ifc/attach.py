@@ -11,7 +11,7 @@ import ifcopenshell
 from bim.fenestration import ShadingState
 from bim.ifc.fenestration_write import attach_state, set_name
 from bim.ifc.project import open_ifc
-from bim.ifc.property_sets import Entity, new_guid, owner_of, save, take_off
+from bim.ifc.property_sets import Entity, new_guid, owner_of, read_again, save, take_off
 from bim.ifc.targets import Targets, target_elements
 
 REFERENCE = "BSDF"  # name of the document
@@ -38,9 +38,8 @@ def attach(
     if bsdf_reference is not None:
         location = os.path.relpath(bsdf_reference, Path(out).resolve().parent).replace(os.sep, "/")
     if _removed(model, elements, state, location):
-        # read anew, as what comes next then has the numbers of what was removed
         guids = [element.GlobalId for element in elements]
-        model = ifcopenshell.file.from_string(model.to_string())
+        model = read_again(model)
         elements = [model.by_guid(guid) for guid in guids]
     if state.holds_data:
         attach_state(model, elements, state)

@@ -115,6 +115,11 @@ DATA;
 """
 
 
+def read_again(model: ifcopenshell.file) -> ifcopenshell.file:
+    """The model as from its file: the next entities have the numbers of those removed last."""
+    return ifcopenshell.file.from_string(model.to_string())
+
+
 def save(model: ifcopenshell.file, out: str | Path) -> None:
     """Write the model; a file of that name is replaced only once the new one is whole."""
     # not `model.write`: on a full disk it says nothing, or not why, and leaves a file of its own
