@@ -179,19 +179,21 @@ class _Drawn:
         return label_of(self.name, self.long_name, self.guid)
 
 
-def check_rooms(model: ifcopenshell.file, rooms: Sequence[str], file: str | PathLike[str]) -> None:
-    """Refuse names of rooms that are like no name of a space or zone; no geometry is read.
+def check_rooms(
+    models: Sequence[ifcopenshell.file], rooms: Sequence[str], file: str | PathLike[str]
+) -> None:
+    """Refuse names of rooms that are like no name of a space or zone in the models of a building.
 
     A name that has words of one of these, or the reverse, may be that of rooms that are joined, cut
     or left out.
 
     Raises: `DataError`.
     """
-    spaces = instances(model, "IfcSpace")
+    spaces = [space for model in models for space in instances(model, "IfcSpace")]
     drawn = [_Drawn(s.GlobalId or "", s.Name or s.LongName or "", s.LongName or "") for s in spaces]
     if not rooms or not drawn:
         return
-    zones = [zone.name for zone in read_zones(model)]
+    zones = [zone.name for model in models for zone in read_zones(model)]
     names = {*zones, *(text for one in drawn for text in (one.guid, one.name, one.long_name))}
     for room in rooms:
         if any(has_words(room, name) or has_words(name, room) for name in names if name.strip()):

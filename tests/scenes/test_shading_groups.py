@@ -19,7 +19,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.light import eye_illuminance, illuminance, with_view
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from scenes.room.control_groups import control_groups
-from scenes.room.heat import heat_of
+from scenes.room.heat import heat_of, step_issues
 from scenes.room.inputs import RoomInputs, room_inputs, skies_for
 from scenes.room.light import room_light
 from scenes.room.operation import Operation, OperationHours, check_schedules
@@ -371,6 +371,24 @@ def test_coupled_rooms_whose_light_and_heat_have_other_states_say_so(
     (issue,) = others[0].issues  # its light is that of open blinds
     assert issue.code == "shading-by-coupled-temperature" and issue.values["hours"] > 100
     assert np.array_equal(alone[1].shading.states, others[1].shading.states)
+
+
+def test_shading_by_room_temperature_is_checked_by_half_the_step(
+    glass, blind, weather, skies, variant
+) -> None:
+    """The year of a room that stays open is not that which half the step gives."""
+    tables = OperationTables.model_validate({"control": WARM})
+    space = TWO.spaces[0]
+    room = room_inputs(
+        TWO, space, in_all_windows(space, glass, blind), weather, FEW, operation=tables, skies=skies
+    )
+    zone = operated_zone(room)
+    shaded = balances([zone], weather, 3600.0)
+    opened = balances([replace(zone, alternatives=None)], weather, 3600.0)
+    assert step_issues([zone], shaded, weather, 3600.0) == ((),)
+    ((issue,),) = step_issues([zone], opened, weather, 3600.0)
+    assert issue.code == "time-step-too-long"
+    assert step_issues([replace(zone, alternatives=None)], shaded, weather, 3600.0) == ((),)
 
 
 def chosen(zone: RoomZone, weather) -> np.ndarray:

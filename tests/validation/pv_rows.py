@@ -13,8 +13,10 @@ each place of the ground and of a module sees, and the ground that a module sees
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
@@ -180,12 +182,15 @@ def quadrature(case: tuple[float, float, float]) -> dict[str, float]:
     return found
 
 
-def main(epw: Path) -> dict[str, pd.DataFrame]:
+def main(
+    epw: Path, *, cases: Annotated[Sequence[str], tuple(CASES)] = tuple(CASES)
+) -> dict[str, pd.DataFrame]:
     """Irradiation of a year of front and back [kWh/m2], shaded shares; both under a uniform sky."""
     variants.activate()
     weather = replace(read_epw(epw), albedo=ALBEDO)
     table, sky = [], []
-    for name, case in CASES.items():
+    for name in cases:
+        case = CASES[name]
         mine, row = ours(case, weather), {"rows": name}
         by_model = {model: theirs(case, weather, model) for model in ("isotropic", "haydavies")}
         for side in ("front", "back"):
