@@ -51,6 +51,7 @@ class Filling:
     is_open: bool = False  # nothing fills it: a doorway between two rooms
     frame_hue: Colour = GREY
     beside: NDArray[np.float64] | None = None  # [K, 3, 3] of its host, near the opening
+    glass_area: float | None = None  # by the corrections, whatever is drawn [m2]
 
     @property
     def is_door(self) -> bool:
@@ -106,7 +107,9 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Issue]]:
         return None, [Issue("opening-without-area", filling.guid, values, Effect("window"))]
     if filling.opening is None and filling.ifc_class.startswith("IfcWindow"):
         issues.append(Issue("window-without-opening", filling.guid, {"element": filling.name}))
-    if len(clear):
+    if filling.glass_area is not None:
+        glass = _of_area(opening, filling.glass_area)
+    elif len(clear):
         glass, more = _drawn_glass(filling, clear, facing, plane, opening)
         issues += more
     elif filling.is_door:
@@ -137,7 +140,7 @@ def _framed_by(
     Args: boxes: low and high corner [2, 3] of what each of the apertures is drawn as.
     """
     one = apertures[number]
-    if one.filling.transparent.any() or one.glass.is_empty:
+    if one.filling.transparent.any() or one.glass.is_empty or one.filling.glass_area is not None:
         return None
     low, high = boxes[number]
     for place, other in enumerate(apertures):
@@ -274,6 +277,13 @@ def _assumed_glass(
         source = Phrase("default-frame", {"fraction": FRAME_FRACTION})
     values = {"element": filling.name, "source": source}
     return _polygonal(glass), [Issue("window-without-glass", filling.guid, values)]
+
+
+def _of_area(opening: shapely.Geometry, area: float) -> shapely.Geometry:
+    """The opening less a frame of one width all round; all of it where that is not the area."""
+    if area < SMALLEST_PANE:
+        return shapely.Polygon()
+    return _polygonal(inset_to_fraction(opening, area / opening.area))
 
 
 def _left_free(filling: Filling, plane: Plane, opening: shapely.Geometry) -> shapely.Geometry:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -41,6 +41,18 @@ def panes_between(building: Building, space: Space) -> dict[str, list[tuple[Face
             ):
                 found.setdefault(other.guid, []).append((face, back))
     return found
+
+
+def rooms_through_panes(building: Building, space: Space, among: Collection[str]) -> list[Space]:
+    """The rooms, of those with a GUID `among`, that glass or open doorways join to a room."""
+    rooms = {other.guid: other for other in building.spaces if other.guid in among}
+    reached, queue = {space.guid: space}, [space]
+    while queue:
+        for guid in panes_between(building, queue.pop(0)):
+            if guid in rooms and guid not in reached:
+                reached[guid] = rooms[guid]
+                queue.append(rooms[guid])
+    return [room for guid, room in reached.items() if guid != space.guid]
 
 
 def wall_depth(face: Face, back: Face) -> float:

@@ -19,7 +19,6 @@ from bim.planes import Plane, merged_polygons, plane_through, polygons_of
 SAME_PLANE = 2e-3  # glass this near the plane of a face lies in it [m]
 WIDER = 1.001  # of a face that is made for a window, in size
 SLIVER = 1.5e-3  # narrower polygons are left out [m]
-LEAST_AREA = 1e-3  # smaller polygons are left out [m2]: honeybee's tolerance, in metres
 RIM = 1e-4  # width of a face around a pane that shares its outline [m]
 INSIDE = 0.01  # share of the glass' border that a face it lies in has to share
 
@@ -44,7 +43,7 @@ def hosted_polygons(space: Space) -> list[HostedPolygon]:
         (face, plane, polygon)
         for face in space.faces
         for plane, polygon in _polygons(face.triangles)
-        if polygon.area > LEAST_AREA and not polygon.buffer(-SLIVER / 2).is_empty
+        if not polygon.buffer(-SLIVER / 2).is_empty
     ]
     panes: list[list[tuple[Window, shapely.Polygon]]] = [[] for _ in parts]
     extra = []

@@ -22,6 +22,7 @@ ALONG = 0.9  # cosine: a face turned by more from a window may only touch its ed
 SMALLEST_SHARE = 0.05  # of the opening: a smaller part before a room is drawing noise
 FLUSH = 0.005  # recesses shallower than this are none [m]
 OVERLAP = 0.001  # the recess enters the room this far, so that the union leaves no slit [m]
+ENDS = ("low", "high")  # corners of a room's box
 SLIT = 1e-5  # halves of a region nearer than this are one: ten times what solids weld [m]
 THIN = 0.002  # pieces thinner than this are not cut off [m]
 
@@ -93,6 +94,11 @@ def project(polygon: shapely.Geometry, source: Plane, target: Plane) -> shapely.
 
 def attachments_of(aperture: Aperture, rooms: Sequence[RoomSolid]) -> list[Attachment]:
     """The rooms on either side of an aperture and the part of it that each has."""
+    outline = aperture.plane.to_world(shapely.get_coordinates(aperture.opening))
+    lows, highs = (np.array([getattr(r, end) for r in rooms]).reshape(-1, 3) for end in ENDS)
+    near = np.all(lows <= outline.max(axis=0) + REACH, axis=1)
+    near &= np.all(highs >= outline.min(axis=0) - REACH, axis=1)
+    rooms = [rooms[i] for i in np.flatnonzero(near)]
     sides = [_one_side(side, rooms) for side in (aperture, aperture.turned)]
     found: list[Attachment] = []
     for here, there in (sides, sides[::-1]):
@@ -111,12 +117,8 @@ def attachments_of(aperture: Aperture, rooms: Sequence[RoomSolid]) -> list[Attac
 
 def _one_side(aperture: Aperture, rooms: Sequence[RoomSolid]) -> list[Attachment]:
     """Attachments of the rooms behind an aperture whose normal points away from them."""
-    outline = aperture.plane.to_world(shapely.get_coordinates(aperture.opening))
-    low, high = outline.min(axis=0) - REACH, outline.max(axis=0) + REACH
     found: list[tuple[float, float, str, shapely.Geometry]] = []
     for room in rooms:
-        if np.any(room.low > high) or np.any(room.high < low):
-            continue
         for facet in room.facets:
             if facet.plane.normal @ aperture.plane.normal < FACING:
                 continue

@@ -24,6 +24,9 @@ class Surfaces:
     surface: NDArray[np.int64]  # [N] index of the surface (axis F) that each triangle belongs to
     names: tuple[str, ...] = ()  # [F] name of each surface
     gloss: tuple[Gloss | None, ...] = ()  # [F] of each surface; none of any where empty
+    # [F] of panes: transmittance at even steps of the cosine of incidence, 0 to 1, for rays along
+    # the normal of their triangles; against it they are passed freely. Opaque: None
+    transmittance: tuple[tuple[float, ...] | None, ...] = ()
 
     def __post_init__(self) -> None:
         for name, kind in (("triangles", float), ("reflectance", float), ("surface", None)):

@@ -12,7 +12,11 @@ from bim.model import Construction, MaterialLayer
 from bim.polygon_rooms import GlazingValues, SurfaceFinish
 from bim.report.issue import Issue
 
-PARTS = ("Glaze", "Gap", "Frame", "Blind", "Shade", "ShadingCoeff")  # of a window type: not read
+# of a window type or an opening: not read
+PARTS = (
+    "Glaze", "Gap", "Frame", "Blind", "Shade", "ShadeControl", "ShadingCoeff", "Reflectance",
+    "Emittance", "GlazeConductivity",
+)  # fmt: skip
 SHADES = ("interiorShadeType", "exteriorShadeType")  # attributes of an opening, not read
 
 
@@ -111,13 +115,16 @@ class Constructions:
         known = self._by_id["WindowType"].get(name)
         if known is None:
             known = self._by_id["Construction"].get(name)
-        if known is None:
-            if name:
-                self._missing("windowTypeIdRef", f"no WindowType {name!r:.60}", guid)
-            return GlazingValues(name=name)
+        if known is None and name:
+            self._missing("windowTypeIdRef", f"no WindowType {name!r:.60}", guid)
         if name not in self._windows:
-            self._windows[name] = self._values(known)
-        return self._windows[name]
+            values = GlazingValues(name=name) if known is None else self._values(known)
+            self._windows[name] = values
+        of_type, own = self._windows[name], self._values(opening)  # the opening's own go first
+        stated = {
+            field: getattr(own, field) for field in ("u_value", "g_value", "visible", "solar")
+        }
+        return replace(of_type, **{field: v for field, v in stated.items() if v is not None})
 
     def _values(self, known: ElementTree.Element) -> GlazingValues:
         """What a window type states; where its U and g are both nought, it states nothing."""

@@ -7,7 +7,7 @@ Open doorways are air boundaries: the way through the wall belongs to the first 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from mitsuba_cfs.files import json_text, write_text
 
 TYPES = {"floor": "Floor", "ceiling": "RoofCeiling", "roof": "RoofCeiling"}
 LEAST_CAPACITY = 100.0  # [J/(kg K)] that honeybee takes
+TOLERANCE = 1e-3  # of the model [m], where no face is smaller than that [m2]
 GLASS_INDEX = 1.52  # refractive index of a pane
 
 
@@ -51,12 +52,17 @@ def write_honeybee(
     guids = {space.guid: names.of(space.label) for space in building.spaces}
     building, sides = touching(building)
     air = _air_boundaries(building, sides, guids, names)
-    rooms = [_room(space, guids, names, library, air=air) for space in building.spaces]
+    parts = {space.guid: hosted_polygons(space) for space in building.spaces}
+    rooms = [
+        _room(space, parts[space.guid], guids, names, library=library, air=air)
+        for space in building.spaces
+    ]
     windows = {window.guid for window in building.windows}
     meshes = [_mesh(e, names, library) for e in building.elements if e.guid not in windows]
     model = {
         "type": "Model", "identifier": names.of(building.name or "building"),
-        "display_name": building.name, "units": "Meters", "tolerance": 0.001,
+        "display_name": building.name, "units": "Meters",
+        "tolerance": _tolerance([one.polygon.area for some in parts.values() for one in some]),
         "angle_tolerance": 1.0, "rooms": rooms, "shade_meshes": meshes,
         "properties": {"type": "ModelProperties", "energy": library.energy(),
                        "radiance": library.radiance()},
@@ -218,17 +224,23 @@ def _air_boundaries(
     }  # fmt: skip
 
 
+def _tolerance(areas: Sequence[float]) -> float:
+    """Tolerance of the model [m]: a smaller area [m2] is no face for honeybee."""
+    return min(TOLERANCE, 10.0 ** np.floor(np.log10(min(areas, default=1.0))))
+
+
 def _room(
     space: Space,
+    parts: Sequence[HostedPolygon],
     guids: Mapping[str, str],
     names: _Names,
-    library: _Library,
     *,
+    library: _Library,
     air: Mapping[Key, dict],
 ) -> dict:
     own = guids[space.guid]
     faces = []
-    for part in hosted_polygons(space):
+    for part in parts:
         if part.face is None:
             faces.append(_own_face(part, own, names, library))
             continue

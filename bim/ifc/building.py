@@ -155,6 +155,7 @@ def _rooms(
     records, issues = read_spaces(
         source.model, source.shapes, source.quantity_scales(), source.damage, stated=stated,
         removed=source.corrections.removed(source.model),
+        names=source.corrections.named(source.model),
     )  # fmt: skip
     records, repeated, more = one_of_each(source.model, records)
     issues += more

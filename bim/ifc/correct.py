@@ -1,6 +1,7 @@
 """The corrections of a model written into the model itself, so that other programs have them too.
 
-What IFC expresses is written: north, outdoor spaces, properties of materials, elements left out.
+What IFC expresses is written: north, outdoor spaces, names, properties of materials, elements left
+out.
 The other entries stay corrections, in a file beside the new model: both together are read as the
 old model with its corrections.
 """
@@ -73,7 +74,7 @@ def correct(path: str | PathLike[str], out: str | PathLike[str]) -> Corrected:
     model = open_ifc(path)
     check_materials(model, corrections)
     # every selector chooses from the model as it was
-    removed = corrections.removed(model)
+    removed, names = corrections.removed(model), corrections.named(model)
     outdoors = {key for key, value in corrections.stated_outdoors(model).items() if value}
     paints = corrections.painted(model)
     values, are_written = _thermal_values(model, corrections.materials)
@@ -97,6 +98,14 @@ def correct(path: str | PathLike[str], out: str | PathLike[str]) -> Corrected:
         elif written:
             rest.pop(key, None)
     rest = {key: value for key, value in rest.items() if value != []}
+    # other entries may choose spaces by the names that they have now
+    by_name = any("name" in str(value).lower() for key, value in rest.items() if key != "room")
+    if "room" in rest and not by_name:
+        rest.pop("room")
+        for step_id, one in names.items():
+            space: Any = model.by_id(step_id)
+            space.Name = space.Name if one.name is None else one.name
+            space.LongName = space.LongName if one.long_name is None else one.long_name
     _remove(model, removed)
     save(model, Path(out))
     if rest:

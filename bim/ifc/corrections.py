@@ -27,6 +27,15 @@
     density = 40                # kg/m3; as the file or the table of materials, if left out
     heat_capacity = 1400        # J/(kg K); likewise
 
+    [[room]]
+    select = 'IfcSpace, Name="3"'
+    name = "1.03"               # number or short name; the file's, if left out
+    long_name = "Kitchen"       # likewise
+
+    [[glass]]
+    select = 'IfcWindow, Name="W1"'   # windows, doors, and openings that nothing fills
+    area = 1.8                  # m2 of glass in each; 0: none
+
 Selectors choose by GUID, class, name, type, material, storey (location), property and more:
 https://docs.ifcopenshell.org/ifcopenshell-python/selector_syntax.html; and by CAD layer, which is
 ours: 'IfcWall, layer="A-WALL"'.
@@ -53,7 +62,7 @@ if TYPE_CHECKING:
 LAYER = re.compile(r'(?:^|,)\s*layer\s*=\s*("[^"]*"|[^,+]+)')  # CAD layer: ours, not ifcopenshell's
 KEYS = ("leave_out", "only", "opaque", "keep", "join", "surroundings", "reflectance", "north",
         "outdoors", "indoors", "material", "close_gaps",
-        "as_drawn")  # fmt: skip
+        "as_drawn", "room", "glass")  # fmt: skip
 OPEN = "open"  # asks for the rooms that are open to each other by more than a door
 PAINT_KEYS = ("select", "visible", "solar", "specular", "roughness")
 MATERIAL_KEYS = {  # of [[material]]: lowest and highest value
@@ -75,6 +84,15 @@ class Paint:
 
 
 @dataclass(frozen=True, slots=True)
+class RoomName:
+    """Names of the spaces that a selector chooses; None: as in the file."""
+
+    select: str
+    name: str | None
+    long_name: str | None
+
+
+@dataclass(frozen=True, slots=True)
 class Corrections:
     """What to leave out of a model and what to repaint."""
 
@@ -93,6 +111,8 @@ class Corrections:
     materials: tuple[MaterialCorrection, ...] = ()  # the first that matches counts
     as_drawn: tuple[str, ...] = ()  # spaces that are neither cut nor raised
     close_gaps: float | None = None  # between elements, where rooms are searched [m]
+    room_names: tuple[RoomName, ...] = ()
+    glass: tuple[tuple[str, float], ...] = ()  # selectors and area of glass [m2]
 
     def removed(self, model: ifcopenshell.file) -> set[int]:
         """STEP ids of the products that are not to be read."""
@@ -126,6 +146,22 @@ class Corrections:
     def heights_as_drawn(self, model: ifcopenshell.file) -> set[int]:
         """STEP ids of the spaces whose drawn height holds."""
         return set().union(*(chosen(model, query, self.file) for query in self.as_drawn))
+
+    def named(self, model: ifcopenshell.file) -> dict[int, RoomName]:
+        """The names of spaces, by STEP id; later entries win."""
+        return {
+            step_id: one
+            for one in self.room_names
+            for step_id in chosen(model, one.select, self.file)
+        }
+
+    def glass_areas(self, model: ifcopenshell.file) -> dict[str, float]:
+        """Area of glass [m2] of windows, doors and openings, by GUID; later entries win."""
+        return {
+            model.by_id(step_id).GlobalId: area
+            for select, area in self.glass
+            for step_id in chosen(model, select, self.file)
+        }
 
     def painted(self, model: ifcopenshell.file) -> dict[int, Paint]:
         """The paint by STEP id; later entries win."""
@@ -211,6 +247,8 @@ def read_corrections(path: str | PathLike[str]) -> Corrections:
         close_gaps=(
             None if "close_gaps" not in table else _share(table["close_gaps"], path, "close_gaps")
         ),
+        room_names=tuple(_room_name(entry, path) for entry in _tables(table, "room", path)),
+        glass=tuple(_glass(entry, path) for entry in _tables(table, "glass", path)),
     )  # fmt: skip
 
 
@@ -229,6 +267,31 @@ def _north(table: dict[str, Any], path: Path) -> float | None:
         message = f"expected degrees from -360 to 360, got {value!r}"
         raise DataError(message, file=path, field="north")
     return float(value)
+
+
+def _room_name(entry: dict[str, Any], path: Path) -> RoomName:
+    select = _selector(entry, path, "room")
+    _check_keys(entry, ("select", "name", "long_name"), path, "room.")
+    texts = {key: value for key, value in entry.items() if key != "select"}
+    if not texts or not all(isinstance(value, str) and value.strip() for value in texts.values()):
+        raise DataError("expected name = '...', long_name = '...'", file=path, field="room")
+    return RoomName(select, texts.get("name"), texts.get("long_name"))
+
+
+def _glass(entry: dict[str, Any], path: Path) -> tuple[str, float]:
+    select = _selector(entry, path, "glass")
+    _check_keys(entry, ("select", "area"), path, "glass.")
+    area = entry.get("area")
+    if isinstance(area, bool) or not isinstance(area, int | float) or not 0 <= area <= 1e4:
+        message = f"expected square metres from 0 to 10000, got {area!r}"
+        raise DataError(message, file=path, field="glass.area")
+    return select, float(area)
+
+
+def _selector(entry: object, path: Path, key: str) -> str:
+    if not isinstance(entry, dict) or not isinstance(entry.get("select"), str):
+        raise DataError("expected select = '...'", file=path, field=key)
+    return str(entry["select"])
 
 
 def _material(entry: dict[str, Any], path: Path) -> MaterialCorrection:
@@ -259,8 +322,7 @@ def _check_keys(table: dict[str, Any], known: Sequence[str], path: Path, prefix:
 
 
 def _paint(entry: dict[str, Any], path: Path) -> Paint:
-    if not isinstance(entry, dict) or not isinstance(entry.get("select"), str):
-        raise DataError("expected select = '...'", file=path, field="reflectance")
+    select = _selector(entry, path, "reflectance")
     _check_keys(entry, PAINT_KEYS, path, "reflectance.")
     if "visible" not in entry:
         raise DataError("expected visible = 0 to 1", file=path, field="reflectance")
@@ -275,9 +337,7 @@ def _paint(entry: dict[str, Any], path: Path) -> Paint:
     if max(visible, solar) + specular > 1:
         message = "expected at most 1 together with visible and with solar"
         raise DataError(message, file=path, field="specular")
-    return Paint(
-        entry["select"], visible, solar, lacquer(specular, roughness) if specular else None
-    )
+    return Paint(select, visible, solar, lacquer(specular, roughness) if specular else None)
 
 
 def _share(value: object, path: Path, field: str) -> float:

@@ -19,6 +19,7 @@ LISTS = {  # key of the corrections: what an entry does, codes of the doubts tha
     "leave_out": ("leave this element out", ("element-drawn-twice",)),
 }
 NORTH = ("true-north-missing", "true-north-invalid", "true-north-from-map", "north-contradicts-map")
+GLASS = ("window-without-glass", "opening-glazed", "glass-clipped", "glass-in-several-planes")
 MATERIALS = ("material-unknown", "material-incomplete", "material-impossible")
 
 
@@ -49,6 +50,15 @@ def corrections_draft(building: Building) -> str:
     if leaks:
         widest = max(float(str(one.values["width"])) for one in leaks)
         lines += ["", *_words(leaks), f"# close_gaps = {min(1.0, widest + 0.1):.1f}"]
+    lines += ["", "# Names of spaces; default: those of the file."]
+    for space in building.spaces:
+        lines += ["# [[room]]", f"# select = {_text(space.guid)}  # {space.volume:.1f} m3"]
+        lines += [f"# name = {_text(space.name)}"]
+        lines += [f"# long_name = {_text(space.long_name)}"] if space.long_name else []
+    for one in (one for one in issues if one.code in GLASS):
+        area = sum(w.area for w in building.windows if w.guid == one.where)
+        lines += ["", f"# {_line(one)}", "# [[glass]]", f"# select = {_text(one.where)}"]
+        lines += [f"# area = {area:.2f}  # m2"]
     seen = {"unnamed"}  # no material at all
     for one in (one for one in issues if one.code in MATERIALS):
         name = str(one.values["material"])

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import astuple
+from functools import cached_property
 from itertools import pairwise
 
 import ifcopenshell
@@ -81,15 +82,21 @@ class _Writer:
 
     def __init__(self, model: ifcopenshell.file) -> None:
         self._model = model
-        self._radian = self.create("IfcSIUnit", None, "PLANEANGLEUNIT", None, "RADIAN")
-        self._metre = self.create("IfcSIUnit", None, "LENGTHUNIT", None, "METRE")
-        self._nanometre = self.create("IfcSIUnit", None, "LENGTHUNIT", "NANO", "METRE")
 
-    def create(self, name: str, *values) -> Entity:
-        if name == "IfcSIUnit":
-            _, kind, prefix, unit = values
-            return self._model.create_entity(name, UnitType=kind, Prefix=prefix, Name=unit)
-        return self._model.create_entity(name, *values)
+    @cached_property
+    def _radian(self) -> Entity:
+        return self._unit("PLANEANGLEUNIT", None, "RADIAN")
+
+    @cached_property
+    def _metre(self) -> Entity:
+        return self._unit("LENGTHUNIT", None, "METRE")
+
+    @cached_property
+    def _nanometre(self) -> Entity:
+        return self._unit("LENGTHUNIT", "NANO", "METRE")
+
+    def _unit(self, kind: str, prefix: str | None, name: str) -> Entity:
+        return self._model.create_entity("IfcSIUnit", UnitType=kind, Prefix=prefix, Name=name)
 
     def single(self, name: str, measure: str, value: float, unit: Entity | None = None) -> Entity:
         number = self._model.create_entity(measure, float(value))

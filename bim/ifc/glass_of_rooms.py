@@ -11,8 +11,8 @@ temperature of its own, so none stays open.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -31,11 +31,13 @@ from bim.planes import plane_through, polygons_of, triangulated
 from bim.rays import RayMesh
 from bim.report.issue import Effect, Issue, Phrase
 from bim.rooms import Attachment, attachments_of
+from mitsuba_cfs.errors import DataError
 
 SMALLEST_OPENING = 0.1  # smaller ones are for ducts [m2]
 DOOR_SILL, DOOR_WIDTH = 0.3, 1.3  # an opening to the floor up to this width is a door [m]
 ASIDE = 0.5  # points asked on both sides of glass lie this far from it [m]
 CLEAR_WAY = 1.0  # an opening goes through where nothing stands in it this far to both sides [m]
+LEAST_MORE = 1e-3  # stated glass exceeds its opening by more than this [m2]
 LEAST_LOST = 0.01  # share of a pane whose loss is reported
 TALLEST_GAP = 30.0  # between the top of a room and glass above it [m]
 DOOR_NAME = re.compile(r"\b(tur|tuer|door|porte?|deur|puerta|porta|ajto|drzwi|dvere|ovi)", re.I)
@@ -78,8 +80,9 @@ def apertures_in(source: Source) -> tuple[list[Aperture], list[Issue]]:
     """The windows, doors and glazed panels of a file, each in its plane."""
     fillings, issues = read_fillings(source.model, source.shapes, source.damage)
     apertures = []
+    areas = source.corrections.glass_areas(source.model)
     for filling in fillings:
-        aperture, more = aperture_of(filling)
+        aperture, more = _corrected(filling, areas, source.corrections.file)
         issues += more
         apertures += [] if aperture is None else [aperture]
     kept = []
@@ -92,6 +95,22 @@ def apertures_in(source: Source) -> tuple[list[Aperture], list[Issue]]:
         values = {"element": label, "other": other.filling.name}
         issues.append(Issue("frame-of-window", filling.guid, values))
     return kept, issues
+
+
+def _corrected(
+    filling: Filling, areas: Mapping[str, float], file: str
+) -> tuple[Aperture | None, list[Issue]]:
+    """The filling in its plane, with the area of glass [m2] by GUID that the corrections state.
+
+    Raises: `DataError` for an area larger than the opening.
+    """
+    area = areas.get(filling.guid)
+    aperture, issues = aperture_of(replace(filling, glass_area=area))
+    if aperture is not None and area is not None and area > aperture.opening.area + LEAST_MORE:
+        message = f"{area:g} m2 is more than the opening of {aperture.opening.area:.3g} m2"
+        label = f"{filling.ifc_class} {filling.name}"
+        raise DataError(message, file=file, element=label, field="glass.area")
+    return aperture, issues
 
 
 def glass_of_rooms(
@@ -183,7 +202,7 @@ def _account(
         if inside is not None:
             out += rest
             low = _room_below(inside, records, building)
-    assumed = not filling.transparent.any()
+    assumed = not filling.transparent.any() and filling.glass_area is None
     z = aperture.plane.to_world(shapely.get_coordinates(aperture.glass))[:, 2]
     heights = float(z.min()), float(z.max())
     return GlassAccount(filling.guid, storey, out, used, assumed, low, heights)
@@ -281,11 +300,12 @@ def _unfilled(
     lows = {record.solid.guid: float(record.solid.low[2]) for record in records}
     panes = [a.aperture.plane.to_world(shapely.get_coordinates(a.region)) for a in filled]
     middles = np.array([pane.mean(axis=0) for pane in panes]).reshape(-1, 3)
+    areas = source.corrections.glass_areas(source.model)
     for opening, host in unfilled_openings(source.model) if records else ():
         filling = None if host is None else _pane_of(source, opening, host)
         if filling is None or _holds_one(filling, middles):
             continue
-        aperture, _ = aperture_of(filling)
+        aperture, _ = _corrected(filling, areas, source.corrections.file)
         if aperture is None or aperture.opening.area < SMALLEST_OPENING:
             continue
         if not _goes_through(aperture, building):
@@ -301,6 +321,10 @@ def _unfilled(
             continue
         area = sum(a.glass.area for a in attached)
         label = f"opening {opening.Name or ''} in {host.is_a()} {host.Name or ''}"
+        if filling.guid in areas:
+            attachments += attached
+            glass.append(GlassAccount(filling.guid, storey_of(host), area, area, False))
+            continue
         if no_rooflight := _no_rooflight(attached[0], opening.Name or "", source, building):
             values = {"element": label, "reason": Phrase(no_rooflight)}
             issues.append(Issue("opening-closed", filling.guid, values))

@@ -9,6 +9,7 @@ from uuid import UUID, uuid5
 
 import ifcopenshell
 import ifcopenshell.guid
+from ifcopenshell.util.element import remove_deep2
 
 from mitsuba_cfs.files import write_text
 
@@ -43,7 +44,7 @@ def give_set(
 ) -> None:
     """Give elements or types a property set; one of that name that they have is replaced."""
     for target in targets:
-        _take_off(model, target, name)
+        take_off(model, target, name)
     owner = owner_of(model)
     described = [name, *(target.GlobalId for target in targets)]
     pset = model.create_entity(
@@ -61,23 +62,30 @@ def give_set(
         )  # fmt: skip
 
 
-def _take_off(model: ifcopenshell.file, target: Entity, name: str) -> None:
-    """Take the property set of that name off an element or type."""
+def take_off(model: ifcopenshell.file, target: Entity, name: str) -> bool:
+    """Take the property sets of that name off an element or type; whether it had one.
+
+    A set that no other element has is removed with all that it alone refers to.
+    """
     if target.is_a("IfcTypeObject"):
-        kept = [one for one in target.HasPropertySets or () if one.Name != name]
-        target.HasPropertySets = kept or None
-        return
-    for relation in list(target.IsDefinedBy or ()):
-        pset = getattr(relation, "RelatingPropertyDefinition", None)
-        if pset is None or pset.Name != name:
-            continue
-        others = [one for one in relation.RelatedObjects if one != target]
-        if others:
-            relation.RelatedObjects = others
-        else:
-            model.remove(relation)
-            if not pset.DefinesType and not model.get_total_inverses(pset):
-                model.remove(pset)
+        every = target.HasPropertySets or ()
+        sets = [one for one in every if one.Name == name]
+        target.HasPropertySets = [one for one in every if one.Name != name] or None
+    else:
+        sets = []
+        for relation in list(target.IsDefinedBy or ()):
+            pset = getattr(relation, "RelatingPropertyDefinition", None)
+            if pset is None or pset.Name != name:
+                continue
+            sets.append(pset)
+            if others := [one for one in relation.RelatedObjects if one != target]:
+                relation.RelatedObjects = others
+            else:
+                model.remove(relation)
+    for pset in sets:
+        if not model.get_total_inverses(pset):
+            remove_deep2(model, pset, do_not_delete=set(model.by_type("IfcOwnerHistory")))
+    return bool(sets)
 
 
 def list_of_numbers(
@@ -105,6 +113,11 @@ FILE_SCHEMA(('{}'));
 ENDSEC;
 DATA;
 """
+
+
+def read_again(model: ifcopenshell.file) -> ifcopenshell.file:
+    """The model as from its file: the next entities have the numbers of those removed last."""
+    return ifcopenshell.file.from_string(model.to_string())
 
 
 def save(model: ifcopenshell.file, out: str | Path) -> None:

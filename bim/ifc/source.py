@@ -106,9 +106,9 @@ def read_source(
     tell("opening", 0.0)
     files = [path, *linked]
     models, damage = open_all(files), Damage()
+    check_rooms([*models.values()], rooms, path, corrections.room_names)
     lengths = [issue for one in models.values() for issue in length_issues(one)]
     model, issues = one_model(models)
-    check_rooms(model, rooms, path)
     endings = [issue for file in files for issue in ending_issues(file)]
     names = {"first": Path(path).name}
     endings += [

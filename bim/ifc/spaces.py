@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
 import ifcopenshell
 
+from bim.ifc.corrections import RoomName
 from bim.ifc.damage import Damage, entities, instances, type_of
 from bim.ifc.project import psets_of, storey_of
 from bim.ifc.quantities import QuantityScales, checked_volume, stated_quantities
@@ -25,6 +26,7 @@ DEEPEST = 20  # zones of zones
 SMALLEST_SPACE = 0.2  # smaller spaces are beams or ducts of the wrong class [m3]
 OVERLAPPING, REMOVED = "spaces-overlap", "space-removed"  # codes of issues
 OUTDOORS = "space-outdoors"
+FILE_NAMES = RoomName("", None, None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +64,14 @@ def read_spaces(
     *,
     stated: Mapping[int, bool] | None = None,
     removed: Collection[int] = (),
+    names: Mapping[int, RoomName] | None = None,
 ) -> tuple[list[SpaceRecord], list[Issue]]:
     """Every space that is indoors by the file and has a body; the others are issues.
 
     Args:
         stated: whether spaces are outdoors, by STEP id, where the corrections say so.
         removed: STEP ids of what the corrections leave out.
+        names: by STEP id, where the corrections state any.
     """
     stated = {} if stated is None else stated
     records: list[SpaceRecord] = []
@@ -78,8 +82,11 @@ def read_spaces(
     bodies = spaces_of([shape.triangles for shape in drawn.values()])
     solids = dict(zip(drawn, bodies, strict=True))
     for space in spaces:
-        label = label_of(space.Name or "", space.LongName or "", space.GlobalId)
         guid = space.GlobalId
+        stated_name = (names or {}).get(space.id(), FILE_NAMES)
+        name = space.Name if stated_name.name is None else stated_name.name
+        long_name = space.LongName if stated_name.long_name is None else stated_name.long_name
+        label = label_of(name or "", long_name or "", guid)
         if guid in seen:
             guid = f"{guid}-{space.id()}"
             values = {"room": label, "guid": guid}
@@ -123,8 +130,8 @@ def read_spaces(
         records.append(
             SpaceRecord(
                 room_solid(guid, label, solid.manifold),
-                space.Name or space.LongName or space.GlobalId,
-                space.LongName or "",
+                name or long_name or guid,
+                long_name or "",
                 storey_of(space),
                 solid.volume,
                 area,
@@ -179,20 +186,28 @@ class _Drawn:
         return label_of(self.name, self.long_name, self.guid)
 
 
-def check_rooms(model: ifcopenshell.file, rooms: Sequence[str], file: str | PathLike[str]) -> None:
-    """Refuse names of rooms that are like no name of a space or zone; no geometry is read.
+def check_rooms(
+    models: Sequence[ifcopenshell.file],
+    rooms: Sequence[str],
+    file: str | PathLike[str],
+    corrected: Iterable[RoomName] = (),
+) -> None:
+    """Refuse names of rooms that are like no name of a space or zone in the models of a building.
 
     A name that has words of one of these, or the reverse, may be that of rooms that are joined, cut
     or left out.
 
+    Args: corrected: names that the corrections state.
+
     Raises: `DataError`.
     """
-    spaces = instances(model, "IfcSpace")
+    spaces = [space for model in models for space in instances(model, "IfcSpace")]
     drawn = [_Drawn(s.GlobalId or "", s.Name or s.LongName or "", s.LongName or "") for s in spaces]
     if not rooms or not drawn:
         return
-    zones = [zone.name for zone in read_zones(model)]
+    zones = [zone.name for model in models for zone in read_zones(model)]
     names = {*zones, *(text for one in drawn for text in (one.guid, one.name, one.long_name))}
+    names |= {text or "" for one in corrected for text in (one.name, one.long_name)}
     for room in rooms:
         if any(has_words(room, name) or has_words(name, room) for name in names if name.strip()):
             continue

@@ -194,6 +194,12 @@ class _Space:
                       "share": 100 * share}  # fmt: skip
             where = f"{other.primitive.file}:{other.primitive.line}"
             issues.append(Issue("pane-before-window", where, values, Effect(glass=surface.area)))
+        walled = 1.0 - stacks.total() / POINTS
+        if layers and walled > OVERLAP:
+            apart = max(self._distance(n, surface) for n in layers)
+            where = f"{thing.primitive.file}:{thing.primitive.line}"
+            values = {"window": thing.name, "share": 100 * walled, "distance": apart}
+            issues.append(Issue("panes-before-wall", where, values, Effect(glass=surface.area)))
         panes = tuple(self._objects[n] for n in reversed(layers))
         hidden = {id(self._objects[n]) for n in seen}
         return _Front(panes, hidden, tuple(left_out), tuple(issues), tuple(sorted(seen)))

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from bim.model import Building, Space
+    from mitsuba_cfs.progress import Progress
 
 UNCUT = 100_000  # columns of a table that nobody sees
 
@@ -45,7 +46,16 @@ UNCUT = 100_000  # columns of a table that nobody sees
     help="Also write a BCF 2.1 file: a topic for each kind of problem, with its elements, for the "
     "author of the model.",
 )
-def command(issues: Path | None, fix: Path | None, bcf: Path | None, **chosen) -> None:
+@click.option(
+    "--page",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.html",
+    help="Also write a page: the 3D model with a mark at each leak, the rooms without the "
+    "corrections beside those with them, and the problems.",
+)
+def command(
+    issues: Path | None, fix: Path | None, bcf: Path | None, page: Path | None, **chosen
+) -> None:
     """List rooms, windows and problems of a building model as the simulation reads them.
 
     BUILDING is a honeybee model (.hbjson), gbXML, a Radiance scene (.rad) or IFC: one file or
@@ -65,6 +75,8 @@ def command(issues: Path | None, fix: Path | None, bcf: Path | None, **chosen) -
     if bcf is not None:
         check_is_ifc(options.building, "--bcf")
         check_file(bcf, field="--bcf", inputs=options.building_files)
+    if page is not None:
+        check_file(page, field="--page", inputs=options.building_files)
     from rich.console import Console
 
     from bim.building_file import named_spaces
@@ -102,6 +114,13 @@ def command(issues: Path | None, fix: Path | None, bcf: Path | None, **chosen) -
         from bim.bcf import write_bcf
 
         console.print(f"{bcf}: topics: {write_bcf(read, bcf)}", markup=False, highlight=False)
+    if page is not None:
+        from scenes.report.page import write_check
+
+        with ProgressBar() as progress:
+            before = _uncorrected(options, progress)
+        write_check(read, head.model, page, before)
+        console.print(f"page: {page}", markup=False, highlight=False)
     if issues is not None:
         import pandas as pd
 
@@ -109,6 +128,18 @@ def command(issues: Path | None, fix: Path | None, bcf: Path | None, **chosen) -
 
         rows = issue_rows(read.issues, "command")
         write_table(pd.DataFrame(rows, columns=list(COLUMNS)), issues, index=False)
+
+
+def _uncorrected(options: InputOptions, progress: Progress) -> Building | None:
+    """The building without the corrections beside it; None where there are none."""
+    from bim.building_file import files_beside
+    from bim.ifc.building import read_ifc
+    from bim.ifc.corrections import Corrections
+
+    first, *linked = options.building_files
+    if not files_beside(first):
+        return None
+    return read_ifc(first, linked=linked, corrections=Corrections(), progress=progress)
 
 
 def _rooms(building: str, spaces: Sequence[Space]) -> Table:

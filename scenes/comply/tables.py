@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import pandas as pd
 
-from scenes.comply.assess import NOT_COMPUTED, NOT_FOR_IT, RoomVerdict
+from scenes.comply.assess import NOT_FOR_IT, RoomVerdict
 from scenes.comply.need import Need
 from scenes.comply.results import CheckedRoom, Compliance
 from scenes.comply.rules import NOT_MET, CriterionTable, LevelTable
@@ -143,10 +143,6 @@ def room_table(result: Compliance, room: CheckedRoom, rule: str) -> Table:
     rows = []
     for verdict in room.verdicts:
         if verdict.rule != rule or not verdict.applies:
-            continue
-        if verdict.reached == NOT_COMPUTED:
-            one, words = verdict.criterion, gettext(NOT_COMPUTED)
-            rows.append((gettext(one.title), clause(one), words, MISSING, "", words))
             continue
         first = True
         for words, (value, limits) in _quantities(verdict).items():

@@ -45,7 +45,7 @@ from scenes.room.leaks import leak_issues
 from scenes.room.light import visible_scene
 from scenes.room.operation import OperationHours, check_schedules, stated_note, with_stated_uses
 from scenes.room.room import operated_zone
-from scenes.room.zone import RoomZone, balances, coupled
+from scenes.room.zone import RoomZone, balances, coupled, inner_sun_note
 from thermal.balance import ZoneResult
 from thermal.moisture import Humidity
 from thermal.ventilation import AirTransfer
@@ -165,6 +165,7 @@ def _traced_rooms(
         room = room_inputs(
             inputs.building, space, in_windows, inputs.weather, study.options,
             operation=study, skies=skies, cache=cache,
+            together=[one.guid for one in inputs.spaces] if study.couple else (),
         )  # fmt: skip
         if space.windows:
             scene, seed = visible_scene(room), study.options.sampling.seed
@@ -238,6 +239,7 @@ def _balanced(
     groups: list[tuple[Sequence[RoomZone], dict[str, Any]]] = [([room], {}) for room in rooms]
     if study.couple:
         rooms, links, notes = coupled(rooms, study.air.door_m3_s)
+        notes += inner_sun_note(rooms, weather.step_h)
         nodes = _air_nodes(study, building, rooms)
         rooms, links, zone_of = with_air_nodes(rooms, links, nodes)
         transfers = _transfers(study, building, zone_of, weather)

@@ -33,6 +33,7 @@ BESIDE = 1.0  # elements this near belong to the building [m]
 STOREYS_ABOVE = 3  # without rooms, the roof with them
 SHOWN = 300.0  # of the surroundings at the least, from the rooms [m]
 SHOWN_SIZES = 5  # or so many times the rooms' size
+MARK = 0.3  # least size of the mark of a leak [m]
 STEPS = 32000  # of the 16-bit coordinates over the model's half size
 
 
@@ -59,6 +60,7 @@ class Model3D:
     rooms: tuple[str, ...]
     storeys: tuple[str, ...]  # names, the lowest first
     left_out: int
+    extra: tuple[str, ...] = ()  # kinds of what belongs to no room: "mark", "before"
 
     def json(self) -> dict[str, Any]:
         """The parts that go into the page as JSON."""
@@ -76,11 +78,56 @@ class Model3D:
 def model3d(result: RunResult) -> Model3D:
     """The mesh of the run's rooms, all elements outdoors, and the sensors in their colours."""
     spaces = tuple(room.space for room in result.spaces)
+    points = [room.daylight.points for room in result.spaces]
+    return _model(result.building, spaces, points=points, layers=layers(result))
+
+
+def checked_model(building: Building, before: Building | None = None) -> Model3D:
+    """The mesh of a building that is not computed, with a mark at each leak.
+
+    Args: before: the same file without its corrections, whose rooms are shown beside.
+    """
+    spaces, extra = building.spaces, []
+    for issue in building.issues:
+        if issue.code == "room-leaks":
+            place = np.array([float(str(issue.values[axis])) for axis in "xyz"])
+            half = max(MARK, float(str(issue.values["width"]))) / 2.0
+            extra.append(("mark", _cube(place, half)))
+    if before is not None:
+        extra += [("before", space.shell) for space in before.spaces]
+    return _model(building, spaces, extra=extra)
+
+
+def _cube(middle: NDArray[np.float64], half: float) -> NDArray[np.float64]:
+    """Triangles [12, 3, 3] of a cube, normals out."""
+    corners = middle + half * np.array(
+        [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    )
+    quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    return corners[[k for a, b, c, d in quads for k in (a, b, c, a, c, d)]].reshape(-1, 3, 3)
+
+
+def _model(
+    building: Building,
+    spaces: Sequence[Space],
+    *,
+    points: Sequence[NDArray[np.float64]] = (),
+    layers: tuple[ColourLayer, ...] = (),
+    extra: Sequence[tuple[str, NDArray[np.float64]]] = (),
+) -> Model3D:
+    """The mesh of rooms and surroundings.
+
+    Args:
+        points: sensors [S, 3] of each room; extra: kinds and triangles of what belongs to no room.
+    """
+    around = element_surfaces(building.elements).triangles
     shells = [space.shell.reshape(-1, 3) for space in spaces]
+    shells += [triangles.reshape(-1, 3) for _, triangles in extra]
+    if not spaces:
+        shells += [around.reshape(-1, 3), *([] if shells or len(around) else [np.zeros((1, 3))])]
     corners = np.concatenate(shells)
     low, high = corners.min(axis=0), corners.max(axis=0)
     centre = (low + high) / 2
-    around = element_surfaces(result.building.elements).triangles
     shown = max(float((high - low).max()) * SHOWN_SIZES, SHOWN)
     outdoors, left_out = largest_triangles(cut_to(around, low - shown, high + shown))
     reach = np.abs(np.concatenate([corners, outdoors.reshape(-1, 3)]) - centre).max()
@@ -105,12 +152,17 @@ def model3d(result: RunResult) -> Model3D:
             {"room": -1, "storey": int(level), "kind": "outdoors", "t": packed(part),
              "e": packed(edges)}
         )  # fmt: skip
-    cells, owners = [], []
-    for index, room in enumerate(result.spaces):
-        flat = sensor_cells(room.daylight.points)
+    for kind, triangles in extra:
+        batches.append(
+            {"room": -1, "storey": 0, "kind": kind, "t": packed(triangles),
+             "e": packed(outline_edges(triangles))}
+        )  # fmt: skip
+    cells, owners = [np.empty((0, 4, 3))], []
+    for index, places in enumerate(points):
+        flat = sensor_cells(places)
         middle = flat.mean(axis=1, keepdims=True)
         flat = middle + 0.9 * (flat - middle)
-        z = np.broadcast_to(room.daylight.points[:, None, 2:3], (*flat.shape[:2], 1))
+        z = np.broadcast_to(places[:, None, 2:3], (*flat.shape[:2], 1))
         cells.append(np.concatenate([flat, z], axis=-1))
         owners += [index] * len(flat)
     sensors = {
@@ -119,10 +171,12 @@ def model3d(result: RunResult) -> Model3D:
         "corners": packed(np.concatenate(cells)),
     }
     labels = tuple(space.label for space in spaces)
-    whole = tuple(map(tuple, (building_box(result.building) - centre).round(3).tolist()))
+    box = building_box(building) if building.spaces else np.array([low, high])
+    whole = tuple(map(tuple, (box - centre).round(3).tolist()))
     return Model3D(
-        tuple(centre), whole, unit, tuple(batches), sensors, layers(result), labels, names, left_out
-    )
+        tuple(centre), whole, unit, tuple(batches), sensors, layers, labels, names, left_out,
+        tuple(dict.fromkeys(kind for kind, _ in extra)),
+    )  # fmt: skip
 
 
 def cut_to(

@@ -12,6 +12,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup, escape
 
+from bim.model import Building
 from mitsuba_cfs.files import json_text, write_text
 from scenes.head import Head
 from scenes.language.catalogue import gettext, in_language, ngettext, translated
@@ -20,7 +21,7 @@ from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import tables
 from scenes.report.method import method_words
-from scenes.report.model3d import model3d
+from scenes.report.model3d import checked_model, model3d
 from scenes.report.names import glossary, option_words, stage_words
 from scenes.report.orientation import orientation
 from scenes.report.page_files import page_files
@@ -50,6 +51,25 @@ def report_html(result: RunResult, page: PageOptions = OWN_PAGE) -> str:
         return _filled(result, page)
 
 
+def write_check(
+    building: Building, head: Sequence[str], path: Path, before: Building | None = None
+) -> None:
+    """Write the check of a model as one HTML file: head, 3D model, problems.
+
+    Args: head: its first lines; before: the same file without its corrections.
+    """
+    text = environment().get_template("check.html.j2").render(
+        page=OWN_PAGE,
+        title=building.name or gettext("Building"),
+        head=head,
+        model=checked_model(building, before),
+        problems=tables.problems_table(building.issues),
+        style=Markup(FILES["style.css"]),
+        scripts=Markup("\n".join(FILES[name] for name in SCRIPTS[:-1])),
+    )  # fmt: skip
+    write_text(path, text)
+
+
 def _filled(result: RunResult, page: PageOptions) -> str:
     rooms = tuple(room_page(result, room, i) for i, room in enumerate(result.spaces, start=1))
     manifest = result.manifest
@@ -70,7 +90,7 @@ def _filled(result: RunResult, page: PageOptions) -> str:
         storeys=storey_plans(result) if several else (),
         storey_data=storey_data(metrics, len(rooms)),
         summary=summary(result) + page.facts,
-        problems=tables.problems_table(result),
+        problems=tables.problems_table(result.issues),
         version=manifest.get("versions", {}).get("mitsuba-cfs", ""),
         inputs=inputs_table(manifest.get("inputs", {})),
         options=options_table(manifest),

@@ -12,7 +12,7 @@ from bim.report.ranking import ranked
 from scenes.language.catalogue import N_, gettext
 from scenes.language.numbers import cell, semicolons
 from scenes.report.names import Quantity, quantity
-from scenes.results import LuminancePicture, RoomYear, RunResult
+from scenes.results import LuminancePicture, RoomYear
 
 DGP_LIMITS = ((0.35, "imperceptible"), (0.40, "perceptible"), (0.45, "disturbing"))
 CLASS_WORDS = {  # of glare
@@ -152,7 +152,7 @@ def sensors_table(room: RoomYear) -> Table:
     return Table(gettext("Sensors of {room}", room=room.space.label), tuple(columns), tuple(rows))
 
 
-def problems_table(result: RunResult) -> Table:
+def problems_table(issues: Iterable[Issue]) -> Table:
     """What is wrong with the building's file and what was done about it."""
     columns = (
         Column(gettext("Glass"), "m²"),
@@ -166,7 +166,7 @@ def problems_table(result: RunResult) -> Table:
             one.first.where,
             *issue_cells(one.text("command", gettext)),
         )
-        for one in ranked(result.issues)
+        for one in ranked(tuple(issues))
     )
     return Table(gettext("Problems by element"), columns, rows)
 

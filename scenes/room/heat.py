@@ -27,7 +27,7 @@ from scenes.results import (
     ThermalResult,
 )
 from scenes.room.operation_tables import ComfortTable, OperationTables
-from scenes.room.zone import RoomZone, balances, coupled
+from scenes.room.zone import RoomZone, balances, coupled, inner_sun_note
 from thermal.balance import ZoneResult
 from thermal.comfort import (
     comfort_by_outdoors,
@@ -342,8 +342,8 @@ def coupled_years(
     progress: Progress = silent,
     *,
     store: StoredArrays | None = None,
-) -> tuple[list[RoomYear], str]:
-    """The years of rooms that exchange heat through the parts between them, and a note on that.
+) -> tuple[list[RoomYear], tuple[str, ...]]:
+    """The years of rooms that exchange heat through the parts between them, and notes on that.
 
     Args:
         tables: of all rooms; terrain of the site, air through open doors.
@@ -357,7 +357,7 @@ def coupled_years(
     )  # fmt: skip
     progress("heat balance", 1.0)
     years = [room.with_heat(heat) for room, heat in zip(rooms, heats, strict=True)]
-    return years, _coupling_note(zones)
+    return years, (_coupling_note(zones), *inner_sun_note(zones, weather.step_h))
 
 
 def _coupling_note(rooms: Sequence[RoomZone]) -> str:

@@ -126,7 +126,7 @@ def borrowed_share(
     return Note(
         "Room {room} receives {share:.0f} % of its daylight through {glass:.1f} m2 of inner glass "
         "and {open:.1f} m2 of open doorways from {rooms}; their sun is averaged over sky patches, "
-        "their blinds are in the first state, and the heat balance omits it.",
+        "their blinds are in the first state, and the heat balance of a room alone omits it.",
         room=space.label,
         share=100 * share,
         glass=inner.area,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,6 +66,7 @@ class RoomInputs:
     file_sensors: FileSensors
     inner_glass: bool  # whether light passes through glass between rooms
     cache: MatrixCache | None
+    together: frozenset[str] = frozenset()  # GUIDs of the rooms that are balanced with this one
 
     @property
     def season(self) -> NDArray[np.int64]:
@@ -104,6 +105,7 @@ def room_inputs(
     grids: Sequence[SensorGrid] = (),
     file_sensors: FileSensors = NO_SENSORS,
     inner_glass: bool = False,
+    together: Collection[str] = (),
 ) -> RoomInputs:
     """The inputs of one room.
 
@@ -112,6 +114,8 @@ def room_inputs(
         operation: tables of all rooms; those of this room are chosen here.
         skies: of `skies_for`, shared by the rooms of a building; computed here without.
         grids: sensor grids in place of the grid of the options.
+        together: GUIDs of the rooms whose heat is balanced with this one's: sun passes the glass
+            and open doorways between them.
 
     Raises: `ValueError` for a window without a system, `DataError` for a room that the tables name
         and the building does not contain.
@@ -135,6 +139,7 @@ def room_inputs(
         file_sensors,
         inner_glass,
         cache,
+        frozenset(together),
     )
 
 

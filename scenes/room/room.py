@@ -20,7 +20,7 @@ No file is read or written:
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TypedDict, Unpack
@@ -84,6 +84,7 @@ class RoomChoices(TypedDict, total=False):
     explore: bool
     rate: tuple[str, NDArray[np.int64]] | None
     inner: bool
+    together: Collection[str]
     progress: Progress
 
 
@@ -144,6 +145,7 @@ def lit_room(
     explore: bool = False,
     rate: tuple[str, NDArray[np.int64]] | None = None,
     inner: bool = False,
+    together: Collection[str] = (),
     progress: Progress = silent,
 ) -> DaylitRoom:
     """Daylight and glare of one room, and the zone from which its heat is computed.
@@ -163,6 +165,7 @@ def lit_room(
         explore: True adds every hour's picture in every state, for the explorer.
         rate: a glare metric (DGP, eDGP, sDGP) and hours of the year with the sun up to rate.
         inner: True lets light of rooms with windows in through glass; phase methods only.
+        together: GUIDs of the rooms that are balanced with this one, see `room_inputs`.
 
     Raises: `RoomError` for a room that cannot be computed (no work plane, no closed zone),
         `ValueError` for a window without a system, `DataError` for an explorer where the outdoors
@@ -174,6 +177,7 @@ def lit_room(
         building, space, systems, weather, options,
         operation=None if operation is None else operation.tables, skies=skies, cache=cache,
         file_sensors=FileSensors.of(building, space), inner_glass=inner,
+        together=together,
     )  # fmt: skip
     if explore and len(room.seasons) > 1:
         message = "the explorer knows one state of the trees: give them one transmittance"

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.defaults import ROOM_REFLECTANCE
+from bim.doorways import THINNEST, panes_between, reveals_between, rooms_through_panes, wall_depth
+from bim.model import Face
 from bim.outer_faces import OuterFaces
 from bim.to_thermal import ThermalRoom
 from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.gloss import Gloss
+from mitsuba_cfs.gloss import STEPS, Gloss, pane, pane_shares, transmissivity
 from mitsuba_cfs.methods.light import hours_by_season, in_order_of_hours
 from mitsuba_cfs.methods.phase_matrices import (
     BATCHES,
@@ -30,15 +33,17 @@ from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.kernels.scene import SceneCache
 from mitsuba_cfs.trace.matrices.absorption import absorption_matrix
 from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
-from scenes.fenestration.thermal_system import ThermalSystem
+from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
-from scenes.room.windows import RoomWindows
+from scenes.room.windows import RoomWindows, room_windows
 from thermal.climate import Solar
 from thermal.control import switched
 
 FloatArray = NDArray[np.float64]
 Gains = dict[str, FloatArray]  # [H] [W] by name: incident_w, transmitted_w, absorbed_..._w
+Place = tuple[str, int]  # GUID of a room, number of its face
+SunBeyond = dict[Place, FloatArray]  # [H] absorbed [W] at panes of the room and in those beyond
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,11 +70,28 @@ class SeasonalOutdoors:
         )
 
 
+SOLAR_CLEAR = 0.80  # solar transmittance of inner glass without a value: 6 mm float, EN 410
+GLASS_INDEX = 1.52
+APART = 0.002  # rooms without a wall's thickness between them are separated by this much [m]
+
+
+@dataclass(frozen=True, slots=True)
+class SunlitRooms:
+    """The triangles that the sun of a room's windows meets: its own, then those beyond its glass.
+
+    Surfaces are numbered by those of the zone, F, then come panes and doorways of the room, the
+    faces of the rooms beyond, and the windows of these.
+    """
+
+    interior: Surfaces
+    beyond: tuple[Place | None, ...] = ()  # of the surfaces from F on; None: a window to outdoors
+
+
 @dataclass(frozen=True, slots=True)
 class ZoneInSun:
     """A zone's surfaces F and windows in the solar band."""
 
-    interior: Surfaces  # the room's triangles, numbered by the surfaces of the zone
+    sunlit: SunlitRooms
     windows: RoomWindows
     thermals: Sequence[Sequence[ThermalSystem]]  # [G][J]
     facade: FloatArray  # [H, F] irradiance on the outside [W/m2]
@@ -165,8 +187,10 @@ def solar_gains(
     *,
     thermals: Sequence[Sequence[ThermalSystem]],
     progress: Progress = silent,
-) -> tuple[Solar, Gains]:
+) -> tuple[Solar, Gains, SunBeyond]:
     """Solar radiation absorbed in the shading states of every hour [H, G], and its sums.
+
+    Also what the faces of rooms beyond the glass absorb.
 
     Each combination of states that occurs is balanced by itself: what a window's blind reflects
     indoors reaches the other windows.
@@ -176,12 +200,8 @@ def solar_gains(
         thermals: thermal data of the window groups in each state [G][J].
     """
     steps = part(progress, 0.0, 0.8, "heat")
-    interior = interior_surfaces(room.space, "solar")
-    numbers = zone.surface_of_face[interior.surface]
     in_sun = ZoneInSun(
-        Surfaces(
-            interior.triangles, interior.reflectance, numbers, gloss=_zone_gloss(interior, numbers)
-        ),
+        sunlit_rooms(room, zone),
         room.windows,
         thermals,
         facade_irradiance(
@@ -197,7 +217,7 @@ def solar_gains(
         back = np.array([heat.back_reflectance for heat in heats])
         if heats and back.tobytes() not in absorption:
             absorption[back.tobytes()] = absorption_matrix(
-                in_sun.interior,
+                in_sun.sunlit.interior,
                 outdoors.first.scene.groups,
                 window_reflectance=back,
                 progress=part(steps, 0.6, 1.0),
@@ -205,12 +225,15 @@ def solar_gains(
             ).values
         absorbed = absorption.get(back.tobytes())
         suns.append(_gains_in_states(in_sun, combination, outdoors, room.skies, absorbed))
+    hours = np.arange(len(kind))
     gains = {
-        name: np.stack([sums[name] for _, sums in suns])[kind, np.arange(len(kind))]
-        for name in suns[0][1]
+        name: np.stack([sums[name] for _, sums, _ in suns])[kind, hours] for name in suns[0][1]
+    }
+    beyond = {
+        place: np.stack([passed[place] for *_, passed in suns])[kind, hours] for place in suns[0][2]
     }
     of_windows = state[:, room.windows.group]
-    return switched([solar for solar, _ in suns], kind, of_windows), gains
+    return switched([solar for solar, *_ in suns], kind, of_windows), gains, beyond
 
 
 def sun_by_hour(suns: Sequence[Solar], number: NDArray[np.int64]) -> Solar:
@@ -268,6 +291,88 @@ def _in_states(
     return [of[min(j, len(of) - 1)] for of, j in zip(thermals, state, strict=True)]
 
 
+def sunlit_rooms(room: RoomInputs, zone: ThermalRoom) -> SunlitRooms:
+    """What the sun of a room's windows meets, through the glass of rooms balanced with it.
+
+    A pane transmits and reflects as a single one of its solar transmittance (Fresnel, n 1.52), a
+    doorway transmits everything; the wall's thickness between is a tube of reveals.  What goes out
+    through the windows of the rooms beyond is lost.
+    """
+    interior = interior_surfaces(room.space, "solar")
+    numbers = zone.surface_of_face[interior.surface]
+    zone_gloss = _zone_gloss(interior, numbers)
+    others = rooms_through_panes(room.building, room.space, room.together)
+    if not others:
+        triangles, reflectance = interior.triangles, interior.reflectance
+        return SunlitRooms(Surfaces(triangles, reflectance, numbers, gloss=zone_gloss))
+    F = len(zone.zone.surfaces)
+    gloss: list[Gloss | None] = [*zone_gloss, *[None] * (F - len(zone_gloss))]
+    transmittance: list[tuple[float, ...] | None] = [None] * F
+    beyond: list[Place | None] = []
+    pieces: list[tuple[FloatArray, float, int]] = []  # triangles, reflectance, surface
+
+    def add(triangles: FloatArray, reflectance: float, place: Place | None, of: Gloss | None = None,
+            tau: tuple[float, ...] | None = None) -> None:  # fmt: skip
+        pieces.append((triangles, reflectance, F + len(beyond)))
+        gloss.append(of)
+        transmittance.append(tau)
+        beyond.append(place)
+
+    reached = {room.space.guid, *(other.guid for other in others)}
+    moved = {room.space.guid: np.zeros(3)}
+    for one in (room.space, *others):
+        through = {
+            face.name: (guid, face, back)
+            for guid, pairs in panes_between(room.building, one).items()
+            if guid in reached
+            for face, back in pairs
+        }
+        step = moved[one.guid]
+        for guid, face, back in through.values():
+            apart = max(APART - wall_depth(face, back), 0.0)
+            moved.setdefault(guid, step + apart * face.normal)
+        for number, face in enumerate(one.faces):
+            place = one.guid, number
+            triangles = face.triangles + step
+            if face.name in through:
+                guid, _, back = through[face.name]
+                add(triangles, 0.0, place, *_pane_optics(face))
+                if one.guid < guid and (depth := wall_depth(face, back)) > THINNEST:
+                    reveals = reveals_between(face, depth).reshape(-1, 3, 3)
+                    add(reveals + step, ROOM_REFLECTANCE["reveal"], place)
+            elif one.guid != room.space.guid:
+                add(triangles, face.reflectance("solar"), place, face.gloss)
+            else:
+                pieces.append(
+                    (triangles, face.reflectance("solar"), int(zone.surface_of_face[number]))
+                )
+        if one.guid != room.space.guid:
+            windows = room_windows(one, room.systems)
+            for group, states in zip(windows.groups, windows.systems, strict=True):
+                back_reflectance = thermal_system(states[0]).back_reflectance
+                for window in group.windows:
+                    add(window.triangles + step, back_reflectance, None)
+    counts = [len(triangles) for triangles, *_ in pieces]
+    joined = Surfaces(
+        np.concatenate([triangles for triangles, *_ in pieces]),
+        np.repeat([reflectance for _, reflectance, _ in pieces], counts),
+        np.repeat([number for *_, number in pieces], counts),
+        gloss=tuple(gloss) if any(gloss) else (),
+        transmittance=tuple(transmittance),
+    )
+    return SunlitRooms(joined, tuple(beyond))
+
+
+def _pane_optics(face: Face) -> tuple[Gloss | None, tuple[float, ...]]:
+    """Specular reflectance and transmittance by angle of a pane or doorway between rooms."""
+    if face.pane is None or face.pane.is_open:
+        return None, (1.0, 1.0)
+    tau = face.pane.solar_transmittance
+    inner = transmissivity(SOLAR_CLEAR if tau is None else tau, GLASS_INDEX)
+    shares = pane_shares(np.linspace(0.0, 1.0, STEPS), GLASS_INDEX, inner)[0]
+    return pane(GLASS_INDEX, inner), tuple(np.clip(shares, 0.0, 1.0).tolist())
+
+
 def _zone_gloss(interior: Surfaces, numbers: NDArray[np.int64]) -> tuple[Gloss | None, ...]:
     """The gloss of the zone's surfaces; none for a surface of faces that differ in gloss."""
     kinds: dict[int, set[Gloss | None]] = {}
@@ -285,19 +390,19 @@ def _gains_in_states(
     outdoors: SeasonalOutdoors,
     skies: AnnualSky,
     absorption: FloatArray | None,
-) -> tuple[Solar, Gains]:
-    """Solar radiation absorbed by window layers, surfaces and facades, and its sums.
+) -> tuple[Solar, Gains, SunBeyond]:
+    """Solar radiation absorbed by window layers, surfaces and facades, sums, and what goes beyond.
 
     Args:
         state: [G] of the window groups.
-        absorption: [G, K, F + G] share of the flux of each window patch that each surface and
-            window absorbs; None for a room without windows.
+        absorption: [G, K, F + B + G] share of the flux of each window patch that each surface, what
+            lies beyond inner glass, and each window absorbs; None for a room without windows.
     """
     group, facade = zone.windows.group, zone.facade
     F = facade.shape[1]
     if absorption is None:
         dark = np.zeros((skies.hours, 0))
-        return Solar(dark, dark, np.zeros_like(facade), facade), {}
+        return Solar(dark, dark, np.zeros_like(facade), facade), {}, {}
     heats = _in_states(zone.thermals, state)
     area = np.array([g.area for g in zone.windows.groups])
     T = np.stack([s.solar.transmission_matrix() for s in zone.windows.in_states(state)])
@@ -307,6 +412,7 @@ def _gains_in_states(
         np.cumsum([len(s) for s in shares[:-1]]),
     )
     taken, outer, inner, air, whole = (rows.T for rows in sums)
+    B = len(zone.sunlit.beyond)
     retained = np.array([h.back_absorptance / max(1.0 - h.back_reflectance, 1e-9) for h in heats])
 
     def year(values: NDArray[Any]) -> NDArray[Any]:
@@ -317,7 +423,7 @@ def _gains_in_states(
         absorbed_inner=year(inner[:, group]),
         inside=year(taken[:, :F]),
         facade=facade,
-        window_inside=year((retained * taken[:, F:] / area)[:, group]),
+        window_inside=year((retained * taken[:, F + B :] / area)[:, group]),
         absorbed_air=year(air[:, group]),
     )
     gains = {
@@ -327,7 +433,13 @@ def _gains_in_states(
         "absorbed_inner_w": (inner + air) @ area,
         "absorbed_room_w": taken[:, :F].sum(axis=1),
     }
-    return solar, {name: skies.whole_year(values) for name, values in gains.items()}
+    if B:
+        gains["at_and_beyond_inner_glass_w"] = taken[:, F : F + B].sum(axis=1)
+    beyond: SunBeyond = {}
+    for number, place in enumerate(zone.sunlit.beyond, F):
+        if place is not None:
+            beyond[place] = beyond.get(place, 0.0) + skies.whole_year(taken[:, number])
+    return solar, {name: skies.whole_year(values) for name, values in gains.items()}, beyond
 
 
 def _sun_alone(room: RoomInputs) -> NDArray[np.floating]:

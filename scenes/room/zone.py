@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from bim.to_thermal import (
 from mitsuba_cfs.compiled import must_compile
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache, cached_or_computed
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.stored_arrays import StoredArrays
@@ -34,7 +35,7 @@ from scenes.room.inputs import RoomInputs
 from scenes.room.operation import OperationHours
 from scenes.room.operation_tables import GroundTable, NeighbourTable, OperationTables
 from scenes.room.options import Occupancy
-from scenes.room.solar import SeasonalOutdoors, solar_gains, sun_by_hour
+from scenes.room.solar import SeasonalOutdoors, SunBeyond, solar_gains, sun_by_hour
 from scenes.room.windows import RoomWindows
 from thermal.balance import BalanceOptions, ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
@@ -276,6 +277,7 @@ class RoomZone:
     fenestration: tuple[dict[str, float | str], ...] = ()  # `fenestration_table` of its windows
     states: tuple[str, ...] = ()  # names of the shading states
     operation: OperationTables | None = None
+    sun_beyond: SunBeyond = field(default_factory=dict)  # of its windows, in rooms beyond glass
     alternatives: RoomAlternatives | None = None  # of shading by the room's temperature
 
     @property
@@ -314,6 +316,10 @@ class RoomZone:
             shading=replace(self.shading, states=states),
             lamps=chosen([room.lamps for room in rooms]),
             daylight=chosen(planes) if planes else None,
+            sun_beyond={
+                place: chosen([room.sun_beyond[place] for room in rooms])
+                for place in self.sun_beyond
+            },
             alternatives=None,
         )
 
@@ -379,10 +385,57 @@ def coupled(
     Returns: the rooms, the air between them [Z, Z] [m3/s], and a sentence for every wall without
         another face.
     """
+    rooms = with_sun_of_others(rooms)
     spaces = [room.space for room in rooms]
     joined, notes = coupled_rooms(spaces, [room.room for room in rooms])
     zones = [replace(room, room=one) for room, one in zip(rooms, joined, strict=True)]
     return zones, door_links(spaces, door_m3_s), notes
+
+
+def with_sun_of_others(rooms: Sequence[RoomZone]) -> list[RoomZone]:
+    """The rooms with the sun that reaches them through the windows of others and inner glass.
+
+    Where the room's temperature chooses the shading, other rooms get the sun of its first state.
+    """
+    return [_with_sun_of(room, rooms) if _has_inner_sun(room, rooms) else room for room in rooms]
+
+
+def _has_inner_sun(room: RoomZone, rooms: Sequence[RoomZone]) -> bool:
+    guid = room.space.guid
+    return any(place == guid for one in rooms for place, _ in one.sun_beyond)
+
+
+def _with_sun_of(room: RoomZone, rooms: Sequence[RoomZone]) -> RoomZone:
+    """The room, and each of its alternatives, with what its faces absorb of the rooms' sun."""
+    inside = room.solar.inside.copy()
+    for one in rooms:
+        source = room if one.space.guid == room.space.guid else one
+        for (guid, face), absorbed in source.sun_beyond.items():
+            if guid == room.space.guid:
+                inside[:, room.room.surface_of_face[face]] += absorbed
+    choices = room.alternatives
+    if choices is not None:
+        choices = replace(choices, rooms=tuple(_with_sun_of(one, rooms) for one in choices.rooms))
+    return replace(room, solar=replace(room.solar, inside=inside), alternatives=choices)
+
+
+def inner_sun_note(rooms: Sequence[RoomZone], step_h: float) -> tuple[str, ...]:
+    """A sentence on the sun that enters by one room and is absorbed in another; none without."""
+    passed = sum(
+        float(absorbed.sum())
+        for room in rooms
+        for (guid, _), absorbed in room.sun_beyond.items()
+        if guid != room.space.guid
+    )
+    if not passed:
+        return ()
+    return (
+        Note(
+            "Sun through glass and open doorways between rooms: {energy:.0f} kWh in the year enter "
+            "by the windows of one room and are absorbed in another.",
+            energy=passed * step_h / 1000.0,
+        ),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -473,7 +526,7 @@ def room_zone(
         seed=room.options.sampling.seed,
         cache=room.cache,
     )
-    solar, gains = solar_gains(
+    solar, gains, beyond = solar_gains(
         room, outdoors, surfaces.room, surfaces.outer, state,
         thermals=surfaces.thermals, progress=progress,
     )  # fmt: skip
@@ -481,7 +534,7 @@ def room_zone(
         room.space, zone, solar, gains, room.shading(state), lamps, room.occupied, plane, services,
         fenestration=tuple(fenestration_table(room.windows, surfaces.thermals)),
         states=tuple(system.name for system in max(room.windows.systems, key=len, default=())),
-        operation=room.operation,
+        operation=room.operation, sun_beyond=beyond,
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from bim.doorways import source_rooms
+from bim.doorways import panes_between, source_rooms
 from bim.model import Space
 from bim.report.issue import Issue, issue_note
 from bim.sensors import model_grids
@@ -92,11 +92,11 @@ def computed_rooms(
     years: list[RoomYear] = []
     if results:
         tables = OperationTables() if inputs.operation is None else inputs.operation.tables
-        years, note = coupled_years(
+        years, coupling = coupled_years(
             results, inputs.weather, options.room.heat_step_s, tables, progress, store=store
         )
         variants.return_memory()
-        notes += [note] if len(years) > 1 else []
+        notes += coupling if len(years) > 1 else []
     rooms = _read_back(years, store)
     for room in rooms if on_room is not None else ():
         on_room(room)
@@ -129,7 +129,11 @@ def _interchangeable(inputs: Inputs, options: JobOptions, one: Space, other: Spa
             return False  # other values, or a rule for windows of one of them
     if options.colour and not same_hues(one, other):
         return False
-    return not balanced_together(inputs, options) or same_surfaces(one, other)
+    if not balanced_together(inputs, options):
+        return True
+    if any(panes_between(building, room) for room in rooms):
+        return False  # sun passes to the rooms beyond
+    return same_surfaces(one, other)
 
 
 def _read_back(rooms: list[RoomYear], store: StoredArrays | None) -> Sequence[RoomYear]:
@@ -171,6 +175,7 @@ class RoomWork:
         room = inputs.building, space, inputs.systems, inputs.weather, options.room
         if self.with_heat:
             return compute_room(*room, **choices)
+        choices["together"] = [one.guid for one in self.spaces]
         light = lit_room(*room, **choices)
         progress("heat", 1.0)
         return light

@@ -15,6 +15,7 @@ from click.testing import CliRunner
 
 from bim.building_file import named_spaces
 from bim.ifc.building import read_ifc
+from bim.ifc.correct import correct
 from bim.ifc.corrections import Corrections, Paint, read_corrections
 from bim.ifc.corrections_draft import corrections_draft
 from bim.ifc.query import query
@@ -172,7 +173,8 @@ def test_the_draft_has_every_doubt_and_reads_back_as_no_correction(tmp_path) -> 
     lines = []
     for line in draft.read_text("utf-8").splitlines():
         bare = line.strip().removeprefix("# ")
-        starts = ("north =", "[[material]]", "name =", "conductivity =", "density =")
+        starts = ("north =", "[[material]]", "name =", "conductivity =", "density =",
+                  "[[room]]", "select =", "long_name =", "[[glass]]", "area =")  # fmt: skip
         is_entry = line.startswith("    # ") and '"' in bare
         lines.append(bare if bare.startswith(starts) or is_entry else line)
     draft.write_text(
@@ -205,3 +207,65 @@ def test_a_space_that_the_user_leaves_out_is_not_said_to_lack_geometry(tmp_path,
     assert missing == (("R1 Room",) if entry == "outdoors" else ())
     with pytest.raises(DataError, match=r"'R1' was left out: .* corrections file"):
         named_spaces(building, ["R1"], path)
+
+
+NAMES = """
+[[room]]
+select = 'IfcSpace, Name="R1"'
+name = "1.03"
+long_name = "Kitchen"
+"""
+
+
+def test_names_and_areas_of_glass_are_corrected(tmp_path):
+    small, walls = box_model()
+    small.opening(walls["south"], (3.6, 0.9, 0.4, 1.0), "hatch")
+    path = tmp_path / "m.ifc"
+    small.model.write(str(path))
+    glass = "\n[[glass]]\nselect = 'IfcWindow'\narea = 2.5\n"
+    glass += "[[glass]]\nselect = 'IfcOpeningElement, Name=\"hatch\"'\narea = 0.3\n"
+    path.with_name("m.corrections.toml").write_text(NAMES + glass, "utf-8")
+    building = read_ifc(path)
+    (space,) = building.spaces
+    assert (space.name, space.long_name) == ("1.03", "Kitchen")
+    assert [one.name for one in read_ifc(path, rooms=["1.03"]).spaces] == ["1.03"]
+    areas = sorted(window.area for window in building.windows)
+    assert areas == [pytest.approx(0.3, rel=1e-3), pytest.approx(2.5, rel=1e-3)]
+    assert building.account.glass_assumed == 0.0
+    path.with_name("m.corrections.toml").write_text(glass.replace("2.5", "0"), "utf-8")
+    assert [w.area for w in read_ifc(path).windows] == [pytest.approx(0.3, rel=1e-3)]
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("[[glass]]\nselect = 'IfcWindow'\narea = 9", "9 m2 is more than the opening of 4.5 m2"),
+        ("[[glass]]\nselect = 'IfcWindow'\narea = -1", "square metres from 0 to 10000"),
+        ("[[glass]]\nselect = 'IfcWindow'\nares = 1", "no such key; did you mean area"),
+        ("[[glass]]\narea = 1", "expected select"),
+        ("[[room]]\nselect = 'IfcSpace'", "expected name = "),
+        ("[[room]]\nselect = 'IfcSpace'\nname = 3", "expected name = "),
+    ],
+)
+def test_wrong_names_and_areas_are_refused_by_name(tmp_path, entry, message):
+    path = tmp_path / "m.ifc"
+    box_room().write(str(path))
+    path.with_name("m.corrections.toml").write_text(entry, "utf-8")
+    with pytest.raises(DataError, match=message):
+        read_ifc(path)
+
+
+def test_names_are_written_into_the_model(tmp_path):
+    path, out = tmp_path / "m.ifc", tmp_path / "out.ifc"
+    box_room().write(str(path))
+    path.with_name("m.corrections.toml").write_text(NAMES, "utf-8")
+    assert correct(path, out).left == ()
+    (space,) = read_ifc(out).spaces
+    assert space.label == "1.03 Kitchen"
+    # another entry chooses the space by the name that it has in the file
+    path.with_name("m.corrections.toml").write_text(
+        "as_drawn = ['IfcSpace, Name=\"R1\"']\n" + NAMES, "utf-8"
+    )
+    assert set(correct(path, tmp_path / "other.ifc").left) == {"as_drawn", "room"}
+    (space,) = read_ifc(tmp_path / "other.ifc").spaces
+    assert space.label == "1.03 Kitchen"

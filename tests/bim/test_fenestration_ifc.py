@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import ifcopenshell
 import ifcopenshell.guid
 import ifcopenshell.validate
@@ -12,6 +14,7 @@ from click.testing import CliRunner
 from bim.fenestration import AngularGValue, ShadingState, read_g_table
 from bim.ifc.attach import attach
 from bim.ifc.fenestration_read import read_states
+from bim.ifc.fenestration_write import set_name
 from bim.ifc.property_sets import list_of_numbers
 from bim.ifc.targets import Targets
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
@@ -23,6 +26,12 @@ from scenes.commands.ifc import command
 from tests.bim.small_ifc import box_room
 
 BLOCKS = ("transmission_front", "transmission_back", "reflection_front", "reflection_back")
+
+
+def g_table() -> AngularGValue:
+    return AngularGValue(
+        np.radians([0, 31, 87]), np.radians([0, 90]), np.arange(6).reshape(3, 2) / 7
+    )
 
 
 def klems(seed: int) -> KlemsBsdf:
@@ -62,7 +71,7 @@ def faults(path) -> list[str]:
 
 def test_klems_tree_g_and_u_come_back_bit_for_bit(path, tmp_path):
     out, again = tmp_path / "one.ifc", tmp_path / "two.ifc"
-    g = AngularGValue(np.radians([0, 31, 87]), np.radians([0, 90]), np.arange(6).reshape(3, 2) / 7)
+    g = g_table()
     bare = ShadingState("", {"Visible": klems(1), "Solar": klems(2)}, g, 1.1)
     blind = ShadingState("blind 45", {"Visible": tree()}, None, 0.1 + 0.2)
     assert attach(path, out, bare, Targets(every_window=True)) == 1
@@ -233,5 +242,38 @@ def test_the_same_command_gives_the_same_bytes(tmp_path, schema):
         texts.append((tmp_path / name).read_bytes())
     assert texts[0] == texts[1]
     attach(tmp_path / "a.ifc", again, state, Targets(every_window=True), bsdf_reference="blind.xml")
-    guids = [one.GlobalId for one in ifcopenshell.open(again).by_type("IfcRoot")]
+    assert again.read_bytes() == texts[0]  # attached twice: nothing is left of the first time
+    other = replace(state, name="blind", g_value=g_table(), bands={"Visible": klems(1)})
+    attach(again, again, other, Targets(every_window=True))
+    whole = again.read_bytes()
+    attach(again, again, other, Targets(every_window=True))
+    assert again.read_bytes() == whole
+    attach(again, again, replace(other, name="up"), Targets(every_window=True))
+    model = ifcopenshell.open(again)
+    guids = [one.GlobalId for one in model.by_type("IfcRoot")]
     assert len(set(guids)) == len(guids)
+    names = {one.Name for one in model.by_type("IfcPropertySet")}
+    assert names >= {set_name(name) for name in ("", "blind", "up")}
+
+
+def test_a_state_of_a_type_is_replaced_without_a_trace(tmp_path):
+    """Its set is taken off the type alone; a window that shares it with others has its own."""
+    path, out = tmp_path / "box.ifc", tmp_path / "out.ifc"
+    box_room("IFC4").write(str(path))
+    model = ifcopenshell.open(str(path))
+    (window,) = model.by_type("IfcWindow")
+    guid = ifcopenshell.guid.new()
+    kind = model.create_entity("IfcWindowType", guid, Name="fixed", PredefinedType="WINDOW",
+                               PartitioningType="SINGLE_PANEL")  # fmt: skip
+    relation = ifcopenshell.guid.new()
+    model.create_entity("IfcRelDefinesByType", relation, RelatedObjects=[window], RelatingType=kind)
+    model.write(str(path))
+    state = ShadingState("", u_value=1.1, g_normal=0.5)
+    attach(path, out, state, Targets(types=["fixed"]))
+    once = out.read_bytes()
+    attach(out, out, state, Targets(types=["fixed"]))
+    assert out.read_bytes() == once
+    attach(out, out, replace(state, u_value=0.8), Targets(types=["fixed"]))
+    (there,) = ifcopenshell.open(str(out)).by_guid(guid).HasPropertySets
+    assert there.Name == "BlackBox Model"
+    assert len(ifcopenshell.open(str(out)).by_type("IfcPropertySet")) == 1

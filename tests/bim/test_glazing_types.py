@@ -111,6 +111,19 @@ def window_type(inner: str) -> Callable:
     return build
 
 
+def window_opening(inner: str) -> Callable:
+    """A gbXML whose window has these children, and a window type of other values."""
+
+    def build(folder: Path) -> Building:
+        path, name = folder / "two.gbxml", "<Name>Window</Name>"
+        start, end = (gbxml().index(f"<{part}") for part in ("U-value", "/WindowType>"))
+        other = U.replace("1.1", "2.5") + G.replace(".5", ".3") + VISIBLE.replace("0.7", "0.4")
+        path.write_text((gbxml()[:start] + other + gbxml()[end:]).replace(name, name + inner))
+        return read_building_file(path)
+
+    return build
+
+
 def opening(kind: str) -> Callable:
     """A gbXML whose window is of that type of opening."""
 
@@ -207,6 +220,11 @@ CASES: dict[str, Callable] = {
     "U-value": window_type(U + G + VISIBLE),
     "Transmittance": window_type(U + G + VISIBLE),
     "Glaze with values": window_type(U + G + VISIBLE + PANES),
+    "Opening with values": window_opening(U + G + VISIBLE),
+    **{
+        kind: window_opening(U + G + VISIBLE + f"<{kind}>1</{kind}>")
+        for kind in ("ShadeControl", "GlazeConductivity", "Reflectance", "Emittance")
+    },
     "Glaze alone": window_type(PANES),
     "Frame": window_type(U + G + VISIBLE + '<Frame id="f"/>'),
     "Blind": window_type(U + G + VISIBLE + '<Blind id="b"/>'),

@@ -27,6 +27,7 @@ from tests.modules import MODULES
 FLAG = re.compile(r"\bcfs [a-z]|(?<![\w-])--[a-z]")
 WITHOUT_FLAGS = ("bim/bonsai/", "bim/report/__main__.py", "bim/to_radiance.py")
 GLASS = Issue("glass-between-rooms", "W1", {"element": "IfcWindow W1", "rooms": ("A", "B")})
+EFFECT = "daylight does not pass it; in the heat of rooms balanced together, sun does"
 
 
 def test_the_fix_is_for_the_layer_that_shows_it():
@@ -37,7 +38,7 @@ def test_the_fix_is_for_the_layer_that_shows_it():
 def test_a_template_is_translated_before_it_is_filled():
     german = {
         "{element} is glass between the rooms {rooms}": "{element} ist Glas zwischen {rooms}",
-        "it is taken as opaque": "gilt als undurchsichtig",
+        EFFECT: "gilt als undurchsichtig",
     }
     text = issue_text(GLASS, fill=lambda one, _, **values: german.get(one, one).format(**values))
     assert text.what == "IfcWindow W1 ist Glas zwischen A, B"
@@ -78,7 +79,7 @@ def test_rows_have_code_and_severity():
     (row,) = issue_rows([GLASS], "command")
     assert dict(zip(COLUMNS, row, strict=True)) == {
         "where": "W1", "what": "IfcWindow W1 is glass between the rooms A, B",
-        "consequence": "it is taken as opaque; --inner-glass lets daylight pass",
+        "consequence": f"{EFFECT}; --inner-glass lets daylight pass",
         "code": "glass-between-rooms", "severity": "loss",
     }  # fmt: skip
 

@@ -314,6 +314,9 @@ def test_a_fabric_behind_a_pane_is_a_layer_of_the_window(tmp_path):
     (tmp_path / "weave.cal").write_text("{ a cosine } tau(t) = t*abs(Rdot); t0 : .5;\n")
     cloth = CLOTH.format(tau="tau(.2*t0)", file="./elsewhere/weave.cal")
     building = read(tmp_path, "\n" + cloth + pane("blind", 0.1, (0, 4), (0, 3), "cloth"))
+    (wide,) = issue_of(building, "panes-before-wall")  # 4.48 m2 of panes before 12 m2 of fabric
+    assert wide.values["share"] == pytest.approx(100 * (1 - 4.48 / 12), abs=2)
+    assert wide.values["distance"] == pytest.approx(0.1)
     (window,) = building.windows
     assert window.name == "blind" and window.glass is None
     (state,) = window.states

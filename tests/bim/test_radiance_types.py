@@ -112,6 +112,19 @@ def scene_of(kind: str, use: str) -> str:
     return OFFICE + definition + f"\nsubject polygon thing\n0\n0\n{SHEET}\n"
 
 
+def test_every_type_of_radiance_is_in_the_table() -> None:
+    """Source: `otypes.h` of Radiance 6; `alias` has a test of its own."""
+    types = """
+        source polygon cone sphere ring cylinder cup bubble tube instance mesh plastic metal trans
+        interface plasfunc metfunc brightfunc brightdata brighttext colorpict glow light illum
+        spotlight mist mirror transfunc BRTDfunc BSDF aBSDF WGMDfunc plasdata metdata transdata
+        colorfunc antimatter colordata colortext texfunc texdata mixfunc mixdata mixtext mixpict
+        prism1 prism2 plastic2 metal2 trans2 ashik2 glass dielectric spectrum specfile specfunc
+        specdata specpict
+    """
+    assert {kind for kind, _, _ in rows()} == set(types.split())
+
+
 @pytest.mark.parametrize(("kind", "use", "status"), rows())
 def test_a_type_has_the_status_of_the_table(tmp_path, kind, use, status):
     klems = fabric_klems(FabricBand(0.2, 0.1, 0.3, 0.3))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -44,17 +45,20 @@ def test_a_room_comes_back(tmp_path, recess, frame):
     np.testing.assert_allclose(floor.normal, before.normal, atol=1e-6)
 
 
-def test_a_pane_is_within_its_face_and_polygons_of_no_area_for_honeybee_are_left_out():
-    """honeybee 1.64 takes a pane on the outline of its face as outside, and 10 cm2 as nothing."""
-    space = shoebox(4, 5, 3, windows=[WindowRectangle(0.5, 0.0, 3.0, 1.5)]).spaces[0]
+def test_a_pane_is_within_its_face_and_no_face_is_smaller_than_the_tolerance(tmp_path):
+    """honeybee 1.64 takes a pane on the outline of its face as outside, and 8 cm2 as nothing."""
+    box = shoebox(4, 5, 3, windows=[WindowRectangle(0.5, 0.0, 3.0, 1.5)])
+    (space,) = box.spaces
     corner = np.array([[[0, 0, 0], [0.04, 0, 0], [0.04, 0.04, 0]]], dtype=float)
     small = replace(space, faces=(*space.faces, replace(space.faces[0], triangles=corner)))
-    parts = hosted_polygons(small)
-    assert len(parts) == len(hosted_polygons(space))
-    ((_, pane),) = next(part.panes for part in parts if part.panes)
-    polygon = next(part.polygon for part in parts if part.panes)
-    assert pane.boundary.distance(polygon.boundary) > 0.9e-4
+    (part,) = [part for part in hosted_polygons(small) if part.panes]
+    ((_, pane),) = part.panes
+    assert pane.boundary.distance(part.polygon.boundary) > 0.9e-4
     assert pane.area == pytest.approx(4.5, rel=1e-4)
+    for spaces, tolerance in (((space,), 1e-3), ((small,), 1e-4)):
+        write_honeybee(replace(box, spaces=spaces), tmp_path / "box.hbjson")
+        model = json.loads((tmp_path / "box.hbjson").read_text())
+        assert model["tolerance"] == pytest.approx(tolerance)
 
 
 def test_what_stands_outdoors_comes_back(tmp_path):

@@ -14,6 +14,7 @@ from scenes.comply.assess import NOT_COMPUTED, assess_room, values_of
 from scenes.comply.findings import Findings, RoomHeat, calendar_of
 from scenes.comply.needs import LimitTable
 from scenes.comply.rules import NOT_MET, read_rule, rule_names
+from scenes.comply.tables import room_table
 from scenes.comply.uses import RoomUse
 from scenes.demo import WEATHER
 
@@ -192,3 +193,16 @@ def test_regions_of_din_4108_2(calendar, site, region):
     times = calendar.times.repeat(2)
     shorter = Findings(replace(calendar, step_h=0.5, times=times), heat=half)
     assert need.value(shorter) == pytest.approx(1200.0)
+
+
+def test_table_of_a_rule_without_verdict_has_its_quantities_and_limits(calendar):
+    rule, findings = read_rule("tm59"), Findings(calendar)
+    values = {"tm59": values_of(rule, findings, rule.parts)}
+    verdicts = assess_room(
+        {"tm59": rule}, values, shoebox().spaces[0], RoomUse("bedroom", True, "")
+    )
+    result, room = SimpleNamespace(rules={"tm59": rule}), SimpleNamespace(verdicts=verdicts)
+    rows = room_table(result, room, "tm59").rows
+    assert [row[-1] for row in rows] == [NOT_COMPUTED] * 2
+    assert all("hours per 100 h" in row[2] for row in rows)
+    assert [row[4] for row in rows] == ["met \u2264 3 h", "met \u2264 1 h"]

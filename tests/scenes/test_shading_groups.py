@@ -184,7 +184,7 @@ def test_sun_of_a_room_is_the_sum_over_its_groups(inputs, skies) -> None:
 
     def transmitted(*states: int) -> np.ndarray:
         hours = np.tile(states, (skies.hours, 1))
-        solar, gains = solar_gains(
+        solar, gains, _ = solar_gains(
             room, outdoors, surfaces.room, surfaces.outer, hours, thermals=surfaces.thermals
         )
         assert np.array_equal(solar.state, hours[:, room.windows.group])

@@ -135,3 +135,13 @@ def test_snow_counts_in_hours_of_any_light(weather):
         thin = replace(cold, snow_depth_cm=0.99 * depth)
         assert not with_albedo(thin, None).notes
     assert len(day) >= 100 and len(night) >= 300
+
+
+def test_gaps_are_counted_in_hours_and_snow_needs_temperatures(weather):
+    """Ten half hours are five hours; without temperatures no snow is credible."""
+    stated = np.full(8760, 0.3)
+    stated[100:110] = np.nan
+    halves = with_albedo(replace(weather, step_h=0.5, stated_albedo=stated), "file")
+    np.testing.assert_allclose(halves.albedo, 0.3)
+    bare = replace(snowed(weather), dry_bulb_c=None)
+    assert with_albedo(bare, None) is bare

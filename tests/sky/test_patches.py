@@ -99,3 +99,9 @@ def test_centres_and_solid_angles_are_those_of_reinsrc_cal(mf, radiance):
     theirs = np.frombuffer(run.stdout).reshape(-1, 4)
     np.testing.assert_allclose(sky.directions[1:-1], theirs[:, :3], atol=1e-12)
     np.testing.assert_allclose(sky.solid_angles[1:-1], theirs[:, 3], rtol=1e-12)
+
+
+@pytest.mark.parametrize("subdivision", [1, 2, 4])
+def test_the_zenith_lies_in_the_last_patch(subdivision):
+    sky = ReinhartSky(subdivision)
+    assert sky.index([[0.0, 0.0, 1.0], [1e-12, 0.0, 2.0]]).tolist() == [sky.size - 1] * 2

@@ -208,3 +208,8 @@ def test_radiances_formulas_by_hand():
     assert found[0] == pytest.approx(-np.cos(d) * np.sin(t))
     with pytest.raises(ValueError, match="sun model: expected one of"):
         sun.sun_directions(weather, model="other")
+
+
+def test_a_rotation_keeps_the_height_and_the_horizontal_part():
+    np.testing.assert_allclose(sun.rotated([[0.0, 0.0, 0.6]], 30.0), [[0.0, 0.0, 0.6]], atol=1e-15)
+    np.testing.assert_allclose(sun.rotated([0.0, 0.8, 0.6], 90.0), [-0.8, 0.0, 0.6], atol=1e-15)

@@ -120,6 +120,34 @@ class TracedGloss:
         return glossy, towards, dr.select(glossy, whole * factor, whole)
 
 
+class TracedPanes:
+    """Tables of the panes between rooms by triangle."""
+
+    def __init__(self, surfaces: Surfaces, windows: int) -> None:
+        """From triangles [N], followed by `windows` glazed ones."""
+        kinds = list(dict.fromkeys(filter(None, surfaces.transmittance)))
+        of_surface = np.zeros(int(surfaces.surface.max(initial=-1)) + 1, dtype=np.int64)
+        for number, values in enumerate(surfaces.transmittance[: len(of_surface)]):
+            of_surface[number] = 1 + kinds.index(values) if values else 0
+        kind = np.append(of_surface[surfaces.surface], np.zeros(windows, dtype=np.int64))
+        even = np.linspace(0.0, 1.0, STEPS)
+        table = [np.interp(even, np.linspace(0.0, 1.0, len(one)), one) for one in kinds]
+        self._kind = mi.UInt32(kind.astype(np.uint32))
+        self._table = mi.Float(np.concatenate([np.zeros(STEPS), *table]).astype(np.float32))
+
+    def is_pane(self, triangle: mi.UInt32, active: mi.Bool) -> mi.Bool:
+        """Whether a triangle transmits."""
+        return dr.gather(mi.UInt32, self._kind, triangle, active) > 0
+
+    def transmittance(self, triangle: mi.UInt32, cosine: mi.Float, active: mi.Bool) -> mi.Float:
+        """Transmittance of a triangle, 0 where it is opaque."""
+        kind = dr.gather(mi.UInt32, self._kind, triangle, active)
+        place = dr.clip(cosine, 0, 1) * (STEPS - 1)
+        low = cell(place, STEPS - 2)
+        a, b = (dr.gather(mi.Float, self._table, kind * STEPS + low + k, active) for k in (0, 1))
+        return dr.lerp(a, b, place - mi.Float(low))
+
+
 def reflected(
     normal: mi.Vector3f, direction: mi.Vector3f, alpha: mi.Float, u: mi.Point2f
 ) -> tuple[mi.Vector3f, mi.Float]:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, triangle_areas
-from mitsuba_cfs.trace.kernels.gloss import TracedGloss
+from mitsuba_cfs.trace.kernels.gloss import TracedGloss, TracedPanes
 from mitsuba_cfs.trace.kernels.mesh import (
     SharedScene,
     SolidMesh,
@@ -118,6 +118,9 @@ class TracedScene:
             TracedGloss(solid, normals[: len(solid.triangles)], len(glazed))
             if (solid.glossy)
             else None
+        )
+        self.panes = (
+            TracedPanes(solid, len(glazed)) if any(map(bool, solid.transmittance)) else None
         )
         self.scene: mi.Scene | SharedScene
         if mesh.is_shared:

@@ -40,16 +40,29 @@ def _absorption_kernel(
         active &= hit.is_valid()
         group = dr.gather(mi.Int32, tracer.group, hit.prim_index, active)
         surface = dr.gather(mi.UInt32, tracer.surface, hit.prim_index, active)
+        origin, towards = position, direction
         position, away, reflectance, _ = tracer.bounce(hit, position, direction, generator, active)
         last = depth + 1 >= max_depth
         slot = row * width + dr.select(group == OPAQUE, surface, F + mi.UInt32(group))
-        absorbed = dr.select(last, 1.0, 1 - reflectance)
+        transmittance, behind = mi.Float(0.0), mi.Bool(False)
+        if dr.hint(tracer.panes is not None, mode="scalar"):
+            normal = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, active)
+            cosine = dr.dot(normal, towards)
+            behind = active & (cosine < 0) & tracer.panes.is_pane(hit.prim_index, active)
+            transmittance = tracer.panes.transmittance(hit.prim_index, cosine, active)
+            left = reflectance + transmittance
+            through = behind | (generator.next_float32() * left < transmittance)
+            beyond = origin + towards * hit.t + dr.mulsign(normal, cosine) * tracer.epsilon
+            position = dr.select(through, beyond, position)
+            away = dr.select(through, towards, away)
+        passed = reflectance + transmittance
+        absorbed = dr.select(behind, 0.0, dr.select(last, 1.0, 1 - passed))
         dr.scatter_add(matrix, mi.Float64(beta * absorbed), slot, active)
-        active &= ~last
+        active &= behind | ~last
 
-        beta *= reflectance
+        beta *= dr.select(behind, 1.0, passed)
         direction = away
-        depth += 1
+        depth += dr.select(behind, mi.UInt32(0), mi.UInt32(1))
         survival = dr.select(depth > 3, dr.minimum(beta * 4.0, 1.0), 1.0)
         active &= (generator.next_float32() < survival) & (beta > 0)
         beta /= dr.maximum(survival, 1e-6)
@@ -75,7 +88,9 @@ def absorption_matrix(
 
     The first F columns are the surfaces, the last G the inner sides of the window groups: what
     they do not reflect, which is absorbed there or leaves the room.  Each row sums to 1 in a
-    closed room; what is missing has left through a gap.
+    closed room; what is missing has left through a gap.  Surfaces that transmit are panes between
+    rooms: a ray along their normal is reflected, absorbed or goes straight on; the pane of the
+    room beyond, which it meets against its normal, is the same glass and is passed freely.
 
     Args:
         surfaces: the room in the solar band; `surfaces.surface` names the F surfaces.

@@ -11,7 +11,7 @@
   const COLOURS = {
     floor: [0.76, 0.73, 0.68, 1], ceiling: [0.88, 0.88, 0.88, 1], wall: [0.86, 0.85, 0.82, 1],
     door: [0.66, 0.54, 0.42, 1], frame: [0.5, 0.52, 0.55, 1], glass: [0.35, 0.65, 0.95, 0.3],
-    furniture: [0.6, 0.55, 0.48, 1], outdoors: [0.55, 0.6, 0.66, 0.1],
+    furniture: [0.6, 0.55, 0.48, 1], outdoors: [0.55, 0.6, 0.66, 0.1], mark: [0.9, 0.1, 0.1, 1], before: [0.95, 0.45, 0.05, 0.18],
   };
   const see = { azimuth: -2.2, elevation: 0.62, distance: 1, target: [0, 0, 0], room: -1, layer: 0, storey: -1 };
 
@@ -55,8 +55,9 @@
     });
     return { p: new Float32Array(p), c: new Float32Array(c) };
   }
+  const shows = { outdoors: () => byId("outdoors").checked, mark: () => true, before: () => byId("before").checked };
   const visible = () => batches.filter((b) => (lifted() || !rise(b)) && (b.room < 0
-    ? byId("outdoors").checked : see.room < 0 || b.room === see.room));
+    ? shows[b.kind]() : see.room < 0 || b.room === see.room));
 
   // ---- camera
   function fit() {
@@ -281,7 +282,7 @@
   byId("out").addEventListener("click", () => zoom(1.25));
   byId("reset").addEventListener("click", reset);
   byId("top").addEventListener("click", () => { see.azimuth = -Math.PI / 2; see.elevation = 1.5707; fit(); repaint(); });
-  byId("outdoors").addEventListener("change", repaint);
+  for (const name of ["outdoors", "before"]) byId(name)?.addEventListener("change", repaint);
   byId("room").addEventListener("change", (event) => { see.room = Number(event.target.value); renderer.sensorsChanged(); fit(); repaint(); });
   byId("storey")?.addEventListener("change", (event) => {
     see.storey = Number(event.target.value);
@@ -291,7 +292,7 @@
     repaint();
   });
   byId("lift")?.addEventListener("change", () => { renderer.sensorsChanged(); fit(); repaint(); });
-  byId("layer").addEventListener("change", (event) => {
+  byId("layer")?.addEventListener("change", (event) => {
     see.layer = Number(event.target.value);
     [...byId("scales").children].forEach((box, i) => { box.hidden = i !== see.layer; });
     renderer.sensorsChanged();
