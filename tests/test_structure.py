@@ -251,6 +251,23 @@ def test_sound_signature_is_passed(source: str) -> None:
     assert not list(_long_signatures("bim/x.py", source))
 
 
+def _scenes_made(name: str, source: str) -> Iterator[str]:
+    """Mitsuba scenes that a module makes by itself."""
+    for node in ast.walk(_tree(source)):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("mi.load_dict", "mi.Scene"):
+            text = ast.unparse(node)
+            if "'type': 'scene'" in text or text.startswith("mi.Scene"):
+                yield f"{name}:{node.lineno}: `mitsuba_cfs.variants.load_scene` makes scenes"
+
+
+def test_all_scenes_share_one_shader_binding_table() -> None:
+    """Else a launch that traces two of them loses rays on CUDA."""
+    apart = ("mitsuba_cfs/variants.py", "scenes/commands/self_test.py")  # that traces one alone
+    sources = {n: s for n, s in SOURCES.items() if n not in apart}
+    assert not [fault for module in sources.items() for fault in _scenes_made(*module)]
+    assert list(_scenes_made("planted.py", "mi.load_dict({'type': 'scene', 'mesh': mesh})"))
+
+
 def test_no_test_is_timed() -> None:
     """Speed is a benchmark: a clock in a test makes it fail on a slow or busy machine."""
     tests = (REPOSITORY / "tests").rglob("test_*.py")

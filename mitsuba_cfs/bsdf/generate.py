@@ -61,16 +61,7 @@ class TracedLayer:
         self.refracts = any(sheet.index and not sheet.pane for sheet in sheets)
         self.has_panes = any(sheet.pane for sheet in sheets)
         self.passes = self.has_panes or any(sheet.straight for sheet in sheets)
-        self.scene = mi.load_dict({"type": "scene", "layer": _mesh(triangles)})
-
-
-def _mesh(triangles):
-    mesh = mi.Mesh("layer", 3 * len(triangles), len(triangles))
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = mi.Float(triangles.ravel().astype(np.float32))
-    parameters["faces"] = mi.UInt32(np.arange(3 * len(triangles), dtype=np.uint32))
-    parameters.update()
-    return mesh
+        self.scene = variants.load_scene(variants.triangle_mesh(triangles))
 
 
 @dr.syntax

@@ -101,7 +101,7 @@ def gains_table(monthly: pd.DataFrame) -> Table:
     columns = [Column(gettext("Month"), numeric=False, short=True)]
     columns += [Column(quantity(n).label, "kWh", quantity(n).meaning) for n in monthly]
     rows = [
-        (f"{month:%Y-%m}", *(cell(v, 0) for v in row))
+        (month.strftime("%Y-%m"), *(cell(v, 0) for v in row))
         for month, row in zip(monthly.index, monthly.to_numpy(), strict=True)
     ]
     rows.append((gettext("Sum"), *(cell(v, 0) for v in monthly.sum())))

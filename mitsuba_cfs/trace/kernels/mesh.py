@@ -7,6 +7,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs import variants
 from mitsuba_cfs.surfaces import triangle_areas
 from mitsuba_cfs.trace.kernels.sampling import opaque, opaque_vector
 
@@ -97,10 +98,4 @@ def unit_normals(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def scene_of(triangles: NDArray[np.float64]) -> mi.Scene:
     """A Mitsuba scene of one mesh of triangles [N, 3, 3] without shared vertices."""
-    n = len(triangles)
-    mesh = mi.Mesh("surfaces", vertex_count=3 * n, face_count=n)
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = mi.Float(triangles.reshape(-1).astype(np.float32))
-    parameters["faces"] = mi.UInt32(np.arange(3 * n, dtype=np.uint32))
-    parameters.update()
-    return mi.load_dict({"type": "scene", "mesh": mesh})
+    return variants.load_scene(variants.triangle_mesh(triangles))
