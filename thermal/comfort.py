@@ -192,12 +192,6 @@ def _months(hours: int) -> NDArray[np.int64]:
     return np.repeat(np.arange(1, 13), 24 * np.array(days))
 
 
-MET, GAGGE_MET = 58.15, 58.2  # [W/m2] of a seated person, in each source
-SKIN, CORE, BLOOD = 33.7, 36.8, 6.3  # neutral temperatures [degC], blood to the skin [L/(h m2)]
-BODY_AREA, BODY_MASS = 1.8258, 70.0  # [m2], [kg]
-CLOTH_TOLERANCE, MOST_ROUNDS = 1e-4, 150  # of the clothing's temperature [K]
-
-
 def pmv_ppd(
     air_c: ArrayLike,
     mrt_c: ArrayLike,
@@ -207,34 +201,18 @@ def pmv_ppd(
     metabolic_rate: float = 1.2,
     clothing: float = 0.5,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Predicted mean vote [H] and percentage dissatisfied [H].
+    """Predicted mean vote [H] and percentage dissatisfied [H] (ISO 7730, pythermalcomfort).
 
     humidity: relative [%]; metabolic_rate in met, clothing in clo.  Hours outside the standard's
     limits are computed all the same.
-
-    Source: ISO 7730:2005, 4.1, 5 and annex D.
     """
+    from pythermalcomfort.models import pmv_ppd_iso
+
     air, mrt, speed, moist = _surroundings(air_c, mrt_c, air_speed, humidity)
-    heat, insulation = metabolic_rate * MET, 0.155 * clothing  # [W/m2], [m2 K/W]
-    wider = 1.0 + 1.29 * insulation if insulation <= 0.078 else 1.05 + 0.645 * insulation
-    vapour = 10.0 * moist * np.exp(16.6536 - 4030.183 / (air + 235.0))  # [Pa]
-    radiant = 3.96e-8 * wider * (mrt + 273.0) ** 4
-    cloth = air + (35.5 - air) / (3.5 * (6.45 * insulation + 0.1))
-    for _ in range(MOST_ROUNDS):
-        before = cloth
-        film = np.maximum(2.38 * np.abs(cloth - air) ** 0.25, 12.1 * np.sqrt(speed))
-        # half of the step to the balance of the clothing, its radiation held
-        lost = 3.96e-8 * wider * (cloth + 273.0) ** 4 - radiant
-        aim = 35.7 - 0.028 * heat - insulation * lost
-        aim = (aim + insulation * wider * film * air) / (1.0 + insulation * wider * film)
-        cloth = 0.5 * (cloth + aim)
-        if np.abs(cloth - before).max(initial=0.0) < CLOTH_TOLERANCE:
-            break
-    skin = 3.05e-3 * (5733.0 - 6.99 * heat - vapour) + 0.42 * max(heat - MET, 0.0)
-    breath = 1.7e-5 * heat * (5867.0 - vapour) + 0.0014 * heat * (34.0 - air)
-    dry = 3.96e-8 * wider * (cloth + 273.0) ** 4 - radiant + wider * film * (cloth - air)
-    pmv = (0.303 * np.exp(-0.036 * heat) + 0.028) * (heat - skin - breath - dry)
-    return pmv, 100.0 - 95.0 * np.exp(-0.03353 * pmv**4 - 0.2179 * pmv**2)
+    result = pmv_ppd_iso(
+        tdb=air, tr=mrt, vr=speed, rh=moist, met=metabolic_rate, clo=clothing, **_PLAIN
+    )
+    return np.asarray(result.pmv, dtype=float), np.asarray(result.ppd, dtype=float)
 
 
 def standard_effective_temperature(
@@ -246,92 +224,15 @@ def standard_effective_temperature(
     metabolic_rate: float = 1.2,
     clothing: float = 0.5,
 ) -> NDArray[np.float64]:
-    """SET [H] [degC] of a standing person after an hour; arguments as for `pmv_ppd`.
+    """SET [H] [degC] (Gagge two-node model, pythermalcomfort); arguments as for `pmv_ppd`."""
+    from pythermalcomfort.models import set_tmp
 
-    Source: Gagge, Fobelets and Berglund 1986, ASHRAE Transactions 92 (2B); ANSI/ASHRAE 55-2020,
-    normative appendix D, with the sweat at the greatest wettedness of the paper.
-    """
     air, mrt, speed, moist = _surroundings(air_c, mrt_c, air_speed, humidity)
-    speed = np.maximum(speed, 0.1)
-    heat, insulation, wider = metabolic_rate * GAGGE_MET, 0.155 * clothing, 1.0 + 0.15 * clothing
-    clothed = clothing > 0.0
-    vapour = 0.01 * moist * _saturation(air)
-    wettest = 0.59 * speed**-0.08 if clothed else 0.38 * speed**-0.29
-    walking = 5.66 * max(metabolic_rate - 0.85, 0.0) ** 0.39
-    film = np.maximum(np.maximum(3.0, 8.600001 * speed**0.53), walking)
-    breath = 0.0023 * heat * (44.0 - vapour) + 0.0014 * heat * (34.0 - air)
-    skin, core = np.full_like(air, SKIN), np.full_like(air, CORE)
-    blood, share = np.full_like(air, BLOOD), np.full_like(air, 0.1)
-    produced, evaporated = np.full_like(air, heat), np.full_like(air, 0.1 * metabolic_rate)
-    radiant = np.full_like(air, 4.7)
-    for _ in range(59):  # minutes
-        around, cloth = 1.0 / (wider * (radiant + film)), None
-        for _ in range(MOST_ROUNDS):
-            felt = (radiant * mrt + film * air) / (radiant + film)
-            now = (around * skin + insulation * felt) / (around + insulation)
-            if cloth is not None and np.abs(now - cloth).max(initial=0.0) <= CLOTH_TOLERANCE:
-                break
-            cloth = now
-            radiant = 4.0 * 0.95 * 0.73 * 5.6697e-8 * (0.5 * (cloth + mrt) + 273.15) ** 3
-            around = 1.0 / (wider * (radiant + film))
-        dry = (skin - felt) / (around + insulation)
-        inner = (core - skin) * (5.28 + 1.163 * blood)
-        rate = BODY_AREA / (0.97 * BODY_MASS * 60.0)
-        step = (inner - dry - evaporated) * rate / share, (produced - inner - breath) * rate
-        skin, core = skin + step[0], core + step[1] / (1.0 - share)
-        cold = np.maximum(SKIN - skin, 0.0)
-        blood = (BLOOD + 120.0 * np.maximum(core - CORE, 0.0)) / (1.0 + 0.5 * cold)
-        blood = np.clip(blood, 0.5, 90.0)
-        warm = share * (skin - SKIN) + (1.0 - share) * core + share * SKIN - 0.1 * SKIN - 0.9 * CORE
-        sweat = 170.0 * np.maximum(warm, 0.0) * np.exp(np.maximum(skin - SKIN, 0.0) / 10.7)
-        sweat = 0.68 * np.minimum(sweat, 500.0)
-        through = 1.0 / (2.2 * wider * film) + insulation / (2.2 * (0.45 if clothed else 1.0))
-        most = (_saturation(skin) - vapour) / through
-        most = np.where(most == 0.0, 0.001, most)
-        wet = 0.06 + 0.94 * sweat / most
-        soaked, part = wet > wettest, (wettest - 0.06) / 0.94
-        diffused = np.where(soaked, 0.06 * (1.0 - part) * most, wet * most - sweat)
-        evaporated = np.where(most < 0.0, 0.0, np.where(soaked, part * most, sweat) + diffused)
-        wet = np.where(soaked | (most < 0.0), wettest, wet)
-        produced = heat + 19.4 * cold * np.maximum(CORE - core, 0.0)
-        share = 0.0417737 + 0.7451833 / (blood + 0.585417)
-    return _standard_temperature(skin, dry + evaporated, wet, radiant, metabolic_rate)
+    result = set_tmp(tdb=air, tr=mrt, v=speed, rh=moist, met=metabolic_rate, clo=clothing, **_PLAIN)
+    return np.asarray(result.set, dtype=float)
 
 
-def _standard_temperature(
-    skin: NDArray[np.float64],
-    lost: NDArray[np.float64],
-    wet: NDArray[np.float64],
-    radiant: NDArray[np.float64],
-    metabolic_rate: float,
-) -> NDArray[np.float64]:
-    """Air of the standard surroundings [degC] to which skin [degC] of a wettedness loses as much.
-
-    Args: lost: heat of the skin [W/m2]; radiant: its radiative coefficient [W/(m2 K)].
-    """
-    film = max(3.0, 5.66 * max(metabolic_rate - 0.85, 0.0) ** 0.39)
-    clothing = 1.52 / (metabolic_rate + 0.6944) - 0.1835
-    wider, whole = 1.0 + 0.25 * clothing, film + radiant
-    passed = 1.0 / (1.0 + 0.155 * wider * whole * clothing)
-    vapour = 0.45 * film / whole * (1.0 - passed) / (film / whole - 0.45 * passed)
-    dry = 1.0 / (1.0 / (wider * whole) + 0.155 * clothing)
-    moist = wet / (1.0 / (2.2 * wider * film) + 0.155 * clothing / (2.2 * vapour))
-    air = skin - lost / dry
-    for _ in range(MOST_ROUNDS):
-        pressure = _saturation(air)
-        excess = lost - dry * (skin - air) - moist * (_saturation(skin) - 0.5 * pressure)
-        slope = dry + 0.5 * moist * pressure * 4030.183 / (air + 235.0) ** 2
-        change = excess / slope
-        air = air - change
-        if np.abs(change).max(initial=0.0) < 1e-6:
-            break
-    return air
-
-
-def _saturation(temperature_c: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Vapour pressure at saturation [torr] (Antoine)."""
-    pressure: NDArray[np.float64] = np.exp(18.6686 - 4030.183 / (temperature_c + 235.0))
-    return pressure
+_PLAIN = {"limit_inputs": False, "round_output": False}
 
 
 def _surroundings(
