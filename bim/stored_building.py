@@ -1,12 +1,13 @@
-"""A building that was read, in the cache: reading its files again takes as long as tracing rooms.
+"""Buildings in the cache: reading IFC files takes as long as tracing rooms.
 
 The file holds arrays and JSON, and on reading no other classes than those of `RECORDS` are made.
-An object that occurs several times in a building (a construction, a gloss) does so again.
+An object that several parts of a building share (a construction, a gloss) is one object again.
 """
 
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -33,6 +34,7 @@ from bim.report.issue import Effect, Issue, Phrase
 from mitsuba_cfs.files import sha256
 from mitsuba_cfs.gloss import Gloss
 from mitsuba_cfs.matrices.cache import CacheEntry, MatrixCache
+from mitsuba_cfs.processes import ended_processes
 
 RECORDS = {
     kind.__name__: kind
@@ -44,7 +46,9 @@ RECORDS = {
 }  # fmt: skip
 PLAIN = (str, int, float, bool, type(None))
 SEQUENCES = {"tuple": tuple, "list": list}
-READER = "bim.ifc.building"  # the module that reads, whose source is a part of the key
+READER = "bim.building_file"  # the module that reads and stores; its source is a part of the key
+
+log = logging.getLogger(__name__)
 
 
 class _NotStored(Exception):
@@ -59,14 +63,18 @@ def read_once(
 ) -> Building:
     """The building of IFC files from the cache; read and stored where it is not in it.
 
+    It is not stored where a process of its reading was stopped or crashed: another time, with more
+    memory or less other work, the building may have what it lacks now.
+
     Args: options: of the reader, besides the files and the corrections beside them.
     """
     entry = _entry(files, options, cache)
     building = None if entry is None else entry.read(_restored)
     if building is None:
-        building = read()
+        with ended_processes() as ended:
+            building = read()
         # files that changed while they were read are not those of the key
-        if entry is not None and entry == _entry(files, options, cache):
+        if entry is not None and not ended and entry == _entry(files, options, cache):
             _store(entry, building)
     return building
 
@@ -87,8 +95,8 @@ def _entry(
 def _store(entry: CacheEntry, building: Building) -> None:
     try:
         entry.write(stored(building))
-    except _NotStored:
-        return
+    except _NotStored as error:
+        log.info("the building is not cached: it holds a %s", error)
 
 
 def stored(building: Building) -> dict[str, NDArray[Any]]:
@@ -120,7 +128,7 @@ def stored(building: Building) -> dict[str, NDArray[Any]]:
             return ["dict", *([plain(key), plain(one)] for key, one in value.items())]
         if kind.__name__ in SEQUENCES and kind is SEQUENCES[kind.__name__]:
             return [kind.__name__, *map(plain, value)]
-        raise _NotStored
+        raise _NotStored(kind.__name__)
 
     whole = plain(building)
     shapes = [[a.dtype.str, *a.shape] for a in arrays]

@@ -167,18 +167,6 @@ def pane_shares(
     return tau.mean(axis=0), rho.mean(axis=0)
 
 
-def transmissivity(transmittance: float, index: float = 1.52) -> float:
-    """Transmissivity, without its faces, of a pane of a transmittance at normal incidence.
-
-    The solution of t = (1 - r)2 a / (1 - r2 a2) for a; 1 where no pane transmits as much.
-    """
-    r = float(_fresnel(np.ones(1), index)[0, 0])
-    if transmittance <= 0:
-        return 0.0
-    root = np.sqrt((1 - r) ** 4 + 4 * (transmittance * r) ** 2)
-    return min(float((root - (1 - r) ** 2) / (2 * transmittance * r**2)), 1.0)
-
-
 def polarised_shares(
     cosine: ArrayLike, index: ArrayLike, transmissivity: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

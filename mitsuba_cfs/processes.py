@@ -13,8 +13,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextvars import ContextVar
 from multiprocessing import connection, get_context, parent_process
 from multiprocessing.process import BaseProcess
 from typing import Any, ClassVar
@@ -31,6 +32,20 @@ class ProcessEnded(RuntimeError):
     def __init__(self, reason: str, last: str) -> None:
         super().__init__(reason)
         self.last = last
+
+
+_ENDED: ContextVar[list[ProcessEnded] | None] = ContextVar("ended processes", default=None)
+
+
+@contextlib.contextmanager
+def ended_processes() -> Iterator[list[ProcessEnded]]:
+    """The processes of `answer_apart` that end without an answer within the block."""
+    ended: list[ProcessEnded] = []
+    token = _ENDED.set(ended)
+    try:
+        yield ended
+    finally:
+        _ENDED.reset(token)
 
 
 def process_pool(processes: int, begin: Callable[[], object] | None = None) -> ProcessPoolExecutor:
@@ -132,7 +147,10 @@ class _Apart:
             timer.cancel()
         if not answer.endswith("\n") or stopped.is_set():  # or it died in the midst of the line
             self.end()
-            raise ProcessEnded(_reason(process.returncode, stopped.is_set(), limit_s), last)
+            error = ProcessEnded(_reason(process.returncode, stopped.is_set(), limit_s), last)
+            if (ended := _ENDED.get()) is not None:
+                ended.append(error)
+            raise error
         return _unpacked(answer)
 
 

@@ -31,8 +31,9 @@ VARIABLE = "CFS_CACHE"  # environment variable with the folder
 DEFAULT_LIMIT = 4 << 30  # [bytes] of all files; the longest unused go first
 RECENT_HASHES = 32  # of dataclasses
 PLAIN = {type(None), bool, int, float, str, bytes}  # whose `repr` tells values apart
+# RuntimeError: of zipfile, for a damaged file that seems encrypted or otherwise compressed
 UNREADABLE = (
-    OSError, ValueError, KeyError, TypeError, IndexError, EOFError, MemoryError, RecursionError,
+    OSError, ValueError, KeyError, TypeError, IndexError, EOFError, MemoryError, RuntimeError,
     zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
 

@@ -189,11 +189,11 @@ def _with_peaks(systems: dict[str, States], overrides: WindowOverrides) -> dict[
         if not any(name in (s.name, *s.names) for s in known.values()):
             there = ", ".join(dict.fromkeys(name for s in known.values() for name in s.names))
             raise DataError(f"no system is {name!r}; there are {there}", field="--see-through")
+    stated = dict(overrides.see_through)
     for i, system in known.items():
-        stated = dict(overrides.see_through)
-        share = stated_share(
-            [stated.get(name) for name in dict.fromkeys((system.name, *system.names))]
-        )
+        share = stated.get(system.name)
+        if share is None:
+            share = stated_share([stated.get(name) for name in system.names])
         known[i] = system if share is None else with_see_through(system, share)
     return {guid: tuple(known[id(s)] for s in states) for guid, states in systems.items()}
 

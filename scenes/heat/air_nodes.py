@@ -88,7 +88,7 @@ def _merged(name: str, rooms: Sequence[RoomZone]) -> RoomZone:
     """The rooms as one, their parts in the order of the rooms."""
     moved = [room.space.label for room in rooms if room.alternatives is not None]
     if moved:
-        message = "a room of an air node has no temperature by which its shading could move"
+        message = "rooms of an air node cannot have shading by the room's temperature"
         raise DataError(message, element=moved[0], field="control.rule")
     first, areas = rooms[0], np.array([room.space.floor_area for room in rooms])
     lit = [room.daylight is not None for room in rooms]

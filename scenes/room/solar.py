@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from bim.defaults import ROOM_REFLECTANCE
 from bim.doorways import THINNEST, panes_between, reveals_between, rooms_through_panes, wall_depth
+from bim.fenestration import pane_transmissivity
 from bim.model import Face
 from bim.outer_faces import OuterFaces
 from bim.to_thermal import ThermalRoom
 from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.gloss import STEPS, Gloss, pane, pane_shares, transmissivity
+from mitsuba_cfs.gloss import STEPS, Gloss, pane, pane_shares
 from mitsuba_cfs.methods.light import hours_by_season, in_order_of_hours
 from mitsuba_cfs.methods.phase_matrices import (
     BATCHES,
@@ -368,7 +369,7 @@ def _pane_optics(face: Face) -> tuple[Gloss | None, tuple[float, ...]]:
     if face.pane is None or face.pane.is_open:
         return None, (1.0, 1.0)
     tau = face.pane.solar_transmittance
-    inner = transmissivity(SOLAR_CLEAR if tau is None else tau, GLASS_INDEX)
+    inner = pane_transmissivity(SOLAR_CLEAR if tau is None else tau, GLASS_INDEX)
     shares = pane_shares(np.linspace(0.0, 1.0, STEPS), GLASS_INDEX, inner)[0]
     return pane(GLASS_INDEX, inner), tuple(np.clip(shares, 0.0, 1.0).tolist())
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 
@@ -12,8 +13,10 @@ import pytest
 import bim.building_file
 from bim.building_file import ReadOptions, read_building_file
 from bim.shoebox import shoebox
-from bim.stored_building import _NotStored, _restored, stored
+from bim.stored_building import READER, _NotStored, _restored, stored
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.processes import ProcessEnded, each_apart
+from mitsuba_cfs.source_code import import_closure
 from scenes.demo import OFFICE
 
 
@@ -95,14 +98,36 @@ def test_a_file_that_changes_while_it_is_read_is_not_stored(office, cache, monke
     assert not list(cache.folder.glob("building-*"))
 
 
+def test_a_building_that_lacks_what_a_process_did_not_finish_is_not_stored(
+    office, cache, monkeypatch
+) -> None:
+    read = bim.building_file._read_ifc
+
+    def interrupted(path, options, progress):
+        assert isinstance(each_apart(time.sleep, [60.0], limit_s=0.2)[0], ProcessEnded)
+        return read(path, options, progress)
+
+    kind = replace(bim.building_file.IFC, reader=interrupted)
+    monkeypatch.setattr(bim.building_file, "IFC", kind)
+    monkeypatch.setattr(bim.building_file, "_format", lambda path: kind)
+    read_building_file(office, cache=cache)
+    assert not list(cache.folder.glob("building-*"))
+
+
+def test_the_sources_that_read_and_store_are_in_the_key() -> None:
+    assert {"bim.ifc.building", "bim.stored_building"} <= import_closure((READER,))
+
+
 def test_a_damaged_file_of_the_cache_is_read_from_its_source(office, cache, reads) -> None:
     first = read_building_file(office, cache=cache)
     [file] = cache.folder.glob("building-*")
-    for content in (b"", file.read_bytes()[:-400]):
+    other = bytearray(file.read_bytes())
+    other[other.index(b"PK\x01\x02") + 10] ^= 0xFF  # method of compression
+    for content in (b"", file.read_bytes()[:-400], other):
         file.write_bytes(content)
         assert same(first, read_building_file(office, cache=cache))
     np.savez(file, text=np.frombuffer(b'[["record", 0], [["Popen", 1]], []]', np.uint8), values=[])
-    assert same(first, read_building_file(office, cache=cache)) and len(reads) == 4
+    assert same(first, read_building_file(office, cache=cache)) and len(reads) == 5
 
 
 def test_an_object_that_is_no_record_is_not_stored() -> None:

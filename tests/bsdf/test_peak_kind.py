@@ -203,5 +203,6 @@ def test_the_user_says_what_the_peak_of_a_bsdf_between_panes_is(tmp_path):
     (tmp_path / "shade.toml").write_text('see_through = "lobe"\n')
     assert filled().visible.see_through == 0.0
     assert filled(("shade.xml", 0.5)).visible.see_through == 0.5
+    assert filled(("shade.xml", 0.4), ("glazing", 0.5)).visible.see_through == 0.5  # of the whole
     with pytest.raises(DataError, match=r"no system is .other\.xml.; there are shade\.xml"):
         filled(("other.xml", 1.0))

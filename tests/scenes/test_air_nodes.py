@@ -90,5 +90,5 @@ def test_a_room_whose_shading_follows_its_temperature_is_refused(variant, weathe
     rooms, links = _rooms(weather, skies, equal=True)
     alternatives = RoomAlternatives((TemperatureCondition(24.0, 22.0),), (rooms[0],) * 2)
     moved = [replace(rooms[0], alternatives=alternatives), rooms[1]]
-    with pytest.raises(DataError, match="no temperature by which its shading could move"):
+    with pytest.raises(DataError, match="cannot have shading by the room's temperature"):
         _one(moved, links)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bim.fenestration import pane_transmissivity
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.gloss import STEPS, pane, pane_shares, transmissivity
+from mitsuba_cfs.gloss import STEPS, pane, pane_shares
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 from mitsuba_cfs.trace.matrices.absorption import absorption_matrix
 
@@ -40,7 +41,7 @@ def absorbed(reflectance: float, *, through: bool, depth: float = 0.3) -> np.nda
     numbers = np.repeat(np.arange(12), [len(part) for part in triangles])
     panes = (BACK, 6 + FRONT)
     rho = np.array([0.0 if i in panes else reflectance for i in range(12)])
-    inner = transmissivity(TAU, INDEX)
+    inner = pane_transmissivity(TAU, INDEX)
     even = tuple(pane_shares(np.linspace(0, 1, STEPS), INDEX, inner)[0].tolist())
     surfaces = Surfaces(
         np.concatenate(triangles), rho[numbers], numbers,
@@ -56,7 +57,7 @@ def test_a_pane_transmits_by_angle_and_nothing_is_lost(variant) -> None:
     opaque, clear = absorbed(0.0, through=False), absorbed(0.0, through=True)
     np.testing.assert_allclose(clear.sum(axis=1), 1.0, atol=2e-4)
     assert opaque[:, 6:12].sum() == 0.0  # the room beyond is dark
-    inner = transmissivity(TAU, INDEX)
+    inner = pane_transmissivity(TAU, INDEX)
     cosine = np.cos(KLEMS_FULL.centres()[0])
     tau, rho = pane_shares(cosine, INDEX, inner)
     met = opaque[:, BACK] / (1 - rho)

@@ -21,9 +21,10 @@ import pandas as pd
 
 from bim import shoebox
 from bim.defaults import default_construction
+from bim.fenestration import pane_transmissivity
 from bim.model import Building, Face, Space, Window
 from bim.shoebox import WindowRectangle
-from mitsuba_cfs.gloss import pane_shares, transmissivity
+from mitsuba_cfs.gloss import pane_shares
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.demo import WEATHER
 from scenes.fenestration.resolver import StatedValues, glazing_system
@@ -161,7 +162,7 @@ def energyplus_model(case: str, outputs: dict[str, str]) -> Model:
     """The two rooms with an interior window."""
     depth, window, inner_pane = CASES[case]
     cosine = np.ones(1)
-    inner = transmissivity(SOLAR_CLEAR, GLASS_INDEX)
+    inner = pane_transmissivity(SOLAR_CLEAR, GLASS_INDEX)
     rho = float(pane_shares(cosine, GLASS_INDEX, inner)[1][0])
     glass = {"optical_data_type": "SpectralAverage", "thickness": 0.006, "conductivity": 1.0}
     glass |= {
