@@ -322,7 +322,7 @@ class EnvelopeTable(TomlTable):
 
 WEATHER_RULES = ("outdoor temperature", "wind", "rain")  # that need nothing computed
 ROOM_RULES = ("air temperature", "operative temperature")  # that the heat balance decides
-MOST_CONDITIONS = 4  # of a room: the balance chooses from two to their power
+MOST_CONDITIONS = 4  # n of a room: the heat balance chooses from 2^n alternatives
 
 
 class ShadingRule(TomlTable):

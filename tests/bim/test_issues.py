@@ -27,7 +27,7 @@ from tests.modules import MODULES
 FLAG = re.compile(r"\bcfs [a-z]|(?<![\w-])--[a-z]")
 WITHOUT_FLAGS = ("bim/bonsai/", "bim/report/__main__.py", "bim/to_radiance.py")
 GLASS = Issue("glass-between-rooms", "W1", {"element": "IfcWindow W1", "rooms": ("A", "B")})
-EFFECT = "daylight does not pass it; in the heat of rooms balanced together, sun does"
+EFFECT = "daylight does not pass it; in the coupled heat balance of both rooms, sun does"
 
 
 def test_the_fix_is_for_the_layer_that_shows_it():

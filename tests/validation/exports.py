@@ -2,7 +2,7 @@
 
     python -m tests.validation exports [FILES...] [--peers PYTHON] [--keep FOLDER]
 
-By default three buildings of ../shared/data/ifc/buildings.  `cfs ifc attach` gives U and g alone to
+By default four buildings of ../shared/data/ifc/buildings.  `cfs ifc attach` gives U and g alone to
 the windows that face south, and the demo's venetian blind (BSDF, U, g) to the others; `cfs export
 --tau` writes the three formats.  honeybee and OpenStudio are those of another Python (`pip install
 honeybee-energy honeybee-radiance honeybee-openstudio openstudio`): honeybee checks the model and
@@ -42,7 +42,9 @@ from scenes.fenestration_exports import known_fenestration
 from tests.benchmarks import radiance
 
 FOLDER = Path("../shared/data/ifc/buildings")
-FILES = ("Duplex_A_20110907.ifc", "AC20-FZK-Haus.ifc", "House_Renga.ifc")
+FILES = (
+    "Duplex_A_20110907.ifc", "AC20-FZK-Haus.ifc", "House_Renga.ifc", "SampleHouse4_Revit_IFC4.ifc",
+)  # fmt: skip
 U_VALUE, G_VALUE, VISIBLE = 1.1, 0.5, 0.7  # of the windows without a BSDF
 SOUTH, OTHERS = "134-226", "226-134"  # azimuths [deg]
 DAYS = 2
