@@ -47,7 +47,7 @@ UNCUT = 100_000  # columns of a table that nobody sees
     "author of the model.",
 )
 @click.option(
-    "--page",
+    "--html",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.html",
     help="Also write a page: the 3D model with a mark at each leak, the rooms without the "
@@ -55,7 +55,7 @@ UNCUT = 100_000  # columns of a table that nobody sees
 )
 @no_cache_option
 def command(
-    issues: Path | None, fix: Path | None, bcf: Path | None, page: Path | None, **chosen
+    issues: Path | None, fix: Path | None, bcf: Path | None, html: Path | None, **chosen
 ) -> None:
     """List rooms, windows and problems of a building model as the simulation reads them.
 
@@ -76,8 +76,8 @@ def command(
     if bcf is not None:
         check_is_ifc(options.building, "--bcf")
         check_file(bcf, field="--bcf", inputs=options.building_files)
-    if page is not None:
-        check_file(page, field="--page", inputs=options.building_files)
+    if html is not None:
+        check_file(html, field="--html", inputs=options.building_files)
     from rich.console import Console
 
     from bim.building_file import named_spaces
@@ -115,13 +115,13 @@ def command(
         from bim.bcf import write_bcf
 
         console.print(f"{bcf}: topics: {write_bcf(read, bcf)}", markup=False, highlight=False)
-    if page is not None:
+    if html is not None:
         from scenes.report.page import write_check
 
         with ProgressBar() as progress:
             before = _uncorrected(options, progress)
-        write_check(read, head.model, page, before)
-        console.print(f"page: {page}", markup=False, highlight=False)
+        write_check(read, head.model, html, before)
+        console.print(f"page: {html}", markup=False, highlight=False)
     if issues is not None:
         import pandas as pd
 

@@ -63,7 +63,7 @@ def test_a_cell_passes_what_rtrace_finds(variant, tmp_path, name):
     pytest.importorskip("pyradiance")
     (tmp_path / "cell.rad").write_text(CELLS[name])
     layer, notes = read_radiance_layer(tmp_path / "cell.rad", PERIOD)
-    assert bool(notes) == (name == "pattern")
+    assert not notes  # the pattern is uniform
     bsdf = generate_klems(layer, KLEMS_QUARTER, samples=32_768).bsdf[0]
     share = float(bsdf.direct_hemispherical(bsdf.transmission_back)[0])
     expected, error = traced_by_radiance(tmp_path)

@@ -18,7 +18,7 @@ from tests.issues import of_code
 
 
 def page_data(path, out) -> dict:
-    result = CliRunner().invoke(command, ["check", str(path), "--page", str(out)])
+    result = CliRunner().invoke(command, ["check", str(path), "--html", str(out)])
     assert result.exit_code == 0 and f"page: {out}" in result.output
     found = re.search(r'id="viewer-data">(.*?)</script>', out.read_text("utf-8"), re.DOTALL)
     return json.loads(found[1])

@@ -64,7 +64,8 @@ def test_each_hour_is_that_of_its_state(variant, skies, tmp_path, monkeypatch) -
         def none(*_: object, **__: object) -> None:
             raise AssertionError("the pictures were made again")
 
-        patched.setattr(glare, "pictures_in_state", none)
+        for makes in ("pictures_in_state", "pictures_by_state"):
+            patched.setattr(glare, makes, none)
         read = rated(skies, folder, (up, down), moves)
         for states, width in (((up, other), 2.0), ((up, down), 1.5)):
             with pytest.raises(AssertionError, match="made again"):
