@@ -10,7 +10,7 @@ import click
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, write_table, write_text
-from scenes.commands.room_options import check_is_ifc, input_options
+from scenes.commands.room_options import check_is_ifc, input_options, no_cache_option
 from scenes.input_options import InputOptions
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ UNCUT = 100_000  # columns of a table that nobody sees
     help="Also write a page: the 3D model with a mark at each leak, the rooms without the "
     "corrections beside those with them, and the problems.",
 )
+@no_cache_option
 def command(
     issues: Path | None, fix: Path | None, bcf: Path | None, html: Path | None, **chosen
 ) -> None:

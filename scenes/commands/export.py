@@ -19,6 +19,7 @@ from scenes.commands.room_options import (
     PrintedHead,
     height_option,
     input_options,
+    no_cache_option,
     spacing_option,
     subdivision_option,
 )
@@ -68,6 +69,7 @@ PATTERNS = {  # of the files that an export writes
 @spacing_option
 @height_option
 @subdivision_option
+@no_cache_option
 def command(
     *,
     radiance: Path | None,

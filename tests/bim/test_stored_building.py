@@ -17,6 +17,7 @@ from bim.stored_building import READER, _NotStored, _restored, stored
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.processes import ProcessEnded, each_apart
 from mitsuba_cfs.source_code import import_closure
+from scenes.cli import run
 from scenes.demo import OFFICE
 
 
@@ -128,6 +129,15 @@ def test_a_damaged_file_of_the_cache_is_read_from_its_source(office, cache, read
         assert same(first, read_building_file(office, cache=cache))
     np.savez(file, text=np.frombuffer(b'[["record", 0], [["Popen", 1]], []]', np.uint8), values=[])
     assert same(first, read_building_file(office, cache=cache)) and len(reads) == 5
+
+
+@pytest.mark.parametrize("more", [["check"], ["export", "--gltf", "office.glb"]])
+def test_commands_read_again_with_no_cache(office, tmp_path, monkeypatch, more) -> None:
+    monkeypatch.setenv("CFS_CACHE", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    for option, stored_files in (["--no-cache"], 0), ([], 1):
+        assert run([*more, str(office), *option]) == 0
+        assert len([*tmp_path.glob("cache/building-*")]) == stored_files
 
 
 def test_an_object_that_is_no_record_is_not_stored() -> None:
