@@ -48,7 +48,11 @@ def cut_rooms(
     result, issues = list(records), []
     for index, part in zip(through, largest_parts(items), strict=True):
         record = records[index]
-        if part is None or isinstance(part, ProcessEnded):
+        if isinstance(part, ProcessEnded):
+            values = {"room": record.label, "reason": str(part)}
+            issues.append(Issue("room-not-cut", record.guid, values))
+            continue
+        if part is None:
             continue
         solid = room_solid(record.guid, record.solid.name, unpacked(part))
         after = solid.manifold.volume()

@@ -7,8 +7,10 @@ import ifcopenshell.guid
 import numpy as np
 import pytest
 
+from bim.ifc import cut_rooms
 from bim.ifc.building import read_ifc
 from bim.ifc.north import north_rotation
+from mitsuba_cfs.processes import ProcessEnded
 from tests.bim.small_ifc import DEPTH, HEIGHT, WALL, WIDTH, box_model, empty_project
 from tests.issues import codes, of_code
 
@@ -79,6 +81,15 @@ def test_a_space_through_its_roof_is_cut_there(tmp_path):
     (issue,) = of_code(building, "room-cut")
     assert issue.values["before"] == pytest.approx(WIDTH * DEPTH * (HEIGHT + 1), abs=0.01)
     assert any(face.kind == "roof" and face.element is not None for face in space.faces)
+
+
+def test_a_space_whose_cut_ends_its_process_is_named(tmp_path, monkeypatch):
+    ended = ProcessEnded("killed by signal 9", "")
+    monkeypatch.setattr(cut_rooms, "largest_parts", lambda items: [ended for _ in items])
+    building = _read(box_model(space_height=HEIGHT + 1.0)[0], tmp_path)
+    (issue,) = of_code(building, "room-not-cut")
+    assert issue.values["reason"] == str(ended)
+    assert "room-cut" not in codes(building)
 
 
 def test_a_gallery_cuts_nothing(tmp_path):
