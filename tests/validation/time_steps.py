@@ -18,6 +18,20 @@ from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
 from thermal.comfort import degree_hours
 
+TWO_PANES = """
+[[system]]
+[[system.layers]]
+thickness = 0.006
+conductivity = 0.9
+solar = [%s]
+gap = { width = 0.016, gas = { argon = 0.9, air = 0.1 } }
+[[system.layers]]
+thickness = 0.006
+conductivity = 0.9
+emissivity = [0.05, 0.84]
+solar = [0.60, 0.22, 0.17]
+"""
+GLAZING = TWO_PANES % "0.775, 0.071, 0.071"
 ROOM = """weather = "{epw}"
 step_minutes = {minutes}
 [box]
@@ -36,17 +50,6 @@ x = 0.5
 sill = 0.9
 width = 3.0
 height = 1.5
-[[system]]
-[[system.layers]]
-thickness = 0.006
-conductivity = 0.9
-solar = [0.775, 0.071, 0.071]
-gap = {{ width = 0.016, gas = {{ argon = 0.9, air = 0.1 }} }}
-[[system.layers]]
-thickness = 0.006
-conductivity = 0.9
-emissivity = [0.05, 0.84]
-solar = [0.60, 0.22, 0.17]
 [gains]
 persons = 2
 equipment_w_m2 = 10
@@ -62,19 +65,8 @@ SLAB = (
     "cooling_c = 25\ncooling_w_m2 = 40\n"
 )
 WINDOWS = "[air.windows]\nshare = 0.1\nopen_above_c = 24\nclose_below_c = 22\n"
-# a second state: the outer pane tinted (electrochromic)
+TINTED = TWO_PANES % "0.08, 0.07, 0.07"  # a second state: the outer pane (electrochromic)
 SHADED = """
-[[system]]
-[[system.layers]]
-thickness = 0.006
-conductivity = 0.9
-solar = [0.08, 0.07, 0.07]
-gap = {{ width = 0.016, gas = {{ argon = 0.9, air = 0.1 }} }}
-[[system.layers]]
-thickness = 0.006
-conductivity = 0.9
-emissivity = [0.05, 0.84]
-solar = [0.60, 0.22, 0.17]
 [control]
 rule = "all"
 parts = [{{ rule = "irradiance", close_above = 100 }},
@@ -88,9 +80,9 @@ CONTROLS = {
     "opened windows": AIR + WINDOWS + HEATED,
     "hybrid ventilation": (f"{FAN}{WINDOWS}hybrid = true\nnight_share = 0.03\n{LOADS}"),
     "opened windows, operative": f'{AIR}{WINDOWS}temperature = "operative"\n{HEATED}',
-    "shading, air": AIR + LOADS + SHADED.format("air temperature"),
-    "shading, operative": AIR + LOADS + SHADED.format("operative temperature"),
-    "shading and windows": AIR + WINDOWS + HEATED + SHADED.format("operative temperature"),
+    "shading, air": AIR + LOADS + TINTED + SHADED.format("air temperature"),
+    "shading, operative": AIR + LOADS + TINTED + SHADED.format("operative temperature"),
+    "shading and windows": AIR + WINDOWS + HEATED + TINTED + SHADED.format("operative temperature"),
     "air by night": f"{AIR}night_ach = 3\nnight = [22, 6]\n{LOADS}",
     "heat recovery": FAN + LOADS,
     "heat recovery with bypass": f"{FAN}bypass_above_c = 23\n{HEATED}",
@@ -116,7 +108,7 @@ def main(folder: Path, *, epw: Path, minutes: Sequence[int] = (20, 10, 5)) -> pd
         years = []
         for step in minutes:
             study = folder / f"{control} {step}.toml"
-            text = ROOM.format(epw=epw.resolve().as_posix(), minutes=step) + tables
+            text = ROOM.format(epw=epw.resolve().as_posix(), minutes=step) + GLAZING + tables
             study.write_text(text, encoding="utf-8")
             years.append(_figures(study))
         row: dict[str, object] = {"control": control}
