@@ -58,6 +58,7 @@ def read_ifc(
     join: Sequence[str] = (),
     furniture: bool = False,
     rooms: Sequence[str] = (),
+    storeys: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Building:
     """The building in an IFC2X3, IFC4 or IFC4X3 file (.ifc, .ifczip).
@@ -71,6 +72,7 @@ def read_ifc(
         furniture: whether furniture is part of the light and views of its room.
         rooms: names that are asked for: where no name in the file is like one of them, it is
             refused before any geometry is read.
+        storeys: names of those that are read, with the next above and below; none: all.
         progress: called with the stage's name and the fraction of it that is done.
 
     Raises: `DataError` where the file is missing or is no readable IFC; faults inside the model are
@@ -78,7 +80,7 @@ def read_ifc(
     """
     tell = progress or (lambda stage, fraction: None)
     corrections = corrections_beside(path, join) if corrections is None else corrections
-    source = read_source(path, corrections, tell, linked, rooms=rooms)
+    source = read_source(path, corrections, tell, linked, rooms=rooms, storeys=storeys)
     tell("rooms", 0.0)
     mesh = mesh_of(source.walls)
     drawn, issues = _rooms(source, mesh, lambda part: tell("rooms", SEARCH * part))
