@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from os import PathLike
+from typing import Any
 
 import ifcopenshell
 import ifcopenshell.util.placement
@@ -18,10 +19,10 @@ from numpy.typing import NDArray
 from bim.ifc.damage import Damage, placement_of
 from bim.ifc.project import length_scale, storey_of, storeys_in
 from bim.names import listed
-from bim.report.issue import Issue
+from bim.report.issue import Issue, Phrase
 from mitsuba_cfs.errors import DataError
 
-Entity = ifcopenshell.entity_instance
+Entity = Any  # of ifcopenshell, which has no types
 STOREY = 2.0  # levels that lie nearer are half storeys, floor finishes or wall tops [m]
 DEEPEST = 20  # operands of operands of a body
 
@@ -62,9 +63,10 @@ def keep_storeys(
             left_out[product.id()] = answer
         return left_out[product.id()]
 
-    removed = [product for product in model.by_type("IfcProduct") if is_left_out(product)]
+    products: list[Entity] = list(model.by_type("IfcProduct"))
+    removed = [product for product in products if is_left_out(product)]
     spaces = sum(product.is_a("IfcSpace") for product in removed)
-    values = {
+    values: dict[str, int | tuple[str | Phrase, ...]] = {
         "storeys": tuple(storey.Name or "" for storey in chosen),
         "near": tuple(sorted(near - {storey.Name or "" for storey in chosen})),
         "elements": sum(product.is_a("IfcElement") for product in removed),
