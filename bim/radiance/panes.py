@@ -14,7 +14,7 @@ from bim.radiance.materials import SYSTEMS
 from bim.radiance.patterns import TURNS
 from bim.radiance.scene import RadianceObject, RadianceScene
 from bim.rays import hemisphere, ray_mesh
-from bim.report.issue import Effect, Issue
+from bim.report.issue import Effect, Issue, area_words
 from mitsuba_cfs.bsdf.angular import ANGLES
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.surfaces import WindowSurface, even_numbers, points_on_triangles, triangle_areas
@@ -356,6 +356,6 @@ def _is_wide(thing: RadianceObject) -> bool:
 
 
 def _left_out(thing: RadianceObject) -> Issue:
-    material, area = thing.material, float(triangle_areas(thing.triangles).sum())
+    material, area = thing.material, area_words(float(triangle_areas(thing.triangles).sum()))
     values = {"surface": thing.name, "material": material.name, "type": material.kind, "area": area}
     return Issue("clear-surface-left-out", f"{thing.primitive.file}:{thing.primitive.line}", values)
