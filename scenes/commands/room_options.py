@@ -115,7 +115,7 @@ join_option = click.option(
     help="Merge rooms that are open to each other; 'open' (IFC): wherever the opening is no door.",
 )
 storey_option = click.option(
-    "--storey",
+    "--only-storey",
     "storeys",
     multiple=True,
     metavar="NAME",
