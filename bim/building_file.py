@@ -332,7 +332,8 @@ def _read_gbxml(path: Path, options: ReadOptions, progress: Progress) -> Buildin
 
 
 FLAGS = {
-    "join": "join", "apertures": "aperture", "facade_panes": "facade-pane", "storeys": "only-storey",
+    "join": "join", "apertures": "aperture", "facade_panes": "facade-pane",
+    "storeys": "only-storey",
 }  # fmt: skip
 UNREAD = {  # by suffix: what it is, and the file to give instead
     ".oct": "is a Radiance octree; give the scene files (.rad) that it was made of",
