@@ -116,7 +116,7 @@ join_option = click.option(
 )
 storey_option = click.option(
     "--only-storey",
-    "storeys",
+    "only_storeys",
     multiple=True,
     metavar="NAME",
     help="Read this storey of an IFC model, with the next above and below; its rooms only.",
