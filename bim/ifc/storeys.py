@@ -111,7 +111,7 @@ def _named(storeys: Collection[Entity], name: str, file: str | PathLike[str]) ->
     if not of_name:
         there = listed(name, (storey.Name or "" for storey in storeys))
         message = f"no storey {name!r}; there are: {there}"
-        raise DataError(message, file=file, field="--only-storey")
+        raise DataError(message, file=file, field="storey")
     return of_name
 
 
