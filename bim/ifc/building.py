@@ -14,6 +14,7 @@ import shapely
 
 from bim.bodies import Bodies
 from bim.boundaries import ElementRecord, Finishes, faces_and_windows, floor_area
+from bim.boxes import Boxes
 from bim.defaults import CLEAR_GLAZING
 from bim.fenestration import ShadingState
 from bim.ifc.accounting import account_of
@@ -106,10 +107,11 @@ def read_ifc(
     by_room = [[a for a in attached if a.room == r.guid] for r in records]
     boundaries = room_boundaries([(r.solid, a) for r, a in zip(records, by_room, strict=True)])
     spaces: list[Space] = []
+    boxes = Boxes.of([record.solid for record in records])
     for index, boundary in enumerate(boundaries):
         tell("rooms", SEARCH + (1 - SEARCH) * index / len(records))
         of_boundary, more = _space(
-            index, boundary, records, around, elements=elements, finishes=finishes
+            index, boundary, records, around, boxes=boxes, elements=elements, finishes=finishes
         )
         spaces += of_boundary
         issues += more
@@ -279,6 +281,7 @@ def _closed_space(
     records: Sequence[SpaceRecord],
     around: Surroundings,
     *,
+    boxes: Boxes,
     elements: Sequence[ElementRecord],
     finishes: Finishes,
 ) -> tuple[Space, list[Issue]]:
@@ -286,7 +289,7 @@ def _closed_space(
     record = records[index]
     others = [other.solid for other in records]
     try:
-        pieces = cut_by_neighbours(record.solid, boundary.pieces, others)
+        pieces = cut_by_neighbours(record.solid, boundary.pieces, others, boxes)
     except shapely.errors.ShapelyError as error:
         raise RoomError(f"its neighbours cannot be cut out: {error}") from error
     beyond = [
