@@ -33,7 +33,7 @@ LABELS = {
 }
 TREES = "trees-by-month"
 NOTED = ("rooms-joined-by-size", TREES)  # codes of issues that are notes of a result's pages
-SHOWN = 8  # kinds of issues of a severity that a head lists
+SHOWN = 8  # kinds of issues of a severity that a head lists; of what is left out it lists all
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
 
 
@@ -189,16 +189,16 @@ def model_lines(building: Building) -> tuple[str, ...]:
 def _issue_lines(issues: Iterable[Issue], severity: str, audience: Audience) -> list[str]:
     """The issues of a severity by kind, the largest glass area first."""
     kinds = ranked([issue for issue in issues if issue.severity == severity])
-    lines = [_issue_line(kind, audience) for kind in kinds[:SHOWN]]
-    if len(kinds) > SHOWN:
-        count = sum(one.count for one in kinds[SHOWN:])
-        lines.append(
-            Note(
-                "{count} more (other kinds: {kinds}); cfs check lists all",
-                count=count,
-                kinds=len(kinds) - SHOWN,
-            )
+    shown = len(kinds) if severity == "loss" else SHOWN
+    lines = [_issue_line(kind, audience) for kind in kinds[:shown]]
+    rest = kinds[shown:]
+    if rest:
+        more = Note(
+            "{count} more problems: cfs check lists all",
+            "{count} more problem: cfs check lists all",
+            count=sum(one.count for one in rest),
         )
+        lines.append(_with_glass(more, sum(one.glass for one in rest)))
     return lines
 
 
@@ -209,9 +209,12 @@ def _issue_line(one: Ranked, audience: Audience) -> str:
         line = Note("{what}: {effect}; {fix}", fix=text.fix, **parts)
     else:
         line = Note("{what}: {effect}", **parts)
-    if not one.glass:
-        return line
-    return Note("{line} ({area:.2f} m2 of glass)", line=line, area=one.glass)
+    return _with_glass(line, one.glass)
+
+
+def _with_glass(line: Note, area: float) -> Note:
+    """A line with the area of the glass that it concerns [m2], where there is one."""
+    return Note("{line} ({area:.2f} m2 of glass)", line=line, area=area) if area else line
 
 
 def model_notes(building: Building) -> tuple[str, ...]:

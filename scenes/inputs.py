@@ -29,6 +29,7 @@ from scenes.room.operation import (
     check_schedules,
     check_states,
     stated_note,
+    unstated_note,
     used_operation,
 )
 from scenes.room.windows import traced_building
@@ -145,6 +146,11 @@ def inputs_of(
         check_schedules(used.tables, files.weather, used.file)
     notes = (
         *stated_note(building, "" if operation is None else operation.file.name),
+        *(
+            ()
+            if operation is None
+            else unstated_note(operation.tables, building, operation.file.name)
+        ),
         *_state_notes(options, operation, filled, systems, building),
     )
     building = traced_building(building, systems)

@@ -147,12 +147,13 @@ def _driven(
 
 
 def _condition_limits(controls: Sequence[TemperatureControl | None]) -> FloatArray:
-    """Limits of the conditions of all zones [Z, K, 3]; those that a zone lacks are never met."""
+    """Limits of the conditions of all zones [Z, K, 5]; those that a zone lacks are never met."""
     most = max((len(c.conditions) for c in controls if c is not None), default=0)
-    limits = np.full((len(controls), most, 3), np.inf)
+    limits = np.full((len(controls), most, 5), np.inf)
     for z, control in enumerate(controls):
         for k, one in enumerate(control.conditions if control else ()):
-            limits[z, k] = one.above_c, one.below_c, one.operative
+            waits = one.open_delay_rows, one.hold_rows
+            limits[z, k] = one.above_c, one.below_c, one.operative, *waits
     return limits
 
 
@@ -271,6 +272,7 @@ def _set_points(
 
 HOUR = 3600.0  # [s]
 AIR_GAS_CONSTANT = 287.055  # [J/(kg K)]
+LONG_AGO = 1 << 40  # rows: before the first
 STRETCH = 744  # rows, a month of hours: the part of all zones in memory at a time
 
 
@@ -544,6 +546,8 @@ def _start(net: Network, conditions: tuple[int, int], start_c: float) -> records
         load=np.zeros(zones),
         opened=np.zeros(zones, dtype=np.bool_),
         met=np.zeros(conditions, dtype=np.bool_),
+        warm=np.zeros(conditions, dtype=np.bool_),
+        since=np.full((*conditions, 2), LONG_AGO),
     )
 
 

@@ -87,6 +87,8 @@ class TemperatureCondition:
     above_c: float
     below_c: float
     operative: bool = False  # else of the air
+    open_delay_rows: int = 0  # hours that it stays met after the temperature has left it: `delayed`
+    hold_rows: int = 0  # least number of hours between two changes: `held`
 
     def __post_init__(self) -> None:
         fits = self.below_c <= self.above_c

@@ -129,11 +129,16 @@ def _take_alternative(
         for k in range(some.limits.shape[1]):
             before += state.met[z, k] << k
         for k in range(some.limits.shape[1]):
-            above, below, operative = some.limits[z, k]
+            above, below, operative, stays, holds = some.limits[z, k]
             felt = state.air[z]
             if operative > 0.0:
                 felt = 0.5 * (felt + mean_radiant(net, state, some.mix[before, hour, z], z))
-            state.met[z, k] = felt > above or (state.met[z, k] and felt >= below)
+            since = state.since[z, k]
+            state.warm[z, k] = felt > above or (state.warm[z, k] and felt >= below)
+            since[0] = 0 if state.warm[z, k] else since[0] + 1
+            since[1] += 1
+            if (since[0] <= stays) != state.met[z, k] and since[1] >= holds:
+                state.met[z, k], since[1] = not state.met[z, k], 0
             now += state.met[z, k] << k
         taken[z] = now
         drive.mix[hour, z] = some.mix[now, hour, z]

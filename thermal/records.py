@@ -50,7 +50,9 @@ class Alternatives(NamedTuple):
     Bit k of an alternative's number is set where condition K of the zone's temperature is met.
     """
 
-    limits: NDArray[np.float64]  # [Z, K, 3] met above, until below [degC]; 1: operative, 0: air
+    # [Z, K, 5] met above, until below [degC]; 1: operative, 0: air; rows that it stays met after
+    # that, rows between two changes
+    limits: NDArray[np.float64]
     inner: NDArray[np.float64]  # [A, R, N]
     outer: NDArray[np.float64]  # [A, R, N]
     air: NDArray[np.float64]  # [A, R, Z]
@@ -96,6 +98,8 @@ class State(NamedTuple):
     load: NDArray[np.float64]  # [Z] ideal load of the step [W], heating positive
     opened: NDArray[np.bool_]  # [Z] whether the windows are open
     met: NDArray[np.bool_]  # [Z, K] conditions of `Alternatives`
+    warm: NDArray[np.bool_]  # [Z, K] what they would be without waiting
+    since: NDArray[np.int64]  # [Z, K, 2] rows since that was true, since they changed
 
 
 class Workspace(NamedTuple):

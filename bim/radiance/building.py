@@ -92,7 +92,7 @@ def _window(name: str, window: PanedWindow, issues: dict[Issue, None]) -> Window
     triangles, glass = window.surface.triangles, plain_glass(window.panes, window.beside)
     states, up = (), None
     if glass is None:
-        layered = layered_window(window.panes, window.outwards, window.beside)
+        layered = layered_window(window.panes, window.outwards, window.beside, window.facing)
         states, up = (layered.state,), layered.up
         issues |= dict.fromkeys(layered.issues)
     return Window(

@@ -87,12 +87,14 @@ def layered_window(
     things: Sequence[RadianceObject],
     outwards: Sequence[bool],
     beside: NDArray[np.float64] | None = None,
+    facing: NDArray[np.float64] | None = None,
 ) -> LayeredWindow:
     """The system of a window's layers, the outer one first.
 
     Args:
         outwards: whether the front of each layer is outdoors.
         beside: [N] share of light at `ANGLES` that meets the innermost alone.
+        facing: [N] share of the light that it reflects outwards that meets the others; None: all.
 
     Raises: `DataError` naming file and line for a layer that cannot be computed.
     """
@@ -124,7 +126,8 @@ def layered_window(
         if beside is not None:
             angular = angular.mixed(_beam_table(plain[-1:]), beside)
     klems = [layer.klems if isinstance(layer, WindowLayer) else klems_of(layer) for layer in layers]
-    system = klems[0] if len(klems) == 1 else combine_layers(klems).bsdf
+    share = np.ones(KLEMS_FULL.size) if facing is None else _patch_means(facing)
+    system = _in_series(klems, share)
     if beside is not None:
         system = _mixed(system, klems[-1], _patch_means(beside))
     system = replace(system, see_through=0.0) if rough else system
@@ -150,6 +153,21 @@ def _beam_table(layers: Sequence[WindowLayer]) -> AngularTable:
     whole = stack([layer.specular for layer in layers])
     values = (whole.tau, whole.rho_front, whole.rho_back)
     return AngularTable(ANGLES, *(np.clip(one.mean(axis=0), 0, 1) for one in values))
+
+
+def _in_series(layers: Sequence[KlemsBsdf], facing: NDArray[np.float64]) -> KlemsBsdf:
+    """Layers as one system, where a share [K] of what the last reflects meets the others.
+
+    The rest leaves the system as from the last one alone.
+    """
+    *outer, inner = (layer.filled() for layer in layers)
+    if not outer:
+        return layers[0]
+    before = outer[0] if len(outer) == 1 else combine_layers(outer).bsdf
+    before = replace(before, reflection_back=facing * before.reflection_back)
+    whole, part = combine_layers([before, inner]).bsdf, facing[:, None]
+    reflected = part * whole.reflection_front + (1 - part) * inner.reflection_front
+    return replace(whole, reflection_front=reflected)
 
 
 def _mixed(system: KlemsBsdf, inner: KlemsBsdf, share: NDArray[np.float64]) -> KlemsBsdf:

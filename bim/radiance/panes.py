@@ -14,7 +14,7 @@ from bim.radiance.materials import SYSTEMS
 from bim.radiance.patterns import TURNS
 from bim.radiance.scene import RadianceObject, RadianceScene
 from bim.rays import hemisphere, ray_mesh
-from bim.report.issue import Effect, Issue
+from bim.report.issue import Effect, Issue, area_words
 from mitsuba_cfs.bsdf.angular import ANGLES
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.surfaces import WindowSurface, even_numbers, points_on_triangles, triangle_areas
@@ -46,6 +46,8 @@ class PanedWindow:
     covered: float = 0.0  # share of the pane that layers of another window cover
     beside: NDArray[np.float64] | None = None  # [N] share of light at `ANGLES` that meets this pane
     # alone, past the rims of those in front of it
+    facing: NDArray[np.float64] | None = None  # [N] share of the light that it reflects outwards at
+    # `ANGLES` that meets the panes before it
 
     @property
     def outwards(self) -> list[bool]:
@@ -118,12 +120,12 @@ def panes_of(
             if space.past_share(surface, layers[id(thing)]) <= PAST:
                 continue
             covered = 1.0 - space.free_share(surface, LAYERS)
-        beside = space.share_beside(surface, front) if front.layers else None
+        beside, facing = space.shares(surface, front) if front.layers else (None, None)
         if beside is not None:
             values = {"window": thing.name, "share": 100 * diffuse_mean(beside)}
             where = f"{thing.primitive.file}:{thing.primitive.line}"
             issues.append(Issue("glass-beside-panes", where, values))
-        windows.append(PanedWindow(surface, (*front.layers, thing), covered, beside))
+        windows.append(PanedWindow(surface, (*front.layers, thing), covered, beside, facing))
         issues += front.issues
     used = {id(pane) for window in windows for pane in window.panes} | set(layers) | far | dark
     rest = [o for o in scene.objects if not o.material.is_opaque and id(o) not in used]
@@ -234,11 +236,16 @@ class _Space:
                 seen[~seen] = ~meets & (ways @ one.normal < 0)
         return float(cosine[past[seen]].sum() / cosine.sum())
 
-    def share_beside(self, surface: WindowSurface, front: _Front) -> NDArray[np.float64] | None:
-        """Share [N] of light at `ANGLES` that meets a pane past the rims of those in front of it.
+    def shares(
+        self, surface: WindowSurface, front: _Front
+    ) -> tuple[NDArray[np.float64] | None, NDArray[np.float64]]:
+        """Shares [N] of light at `ANGLES` by what is in front of a pane.
 
-        Means over the pane and over azimuths, of the rays that no wall between the panes stops;
-        None where it is below `PAST` of diffuse light.
+        Means over azimuths.  First of the light from outdoors, what meets the pane past the rims
+        of those in front of it: the mean over the pane, of the rays that no wall between the panes
+        stops; None where it is below `PAST` of diffuse light.  Then of the light that the pane
+        reflects outwards, what meets those panes and no wall: the mean over where it is lit, by
+        the share of each point's hemisphere that they cover.
         """
         polar = np.radians(np.arange(0.0, 90.0, RIM_STEP))
         points = _points_off_edges(surface)
@@ -249,12 +256,15 @@ class _Space:
         distance, hit = self._mesh.first_hits(starts, directions)
         far = (hit < 0) | (distance * (directions @ surface.normal) > depth)
         covered = (hit >= 0) & np.isin(self._owner[hit], front.numbers)
-        sums = [
-            values.reshape(len(points), len(polar), TURNS).sum(axis=(0, 2))
+        past, facing = (
+            values.reshape(len(points), len(polar), TURNS).mean(axis=2)
             for values in (far & ~covered, covered)
-        ]
-        shares = np.interp(ANGLES, polar, sums[0] / np.maximum(sums[0] + sums[1], 1))
-        return shares if diffuse_mean(shares) > PAST else None
+        )
+        free = past.sum(axis=0)
+        beside = np.interp(ANGLES, polar, free / np.maximum(free + facing.sum(axis=0), 1 / TURNS))
+        lit = facing @ np.sin(2 * polar)
+        met = np.interp(ANGLES, polar, lit @ facing / lit.sum())
+        return (beside if diffuse_mean(beside) > PAST else None), met
 
     def has_room(self, thing: RadianceObject, surface: WindowSurface) -> bool:
         """Whether there is a room on the inner side of a pane.
@@ -356,6 +366,6 @@ def _is_wide(thing: RadianceObject) -> bool:
 
 
 def _left_out(thing: RadianceObject) -> Issue:
-    material, area = thing.material, float(triangle_areas(thing.triangles).sum())
+    material, area = thing.material, area_words(float(triangle_areas(thing.triangles).sum()))
     values = {"surface": thing.name, "material": material.name, "type": material.kind, "area": area}
     return Issue("clear-surface-left-out", f"{thing.primitive.file}:{thing.primitive.line}", values)

@@ -25,7 +25,7 @@ from bim.radiance.materials import (
 from bim.radiance.patterns import COMPUTED_PATTERNS, EVEN, pattern_values
 from bim.radiance.primitives import VOID, Command, Definition, Primitive, read_statements
 from bim.radiance.xform import Xform, read_xform
-from bim.report.issue import Issue
+from bim.report.issue import Issue, area_words
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.surfaces import triangle_areas
 
@@ -361,10 +361,10 @@ class _Reader:
     def issues(self) -> Iterator[Issue]:
         """Parts of the files that are not used, each kind once."""
         for (code, kind), count in self.left_out.items():
-            first = self.first[code, kind]
-            values = {"count": count, "type": kind, "first": first.name}
-            if area := self.areas[code, kind]:
-                values["area"] = area
+            if code == "primitives-not-read" and ("surfaces-not-read", kind) in self.left_out:
+                continue  # the definitions of surfaces that are reported
+            first, area = self.first[code, kind], area_words(self.areas[code, kind])
+            values = {"count": count, "type": kind, "first": first.name, "area": area}
             yield Issue(code, f"{first.file}:{first.line}", values)
 
 

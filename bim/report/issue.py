@@ -25,6 +25,7 @@ Audience = Literal["python", "command"]  # whom a fix is for: an argument, or a 
 Fill = Callable[..., str]  # as `mitsuba_cfs.notes.filled`: template, singular, values by name
 SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 CATALOGUE = Path(__file__).parent / "catalogue.toml"
+SMALL_AREA = 0.1  # [m2]
 LISTED = 6  # names that a text lists before it counts the rest
 COLUMNS = ("where", "what", "consequence", "code", "severity")  # of `issue_rows`
 
@@ -89,6 +90,11 @@ class Issue:
     def severity(self) -> Severity:
         """Severity of the code."""
         return catalogue()[self.code].severity
+
+
+def area_words(area: float) -> Phrase:
+    """An area [m2] as a value of an issue, also one that a digit after the point shows as 0."""
+    return Phrase("area", {"area": area}) if area >= SMALL_AREA else Phrase("area-small")
 
 
 class IssueText(NamedTuple):

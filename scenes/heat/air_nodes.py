@@ -6,7 +6,7 @@ loads are the zone's.  Walls between its rooms have the zone's air on both sides
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +17,8 @@ from bim.model import Space
 from bim.to_thermal import ThermalRoom
 from mitsuba_cfs.errors import DataError
 from scenes.results import ShadingYear
-from scenes.room.zone import RoomServices, RoomZone
+from scenes.room.operation_tables import MOST_CONDITIONS
+from scenes.room.zone import RoomAlternatives, RoomServices, RoomZone
 from thermal.climate import Solar
 from thermal.network import framed
 from thermal.ventilation import WindowAiring
@@ -47,7 +48,7 @@ def with_air_nodes(
         beside = _beside(room, node_of)
         groups[name].append(_renamed(beside) if room.zone.name in node_of else beside)
     merged = [
-        _merged(name, group) if name in nodes.values() else group[0]
+        _in_alternatives(name, group) if name in nodes.values() else group[0]
         for name, group in groups.items()
     ]
     place = [order.index(name) for name in names]
@@ -84,12 +85,38 @@ def _renamed(room: RoomZone) -> RoomZone:
     return replace(room, room=replace(room.room, zone=zone))
 
 
+def _in_alternatives(name: str, rooms: Sequence[RoomZone]) -> RoomZone:
+    """The rooms as one, in an alternative for all conditions of their shading met or not.
+
+    The conditions are of the temperature of the air node, the operative one of all its faces.
+
+    Raises: `DataError` for more than `MOST_CONDITIONS`.
+    """
+    of_rooms = [room.alternatives.conditions if room.alternatives else () for room in rooms]
+    conditions = tuple(dict.fromkeys(one for each in of_rooms for one in each))
+    if len(conditions) > MOST_CONDITIONS:
+        message = f"{len(conditions)} limits of the temperature of {name}; at most "
+        raise DataError(f"{message}{MOST_CONDITIONS}", element=name, field="control")
+
+    def those(number: int) -> Iterator[RoomZone]:
+        for room, read in zip(rooms, of_rooms, strict=True):
+            if room.alternatives is None:
+                yield room
+                continue
+            bits = (number >> conditions.index(one) & 1 for one in read)
+            one = room.alternatives.rooms[sum(bit << k for k, bit in enumerate(bits))]
+            zone = replace(room.zone, gains=one.zone.gains)  # with the names of the air node
+            yield replace(one, room=replace(room.room, zone=zone))
+
+    whole = _merged(name, rooms)
+    if not conditions:
+        return whole
+    every = tuple(_merged(name, list(those(n))) for n in range(2 ** len(conditions)))
+    return replace(whole, alternatives=RoomAlternatives(conditions, every))
+
+
 def _merged(name: str, rooms: Sequence[RoomZone]) -> RoomZone:
     """The rooms as one, their parts in the order of the rooms."""
-    moved = [room.space.label for room in rooms if room.alternatives is not None]
-    if moved:
-        message = "rooms of an air node cannot have shading by the room's temperature"
-        raise DataError(message, element=moved[0], field="control.rule")
     first, areas = rooms[0], np.array([room.space.floor_area for room in rooms])
     lit = [room.daylight is not None for room in rooms]
     daylight = None

@@ -43,7 +43,13 @@ from scenes.room.heat import felt_by, room_humidity, step_issues
 from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.leaks import leak_issues
 from scenes.room.light import visible_scene
-from scenes.room.operation import OperationHours, check_schedules, stated_note, with_stated_uses
+from scenes.room.operation import (
+    OperationHours,
+    check_schedules,
+    stated_note,
+    unstated_note,
+    with_stated_uses,
+)
 from scenes.room.room import operated_zone
 from scenes.room.zone import RoomZone, balances, coupled, inner_sun_note
 from thermal.balance import ZoneResult
@@ -355,5 +361,6 @@ def study_inputs(
     building = building_or_box(study.box, options, progress)
     rooms = "all" if study.couple or study.box is not None else "glazed"
     inputs = inputs_of(building, options, files.inputs, rooms=rooms, states=every_state)
-    inputs = replace(inputs, notes=stated_note(building, "the study"))
+    notes = *stated_note(building, "the study"), *unstated_note(study, building, "the study")
+    inputs = replace(inputs, notes=notes)
     return replace(inputs, spaces=shared_constructions(inputs.spaces)) if study.couple else inputs

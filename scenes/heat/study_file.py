@@ -77,7 +77,7 @@ class BoxTable(TomlTable):
     height: Length
     facing_deg: float = 180.0
     recess: Annotated[float, Field(ge=0)] = 0.0
-    window: tuple[WindowTable, ...]
+    window: tuple[WindowTable, ...] = ()
     plate: tuple[PlateTable, ...] = ()
     reflectance: dict[Part, Share] = Field(default_factory=dict)
     specular: dict[Part, Share] = Field(default_factory=dict)  # of a lacquer at normal incidence

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -444,6 +445,28 @@ def stated_note(building: Building, before: str = "") -> tuple[str, ...]:
         **values,
     )
     return (note,)
+
+
+ASSUMED = {"gains": ("equipment_w_m2", "persons", "occupied"), "air": ("infiltration_ach",)}
+
+
+def unstated_note(tables: OperationTables, building: Building, file: str) -> tuple[str, ...]:
+    """A sentence on the gains and leaks that neither tables nor building state; empty without any.
+
+    Args: file: name of the file of the tables.
+    """
+    if building.spaces and all(space.guid in building.uses for space in building.spaces):
+        return ()
+    values = [
+        f"{name}.{key} = {json.dumps(getattr(table, key))}"
+        for name, keys in ASSUMED.items()
+        for table in [getattr(tables, name)]
+        for key in keys
+        if key not in table.model_fields_set
+    ]
+    if not values:
+        return ()
+    return (Note("{values}, not stated in {file}.", values=", ".join(values), file=file),)
 
 
 def _entry(

@@ -75,7 +75,8 @@ def temperature_conditions(room: RoomInputs) -> tuple[TemperatureCondition, ...]
     if room.operation is None or not room.space.windows:
         return ()
     leaves = (leaf for rule in room.control.rules for leaf in rule.leaves)
-    by_room = (condition_of(leaf) for leaf in leaves if leaf.rule in ROOM_RULES)
+    step_h = room.weather.step_h
+    by_room = (condition_of(leaf, step_h) for leaf in leaves if leaf.rule in ROOM_RULES)
     conditions = tuple(dict.fromkeys(by_room))
     if len(conditions) > MOST_CONDITIONS:
         message = f"{len(conditions)} limits of the room's temperature; at most {MOST_CONDITIONS}"
@@ -83,10 +84,15 @@ def temperature_conditions(room: RoomInputs) -> tuple[TemperatureCondition, ...]
     return conditions
 
 
-def condition_of(rule: ShadingRule) -> TemperatureCondition:
-    """The condition of a rule by the room's temperature."""
-    operative = rule.rule == "operative temperature"
-    return TemperatureCondition(rule.closes_above_c, rule.opens_below_c, operative)
+def condition_of(rule: ShadingRule, step_h: float) -> TemperatureCondition:
+    """The condition of a rule by the room's temperature, for weather in steps of so many hours."""
+    operative, rows = rule.rule == "operative temperature", _waits(rule, step_h)
+    return TemperatureCondition(rule.closes_above_c, rule.opens_below_c, operative, *rows)
+
+
+def _waits(rule: ShadingRule, step_h: float) -> tuple[int, int]:
+    """Steps of the weather that a rule waits before it opens, and between two moves."""
+    return round(rule.open_delay_h / step_h), round(rule.hold_h / step_h)
 
 
 def shading_states(
@@ -141,7 +147,7 @@ def _by_rule(
             hours = OperationHours(operation, room.weather)
             return hours.states(rule, place, room.windows.states, closed)
         if rule.rule in ROOM_RULES:
-            met = signals.met[condition_of(rule)]
+            met = signals.met[condition_of(rule, room.weather.step_h)]
             return always(closed if met else 0, room.skies.hours)
         if rule.rule == "irradiance":
             brightest = signals.irradiance(rule.sensor)[:, groups].max(axis=1)
@@ -156,8 +162,8 @@ def _by_rule(
             states = np.max(parts, axis=0) if rule.rule == "any" else np.min(parts, axis=0)
         else:
             states = plain(rule, place)
-        rows = [round(hours / room.weather.step_h) for hours in (rule.open_delay_h, rule.hold_h)]
-        return held(delayed(states, rows[0]), rows[1])
+        wait, hold = _waits(rule, room.weather.step_h)
+        return held(delayed(states, wait), hold)
 
     return of(room.control.rules[c], room.control.places[c])
 

@@ -16,7 +16,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from tests.benchmarks.harness import PeerFailed, PeerMissing
 
 LUX = (47.435, 119.93, 11.635)  # lm/W of Radiance's channels
-RTRACE = "-I+ -h -ab 12 -aa 0 -ad 20000 -as 0 -lw 1e-8 -lr 16 -dj 0.5 -dc 1 -dt 0"
+RTRACE = "-I+ -h -aa 0 -ad 20000 -as 0 -lw 1e-8 -lr 16 -dj 0.5 -dc 1 -dt 0"
 SKY_AND_GROUND = (
     "skyfunc glow sky_glow 0 0 4 1 1 1 0 sky_glow source sky 0 0 4 0 0 1 180 "
     "skyfunc glow ground_glow 0 0 4 1 1 1 0 ground_glow source ground 0 0 4 0 0 -1 180"
@@ -47,14 +47,17 @@ def run(command: str, folder: Path, stdin: bytes = b"") -> bytes:
     return done.stdout
 
 
-def eye_illuminance(folder: Path, scenes: Sequence[str], sky: str, eye: str) -> float:
+def eye_illuminance(
+    folder: Path, scenes: Sequence[str], sky: str, eye: str, bounces: int = 12
+) -> float:
     """Illuminance [lx] at an eye by `rtrace`.
 
-    Args: scenes: names of files; sky: arguments of `gendaylit`; eye: its place and direction.
+    Args: scenes: names of files; sky: arguments of `gendaylit`; eye: its place and direction;
+    bounces: `-ab`, of which the hemisphere of the eye is the first.
     """
     (folder / "sky.rad").write_bytes(run(f"gendaylit {sky}", folder) + SKY_AND_GROUND.encode())
     run(f"oconv sky.rad {' '.join(scenes)} > scene.oct", folder)
-    rgb = run(f"echo {eye} | rtrace {RTRACE} scene.oct", folder).split()
+    rgb = run(f"echo {eye} | rtrace {RTRACE} -ab {bounces} scene.oct", folder).split()
     return float(np.dot(LUX, [float(v) for v in rgb[:3]]))
 
 

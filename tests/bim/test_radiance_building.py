@@ -196,7 +196,7 @@ def test_a_pane_without_a_room_behind_it_is_reported(tmp_path):
     building = read(tmp_path, text)
     assert len(building.windows) == 1
     (issue,) = issue_of(building, "clear-surface-left-out")
-    assert issue.severity == "loss" and issue.values["area"] == pytest.approx(144)
+    assert issue.severity == "loss" and issue.values["area"].values["area"] == pytest.approx(144)
     options = ReadOptions(facade_panes=("tinted",))
     facade = read_building_file(building.file, options)
     (element,) = [one for one in facade.elements if one.name.startswith("opposite")]
@@ -331,6 +331,37 @@ def test_a_fabric_behind_a_pane_is_a_layer_of_the_window(tmp_path):
     assert 0.023 < share < 0.025
     (issue,) = issue_of(building, "function-file-elsewhere")
     assert issue.severity == "assumption"
+
+
+def test_a_wide_fabric_exchanges_light_with_the_pane_that_it_faces(tmp_path):
+    """The pane covers 2.8 x 1.6 m of 4 x 3 m of fabric, whose front of 0.4 is outdoors."""
+    gap = 0.2
+    cloth = CLOTH.format(tau="0", file=".") + pane("blind", gap, (0, 4), (0, 3), "cloth")
+    (window,) = read(tmp_path, "\n" + cloth).windows
+    bsdf = window.states[0].bands["Visible"].filled()
+    x, z = ((np.arange(n) + 0.5) / 20 for n in (80, 60))
+    polar, phi = np.radians(np.arange(0.5, 90)), 2 * np.pi * (np.arange(90) + 0.5) / 90
+    met = []  # [polar, place]
+    for angle in polar:
+        covers = [
+            (low < at[:, None] + gap * np.tan(angle) * turn(phi))
+            & (at[:, None] + gap * np.tan(angle) * turn(phi) < high)
+            for at, turn, low, high in ((x, np.cos, 0.6, 3.4), (z, np.sin, 0.9, 2.5))
+        ]
+        met.append(np.einsum("xp,zp->xz", *(c.astype(float) for c in covers)).ravel() / 90)
+    lit = np.sin(2 * polar) @ met
+    facing = np.array(met) @ lit / lit.sum()
+    glass = glass_table([(0.87, 1.52)])
+    mirrored = np.interp(polar, glass.theta, glass.reflectance_front)
+    weight = np.sin(2 * polar) / np.sin(2 * polar).sum()
+    passed = bsdf.direct_hemispherical(bsdf.transmission_front)[0]
+    again = 1 / (1 - 0.4 * weight @ (mirrored * facing))
+    assert passed == pytest.approx(glass.transmittance[0] * 0.02 * again, rel=2e-3)
+    for patch, angle in ((1, 10.0), (50, 40.0)):  # outgoing ones of normal incidence
+        through = 0.4 * again * glass.transmittance[0] * glass.transmitted(np.radians(angle))
+        share = np.interp(np.radians(angle), polar, facing)
+        expected = share * through + (1 - share) * 0.4
+        assert np.pi * bsdf.reflection_front[patch, 0] == pytest.approx(expected, rel=0.03)
 
 
 @pytest.mark.parametrize(

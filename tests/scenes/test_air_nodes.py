@@ -11,7 +11,7 @@ from mitsuba_cfs.errors import DataError
 from scenes.heat.air_nodes import with_air_nodes
 from scenes.room.zone import RoomAlternatives, balances, coupled
 from tests.scenes.test_coupled_heat import lit, two_boxes
-from thermal.control import TemperatureCondition
+from thermal.control import TemperatureCondition, by_threshold
 
 TABLES = {"loads": {"heating_c": 22.0, "cooling_c": 25.0}, "gains": {"equipment_w_m2": 5.0},
           "air": {"infiltration_ach": 0.3}}  # fmt: skip
@@ -86,9 +86,38 @@ def test_a_room_beside_an_air_node_keeps_its_wall_to_it(variant, weather, skies)
     balances(found, weather, 3600.0, air_links=between)
 
 
-def test_a_room_whose_shading_follows_its_temperature_is_refused(variant, weather, skies) -> None:
-    rooms, links = _rooms(weather, skies, equal=True)
-    alternatives = RoomAlternatives((TemperatureCondition(24.0, 22.0),), (rooms[0],) * 2)
-    moved = [replace(rooms[0], alternatives=alternatives), rooms[1]]
-    with pytest.raises(DataError, match="cannot have shading by the room's temperature"):
-        _one(moved, links)
+def _shaded(room, *conditions):
+    """The room with an alternative for each combination: of the conditions met, half the sun."""
+    dimmed = [
+        replace(room, solar=replace(room.solar, facade=room.solar.facade * 0.5 ** n.bit_count()))
+        for n in range(2 ** len(conditions))
+    ]
+    return replace(room, alternatives=RoomAlternatives(conditions, tuple(dimmed)))
+
+
+def test_shading_by_temperature_follows_that_of_the_air_node(variant, weather, skies) -> None:
+    rooms, links = _rooms(weather, skies, equal=False)
+    warm, hot = TemperatureCondition(23.0, 22.5), TemperatureCondition(24.0, 23.0)
+    one = _one([_shaded(rooms[0], warm, hot), _shaded(rooms[1], hot)], links)
+    (result,) = balances([one], weather, 3600.0)
+    air = result.air_c[:-1]
+    met = [by_threshold(air, c.above_c, c.below_c) for c in (warm, hot)]
+    np.testing.assert_array_equal(result.alternative[25:], (met[0] + 2 * met[1])[24:])
+    assert 0 < met[1].sum() < met[0].sum()
+    chosen = one.in_alternatives(result.alternative)
+    (given,) = balances([chosen], weather, 3600.0)
+    np.testing.assert_allclose(given.air_c[48:], result.air_c[48:], atol=1e-3)
+    walls = len(rooms[0].zone.surfaces)
+    shares = (0.5 ** (met[0] + met[1]), 0.5 ** met[1])
+    for room, share, here in zip(rooms, shares, (slice(walls), slice(walls, None)), strict=True):
+        expected = room.solar.facade[25:] * share[24:, None]
+        np.testing.assert_allclose(chosen.solar.facade[25:, here], expected, rtol=1e-6)
+
+
+def test_more_conditions_in_an_air_node_than_can_be_computed_are_refused(
+    variant, weather, skies
+) -> None:
+    rooms, links = _rooms(weather, skies, equal=False)
+    limits = [TemperatureCondition(float(t), float(t)) for t in range(22, 27)]
+    with pytest.raises(DataError, match="5 limits of the temperature of Dwelling; at most 4"):
+        _one([_shaded(rooms[0], *limits[:3]), _shaded(rooms[1], *limits[3:])], links)

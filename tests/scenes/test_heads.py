@@ -12,7 +12,7 @@ import pytest
 
 from bim.building_file import read_building_file
 from bim.gbxml.write import write_gbxml
-from bim.report.issue import issue_text
+from bim.report.issue import Effect, Issue, catalogue, issue_text
 from mitsuba_cfs.errors import DataError
 from scenes import cli
 from scenes.demo import VENETIAN_BLIND, WEATHER
@@ -31,6 +31,11 @@ from tests.conftest import REPOSITORY
 from tests.explore.synthetic import explored_run
 from tests.report.test_study_report import study as study_result
 
+# types of modifiers that are not read: more than a head lists of other kinds of issues
+UNREAD = (
+    "prism1", "prism2", "mist", "transfunc", "transdata", "plasfunc", "plasdata", "metfunc",
+    "metdata", "ashik2", "antimatter", "WGMDfunc",
+)  # fmt: skip
 STOP = "stopped before anything is traced"
 RAD = REPOSITORY / "docs/tutorials/office.rad"
 STUDY = f"""
@@ -247,3 +252,36 @@ def test_the_pages_show_the_head_in_their_language(tmp_path: Path, language: str
     for text in pages:
         aside = unescape(text.partition('<aside class="notes"')[2].partition("</aside>")[0])
         assert [line for line in lines if f"<li>{line}</li>" not in aside] == []
+
+
+def test_a_head_names_all_that_is_left_out(tmp_path):
+    things = [
+        f"void {kind} odd_{kind} 0 0 0\n"
+        f"odd_{kind} polygon chip_{kind} 0 0 9 1 3 1 1.01 3 1 1 3 1.01"
+        for kind in UNREAD
+    ]
+    panes = [
+        f"void dielectric clear_{n} 0 0 5 1 1 1 1.5 0\n"
+        f"clear_{n} polygon gem_{n} 0 0 9 2 3 1 2.01 3 1 2 3 1.01"
+        for n in range(2)
+    ]
+    scene = tmp_path / "chips.rad"
+    scene.write_text("\n".join([RAD.read_text(), *things, *panes]))
+    lines = head_of(read_building_file(scene)).lines
+    for kind in UNREAD:
+        (line,) = (line for line in lines if f"of type {kind}:" in line)
+        assert line.startswith(
+            f"left out: 1 surface, less than 0.1 m2, has a modifier of type {kind}"
+        )
+    assert [any(f"gem_{n}" in line for line in lines) for n in range(2)] == [True, True]
+    assert not [line for line in lines if " 0.0 m2" in line or "problem" in line]
+
+
+def test_a_head_counts_further_problems_with_their_glass():
+    kinds = [code for code, one in catalogue().items() if one.severity == "warning"][:10]
+    values = {name: 1.0 for code in kinds for name in catalogue()[code].fields}
+    issues = [Issue(code, "w", values, Effect(glass=n + 1.0)) for n, code in enumerate(kinds)]
+    *_, last = Head((), tuple(issues)).lines
+    assert last == "warning: 2 more problems: cfs check lists all (3.00 m2 of glass)"
+    lines = Head((), (issues[0],)).lines
+    assert not [line for line in lines if "more problem" in line]

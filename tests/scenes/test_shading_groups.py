@@ -35,6 +35,7 @@ from scenes.room.solar import seasonal_outdoors, solar_gains
 from scenes.room.windows import in_all_windows, room_windows
 from scenes.room.zone import RoomZone, balances, zone_surfaces
 from tests.scenes.small_box import HOURS, SMALL, clear
+from thermal.control import TemperatureCondition
 
 FEW = SMALL.changed(
     sensor_samples=256, patch_samples=256, sun_points=16, picture_size=32, picture_samples=2,
@@ -324,10 +325,13 @@ WARM = {"rule": "operative temperature", "close_above_c": 22.0, "open_below_c": 
 
 
 def test_rules_by_room_temperature_are_computed_both_ways(inputs) -> None:
-    sun = {"rule": "irradiance", "close_above": 150.0}
-    room = inputs({"rule": "all", "parts": [sun, WARM, WARM]})
+    sun, slow = (
+        {"rule": "irradiance", "close_above": 150.0},
+        WARM | {"open_delay_h": 2, "hold_h": 3},
+    )
+    room = inputs({"rule": "all", "parts": [sun, slow, slow]})
     (condition,) = temperature_conditions(room)
-    assert (condition.above_c, condition.below_c, condition.operative) == (22.0, 21.0, True)
+    assert condition == TemperatureCondition(22.0, 21.0, True, 2, 3)
     outdoors, by_sun = seasonal_outdoors(room), by_group(inputs(sun))["S"]
     cold, warm = (
         shading_states(room, None, outdoors, met={condition: met})[:, 0] for met in (False, True)
@@ -338,7 +342,7 @@ def test_rules_by_room_temperature_are_computed_both_ways(inputs) -> None:
 @pytest.mark.parametrize(
     ("control", "key"),
     [
-        (WARM | {"hold_h": 2.0}, "control.hold_h"),
+        ({"rule": "all", "hold_h": 2.0, "parts": [WARM]}, "control.hold_h"),
         ({"rule": "any", "open_delay_h": 1.0, "parts": [WARM]}, "control.open_delay_h"),
         (WARM | {"open_below_c": 23.0}, "control.open_below_c"),
         ({"rule": "any", "parts": [WARM, WARM | {"open_below_c": 23.0}]},

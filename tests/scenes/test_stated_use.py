@@ -19,7 +19,7 @@ from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
 from scenes.input_files import read_weather
 from scenes.room.inputs import FileSensors
-from scenes.room.operation import OperationHours, stated_note, with_stated_uses
+from scenes.room.operation import OperationHours, stated_note, unstated_note, with_stated_uses
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.room import compute_room
@@ -83,6 +83,20 @@ def test_a_file_without_uses_changes_nothing():
     building, tables = read_honeybee(TWO_ROOMS), OperationTables()
     assert with_stated_uses(tables, building) is tables
     assert not stated_note(building)
+
+
+def test_gains_and_leaks_that_nobody_states_are_named(used):
+    building, tables = read_honeybee(TWO_ROOMS), OperationTables(gains={"persons": 0})
+    (note,) = unstated_note(tables, building, "use.toml")
+    assert note == (
+        "gains.equipment_w_m2 = 8.0, gains.occupied = [8, 18], air.infiltration_ach = 0.5, "
+        "not stated in use.toml."
+    )
+    stated = {"equipment_w_m2": 0, "persons": 0, "occupied": [0, 24]}
+    whole = OperationTables(gains=stated, air={"infiltration_ach": 0.5})
+    assert not unstated_note(whole, building, "use.toml")
+    both = replace(used, uses={space.guid: used.uses["Office"] for space in used.spaces})
+    assert not unstated_note(OperationTables(), both, "use.toml")
 
 
 def test_values_that_cannot_be_name_the_file(used):

@@ -40,6 +40,18 @@ def study_file(folder: Path, text: str, *, weather: Path = WEATHER, bsdf: Path =
     return path
 
 
+def test_a_cellar_without_windows_needs_no_system(tmp_path, variant, capsys):
+    path, under = tmp_path / "study.toml", 'left = "ground"\nfloor = "ground"\n'
+    box = f"[box]\nwidth = 4\ndepth = 5\nheight = 2.4\n[box.adjacency]\n{under}"
+    ground = '[envelope.ground]\nkind = "basement"\ndepth = 2.4\nperimeter = 5\n'
+    text = f'weather = "{WEATHER}"\n{box}{ground}[loads]\nheating_c = 18\n'
+    path.write_text(text, encoding="utf-8")
+    assert main(["thermal", str(path), "--out", str(tmp_path / "out")]) == 0
+    assert "assumed: gains.equipment_w_m2 = 8.0, gains.persons = 1.0," in capsys.readouterr().out
+    hours = pd.read_csv(tmp_path / "out" / "hours.csv")
+    assert hours["air_c"].min() > 18.0 - 1e-3 and hours["heating_w"].max() > 0.0
+
+
 def test_study_of_a_box_with_two_states(tmp_path, variant, capsys):
     second = f'[[system]]\nbsdf = "{BLIND}"\nu_value = 0.9\n'
     text = (

@@ -10,7 +10,14 @@ import pytest
 from tests.thermal.rooms import box, climate, sun
 from thermal.balance import BalanceOptions, simulate, simulate_zones
 from thermal.blackbox import Fenestration
-from thermal.control import TemperatureCondition, TemperatureControl, by_threshold, switched
+from thermal.control import (
+    TemperatureCondition,
+    TemperatureControl,
+    by_threshold,
+    delayed,
+    held,
+    switched,
+)
 from thermal.emitters import IdealLoads
 from thermal.errors import ThermalInputError
 from thermal.ventilation import SupplyAir, WindowAiring
@@ -33,7 +40,10 @@ def shaded_room():
     return room, day, shade
 
 
-@pytest.mark.parametrize("condition", [WARM, replace(WARM, operative=True)])
+SLOW = replace(WARM, open_delay_rows=2, hold_rows=7)
+
+
+@pytest.mark.parametrize("condition", [WARM, replace(WARM, operative=True), SLOW])
 def test_shading_follows_the_temperature_at_the_end_of_the_step_before(condition):
     """With one step an hour the hourly means are the ends of the steps.
 
@@ -45,8 +55,9 @@ def test_shading_follows_the_temperature_at_the_end_of_the_step_before(condition
     year = {"step_s": 3600.0, "options": BalanceOptions(warm_days=0, start_c=23.0)}
     result = simulate(room, climate(HOURS, outdoor=OUTDOOR), day, control=control, **year)
     temperature = result.operative_c if condition.operative else result.air_c
-    expected = by_threshold(temperature[:-1], condition.above_c, condition.below_c)
-    assert 10 < expected.sum() < 110
+    at_once = by_threshold(temperature[:-1], condition.above_c, condition.below_c)
+    expected = held(delayed(at_once, condition.open_delay_rows), condition.hold_rows)
+    assert 10 < expected.sum() < 110 and (condition is not SLOW or (expected != at_once).any())
     np.testing.assert_array_equal(result.alternative[1:], expected)
     chosen = switched([day, shade], result.alternative)
     lit = replace(room, gains=Gains(radiant=100.0 * result.alternative))

@@ -2,7 +2,7 @@ r"""An office that others published: DGP and Ev of the Geneva office of raytrave
 
     python -m tests.validation geneva [FOLDER] [--by functions] [--every 20] [--size 300]
     python -m tests.validation geneva [FOLDER] --by command --cases 01_glz --views 1
-    python -m tests.validation geneva [FOLDER] --by rtrace --every 150
+    python -m tests.validation geneva [FOLDER] --by rtrace --every 150 [--bounces 7]
 
 FOLDER holds `validations/base1compdv` of stephanwaz/raytraverse: scene, views, skies, weather and
 the brute-force reference of 2,022 hours.  By functions: the five-phase method of `import
@@ -103,7 +103,9 @@ def by_command(
         yield table
 
 
-def by_rtrace(folder: Path, case: str, views: Sequence[int], every: int) -> Iterator[pd.DataFrame]:
+def by_rtrace(
+    folder: Path, case: str, views: Sequence[int], every: int, bounces: int
+) -> Iterator[pd.DataFrame]:
     """Ev [lx] by hour of the year as `rtrace` computes it from 20,000 rays."""
     rows = np.loadtxt(folder / "refs/skydata.txt")
     files = [f"scene/options/{geneva.CASES[case]}.rad", "scene/RAD/office.rad"]
@@ -117,7 +119,7 @@ def by_rtrace(folder: Path, case: str, views: Sequence[int], every: int) -> Iter
             for x, y, z, beam, diffuse in rows[hours]:
                 altitude, azimuth = np.degrees([np.arcsin(z), np.arctan2(-x, -y)])  # from south
                 sky = f"-ang {altitude:.4f} {azimuth:.4f} -W {beam:g} {diffuse:g}"
-                values.append(eye_illuminance(Path(temporary), files, sky, eye))
+                values.append(eye_illuminance(Path(temporary), files, sky, eye, bounces))
         yield pd.DataFrame({"Ev": values}, index=hours)
 
 
@@ -157,6 +159,7 @@ def main(
     every: Annotated[int, "of the 2,022 hours, by rtrace of those that count"] = 20,
     size: Annotated[int, "[px]"] = 300,
     dew_point: Annotated[str, ("epw", "gendaylit")] = "epw",
+    bounces: Annotated[int, "of rtrace, the eye's hemisphere included"] = 12,
 ) -> pd.DataFrame:
     """A row for each case and view."""
     rows = []
@@ -164,7 +167,7 @@ def main(
         if by == "command":
             tables = by_command(folder, case, views, size, dew_point)
         elif by == "rtrace":
-            tables = by_rtrace(folder, case, views, every)
+            tables = by_rtrace(folder, case, views, every, bounces)
         else:
             tables = by_functions(folder, case, views, every, size)
         rows += [error_row(t, folder, case, v) for v, t in zip(views, tables, strict=True)]

@@ -82,6 +82,10 @@ CONTROLS = {
     "opened windows, operative": f'{AIR}{WINDOWS}temperature = "operative"\n{HEATED}',
     "shading, air": AIR + LOADS + TINTED + SHADED.format("air temperature"),
     "shading, operative": AIR + LOADS + TINTED + SHADED.format("operative temperature"),
+    "shading that waits": AIR
+    + LOADS
+    + TINTED
+    + SHADED.format("operative temperature").replace("22.5", "22.5, open_delay_h = 2, hold_h = 3"),
     "shading and windows": AIR + WINDOWS + HEATED + TINTED + SHADED.format("operative temperature"),
     "air by night": f"{AIR}night_ach = 3\nnight = [22, 6]\n{LOADS}",
     "heat recovery": FAN + LOADS,
