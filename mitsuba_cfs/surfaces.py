@@ -75,7 +75,7 @@ class Surfaces:
 
 
 @dataclass(frozen=True, slots=True)
-class Outdoors:
+class SharedOutdoors:
     """The surroundings of several rooms, their windows among them."""
 
     surfaces: Surfaces

@@ -28,10 +28,10 @@ from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene, Sampling
 from mitsuba_cfs.methods.subdivision import CellLight, Parts, allowed, subdivided
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.surfaces import Outdoors, Surfaces, WindowGroup
+from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, joined
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
-from mitsuba_cfs.trace.kernels.rooms import Room
+from mitsuba_cfs.trace.kernels.rooms import TracedRoom
 from mitsuba_cfs.trace.kernels.scene import SceneCache
 from mitsuba_cfs.trace.matrices.adjacent import AdjacentRoomLight, GlassToRoom, adjacent_daylight
 from mitsuba_cfs.trace.matrices.cell_daylight import BATCHES as CELL_BATCHES
@@ -216,7 +216,7 @@ def phase_matrices(
 
 def matrices_together(
     scenes: Sequence[DaylightScene],
-    outdoors: Outdoors,
+    outdoors: SharedOutdoors,
     sampling: Sampling,
     *,
     five_phase: bool = True,
@@ -237,7 +237,7 @@ def matrices_together(
     passes = [(OUTDOOR_DEPTH, False), *([(1, False)] if five_phase else [])]
     if five_phase and outdoors.surfaces.glossy:
         passes.append((1, True))
-    fronts = [Room(one.exterior, of.groups, number=i)
+    fronts = [TracedRoom(one.exterior, of.groups, number=i)
               for i, (one, of) in enumerate(zip(scenes, parts, strict=True))]  # fmt: skip
     options = [
         _daylight_options(sampling, len(one.groups), len(of.groups))
@@ -259,31 +259,30 @@ def matrices_together(
             )
         )  # fmt: skip
     rooms = [
-        Room(one.scene.interior, one.parts.groups, *sensors_of(*one.scene.sensors()))
+        TracedRoom(one.scene.interior, one.parts.groups, *sensors_of(*one.scene.sensors()))
         for one in matrices
     ]
-    view: dict[str, Any] = _view_options(sampling) | common
-    sensors = views_of_rooms(rooms, max_depth=INDOOR_DEPTH, **view)
-    sharp = [
-        i for i, one in enumerate(matrices)
-        if any(has_sharp_beam(one, g) for g in range(len(one.scene.groups)))
-    ]  # fmt: skip
-    straight = views_of_rooms([rooms[i] for i in sharp], max_depth=1, **view)
-    of_room = dict(zip(sharp, straight, strict=True))
+    sharp = [any(has_sharp_beam(one, g) for g in range(len(one.scene.groups))) for one in matrices]
+    views = views_of_rooms(
+        rooms, max_depth=INDOOR_DEPTH, with_direct=any(sharp), **_view_options(sampling), **common
+    )
     progress("V and D", 1.0)
     return [
-        replace(one, sensors=sensors[i], direct_sensors=of_room[i].values if i in of_room else None)
-        for i, one in enumerate(matrices)
+        replace(one, sensors=whole, direct_sensors=None if part is None else part.values)
+        for one, (whole, part) in zip(matrices, views, strict=True)
     ]
 
 
 def _parts_together(
-    scenes: Sequence[DaylightScene], outdoors: Outdoors, sampling: Sampling, common: dict[str, Any]
+    scenes: Sequence[DaylightScene],
+    outdoors: SharedOutdoors,
+    sampling: Sampling,
+    common: dict[str, Any],
 ) -> list[Parts]:
     """The window groups of each room, cut where the view outdoors differs within a group."""
     cells = [[window_cells(group) for group in one.groups] for one in scenes]
     daylight = cells_of_rooms(
-        [Room(one.exterior, one.groups, number=i) for i, one in enumerate(scenes)],
+        [TracedRoom(one.exterior, one.groups, number=i) for i, one in enumerate(scenes)],
         outdoors, cells, [_cell_samples(sampling, of) for of in cells],
         max_depth=OUTDOOR_DEPTH, seed=sampling.seed, **common,
     )  # fmt: skip
@@ -294,8 +293,8 @@ def _parts_together(
 
 
 def _daylight_together(
-    rooms: Sequence[Room],
-    outdoors: Outdoors,
+    rooms: Sequence[TracedRoom],
+    outdoors: SharedOutdoors,
     options: Sequence[dict[str, Any]],
     depth: int,
     *,
@@ -376,7 +375,11 @@ def as_five_phase(matrices: PhaseMatrices) -> PhaseMatrices:
     matrices = with_direct_daylight(replace(matrices, five_phase=True))
     if matrices.sensors is None or matrices.direct_sensors is not None:
         return matrices
-    return replace(matrices, direct_sensors=_sensors(matrices, 1, silent).values)
+    direct = view_matrix(
+        matrices.scene.interior, matrices.parts.groups, *matrices.scene.sensors(), max_depth=1,
+        cache=matrices.cache, scenes=matrices.scenes, **_view_options(matrices.sampling),
+    )  # fmt: skip
+    return replace(matrices, direct_sensors=direct.values)
 
 
 def has_sharp_beam(matrices: PhaseMatrices, g: int) -> bool:
@@ -391,12 +394,21 @@ def with_sensors(matrices: PhaseMatrices, *, progress: Progress = silent) -> Pha
     """The matrices with V of the scene's sensors, and V_d where the straight beam is apart."""
     if matrices.sensors is not None:
         return matrices
-    sensors = _sensors(matrices, INDOOR_DEPTH, part(progress, 0.3, 0.9, "daylight"))
-    direct = None
-    if any(has_sharp_beam(matrices, g) for g in range(len(matrices.scene.groups))):
-        # V_d is a part of V entry by entry: the same seed and samples
-        direct = _sensors(matrices, 1, part(progress, 0.9, 1.0, "daylight")).values
-    return replace(matrices, sensors=sensors, direct_sensors=direct)
+    room = TracedRoom(
+        matrices.scene.interior, matrices.parts.groups, *sensors_of(*matrices.scene.sensors())
+    )
+    ((sensors, direct),) = views_of_rooms(
+        [room],
+        max_depth=INDOOR_DEPTH,
+        with_direct=any(has_sharp_beam(matrices, g) for g in range(len(matrices.scene.groups))),
+        progress=part(progress, 0.3, 1.0, "daylight"),
+        cache=matrices.cache,
+        scenes=matrices.scenes,
+        **_view_options(matrices.sampling),
+    )
+    return replace(
+        matrices, sensors=sensors, direct_sensors=None if direct is None else direct.values
+    )
 
 
 def with_exchange(
@@ -691,20 +703,6 @@ def _inner_daylight(
         )
         for g, room in enumerate(adjacent, len(scene.outdoor_groups))
     ]  # fmt: skip
-
-
-def _sensors(matrices: PhaseMatrices, depth: int, progress: Progress) -> Estimate:
-    """V [S, Q, K], or V_d with a depth of 1."""
-    return view_matrix(
-        matrices.scene.interior,
-        matrices.parts.groups,
-        *matrices.scene.sensors(),
-        max_depth=depth,
-        progress=progress,
-        cache=matrices.cache,
-        scenes=matrices.scenes,
-        **_view_options(matrices.sampling),
-    )
 
 
 def _view_options(sampling: Sampling) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mitsuba_cfs.surfaces import Outdoors, Surfaces, WindowGroup, WindowSurface
+from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup, WindowSurface
 
 from . import rooms
 
@@ -34,15 +34,15 @@ def elsewhere() -> tuple[Surfaces, list[WindowGroup]]:
 
 def three_rooms():
     """The test room, one that is turned and elsewhere, the test room with darker walls."""
-    from mitsuba_cfs.trace.kernels.rooms import Room
+    from mitsuba_cfs.trace.kernels.rooms import TracedRoom
 
     first, groups = rooms.test_room()
     turned, others = elsewhere()
     dark, _ = rooms.test_room(scale=0.5)
     return [
-        Room(first, groups, *sensors(groups, 5)),
-        Room(turned, others, *sensors(others, SEVERAL)),
-        Room(dark, groups, *sensors(groups, 3)),
+        TracedRoom(first, groups, *sensors(groups, 5)),
+        TracedRoom(turned, others, *sensors(others, SEVERAL)),
+        TracedRoom(dark, groups, *sensors(groups, 3)),
     ]
 
 
@@ -51,8 +51,8 @@ def test_rooms_together_have_the_matrices_of_each_alone(depth):
     from mitsuba_cfs.trace.matrices.view import view_matrix, views_of_rooms
 
     several = three_rooms()
-    together = views_of_rooms(several, max_depth=depth, **FEW)
-    for room, found in zip(several, together, strict=True):
+    together = views_of_rooms(several, max_depth=depth, with_direct=True, **FEW)
+    for room, (found, direct) in zip(several, together, strict=True):
         alone = view_matrix(
             room.surfaces, room.groups, room.points, room.directions, max_depth=depth, **FEW
         )
@@ -61,12 +61,14 @@ def test_rooms_together_have_the_matrices_of_each_alone(depth):
         assert change < 2e-5, f"{change:.1e} of the light"
         error = found.sum_error.mean() / alone.sum_error.mean()
         assert error == pytest.approx(1.0, rel=1e-2)
+        again, _ = views_of_rooms([room], max_depth=1, **FEW)[0]
+        assert np.abs(direct.values - again.values).sum() < 2e-5 * again.values.sum()
         assert np.allclose(found.covariance, alone.covariance, rtol=0.05, atol=1e-6)
 
 
 def facade():
     """Three rooms that see an obstruction and the windows of each other, and the whole outdoors."""
-    from mitsuba_cfs.trace.kernels.rooms import Room, joined_surfaces
+    from mitsuba_cfs.trace.kernels.rooms import TracedRoom, joined_surfaces
 
     _, (group,) = rooms.test_room()
     glass, windows, groups = group.windows[0].triangles, [], []
@@ -78,12 +80,12 @@ def facade():
         out = -0.05 * side[1] * np.array([0.0, 1.0, 0.0])
         windows.append(Surfaces(np.concatenate([pane, pane + out]), np.full(4, 0.6), np.zeros(4)))
     common = rooms.obstruction()
-    outdoors = Outdoors(
+    outdoors = SharedOutdoors(
         joined_surfaces([common, *windows]),
         np.repeat([-1, 0, 1, 2], [len(common.triangles), 4, 4, 4]),
     )
     each = [
-        Room(
+        TracedRoom(
             joined_surfaces([common, *(w for w in windows if w is not windows[i])]),
             groups[i], number=i,
         )

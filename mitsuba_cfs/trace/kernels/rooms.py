@@ -32,14 +32,14 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
-class Room:
+class TracedRoom:
     """Surfaces of a room, or in front of its windows, and the points that rays start from."""
 
     surfaces: Surfaces
     groups: Sequence[WindowGroup]
     points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))  # [S, 3]
     directions: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))  # [S, 3]
-    number: int = 0  # among the owners of `Outdoors`
+    number: int = 0  # among the owners of `SharedOutdoors`
 
     @property
     def bounds(self) -> NDArray[np.float64]:
@@ -59,7 +59,7 @@ class Room:
         """What rays draw random numbers by: whether surfaces are glossy, and whether panes."""
         return bool(self.surfaces.glossy), any(map(bool, self.surfaces.transmittance))
 
-    def moved(self, shift: NDArray[np.float64]) -> Room:
+    def moved(self, shift: NDArray[np.float64]) -> TracedRoom:
         """The room elsewhere."""
         surfaces = replace(self.surfaces, triangles=self.surfaces.triangles + shift)
         groups = [_moved_group(group, shift) for group in self.groups]
@@ -71,7 +71,7 @@ def _moved_group(group: WindowGroup, shift: NDArray[np.float64]) -> WindowGroup:
     return WindowGroup(group.name, tuple(windows))
 
 
-def apart(rooms: Sequence[Room]) -> tuple[list[Room], float]:
+def apart(rooms: Sequence[TracedRoom]) -> tuple[list[TracedRoom], float]:
     """The rooms on the places of a cubic grid about the origin, and the longest ray in any [m].
 
     A single room stays where it is.
@@ -115,7 +115,7 @@ def _padded(parts: Sequence[tuple[T, ...]], counts: Sequence[int]) -> tuple[T | 
 
 
 def batches_of_rooms(
-    rooms: Sequence[Room], entries: Sequence[int], *, outdoors: bool
+    rooms: Sequence[TracedRoom], entries: Sequence[int], *, outdoors: bool
 ) -> Iterator[list[int]]:
     """Numbers of the rooms that share a scene: few enough for memory; indoors alike in `kind`.
 
@@ -140,7 +140,7 @@ def batches_of_rooms(
 
 
 def of_rooms(
-    rooms: Sequence[Room],
+    rooms: Sequence[TracedRoom],
     traced: Callable[[Sequence[int]], Callable[[int], NDArray[np.float64]]],
     entries: Sequence[CacheEntry | None],
     *,
@@ -149,6 +149,7 @@ def of_rooms(
     label: str,
     progress: Progress = silent,
     outdoors: bool = False,
+    layers: int = 1,
 ) -> list[Estimate]:
     """The matrix of each room, of several that are traced together.
 
@@ -158,20 +159,23 @@ def of_rooms(
     Args:
         traced: gives batches of the matrices of some rooms, one after the other, the last axis
             whole; called where they are not in the cache.
-        entries, shapes: of each room's matrix.
+        entries: of each room's matrix, layer by layer; shapes: of each room's matrix.
         outdoors: rather than indoors.
+        layers: of the batches: matrices of each room that one pass gives, of all rooms each.
     """
     found: dict[int, Estimate] = {}
-    sizes = [math.prod(shape) for shape in shapes]
-    for some in batches_of_rooms(rooms, sizes, outdoors=outdoors):
-        rows = [sizes[i] // shapes[i][-1] for i in some]
+    sizes, count = [math.prod(shape) for shape in shapes], len(rooms)
+    for some in batches_of_rooms(rooms, [layers * size for size in sizes], outdoors=outdoors):
+        those = [layer * count + i for layer in range(layers) for i in some]
+        of_each = [shapes[i % count] for i in those]
+        rows = [math.prod(shape[:-1]) for shape in of_each]
         together = accumulate(
-            _at_first_use(partial(traced, some)), stopping=stopping, label=label, progress=progress,
-            entry=_joined_entry([entries[i] for i in some], [shapes[i] for i in some]),
+            _at_first_use(partial(traced, some)), stopping=stopping, label=label,
+            progress=progress, entry=_joined_entry([entries[i] for i in those], of_each),
         )  # fmt: skip
-        for i, first, count in zip(some, np.cumsum(rows) - rows, rows, strict=True):
-            found[i] = together.part(np.s_[first : first + count]).shaped(shapes[i])
-    return [found[number] for number in range(len(rooms))]
+        for i, shape, first, size in zip(those, of_each, np.cumsum(rows) - rows, rows, strict=True):
+            found[i] = together.part(np.s_[first : first + size]).shaped(shape)
+    return [found[number] for number in range(layers * count)]
 
 
 def _at_first_use(

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs import variants
-from mitsuba_cfs.surfaces import Outdoors, Surfaces, WindowGroup, triangle_areas
+from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup, triangle_areas
 from mitsuba_cfs.trace.kernels.gloss import TracedGloss, TracedPanes
 from mitsuba_cfs.trace.kernels.mesh import (
     OwnedMesh,
@@ -26,7 +26,7 @@ from mitsuba_cfs.trace.kernels.mesh import (
     unit_normals,
 )
 from mitsuba_cfs.trace.kernels.random_walk import diffuse_direction
-from mitsuba_cfs.trace.kernels.rooms import Room, apart, joined_surfaces
+from mitsuba_cfs.trace.kernels.rooms import TracedRoom, apart, joined_surfaces
 from mitsuba_cfs.trace.kernels.sampling import (
     DiscreteDistribution,
     column,
@@ -393,8 +393,10 @@ class SceneCache:
         # with the objects whose ids are in the key, so that no other object gets these ids
         self._scenes: OrderedDict[tuple, tuple[tuple, TracedScene]] = OrderedDict()
         self._meshes: list[tuple[str, SolidMesh]] = []
-        self._together: dict[tuple, tuple[tuple, list[Room], TracedScene]] = {}  # the last one
-        self._building: tuple[tuple, tuple, OwnedMesh] | None = None  # the last one
+        self._together: dict[
+            tuple, tuple[tuple, list[TracedRoom], TracedScene]
+        ] = {}  # the last one
+        self._building: tuple[tuple, tuple, OwnedMesh] | None = None
         for store in (self._scenes, self._meshes, self._together):  # at exit: before Dr.Jit ends
             weakref.finalize(self, store.clear)
 
@@ -432,7 +434,7 @@ class SceneCache:
             self._scenes.popitem(last=False)
         return self._scenes[key][1]
 
-    def together(self, rooms: Sequence[Room]) -> tuple[list[Room], TracedScene]:
+    def together(self, rooms: Sequence[TracedRoom]) -> tuple[list[TracedRoom], TracedScene]:
         """Rooms moved apart from each other, and the scene of all of them."""
         if len(rooms) == 1:
             return list(rooms), self.scene(rooms[0].surfaces, rooms[0].groups)
@@ -447,7 +449,7 @@ class SceneCache:
             ))}  # fmt: skip
         return self._together[key][1:]
 
-    def outdoors(self, outdoors: Outdoors, rooms: Sequence[Room]) -> TracedScene:
+    def outdoors(self, outdoors: SharedOutdoors, rooms: Sequence[TracedRoom]) -> TracedScene:
         """The scene in front of some rooms of a building; its mesh is built once."""
         of = outdoors.surfaces.triangles, outdoors.owner
         variant = variants.activate()

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.surfaces import Outdoors, Surfaces, WindowGroup
+from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
-from mitsuba_cfs.trace.kernels.rooms import Room, of_rooms
+from mitsuba_cfs.trace.kernels.rooms import TracedRoom, of_rooms
 from mitsuba_cfs.trace.kernels.sampling import (
     Ranges,
     batch_key,
@@ -54,7 +54,7 @@ def cell_daylight(
 
     Args: samples: paths of each cell and patch in each of 2 batches.
     """
-    room = Room(surfaces, tuple(groups))
+    room = TracedRoom(surfaces, tuple(groups))
     (found,) = cells_of_rooms(
         [room], None, [cells], [samples], subdivision=subdivision, basis=basis,
         max_depth=max_depth, seed=seed, cache=cache, scenes=scenes,
@@ -63,8 +63,8 @@ def cell_daylight(
 
 
 def cells_of_rooms(
-    rooms: Sequence[Room],
-    outdoors: Outdoors | None,
+    rooms: Sequence[TracedRoom],
+    outdoors: SharedOutdoors | None,
     cells: Sequence[Sequence[Cells]],
     samples: Sequence[int],
     *,
@@ -105,7 +105,7 @@ def cells_of_rooms(
         frames, corner, *sides = joined
         tables = [vectors(v) for v in (corner - tracer.centre, *sides)]
         axes = [vectors(frames[:, i]) for i in range(3)]
-        return _batches(tracer, bins, sky, tables, axes, counts, paths,
+        return _batches(tracer, bins, sky, tables, axes, counts=counts, samples=paths,
                         max_depth=max_depth, seed=seed)  # fmt: skip
 
     stored = (None if entry is None else entry.read(_stored) for entry in entries)
@@ -141,9 +141,9 @@ def _batches(
     sky: SkyBins,
     places: Sequence[mi.Vector3f],
     axes: Sequence[mi.Vector3f],
+    *,
     counts: NDArray[np.int64],
     samples: NDArray[np.int64],
-    *,
     max_depth: int,
     seed: int,
 ) -> Callable[[int], NDArray[np.float64]]:

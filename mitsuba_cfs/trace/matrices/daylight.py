@@ -18,11 +18,11 @@ from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.surfaces import Outdoors, Surfaces, WindowGroup
+from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts, roulette
-from mitsuba_cfs.trace.kernels.rooms import Room, of_rooms
+from mitsuba_cfs.trace.kernels.rooms import TracedRoom, of_rooms
 from mitsuba_cfs.trace.kernels.sampling import (
     batch_key,
     empty_sums,
@@ -148,7 +148,7 @@ def daylight_matrix(
 
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
     """
-    room = Room(surfaces, tuple(groups))
+    room = TracedRoom(surfaces, tuple(groups))
     (found,) = daylight_of_rooms(
         [room], None, subdivision=subdivision, basis=basis, samples=samples, max_depth=max_depth,
         stopping=stopping, seed=seed, progress=progress, cache=cache, scenes=scenes,
@@ -157,8 +157,8 @@ def daylight_matrix(
 
 
 def daylight_of_rooms(
-    rooms: Sequence[Room],
-    outdoors: Outdoors | None,
+    rooms: Sequence[TracedRoom],
+    outdoors: SharedOutdoors | None,
     *,
     subdivision: int = 4,
     basis: KlemsBasis = KLEMS_FULL,

@@ -23,7 +23,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, cache_entry
-from mitsuba_cfs.trace.kernels.rooms import Room, of_rooms
+from mitsuba_cfs.trace.kernels.rooms import TracedRoom, of_rooms
 from mitsuba_cfs.trace.kernels.sampling import (
     Ranges,
     batch_key,
@@ -73,7 +73,7 @@ class _Sensors:
     entries: NDArray[np.int64]  # [R] where the room's rows begin; as many again at the end
 
     @classmethod
-    def of(cls, tracer: TracedScene, bins: DirectionBins, rooms: Sequence[Room]) -> _Sensors:
+    def of(cls, tracer: TracedScene, bins: DirectionBins, rooms: Sequence[TracedRoom]) -> _Sensors:
         """The sensors of the rooms of a scene."""
         counts = np.array([len(room.points) for room in rooms])
         widths = bins.size * np.array([len(room.groups) for room in rooms])
@@ -182,8 +182,10 @@ def indirect_rows(
     entries = np.cumsum([0, *(points * widths)])
     rows = empty_sums(int(entries[-1]))
     paths = Ranges(points * [block.paths for block in blocks])
-    _add_paths(of, rows, paths, blocks, entries[:-1], (position, face, weight), first_point,
-               max_depth=max_depth, key_of=key_of)  # fmt: skip
+    _add_paths(
+        of, rows, paths, blocks, entries[:-1], (position, face, weight),
+        first_point=first_point, max_depth=max_depth, key_of=key_of,
+    )  # fmt: skip
     rows, weight = rows.numpy(), weight.numpy()
     found, ends = [], np.cumsum(points)
     for i, block in enumerate(blocks):
@@ -207,8 +209,8 @@ def _add_paths(
     blocks: Sequence[_Block],
     entries: NDArray[np.int64],
     points: tuple[mi.Point3f, mi.Vector3f, mi.Float],
-    first_point: mi.UInt32,
     *,
+    first_point: mi.UInt32,
     max_depth: int,
     key_of: Callable[[mi.UInt32], mi.UInt32],
 ) -> None:
@@ -469,8 +471,8 @@ def view_matrix(
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method);
     balance heuristic of Veach, Guibas 1995.
     """
-    room = Room(surfaces, tuple(groups), *sensors_of(points, directions))
-    (found,) = views_of_rooms(
+    room = TracedRoom(surfaces, tuple(groups), *sensors_of(points, directions))
+    ((found, _),) = views_of_rooms(
         [room], basis=basis, samples=samples, max_depth=max_depth, stopping=stopping, seed=seed,
         progress=progress, cache=cache, scenes=scenes,
     )  # fmt: skip
@@ -478,8 +480,9 @@ def view_matrix(
 
 
 def views_of_rooms(
-    rooms: Sequence[Room],
+    rooms: Sequence[TracedRoom],
     *,
+    with_direct: bool = False,
     basis: KlemsBasis = KLEMS_FULL,
     samples: int = 4096,
     max_depth: int = 32,
@@ -488,27 +491,30 @@ def views_of_rooms(
     progress: Progress = silent,
     cache: MatrixCache | None = None,
     scenes: SceneCache | None = None,
-) -> list[Estimate]:
-    """`view_matrix` of several rooms, traced together.
+) -> list[tuple[Estimate, Estimate | None]]:
+    """`view_matrix` of several rooms, traced together, and their direct parts from the same rays.
 
     The random numbers of a room do not depend on the other rooms: each matrix is that of the room
     alone but for the rounding of coordinates.
+
+    Args: with_direct: the matrices with a depth of 1 besides, entry by entry a part of the others.
     """
     n, scenes = int(samples), SceneCache() if scenes is None else scenes
-    bins = DirectionBins(basis)
+    bins, depths = DirectionBins(basis), (max_depth, 1) if with_direct else (max_depth,)
     entries = [
         cache_entry(
             cache, "view matrix", room.surfaces, room.groups, room.points, room.directions, basis,
-            n, max_depth, seed, by=__name__, stopping=stopping,
+            n, depth, seed, by=__name__, stopping=stopping,
         )
+        for depth in depths
         for room in rooms
     ]  # fmt: skip
 
     def traced(some: Sequence[int]) -> Callable[[int], NDArray[np.float64]]:
         placed, tracer = scenes.together([rooms[i] for i in some])
-        return _batches(_Sensors.of(tracer, bins, placed), n, max_depth, seed)
+        return _batches(_Sensors.of(tracer, bins, placed), n, depths, seed)
 
-    return of_rooms(
+    found = of_rooms(
         rooms,
         traced,
         entries,
@@ -516,13 +522,20 @@ def views_of_rooms(
         stopping=stopping,
         label="view matrix",
         progress=progress,
+        layers=len(depths),
     )
+    count = len(rooms)
+    return list(zip(found[:count], found[count:] or [None] * count, strict=True))
 
 
 def _batches(
-    of: _Sensors, samples: int, max_depth: int, seed: int
+    of: _Sensors, samples: int, depths: Sequence[int], seed: int
 ) -> Callable[[int], NDArray[np.float64]]:
-    """Batches of the rows of all rooms [S * G of each, K]."""
+    """Batches of the rows of all rooms [S * G of each, K], those of each depth.
+
+    Args: depths: most bounces; a second one is 1.
+    """
+    max_depth = depths[0]
     most = int(of.counts.max())
     if most * samples >= 2**32:
         raise ValueError(f"{most} sensors x {samples} samples: a batch must stay below 2**32 paths")
@@ -532,6 +545,7 @@ def _batches(
         matrix = empty_sums(int(of.entries[-1]))
         key = batch_key(seed, number)
         _add_direct(of, matrix, samples=samples, key=key)
+        direct = [] if len(depths) == 1 else [np.array(sums_of(matrix, (int(of.entries[-1]),)))]
         if of.tracer.gloss is not None and max_depth > 1:
             _add_mirrored(of, matrix, samples=samples, max_depth=max_depth, key=key)
         values = sums_of(matrix, (int(of.entries[-1]),))
@@ -541,7 +555,7 @@ def _batches(
                 first = of.entries[block.room]
                 first += (block.first - of.firsts[block.room]) * of.widths[block.room]
                 values[first : first + rows.size] += rows.ravel()
-        return values.reshape(-1, of.bins.size)
+        return np.concatenate([values, *direct]).reshape(-1, of.bins.size)
 
     return batch
 
