@@ -1,4 +1,4 @@
-"""Several rooms in one scene, so far apart that no ray gets from one to another.
+"""Several rooms in one scene, with gaps that no ray of a room crosses.
 
 One acceleration structure and one launch serve the rooms of a building.  Each room is moved as a
 whole: what its rays meet is the same as in a scene of its own.
