@@ -98,14 +98,25 @@ def layered_window(
 
     Raises: `DataError` naming file and line for a layer that cannot be computed.
     """
-    issues = list(dict.fromkeys(issue for thing in things for issue in moved_files(thing)))
+    files = [issue for thing in things for issue in (*moved_files(thing), *_thickness(thing))]
+    issues = list(dict.fromkeys(files))
     if len(things) == 1 and things[0].material.kind in SYSTEMS:
         thing = things[0]
-        path = _bsdf_file(thing)
+        path, shares = _bsdf_file(thing), _added_shares(thing, outwards[0])
         bands = dict(read_bsdf_xml(path).bands)
         if outwards[0]:  # the front of its data is on the side that the normal leaves
             bands = {name: band.turned_round() for name, band in bands.items()}
-        state = ShadingState(bands=bands, file=path)
+        if not any(shares):
+            return LayeredWindow(
+                ShadingState(bands=bands, file=path), up_vector(thing), tuple(issues)
+            )
+        if any(isinstance(band, TensorTreeBsdf) for band in bands.values()):
+            raise thing.definitions[-1].primitive.fault(
+                "adds diffuse shares to a tensor tree, which is not computed: "
+                "add them to the file, or use its Klems matrix"
+            )
+        bands = {name: _with_shares(klems_of(band), shares) for name, band in bands.items()}
+        state = ShadingState(bands=bands, layers=(path,))
         return LayeredWindow(state, up_vector(thing), tuple(issues))
     layers = [
         _bsdf_layer(thing, outward)
@@ -234,7 +245,41 @@ def _bsdf_file(thing: RadianceObject) -> Path:
 def _bsdf_layer(thing: RadianceObject, outward: bool) -> KlemsBsdf:
     file = read_bsdf_xml(_bsdf_file(thing))
     bsdf = klems_of(file.bands.get("Visible") or file.bands["Solar"]).filled()
-    return bsdf.turned_round() if outward else bsdf
+    side = bsdf.turned_round() if outward else bsdf
+    return _with_shares(side, _added_shares(thing, outward))
+
+
+def _added_shares(thing: RadianceObject, outward: bool) -> tuple[float, float, float]:
+    """Shares that a `BSDF` adds to its file: reflected outdoors and indoors, transmitted."""
+    numbers = (*thing.definitions[-1].primitive.numbers, *9 * [0.0])
+    front, back, passed = (luminance(numbers[i : i + 3]) for i in (0, 3, 6))
+    return (front, back, passed) if outward else (back, front, passed)
+
+
+def _with_shares(bsdf: KlemsBsdf, shares: tuple[float, float, float]) -> KlemsBsdf:
+    """A BSDF and shares that it scatters evenly besides: of its front, its back, through it."""
+    front, back, passed = (share / np.pi for share in shares)
+    full = bsdf.filled()
+    return replace(
+        bsdf,
+        transmission_front=full.transmission_front + passed,
+        transmission_back=full.transmission_back + passed,
+        reflection_front=full.reflection_front + front,
+        reflection_back=full.reflection_back + back,
+    )
+
+
+def _thickness(thing: RadianceObject) -> list[Issue]:
+    """The thickness of a `BSDF`, which shows the geometry behind it in Radiance."""
+    if thing.material.kind != "BSDF":
+        return []
+    definition = thing.definitions[-1]
+    functions, _ = functions_of(definition, definition.primitive.strings[5:])
+    thickness = float(evaluated(definition, functions, definition.primitive.strings[0], {}))
+    if not thickness:
+        return []
+    where = f"{thing.primitive.file}:{thing.primitive.line}"
+    return [Issue("bsdf-thickness", where, {"surface": thing.name, "thickness": thickness})]
 
 
 def _layer(

@@ -91,6 +91,9 @@ def panes_of(
     """
     dark = {id(thing) for thing in scene.of_modifiers(facades)} if facades else set()
     panes = [o for o in scene.objects if is_pane(o) and id(o) not in dark]
+    edges = _edges(panes)
+    dark |= {id(thing) for thing in edges}
+    panes = [o for o in panes if id(o) not in dark]
     sides, space = pane_sides(scene, panes), _Space(scene, {id(pane) for pane in panes})
     chosen: list[tuple[RadianceObject, WindowSurface]] = []
     for thing in scene.of_modifiers(apertures):
@@ -128,6 +131,10 @@ def panes_of(
         windows.append(PanedWindow(surface, (*front.layers, thing), covered, beside, facing))
         issues += front.issues
     used = {id(pane) for window in windows for pane in window.panes} | set(layers) | far | dark
+    if edges:
+        values = {"count": len(edges), "first": edges[0].name}
+        first = edges[0].primitive
+        issues.append(Issue("edges-of-panes", f"{first.file}:{first.line}", values))
     rest = [o for o in scene.objects if not o.material.is_opaque and id(o) not in used]
     return Panes(tuple(windows), (*issues, *map(_left_out, rest)))
 
@@ -356,13 +363,41 @@ def _optics(thing: RadianceObject) -> object:
     return replace(thing.material, name=""), tuple(map(id, definitions))
 
 
-def _is_wide(thing: RadianceObject) -> bool:
-    """Whether a surface is no strip, such as a slat."""
-    if not thing.material.is_translucent:
-        return True
+def _edges(panes: Sequence[RadianceObject]) -> list[RadianceObject]:
+    """The narrow sides of panes that are drawn as boxes: their corners are those of the panes."""
+    normals: dict[tuple[float, ...], list[NDArray[np.float64]]] = {}
+    narrow = []
+    for pane in panes:
+        if _width(pane) < NARROW:
+            narrow.append(pane)
+            continue
+        for corner in _corners(pane):
+            normals.setdefault(corner, []).append(pane.normal)
+    return [
+        one
+        for one in narrow
+        if all(
+            any(abs(normal @ one.normal) < 1 - PARALLEL for normal in normals.get(corner, ()))
+            for corner in _corners(one)
+        )
+    ]
+
+
+def _corners(thing: RadianceObject) -> set[tuple[float, ...]]:
+    """Vertices of a surface, to 0.1 mm."""
+    return set(map(tuple, np.round(thing.triangles.reshape(-1, 3), 4) + 0.0))
+
+
+def _width(thing: RadianceObject) -> float:
+    """The smaller extent of a surface in its plane [m]."""
     corners = thing.triangles.reshape(-1, 3)
     sizes = np.linalg.svd(corners - corners.mean(axis=0))[2] @ corners.T
-    return bool(np.sort(np.ptp(sizes, axis=1))[1] >= NARROW)
+    return float(np.sort(np.ptp(sizes, axis=1))[1])
+
+
+def _is_wide(thing: RadianceObject) -> bool:
+    """Whether a surface is no strip, such as a slat."""
+    return not thing.material.is_translucent or _width(thing) >= NARROW
 
 
 def _left_out(thing: RadianceObject) -> Issue:
