@@ -241,10 +241,12 @@ def _model(name: str) -> Callable[..., Any]:
 
     They are compiled or read from numba's cache when the package is imported, for half a second.
     """
+    import pythermalcomfort
+
     package = "pythermalcomfort.models"
     if package in sys.modules:
         return getattr(import_module(f"{package}.{name}"), name)
-    folder = Path(import_module("pythermalcomfort").__file__ or "").parent / "models"
+    folder = Path(pythermalcomfort.__file__ or "").parent / "models"
     bare = ModuleType(package)  # its own file is not run
     bare.__path__ = [str(folder)]
     sys.modules[package] = bare
