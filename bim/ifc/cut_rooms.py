@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bim.boxes import Boxes
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
@@ -25,6 +26,7 @@ from bim.solids import packed, unpacked
 from mitsuba_cfs.processes import ProcessEnded
 
 THROUGH = 0.1  # a space that ends less far beyond a slab is drawn into it [m]
+TOUCHING = 1e-9  # a lid beside a space that overlaps it by less does not cover it [m]
 MOSTLY = 0.7  # share of the top of a space that has to lie beyond what cuts it
 LEAST_CUT = 0.02  # share of the volume: less is the drawing's
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -37,14 +39,15 @@ def cut_rooms(
 
     Args: lids: of `room_lids`; fixed: STEP ids of spaces whose drawn height holds.
     """
+    boxes = Boxes.of_triangles([lid.triangles for lid in lids])
     through = [
         index
         for index, record in enumerate(records)
-        if record.step_id not in fixed and goes_through(record, lids)
+        if record.step_id not in fixed and goes_through(record, lids, boxes)
     ]
     if not through:
         return list(records), []
-    items = [(packed(records[i].solid.manifold), _near(records[i], lids)) for i in through]
+    items = [(packed(records[i].solid.manifold), _near(records[i], lids, boxes)) for i in through]
     result, issues = list(records), []
     for index, part in zip(through, largest_parts(items), strict=True):
         record = records[index]
@@ -71,9 +74,12 @@ def cut_rooms(
     return result, issues
 
 
-def goes_through(record: SpaceRecord, lids: Sequence[Shape]) -> bool:
-    """Whether most of the top of a space, or of its bottom, is beyond a slab, roof or ceiling."""
-    near = _near(record, lids)
+def goes_through(record: SpaceRecord, lids: Sequence[Shape], boxes: Boxes) -> bool:
+    """Whether most of the top of a space, or of its bottom, is beyond a slab, roof or ceiling.
+
+    Args: boxes: of the lids.
+    """
+    near = _near(record, lids, boxes)
     if not near:
         return False
     mesh = ray_mesh(np.concatenate(near))
@@ -94,20 +100,11 @@ def goes_through(record: SpaceRecord, lids: Sequence[Shape]) -> bool:
     return False
 
 
-def _near(record: SpaceRecord, lids: Sequence[Shape]) -> list[np.ndarray]:
+def _near(record: SpaceRecord, lids: Sequence[Shape], boxes: Boxes) -> list[np.ndarray]:
     """Bodies of what may cut a space: inside of its height, over or under it."""
-    meshes = []
-    for lid in lids:
-        corners = lid.triangles.reshape(-1, 3)
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        inside = low[2] < record.solid.high[2] - THROUGH and high[2] > record.solid.low[2] + THROUGH
-        if (
-            inside
-            and np.all(low[:2] < record.solid.high[:2])
-            and np.all(high[:2] > record.solid.low[:2])
-        ):
-            meshes.append(lid.triangles)
-    return meshes
+    inside = np.array([TOUCHING, TOUCHING, THROUGH])
+    near = boxes.near(record.solid.low + inside, record.solid.high - inside)
+    return [lids[index].triangles for index in near]
 
 
 def room_lids(source: Source) -> list[Shape]:
