@@ -161,7 +161,7 @@ def plan_table(rooms: Sequence[PlannedRoom]) -> str:
 def plan_page(rooms: Sequence[PlannedRoom]) -> str:
     """The first plan as a page that loads itself again until the report takes its place."""
     glare = gettext("Occupied hours with glare, by the light at the eye")
-    heads = (gettext("Room"), *(quantity(name).label for name in COLUMNS[:3]), glare)
+    heads = (gettext("Room"), *map(_head, COLUMNS[:3]), glare)
     head = "".join(f"<th>{escape(text)}</th>" for text in heads)
     rows = []
     for room in rooms:
@@ -184,19 +184,26 @@ def plan_page(rooms: Sequence[PlannedRoom]) -> str:
     )
 
 
+def _head(name: str) -> str:
+    """Label and unit of a figure."""
+    of = quantity(name)
+    return of.label if of.unit in of.label else f"{of.label} [{of.unit}]"
+
+
 def options_for_error(
     options: RoomOptions, rooms: Sequence[PlannedRoom], error: float
 ) -> RoomOptions:
     """The options of a run with as many paths as a stated error of the yearly means needs.
 
     The error of the first plan falls with the root of the paths; the room with the largest decides.
-    No more than those of `options`.
+    Half of the variance is left to what a first plan does not trace, the sun.  No more paths than
+    those of `options`.
 
     Source: Stein 1945, "A two-sample test for a linear hypothesis whose power is independent of the
     variance", Annals of Mathematical Statistics 16:243-258.
     """
     worst = max((room.mean_error for room in rooms), default=0.0)
-    share, first = (worst / error) ** 2, plan_options(options).sampling
+    share, first = 2 * (worst / error) ** 2, plan_options(options).sampling
     return options.changed(**{
         name: min(max(math.ceil(share * getattr(first, name)), 1), getattr(options.sampling, name))
         for name in PATHS

@@ -81,7 +81,7 @@ def test_paths_follow_from_the_error_of_the_worst_room():
     options = RoomOptions.of(sensor_samples=4096, patch_samples=4096)
     rooms = [planned("a", 0.02), planned("b", 0.1)]
     coarse = options_for_error(options, rooms, 0.05).sampling
-    assert (coarse.sensor_samples, coarse.patch_samples) == (1024, 512)
+    assert (coarse.sensor_samples, coarse.patch_samples) == (2048, 1024)
     fine = options_for_error(options, rooms, 0.01).sampling
     assert (fine.sensor_samples, fine.patch_samples) == (4096, 4096)
 
