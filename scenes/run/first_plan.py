@@ -43,6 +43,7 @@ PATHS = {"sensor_samples": 256, "patch_samples": 128}
 SPACING = 1.0  # of the sensors, at least [m]
 READ = {"eye"}  # what a rule of shading may read; others leave the first state
 GLARE = LIMITS[1]  # above it glare disturbs, EN 17037's medium level
+SET = 24  # rooms that are traced together: each has its surroundings in memory
 FROM = 6  # rooms; fewer are computed nearly as soon
 REFRESH_S = 5  # of the page
 COLUMNS = ("daylight_factor", "da300", "sda300_50", "glare_h")
@@ -75,16 +76,17 @@ def first_plan(
     room = plan_options(options.room)
     skies = skies_for(inputs.weather, room.sampling, **room.sky)
     chosen = replace(options, room=room, inner_glass=False, cache=False)
-    rooms = traced_together(inputs, spaces, skies, chosen, cut=False)
     planned = []
-    for number, (one, scene, matrices) in enumerate(rooms, 1):
-        if matrices is None:
-            matrices = phase_matrices(scene, room.sampling, five_phase=False)
-        try:
-            planned.append(_planned(one, matrices))
-        except RoomError:
-            continue
-        progress("first plan", number / len(rooms))
+    for start in range(0, len(spaces), SET):
+        some = spaces[start : start + SET]
+        for one, scene, matrices in traced_together(inputs, some, skies, chosen, cut=False):
+            if matrices is None:
+                matrices = phase_matrices(scene, room.sampling, five_phase=False)
+            try:
+                planned.append(_planned(one, matrices))
+            except RoomError:
+                continue
+        progress("first plan", min(start + SET, len(spaces)) / max(len(spaces), 1))
     return planned
 
 

@@ -27,7 +27,7 @@ from scenes.room.light import visible_scene
 from scenes.room.room import inputs_of_room
 from scenes.run.options import JobOptions
 
-ENTRIES = 1 << 23  # of D of the rooms that are traced together: 64 MB in each of some ten arrays
+ENTRIES = 1 << 21  # of D of the rooms that are traced together: 16 MB in each of some ten arrays
 
 
 class RoomsTogether:
