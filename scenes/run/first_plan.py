@@ -198,8 +198,8 @@ def options_for_error(
     """The options of a run with as many paths as a stated error of the yearly means needs.
 
     The error of the first plan falls with the root of the paths; the room with the largest decides.
-    Half of the variance is left to what a first plan does not trace, the sun.  No more paths than
-    those of `options`.
+    Half of the variance is left to what a first plan does not trace, the sun.  At most the paths of
+    `options`.
 
     Source: Stein 1945, "A two-sample test for a linear hypothesis whose power is independent of the
     variance", Annals of Mathematical Statistics 16:243-258.
