@@ -94,7 +94,8 @@ def layered_window(
     Args:
         outwards: whether the front of each layer is outdoors.
         beside: [N] share of light at `ANGLES` that meets the innermost alone.
-        facing: [N] share of the light that it reflects outwards that meets the others; None: all.
+        facing: [N] share of the light that it reflects outwards that meets the others, where the
+            rest meets walls; None without walls.
 
     Raises: `DataError` naming file and line for a layer that cannot be computed.
     """
@@ -133,12 +134,13 @@ def layered_window(
     angular = None
     plain = [layer for layer in layers if isinstance(layer, WindowLayer)]
     if len(plain) == len(layers):
-        angular = _beam_table(plain)
+        angular, alone = _beam_table(plain), _beam_table(plain[-1:])
+        if facing is not None:
+            angular = replace(angular, reflectance_front=alone.reflectance_front)
         if beside is not None:
-            angular = angular.mixed(_beam_table(plain[-1:]), beside)
+            angular = angular.mixed(alone, beside)
     klems = [layer.klems if isinstance(layer, WindowLayer) else klems_of(layer) for layer in layers]
-    share = np.ones(KLEMS_FULL.size) if facing is None else _patch_means(facing)
-    system = _in_series(klems, share)
+    system = _in_series(klems, None if facing is None else _patch_means(facing))
     if beside is not None:
         system = _mixed(system, klems[-1], _patch_means(beside))
     system = replace(system, see_through=0.0) if rough else system
@@ -166,19 +168,21 @@ def _beam_table(layers: Sequence[WindowLayer]) -> AngularTable:
     return AngularTable(ANGLES, *(np.clip(one.mean(axis=0), 0, 1) for one in values))
 
 
-def _in_series(layers: Sequence[KlemsBsdf], facing: NDArray[np.float64]) -> KlemsBsdf:
-    """Layers as one system, where a share [K] of what the last reflects meets the others.
+def _in_series(layers: Sequence[KlemsBsdf], facing: NDArray[np.float64] | None) -> KlemsBsdf:
+    """Layers as one system, where a share [K] of what the last reflects outwards meets the others.
 
-    The rest leaves the system as from the last one alone.
+    The rest meets the walls between them, which see the last layer alone: what the others mirror
+    is outdoors.
     """
-    *outer, inner = (layer.filled() for layer in layers)
-    if not outer:
+    if len(layers) == 1:
         return layers[0]
+    if facing is None:
+        return combine_layers(list(layers)).bsdf
+    *outer, inner = (layer.filled() for layer in layers)
     before = outer[0] if len(outer) == 1 else combine_layers(outer).bsdf
     before = replace(before, reflection_back=facing * before.reflection_back)
-    whole, part = combine_layers([before, inner]).bsdf, facing[:, None]
-    reflected = part * whole.reflection_front + (1 - part) * inner.reflection_front
-    return replace(whole, reflection_front=reflected)
+    whole = combine_layers([before, inner]).bsdf
+    return replace(whole, reflection_front=inner.reflection_front)
 
 
 def _mixed(system: KlemsBsdf, inner: KlemsBsdf, share: NDArray[np.float64]) -> KlemsBsdf:

@@ -47,7 +47,7 @@ class PanedWindow:
     beside: NDArray[np.float64] | None = None  # [N] share of light at `ANGLES` that meets this pane
     # alone, past the rims of those in front of it
     facing: NDArray[np.float64] | None = None  # [N] share of the light that it reflects outwards at
-    # `ANGLES` that meets the panes before it
+    # `ANGLES` that meets the panes before it; None without walls between them
 
     @property
     def outwards(self) -> list[bool]:
@@ -124,6 +124,7 @@ def panes_of(
                 continue
             covered = 1.0 - space.free_share(surface, LAYERS)
         beside, facing = space.shares(surface, front) if front.layers else (None, None)
+        facing = facing if front.walled > OVERLAP else None
         if beside is not None:
             values = {"window": thing.name, "share": 100 * diffuse_mean(beside)}
             where = f"{thing.primitive.file}:{thing.primitive.line}"
@@ -147,7 +148,8 @@ class _Front:
     hidden: set[int]  # identities of all that are near
     others: tuple[RadianceObject, ...]  # panes that are left out
     issues: tuple[Issue, ...]
-    numbers: tuple[int, ...] = ()  # of all that are near, in the scene
+    numbers: tuple[int, ...]  # of all that are near, in the scene
+    walled: float  # share of the window that is behind a wall, not the layers
 
 
 class _Space:
@@ -211,7 +213,7 @@ class _Space:
             issues.append(Issue("panes-before-wall", where, values, Effect(glass=surface.area)))
         panes = tuple(self._objects[n] for n in reversed(layers))
         hidden = {id(self._objects[n]) for n in seen}
-        return _Front(panes, hidden, tuple(left_out), tuple(issues), tuple(sorted(seen)))
+        return _Front(panes, hidden, tuple(left_out), tuple(issues), tuple(sorted(seen)), walled)
 
     def free_share(self, surface: WindowSurface, reach: float) -> float:
         """Share of a pane with neither another pane nor a wall on its room side."""

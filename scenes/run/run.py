@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
 import platform
+import shutil
 import time
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
@@ -10,6 +12,7 @@ from dataclasses import asdict, dataclass
 from functools import lru_cache, partial
 from importlib import metadata
 from pathlib import Path
+from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any
 
 from bim.doorways import panes_between, source_rooms
@@ -40,6 +43,7 @@ from scenes.room.operation_tables import OperationTables
 from scenes.room.room import RoomChoices, compute_room, lit_room
 from scenes.room.series import RoomSeries, moved_light, moved_result
 from scenes.run.options import JobOptions
+from scenes.run.together import RoomsTogether
 from scenes.workers import Tasks
 
 OnLight = Callable[[DaylitRoom], None]  # called with the light of each room, before its heat
@@ -69,24 +73,27 @@ def computed_rooms(
     Rooms that exchange heat are balanced together, after the light of all of them.
     """
     coupled = balanced_together(inputs, options)
-    work = RoomWork(inputs, run_spaces(inputs, options), skies, options, with_heat=not coupled)
-    store = StoredArrays() if len(work.spaces) > 1 else None
-    series = RoomSeries(
-        inputs.building,
-        work.spaces,
-        inputs.systems,
-        options.room.sampling,
-        MatrixCache.of_user() if options.cache else None,
-        work,
-        moved_light if coupled else moved_result,
-        options.building,
-        partial(_interchangeable, inputs, options),
-        on_room=(on_light if coupled else on_room) or _ignore,
-        shared=N_("daylight, glare and solar gains") if coupled else N_("results"),
-        parallel=None if workers is None else partial(work.parallel, workers=workers),
-        stored=_unchanged if store is None else store.stored,
-    )
-    results, issues, notes = series.results(progress)
+    spaces = run_spaces(inputs, options)
+    store = StoredArrays() if len(spaces) > 1 else None
+    with TemporaryDirectory(prefix="cfs-matrices-") as folder:
+        together = RoomsTogether(inputs, spaces, skies, options, Path(folder))
+        work = RoomWork(inputs, spaces, skies, options, together, with_heat=not coupled)
+        series = RoomSeries(
+            inputs.building,
+            spaces,
+            inputs.systems,
+            options.room.sampling,
+            MatrixCache.of_user() if options.cache else None,
+            work,
+            moved_light if coupled else moved_result,
+            options.building,
+            partial(_interchangeable, inputs, options),
+            on_room=(on_light if coupled else on_room) or _ignore,
+            shared=N_("daylight, glare and solar gains") if coupled else N_("results"),
+            parallel=None if workers is None else partial(work.parallel, workers=workers),
+            stored=_unchanged if store is None else store.stored,
+        )
+        results, issues, notes = series.results(progress)
     if not coupled:
         return _read_back(results, store), issues, notes
     years: list[RoomYear] = []
@@ -158,15 +165,17 @@ class RoomWork:
     spaces: Sequence[Space]  # `run_spaces`
     skies: AnnualSky
     options: JobOptions
+    together: RoomsTogether  # traces the matrices of several rooms at once
     with_heat: bool  # False: light alone, the heat of all rooms is balanced together
 
     def __call__(self, space: Space, progress: Progress = silent) -> RoomYear | DaylitRoom:
         """The result of a room."""
         inputs, options = self.inputs, self.options
+        cache = self.together.cache_for(space, progress)
         choices: RoomChoices = {
             "operation": inputs.operation,
             "skies": self.skies,
-            "cache": MatrixCache.of_user() if options.cache else None,
+            "cache": cache,
             "explore": options.explore,
             "colour": options.colour,
             "inner": options.inner_glass,
@@ -225,19 +234,23 @@ class _FromFiles:
 
     def __call__(self, guid: str) -> tuple[str, RoomYear | DaylitRoom]:
         variants.activate()
-        inputs, spaces, skies = _read(self.options, self.run)
-        work = RoomWork(inputs, spaces, skies, self.options, with_heat=self.with_heat)
+        inputs, together, spaces, skies = _read(self.options, self.run)
+        work = RoomWork(inputs, spaces, skies, self.options, together, with_heat=self.with_heat)
         return guid, work.of(guid)
 
 
 @lru_cache(maxsize=1)
-def _read(options: JobOptions, run: str) -> tuple[Inputs, Sequence[Space], AnnualSky]:
+def _read(
+    options: JobOptions, run: str
+) -> tuple[Inputs, RoomsTogether, Sequence[Space], AnnualSky]:
     inputs, room = read_inputs(options, inner=options.inner_glass), options.room
     if _identity(options, inputs) != run:
         message = "a worker has other input files or another version of the program"
         raise DataError(message, field="--scheduler")
     skies = skies_for(inputs.weather, room.sampling, **room.sky)
-    return inputs, run_spaces(inputs, options), skies
+    spaces, folder = run_spaces(inputs, options), Path(mkdtemp(prefix="cfs-matrices-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return inputs, RoomsTogether(inputs, spaces, skies, options, folder), spaces, skies
 
 
 def _failed(guid: str, error: BaseException) -> tuple[str, BaseException]:

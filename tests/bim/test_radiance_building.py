@@ -358,11 +358,9 @@ def test_a_wide_fabric_exchanges_light_with_the_pane_that_it_faces(tmp_path):
     passed = bsdf.direct_hemispherical(bsdf.transmission_front)[0]
     again = 1 / (1 - 0.4 * weight @ (mirrored * facing))
     assert passed == pytest.approx(glass.transmittance[0] * 0.02 * again, rel=2e-3)
-    for patch, angle in ((1, 10.0), (50, 40.0)):  # outgoing ones of normal incidence
-        through = 0.4 * again * glass.transmittance[0] * glass.transmitted(np.radians(angle))
-        share = np.interp(np.radians(angle), polar, facing)
-        expected = share * through + (1 - share) * 0.4
-        assert np.pi * bsdf.reflection_front[patch, 0] == pytest.approx(expected, rel=0.03)
+    # the wall beside the window sees the fabric alone, no mirror image in the pane
+    np.testing.assert_allclose(bsdf.reflection_front, 0.4 / np.pi, rtol=1e-9)
+    assert not window.states[0].angular.reflectance_front.any()
 
 
 def test_a_pane_drawn_as_a_box_is_two_panes(tmp_path):
