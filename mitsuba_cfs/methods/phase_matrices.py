@@ -220,6 +220,7 @@ def matrices_together(
     sampling: Sampling,
     *,
     five_phase: bool = True,
+    cut: bool = True,
     cache: MatrixCache | None = None,
     progress: Progress = silent,
 ) -> list[PhaseMatrices]:
@@ -230,9 +231,14 @@ def matrices_together(
     Args:
         scenes: of rooms with windows outdoors alone, and something in front of them.
         outdoors: of all; the windows of a room are those of the scene of that number.
+        cut: windows where the view outdoors differs; False: D's means have no stated error.
     """
-    common: dict[str, Any] = {"cache": cache, "scenes": SceneCache()}
-    parts = _parts_together(scenes, outdoors, sampling, common)
+    shared = SceneCache()
+    shared.know_fronts(outdoors, [scene.exterior for scene in scenes])
+    common: dict[str, Any] = {"cache": cache, "scenes": shared}
+    parts = [Parts.whole(scene.groups) for scene in scenes]
+    if cut:
+        parts = _parts_together(scenes, outdoors, sampling, common)
     progress("V and D", 0.2)
     passes = [(OUTDOOR_DEPTH, False), *([(1, False)] if five_phase else [])]
     if five_phase and outdoors.surfaces.glossy:
@@ -256,6 +262,7 @@ def matrices_together(
                 one, sampling, five_phase, cache, of, (), whole[i],
                 direct_daylight=beams[0] if beams else None,
                 straight_daylight=beams[-1] if beams else None,
+                scenes=shared,
             )
         )  # fmt: skip
     rooms = [

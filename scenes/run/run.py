@@ -8,7 +8,7 @@ import shutil
 import time
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from importlib import metadata
 from pathlib import Path
@@ -42,6 +42,7 @@ from scenes.room.inputs import skies_for
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import RoomChoices, compute_room, lit_room
 from scenes.room.series import RoomSeries, moved_light, moved_result
+from scenes.run.first_plan import FROM, PlannedRoom, first_plan, options_for_error
 from scenes.run.options import JobOptions
 from scenes.run.together import RoomsTogether
 from scenes.workers import Tasks
@@ -268,6 +269,7 @@ def _requirements(inputs: Inputs) -> Requirements:
 
 
 OnHead = Callable[[Head], None]  # called as soon as all inputs are read
+OnPlan = Callable[[Sequence[PlannedRoom]], None]  # called with the first plan of many rooms
 
 
 def run_job(
@@ -278,6 +280,7 @@ def run_job(
     on_room: OnRoom | None = None,
     on_light: OnLight | None = None,
     on_head: OnHead | None = None,
+    on_plan: OnPlan | None = None,
     workers: Workers | None = None,
 ) -> RunResult:
     """Daylight, glare, temperatures and comfort of the chosen rooms.
@@ -288,6 +291,7 @@ def run_job(
         on_light: called with the light of each room as soon as it is computed, if the rooms' heat
             is balanced together.
         on_head: called with what was left out and assumed, before anything is traced.
+        on_plan: called with first figures of all rooms where these are many, before the rest.
         workers: compute several rooms at a time; None: this process, room by room.
 
     Raises: `DataError` for a file that cannot be used, before anything is traced.
@@ -297,8 +301,9 @@ def run_job(
     if on_head is not None:
         on_head(inputs.head)
     return run_inputs(
-        inputs, options, progress, on_room=on_room, on_light=on_light, workers=workers, start=start
-    )
+        inputs, options, progress, on_room=on_room, on_light=on_light, on_plan=on_plan,
+        workers=workers, start=start,
+    )  # fmt: skip
 
 
 def run_inputs(
@@ -308,6 +313,7 @@ def run_inputs(
     *,
     on_room: OnRoom | None = None,
     on_light: OnLight | None = None,
+    on_plan: OnPlan | None = None,
     workers: Workers | None = None,
     start: float | None = None,
 ) -> RunResult:
@@ -322,6 +328,13 @@ def run_inputs(
     head = inputs.head
     sun = sun_directions(weather)
     variant = variants.activate()
+    if options.error is not None or (on_plan is not None and len(inputs.spaces) >= FROM):
+        plan = first_plan(inputs, run_spaces(inputs, options), options, progress)
+        if options.error is not None:
+            room = options_for_error(options.room, plan, options.error)
+            options = replace(options, room=room)
+        if on_plan is not None and plan:
+            on_plan(plan)
     progress("sky", 0.0)
     room = options.room
     skies = skies_for(weather, room.sampling, **room.sky)

@@ -16,16 +16,18 @@ from bim.to_tracer import orientation_groups, outdoors_of_rooms
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.methods.phase_matrices import matrices_together
-from mitsuba_cfs.progress import Progress
+from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, matrices_together
+from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from scenes.inputs import Inputs
+from scenes.room.inputs import RoomInputs
 from scenes.room.light import visible_scene
 from scenes.room.room import inputs_of_room
 from scenes.run.options import JobOptions
 
-ENTRIES = 1 << 23  # of D of the rooms that are traced together: 64 MB in each of some ten arrays
+ENTRIES = 1 << 21  # of D of the rooms that are traced together: 16 MB in each of some ten arrays
 
 
 class RoomsTogether:
@@ -82,33 +84,54 @@ class RoomsTogether:
         cache = self._cache()
         if not self._options.cache and cache.folder.exists():
             shutil.rmtree(cache.folder)
-        inputs, options = self._inputs, self._options
-        scenes, those = [], []
-        for space in spaces:
-            try:
-                room = inputs_of_room(
-                    inputs.building, space, inputs.systems, inputs.weather, options.room,
-                    operation=inputs.operation, skies=self._skies, inner=options.inner_glass,
-                )  # fmt: skip
-                scenes.append(visible_scene(room))
-            except RoomError:  # its stages say so
-                continue
-            those.append(space)
-        first = seasons(inputs.building)[0].building
-        outdoors = outdoors_of_rooms(first, those)
-        glossy = bool(outdoors.surfaces.glossy)
-        some = [
-            i for i, scene in enumerate(scenes)
-            if not scene.adjacent
-            and len(scene.exterior.triangles)
-            and bool(scene.exterior.glossy) == glossy
-        ]  # fmt: skip
-        if len(some) > 1:
-            matrices_together(
-                [scenes[i] for i in some],
-                outdoors_of_rooms(first, [those[i] for i in some]),
-                options.room.sampling,
-                five_phase=options.room.method != "three-phase",
-                cache=cache,
-                progress=progress,
-            )
+        traced_together(self._inputs, spaces, self._skies, self._options, cache, progress=progress)
+
+
+def traced_together(
+    inputs: Inputs,
+    spaces: Sequence[Space],
+    skies: AnnualSky,
+    options: JobOptions,
+    cache: MatrixCache | None = None,
+    *,
+    cut: bool = True,
+    progress: Progress = silent,
+) -> list[tuple[RoomInputs, DaylightScene, PhaseMatrices | None]]:
+    """The matrices of rooms that can be traced together; None for the others.
+
+    Rooms without a place for sensors are left out.
+
+    Args: cut: windows where the view outdoors differs.
+    """
+    rooms: list[tuple[RoomInputs, DaylightScene]] = []
+    for space in spaces:
+        try:
+            room = inputs_of_room(
+                inputs.building, space, inputs.systems, inputs.weather, options.room,
+                operation=inputs.operation, skies=skies, inner=options.inner_glass,
+            )  # fmt: skip
+            rooms.append((room, visible_scene(room)))
+        except RoomError:  # the room's stages say so
+            continue
+    first = seasons(inputs.building)[0].building
+    glossy = bool(outdoors_of_rooms(first, [room.space for room, _ in rooms]).surfaces.glossy)
+    some = [
+        i for i, (_, scene) in enumerate(rooms)
+        if scene.groups
+        and not scene.adjacent
+        and len(scene.exterior.triangles)
+        and bool(scene.exterior.glossy) == glossy
+    ]  # fmt: skip
+    found: dict[int, PhaseMatrices] = {}
+    if len(some) > 1:
+        matrices = matrices_together(
+            [rooms[i][1] for i in some],
+            outdoors_of_rooms(first, [rooms[i][0].space for i in some]),
+            options.room.sampling,
+            five_phase=options.room.method != "three-phase",
+            cut=cut,
+            cache=cache,
+            progress=progress,
+        )
+        found = dict(zip(some, matrices, strict=True))
+    return [(room, scene, found.get(i)) for i, (room, scene) in enumerate(rooms)]

@@ -80,22 +80,27 @@ class OwnedScene:
         self,
         mesh: OwnedMesh,
         panes: NDArray[np.float64],
+        centre: NDArray[np.float64],
+        *,
         room: NDArray[np.int64],
         numbers: NDArray[np.int64],
     ) -> None:
-        """Of panes [N, 3, 3] in coordinates about the mesh's middle, and the room [N] of each.
+        """Of panes [N, 3, 3] in coordinates about the centre, as rays and hits are.
 
-        Args: numbers: of the rooms among the owners of the mesh [R].
+        Args:
+            room: of each pane [N].
+            numbers: of the rooms among the owners of the mesh [R].
         """
         self._common, self._owned = mesh.common, mesh.owned
-        self._panes = scene_of(panes)
+        self._shift = opaque_vector(centre - mesh.middle)
+        self._panes = scene_of(panes + (centre - mesh.middle)) if len(panes) else None
         owner = mesh.owner[mesh.owner >= 0]
         room_of_owner = np.full(max(numbers.max(), owner.max(initial=0)) + 1, NOT_HERE)
         room_of_owner[numbers] = np.arange(len(numbers))
         self._first = opaque(len(mesh.owner) - len(owner), mi.UInt32)
         self._first_pane = opaque(len(mesh.owner), mi.UInt32)
         self._owner = column(np.append(room_of_owner[owner], NOT_HERE), mi.UInt32)
-        self._room_of_pane = column(room, mi.UInt32)
+        self._room_of_pane = column(np.append(room, 0), mi.UInt32)
         self._room = opaque(0, mi.UInt32)
 
     def of_lanes(self, room: mi.UInt32) -> OwnedScene:
@@ -109,13 +114,16 @@ class OwnedScene:
     ) -> mi.PreliminaryIntersection3f:
         """The first hit of rays, as of a `mi.Scene` of one mesh."""
         hit, before = dr.zeros(mi.PreliminaryIntersection3f), mi.Ray3f(ray)
+        before.o = mi.Point3f(ray.o + self._shift)
         hit.t = dr.inf
         if self._common is not None:
             hit = self._common.ray_intersect_preliminary(before, coherent, active)
             before.maxt = dr.minimum(before.maxt, hit.t)
-        parts = [(self._panes, self._room_of_pane, self._first_pane, False)]
+        parts = []
         if self._owned is not None:
-            parts.insert(0, (self._owned, self._owner, self._first, True))
+            parts.append((self._owned, self._owner, self._first, True))
+        if self._panes is not None:
+            parts.append((self._panes, self._room_of_pane, self._first_pane, False))
         for scene, owner, first, passes in parts:
             nearer = self._first_not_passed(scene, owner, before, active, passes)
             valid = nearer.is_valid()

@@ -140,7 +140,9 @@ class TracedScene:
         self.scene: mi.Scene | SharedScene | OwnedScene
         if isinstance(mesh, OwnedMesh):
             room = self._room_of_group[glazed_group.astype(int)]
-            self.scene = OwnedScene(mesh, panes, room, self._numbers)
+            self.scene = OwnedScene(
+                mesh, panes, self.centre, room=room[: len(panes)], numbers=self._numbers
+            )
         elif mesh.is_shared:
             self.scene = SharedScene(mesh, panes, self.centre)
         else:
@@ -397,6 +399,8 @@ class SceneCache:
             tuple, tuple[tuple, list[TracedRoom], TracedScene]
         ] = {}  # the last one
         self._building: tuple[tuple, tuple, OwnedMesh] | None = None
+        # surroundings of rooms in a building's mesh, by identity
+        self._fronts: dict[int, tuple[Surfaces, SharedOutdoors, int]] = {}
         for store in (self._scenes, self._meshes, self._together):  # at exit: before Dr.Jit ends
             weakref.finalize(self, store.clear)
 
@@ -423,6 +427,13 @@ class SceneCache:
             *(None if a is None else a.tobytes() for a in arrays),
             *map(id, inputs),
         )
+        if key not in self._scenes and id(surfaces) in self._fronts:
+            _, outdoors, number = self._fronts[id(surfaces)]
+            self._scenes[key] = inputs, TracedScene(
+                outdoors.surfaces, groups, windows_block=windows_block,
+                window_reflectance=arrays[0], centre=arrays[1],
+                mesh=self._building_mesh(outdoors), numbers=[number],
+            )  # fmt: skip
         if key not in self._scenes:
             reflectance, middle = arrays
             self._scenes[key] = inputs, TracedScene(
@@ -451,16 +462,24 @@ class SceneCache:
 
     def outdoors(self, outdoors: SharedOutdoors, rooms: Sequence[TracedRoom]) -> TracedScene:
         """The scene in front of some rooms of a building; its mesh is built once."""
-        of = outdoors.surfaces.triangles, outdoors.owner
-        variant = variants.activate()
-        if self._building is None or self._building[0] != (variant, *map(id, of)):
-            self._building = (variant, *map(id, of)), of, OwnedMesh(*of)
-        mesh = self._building[-1]
+        mesh = self._building_mesh(outdoors)
         return TracedScene(
             outdoors.surfaces, [group for room in rooms for group in room.groups],
             centre=mesh.middle, mesh=mesh, rooms=[len(room.groups) for room in rooms],
             numbers=[room.number for room in rooms],
         )  # fmt: skip
+
+    def know_fronts(self, outdoors: SharedOutdoors, fronts: Sequence[Surfaces]) -> None:
+        """Trace what is in front of each room, by its number, in the mesh of the building."""
+        for number, surfaces in enumerate(fronts):
+            self._fronts[id(surfaces)] = surfaces, outdoors, number
+
+    def _building_mesh(self, outdoors: SharedOutdoors) -> OwnedMesh:
+        of = outdoors.surfaces.triangles, outdoors.owner
+        variant = variants.activate()
+        if self._building is None or self._building[0] != (variant, *map(id, of)):
+            self._building = (variant, *map(id, of)), of, OwnedMesh(*of)
+        return self._building[-1]
 
     def _mesh(self, triangles: NDArray[np.float64]) -> SolidMesh:
         """The mesh of triangles [N, 3, 3]; equal triangles share one if it is large."""

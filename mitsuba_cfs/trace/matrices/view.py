@@ -43,6 +43,7 @@ STEEPEST = 1e4  # tangent of the largest polar angle
 NEWTON_STEPS = 3  # the integrand is nearly linear within a ring
 DIRECT_SHARE = 2  # strata of the direct part for each path of a sensor
 LEAST_STRATA = 4  # their error falls with the power 1.5
+COARSE = 64  # paths of a sensor for each of these least strata
 BLOCK_LANES = 1 << 26
 ROW_ENTRIES = 1 << 23  # of the rows of hits that are traced at once
 
@@ -563,7 +564,8 @@ def _batches(
 def _add_direct(of: _Sensors, matrix: mi.Float64, *, samples: int, key: mi.UInt32) -> None:
     """Add the windows that each sensor sees, patch by patch."""
     K, triangles = of.bins.size, of.tracer.window_triangles
-    strata = np.maximum(LEAST_STRATA, DIRECT_SHARE * samples // (triangles * K))
+    least = min(max(samples // COARSE, 1), LEAST_STRATA)
+    strata = np.maximum(least, DIRECT_SHARE * samples // (triangles * K))
     lanes = Ranges(of.counts * triangles * K * strata)
     tables = [
         column(values, mi.UInt32)
