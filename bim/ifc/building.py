@@ -169,7 +169,7 @@ def _rooms(
     issues += more
     covers = room_lids(source)
     fixed = source.corrections.heights_as_drawn(source.model)
-    read, more = cut_rooms(read, covers, fixed)
+    read, more = cut_rooms(read, covers, mesh, fixed)
     issues += more
     apertures = open_apertures(source, read, mesh.triangles)
     records, passages, more = joined_rooms(source, read, apertures, mesh.triangles)

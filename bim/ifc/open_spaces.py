@@ -159,7 +159,7 @@ def _share(parts: Sequence[tuple[float, float]]) -> float:
 
 def _under_sky(facet: Facet, floor: float, building: RayMesh) -> float:
     """Share of a top facet over which nothing is, from halfway up: it may be above its roof."""
-    start, _ = _grid(facet)
+    start, _ = facet_grid(facet)
     start[:, 2] = np.minimum(start[:, 2] - INSIDE, 0.5 * (start[:, 2] + floor))
     _, hit = building.first_hits(start, np.tile([0.0, 0.0, 1.0], (len(start), 1)))
     return float(np.mean(hit < 0))
@@ -167,7 +167,7 @@ def _under_sky(facet: Facet, floor: float, building: RayMesh) -> float:
 
 def _free(facet: Facet, building: RayMesh, others: RayMesh) -> NDArray[np.bool_]:
     """Whether a ray from each point [N] of a side meets neither an element nor another space."""
-    points, _ = _grid(facet)
+    points, _ = facet_grid(facet)
     directions = np.tile(facet.plane.normal, (len(points), 1))
     start = points - INSIDE * directions
     _, hit = building.first_hits(start, directions, SIDE_REACH + INSIDE)
@@ -180,7 +180,7 @@ def _open_across(free: NDArray[np.bool_], facet: Facet, building: RayMesh) -> fl
 
     Args: free: of its points [N], whether nothing is beyond.
     """
-    points, rows = _grid(facet)
+    points, rows = facet_grid(facet)
     levels = np.unique(rows)
     if max((float(np.mean(free[rows == row])) for row in levels), default=0.0) < ACROSS:
         return 0.0
@@ -188,7 +188,7 @@ def _open_across(free: NDArray[np.bool_], facet: Facet, building: RayMesh) -> fl
     return float(np.mean(free)) if is_open(outside, facet.plane.normal, building) else 0.0
 
 
-def _grid(facet: Facet) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def facet_grid(facet: Facet) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Points [N, 3] spread over a facet, and the row [N] of each, level where it is upright."""
     up = facet.plane.to_plane(facet.plane.origin + np.array([[0.0, 0.0, 1.0]]))[0, :2]
     angle = np.arctan2(*up) if np.linalg.norm(up) > 1e-6 else 0.0
