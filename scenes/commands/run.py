@@ -41,6 +41,7 @@ NEED_PHASES = {
     "annual_glare": "--annual-glare",
     "explore": "--explore",
     "inner_glass": "--inner-glass",
+    "error": "--error",
 }
 _DEFAULT = RoomOptions()
 

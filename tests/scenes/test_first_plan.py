@@ -12,6 +12,8 @@ from bim.model import Element
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import TEMPORARY
 from mitsuba_cfs.progress import silent
+from scenes import cli
+from scenes.demo import OFFICE, WEATHER
 from scenes.inputs import Inputs
 from scenes.result_folder import FolderMark, ResultFolder
 from scenes.room.options import RoomOptions
@@ -165,3 +167,9 @@ def test_a_first_plan_takes_no_file_of_others(tmp_path):
     with pytest.raises(DataError, match="which no earlier run wrote"):
         folder.early({"report.html": "plan"})
     assert (tmp_path / "out" / "report.html").read_text() == "mine"
+
+
+def test_an_error_needs_matrices(tmp_path, capsys):
+    words = ["run", str(OFFICE), "--weather", str(WEATHER), "--out", str(tmp_path / "out")]
+    assert cli.run([*words, "--method", "point-in-time", "--error", "5%"]) == 2
+    assert "--error needs --method three-phase or five-phase" in capsys.readouterr().err
