@@ -120,7 +120,7 @@ def test_a_killed_run_leaves_no_matrices(two_rooms, tmp_path, monkeypatch):
 
     monkeypatch.setattr(run, "RoomsTogether", stopped)
     with pytest.raises(KeyboardInterrupt):
-        run_inputs(inputs, options)
+        run.computed_rooms(inputs, None, options, silent)
     (place,) = places
     assert TEMPORARY.fullmatch(place.name), "the next run removes what a killed one left"
     assert not place.exists()
