@@ -88,7 +88,8 @@ def test_a_window_of_two_rooms_lights_both_in_the_first_plan(two_rooms):
     before = np.concatenate([pane + np.array([0.0, -0.05, 0.0]) for pane in panes])
     shared = [replace(s, windows=(replace(s.windows[0], guid="both"),)) for s in inputs.spaces]
     element = Element("both", "Window", "IfcWindow", before, 0.3, 0.3)
-    building = replace(inputs.building, spaces=tuple(shared), elements=(element,))
+    elements = (*inputs.building.elements, element)
+    building = replace(inputs.building, spaces=tuple(shared), elements=elements)
     systems = {"both": inputs.systems[inputs.spaces[0].windows[0].guid]}
     inputs = replace(inputs, building=building, spaces=shared, systems=systems)
     for room in first_plan(inputs, shared, options):
