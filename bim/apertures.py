@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from bim.boxes import Boxes
 from bim.colours import GREY, Colour
 from bim.defaults import FRAME_FRACTION
 from bim.planes import Plane, area_vectors, plane_through, polygons_of, without_slits
@@ -122,7 +123,8 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Issue]]:
 
 def framed_by(apertures: Sequence[Aperture]) -> list[Aperture | None]:
     """The window that each one without a drawn pane lies around, or None; as its frame."""
-    boxes = [_box(aperture.filling.triangles) for aperture in apertures]
+    ends = [_box(aperture.filling.triangles) for aperture in apertures]
+    boxes = Boxes(*np.array(ends).reshape(-1, 2, 3).swapaxes(0, 1))
     return [_framed_by(number, apertures, boxes) for number in range(len(apertures))]
 
 
@@ -132,24 +134,17 @@ def _box(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([low, triangles.max(axis=(0, 1), initial=-np.inf)])
 
 
-def _framed_by(
-    number: int, apertures: Sequence[Aperture], boxes: Sequence[NDArray[np.float64]]
-) -> Aperture | None:
+def _framed_by(number: int, apertures: Sequence[Aperture], boxes: Boxes) -> Aperture | None:
     """The window that one without a drawn pane lies around, or None; of two the lesser is kept.
 
-    Args: boxes: low and high corner [2, 3] of what each of the apertures is drawn as.
+    Args: boxes: of what each of the apertures is drawn as.
     """
     one = apertures[number]
     if one.filling.transparent.any() or one.glass.is_empty or one.filling.glass_area is not None:
         return None
-    low, high = boxes[number]
-    for place, other in enumerate(apertures):
-        if place == number or other.glass.is_empty:
-            continue
-        their_low, their_high = boxes[place]
-        if np.any(their_high < low) or np.any(their_low > high):
-            continue
-        if not _lies_around(one, other):
+    for place in boxes.near(boxes.low[number], boxes.high[number]):
+        other = apertures[place]
+        if place == number or other.glass.is_empty or not _lies_around(one, other):
             continue
         lesser = (round(other.glass.area, 3), place) < (round(one.glass.area, 3), number)
         if lesser or other.filling.transparent.any() or not _lies_around(other, one):

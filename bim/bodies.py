@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,10 +83,11 @@ class Bodies:
         into = area_vectors(self.mesh.triangles[hit]) @ direction < 0
         element, items = self.element[hit], self.item[hit]
         spans: list[Span] = []
-        for number in np.unique(element).tolist():
+        for number in sorted(set(element.tolist())):
             parts: list[Part] = []
-            for item in np.unique(items[element == number]).tolist():
-                own = (element == number) & (items == item)
+            of_element = element == number
+            for item in sorted(set(items[of_element].tolist())):
+                own = of_element & (items == item)
                 faces = _faces(distance[own], hit[own], into[own])
                 if _depths(faces)[0] > 0:  # the ray begins inside, or the body is inside out
                     turned = into[own] ^ self._is_turned(number, hit[own])
@@ -155,15 +157,20 @@ def _faces(
     distance: NDArray[np.float64], hit: NDArray[np.int64], into: NDArray[np.bool_]
 ) -> list[Face]:
     """Faces of one element along a ray, those in one place once each way, the way in first."""
-    place = np.cumsum(np.diff(distance, prepend=distance[0]) > SAME_PLACE)
-    _, once = np.unique(2 * place + ~into, return_index=True)
-    return [(float(distance[i]), int(hit[i]), bool(into[i])) for i in once]
+    faces: dict[tuple[int, bool], Face] = {}
+    place, before = 0, float(distance[0])
+    for face in zip(distance.tolist(), hit.tolist(), into.tolist(), strict=True):
+        place += face[0] - before > SAME_PLACE
+        before = face[0]
+        faces.setdefault((place, not face[2]), face)
+    return [faces[key] for key in sorted(faces)]
 
 
 def _depths(faces: Sequence[Face]) -> list[int]:
     """In how many bodies of an element a ray is, before the first face and after each."""
-    steps = np.cumsum([0, *(1 if into else -1 for _, _, into in faces)])
-    return (steps - min(steps.min(), 0)).tolist()
+    steps = list(accumulate((1 if into else -1 for _, _, into in faces), initial=0))
+    least = min(steps)
+    return [step - least for step in steps]
 
 
 def _inside_out(triangles: NDArray[np.float64]) -> NDArray[np.bool_]:

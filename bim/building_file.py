@@ -95,6 +95,7 @@ class ReadOptions:
     facade_panes: tuple[str, ...] = ()  # materials of panes before dark rooms: they mirror
     linked: tuple[Path, ...] = ()  # further files of the same building: facade, structure, site
     rooms: tuple[str, ...] = ()  # names that are asked for, to refuse wrong ones at once
+    storeys: tuple[str, ...] = ()  # that are read, with the next above and below; none: all
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +134,7 @@ def read_building_file(
             raise DataError(f"not for {kind.name} files", file=path, field=f"--{FLAGS[field]}")
     read = partial(kind.reader, path, options, progress or (lambda stage, fraction: None))
     if cache is not None and kind is IFC:
-        chosen = options.join, options.furniture
+        chosen = options.join, options.furniture, options.storeys
         building = read_once(read, (path, *linked), chosen, cache)
     else:
         building = read()
@@ -287,6 +288,7 @@ def _read_ifc(path: Path, options: ReadOptions, progress: Progress) -> Building:
         join=options.join,
         furniture=options.furniture,
         rooms=options.rooms,
+        storeys=options.storeys,
         progress=progress,
     )
 
@@ -329,7 +331,10 @@ def _read_gbxml(path: Path, options: ReadOptions, progress: Progress) -> Buildin
     return read_gbxml(path, join=options.join, furniture=options.furniture)
 
 
-FLAGS = {"join": "join", "apertures": "aperture", "facade_panes": "facade-pane"}
+FLAGS = {
+    "join": "join", "apertures": "aperture", "facade_panes": "facade-pane",
+    "storeys": "only-storey",
+}  # fmt: skip
 UNREAD = {  # by suffix: what it is, and the file to give instead
     ".oct": "is a Radiance octree; give the scene files (.rad) that it was made of",
     ".ifcxml": "is ifcXML; export the model as IFC (.ifc), or convert it with IfcConvert",
@@ -347,7 +352,9 @@ MARKS = (  # in the first bytes of a file of any suffix
     (b"ISO_10303_28", ".ifcxml"),
     (b"dragonfly_version", ".dfjson"),
 )
-IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join", "linked"))
+IFC = BuildingFormat(
+    "IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join", "linked", "storeys")
+)
 RADIANCE = BuildingFormat(
     "Radiance", (".rad",), _check_there, _read_radiance, ("apertures", "facade_panes")
 )
@@ -373,7 +380,8 @@ def chosen_spaces(
     """
     chosen = named_spaces(building, names, path)
     if names:
-        zoned = {space.guid for name in names for space in building.zone(name)}
+        groups = [*map(building.zone, names), *map(building.storey, names)]
+        zoned = {space.guid for group in groups for space in group}
         chosen = [space for space in chosen if lit(space) or space.guid not in zoned]
         for space in chosen:
             if not lit(space):
@@ -405,11 +413,11 @@ def named_spaces(building: Building, names: Sequence[str], path: Path) -> list[S
 
 
 def _spaces(building: Building, name: str, path: Path) -> Sequence[Space]:
-    """The space of a name, else those of the zone of that name."""
+    """The space of a name, else those of the zone or the storey of that name."""
     try:
         return (building.space(name),)
     except (UnknownName, AmbiguousName) as error:
-        zone = building.zone(name)
+        zone = building.zone(name) or building.storey(name)
         if zone and isinstance(error, UnknownName):
             return zone
         lost = [p for p in _lost(building, "room") if p.where == name or _names(p, name)]

@@ -71,11 +71,11 @@ def shared_volumes(
     return each_apart(_shared, [(one, list(near)) for one, near in solids], limit_s=LIMIT_S)
 
 
-def largest_parts(
+def parted(
     items: Sequence[tuple[PackedSolid, Sequence[Body]]],
-) -> list[PackedSolid | ProcessEnded | None]:
-    """The largest part of each solid that bodies cut through; None where they do not part it."""
-    return each_apart(_largest_part, [(one, list(by)) for one, by in items], limit_s=LIMIT_S)
+) -> list[list[PackedSolid] | ProcessEnded]:
+    """The parts of each solid that bodies cut through, the largest first; none if it stays one."""
+    return each_apart(_parted, [(one, list(by)) for one, by in items], limit_s=LIMIT_S)
 
 
 def united(solids: Sequence[PackedSolid], outlines: Sequence[Outline]) -> PackedSolid | None:
@@ -113,16 +113,17 @@ def _space(body: Body) -> Packed | None:
     return None if outline is None else (packed(outline), "outline-extruded")
 
 
-def _largest_part(item: tuple[PackedSolid, list[Body]]) -> PackedSolid | None:
+def _parted(item: tuple[PackedSolid, list[Body]]) -> list[PackedSolid]:
     one, bodies = item
     solids = [found.manifold for body in bodies if (found := solid_of(body)) is not None]
     if not solids:
-        return None
+        return []
     whole = unpacked(one)
     parts = [p for p in (whole - union(solids)).decompose() if p.volume() > SLIT]
     if len(parts) < 2:
-        return None
-    return packed(max(parts, key=lambda part: part.volume()).as_original())
+        return []
+    parts.sort(key=lambda part: -part.volume())
+    return [packed(part.as_original()) for part in parts]
 
 
 def _shared(item: tuple[PackedSolid, list[PackedSolid]]) -> list[float]:

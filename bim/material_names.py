@@ -1,4 +1,4 @@
-"""What a material is by its name, in sixteen languages: properties from `material_names.toml`.
+"""What a material is by its name, in eighteen languages: properties from `material_names.toml`.
 
 A name is cut into words.  A row of the table lists stems: "wool" begins a word, "=pur" is a whole
 word, "-wolle" is anywhere in one (German compounds; Chinese and Japanese, which do not part words;
@@ -50,6 +50,7 @@ LAYERED = ("insulation", "insulating", "frame", "air", "panel")
 MIXED = ("carrier", "board")
 CONCRETE = "reinforced concrete"
 METALS = ("steel", "aluminium alloy")  # skins of sandwich panels, studs of framed gaps
+GYPSUM = ["gypsum plasterboard", "gypsum plaster"]
 CLASS_OF_CONCRETE = re.compile(r"\b(?:l?c|b)\s?\d{2}\s?/\s?\d{2}\b")
 CONDUCTIVITY = (
     re.compile(r"(?:^|[^\d.,])(0[.,]\d{2,4})\s*w\s*/?\s*\(?m"),
@@ -139,15 +140,21 @@ def _kind_named(name: str) -> Kind:
         return next(kind for kind in table() if kind.layer.name == CONCRETE)
     best = [kind for kind in matches if kind.group in LAYERED]
     others = [kind for kind in matches if kind.group in MIXED]
-    if best and best[0].group in ("panel", "frame"):
-        skins = METALS if best[0].group == "panel" else (*METALS, "softwood")
+    skinned = [kind.group for kind in best if kind.group in ("panel", "frame")]
+    if skinned:
+        skins = METALS if skinned[0] == "panel" else (*METALS, "softwood")
         others = [kind for kind in others if kind.layer.name not in skins]
+    filled = [kind for kind in best if kind.group in ("insulation", "insulating")]
+    if best and best[0].group == "frame" and filled:
+        best = filled  # studs with insulation between them
     if best and others:
         return Kind(UNKNOWN_MATERIAL, "mixed", ())
     glass = [kind for kind in matches if kind.group == "glass"]
     if best and glass and best[0].group == "insulating":
         best = glass  # insulating glass
     chosen = best or [kind for kind in matches if kind.group != "nothing"]
+    if [kind.layer.name for kind in chosen[:2]] == GYPSUM:
+        chosen = chosen[1:]  # plaster of gypsum, no board
     return chosen[0] if chosen else Kind(UNKNOWN_MATERIAL, "unknown", ())
 
 

@@ -360,6 +360,11 @@ class Building:
         }
         return tuple(space for space in self.spaces if space.guid in rooms)
 
+    def storey(self, name: str) -> tuple[Space, ...]:
+        """The spaces of the storeys of that name; none where there is none."""
+        key = " ".join(name.split()).casefold()
+        return tuple(s for s in self.spaces if " ".join(s.storey.split()).casefold() == key)
+
     def room(self, name_or_guid: str) -> Room:
         """The space of that GUID, number, name or both, together with its building.
 

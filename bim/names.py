@@ -12,6 +12,8 @@ from itertools import count
 from typing import Protocol, TypeVar
 
 SHOWN = 8  # names that a message lists
+# Latin letters that Unicode does not part into a letter and its accent
+UNDIVIDED = str.maketrans({"ł": "l", "Ł": "L", "ı": "i", "đ": "d", "Đ": "D", "ø": "o", "Ø": "O"})
 JOINT = " + "  # between the names of rooms that are one
 
 
@@ -52,7 +54,7 @@ def label_of(name: str, long_name: str, guid: str) -> str:
 @lru_cache(maxsize=4096)  # the same words are looked for in every material of a model
 def plain_text(text: str) -> str:
     """Small letters without the accents of Latin ones, to look for words in: béton is beton."""
-    whole = unicodedata.normalize("NFKC", text).replace("ł", "l").replace("Ł", "L")
+    whole = unicodedata.normalize("NFKC", text).translate(UNDIVIDED)
     plain = (unicodedata.normalize("NFD", c) for c in whole)
     kept = (c[0] if c[0].isascii() else unicodedata.normalize("NFC", c) for c in plain)
     return "".join(kept).casefold()

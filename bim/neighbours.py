@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.bodies import Bodies, Span
+from bim.boxes import Boxes
 from bim.planes import Facet, area_vectors, polygons_of, triangulated
 from bim.rays import RayMesh, hemisphere
 from bim.rooms import Piece, RoomSolid, cut
@@ -62,16 +63,14 @@ class Surroundings:
 
 
 def cut_by_neighbours(
-    room: RoomSolid, pieces: Sequence[Piece], rooms: Sequence[RoomSolid]
+    room: RoomSolid, pieces: Sequence[Piece], rooms: Sequence[RoomSolid], boxes: Boxes
 ) -> list[Piece]:
-    """Pieces cut where the faces of other rooms lie opposite, as second-level boundaries are."""
-    near = [
-        other
-        for other in rooms
-        if other.guid != room.guid
-        and np.all(other.low <= room.high + DEEPEST_WALL)
-        and np.all(other.high >= room.low - DEEPEST_WALL)
-    ]
+    """Pieces cut where the faces of other rooms lie opposite, as second-level boundaries are.
+
+    Args: boxes: of the rooms.
+    """
+    around = boxes.near(room.low, room.high, DEEPEST_WALL)
+    near = [rooms[index] for index in around if rooms[index].guid != room.guid]
     result: list[Piece] = []
     for piece in pieces:
         if piece.role == "glass":

@@ -11,7 +11,7 @@ from bim.names import numbered
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
+from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup, WindowSurface
 
 SAME_ORIENTATION = 5e-4  # difference between frame axes [1] within a group: 0.03 degrees
 COMPASS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
@@ -31,6 +31,20 @@ def exterior_surfaces(building: Building, space: Space, band: str = "visible") -
     """The surroundings of a room's windows: every element but those windows."""
     own = {window.guid for window in space.windows}
     return element_surfaces((e for e in building.elements if e.guid not in own), band)
+
+
+def outdoors_of_rooms(
+    building: Building, spaces: Sequence[Space], band: str = "visible"
+) -> SharedOutdoors:
+    """The surroundings of several rooms: all elements, the windows of the rooms last.
+
+    A room's rays pass the windows of the room; no window may be that of two of the rooms.
+    """
+    room = {window.guid: i for i, space in enumerate(spaces) for window in space.windows}
+    elements = sorted(building.elements, key=lambda element: element.guid in room)
+    owner = [room.get(element.guid, -1) for element in elements]
+    counts = [len(element.triangles) for element in elements]
+    return SharedOutdoors(element_surfaces(elements, band), np.repeat(owner, counts))
 
 
 def element_surfaces(elements: Iterable[Element], band: str = "visible") -> Surfaces:

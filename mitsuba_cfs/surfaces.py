@@ -75,6 +75,16 @@ class Surfaces:
 
 
 @dataclass(frozen=True, slots=True)
+class SharedOutdoors:
+    """The surroundings of several rooms, their windows among them."""
+
+    surfaces: Surfaces
+    owner: NDArray[
+        np.int64
+    ]  # [N] the room that a triangle is a window of; -1: of none, these come first
+
+
+@dataclass(frozen=True, slots=True)
 class WindowSurface:
     """A plane glazed aperture; its normal points outdoors."""
 

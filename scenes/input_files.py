@@ -21,8 +21,11 @@ from bim.building_file import files_beside as building_files_beside
 from bim.model import Building
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, silent, summed
 from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.matrix import DEFAULT_DEW_POINT_C
+from mitsuba_cfs.sky.wea import is_wea, read_wea
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
 from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system
@@ -53,13 +56,14 @@ def read_files(
     *,
     light_only: bool = False,
     hourly: bool = True,
+    temperatures: bool = True,
     weather: Weather | None = None,
     table: str = "",
 ) -> InputFiles:
     """Read and check the weather, the system and the operation, the quick ones first.
 
     Args:
-        light_only: neither U nor g is needed; hourly: the weather must have steps of 1 h.
+        light_only: neither U nor g is needed; hourly, temperatures: as of `read_weather`.
         weather: of the options' file, where it is read already.
         table: of a study file that names a system, for messages; by default the flags do.
 
@@ -69,7 +73,7 @@ def read_files(
     if options.weather is None:
         raise ValueError("inputs from files need a weather file")
     if weather is None:
-        weather = read_weather(options.weather, hourly=hourly)
+        weather = read_weather(options.weather, hourly=hourly, temperatures=temperatures)
     operation = None if options.operation is None else read_operation(options.operation)
     system = read_override(options, heat=not light_only, by="" if table else "--cfs")
     if operation is not None:
@@ -127,15 +131,35 @@ def check_names(names: Sequence[str], field: str = "--space") -> None:
             raise DataError("expected the name or GUID of a room, got nothing", field=field)
 
 
-def read_weather(path: str | PathLike[str], *, hourly: bool = True) -> Weather:
-    """Weather of one year from an EPW file; hourly: in steps of 1 h.
+def read_weather(
+    path: str | PathLike[str], *, hourly: bool = True, temperatures: bool = True
+) -> Weather:
+    """Weather of one year from an EPW file.
+
+    Args: hourly: in steps of 1 h; temperatures: else a WEA file is read too, which has none.
 
     Raises: `DataError` for a file that cannot be used.
     """
-    weather = read_epw(path)
+    wea = is_wea(path)
+    if wea and temperatures:
+        message = "is a WEA file, which has no temperatures: give an EPW file"
+        raise DataError(f"{message} (cfs dgp and cfs picture take it)", file=path)
+    weather = _of_wea(Path(path)) if wea else read_epw(path)
     if hourly and weather.step_h != 1.0:
         raise DataError(f"has steps of {weather.step_h:g} h; the run needs hours", file=path)
     return weather
+
+
+def _of_wea(path: Path) -> Weather:
+    """The weather of a WEA file, with a note of what it lacks."""
+    note = Note(
+        "{file} states no dew point: that of Radiance's programs, {dew:.1f} °C, is used for the "
+        "luminous efficacy.",
+        file=path.name,
+        dew=DEFAULT_DEW_POINT_C,
+    )
+    weather = read_wea(path)
+    return replace(weather, notes=(*weather.notes, note))
 
 
 def read_override(

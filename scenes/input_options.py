@@ -34,6 +34,9 @@ class InputOptions:
     see_through: tuple[str, ...] = ()  # FILE=specular, lobe or a share, see `input_files`
     operation: Path | None = None  # shading control, gains, set points
     linked: tuple[Path, ...] = ()  # further files of the same building: facade, structure, site
+    only_storeys: tuple[
+        str, ...
+    ] = ()  # that are read of a large model, with the next ones; none: all
 
     @property
     def read(self) -> ReadOptions:
@@ -43,8 +46,13 @@ class InputOptions:
         return ReadOptions(
             tuple(self.join), self.furniture, tuple(self.apertures),
             tuple(map(Path, self.surroundings)), self.surroundings_offset, tuple(self.facade_panes),
-            tuple(map(Path, self.linked)), tuple(self.spaces),
+            tuple(map(Path, self.linked)), tuple(self.spaces), tuple(self.only_storeys),
         )  # fmt: skip
+
+    @property
+    def rooms(self) -> tuple[str, ...]:
+        """Names of the rooms that are asked for, else of their storeys; none: all."""
+        return self.spaces or self.only_storeys
 
     @property
     def building_files(self) -> tuple[Path, ...]:

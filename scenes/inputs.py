@@ -128,10 +128,10 @@ def inputs_of(
         beyond = {space.guid: source_rooms(building, space) for space in building.spaces}
     file = options.building or building.file or Path(building.name)
     if rooms == "all":
-        spaces = named_spaces(building, options.spaces, file)
+        spaces = named_spaces(building, options.rooms, file)
     else:
         spaces = chosen_spaces(
-            building, options.spaces, file, lambda s: bool(s.windows or beyond.get(s.guid))
+            building, options.rooms, file, lambda s: bool(s.windows or beyond.get(s.guid))
         )
     spaces = spaces[:1] if rooms == "first" else spaces
     traced = {s.guid: s for space in spaces for s in (space, *beyond.get(space.guid, ()))}

@@ -26,7 +26,7 @@ def read_files(options: PictureOptions) -> PictureFiles:
     Raises: `DataError` for a file that cannot be used, `PictureHourError` for a wrong hour.
     """
     view = None if options.view is None else parsed_view(options.view)
-    files = input_files.read_files(options, light_only=True)
+    files = input_files.read_files(options, light_only=True, temperatures=False)
     return PictureFiles(files, hour_of(options.at, files.weather.midpoints, "--at"), view)
 
 

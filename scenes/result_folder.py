@@ -9,9 +9,9 @@ from __future__ import annotations
 import json
 import os
 import weakref
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path, PurePosixPath
 
@@ -150,6 +150,23 @@ class ResultFolder:
                 raise
             raise self._error(f"cannot be written: {reason(error)}") from error
         return self.folder / name
+
+    def early(self, files: Mapping[str, str]) -> None:
+        """Write texts by file name that stay until `replaced` puts the results in their place."""
+        made: list[Path] = []
+        try:
+            made = _make_folders(self._place)
+            for name in files:
+                if name not in self._mark.files and _taken(self._place, name):
+                    raise self._error(f"holds {name}, which no earlier run wrote")
+            known = tuple(dict.fromkeys((*self._mark.files, *files)))
+            self._mark = replace(self._mark, files=known)
+            self._mark.write(self._place)
+            for name, text in files.items():
+                write_text(self._place / name, text)
+        except OSError as error:
+            _remove_empty(made)
+            raise self._error(f"cannot be written: {reason(error)}") from error
 
     def _refuse_inputs(self, inputs: Iterable[Path | None]) -> None:
         here = Path(os.path.realpath(os.curdir))

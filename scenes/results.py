@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -15,9 +15,11 @@ from bim.report.issue import Issue
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.notes import Note
-from mitsuba_cfs.picture_year.year import PictureYear
 from scenes.fenestration.peaks import lobe_notes
 from scenes.head import NO_HEAD, Head
+
+if TYPE_CHECKING:
+    from mitsuba_cfs.picture_year.year import PictureYear
 
 # Columns with three phases, see `mitsuba_cfs.methods.sun_by_patches`
 SUNNY_HOUR_ERROR = "sunny_hour_error"  # [%] of sensors

@@ -14,6 +14,7 @@ import shapely
 
 from bim.bodies import Bodies
 from bim.boundaries import ElementRecord, Finishes, faces_and_windows, floor_area
+from bim.boxes import Boxes
 from bim.defaults import CLEAR_GLAZING
 from bim.fenestration import ShadingState
 from bim.ifc.accounting import account_of
@@ -58,6 +59,7 @@ def read_ifc(
     join: Sequence[str] = (),
     furniture: bool = False,
     rooms: Sequence[str] = (),
+    storeys: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Building:
     """The building in an IFC2X3, IFC4 or IFC4X3 file (.ifc, .ifczip).
@@ -71,6 +73,7 @@ def read_ifc(
         furniture: whether furniture is part of the light and views of its room.
         rooms: names that are asked for: where no name in the file is like one of them, it is
             refused before any geometry is read.
+        storeys: names of those that are read, with the next above and below; none: all.
         progress: called with the stage's name and the fraction of it that is done.
 
     Raises: `DataError` where the file is missing or is no readable IFC; faults inside the model are
@@ -78,7 +81,7 @@ def read_ifc(
     """
     tell = progress or (lambda stage, fraction: None)
     corrections = corrections_beside(path, join) if corrections is None else corrections
-    source = read_source(path, corrections, tell, linked, rooms=rooms)
+    source = read_source(path, corrections, tell, linked, rooms=rooms, storeys=storeys)
     tell("rooms", 0.0)
     mesh = mesh_of(source.walls)
     drawn, issues = _rooms(source, mesh, lambda part: tell("rooms", SEARCH * part))
@@ -104,10 +107,11 @@ def read_ifc(
     by_room = [[a for a in attached if a.room == r.guid] for r in records]
     boundaries = room_boundaries([(r.solid, a) for r, a in zip(records, by_room, strict=True)])
     spaces: list[Space] = []
+    boxes = Boxes.of([record.solid for record in records])
     for index, boundary in enumerate(boundaries):
         tell("rooms", SEARCH + (1 - SEARCH) * index / len(records))
         of_boundary, more = _space(
-            index, boundary, records, around, elements=elements, finishes=finishes
+            index, boundary, records, around, boxes=boxes, elements=elements, finishes=finishes
         )
         spaces += of_boundary
         issues += more
@@ -165,7 +169,7 @@ def _rooms(
     issues += more
     covers = room_lids(source)
     fixed = source.corrections.heights_as_drawn(source.model)
-    read, more = cut_rooms(read, covers, fixed)
+    read, more = cut_rooms(read, covers, mesh, fixed)
     issues += more
     apertures = open_apertures(source, read, mesh.triangles)
     records, passages, more = joined_rooms(source, read, apertures, mesh.triangles)
@@ -277,6 +281,7 @@ def _closed_space(
     records: Sequence[SpaceRecord],
     around: Surroundings,
     *,
+    boxes: Boxes,
     elements: Sequence[ElementRecord],
     finishes: Finishes,
 ) -> tuple[Space, list[Issue]]:
@@ -284,7 +289,7 @@ def _closed_space(
     record = records[index]
     others = [other.solid for other in records]
     try:
-        pieces = cut_by_neighbours(record.solid, boundary.pieces, others)
+        pieces = cut_by_neighbours(record.solid, boundary.pieces, others, boxes)
     except shapely.errors.ShapelyError as error:
         raise RoomError(f"its neighbours cannot be cut out: {error}") from error
     beyond = [

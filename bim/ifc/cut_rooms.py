@@ -4,6 +4,9 @@ Revit draws rooms to an upper limit, 4 m by default, through whatever is drawn l
 roofs and ceilings part the solid of a space, its largest part is the room.  A gallery, or a slab
 with an opening for a stair or a shaft, parts nothing; the openings of roofs and ceilings are for
 windows and do not count.
+
+A room under a pitched roof may be drawn as a box that reaches through the roof with a part of its
+top.  It is cut there if all that the roof parts from it is under the open sky; a dormer is not.
 """
 
 from __future__ import annotations
@@ -12,49 +15,63 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from bim.boxes import Boxes
+from bim.ifc.open_spaces import facet_grid
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
-from bim.isolated_solids import largest_parts
-from bim.planes import area_vectors
-from bim.rays import ray_mesh
+from bim.isolated_solids import parted
+from bim.planes import Facet, area_vectors
+from bim.rays import RayMesh, ray_mesh
 from bim.report.issue import Issue
-from bim.rooms import room_solid
+from bim.rooms import RoomSolid, room_solid
 from bim.solids import packed, unpacked
 from mitsuba_cfs.processes import ProcessEnded
 
 THROUGH = 0.1  # a space that ends less far beyond a slab is drawn into it [m]
+TOUCHING = 1e-9  # a lid beside a space that overlaps it by less does not cover it [m]
 MOSTLY = 0.7  # share of the top of a space that has to lie beyond what cuts it
+PARTLY = 0.05  # and from which the room may be one under a pitched roof
+OPEN = 0.7  # share of the top of a part under the open sky from which it is outdoors
 LEAST_CUT = 0.02  # share of the volume: less is the drawing's
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def cut_rooms(
-    records: Sequence[SpaceRecord], lids: Sequence[Shape], fixed: Collection[int] = ()
+    records: Sequence[SpaceRecord],
+    lids: Sequence[Shape],
+    building: RayMesh,
+    fixed: Collection[int] = (),
 ) -> tuple[list[SpaceRecord], list[Issue]]:
     """The rooms, those cut that go through what covers them, each with an issue.
 
-    Args: lids: of `room_lids`; fixed: STEP ids of spaces whose drawn height holds.
+    Args:
+        lids: of `room_lids`; building: all that may cover a space.
+        fixed: STEP ids of spaces whose drawn height holds.
     """
-    through = [
-        index
+    boxes = Boxes.of_triangles([lid.triangles for lid in lids])
+    wholly = {
+        index: goes_through(record, lids, boxes)
         for index, record in enumerate(records)
-        if record.step_id not in fixed and goes_through(record, lids)
-    ]
+        if record.step_id not in fixed
+    }
+    through = [i for i, all_of_it in wholly.items() if all_of_it or _leaves(records[i], building)]
     if not through:
         return list(records), []
-    items = [(packed(records[i].solid.manifold), _near(records[i], lids)) for i in through]
+    items = [(packed(records[i].solid.manifold), _near(records[i], lids, boxes)) for i in through]
     result, issues = list(records), []
-    for index, part in zip(through, largest_parts(items), strict=True):
+    for index, parts in zip(through, parted(items), strict=True):
         record = records[index]
-        if isinstance(part, ProcessEnded):
-            values = {"room": record.label, "reason": str(part)}
+        if isinstance(parts, ProcessEnded):
+            values = {"room": record.label, "reason": str(parts)}
             issues.append(Issue("room-not-cut", record.guid, values))
             continue
-        if part is None:
+        solids = [room_solid(record.guid, record.solid.name, unpacked(part)) for part in parts]
+        if not solids or not (wholly[index] or all(_outdoors(s, building) for s in solids[1:])):
             continue
-        solid = room_solid(record.guid, record.solid.name, unpacked(part))
+        solid = solids[0]
         after = solid.manifold.volume()
         if after > (1 - LEAST_CUT) * record.volume:
             continue
@@ -71,9 +88,12 @@ def cut_rooms(
     return result, issues
 
 
-def goes_through(record: SpaceRecord, lids: Sequence[Shape]) -> bool:
-    """Whether most of the top of a space, or of its bottom, is beyond a slab, roof or ceiling."""
-    near = _near(record, lids)
+def goes_through(record: SpaceRecord, lids: Sequence[Shape], boxes: Boxes) -> bool:
+    """Whether most of the top of a space, or of its bottom, is beyond a slab, roof or ceiling.
+
+    Args: boxes: of the lids.
+    """
+    near = _near(record, lids, boxes)
     if not near:
         return False
     mesh = ray_mesh(np.concatenate(near))
@@ -94,20 +114,48 @@ def goes_through(record: SpaceRecord, lids: Sequence[Shape]) -> bool:
     return False
 
 
-def _near(record: SpaceRecord, lids: Sequence[Shape]) -> list[np.ndarray]:
+def _leaves(record: SpaceRecord, building: RayMesh) -> bool:
+    """Whether a part of the top of a space is under the open sky and has a cover beneath it."""
+    down, height = (
+        np.array([[0.0, 0.0, -1.0]]),
+        float(np.ptp([record.solid.low[2], record.solid.high[2]])),
+    )
+    share = area = 0.0
+    for facet in _tops(record.solid):
+        points, _ = facet_grid(facet)
+        open_above = _open_above(points, building)
+        start = points + THROUGH * down
+        _, below = building.first_hits(start, np.tile(down, (len(points), 1)), height - 2 * THROUGH)
+        share += facet.polygon.area * float(np.mean(open_above & (below >= 0)))
+        area += facet.polygon.area
+    return share > PARTLY * area > 0
+
+
+def _outdoors(solid: RoomSolid, building: RayMesh) -> bool:
+    """Whether most of the top of a solid is under the open sky."""
+    area = free = 0.0
+    for facet in _tops(solid):
+        points, _ = facet_grid(facet)
+        area += facet.polygon.area
+        free += facet.polygon.area * float(np.mean(_open_above(points, building)))
+    return free > OPEN * area > 0
+
+
+def _tops(solid: RoomSolid) -> list[Facet]:
+    return [facet for facet in solid.facets if facet.plane.normal[2] > 0.5]
+
+
+def _open_above(points: NDArray[np.float64], building: RayMesh) -> NDArray[np.bool_]:
+    """Whether nothing is above each of the points [N, 3]."""
+    _, hit = building.first_hits(points, np.tile([[0.0, 0.0, 1.0]], (len(points), 1)))
+    return hit < 0
+
+
+def _near(record: SpaceRecord, lids: Sequence[Shape], boxes: Boxes) -> list[np.ndarray]:
     """Bodies of what may cut a space: inside of its height, over or under it."""
-    meshes = []
-    for lid in lids:
-        corners = lid.triangles.reshape(-1, 3)
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        inside = low[2] < record.solid.high[2] - THROUGH and high[2] > record.solid.low[2] + THROUGH
-        if (
-            inside
-            and np.all(low[:2] < record.solid.high[:2])
-            and np.all(high[:2] > record.solid.low[:2])
-        ):
-            meshes.append(lid.triangles)
-    return meshes
+    inside = np.array([TOUCHING, TOUCHING, THROUGH])
+    near = boxes.near(record.solid.low + inside, record.solid.high - inside)
+    return [lids[index].triangles for index in near]
 
 
 def room_lids(source: Source) -> list[Shape]:

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from bim.apertures import main_direction
+from bim.boxes import Boxes
 from bim.ifc.shapes import Shape
 from bim.isolated_solids import gaps_between, solids_of
 from bim.planes import area_vectors
@@ -142,17 +143,12 @@ def walls_apart(shapes: Sequence[Shape], solids: Solids) -> list[Issue]:
             box = solid.manifold.bounding_box()
             body = packed(solid.manifold)
             walls.append((shape, body, normal, np.array(box[:3]), np.array(box[3:])))
-    near = []
-    for i, (one, body, normal, low, high) in enumerate(walls):
-        others = [
-            (other, its_body)
-            for other, its_body, its_normal, its_low, its_high in walls[i + 1 :]
-            if np.all(its_low <= high + WIDEST_JOINT)
-            and np.all(low <= its_high + WIDEST_JOINT)
-            and abs(normal @ its_normal) <= ACROSS
-        ]
-        if others:
-            near.append((one, body, others))
+    ends = np.array([wall[3:] for wall in walls]).reshape(-1, 2, 3)
+    pairs: dict[int, list[int]] = {}
+    for i, j in Boxes(ends[:, 0], ends[:, 1]).pairs(WIDEST_JOINT):
+        if abs(walls[i][2] @ walls[j][2]) <= ACROSS:
+            pairs.setdefault(i, []).append(j)
+    near = [(*walls[i][:2], [walls[j][:2] for j in others]) for i, others in pairs.items()]
     return _gap_issues(near)
 
 

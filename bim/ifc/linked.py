@@ -99,6 +99,8 @@ def one_model(
     """
     (first_name, model), *others = models.items()
     issues: list[Issue] = []
+    if not others:
+        return model, issues
     first = _Frame.of(model)
     for name, other in others:
         if other.schema != model.schema:

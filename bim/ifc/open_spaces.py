@@ -21,6 +21,7 @@ import shapely
 import shapely.affinity
 from numpy.typing import NDArray
 
+from bim.boxes import Boxes
 from bim.ifc.spaces import OUTDOORS, SpaceRecord
 from bim.names import plain_text
 from bim.neighbours import is_open
@@ -72,10 +73,12 @@ def open_spaces(
         indoors: GUIDs of spaces that are rooms by the corrections.
         windows: triangles [N, 3, 3] of each window of the file.
     """
-    shares = {record.guid: _openness(record, records, building) for record in records}
+    solids = [record.solid for record in records]
+    boxes, glass = Boxes.of(solids), Boxes.of_triangles(windows)
+    shares = {record.guid: _openness(record, records, boxes, building) for record in records}
     rooms, issues = [], []
     for record in records:
-        reason = _reason(record, records, shares, windows)
+        reason = _reason(record, records, shares, boxes, glass)
         if reason is None or record.guid in indoors:
             rooms.append(record)
             continue
@@ -88,9 +91,13 @@ def _reason(
     record: SpaceRecord,
     records: Sequence[SpaceRecord],
     shares: Mapping[str, Openness],
-    windows: Sequence[NDArray[np.float64]],
+    boxes: Boxes,
+    windows: Boxes,
 ) -> Phrase | None:
-    """Why a space is outdoors; None for a room."""
+    """Why a space is outdoors; None for a room.
+
+    Args: boxes: of the spaces.
+    """
     share, named = shares[record.guid], _has_outdoor_name(record)
     values = {"top": 100 * share.top, "sides": 100 * share.sides}
     if share.top > UNCOVERED:
@@ -103,24 +110,21 @@ def _reason(
             return Phrase("open-above", values)
     if named and (share.top > HINTED_TOP or share.sides > HINTED):
         return Phrase("open-and-named", values)
-    if share.sides > OPEN_SIDES and _has_inner_window(record, records, windows):
+    if share.sides > OPEN_SIDES and _has_inner_window(record, boxes, windows):
         return Phrase("open-sides", values)
     return None
 
 
-def _has_inner_window(
-    record: SpaceRecord, records: Sequence[SpaceRecord], windows: Sequence[NDArray[np.float64]]
-) -> bool:
-    """Whether a window is between a space and another one."""
-    for window in windows:
-        corners = window.reshape(-1, 3)
-        beside = [
-            one.guid
-            for one in records
-            if np.all(corners.min(axis=0) > one.solid.low - WALL)
-            and np.all(corners.max(axis=0) < one.solid.high + WALL)
-        ]
-        if record.guid in beside and len(beside) > 1:
+def _has_inner_window(record: SpaceRecord, boxes: Boxes, windows: Boxes) -> bool:
+    """Whether a window is between a space and another one.
+
+    Args: boxes: of all spaces.
+    """
+    for one in windows.near(record.solid.low, record.solid.high, WALL):
+        low, high = windows.low[one], windows.high[one]
+        around = np.all((low > boxes.low - WALL) & (high < boxes.high + WALL), axis=1)
+        beside = np.all((low > record.solid.low - WALL) & (high < record.solid.high + WALL))
+        if beside and around.sum() > 1:
             return True
     return False
 
@@ -130,23 +134,21 @@ def _has_outdoor_name(record: SpaceRecord) -> bool:
     return OUTDOOR_NAMES.search(plain_text(f"{record.name} {record.long_name}")) is not None
 
 
-def _openness(record: SpaceRecord, records: Sequence[SpaceRecord], building: RayMesh) -> Openness:
+def _openness(
+    record: SpaceRecord, records: Sequence[SpaceRecord], boxes: Boxes, building: RayMesh
+) -> Openness:
     facets = [f for f in record.solid.facets if f.polygon.area > SMALLEST]
     upper = [facet for facet in facets if facet.plane.normal[2] > 0.3]
     sides = [facet for facet in facets if abs(facet.plane.normal[2]) <= 0.3]
-    near = [
-        triangles_of(other.solid.manifold)[0]
-        for other in records
-        if other.guid != record.guid
-        and np.all(other.solid.low <= record.solid.high + SIDE_REACH)
-        and np.all(other.solid.high >= record.solid.low - SIDE_REACH)
-    ]
+    around = boxes.near(record.solid.low, record.solid.high, SIDE_REACH)
+    beside = (records[index] for index in around if records[index].guid != record.guid)
+    near = [triangles_of(other.solid.manifold)[0] for other in beside]
     others = ray_mesh(np.concatenate([np.empty((0, 3, 3)), *near]))
     above = [(_under_sky(f, float(record.solid.low[2]), building), f.polygon.area) for f in upper]
-    beside = [(_free(f, building, others), f) for f in sides]
+    free_sides = [(_free(f, building, others), f) for f in sides]
     return Openness(
         _share(above),
-        _share([(_open_across(free, f, building), f.polygon.area) for free, f in beside]),
+        _share([(_open_across(free, f, building), f.polygon.area) for free, f in free_sides]),
     )
 
 
@@ -157,7 +159,7 @@ def _share(parts: Sequence[tuple[float, float]]) -> float:
 
 def _under_sky(facet: Facet, floor: float, building: RayMesh) -> float:
     """Share of a top facet over which nothing is, from halfway up: it may be above its roof."""
-    start, _ = _grid(facet)
+    start, _ = facet_grid(facet)
     start[:, 2] = np.minimum(start[:, 2] - INSIDE, 0.5 * (start[:, 2] + floor))
     _, hit = building.first_hits(start, np.tile([0.0, 0.0, 1.0], (len(start), 1)))
     return float(np.mean(hit < 0))
@@ -165,7 +167,7 @@ def _under_sky(facet: Facet, floor: float, building: RayMesh) -> float:
 
 def _free(facet: Facet, building: RayMesh, others: RayMesh) -> NDArray[np.bool_]:
     """Whether a ray from each point [N] of a side meets neither an element nor another space."""
-    points, _ = _grid(facet)
+    points, _ = facet_grid(facet)
     directions = np.tile(facet.plane.normal, (len(points), 1))
     start = points - INSIDE * directions
     _, hit = building.first_hits(start, directions, SIDE_REACH + INSIDE)
@@ -178,7 +180,7 @@ def _open_across(free: NDArray[np.bool_], facet: Facet, building: RayMesh) -> fl
 
     Args: free: of its points [N], whether nothing is beyond.
     """
-    points, rows = _grid(facet)
+    points, rows = facet_grid(facet)
     levels = np.unique(rows)
     if max((float(np.mean(free[rows == row])) for row in levels), default=0.0) < ACROSS:
         return 0.0
@@ -186,7 +188,7 @@ def _open_across(free: NDArray[np.bool_], facet: Facet, building: RayMesh) -> fl
     return float(np.mean(free)) if is_open(outside, facet.plane.normal, building) else 0.0
 
 
-def _grid(facet: Facet) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def facet_grid(facet: Facet) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Points [N, 3] spread over a facet, and the row [N] of each, level where it is upright."""
     up = facet.plane.to_plane(facet.plane.origin + np.array([[0.0, 0.0, 1.0]]))[0, :2]
     angle = np.arctan2(*up) if np.linalg.norm(up) > 1e-6 else 0.0

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from trimesh.intersections import slice_faces_plane
 
 from bim.apertures import Aperture, Filling, aperture_of, shadow
+from bim.boxes import Boxes
 from bim.ifc.fillings import beside_opening, unfilled_openings
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
@@ -61,6 +62,18 @@ class Passage:
         return self.area > LARGEST_DOOR
 
 
+@dataclass(frozen=True, slots=True)
+class _Drawn:
+    """Triangles [N, 3, 3] of all that may stand in an opening, and their boxes."""
+
+    triangles: NDArray[np.float64]
+    boxes: Boxes
+
+    @classmethod
+    def of(cls, triangles: NDArray[np.float64]) -> _Drawn:
+        return cls(triangles, Boxes(triangles.min(axis=1), triangles.max(axis=1)))
+
+
 def open_apertures(
     source: Source, records: Sequence[SpaceRecord], bodies: NDArray[np.float64]
 ) -> list[Aperture]:
@@ -82,9 +95,9 @@ def open_apertures(
         aperture, _ = aperture_of(filling)
         if aperture is not None:
             result.append(replace(aperture, glass=aperture.opening))
-    for one, other in combinations([record.solid for record in records], 2):
-        if np.all(one.low < other.high + TOUCHING) and np.all(other.low < one.high + TOUCHING):
-            result += _common_faces(one, other, bodies)
+    solids, drawn = [record.solid for record in records], _Drawn.of(bodies)
+    for i, j in Boxes.of(solids).pairs(TOUCHING):
+        result += _common_faces(solids[i], solids[j], drawn)
     return result
 
 
@@ -92,18 +105,18 @@ def passages(
     apertures: Sequence[Aperture], records: Sequence[SpaceRecord], bodies: NDArray[np.float64]
 ) -> list[Passage]:
     """Those of the apertures that lead from room to room."""
-    solids = [record.solid for record in records]
+    solids, drawn = [record.solid for record in records], _Drawn.of(bodies)
     result = []
     for aperture in apertures:
         sides = attachments_of(aperture, solids)
         for one, other in combinations(sides, 2):
             if one.neighbour == other.room and other.neighbour == one.room:
-                passage = _passage(one, other, bodies)
+                passage = _passage(one, other, drawn)
                 result += [] if passage is None else [passage]
     return result
 
 
-def _passage(one: Attachment, other: Attachment, bodies: NDArray[np.float64]) -> Passage | None:
+def _passage(one: Attachment, other: Attachment, bodies: _Drawn) -> Passage | None:
     """What is open between two rooms if the opening goes through to both."""
     plane = one.aperture.plane
     # the first room lies below the plane, the other one above
@@ -131,9 +144,7 @@ def _mirrored(region: shapely.Geometry) -> shapely.Geometry:
     return shapely.transform(region, lambda points: points * [-1.0, 1.0])
 
 
-def _common_faces(
-    one: RoomSolid, other: RoomSolid, bodies: NDArray[np.float64]
-) -> Iterator[Aperture]:
+def _common_faces(one: RoomSolid, other: RoomSolid, bodies: _Drawn) -> Iterator[Aperture]:
     """Where two rooms touch and nothing stands, in the plane of the first one's faces."""
     guid = f"{one.guid} {other.guid}"
     name = f"boundary of {one.name} and {other.name}"
@@ -170,16 +181,15 @@ def _free(
     region: shapely.Geometry,
     plane: Plane,
     heights: tuple[float, float],
-    bodies: NDArray[np.float64],
+    bodies: _Drawn,
 ) -> shapely.Geometry:
     """The part of a region [m] with nothing between two heights above its plane [m]."""
     box = np.array(shapely.bounds(region)).reshape(2, 2)
     corners = plane.to_world(
         np.array([[x, y, z] for x in box[:, 0] for y in box[:, 1] for z in heights])
     )
-    near = np.all(bodies.min(axis=1) < corners.max(axis=0), axis=1)
-    near &= np.all(bodies.max(axis=1) > corners.min(axis=0), axis=1)
-    local = plane.to_plane(bodies[near])
+    near = bodies.boxes.near(corners.min(axis=0), corners.max(axis=0))
+    local = plane.to_plane(bodies.triangles[near])
     for height, up in zip(heights, (1.0, -1.0), strict=True):
         local = _cut_off(local, height, up)
     upright = Plane(np.zeros(3), np.eye(3))

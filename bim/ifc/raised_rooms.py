@@ -20,6 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bim.boxes import Boxes
 from bim.ifc.cut_rooms import goes_through
 from bim.ifc.glass_of_rooms import GlassOfRooms
 from bim.ifc.project import psets_of
@@ -58,6 +59,7 @@ def raised_rooms(
     if not low:
         return list(records), []
     lids, fixed = _lids(source), source.corrections.heights_as_drawn(source.model)
+    boxes = Boxes.of_triangles([cover.triangles for cover in covers])
     result, issues = list(records), []
     for index, record in enumerate(records):
         if record.guid not in low or record.step_id in fixed:
@@ -67,7 +69,7 @@ def raised_rooms(
             continue
         most = max(float(np.ptp([record.solid.low[2], record.solid.high[2]])), 2 * reach + PLENUM)
         share = _share_above(record, area, glass)
-        if goes_through(record, covers):
+        if goes_through(record, covers, boxes):
             raised, why = record, Phrase("ceiling-drawn")
         else:
             raised, why = _raised(source, index, result, lids, share, most)

@@ -13,8 +13,8 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 
 import ifcopenshell
-import numpy as np
 
+from bim.boxes import Boxes
 from bim.ifc.spaces import OVERLAPPING, SpaceRecord
 from bim.isolated_solids import shared_volumes
 from bim.report.issue import Issue, Phrase
@@ -62,14 +62,9 @@ def one_of_each(
 
 def shared_by_pair(records: Sequence[SpaceRecord]) -> tuple[Shared, list[Issue]]:
     """Volume [m3] that each pair of spaces shares, if any, and what could not be computed."""
-    near = {
-        i: [
-            j
-            for j, b in enumerate(records[i + 1 :], i + 1)
-            if np.all(a.solid.low <= b.solid.high) and np.all(b.solid.low <= a.solid.high)
-        ]
-        for i, a in enumerate(records)
-    }
+    near: dict[int, list[int]] = {i: [] for i in range(len(records))}
+    for i, j in Boxes.of([record.solid for record in records]).pairs():
+        near[i].append(j)
     bodies = {i: packed(records[i].solid.manifold) for i in near}
     items = [(bodies[i], [bodies[j] for j in others]) for i, others in near.items() if others]
     volumes = iter(shared_volumes(items))

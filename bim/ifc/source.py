@@ -28,6 +28,7 @@ from bim.ifc.project import (
 from bim.ifc.quantities import QuantityScales
 from bim.ifc.shapes import NO_ELEMENTS, Shape, read_shapes
 from bim.ifc.spaces import check_rooms
+from bim.ifc.storeys import check_storeys, keep_storeys
 from bim.ifc.surface_styles import SurfaceStyle
 from bim.ifc.transparent import judged_transparent
 from bim.names import listed
@@ -96,19 +97,22 @@ def read_source(
     linked: Sequence[str | PathLike[str]] = (),
     *,
     rooms: Sequence[str] = (),
+    storeys: Sequence[str] = (),
 ) -> Source:
     """The opened model, its shapes meshed, corrected and placed.
 
     Args:
         linked: files of the same building, whose elements are added.
-        rooms: as of `bim.ifc.building.read_ifc`.
+        rooms, storeys: as of `bim.ifc.building.read_ifc`.
     """
     tell("opening", 0.0)
     files = [path, *linked]
     models, damage = open_all(files), Damage()
     check_rooms([*models.values()], rooms, path, corrections.room_names)
+    check_storeys([*models.values()], storeys, path)
     lengths = [issue for one in models.values() for issue in length_issues(one)]
     model, issues = one_model(models)
+    issues += keep_storeys(model, storeys, path, damage)
     endings = [issue for file in files for issue in ending_issues(file)]
     names = {"first": Path(path).name}
     endings += [

@@ -11,7 +11,7 @@ import ifcopenshell
 
 from bim.ifc.corrections import RoomName
 from bim.ifc.damage import Damage, entities, instances, type_of
-from bim.ifc.project import psets_of, storey_of
+from bim.ifc.project import psets_of, storey_of, storeys_in
 from bim.ifc.quantities import QuantityScales, checked_volume, stated_quantities
 from bim.ifc.shapes import Shape
 from bim.isolated_solids import spaces_of
@@ -192,7 +192,7 @@ def check_rooms(
     file: str | PathLike[str],
     corrected: Iterable[RoomName] = (),
 ) -> None:
-    """Refuse names of rooms that are like no name of a space or zone in the models of a building.
+    """Refuse names that are like no name of a space, zone or storey in the models of a building.
 
     A name that has words of one of these, or the reverse, may be that of rooms that are joined, cut
     or left out.
@@ -206,7 +206,12 @@ def check_rooms(
     if not rooms or not drawn:
         return
     zones = [zone.name for model in models for zone in read_zones(model)]
-    names = {*zones, *(text for one in drawn for text in (one.guid, one.name, one.long_name))}
+    storeys = [one.Name or "" for model in models for one in storeys_in(model)]
+    names = {
+        *zones,
+        *storeys,
+        *(text for one in drawn for text in (one.guid, one.name, one.long_name)),
+    }
     names |= {text or "" for one in corrected for text in (one.name, one.long_name)}
     for room in rooms:
         if any(has_words(room, name) or has_words(name, room) for name in names if name.strip()):

@@ -94,18 +94,30 @@ def layered_window(
     Args:
         outwards: whether the front of each layer is outdoors.
         beside: [N] share of light at `ANGLES` that meets the innermost alone.
-        facing: [N] share of the light that it reflects outwards that meets the others; None: all.
+        facing: [N] share of the light that it reflects outwards that meets the others, where the
+            rest meets walls; None without walls.
 
     Raises: `DataError` naming file and line for a layer that cannot be computed.
     """
-    issues = list(dict.fromkeys(issue for thing in things for issue in moved_files(thing)))
+    files = [issue for thing in things for issue in (*moved_files(thing), *_thickness(thing))]
+    issues = list(dict.fromkeys(files))
     if len(things) == 1 and things[0].material.kind in SYSTEMS:
         thing = things[0]
-        path = _bsdf_file(thing)
+        path, shares = _bsdf_file(thing), _added_shares(thing, outwards[0])
         bands = dict(read_bsdf_xml(path).bands)
         if outwards[0]:  # the front of its data is on the side that the normal leaves
             bands = {name: band.turned_round() for name, band in bands.items()}
-        state = ShadingState(bands=bands, file=path)
+        if not any(shares):
+            return LayeredWindow(
+                ShadingState(bands=bands, file=path), up_vector(thing), tuple(issues)
+            )
+        if any(isinstance(band, TensorTreeBsdf) for band in bands.values()):
+            raise thing.definitions[-1].primitive.fault(
+                "adds diffuse shares to a tensor tree, which is not computed: "
+                "add them to the file, or use its Klems matrix"
+            )
+        bands = {name: _with_shares(klems_of(band), shares) for name, band in bands.items()}
+        state = ShadingState(bands=bands, layers=(path,))
         return LayeredWindow(state, up_vector(thing), tuple(issues))
     layers = [
         _bsdf_layer(thing, outward)
@@ -122,12 +134,13 @@ def layered_window(
     angular = None
     plain = [layer for layer in layers if isinstance(layer, WindowLayer)]
     if len(plain) == len(layers):
-        angular = _beam_table(plain)
+        angular, alone = _beam_table(plain), _beam_table(plain[-1:])
+        if facing is not None:
+            angular = replace(angular, reflectance_front=alone.reflectance_front)
         if beside is not None:
-            angular = angular.mixed(_beam_table(plain[-1:]), beside)
+            angular = angular.mixed(alone, beside)
     klems = [layer.klems if isinstance(layer, WindowLayer) else klems_of(layer) for layer in layers]
-    share = np.ones(KLEMS_FULL.size) if facing is None else _patch_means(facing)
-    system = _in_series(klems, share)
+    system = _in_series(klems, None if facing is None else _patch_means(facing))
     if beside is not None:
         system = _mixed(system, klems[-1], _patch_means(beside))
     system = replace(system, see_through=0.0) if rough else system
@@ -155,19 +168,21 @@ def _beam_table(layers: Sequence[WindowLayer]) -> AngularTable:
     return AngularTable(ANGLES, *(np.clip(one.mean(axis=0), 0, 1) for one in values))
 
 
-def _in_series(layers: Sequence[KlemsBsdf], facing: NDArray[np.float64]) -> KlemsBsdf:
-    """Layers as one system, where a share [K] of what the last reflects meets the others.
+def _in_series(layers: Sequence[KlemsBsdf], facing: NDArray[np.float64] | None) -> KlemsBsdf:
+    """Layers as one system, where a share [K] of what the last reflects outwards meets the others.
 
-    The rest leaves the system as from the last one alone.
+    The rest meets the walls between them, which see the last layer alone: what the others mirror
+    is outdoors.
     """
-    *outer, inner = (layer.filled() for layer in layers)
-    if not outer:
+    if len(layers) == 1:
         return layers[0]
+    if facing is None:
+        return combine_layers(list(layers)).bsdf
+    *outer, inner = (layer.filled() for layer in layers)
     before = outer[0] if len(outer) == 1 else combine_layers(outer).bsdf
     before = replace(before, reflection_back=facing * before.reflection_back)
-    whole, part = combine_layers([before, inner]).bsdf, facing[:, None]
-    reflected = part * whole.reflection_front + (1 - part) * inner.reflection_front
-    return replace(whole, reflection_front=reflected)
+    whole = combine_layers([before, inner]).bsdf
+    return replace(whole, reflection_front=inner.reflection_front)
 
 
 def _mixed(system: KlemsBsdf, inner: KlemsBsdf, share: NDArray[np.float64]) -> KlemsBsdf:
@@ -234,7 +249,41 @@ def _bsdf_file(thing: RadianceObject) -> Path:
 def _bsdf_layer(thing: RadianceObject, outward: bool) -> KlemsBsdf:
     file = read_bsdf_xml(_bsdf_file(thing))
     bsdf = klems_of(file.bands.get("Visible") or file.bands["Solar"]).filled()
-    return bsdf.turned_round() if outward else bsdf
+    side = bsdf.turned_round() if outward else bsdf
+    return _with_shares(side, _added_shares(thing, outward))
+
+
+def _added_shares(thing: RadianceObject, outward: bool) -> tuple[float, float, float]:
+    """Shares that a `BSDF` adds to its file: reflected outdoors and indoors, transmitted."""
+    numbers = (*thing.definitions[-1].primitive.numbers, *9 * [0.0])
+    front, back, passed = (luminance(numbers[i : i + 3]) for i in (0, 3, 6))
+    return (front, back, passed) if outward else (back, front, passed)
+
+
+def _with_shares(bsdf: KlemsBsdf, shares: tuple[float, float, float]) -> KlemsBsdf:
+    """A BSDF and shares that it scatters evenly besides: of its front, its back, through it."""
+    front, back, passed = (share / np.pi for share in shares)
+    full = bsdf.filled()
+    return replace(
+        bsdf,
+        transmission_front=full.transmission_front + passed,
+        transmission_back=full.transmission_back + passed,
+        reflection_front=full.reflection_front + front,
+        reflection_back=full.reflection_back + back,
+    )
+
+
+def _thickness(thing: RadianceObject) -> list[Issue]:
+    """The thickness of a `BSDF`, which shows the geometry behind it in Radiance."""
+    if thing.material.kind != "BSDF":
+        return []
+    definition = thing.definitions[-1]
+    functions, _ = functions_of(definition, definition.primitive.strings[5:])
+    thickness = float(evaluated(definition, functions, definition.primitive.strings[0], {}))
+    if not thickness:
+        return []
+    where = f"{thing.primitive.file}:{thing.primitive.line}"
+    return [Issue("bsdf-thickness", where, {"surface": thing.name, "thickness": thickness})]
 
 
 def _layer(

@@ -47,7 +47,7 @@ class PanedWindow:
     beside: NDArray[np.float64] | None = None  # [N] share of light at `ANGLES` that meets this pane
     # alone, past the rims of those in front of it
     facing: NDArray[np.float64] | None = None  # [N] share of the light that it reflects outwards at
-    # `ANGLES` that meets the panes before it
+    # `ANGLES` that meets the panes before it; None without walls between them
 
     @property
     def outwards(self) -> list[bool]:
@@ -91,6 +91,9 @@ def panes_of(
     """
     dark = {id(thing) for thing in scene.of_modifiers(facades)} if facades else set()
     panes = [o for o in scene.objects if is_pane(o) and id(o) not in dark]
+    edges = _edges(panes)
+    dark |= {id(thing) for thing in edges}
+    panes = [o for o in panes if id(o) not in dark]
     sides, space = pane_sides(scene, panes), _Space(scene, {id(pane) for pane in panes})
     chosen: list[tuple[RadianceObject, WindowSurface]] = []
     for thing in scene.of_modifiers(apertures):
@@ -121,6 +124,7 @@ def panes_of(
                 continue
             covered = 1.0 - space.free_share(surface, LAYERS)
         beside, facing = space.shares(surface, front) if front.layers else (None, None)
+        facing = facing if front.walled > OVERLAP else None
         if beside is not None:
             values = {"window": thing.name, "share": 100 * diffuse_mean(beside)}
             where = f"{thing.primitive.file}:{thing.primitive.line}"
@@ -128,6 +132,10 @@ def panes_of(
         windows.append(PanedWindow(surface, (*front.layers, thing), covered, beside, facing))
         issues += front.issues
     used = {id(pane) for window in windows for pane in window.panes} | set(layers) | far | dark
+    if edges:
+        values = {"count": len(edges), "first": edges[0].name}
+        first = edges[0].primitive
+        issues.append(Issue("edges-of-panes", f"{first.file}:{first.line}", values))
     rest = [o for o in scene.objects if not o.material.is_opaque and id(o) not in used]
     return Panes(tuple(windows), (*issues, *map(_left_out, rest)))
 
@@ -140,7 +148,8 @@ class _Front:
     hidden: set[int]  # identities of all that are near
     others: tuple[RadianceObject, ...]  # panes that are left out
     issues: tuple[Issue, ...]
-    numbers: tuple[int, ...] = ()  # of all that are near, in the scene
+    numbers: tuple[int, ...]  # of all that are near, in the scene
+    walled: float  # share of the window that is behind a wall, not the layers
 
 
 class _Space:
@@ -204,7 +213,7 @@ class _Space:
             issues.append(Issue("panes-before-wall", where, values, Effect(glass=surface.area)))
         panes = tuple(self._objects[n] for n in reversed(layers))
         hidden = {id(self._objects[n]) for n in seen}
-        return _Front(panes, hidden, tuple(left_out), tuple(issues), tuple(sorted(seen)))
+        return _Front(panes, hidden, tuple(left_out), tuple(issues), tuple(sorted(seen)), walled)
 
     def free_share(self, surface: WindowSurface, reach: float) -> float:
         """Share of a pane with neither another pane nor a wall on its room side."""
@@ -356,13 +365,41 @@ def _optics(thing: RadianceObject) -> object:
     return replace(thing.material, name=""), tuple(map(id, definitions))
 
 
-def _is_wide(thing: RadianceObject) -> bool:
-    """Whether a surface is no strip, such as a slat."""
-    if not thing.material.is_translucent:
-        return True
+def _edges(panes: Sequence[RadianceObject]) -> list[RadianceObject]:
+    """The narrow sides of panes that are drawn as boxes: their corners are those of the panes."""
+    normals: dict[tuple[float, ...], list[NDArray[np.float64]]] = {}
+    narrow = []
+    for pane in panes:
+        if _width(pane) < NARROW:
+            narrow.append(pane)
+            continue
+        for corner in _corners(pane):
+            normals.setdefault(corner, []).append(pane.normal)
+    return [
+        one
+        for one in narrow
+        if all(
+            any(abs(normal @ one.normal) < 1 - PARALLEL for normal in normals.get(corner, ()))
+            for corner in _corners(one)
+        )
+    ]
+
+
+def _corners(thing: RadianceObject) -> set[tuple[float, ...]]:
+    """Vertices of a surface, to 0.1 mm."""
+    return set(map(tuple, np.round(thing.triangles.reshape(-1, 3), 4) + 0.0))
+
+
+def _width(thing: RadianceObject) -> float:
+    """The smaller extent of a surface in its plane [m]."""
     corners = thing.triangles.reshape(-1, 3)
     sizes = np.linalg.svd(corners - corners.mean(axis=0))[2] @ corners.T
-    return bool(np.sort(np.ptp(sizes, axis=1))[1] >= NARROW)
+    return float(np.sort(np.ptp(sizes, axis=1))[1])
+
+
+def _is_wide(thing: RadianceObject) -> bool:
+    """Whether a surface is no strip, such as a slat."""
+    return not thing.material.is_translucent or _width(thing) >= NARROW
 
 
 def _left_out(thing: RadianceObject) -> Issue:

@@ -10,10 +10,10 @@ import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from html import escape
 from os import PathLike
 from typing import Any, TypeVar
 from xml.parsers import expat
-from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -406,8 +406,8 @@ def _lines(bsdf: BsdfFile, digits: int) -> Iterator[str]:
 
 def _material_lines(bsdf: BsdfFile) -> Iterator[str]:
     yield "<Material>\n"
-    yield f"\t<Name>{escape(bsdf.name)}</Name>\n"
-    yield f"\t<Manufacturer>{escape(bsdf.manufacturer)}</Manufacturer>\n"
+    yield f"\t<Name>{escape(bsdf.name, quote=False)}</Name>\n"
+    yield f"\t<Manufacturer>{escape(bsdf.manufacturer, quote=False)}</Manufacturer>\n"
     for tag, length in (
         ("Thickness", bsdf.thickness),
         ("Width", bsdf.width),
@@ -415,7 +415,7 @@ def _material_lines(bsdf: BsdfFile) -> Iterator[str]:
     ):
         if length is not None:
             yield f'\t<{tag} unit="meter">{length:.9g}</{tag}>\n'
-    yield f"\t<DeviceType>{escape(bsdf.device_type)}</DeviceType>\n"
+    yield f"\t<DeviceType>{escape(bsdf.device_type, quote=False)}</DeviceType>\n"
     for tag, value in (
         ("ThermalConductivity", bsdf.conductivity),
         ("EmissivityFront", bsdf.emissivity_front),
@@ -448,7 +448,7 @@ def _structure(bsdf: Bsdf) -> str:
 
 
 def _angle_basis(basis: KlemsBasis) -> Iterator[str]:
-    yield f"\t<AngleBasis>\n\t<AngleBasisName>{escape(basis.name)}</AngleBasisName>\n"
+    yield f"\t<AngleBasis>\n\t<AngleBasisName>{escape(basis.name, quote=False)}</AngleBasisName>\n"
     bounds = np.degrees(basis.theta_bounds)
     for ring, count in enumerate(basis.phi_counts):
         middle = 0.0 if ring == 0 and count == 1 else 0.5 * (bounds[ring] + bounds[ring + 1])
@@ -468,15 +468,15 @@ def _block(
     source, detector = SPECTRA.get(band, SPECTRA["Visible"])
     yield (
         f'<WavelengthData>\n\t<LayerNumber>System</LayerNumber>\n\t<Wavelength unit="Integral">'
-        f"{escape(band)}</Wavelength>\n\t<SourceSpectrum>{source}</SourceSpectrum>\n"
+        f"{escape(band, quote=False)}</Wavelength>\n\t<SourceSpectrum>{source}</SourceSpectrum>\n"
         f"\t<DetectorSpectrum>{detector}</DetectorSpectrum>\n\t<WavelengthDataBlock>\n"
         f"\t<WavelengthDataDirection>{kind.title()} {side.title()}</WavelengthDataDirection>\n"
     )
     if isinstance(bsdf, TensorTreeBsdf):
         yield "\t<AngleBasis>LBNL/Shirley-Chiu</AngleBasis>\n"
     else:
-        yield f"\t<ColumnAngleBasis>{escape(bsdf.basis_in.name)}</ColumnAngleBasis>\n"
-        yield f"\t<RowAngleBasis>{escape(bsdf.basis_out.name)}</RowAngleBasis>\n"
+        yield f"\t<ColumnAngleBasis>{escape(bsdf.basis_in.name, quote=False)}</ColumnAngleBasis>\n"
+        yield f"\t<RowAngleBasis>{escape(bsdf.basis_out.name, quote=False)}</RowAngleBasis>\n"
     data_type = "BTDF" if kind == "transmission" else "BRDF"
     yield f"\t<ScatteringDataType>{data_type}</ScatteringDataType>\n\t<ScatteringData>\n"
     if isinstance(block, TensorTree):

@@ -120,6 +120,7 @@ class MatrixCache:
 
     folder: Path
     limit: int = DEFAULT_LIMIT  # [bytes]
+    stores: bool = True  # rather than only read
     hashes: RecentHashes = field(default_factory=RecentHashes, compare=False, repr=False)
 
     @classmethod
@@ -175,6 +176,8 @@ class CacheEntry:
 
         A folder that cannot be written to costs a warning, not the run.
         """
+        if not self.cache.stores:
+            return False
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with replacing(self.path) as part:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.glare.annual import PictureMatrix
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import CacheEntry, MatrixCache, RecentResults
@@ -27,16 +28,17 @@ from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene, Sampling
 from mitsuba_cfs.methods.subdivision import CellLight, Parts, allowed, subdivided
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, joined
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
+from mitsuba_cfs.trace.kernels.rooms import TracedRoom
 from mitsuba_cfs.trace.kernels.scene import SceneCache
 from mitsuba_cfs.trace.matrices.adjacent import AdjacentRoomLight, GlassToRoom, adjacent_daylight
 from mitsuba_cfs.trace.matrices.cell_daylight import BATCHES as CELL_BATCHES
-from mitsuba_cfs.trace.matrices.cell_daylight import cell_daylight
-from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
+from mitsuba_cfs.trace.matrices.cell_daylight import cell_daylight, cells_of_rooms
+from mitsuba_cfs.trace.matrices.daylight import daylight_matrix, daylight_of_rooms
 from mitsuba_cfs.trace.matrices.exchange import outdoor_exchange, window_exchange
-from mitsuba_cfs.trace.matrices.view import view_matrix
+from mitsuba_cfs.trace.matrices.view import view_matrix, views_of_rooms
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown, adjacent_picture
 from mitsuba_cfs.trace.pictures.annual import ViewMatrices, ViewNoise, view_matrices
 from mitsuba_cfs.trace.sun.sunlit_rows import (
@@ -46,7 +48,7 @@ from mitsuba_cfs.trace.sun.sunlit_rows import (
     sparse_matrix,
     window_sunlit_shares,
 )
-from mitsuba_cfs.window_parts import cut_group, even_regions, window_cells
+from mitsuba_cfs.window_parts import Cells, cut_group, even_regions, window_cells
 
 LARGEST = 256 << 20  # [bytes] of a file; larger ones would push out all the others
 
@@ -212,6 +214,119 @@ def phase_matrices(
     return with_needs(matrices, needs, progress=progress)
 
 
+def matrices_together(
+    scenes: Sequence[DaylightScene],
+    outdoors: SharedOutdoors,
+    sampling: Sampling,
+    *,
+    five_phase: bool = True,
+    cut: bool = True,
+    cache: MatrixCache | None = None,
+    progress: Progress = silent,
+) -> list[PhaseMatrices]:
+    """`phase_matrices` of rooms of one building, for their sensors, traced together.
+
+    With a cache those of a room alone are found there later.
+
+    Args:
+        scenes: of rooms with windows outdoors alone, and something in front of them.
+        outdoors: of all; the windows of a room are those of the scene of that number.
+        cut: windows where the view outdoors differs; False: D's means have no stated error.
+    """
+    shared = SceneCache()
+    shared.know_fronts(outdoors, [scene.exterior for scene in scenes])
+    common: dict[str, Any] = {"cache": cache, "scenes": shared}
+    parts = [Parts.whole(scene.groups) for scene in scenes]
+    if cut:
+        parts = _parts_together(scenes, outdoors, sampling, common)
+    progress("V and D", 0.2)
+    passes = [(OUTDOOR_DEPTH, False), *([(1, False)] if five_phase else [])]
+    if five_phase and outdoors.surfaces.glossy:
+        passes.append((1, True))
+    fronts = [TracedRoom(one.exterior, of.groups, number=i)
+              for i, (one, of) in enumerate(zip(scenes, parts, strict=True))]  # fmt: skip
+    options = [
+        _daylight_options(sampling, len(one.groups), len(of.groups))
+        for one, of in zip(scenes, parts, strict=True)
+    ]
+    whole, *direct = (
+        _daylight_together(fronts, outdoors, options, depth, plain=plain, common=common)
+        for depth, plain in passes
+    )
+    progress("V and D", 0.5)
+    matrices = []
+    for i, (one, of) in enumerate(zip(scenes, parts, strict=True)):
+        beams = [part[i].values for part in direct]
+        matrices.append(
+            PhaseMatrices(
+                one, sampling, five_phase, cache, of, (), whole[i],
+                direct_daylight=beams[0] if beams else None,
+                straight_daylight=beams[-1] if beams else None,
+                scenes=shared,
+            )
+        )  # fmt: skip
+    rooms = [
+        TracedRoom(one.scene.interior, one.parts.groups, *sensors_of(*one.scene.sensors()))
+        for one in matrices
+    ]
+    sharp = [any(has_sharp_beam(one, g) for g in range(len(one.scene.groups))) for one in matrices]
+    views = views_of_rooms(
+        rooms, max_depth=INDOOR_DEPTH, with_direct=any(sharp), **_view_options(sampling), **common
+    )
+    progress("V and D", 1.0)
+    return [
+        replace(one, sensors=whole, direct_sensors=None if part is None else part.values)
+        for one, (whole, part) in zip(matrices, views, strict=True)
+    ]
+
+
+def _parts_together(
+    scenes: Sequence[DaylightScene],
+    outdoors: SharedOutdoors,
+    sampling: Sampling,
+    common: dict[str, Any],
+) -> list[Parts]:
+    """The window groups of each room, cut where the view outdoors differs within a group."""
+    cells = [[window_cells(group) for group in one.groups] for one in scenes]
+    daylight = cells_of_rooms(
+        [TracedRoom(one.exterior, one.groups, number=i) for i, one in enumerate(scenes)],
+        outdoors, cells, [_cell_samples(sampling, of) for of in cells],
+        max_depth=OUTDOOR_DEPTH, seed=sampling.seed, **common,
+    )  # fmt: skip
+    return [
+        _parts_of_cells(one.groups, of, light, sampling)
+        for one, of, light in zip(scenes, cells, daylight, strict=True)
+    ]
+
+
+def _daylight_together(
+    rooms: Sequence[TracedRoom],
+    outdoors: SharedOutdoors,
+    options: Sequence[dict[str, Any]],
+    depth: int,
+    *,
+    plain: bool,
+    common: dict[str, Any],
+) -> list[Estimate]:
+    """D of each room; those with equal options are traced together.
+
+    Args: plain: without the gloss of what is outdoors.
+    """
+    if plain:
+        rooms = [replace(one, surfaces=replace(one.surfaces, gloss=())) for one in rooms]
+        outdoors = replace(outdoors, surfaces=replace(outdoors.surfaces, gloss=()))
+    alike: dict[str, list[int]] = {}
+    for i, chosen in enumerate(options):
+        alike.setdefault(repr(chosen), []).append(i)
+    found: dict[int, Estimate] = {}
+    for some in alike.values():
+        traced = daylight_of_rooms(
+            [rooms[i] for i in some], outdoors, max_depth=depth, **options[some[0]], **common
+        )
+        found |= dict(zip(some, traced, strict=True))
+    return [found[i] for i in range(len(rooms))]
+
+
 def with_needs(
     matrices: PhaseMatrices, needs: Iterable[str], *, progress: Progress = silent
 ) -> PhaseMatrices:
@@ -267,7 +382,11 @@ def as_five_phase(matrices: PhaseMatrices) -> PhaseMatrices:
     matrices = with_direct_daylight(replace(matrices, five_phase=True))
     if matrices.sensors is None or matrices.direct_sensors is not None:
         return matrices
-    return replace(matrices, direct_sensors=_sensors(matrices, 1, silent).values)
+    direct = view_matrix(
+        matrices.scene.interior, matrices.parts.groups, *matrices.scene.sensors(), max_depth=1,
+        cache=matrices.cache, scenes=matrices.scenes, **_view_options(matrices.sampling),
+    )  # fmt: skip
+    return replace(matrices, direct_sensors=direct.values)
 
 
 def has_sharp_beam(matrices: PhaseMatrices, g: int) -> bool:
@@ -282,12 +401,21 @@ def with_sensors(matrices: PhaseMatrices, *, progress: Progress = silent) -> Pha
     """The matrices with V of the scene's sensors, and V_d where the straight beam is apart."""
     if matrices.sensors is not None:
         return matrices
-    sensors = _sensors(matrices, INDOOR_DEPTH, part(progress, 0.3, 0.9, "daylight"))
-    direct = None
-    if any(has_sharp_beam(matrices, g) for g in range(len(matrices.scene.groups))):
-        # V_d is a part of V entry by entry: the same seed and samples
-        direct = _sensors(matrices, 1, part(progress, 0.9, 1.0, "daylight")).values
-    return replace(matrices, sensors=sensors, direct_sensors=direct)
+    room = TracedRoom(
+        matrices.scene.interior, matrices.parts.groups, *sensors_of(*matrices.scene.sensors())
+    )
+    ((sensors, direct),) = views_of_rooms(
+        [room],
+        max_depth=INDOOR_DEPTH,
+        with_direct=any(has_sharp_beam(matrices, g) for g in range(len(matrices.scene.groups))),
+        progress=part(progress, 0.3, 1.0, "daylight"),
+        cache=matrices.cache,
+        scenes=matrices.scenes,
+        **_view_options(matrices.sampling),
+    )
+    return replace(
+        matrices, sensors=sensors, direct_sensors=None if direct is None else direct.values
+    )
 
 
 def with_exchange(
@@ -414,17 +542,32 @@ def _parts_of_outdoor_groups(
     if not len(scene.exterior.triangles) or not groups:
         return Parts.whole(groups)
     cells = [window_cells(group) for group in groups]
-    paths = CELL_SHARE * sampling.patch_samples * len(cells) / sum(len(c.area) for c in cells)
     daylight = cell_daylight(
         scene.exterior,
         groups,
         cells,
-        samples=max(round(paths / CELL_BATCHES), 1),
+        samples=_cell_samples(sampling, cells),
         max_depth=OUTDOOR_DEPTH,
         seed=sampling.seed,
         cache=cache,
         scenes=scenes,
     )
+    return _parts_of_cells(groups, cells, daylight, sampling)
+
+
+def _cell_samples(sampling: Sampling, cells: Sequence[Cells]) -> int:
+    """Paths of each patch of a cell in each batch, for the cells of each group."""
+    paths = CELL_SHARE * sampling.patch_samples * len(cells) / sum(len(c.area) for c in cells)
+    return max(round(paths / CELL_BATCHES), 1)
+
+
+def _parts_of_cells(
+    groups: Sequence[WindowGroup],
+    cells: Sequence[Cells],
+    daylight: Sequence[NDArray[np.float64]],
+    sampling: Sampling,
+) -> Parts:
+    """The parts of groups by the light of their cells."""
     lights = map(CellLight, groups, cells, daylight)
     most, limit = sampling.window_parts or None, allowed(sampling.patch_samples)
     return Parts.of_cells(subdivided(light, most, limit=limit) for light in lights)
@@ -474,23 +617,29 @@ def _daylight(
     scenes: SceneCache,
 ) -> Estimate:
     """D [q, K, P] of the parts that look outdoors."""
-    groups, outer = scene.outdoor_groups, parts.groups[: parts.outdoors(scene)]
-    samples, batches = sampling.patch_samples, BATCHES
-    if len(outer) > len(groups):  # at about the cost of the whole groups
-        samples = samples * len(groups) // len(outer)
-        batches = PART_BATCHES
+    outer = parts.groups[: parts.outdoors(scene)]
     return daylight_matrix(
         scene.exterior,
         outer,
-        subdivision=sampling.subdivision,
-        samples=max(samples // batches, 1),
         max_depth=depth,
-        stopping=Stopping(batches=batches),
-        seed=sampling.seed,
         progress=progress,
         cache=cache,
         scenes=scenes,
+        **_daylight_options(sampling, len(scene.outdoor_groups), len(outer)),
     )
+
+
+def _daylight_options(sampling: Sampling, groups: int, parts: int) -> dict[str, Any]:
+    """Of `daylight_matrix` for so many window groups in parts."""
+    samples, batches = sampling.patch_samples, BATCHES
+    if parts > groups:  # at about the cost of the whole groups
+        samples, batches = samples * groups // parts, PART_BATCHES
+    return {
+        "subdivision": sampling.subdivision,
+        "samples": max(samples // batches, 1),
+        "stopping": Stopping(batches=batches),
+        "seed": sampling.seed,
+    }
 
 
 def _direct_daylight(
@@ -563,21 +712,13 @@ def _inner_daylight(
     ]  # fmt: skip
 
 
-def _sensors(matrices: PhaseMatrices, depth: int, progress: Progress) -> Estimate:
-    """V [S, Q, K], or V_d with a depth of 1."""
-    chosen = matrices.sampling
-    return view_matrix(
-        matrices.scene.interior,
-        matrices.parts.groups,
-        *matrices.scene.sensors(),
-        samples=max(chosen.sensor_samples // BATCHES, 1),
-        max_depth=depth,
-        stopping=Stopping(batches=BATCHES),
-        seed=chosen.seed,
-        progress=progress,
-        cache=matrices.cache,
-        scenes=matrices.scenes,
-    )
+def _view_options(sampling: Sampling) -> dict[str, Any]:
+    """Of `view_matrix`."""
+    return {
+        "samples": max(sampling.sensor_samples // BATCHES, 1),
+        "stopping": Stopping(batches=BATCHES),
+        "seed": sampling.seed,
+    }
 
 
 def _exchange_samples(sampling: Sampling, parts: Sequence[WindowGroup], share: int) -> int:

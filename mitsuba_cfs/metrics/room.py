@@ -89,6 +89,7 @@ def room_metrics(
     direct_illuminance: ArrayLike | None = None,
     areas: ArrayLike | None = None,
     horizontal_openings: bool = False,
+    daylight_hours: schedules.Mask | None = None,
 ) -> RoomMetrics:
     """Daylight metrics of a room, each with the schedule of its standard.
 
@@ -98,8 +99,10 @@ def room_metrics(
         direct_illuminance: [H, S] [lx] straight from the sun, blinds open, for ASE.
         areas: [S] area of each sensor; equal unless given.
         horizontal_openings: the room is lit by rooflights (EN 17037, table A.2).
+        daylight_hours: [H] of EN 17037, where they are known.
     """
-    ten, half = schedules.lm83_hours(weather), schedules.daylight_hours(weather)
+    ten, half = schedules.lm83_hours(weather), daylight_hours
+    half = schedules.daylight_hours(weather) if half is None else half
     illuminance = np.asarray(illuminance)
     lit = ase = None
     if direct_illuminance is not None:

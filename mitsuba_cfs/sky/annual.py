@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,7 @@ from mitsuba_cfs.sky.three_part import three_part
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.sky.weather_table import LONGEST_GAP_H, interpolated
 
+T = TypeVar("T")
 FROM_FILE = ("file", "snow")
 # Reflectance of ground under snow, and 0.2 without: Liu and Jordan 1963, "The long-term average
 # performance of flat-plate solar-energy collectors", Solar Energy 7 (2), 53-74
@@ -179,6 +180,16 @@ class AnnualSky:
     solar: NDArray[np.floating] | None = None  # [P, L] radiance, the sun among it [W/m2/sr]
     _lit_sun: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
     _totals: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
+    _of_year: dict[Callable[..., Any], Any] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
+
+    def once(self, function: Callable[[Weather], T], weather: Weather) -> T:
+        """A result of the weather of these skies alone, made once for all rooms."""
+        if function not in self._of_year:
+            self._of_year[function] = function(weather)
+        result: T = self._of_year[function]
+        return result
 
     @property
     def lit_sun(self) -> NDArray[np.floating] | csr_array:

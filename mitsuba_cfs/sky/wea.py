@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import write_bytes
+from mitsuba_cfs.files import reason, write_bytes
 from mitsuba_cfs.sky import weather_table
 from mitsuba_cfs.sky.sun import direct_normal_from_global, sun_directions
 from mitsuba_cfs.sky.weather import Weather
@@ -26,6 +26,15 @@ from mitsuba_cfs.sky.weather_table import (
     number,
     read_lines,
 )
+
+
+def is_wea(path: str | PathLike[str]) -> bool:
+    """Whether a file begins as a WEA does; `DataError` where it cannot be read."""
+    try:
+        with open(path, "rb") as file:
+            return file.read(5).lower() == b"place"
+    except OSError as error:
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from error
 
 
 def read_wea(path: str | PathLike[str], *, whole_year: bool = True) -> Weather:

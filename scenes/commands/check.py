@@ -88,7 +88,7 @@ def command(
 
     with ProgressBar() as progress:
         read = building_of(options, progress)
-    spaces = named_spaces(read, options.spaces, options.building) if options.spaces else read.spaces
+    spaces = named_spaces(read, options.rooms, options.building) if options.rooms else read.spaces
     windows = [window for space in spaces for window in space.windows]
     known = known_fenestration(spaces, options.building)
     # a file or a program that reads on gets every line whole, however long

@@ -112,7 +112,7 @@ def command(
 
     with ProgressBar() as progress:
         read = building_of(options, progress)
-    spaces = named_spaces(read, options.spaces, building)
+    spaces = named_spaces(read, options.rooms, building)
     known = known_fenestration(spaces, building, overrides_of(options, None, light_only=True))
     head = PrintedHead()
     head(head_of(read, light_only=True).with_assumptions(known.notes()))

@@ -114,6 +114,13 @@ join_option = click.option(
     metavar="'ROOM + ROOM'",
     help="Merge rooms that are open to each other; 'open' (IFC): wherever the opening is no door.",
 )
+storey_option = click.option(
+    "--only-storey",
+    "only_storeys",
+    multiple=True,
+    metavar="NAME",
+    help="Read this storey of an IFC model, with the next above and below; its rooms only.",
+)
 furniture_option = click.option(
     "--furniture", is_flag=True, help="Include the furniture of the model in light and views."
 )
@@ -174,7 +181,7 @@ needed_weather_option = click.option(
     "--weather", required=True, type=FILE, help="Hourly weather file (EPW)."
 )
 weather_option = click.option(
-    "--weather", type=FILE, help="Hourly weather file (EPW); required with BUILDING."
+    "--weather", type=FILE, help="Hourly weather file (EPW or WEA); required with BUILDING."
 )
 system_option = click.option(
     "--cfs",
@@ -389,7 +396,7 @@ def input_options(
         *([see_through_option] if weather and system else []),
         *([] if not spaces else [
             space_option("spaces", f"default: {spaces}", several=several), join_option,
-            furniture_option, surroundings_option, surroundings_offset_option,
+            storey_option, furniture_option, surroundings_option, surroundings_offset_option,
         ]),
         aperture_option,
         facade_pane_option,

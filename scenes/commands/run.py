@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -30,6 +32,10 @@ from scenes.commands.room_options import (
 from scenes.room.options import RoomOptions
 from scenes.run.options import JobOptions
 
+if TYPE_CHECKING:
+    from scenes.result_folder import ResultFolder
+    from scenes.run.first_plan import PlannedRoom
+
 LOADS = ("heating", "cooling", "lighting")
 NEED_PHASES = {
     "annual_glare": "--annual-glare",
@@ -37,6 +43,26 @@ NEED_PHASES = {
     "inner_glass": "--inner-glass",
 }
 _DEFAULT = RoomOptions()
+
+
+class Percentage(click.ParamType):
+    """A share in per cent, such as 5%."""
+
+    name = "PERCENT"
+
+    def convert(
+        self, value: str | float, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """The share, 0 to 1."""
+        if isinstance(value, float):
+            return value
+        try:
+            share = float(value.removesuffix("%")) / 100
+        except ValueError:
+            share = -1.0
+        if not 0 < share < 1:
+            self.fail(f"{value!r}: expected a percentage above 0 and below 100, such as 5%")
+        return share
 
 
 @click.command()
@@ -84,6 +110,12 @@ _DEFAULT = RoomOptions()
 @explore_option()
 @processes_option
 @scheduler_option
+@click.option(
+    "--error",
+    type=Percentage(),
+    help="Enough relative standard error of the rooms' yearly mean illuminance, such as 5%: the "
+    "number of rays follows from a first plan, up to the usual one.",
+)
 @click.option(
     "--netcdf",
     is_flag=True,
@@ -153,11 +185,11 @@ def run_to_folder(
     beside = processes > 1 or scheduler is not None
     if options.quick:
         click.echo(quick_run.NOTE)
-    lines, head = _RoomLines(), PrintedHead()
+    lines, head, plan = _RoomLines(), PrintedHead(), _FirstPlan(folder, page_options.language)
     with ProgressBar() as progress, compiled_beside():
         result = run_job(
             options, progress, files,
-            on_room=lines.year, on_light=lines.light, on_head=head,
+            on_room=lines.year, on_light=lines.light, on_head=head, on_plan=plan,
             workers=Workers(processes, scheduler) if beside else None,
         )  # fmt: skip
         progress("results", 0.0)
@@ -166,7 +198,8 @@ def run_to_folder(
         with in_language(page_options.language):
             write_results(
                 result, folder, report, explorer,
-                netcdf=options.netcdf, processes=processes, progress=progress,
+                netcdf=options.netcdf, processes=processes, first_plan=plan.table,
+                progress=progress,
             )  # fmt: skip
         progress("results", 1.0)
     head.notes(note for note in result.notes if note != quick_run.NOTE)
@@ -176,6 +209,23 @@ def run_to_folder(
     click.echo(f"report: {out / 'report.html'}")
     if options.explore:
         click.echo(f"explorer: {out / EXPLORER / 'index.html'}")
+
+
+class _FirstPlan:
+    """Prints the first plan and writes it in the place of the report."""
+
+    def __init__(self, folder: ResultFolder, language: str) -> None:
+        self._folder, self._language, self.table = folder, language, ""
+
+    def __call__(self, rooms: Sequence[PlannedRoom]) -> None:
+        from scenes.language.catalogue import in_language
+        from scenes.run.first_plan import plan_lines, plan_page, plan_table
+        from scenes.run.outputs import FIRST_PLAN, REPORT
+
+        self.table = plan_table(rooms)
+        with in_language(self._language):
+            self._folder.early({FIRST_PLAN: self.table, REPORT: plan_page(rooms)})
+        click.echo("\n".join(plan_lines(rooms)))
 
 
 class _RoomLines:

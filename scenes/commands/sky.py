@@ -11,7 +11,7 @@ import click
 import numpy as np
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import check_file, reason, write_table
+from mitsuba_cfs.files import check_file, write_table
 from mitsuba_cfs.matrices.mtx_io import FORMATS, write_matrix
 from mitsuba_cfs.sky.cie import KINDS
 from mitsuba_cfs.sky.options import LABELS, LEAST_ALTITUDE_DEG, PARTS, SUN_PATCHES
@@ -301,14 +301,9 @@ def sun_steps(weather: Weather, sun_model: str) -> np.ndarray:
 def read_weather(path: Path) -> Weather:
     """An EPW or a WEA file, by its first word."""
     from mitsuba_cfs.sky.epw import read_epw
-    from mitsuba_cfs.sky.wea import read_wea
+    from mitsuba_cfs.sky.wea import is_wea, read_wea
 
-    try:
-        with open(path, "rb") as file:
-            start = file.read(6).lower()
-    except OSError as error:
-        raise DataError(f"cannot be read: {reason(error)}", file=path) from error
-    weather = read_wea(path, whole_year=False) if start.startswith(b"place") else read_epw(path)
+    weather = read_wea(path, whole_year=False) if is_wea(path) else read_epw(path)
     _tell(weather)
     return weather
 

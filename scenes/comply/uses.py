@@ -14,6 +14,7 @@ from pathlib import Path
 from pydantic import Field
 
 from bim.model import Space
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.notes import Note
 from scenes.language.catalogue import N_
 from scenes.toml_file import TomlTable, read_table, validated
@@ -94,10 +95,14 @@ class RoomUses:
         source = Note("no information on its use, taken as regularly occupied")
         return RoomUse(UNKNOWN, True, source, True)
 
-    def _named(self, key: str) -> RoomUse:
-        use = next((one for one in self.uses if one.key == key), None)
-        occupied = use.occupied if use is not None else True
-        return RoomUse(key, occupied, Note("named in {file}", file=self.file))
+    def _named(self, text: str) -> RoomUse:
+        """The use that a mapping file states: a key, else a text with one of its words."""
+        use = _use_stated(text, self.uses)
+        if use is None:
+            keys = ", ".join(dict.fromkeys(one.key for one in self.uses))
+            message = f"expected a use, one of {keys}, or one of a [[use]], got {text!r}"
+            raise DataError(message, file=self.file, field="rooms")
+        return RoomUse(use.key, use.occupied, Note("named in {file}", file=self.file))
 
     @staticmethod
     def _texts(space: Space, texts: Sequence[tuple[str, str]]) -> Iterator[tuple[str, str]]:
@@ -119,7 +124,16 @@ def read_uses(path: Path | None = None) -> RoomUses:
     if path is None:
         return RoomUses(shipped.use, {})
     own = validated(UsesFile, read_table(path), path)
-    return RoomUses((*own.use, *shipped.use), own.rooms, path.name, own.dwellings)
+    uses = RoomUses((*own.use, *shipped.use), own.rooms, path.name, own.dwellings)
+    for text in own.rooms.values():
+        uses._named(text)
+    return uses
+
+
+def _use_stated(text: str, uses: Sequence[UseTable]) -> UseTable | None:
+    of_key = (use for use in uses if use.key == text)
+    of_word = (use for use in uses if any(_holds(text, word) for word in use.words))
+    return next(of_key, next(of_word, None))
 
 
 def _holds(text: str, word: str) -> bool:

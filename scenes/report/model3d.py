@@ -34,6 +34,7 @@ STOREYS_ABOVE = 3  # without rooms, the roof with them
 SHOWN = 300.0  # of the surroundings at the least, from the rooms [m]
 SHOWN_SIZES = 5  # or so many times the rooms' size
 MARK = 0.3  # least size of the mark of a leak [m]
+NORTH = 0.2  # length of the arrow by the longer side of the building
 STEPS = 32000  # of the 16-bit coordinates over the model's half size
 
 
@@ -60,7 +61,7 @@ class Model3D:
     rooms: tuple[str, ...]
     storeys: tuple[str, ...]  # names, the lowest first
     left_out: int
-    extra: tuple[str, ...] = ()  # kinds of what belongs to no room: "mark", "before"
+    extra: tuple[str, ...] = ()  # kinds of what belongs to no room: "mark", "before", "north"
 
     def json(self) -> dict[str, Any]:
         """The parts that go into the page as JSON."""
@@ -107,6 +108,16 @@ def _cube(middle: NDArray[np.float64], half: float) -> NDArray[np.float64]:
     return corners[[k for a, b, c, d in quads for k in (a, b, c, a, c, d)]].reshape(-1, 3, 3)
 
 
+def _arrow(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Triangles [2, 3, 3] of an arrow on the ground that points north, south of a box."""
+    length = NORTH * float((high - low)[:2].max())
+    tip = np.array([(low[0] + high[0]) / 2, low[1] - length / 4, low[2]])
+    left, right, notch = tip + length * np.array([(-0.25, -1, 0), (0.25, -1, 0), (0, -0.75, 0)])
+    return np.array(
+        [[tip, notch, left], [tip, right, notch]]
+    )  # faces towards the eye are not drawn
+
+
 def _model(
     building: Building,
     spaces: Sequence[Space],
@@ -130,7 +141,10 @@ def _model(
     centre = (low + high) / 2
     shown = max(float((high - low).max()) * SHOWN_SIZES, SHOWN)
     outdoors, left_out = largest_triangles(cut_to(around, low - shown, high + shown))
-    reach = np.abs(np.concatenate([corners, outdoors.reshape(-1, 3)]) - centre).max()
+    box = building_box(building) if building.spaces else np.array([low, high])
+    extra = [*extra, ("north", _arrow(*box))]
+    packed_corners = [corners, outdoors.reshape(-1, 3), extra[-1][1].reshape(-1, 3)]
+    reach = np.abs(np.concatenate(packed_corners) - centre).max()
     unit = float(reach) / STEPS
     names, levels, tops = storey_levels(spaces)
 
@@ -171,7 +185,6 @@ def _model(
         "corners": packed(np.concatenate(cells)),
     }
     labels = tuple(space.label for space in spaces)
-    box = building_box(building) if building.spaces else np.array([low, high])
     whole = tuple(map(tuple, (box - centre).round(3).tolist()))
     return Model3D(
         tuple(centre), whole, unit, tuple(batches), sensors, layers, labels, names, left_out,

@@ -20,7 +20,7 @@ from mitsuba_cfs.metrics.autonomy import daylight_autonomy_noise
 from mitsuba_cfs.metrics.lm83 import spatial_daylight_autonomy_error
 from mitsuba_cfs.metrics.noise import Noise
 from mitsuba_cfs.metrics.room import daylight_factor, room_metrics
-from mitsuba_cfs.metrics.schedules import lm83_hours
+from mitsuba_cfs.metrics.schedules import Mask, daylight_hours, lm83_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -36,9 +36,13 @@ def room_daylight(
     light: RoomLight,
     state: NDArray[np.int64],
     *,
+    sunny_hours: bool = True,
     progress: Progress = silent,
 ) -> DaylightResult:
-    """Illuminance of the year with the shading states of each hour [H, G], and its metrics."""
+    """Illuminance of the year with the shading states of each hour [H, G], and its metrics.
+
+    Args: sunny_hours: with the three-phase method, state its error in hours with sun.
+    """
     progress("daylight", 0.0)
     lights, lit_state, points = light.light, light.states(state), light.scene.points
     traced = picture_light(room, light)
@@ -54,7 +58,7 @@ def room_daylight(
         relative_error=error,
     )
     blurred = None
-    if room.options.method == "three-phase":
+    if room.options.method == "three-phase" and sunny_hours:
         blurred = 100.0 * sunny_hour_error(lights, lit_state, lit)
     # LM-83's direct sun and the daylight factor are those of open blinds
     direct = direct_sun(lights)
@@ -66,6 +70,7 @@ def room_daylight(
         table, of_room = daylight_metrics(
             points[sensors], illuminance[:, sensors], factor[sensors], room.weather, sun,
             autonomy_noise=autonomy_noise.part(sensors),
+            half=room.skies.once(daylight_hours, room.weather),
         )  # fmt: skip
         table["daylight_factor_standard_error"] = 100.0 * factor_error[sensors]
         if blurred is not None:
@@ -136,6 +141,7 @@ def daylight_metrics(
     direct: NDArray[np.float32] | None = None,
     *,
     autonomy_noise: Noise,
+    half: Mask | None = None,
 ) -> tuple[pd.DataFrame, dict[str, float]]:
     """Metrics by sensor (a table with the positions) and of the room, shares in per cent.
 
@@ -143,8 +149,9 @@ def daylight_metrics(
         points: [S, 3]; illuminance: [H, S] [lx]; daylight_factor: [S] 0 to 1.
         direct: [H, S] [lx] straight from the sun, for annual sunlight exposure.
         autonomy_noise: [S] of DA.
+        half: [H] EN 17037's daylight hours, where they are known.
     """
-    metrics = room_metrics(illuminance, weather, direct_illuminance=direct)
+    metrics = room_metrics(illuminance, weather, direct_illuminance=direct, daylight_hours=half)
     by_sensor = metrics.by_sensor()
     table = pd.DataFrame(points, columns=["x", "y", "z"]).rename_axis("sensor")
     for column, source in SENSOR_COLUMNS.items():

@@ -171,13 +171,9 @@ def lit_room(
         `ValueError` for a window without a system, `DataError` for an explorer where the outdoors
         changes over the year.
     """
-    if operation is None:
-        systems = {guid: states[:1] for guid, states in systems.items()}
-    room = room_inputs(
+    room = inputs_of_room(
         building, space, systems, weather, options,
-        operation=None if operation is None else operation.tables, skies=skies, cache=cache,
-        file_sensors=FileSensors.of(building, space), inner_glass=inner,
-        together=together,
+        operation=operation, skies=skies, cache=cache, inner=inner, together=together,
     )  # fmt: skip
     if explore and len(room.seasons) > 1:
         message = "the explorer knows one state of the trees: give them one transmittance"
@@ -235,6 +231,30 @@ def lit_room(
         space, daylight, glare, zone, times.seconds, year, dgp=dgp,
         dgp_sunny_hour_error=dgp_error, as_lobe=as_lobe, issues=leaks, explored=explored,
         borrowed=borrowed_share(space, light.light, light.inner),
+    )  # fmt: skip
+
+
+def inputs_of_room(
+    building: Building,
+    space: Space,
+    systems: Mapping[str, States],
+    weather: Weather,
+    options: RoomOptions,
+    *,
+    operation: Operation | None = None,
+    skies: AnnualSky | None = None,
+    cache: MatrixCache | None = None,
+    inner: bool = False,
+    together: Collection[str] = (),
+) -> RoomInputs:
+    """The inputs of `lit_room`, from its arguments."""
+    if operation is None:
+        systems = {guid: states[:1] for guid, states in systems.items()}
+    return room_inputs(
+        building, space, systems, weather, options,
+        operation=None if operation is None else operation.tables, skies=skies, cache=cache,
+        file_sensors=FileSensors.of(building, space), inner_glass=inner,
+        together=together,
     )  # fmt: skip
 
 

@@ -420,22 +420,33 @@ def _with_sun_of(room: RoomZone, rooms: Sequence[RoomZone]) -> RoomZone:
 
 
 def inner_sun_note(rooms: Sequence[RoomZone], step_h: float) -> tuple[str, ...]:
-    """A sentence on the sun that enters by one room and is absorbed in another; none without."""
-    passed = sum(
-        float(absorbed.sum())
+    """Sentences on the sun that enters by one room and is absorbed in another; none without."""
+    passed = {
+        room.space.label: sum(
+            float(absorbed.sum()) * step_h / 1000.0
+            for (guid, _), absorbed in room.sun_beyond.items()
+            if guid != room.space.guid
+        )
         for room in rooms
-        for (guid, _), absorbed in room.sun_beyond.items()
-        if guid != room.space.guid
-    )
-    if not passed:
-        return ()
-    return (
-        Note(
+    }
+    by_temperature = [r.space.label for r in rooms if r.alternatives and passed[r.space.label]]
+    notes = []
+    if any(passed.values()):
+        note = Note(
             "Sun through glass and open doorways between rooms: {energy:.0f} kWh in the year enter "
             "by the windows of one room and are absorbed in another.",
-            energy=passed * step_h / 1000.0,
-        ),
-    )
+            energy=sum(passed.values()),
+        )
+        notes.append(note)
+    if by_temperature:
+        note = Note(
+            "{energy:.0f} kWh of it are those of the first shading state, whatever the shading "
+            "does: the temperature of {rooms} moves it.",
+            energy=sum(passed[label] for label in by_temperature),
+            rooms=", ".join(by_temperature),
+        )
+        notes.append(note)
+    return tuple(notes)
 
 
 @dataclass(frozen=True, slots=True)

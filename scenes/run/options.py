@@ -21,6 +21,7 @@ class JobOptions(InputOptions):
     coupled_heat: bool = True  # heat flows between the rooms that are computed
     colour: bool = True  # each room's brightest picture in colour too
     explore: bool = False  # every hour's picture in every shading state, for the explorer
+    error: float | None = None  # relative, of yearly means: fewer rays where it needs fewer
     netcdf: bool = False  # all numbers of the run as one netCDF file besides
 
     @property

@@ -37,7 +37,7 @@ from scenes.run.netcdf import write_netcdf
 from scenes.user_errors import user_message
 from scenes.workers import Tasks
 
-REPORT = "report.html"
+REPORT, FIRST_PLAN = "report.html", "first_plan.csv"
 ROOMS_A_PROCESS = 8
 
 
@@ -49,6 +49,7 @@ def write_results(
     *,
     netcdf: bool = False,
     processes: int = 1,
+    first_plan: str = "",
     progress: Progress = silent,
 ) -> None:
     """Write all files of a run; earlier results are replaced at the end.
@@ -58,6 +59,7 @@ def write_results(
         write_explorer: `scenes.explore.folder.write_explorer`, or None for no explorer.
         netcdf: whether all numbers are written as one netCDF file besides.
         processes: that many rooms' files are written at a time.
+        first_plan: the table of the first plan, where there was one.
 
     Captions in pictures are in the language of `in_language`. A fault of the program in one of
     these pages is raised when all else is in place.
@@ -69,6 +71,8 @@ def write_results(
         places = [temporary / name if several else temporary for name in names]
         _write_rooms(result, places, processes, progress)
         write_table(_issues(result), temporary / "problems.csv", index=False)
+        if first_plan:
+            write_text(temporary / FIRST_PLAN, first_plan)
         if netcdf:
             write_netcdf(result, temporary / NETCDF)
         for write, page in ((write_report, REPORT), (write_explorer, EXPLORER)):

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import atexit
 import platform
+import shutil
 import time
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from importlib import metadata
 from pathlib import Path
+from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any
 
 from bim.doorways import panes_between, source_rooms
@@ -39,7 +42,9 @@ from scenes.room.inputs import skies_for
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import RoomChoices, compute_room, lit_room
 from scenes.room.series import RoomSeries, moved_light, moved_result
+from scenes.run.first_plan import FROM, PlannedRoom, first_plan, options_for_error
 from scenes.run.options import JobOptions
+from scenes.run.together import RoomsTogether
 from scenes.workers import Tasks
 
 OnLight = Callable[[DaylitRoom], None]  # called with the light of each room, before its heat
@@ -69,24 +74,27 @@ def computed_rooms(
     Rooms that exchange heat are balanced together, after the light of all of them.
     """
     coupled = balanced_together(inputs, options)
-    work = RoomWork(inputs, run_spaces(inputs, options), skies, options, with_heat=not coupled)
-    store = StoredArrays() if len(work.spaces) > 1 else None
-    series = RoomSeries(
-        inputs.building,
-        work.spaces,
-        inputs.systems,
-        options.room.sampling,
-        MatrixCache.of_user() if options.cache else None,
-        work,
-        moved_light if coupled else moved_result,
-        options.building,
-        partial(_interchangeable, inputs, options),
-        on_room=(on_light if coupled else on_room) or _ignore,
-        shared=N_("daylight, glare and solar gains") if coupled else N_("results"),
-        parallel=None if workers is None else partial(work.parallel, workers=workers),
-        stored=_unchanged if store is None else store.stored,
-    )
-    results, issues, notes = series.results(progress)
+    spaces = run_spaces(inputs, options)
+    store = StoredArrays() if len(spaces) > 1 else None
+    with TemporaryDirectory(prefix="cfs-matrices-") as folder:
+        together = RoomsTogether(inputs, spaces, skies, options, Path(folder))
+        work = RoomWork(inputs, spaces, skies, options, together, with_heat=not coupled)
+        series = RoomSeries(
+            inputs.building,
+            spaces,
+            inputs.systems,
+            options.room.sampling,
+            MatrixCache.of_user() if options.cache else None,
+            work,
+            moved_light if coupled else moved_result,
+            options.building,
+            partial(_interchangeable, inputs, options),
+            on_room=(on_light if coupled else on_room) or _ignore,
+            shared=N_("daylight, glare and solar gains") if coupled else N_("results"),
+            parallel=None if workers is None else partial(work.parallel, workers=workers),
+            stored=_unchanged if store is None else store.stored,
+        )
+        results, issues, notes = series.results(progress)
     if not coupled:
         return _read_back(results, store), issues, notes
     years: list[RoomYear] = []
@@ -158,15 +166,17 @@ class RoomWork:
     spaces: Sequence[Space]  # `run_spaces`
     skies: AnnualSky
     options: JobOptions
+    together: RoomsTogether  # traces the matrices of several rooms at once
     with_heat: bool  # False: light alone, the heat of all rooms is balanced together
 
     def __call__(self, space: Space, progress: Progress = silent) -> RoomYear | DaylitRoom:
         """The result of a room."""
         inputs, options = self.inputs, self.options
+        cache = self.together.cache_for(space, progress)
         choices: RoomChoices = {
             "operation": inputs.operation,
             "skies": self.skies,
-            "cache": MatrixCache.of_user() if options.cache else None,
+            "cache": cache,
             "explore": options.explore,
             "colour": options.colour,
             "inner": options.inner_glass,
@@ -225,19 +235,23 @@ class _FromFiles:
 
     def __call__(self, guid: str) -> tuple[str, RoomYear | DaylitRoom]:
         variants.activate()
-        inputs, spaces, skies = _read(self.options, self.run)
-        work = RoomWork(inputs, spaces, skies, self.options, with_heat=self.with_heat)
+        inputs, together, spaces, skies = _read(self.options, self.run)
+        work = RoomWork(inputs, spaces, skies, self.options, together, with_heat=self.with_heat)
         return guid, work.of(guid)
 
 
 @lru_cache(maxsize=1)
-def _read(options: JobOptions, run: str) -> tuple[Inputs, Sequence[Space], AnnualSky]:
+def _read(
+    options: JobOptions, run: str
+) -> tuple[Inputs, RoomsTogether, Sequence[Space], AnnualSky]:
     inputs, room = read_inputs(options, inner=options.inner_glass), options.room
     if _identity(options, inputs) != run:
         message = "a worker has other input files or another version of the program"
         raise DataError(message, field="--scheduler")
     skies = skies_for(inputs.weather, room.sampling, **room.sky)
-    return inputs, run_spaces(inputs, options), skies
+    spaces, folder = run_spaces(inputs, options), Path(mkdtemp(prefix="cfs-matrices-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return inputs, RoomsTogether(inputs, spaces, skies, options, folder), spaces, skies
 
 
 def _failed(guid: str, error: BaseException) -> tuple[str, BaseException]:
@@ -255,6 +269,7 @@ def _requirements(inputs: Inputs) -> Requirements:
 
 
 OnHead = Callable[[Head], None]  # called as soon as all inputs are read
+OnPlan = Callable[[Sequence[PlannedRoom]], None]  # called with the first plan of many rooms
 
 
 def run_job(
@@ -265,6 +280,7 @@ def run_job(
     on_room: OnRoom | None = None,
     on_light: OnLight | None = None,
     on_head: OnHead | None = None,
+    on_plan: OnPlan | None = None,
     workers: Workers | None = None,
 ) -> RunResult:
     """Daylight, glare, temperatures and comfort of the chosen rooms.
@@ -275,6 +291,7 @@ def run_job(
         on_light: called with the light of each room as soon as it is computed, if the rooms' heat
             is balanced together.
         on_head: called with what was left out and assumed, before anything is traced.
+        on_plan: called with first figures of all rooms where these are many, before the rest.
         workers: compute several rooms at a time; None: this process, room by room.
 
     Raises: `DataError` for a file that cannot be used, before anything is traced.
@@ -284,8 +301,9 @@ def run_job(
     if on_head is not None:
         on_head(inputs.head)
     return run_inputs(
-        inputs, options, progress, on_room=on_room, on_light=on_light, workers=workers, start=start
-    )
+        inputs, options, progress, on_room=on_room, on_light=on_light, on_plan=on_plan,
+        workers=workers, start=start,
+    )  # fmt: skip
 
 
 def run_inputs(
@@ -295,6 +313,7 @@ def run_inputs(
     *,
     on_room: OnRoom | None = None,
     on_light: OnLight | None = None,
+    on_plan: OnPlan | None = None,
     workers: Workers | None = None,
     start: float | None = None,
 ) -> RunResult:
@@ -309,6 +328,13 @@ def run_inputs(
     head = inputs.head
     sun = sun_directions(weather)
     variant = variants.activate()
+    if options.error is not None or (on_plan is not None and len(inputs.spaces) >= FROM):
+        plan = first_plan(inputs, run_spaces(inputs, options), options, progress)
+        if options.error is not None:
+            room = options_for_error(options.room, plan, options.error)
+            options = replace(options, room=room)
+        if on_plan is not None and plan:
+            on_plan(plan)
     progress("sky", 0.0)
     room = options.room
     skies = skies_for(weather, room.sampling, **room.sky)

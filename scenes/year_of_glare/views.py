@@ -40,7 +40,7 @@ def read_files(options: YearOptions) -> InputFiles:
     Raises: `DataError` for what cannot be used.
     """
     rated_views(options)
-    return input_files.read_files(options, light_only=True)
+    return input_files.read_files(options, light_only=True, temperatures=False)
 
 
 def _check_kind(each: NamedView) -> None:

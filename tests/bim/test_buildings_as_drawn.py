@@ -85,7 +85,7 @@ def test_a_space_through_its_roof_is_cut_there(tmp_path):
 
 def test_a_space_whose_cut_ends_its_process_is_named(tmp_path, monkeypatch):
     ended = ProcessEnded("killed by signal 9", "")
-    monkeypatch.setattr(cut_rooms, "largest_parts", lambda items: [ended for _ in items])
+    monkeypatch.setattr(cut_rooms, "parted", lambda items: [ended for _ in items])
     building = _read(box_model(space_height=HEIGHT + 1.0)[0], tmp_path)
     (issue,) = of_code(building, "room-not-cut")
     assert issue.values["reason"] == str(ended)

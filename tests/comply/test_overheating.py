@@ -99,8 +99,31 @@ def test_two_of_three_criteria_of_tm52(calendar, hours, excess, verdict):
     assert reached("tm52", found, "office") == {"overheating": verdict}
 
 
+# Rooms of a block of flats under Heathrow's weather: criteria 1 [%], 2 [K h], 3 [K], and which of
+# them fail, by IES VE 2019: github.com/maxfordham/adaptive-comfort, ies_TestJob1_TM52_0.1.csv
+BY_IES = """2.5 11 2 2; 7.8 14 2 12; 8.1 15 2 12; 0 0 0 -; 10.6 25 3 12; 26 27 3 12; 11.6 31 3 12;
+26.3 29 3 12; 0.6 5 1 -; 0.1 5 1 -; 12.9 29 3 12; 28.3 30 3 12; 13.4 33 3 12; 28.6 30 3 12; 0 1 1 -;
+1.6 7 1 2; 0.4 7 1 2; 5.6 18 2 12; 17.7 22 2 12; 5.2 21 2 12; 17.7 22 2 12"""
+
+
+@pytest.mark.parametrize("room", BY_IES.split(";"))
+def test_verdicts_of_tm52_as_another_program_published_them(room):
+    *figures, failing = room.split()
+    rule, figures = read_rule("tm52"), [float(one) for one in figures]
+    needs = rule.criterion[0].level[0].needs
+    beyond = [str(n) for n, (v, one) in enumerate(zip(figures, needs, strict=True), 1)
+              if v > one.at_most]  # fmt: skip
+    assert ("".join(beyond) or "-") == failing
+    values = {"tm52": dict(zip(needs, figures, strict=True))}
+    use = RoomUse("office", True, "")
+    (verdict,) = assess_room({"tm52": rule}, values, shoebox().spaces[0], use)
+    assert verdict.reached == (NOT_MET if len(beyond) > 1 else "met")
+
+
 def test_nights_of_tm59(calendar):
-    """1 % of the 3,285 hours from 22 to 7 o'clock: 32 are permitted, 33 not; days do not count."""
+    """As published (energaia.co.uk/overheating-tm59.html): 33 hours are a fail.
+
+    1 % of the 3,285 hours from 22 to 7 o'clock: 32 are permitted, 33 not; days do not count."""
     nights = np.flatnonzero((CLOCK >= 22) | (CLOCK < 7))
     for count, verdict in ((32, "met"), (33, NOT_MET)):
         operative = np.full(8760, 22.0)
@@ -108,6 +131,23 @@ def test_nights_of_tm59(calendar):
         operative[(CLOCK == 12) & (HOUR < 1000)] = 40.0  # in winter, by day
         assert reached("tm59", year(calendar, operative), "bedroom")["nights"] == verdict
     assert "nights" not in reached("tm59", year(calendar, 22.0), "living")
+
+
+@pytest.mark.parametrize(
+    ("above", "hours", "degree_hours"),
+    [
+        (1.0, (12, 15), 3.0),  # malosi.fr, degres-heures-dh-en-re2020: 1 °C for 3 h
+        (4.0, (12, 14), 8.0),  # the same: 4 °C for 2 h
+        (2.0, (3, 4), 2.0),  # aglo.ai, DH: 28 °C for an hour of the night
+    ],
+)
+def test_degree_hours_of_re2020_as_published(calendar, above, hours, degree_hours):
+    outdoor = np.where((HOUR >= 24 * 150) & (HOUR < 24 * 240), 20.0, 5.0)
+    day = (HOUR // 24 == 200) & (CLOCK >= hours[0]) & (CLOCK < hours[1])
+    limit = 26.0 if hours[1] <= 7 else 0.33 * 20 + 20.8
+    (need,) = read_rule("re2020").criterion[0].level[0].needs
+    found = year(calendar, np.where(day, limit + above, 22.0), outdoor)
+    assert need.value(found) == pytest.approx(degree_hours, rel=1e-3)
 
 
 def test_degree_hours_of_re2020(calendar):

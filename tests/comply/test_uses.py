@@ -74,3 +74,13 @@ def test_dwellings_are_named_in_the_mapping_file(tmp_path):
     assert use("Living room", file=path, name="B1012").dwelling == ""
     assert use("Living room", file=path, name="A102").key == "living"
     assert use("Living room").dwelling == ""
+
+
+def test_a_stated_use_is_a_key_or_has_its_word(tmp_path):
+    path = tmp_path / "uses.toml"
+    path.write_text('[rooms]\n"A0" = "Living room"\n"A1" = "bedroom"\n', "utf-8")
+    uses = read_uses(path)
+    assert [uses._named(uses.rooms[name]).key for name in ("A0", "A1")] == ["living", "bedroom"]
+    path.write_text('[rooms]\n"A0" = "quiddity"\n', "utf-8")
+    with pytest.raises(DataError, match=r"rooms: expected a use, one of .*living.*'quiddity'"):
+        read_uses(path)

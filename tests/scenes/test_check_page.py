@@ -56,3 +56,17 @@ def test_rooms_without_the_corrections_are_beside_those_with_them(tmp_path) -> N
     assert np.ptp(after[:, 2]) == pytest.approx(HEIGHT + 1.0, abs=0.01)
     assert np.ptp(before[:, 0]) == pytest.approx(WIDTH, abs=0.01)
     assert np.ptp(before[:, 1]) >= DEPTH - 0.01
+
+
+@pytest.mark.parametrize("north_deg", [0.0, 40.0])
+def test_the_arrow_points_north_whatever_the_axes_of_the_model(tmp_path, north_deg) -> None:
+    path = tmp_path / "m.ifc"
+    box_model()[0].model.write(str(path))
+    path.with_name("m.corrections.toml").write_text(f"north = {north_deg}", "utf-8")
+    data = page_data(path, tmp_path / "m.html")
+    arrow, walls = corners(data, "north"), corners(data, "wall")
+    tip = arrow[arrow[:, 1].argmax()]
+    tail = arrow[arrow[:, 1] < arrow[:, 1].max() - 0.1].mean(axis=0)
+    assert (tip - tail)[0] == pytest.approx(0.0, abs=0.01) and (tip - tail)[1] > 0.5
+    assert arrow[:, 1].max() < walls[:, 1].min()  # outside the house, on the ground
+    assert np.ptp(arrow[:, 2]) < 0.01

@@ -13,9 +13,10 @@ from scenes.fenestration.systems import read_system
 from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.room import operated_zone
 from scenes.room.windows import in_all_windows
-from scenes.room.zone import coupled, inner_sun_note
+from scenes.room.zone import RoomAlternatives, coupled, inner_sun_note
 from tests.scenes.small_box import SMALL
 from tests.validation.inner_sun import REFLECTANCE, two_rooms
+from thermal.control import TemperatureCondition
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +49,12 @@ def test_what_the_pane_lets_through_is_absorbed_behind_it(variant, zones) -> Non
     # what the pane absorbed as an opaque wall now goes on, and some of it returns
     before, after = alone.solar.inside.sum(), front.solar.inside.sum()
     assert before - after == pytest.approx(at_pane + passed, rel=0.03)
-    assert "kWh in the year" in inner_sun_note([front, rear], 1.0)[0]
+    (note,) = inner_sun_note([front, rear], 1.0)
+    assert "kWh in the year" in note
+    by_temperature = RoomAlternatives((TemperatureCondition(23.0, 22.5),), (front, front))
+    _, more = inner_sun_note([replace(front, alternatives=by_temperature), rear], 1.0)
+    assert more.startswith(note.split("rooms: ")[1].split(" kWh")[0])  # all of it
+    assert more.endswith(f"the temperature of {front.space.label} moves it.")
 
 
 def test_the_balance_has_the_sun_of_the_other_room(variant, zones) -> None:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
 from mitsuba_cfs.images.hdr import read_hdr
 from mitsuba_cfs.images.view import fitted, parse_view
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.wea import write_wea
 from scenes import cli
+from scenes.demo import WEATHER
+from tests.conftest import REPOSITORY
 
+OFFICE = REPOSITORY / "docs/tutorials/office.rad"
 pytestmark = pytest.mark.usefixtures("variant")
 
 
@@ -60,6 +67,24 @@ def test_what_cannot_be_is_told_in_a_line(words, message, tmp_path, monkeypatch,
     said = capsys.readouterr().err.strip()
     assert message in said and "\n" not in said
     assert not list(tmp_path.iterdir())
+
+
+def test_light_needs_a_wea_and_heat_an_epw(tmp_path, capsys):
+    epw, wea = read_epw(WEATHER), tmp_path / "city.wea"
+    write_wea(epw, wea)
+    call = ["picture", "--at", "06-21 12:30", "--size", "32", "--samples", "4", "--weather"]
+    shown = {}
+    for file in (str(wea), str(WEATHER)):
+        assert cli.run([*call, file, "--out", str(tmp_path / "a.png")]) == 0
+        shown[file] = capsys.readouterr().out
+    assert "city.wea states no dew point: that of Radiance's programs, 11.0" in shown[str(wea)]
+    values = [
+        float(re.search(r"Ev ([\d,]+) lx", text)[1].replace(",", "")) for text in shown.values()
+    ]
+    assert values[0] == pytest.approx(values[1], rel=0.05) and values[0] != values[1]
+    run = ["run", "--weather", str(wea), "--out", str(tmp_path / "out"), str(OFFICE)]
+    assert cli.run(run) != 0
+    assert "city.wea: is a WEA file, which has no temperatures" in capsys.readouterr().err
 
 
 def test_pixels_of_a_view_are_square():

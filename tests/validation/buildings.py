@@ -1,6 +1,6 @@
 """Rooms, volume, glass, outdoors, outer walls and north of every IFC file in folders.
 
-    python -m tests.validation buildings [FOLDERS...]
+    python -m tests.validation buildings [FOLDERS or FILES...]
 
 Without folders: ../shared/data/ifc and ../shared/cases/ifc.  U of the outer walls is weighted by
 area, with the surface resistances of EN ISO 6946 (0.13 and 0.04 m2 K/W); north is the direction of
@@ -46,9 +46,10 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def ifc_files(folders: Iterable[str | Path]) -> list[Path]:
-    """The IFC files of folders, in order."""
+    """The IFC files of folders, in order; a file is itself."""
     names = (".ifc", ".ifczip", ".ifcxml")
-    return [p for f in folders for p in sorted(Path(f).rglob("*")) if p.suffix.lower() in names]
+    paths = [p for f in map(Path, folders) for p in ([f] if f.is_file() else sorted(f.rglob("*")))]
+    return [path for path in paths if path.suffix.lower() in names]
 
 
 def figures(path: Path) -> str:

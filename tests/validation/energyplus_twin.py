@@ -7,11 +7,13 @@ has written, with the study's own weather file.  With `--their-sun` our balance 
 EnergyPlus' sun in every hour: on the outer walls, in the window layers and in the room's surfaces
 (of windows by two panes).  What still differs then is not the sun's.  With `--open-sky` it is
 solved again as if nothing hid the sky from the outer faces' longwave, and the share of the sky
-that each face sees stands beside EnergyPlus' own.
+that each face sees stands beside EnergyPlus' own.  `--clock` adds the processor seconds of our
+balance, from arrays to arrays, and of EnergyPlus' run, without starting Python.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -25,7 +27,7 @@ from scenes.heat.energyplus import energyplus_twin
 from scenes.heat.study import BalancedRooms, run_study
 from scenes.heat.study_file import read_study
 from scenes.room.zone import RoomZone, balances
-from tests.validation.energyplus_program import run_written
+from tests.validation.energyplus_program import TIME_FILE, run_written
 
 Hours = NDArray[np.float64]  # [H] or [H, N]
 SETTLED = 7 * 24  # hours left out of the temperatures at the start
@@ -45,11 +47,17 @@ SUMS = {"incident_w": "sun on", "transmitted_w": "sun in", "absorbed_room_w": "s
 
 
 def compared(
-    path: Path, folder: Path, *, their_sun: bool = False, open_sky: bool = False
+    path: Path,
+    folder: Path,
+    *,
+    their_sun: bool = False,
+    open_sky: bool = False,
+    clock: bool = False,
 ) -> dict[str, pd.DataFrame]:
     """Air [K] and loads [kWh] of every room of a study, ours and EnergyPlus', by what ours has.
 
-    Args: their_sun: a table of ours with EnergyPlus' sun; open_sky: one of ours with a free sky.
+    Args: their_sun: a table of ours with EnergyPlus' sun; open_sky: one of ours with a free sky;
+        clock: one of processor seconds.
     """
     study = read_study(path)
     kept: list[BalancedRooms] = []
@@ -71,6 +79,13 @@ def compared(
         return _rows(twin.zones, replace(found, rooms=rooms, results=results), theirs)
 
     tables = {"ours": _rows(twin.zones, found, theirs)}
+    if clock:
+        start = time.process_time()
+        again(list(found.rooms))
+        seconds = {"ours": time.process_time() - start}
+        seconds["E+"] = float((folder / TIME_FILE).read_text().split()[1])
+        faces = sum(len(r.zone.surfaces) + len(r.zone.windows) for r in found.rooms)
+        tables["processor seconds"] = pd.DataFrame([{"faces": faces} | seconds])
     if open_sky:
         named = zip(twin.zones, found.rooms, strict=True)
         listed = (folder / "eplusout.eio").read_text()
@@ -217,13 +232,18 @@ def shouted(name: str) -> str:
 
 
 def main(
-    studies: Sequence[Path], *, out: Path, their_sun: bool = False, open_sky: bool = False
+    studies: Sequence[Path],
+    *,
+    out: Path,
+    their_sun: bool = False,
+    open_sky: bool = False,
+    clock: bool = False,
 ) -> dict[str, pd.DataFrame]:
-    """A table for each study; their_sun, open_sky: see `compared`."""
+    """A table for each study; their_sun, open_sky, clock: see `compared`."""
     return {
         f"{path.name}, {title}": table.round(2)
         for path in studies
         for title, table in compared(
-            path, out / path.stem, their_sun=their_sun, open_sky=open_sky
+            path, out / path.stem, their_sun=their_sun, open_sky=open_sky, clock=clock
         ).items()
     }

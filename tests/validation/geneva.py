@@ -10,10 +10,10 @@ mitsuba_cfs` under the reference's own skies, rated as raytools sums (pixel by p
 evalglare groups; fabric and panes are described in `geneva_scene`.  By command: `cfs dgp FILE.rad
 --weather EPW`, every hour of the year, the scene's files as they are.  The irradiances of the EPW
 are those of the reference's sky; its dew point is not, which `gendaylit -ang` takes as 11 degC for
-the luminous efficacies (`--dew-point gendaylit` writes it into the EPW).  By rtrace: Ev by
-Radiance's own program under the reference's skies, which shows the reference's own error.  Errors
-as raytraverse publishes them: over the hours whose reference DGP is 0.25 to 0.75, the mean absolute
-difference of DGP, and of Ev as a share of it.
+the luminous efficacies; `--weather wea` is the reference's own file, which has none.  By rtrace:
+Ev by Radiance's own program under the reference's skies, which shows the reference's own error.
+Errors as raytraverse publishes them: over the hours whose reference DGP is 0.25 to 0.75, the mean
+absolute difference of DGP, and of Ev as a share of it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,6 @@ import bim
 import mitsuba_cfs as cfs
 from mitsuba_cfs.images.view import format_view
 from mitsuba_cfs.methods.phase_matrices import with_eye, with_needs
-from mitsuba_cfs.sky.matrix import DEFAULT_DEW_POINT_C
 from tests.benchmarks.radiance import eye_illuminance
 from tests.validation import geneva_scene as geneva
 from tests.validation.differences import mean_absolute
@@ -69,7 +68,7 @@ def by_functions(
 
 
 def by_command(
-    folder: Path, case: str, views: Sequence[int], size: int, dew_point: str
+    folder: Path, case: str, views: Sequence[int], size: int, weather: str
 ) -> Iterator[pd.DataFrame]:
     """The same by `cfs dgp`, with the sun and the ground of the reference's sky."""
     for number in views:
@@ -78,13 +77,10 @@ def by_command(
             for part in ("options", "RAD"):
                 shutil.copytree(folder / part, scene.with_name(part))
             shutil.copy(folder / "roos_fabric.cal", scene.parent)
-            weather = folder / "refs" / "geneva.epw"
-            if dew_point == "gendaylit":
-                weather = with_dew_point(weather, scene.parent, DEFAULT_DEW_POINT_C)
             files = f"options/{geneva.CASES[case]}.rad", "RAD/office.rad"
             scene.write_text("".join(f"!xform {file}\n" for file in files))
             words = [
-                "dgp", scene, "--weather", weather, "--out", out,
+                "dgp", scene, "--weather", folder / f"refs/geneva.{weather}", "--out", out,
                 "--view", format_view(geneva.view(folder, number, size)), "--size", size,
                 "--sun-model", "radiance", "--sky-ground", "gendaylit", "--worst", 0,
             ]  # fmt: skip
@@ -158,14 +154,14 @@ def main(
     views: Annotated[Sequence[int], geneva.VIEWS] = geneva.VIEWS,
     every: Annotated[int, "of the 2,022 hours, by rtrace of those that count"] = 20,
     size: Annotated[int, "[px]"] = 300,
-    dew_point: Annotated[str, ("epw", "gendaylit")] = "epw",
+    weather: Annotated[str, ("epw", "wea")] = "epw",
     bounces: Annotated[int, "of rtrace, the eye's hemisphere included"] = 12,
 ) -> pd.DataFrame:
     """A row for each case and view."""
     rows = []
     for case in cases:
         if by == "command":
-            tables = by_command(folder, case, views, size, dew_point)
+            tables = by_command(folder, case, views, size, weather)
         elif by == "rtrace":
             tables = by_rtrace(folder, case, views, every, bounces)
         else:

@@ -85,7 +85,9 @@ CONTROLS = {
     "shading that waits": AIR
     + LOADS
     + TINTED
-    + SHADED.format("operative temperature").replace("22.5", "22.5, open_delay_h = 2, hold_h = 3"),
+    + SHADED.format("operative temperature")
+    .replace("23.5", "25.0")
+    .replace("22.5", "24.9, open_delay_h = 2, hold_h = 3"),
     "shading and windows": AIR + WINDOWS + HEATED + TINTED + SHADED.format("operative temperature"),
     "air by night": f"{AIR}night_ach = 3\nnight = [22, 6]\n{LOADS}",
     "heat recovery": FAN + LOADS,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import mitsuba as mi
@@ -43,6 +45,16 @@ class Estimate:
             values=self.values[index],
             standard_error=self.standard_error[index],
             covariance=self.covariance[index],
+        )
+
+    def shaped(self, shape: tuple[int, ...]) -> Estimate:
+        """The same entries as an array of another shape with the same last axis."""
+        of_blocks = self.covariance.shape[-2:]
+        return replace(
+            self,
+            values=self.values.reshape(shape),
+            standard_error=self.standard_error.reshape(shape),
+            covariance=self.covariance.reshape(*shape[:-1], *of_blocks),
         )
 
     def error_of(self, weights: ArrayLike) -> NDArray[np.float64]:
@@ -134,7 +146,7 @@ def accumulate(
     stopping: Stopping | None = None,
     label: str = "",
     progress: Progress = silent,
-    entry: CacheEntry | None = None,
+    entry: CacheEntry | JoinedEntry | None = None,
 ) -> Estimate:
     """Mean of the batches `batch(0)`, `batch(1)`, ... and the standard error of that mean.
 
@@ -150,7 +162,7 @@ def accumulate(
     state = entry.load() if entry is not None else None
     if state is not None and state.finished:
         progress(label, 1.0)
-        return _estimate(state)
+        return estimate_of(state)
     mean = spread = covariance = np.zeros(())
     count, before = 0, 0.0
     if state is not None:
@@ -176,7 +188,7 @@ def accumulate(
     # no batch follows: seven digits of the error are enough
     state = replace(state, finished=True, spread=state.spread.astype(np.float32))
     keeper.save(state)
-    return _estimate(state)
+    return estimate_of(state)
 
 
 def cache_entry(
@@ -193,10 +205,61 @@ def cache_entry(
     return cache.entry(label, mi.variant(), stopping or Stopping(), *inputs, by=by)
 
 
+@dataclass(frozen=True, slots=True)
+class JoinedEntry:
+    """The cache entries of several matrices that are traced as one, row after row."""
+
+    entries: Sequence[CacheEntry]
+    shapes: Sequence[tuple[int, ...]]  # of each matrix; the last axis is the same
+
+    @property
+    def _rows(self) -> list[slice]:
+        ends = np.cumsum([0, *(math.prod(shape[:-1]) for shape in self.shapes)])
+        return [slice(first, end) for first, end in pairwise(ends)]
+
+    def load(self) -> BatchMean | None:
+        """The state of all; None unless each has as many batches."""
+        states = [entry.load() for entry in self.entries]
+        some = [state for state in states if state is not None]
+        if len(some) < len(states) or len({(one.count, one.finished) for one in some}) > 1:
+            return None
+        size = self.shapes[0][-1]
+
+        def joined_of(name: str, last: int) -> NDArray[np.float64]:
+            arrays = (getattr(one, name) for one in some)
+            return np.concatenate([a.reshape(-1, *a.shape[a.ndim - last :]) for a in arrays])
+
+        mean, spread = joined_of("mean", 1), joined_of("spread", 1)
+        if mean.shape[-1] != size:
+            return None
+        seconds = sum(one.seconds for one in some)
+        first = some[0]
+        return BatchMean(
+            first.count, mean, spread, joined_of("covariance", 2), seconds, first.finished
+        )
+
+    def save(self, state: BatchMean) -> None:
+        """Write the state of each."""
+        for entry, shape, rows in zip(self.entries, self.shapes, self._rows, strict=True):
+            covariance = state.covariance[rows]
+            of_blocks = covariance.shape[-2:]
+            share = (rows.stop - rows.start) / len(state.mean)
+            entry.save(
+                BatchMean(
+                    state.count,
+                    state.mean[rows].reshape(shape),
+                    state.spread[rows].reshape(shape),
+                    covariance.reshape(*shape[:-1], *of_blocks),
+                    state.seconds * share,
+                    state.finished,
+                )
+            )
+
+
 class _Keeper:
     """Saves states, seldom enough that saving takes a small share of the time."""
 
-    def __init__(self, entry: CacheEntry | None, count: int) -> None:
+    def __init__(self, entry: CacheEntry | JoinedEntry | None, count: int) -> None:
         self._entry = entry
         self._saved = (count, False)
         self._next = time.monotonic() + SAVE_SECONDS
@@ -235,7 +298,7 @@ def _with_another(
     return mean, left, covariance
 
 
-def _estimate(state: BatchMean) -> Estimate:
+def estimate_of(state: BatchMean) -> Estimate:
     """Mean and standard error of the batches so far."""
     pairs = (state.count - 1) * state.count
     error = np.sqrt(np.maximum(state.spread.astype(float), 0) / pairs)
@@ -252,7 +315,7 @@ def _fraction_done(state: BatchMean, stopping: Stopping) -> float:
     if stopping.time_limit is not None:
         fractions.append(state.seconds / stopping.time_limit)
     if stopping.target_error is not None:
-        error = _estimate(state).relative_error
+        error = estimate_of(state).relative_error
         fractions.append(
             1.0 if error <= stopping.target_error else (stopping.target_error / error) ** 2
         )

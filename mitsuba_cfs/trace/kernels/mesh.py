@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -9,9 +11,11 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.surfaces import triangle_areas
-from mitsuba_cfs.trace.kernels.sampling import opaque, opaque_vector
+from mitsuba_cfs.trace.kernels.sampling import column, opaque, opaque_vector
 
 FROM = 2048  # triangles; a smaller mesh takes less time to build than a second structure to trace
+NOT_HERE = 0xFFFFFFFF  # a room that no ray is of
+CLEAR = 2e-5  # beyond a triangle that a ray passes [m]
 FARTHEST = 256.0  # from the common origin, where float32 has steps of 3e-5 m [m]
 
 
@@ -49,6 +53,117 @@ class SolidMesh:
     def radius(self, centre: NDArray[np.float64]) -> float:
         """The greatest coordinate of the triangles about a centre [m]."""
         return float(np.abs(self.bounds - centre).max())
+
+
+class OwnedMesh(SolidMesh):
+    """Surroundings of several rooms: a room's rays pass the triangles of its windows.
+
+    The windows of a room are elements in front of all other rooms.
+    """
+
+    def __init__(self, triangles: NDArray[np.float64], owner: NDArray[np.int64]) -> None:
+        """From triangles [N, 3, 3] [m], and the room [N] of each; -1: of none, these come first."""
+        super().__init__(triangles)
+        self.owner = owner[self.keep]
+        if (self.owner[1:] < 0)[self.owner[:-1] >= 0].any():
+            raise ValueError("owner: expected triangles of no room first")
+        common = int(np.count_nonzero(self.owner < 0))
+        solid = triangles[self.keep] - self.middle
+        self.common = scene_of(solid[:common]) if common else None
+        self.owned = scene_of(solid[common:]) if common < len(solid) else None
+
+
+class OwnedScene:
+    """An `OwnedMesh` and the panes of its rooms, for rays of which each is of one room."""
+
+    def __init__(
+        self,
+        mesh: OwnedMesh,
+        panes: NDArray[np.float64],
+        centre: NDArray[np.float64],
+        *,
+        room: NDArray[np.int64],
+        numbers: NDArray[np.int64],
+    ) -> None:
+        """Of panes [N, 3, 3] in coordinates about the centre, as rays and hits are.
+
+        Args:
+            room: of each pane [N].
+            numbers: of the rooms among the owners of the mesh [R].
+        """
+        self._common, self._owned = mesh.common, mesh.owned
+        self._shift = opaque_vector(centre - mesh.middle)
+        self._panes = scene_of(panes + (centre - mesh.middle)) if len(panes) else None
+        owner = mesh.owner[mesh.owner >= 0]
+        room_of_owner = np.full(max(numbers.max(), owner.max(initial=0)) + 1, NOT_HERE)
+        room_of_owner[numbers] = np.arange(len(numbers))
+        self._first = opaque(len(mesh.owner) - len(owner), mi.UInt32)
+        self._first_pane = opaque(len(mesh.owner), mi.UInt32)
+        self._owner = column(np.append(room_of_owner[owner], NOT_HERE), mi.UInt32)
+        self._room_of_pane = column(np.append(room, 0), mi.UInt32)
+        self._room = opaque(0, mi.UInt32)
+
+    def of_lanes(self, room: mi.UInt32) -> OwnedScene:
+        """The same scene for rays of the rooms of the lanes."""
+        scene = copy(self)
+        scene._room = room
+        return scene
+
+    def ray_intersect_preliminary(
+        self, ray: mi.Ray3f, coherent: bool = False, active: mi.Bool = True
+    ) -> mi.PreliminaryIntersection3f:
+        """The first hit of rays, as of a `mi.Scene` of one mesh."""
+        hit, before = dr.zeros(mi.PreliminaryIntersection3f), mi.Ray3f(ray)
+        before.o = mi.Point3f(ray.o + self._shift)
+        hit.t = dr.inf
+        if self._common is not None:
+            hit = self._common.ray_intersect_preliminary(before, coherent, active)
+            before.maxt = dr.minimum(before.maxt, hit.t)
+        parts = []
+        if self._owned is not None:
+            parts.append((self._owned, self._owner, self._first, True))
+        if self._panes is not None:
+            parts.append((self._panes, self._room_of_pane, self._first_pane, False))
+        for scene, owner, first, passes in parts:
+            nearer = self._first_not_passed(scene, owner, before, active, passes)
+            valid = nearer.is_valid()
+            nearer.prim_index += first
+            hit = dr.select(valid, nearer, hit)
+            before.maxt = dr.minimum(before.maxt, hit.t)
+        return hit
+
+    def ray_test(self, ray: mi.Ray3f, coherent: bool = False, active: mi.Bool = True) -> mi.Bool:
+        """Whether rays meet anything."""
+        return self.ray_intersect_preliminary(ray, coherent, active).is_valid()
+
+    @dr.syntax
+    def _first_not_passed(
+        self, scene: mi.Scene, owner: mi.UInt32, ray: mi.Ray3f, active: mi.Bool, passes: bool
+    ) -> mi.PreliminaryIntersection3f:
+        """First hits of a mesh but for triangles of the ray's room, or but for those of others.
+
+        Args: passes: whether rays pass those of their room.
+        """
+        way, gone = mi.Ray3f(ray), mi.Float(0)
+        hit = scene.ray_intersect_preliminary(way, coherent=False, active=active)
+        passed = self._passes(owner, hit, active, passes)
+        while passed:
+            step = hit.t * (1 + 1e-6) + CLEAR
+            gone += step
+            way.o = mi.Point3f(way.o + way.d * step)
+            way.maxt -= step
+            hit = scene.ray_intersect_preliminary(way, coherent=False, active=passed)
+            passed = self._passes(owner, hit, passed, passes)
+        hit.t += gone
+        return hit
+
+    def _passes(
+        self, owner: mi.UInt32, hit: mi.PreliminaryIntersection3f, active: mi.Bool, passes: bool
+    ) -> mi.Bool:
+        """Whether active rays pass the triangles that they hit."""
+        active = active & hit.is_valid()
+        same = dr.gather(mi.UInt32, owner, hit.prim_index, active) == self._room
+        return active & (same if passes else ~same)
 
 
 class SharedScene:

@@ -41,19 +41,20 @@ class PatchLight:
     def add(
         self,
         sums: mi.Float64,
-        row: mi.UInt32,
+        entry: mi.UInt32,
         patch: mi.UInt32,
         value: mi.Float,
         other: mi.UInt32,
         other_value: mi.Float,
     ) -> None:
-        """Add value * L[patch, h] of two patches to the sums [rows * h] of a row.
+        """Add value * L[patch, h] of two patches to the sums [h] of a row.
 
-        Args: patch, other: numbers, by that of all patches more after the first reflection.
+        Args: entry: where the row begins; patch, other: numbers, by that of all patches more after
+            the first reflection.
         """
         one, two, hour = value > 0, other_value > 0, mi.UInt32(0)
         while (one | two) & (hour < self._count):
             found = value * dr.gather(mi.Float, self._table, patch * self._count + hour, one)
             found += other_value * dr.gather(mi.Float, self._table, other * self._count + hour, two)
-            dr.scatter_add(sums, mi.Float64(found), row * self._count + hour)
+            dr.scatter_add(sums, mi.Float64(found), entry + hour)
             hour += 1

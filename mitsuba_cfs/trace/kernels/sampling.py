@@ -139,6 +139,31 @@ def sums_of(sums: mi.Float64, shape: Sequence[int]) -> NDArray[np.float64]:
     return sums.numpy()[: math.prod(shape)].reshape(shape)
 
 
+class Ranges:
+    """Lanes in consecutive ranges, such as one for each room; kernels know no count of either."""
+
+    STEPS = 8  # of the search: kernels differ by so many halvings of the table
+
+    def __init__(self, counts: ArrayLike) -> None:
+        """From the number of lanes of each range [R]."""
+        ends = np.cumsum(np.asarray(counts, dtype=np.int64))
+        self.total = int(ends[-1])
+        self.firsts = ends - counts  # [R]
+        if self.total >= 2**32:
+            raise ValueError(f"{self.total} lanes: a launch must stay below 2**32")
+        self._first = column(self.firsts, mi.UInt32)
+        self._last = len(ends) - 1
+
+    def of(self, lane: mi.UInt32) -> tuple[mi.UInt32, mi.UInt32]:
+        """The range of each lane, and its number within it."""
+        low, high = mi.UInt32(0), opaque(self._last, mi.UInt32)
+        for _ in range(-(-max(self._last, 1).bit_length() // self.STEPS) * self.STEPS):
+            middle = (low + high + 1) >> 1
+            reached = dr.gather(mi.UInt32, self._first, middle) <= lane
+            low, high = dr.select(reached, middle, low), dr.select(reached, high, middle - 1)
+        return low, lane - dr.gather(mi.UInt32, self._first, low)
+
+
 class DiscreteDistribution:
     """Discrete sampling by weights; unlike `mi.DiscreteDistribution`, its kernels know no count.
 

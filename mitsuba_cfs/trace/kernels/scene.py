@@ -5,6 +5,7 @@ from __future__ import annotations
 import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
+from copy import copy
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -14,17 +15,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs import variants
-from mitsuba_cfs.surfaces import Surfaces, WindowGroup, triangle_areas
+from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup, triangle_areas
 from mitsuba_cfs.trace.kernels.gloss import TracedGloss, TracedPanes
 from mitsuba_cfs.trace.kernels.mesh import (
+    OwnedMesh,
+    OwnedScene,
     SharedScene,
     SolidMesh,
     scene_of,
     unit_normals,
 )
 from mitsuba_cfs.trace.kernels.random_walk import diffuse_direction
+from mitsuba_cfs.trace.kernels.rooms import TracedRoom, apart, joined_surfaces
 from mitsuba_cfs.trace.kernels.sampling import (
     DiscreteDistribution,
+    column,
     lattice_2d,
     opaque,
     opaque_vector,
@@ -58,10 +63,16 @@ class TracedScene:
         window_reflectance: ArrayLike | None = None,
         centre: ArrayLike | None = None,
         mesh: SolidMesh | None = None,
+        rooms: Sequence[int] = (),
+        numbers: Sequence[int] = (),
+        reach: float = np.inf,
     ) -> None:
         """Build the scene.
 
         Args:
+            rooms: how many of the groups are those of each room, where there are several.
+            numbers: of these rooms as owners of triangles of an `OwnedMesh`.
+            reach: of rays; what is further away belongs to another room [m].
             windows_block: if false, a ray passes through the windows.
             window_reflectance: [G] diffuse, of the windows from the room; 0 by default.
             centre: [3] origin of the scene's coordinates; the middle of the windows by default.
@@ -75,6 +86,10 @@ class TracedScene:
         glazed_group = np.concatenate([np.full(len(w.triangles), g) for g, w in windows] or [[]])
 
         self.surfaces, self.groups = surfaces, tuple(groups)
+        rooms = tuple(rooms) or (len(groups),)
+        self._room_of_group = np.repeat(np.arange(len(rooms)), rooms)
+        self._numbers = np.asarray(numbers, dtype=np.int64)
+        self._reach = opaque(reach)
         self._derived: dict[Callable[[TracedScene], Any], Any] = {}
         self._panes = windows_block and bool(windows)
         self.centre = _middle(groups) if centre is None else np.asarray(centre, float)
@@ -122,8 +137,13 @@ class TracedScene:
         self.panes = (
             TracedPanes(solid, len(glazed)) if any(map(bool, solid.transmittance)) else None
         )
-        self.scene: mi.Scene | SharedScene
-        if mesh.is_shared:
+        self.scene: mi.Scene | SharedScene | OwnedScene
+        if isinstance(mesh, OwnedMesh):
+            room = self._room_of_group[glazed_group.astype(int)]
+            self.scene = OwnedScene(
+                mesh, panes, self.centre, room=room[: len(panes)], numbers=self._numbers
+            )
+        elif mesh.is_shared:
             self.scene = SharedScene(mesh, panes, self.centre)
         else:
             self.scene = scene_of(np.concatenate([solid.triangles - self.centre, panes]))
@@ -135,14 +155,22 @@ class TracedScene:
         """Tables by glazed triangle and by group, to sample points on the windows."""
         groups, window_group = self.groups, glazed_group
         areas = triangle_areas(glazed)
-        self.window_area = opaque(float(areas.sum()))
-        self.window_triangles = len(glazed)
+        room = self._room_of_group[window_group.astype(int)]
+        self._window_area = column(np.bincount(room, areas))
+        self.window_triangles = np.bincount(room)  # [R] of each room
         self._glazed_vertices = [vectors(glazed[:, i] - self.centre, mi.Point3f) for i in range(3)]
         self._glazed_group = mi.Int32(window_group.astype(np.int32))
-        self._glazed = DiscreteDistribution(areas)
+        self._glazed = DiscreteDistribution(areas, room)
         frames = np.stack([g.frame for g in groups])  # [G, 3, 3]
         self._frame_rows = [vectors(frames[:, i]) for i in range(3)]
         self._axes = [tuple(map(opaque_vector, g.frame)) for g in groups]
+        of_room = np.bincount(self._room_of_group)
+        room_of_group = self._room_of_group
+        firsts = np.cumsum(of_room) - of_room
+        local = np.arange(len(groups)) - firsts[room_of_group]
+        self._group_tables = [
+            column(table, mi.UInt32) for table in (room_of_group, local, of_room[room_of_group])
+        ]
         self._glazed_by_group = DiscreteDistribution(areas, window_group)
 
     def derived(self, function: Callable[[TracedScene], T]) -> T:
@@ -152,9 +180,34 @@ class TracedScene:
         result: T = self._derived[function]
         return result
 
-    def sample_window(self, u: mi.Point2f, active: mi.Bool) -> tuple[mi.Point3f, mi.Int32]:
-        """A point uniform over the area of all windows, and its group."""
-        triangle, reused = self._glazed.sample_reuse(u.x, active)
+    def of_lanes(self, room: mi.UInt32) -> TracedScene:
+        """The scene for rays of the rooms of the lanes."""
+        if not isinstance(self.scene, OwnedScene):
+            return self
+        tracer = copy(self)
+        tracer.scene = self.scene.of_lanes(room)
+        return tracer
+
+    def group_in_room(self, group: mi.UInt32) -> tuple[mi.UInt32, mi.UInt32, mi.UInt32]:
+        """The room of a group, its number among those of the room, and how many these are."""
+        room, local, count = (dr.gather(mi.UInt32, table, group) for table in self._group_tables)
+        return room, local, count
+
+    def ray(self, origin: mi.Point3f, direction: mi.Vector3f) -> mi.Ray3f:
+        """A ray that ends within the room."""
+        return mi.Ray3f(origin, direction, self._reach, 0.0, [])
+
+    def window_area(self, room: mi.UInt32 | None = None) -> mi.Float:
+        """Area of all windows of each lane's room; of the first by default."""
+        room = opaque(0, mi.UInt32) if room is None else room
+        return dr.gather(mi.Float, self._window_area, room)
+
+    def sample_window(
+        self, u: mi.Point2f, active: mi.Bool, room: mi.UInt32 | None = None
+    ) -> tuple[mi.Point3f, mi.Int32]:
+        """A point uniform over the area of all windows of each lane's room, and its group."""
+        room = opaque(0, mi.UInt32) if room is None else room
+        triangle, reused = self._glazed.sample_reuse(u.x, active, room)
         return self._point(triangle, mi.Point2f(reused, u.y), active), dr.gather(
             mi.Int32, self._glazed_group, triangle, active
         )
@@ -255,14 +308,13 @@ class TracedScene:
         """Whether other panes, such as a screen, are close in front of windows."""
         if not self._panes:
             return False
-        number = dr.arange(mi.UInt32, SERIES_PLACES)
-        for g in range(len(self.groups)):
-            u, out = lattice_2d(number, opaque(g, mi.UInt32), 0), self.exterior_normal(g)
-            start = self.sample_group(g, u) + out * self.epsilon
-            hit = self._met(start, out, number >= 0)
-            if dr.any(self.leaves(hit, out, hit.t < SERIES_GAP)):
-                return True
-        return False
+        number = dr.arange(mi.UInt32, SERIES_PLACES * len(self.groups))
+        group = number // SERIES_PLACES
+        u, out = lattice_2d(number % SERIES_PLACES, group, 0), self.exterior_normal(group)
+        start = self.sample_group(group, u) + out * self.epsilon
+        tracer = self.of_lanes(self.group_in_room(group)[0])
+        hit = tracer._met(start, out, number >= 0)
+        return bool(dr.any(self.leaves(hit, out, hit.t < SERIES_GAP)))
 
     @dr.syntax
     def met_outdoors(
@@ -343,7 +395,13 @@ class SceneCache:
         # with the objects whose ids are in the key, so that no other object gets these ids
         self._scenes: OrderedDict[tuple, tuple[tuple, TracedScene]] = OrderedDict()
         self._meshes: list[tuple[str, SolidMesh]] = []
-        for store in (self._scenes, self._meshes):  # at exit: before Dr.Jit ends
+        self._together: dict[
+            tuple, tuple[tuple, list[TracedRoom], TracedScene]
+        ] = {}  # the last one
+        self._building: tuple[tuple, tuple, OwnedMesh] | None = None
+        # surroundings of rooms in a building's mesh, by identity
+        self._fronts: dict[int, tuple[Surfaces, SharedOutdoors, int]] = {}
+        for store in (self._scenes, self._meshes, self._together):  # at exit: before Dr.Jit ends
             weakref.finalize(self, store.clear)
 
     def scene(
@@ -369,6 +427,13 @@ class SceneCache:
             *(None if a is None else a.tobytes() for a in arrays),
             *map(id, inputs),
         )
+        if key not in self._scenes and id(surfaces) in self._fronts:
+            _, outdoors, number = self._fronts[id(surfaces)]
+            self._scenes[key] = inputs, TracedScene(
+                outdoors.surfaces, groups, windows_block=windows_block,
+                window_reflectance=arrays[0], centre=arrays[1],
+                mesh=self._building_mesh(outdoors), numbers=[number],
+            )  # fmt: skip
         if key not in self._scenes:
             reflectance, middle = arrays
             self._scenes[key] = inputs, TracedScene(
@@ -379,6 +444,42 @@ class SceneCache:
         while len(self._scenes) > self._most_scenes:
             self._scenes.popitem(last=False)
         return self._scenes[key][1]
+
+    def together(self, rooms: Sequence[TracedRoom]) -> tuple[list[TracedRoom], TracedScene]:
+        """Rooms moved apart from each other, and the scene of all of them."""
+        if len(rooms) == 1:
+            return list(rooms), self.scene(rooms[0].surfaces, rooms[0].groups)
+        inputs = tuple(part for room in rooms for part in (room.surfaces, *room.groups))
+        key = (variants.activate(), "together", *map(id, inputs))
+        if key not in self._together:
+            placed, reach = apart(rooms)
+            groups = [group for room in placed for group in room.groups]
+            self._together = {key: (inputs, placed, TracedScene(
+                joined_surfaces([room.surfaces for room in placed]), groups, centre=np.zeros(3),
+                rooms=[len(room.groups) for room in rooms], reach=reach,
+            ))}  # fmt: skip
+        return self._together[key][1:]
+
+    def outdoors(self, outdoors: SharedOutdoors, rooms: Sequence[TracedRoom]) -> TracedScene:
+        """The scene in front of some rooms of a building; its mesh is built once."""
+        mesh = self._building_mesh(outdoors)
+        return TracedScene(
+            outdoors.surfaces, [group for room in rooms for group in room.groups],
+            centre=mesh.middle, mesh=mesh, rooms=[len(room.groups) for room in rooms],
+            numbers=[room.number for room in rooms],
+        )  # fmt: skip
+
+    def know_fronts(self, outdoors: SharedOutdoors, fronts: Sequence[Surfaces]) -> None:
+        """Trace what is in front of each room, by its number, in the mesh of the building."""
+        for number, surfaces in enumerate(fronts):
+            self._fronts[id(surfaces)] = surfaces, outdoors, number
+
+    def _building_mesh(self, outdoors: SharedOutdoors) -> OwnedMesh:
+        of = outdoors.surfaces.triangles, outdoors.owner
+        variant = variants.activate()
+        if self._building is None or self._building[0] != (variant, *map(id, of)):
+            self._building = (variant, *map(id, of)), of, OwnedMesh(*of)
+        return self._building[-1]
 
     def _mesh(self, triangles: NDArray[np.float64]) -> SolidMesh:
         """The mesh of triangles [N, 3, 3]; equal triangles share one if it is large."""

@@ -17,12 +17,12 @@ ROULETTE = 1.0  # a path survives a bounce with so many times the share of light
 def add_view_paths(
     tracer: TracedScene,
     bins: DirectionBins,
-    matrix: mi.Float64,  # [paths rows * G * K], accumulated in place
-    row: mi.UInt32,  # row of the matrix that each path adds to
+    matrix: mi.Float64,  # rows of G * K entries, accumulated in place
+    entry: mi.UInt32,  # where the row that each path adds to has the first patch of group 0
     position: mi.Point3f,  # where the path starts
     normal: mi.Vector3f,  # direction that the irradiance is measured about
     *,
-    later: mi.UInt32,  # rows further on that what comes after the first bounce is added to
+    later: mi.UInt32,  # entries further on that what comes after the first bounce is added to
     beta: mi.Float,  # weight of the irradiance at the start
     sample: mi.UInt32,  # number of the path in its stream
     stream: mi.UInt32,  # key of the stratified stream
@@ -32,6 +32,7 @@ def add_view_paths(
     carried: mi.Float | None,  # no default: `dr.syntax` loses those of keywords
     mirrored: mi.Vector3f | None,  # where paths go that start by a surface's gloss
     light: PatchLight | None,  # rows of the hours' luminance, not of the patches
+    room: mi.UInt32 | None,  # of each path, in a scene of several
 ) -> None:
     """Add beta * d(irradiance at the start) / d(radiance of each patch) to the matrix.
 
@@ -49,7 +50,8 @@ def add_view_paths(
     depth = mi.UInt32(0)  # bounces so far
     early = carried is not None
     carried = mi.Float(1.0 if carried is None else carried)  # product of reflectances so far
-    row, later = mi.UInt32(row), mi.UInt32(later)  # copies: the loop changes them
+    entry, later = mi.UInt32(entry), mi.UInt32(later)  # copies: the loop changes them
+    area = tracer.window_area(room)
     shiny = tracer.gloss is not None
     by_gloss = mi.Bool(mirrored is not None)  # the path goes on as a mirror sends it
     onwards = mi.Vector3f(normal if mirrored is None else mirrored)
@@ -63,7 +65,7 @@ def add_view_paths(
             u_window = lattice_2d(sample, stream, 4)
 
         # ----- Next event: a point on the windows -----
-        target, group = tracer.sample_window(u_window, active)
+        target, group = tracer.sample_window(u_window, active, room)
         to_window = target - position
         distance2 = dr.squared_norm(to_window)
         distance = dr.sqrt(distance2)
@@ -75,11 +77,11 @@ def add_view_paths(
             visible &= ~by_gloss
         shadow = mi.Ray3f(position, omega, distance * (1 - 1e-4), 0.0, [])
         visible &= ~tracer.scene.ray_test(shadow, coherent=False, active=visible)
-        density_area = distance2 / (tracer.window_area * local.z)
+        density_area = distance2 / (area * local.z)
         value = cos_start / (density_area + cos_start * dr.inv_pi)
         patch = mi.UInt32(group) * K + bins.index(local)
         if dr.hint(light is None, mode="scalar"):
-            dr.scatter_add(matrix, mi.Float64(beta * value), row * width + patch, visible)
+            dr.scatter_add(matrix, mi.Float64(beta * value), entry + patch, visible)
         drawn, drawn_value = mi.UInt32(patch), dr.select(visible, beta * value, 0.0)
 
         # ----- Next direction: cosine about the normal -----
@@ -88,7 +90,7 @@ def add_view_paths(
         direction = frame.to_world(local_out)
         if dr.hint(shiny, mode="scalar"):
             direction = dr.select(by_gloss, onwards, direction)
-        ray = mi.Ray3f(position, direction)
+        ray = tracer.ray(position, direction)
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         active &= hit.is_valid()
         group_hit = dr.gather(mi.Int32, tracer.group, hit.prim_index, active)
@@ -98,17 +100,17 @@ def add_view_paths(
         local = tracer.to_local(group_hit, direction, glazed)
         glazed &= local.z > 1e-4
         cos_start = local_out.z
-        density_area = hit.t * hit.t / (tracer.window_area * local.z)
+        density_area = hit.t * hit.t / (area * local.z)
         value = cos_start / (density_area + cos_start * dr.inv_pi)
         if dr.hint(shiny, mode="scalar"):
             value = dr.select(by_gloss, 1.0, value)
         patch = mi.UInt32(group_hit) * K + bins.index(local)
         if dr.hint(light is None, mode="scalar"):
-            dr.scatter_add(matrix, mi.Float64(beta * value), row * width + patch, glazed)
+            dr.scatter_add(matrix, mi.Float64(beta * value), entry + patch, glazed)
         else:
             first = dr.select(depth == 0, none, width)
             met_value = dr.select(glazed, beta * value, 0.0)
-            light.add(matrix, row, first + drawn, drawn_value, first + patch, met_value)
+            light.add(matrix, entry, first + drawn, drawn_value, first + patch, met_value)
 
         # ----- Bounce: E(x) gains rho E(hit); Russian roulette -----
         position, normal, rho = tracer.surface_at(hit, position, direction, active)
@@ -121,7 +123,7 @@ def add_view_paths(
         beta *= rho
         carried *= rho
         depth += 1
-        row += later
+        entry += later
         later = mi.UInt32(0)
         if dr.hint(early, mode="scalar"):
             survival = dr.minimum(carried * ROULETTE, 1.0)
@@ -141,14 +143,15 @@ def add_mirrored(
     origin: mi.Point3f,
     direction: mi.Vector3f,
     *,
-    row: mi.UInt32,
-    later: mi.UInt32,  # rows further on that what comes after the first bounce is added to
+    entry: mi.UInt32,  # as of `add_view_paths`
+    later: mi.UInt32,  # entries further on that what comes after the first bounce is added to
     beta: mi.Float,  # weight of the radiance of what the rays meet
     sample: mi.UInt32,
     stream: mi.UInt32,
     generator: mi.PCG32,
     max_depth: mi.UInt32,
     active: mi.Bool,
+    room: mi.UInt32 | None = None,
 ) -> None:
     """Add the light that the gloss of surfaces reflects to rays with first hits `hit`."""
     position, face, _ = tracer.surface_at(hit, origin, direction, active)
@@ -156,9 +159,9 @@ def add_mirrored(
         hit.prim_index, face, direction, mi.Float(0), generator, active
     )
     add_view_paths(
-        tracer, bins, matrix, row, position, face, later=later,
+        tracer, bins, matrix, entry, position, face, later=later,
         beta=dr.select(glossy, beta * weight, 0.0), sample=sample,
         stream=mi.sample_tea_32(stream, mi.UInt32(0x6A09E667))[0], generator=generator,
         max_depth=max_depth, active=glossy & (weight > 0), carried=None, mirrored=onwards,
-        light=None,
+        light=None, room=room,
     )  # fmt: skip

@@ -66,8 +66,12 @@ def window_batches(
         row = lane // each
         number, sample = row // K, lane - row * each
         patch = row - number * K
-        key = number + dr.opaque(mi.UInt32, seed * 1_000_003 * G + first & 0xFFFFFFFF)
-        group = (number + dr.opaque(mi.UInt32, first % G)) % dr.opaque(mi.UInt32, G)
+        turn = number + dr.opaque(mi.UInt32, first % G)
+        batch = turn // dr.opaque(mi.UInt32, G)
+        group = turn - batch * dr.opaque(mi.UInt32, G)
+        _, local, count_of_room = tracer.group_in_room(group)
+        batch += dr.opaque(mi.UInt32, seed * 1_000_003 + first // G & 0xFFFFFFFF)
+        key = batch * count_of_room + local
         stream = mi.sample_tea_32(patch, key)[0]
         local = bins.sample(patch, lattice_2d(sample, stream, 0))
         position = tracer.sample_group(group, lattice_2d(sample, stream, 2))

@@ -5,7 +5,7 @@ Directions in which a flat receiver takes up light: the cosine times its angular
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import drjit as dr
@@ -18,10 +18,11 @@ from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts, roulette
+from mitsuba_cfs.trace.kernels.rooms import TracedRoom, of_rooms
 from mitsuba_cfs.trace.kernels.sampling import (
     batch_key,
     empty_sums,
@@ -147,29 +148,79 @@ def daylight_matrix(
 
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
     """
-    scenes = SceneCache() if scenes is None else scenes
-    something = len(surfaces.triangles) > 0  # light comes back to the windows
-    tracer = scenes.scene(surfaces, groups, windows_block=something)
+    room = TracedRoom(surfaces, tuple(groups))
+    (found,) = daylight_of_rooms(
+        [room], None, subdivision=subdivision, basis=basis, samples=samples, max_depth=max_depth,
+        stopping=stopping, seed=seed, progress=progress, cache=cache, scenes=scenes,
+    )  # fmt: skip
+    return found
+
+
+def daylight_of_rooms(
+    rooms: Sequence[TracedRoom],
+    outdoors: SharedOutdoors | None,
+    *,
+    subdivision: int = 4,
+    basis: KlemsBasis = KLEMS_FULL,
+    samples: int = 4096,
+    max_depth: int = 16,
+    stopping: Stopping | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+    cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
+) -> list[Estimate]:
+    """`daylight_matrix` of several rooms of a building, traced together.
+
+    The random numbers of a room do not depend on the other rooms.
+
+    Args:
+        rooms: their surfaces are what is in front of the windows of each.
+        outdoors: the same of all rooms; None for a single room.
+    """
+    scenes, n = SceneCache() if scenes is None else scenes, int(samples)
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
-    n = int(samples)
+    entries = [
+        cache_entry(
+            cache, "daylight matrix", room.surfaces, room.groups, subdivision, basis, n, max_depth,
+            seed, by=__name__, stopping=stopping,
+        )
+        for room in rooms
+    ]  # fmt: skip
 
-    def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
-        depth = dr.opaque(mi.UInt32, max_depth)
-        clear = tracer.exterior_normal(paths.group) * tracer.epsilon if something else 0.0
-        place = mi.Point3f(paths.position + clear)
-        starts = PathStarts(paths.row, place, paths.outward, paths.generator, depth, mi.Bool(True))
-        add_daylight_paths(tracer, sky, matrix, starts)
+    def traced(some: Sequence[int]) -> Callable[[int], NDArray[np.float64]]:
+        something = outdoors is not None or len(rooms[0].surfaces.triangles) > 0
+        if outdoors is None:
+            tracer = scenes.scene(rooms[0].surfaces, rooms[0].groups, windows_block=something)
+        else:
+            tracer = scenes.outdoors(outdoors, [rooms[i] for i in some])
 
-    return accumulate(
-        window_batches(tracer, bins, sky.size, n, seed, follow, stopping=stopping or Stopping()),
+        def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
+            depth = dr.opaque(mi.UInt32, max_depth)
+            # light comes back to the windows where there is something
+            clear = tracer.exterior_normal(paths.group) * tracer.epsilon if something else 0.0
+            place = mi.Point3f(paths.position + clear)
+            starts = PathStarts(
+                paths.row, place, paths.outward, paths.generator, depth, mi.Bool(True)
+            )
+            here = tracer.of_lanes(tracer.group_in_room(paths.group)[0])
+            add_daylight_paths(here, sky, matrix, starts)
+
+        batch = window_batches(
+            tracer, bins, sky.size, n, seed, follow, stopping=stopping or Stopping()
+        )
+        return lambda number: batch(number).reshape(-1, sky.size)
+
+    return of_rooms(
+        rooms,
+        traced,
+        entries,
+        shapes=[(len(room.groups), bins.size, sky.size) for room in rooms],
         stopping=stopping,
         label="daylight matrix",
         progress=progress,
-        entry=cache_entry(
-            cache, "daylight matrix", surfaces, groups, subdivision, basis, n, max_depth,
-            seed, by=__name__, stopping=stopping,
-        ),
-    )  # fmt: skip
+        outdoors=True,
+    )
 
 
 def sky_irradiance_matrix(

@@ -128,6 +128,7 @@ def _block(
     columns = len(tracer.groups) * bins.size
     shape = own + 2 * b, columns if light is None else light.hours
     matrix, patches = empty_sums(math.prod(shape)), []
+    width = dr.opaque(mi.UInt32, shape[1])
     eye, share = tracer.place(view.position), column(weight)
     stream, first = streams(pixels, seed), column(time * samples, mi.UInt32)
     lit, again = column(own + place, mi.UInt32), dr.opaque(mi.UInt32, b)
@@ -146,9 +147,9 @@ def _block(
             way,
             hit,
             active=exist,
-            row=dr.arange(mi.UInt32, dr.width(first)),
-            lit=lit,
-            later=lit + again,
+            entry=dr.arange(mi.UInt32, dr.width(first)) * width,
+            lit=lit * width,
+            later=(lit + again) * width,
             beta=share,
             stream=stream,
             sample=first + dr.opaque(mi.UInt32, j),
@@ -208,11 +209,11 @@ def add_seen_and_reflected(
     Args: paths: `stream` to `max_depth` of `add_picture_paths`.
     """
     hit, patch, glazed = seen_patch(tracer, bins, eye, direction, active)
-    slot = row * opaque(bins.size * len(tracer.groups), mi.UInt32) + patch
-    dr.scatter_add(matrix, mi.Float64(beta), slot, glazed)
+    entry = row * opaque(bins.size * len(tracer.groups), mi.UInt32)
+    dr.scatter_add(matrix, mi.Float64(beta), entry + patch, glazed)
     add_picture_paths(
         tracer, bins, matrix, eye, direction, hit,
-        active=active, row=row, lit=row, later=row, beta=beta, light=None, **paths,
+        active=active, entry=entry, lit=entry, later=entry, beta=beta, light=None, **paths,
     )  # fmt: skip
 
 
@@ -225,9 +226,9 @@ def add_picture_paths(
     hit: mi.PreliminaryIntersection3f,  # of `seen_patch`
     *,
     active: mi.Bool,  # as of that
-    row: mi.UInt32,  # of specular reflections
-    lit: mi.UInt32,  # row of light after one reflection
-    later: mi.UInt32,  # row of light after more reflections
+    entry: mi.UInt32,  # where the row of specular reflections begins
+    lit: mi.UInt32,  # ... that of light after one reflection
+    later: mi.UInt32,  # ... that of light after more reflections
     beta: mi.Float,  # weight of the path
     stream: mi.UInt32,  # of the stratified samples: a pixel
     sample: mi.UInt32,
@@ -259,10 +260,11 @@ def add_picture_paths(
         carried=None,
         mirrored=None,
         light=light,
+        room=None,
     )
     if tracer.gloss is not None:
         add_mirrored(
             tracer, bins, matrix, hit, eye, direction,
-            row=row, later=later - row, beta=beta, sample=sample, stream=stream,
+            entry=entry, later=later - entry, beta=beta, sample=sample, stream=stream,
             generator=mirrors, max_depth=max_depth, active=active,
         )  # fmt: skip

@@ -8,7 +8,8 @@ rays of one sensor meet serve the others too (`indirect_rows`).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
@@ -21,13 +22,14 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
-from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, cache_entry
+from mitsuba_cfs.trace.kernels.rooms import TracedRoom, of_rooms
 from mitsuba_cfs.trace.kernels.sampling import (
+    Ranges,
     batch_key,
     column,
     empty_sums,
     lattice_2d,
-    opaque,
     path_generator,
     sums_of,
     vectors,
@@ -41,7 +43,9 @@ STEEPEST = 1e4  # tangent of the largest polar angle
 NEWTON_STEPS = 3  # the integrand is nearly linear within a ring
 DIRECT_SHARE = 2  # strata of the direct part for each path of a sensor
 LEAST_STRATA = 4  # their error falls with the power 1.5
+COARSE = 64  # paths of a sensor for each of these least strata
 BLOCK_LANES = 1 << 26
+ROW_ENTRIES = 1 << 23  # of the rows of hits that are traced at once
 
 
 def shares(sensors: int, samples: int) -> tuple[int, int]:
@@ -55,22 +59,97 @@ def shares(sensors: int, samples: int) -> tuple[int, int]:
     return hits, paths
 
 
+@dataclass(frozen=True, slots=True)
+class _Sensors:
+    """The sensors of the rooms of one scene, and where the matrix has the row of each."""
+
+    tracer: TracedScene
+    bins: DirectionBins
+    place: mi.Point3f  # [S] those of one room after the other
+    normal: mi.Vector3f  # [S]
+    entry: mi.UInt32  # [S] of the matrix, as `add_view_paths` takes it
+    room: mi.UInt32  # [S]
+    counts: NDArray[np.int64]  # [R] sensors of each room
+    widths: NDArray[np.int64]  # [R] entries of a row
+    entries: NDArray[np.int64]  # [R] where the room's rows begin; as many again at the end
+
+    @classmethod
+    def of(cls, tracer: TracedScene, bins: DirectionBins, rooms: Sequence[TracedRoom]) -> _Sensors:
+        """The sensors of the rooms of a scene."""
+        counts = np.array([len(room.points) for room in rooms])
+        widths = bins.size * np.array([len(room.groups) for room in rooms])
+        entries = np.cumsum([0, *(counts * widths)])
+        number = [np.arange(count) for count in counts]
+        firsts = np.cumsum(widths) - widths  # of the patches of each room's first group
+        rows = [e - f + n * w for e, f, n, w in zip(entries, firsts, number, widths, strict=False)]
+        points = np.concatenate([room.points for room in rooms])
+        return cls(
+            tracer,
+            bins,
+            vectors(points - tracer.centre, mi.Point3f),
+            vectors(np.concatenate([room.directions for room in rooms])),
+            column(np.concatenate(rows) & 0xFFFFFFFF, mi.UInt32),
+            column(np.repeat(np.arange(len(rooms)), counts), mi.UInt32),
+            counts,
+            widths,
+            entries,
+        )
+
+    @property
+    def firsts(self) -> NDArray[np.int64]:
+        """The first sensor of each room [R]."""
+        return np.cumsum(self.counts) - self.counts
+
+    def blocks(self, samples: int) -> list[_Block]:
+        """The sensors that share hits."""
+        found = []
+        for room, (count, first) in enumerate(zip(self.counts, self.firsts, strict=True)):
+            parts = np.array_split(np.arange(first, first + count), -(-count // MOST_SENSORS))
+            for number, part in enumerate(parts):
+                hits, paths = shares(len(part), samples)
+                found.append(_Block(room, number, int(part[0]), len(part), hits, paths))
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """Sensors of a room that share hits."""
+
+    room: int
+    number: int  # among those of its room
+    first: int  # sensor
+    sensors: int
+    hits: int  # of each sensor
+    paths: int  # of each hit
+
+    @property
+    def points(self) -> int:
+        """Hits of all its sensors."""
+        return self.sensors * self.hits
+
+
+def _launches(of: _Sensors, blocks: Sequence[_Block]) -> Iterator[list[_Block]]:
+    """Blocks that are traced together: as many as memory allows."""
+    launch: list[_Block] = []
+    total = 0
+    for block in blocks:
+        size = block.points * int(of.widths[block.room])
+        if launch and total + size > ROW_ENTRIES:
+            yield launch
+            launch, total = [], 0
+        launch.append(block)
+        total += size
+    yield launch
+
+
 def indirect_rows(
-    tracer: TracedScene,
-    bins: DirectionBins,
-    place: mi.Point3f,  # [C]
-    normal: mi.Vector3f,  # [C]
-    *,
-    hits: int,
-    paths: int,
-    max_depth: int,
-    key: mi.UInt32,
-) -> NDArray[np.float64]:
-    """Interreflected part of the view matrix of a few sensors [C, G * K].
+    of: _Sensors, blocks: Sequence[_Block], *, max_depth: int, key: mi.UInt32
+) -> list[NDArray[np.float64]]:
+    """Interreflected part of the view matrix of some blocks of sensors [C, G * K] each.
 
     Each sensor's cosine-distributed rays meet the room in `hits` points.  At every point x the
     row of its own irradiance, V(x), is estimated by `paths` paths; every sensor s takes all points
-    of all sensors with the weight of the balance heuristic over the sensors,
+    of all sensors of its block with the weight of the balance heuristic over these,
 
         V[s] += sum over x of rho(x) V(x) G(s, x) / (hits sum over s' of G(s', x)),
 
@@ -80,59 +159,122 @@ def indirect_rows(
     Source: Veach, Guibas 1995 (balance heuristic); Bekaert, Sbert, Halton 2002, "Accelerating path
     tracing by re-using paths" (the same among pixels).
     """
-    C = dr.width(place)
-    position, face, weight, triangle = _hits(tracer, place, normal, hits, key)
-    M = dr.width(weight)
-    exchange, slant = _exchange(tracer, place, normal, position, face, hits)
-    exchange = exchange.numpy().reshape(C, M)
-    total = exchange.sum(axis=0)
-    share = weight.numpy() / (hits * np.where(total > 0, total, 1.0))
-    if tracer.gloss is not None:  # of the diffuse reflectance, by the angle that a sensor sees
-        point = dr.arange(mi.UInt32, C * M) % dr.opaque(mi.UInt32, M)
-        left = tracer.gloss.diffuse_share(dr.gather(mi.UInt32, triangle, point), slant, True)
-        exchange = exchange * left.numpy().reshape(C, M)
+    tracer = of.tracer
+    points = np.array([block.points for block in blocks])
+    hits = column([block.hits for block in blocks], mi.UInt32)
+    numbers = column([block.number for block in blocks], mi.UInt32)
+    first = column([block.first for block in blocks], mi.UInt32)
+    first_point = column(np.cumsum(points) - points, mi.UInt32)
 
-    columns = len(tracer.groups) * bins.size
-    rows = empty_sums(M * columns)
-    count = dr.opaque(mi.UInt32, paths)
-    path = dr.arange(mi.UInt32, M * paths)
-    hit = path // count
+    def key_of(block: mi.UInt32) -> mi.UInt32:
+        return mi.sample_tea_32(key, dr.gather(mi.UInt32, numbers, block))[0]
+
+    position, face, weight, triangle = _hits(of, Ranges(points), key_of, first, hits)
+    pairs = Ranges(points * [block.sensors for block in blocks])
+    exchange, slant, point = _exchange(
+        of, pairs, (column(points, mi.UInt32), first_point, first, hits), (position, face)
+    )
+    exchange, left = exchange.numpy(), None
+    if tracer.gloss is not None:  # of the diffuse reflectance, by the angle that a sensor sees
+        left = tracer.gloss.diffuse_share(dr.gather(mi.UInt32, triangle, point), slant, True)
+        left = left.numpy()
+
+    widths = of.widths[[block.room for block in blocks]]
+    entries = np.cumsum([0, *(points * widths)])
+    rows = empty_sums(int(entries[-1]))
+    paths = Ranges(points * [block.paths for block in blocks])
+    _add_paths(
+        of, rows, paths, blocks, entries[:-1], (position, face, weight),
+        first_point=first_point, max_depth=max_depth, key_of=key_of,
+    )  # fmt: skip
+    rows, weight = rows.numpy(), weight.numpy()
+    found, ends = [], np.cumsum(points)
+    for i, block in enumerate(blocks):
+        shape = block.sensors, block.points
+        some = slice(pairs.firsts[i], pairs.firsts[i] + math.prod(shape))
+        seen = exchange[some].reshape(shape)
+        total = seen.sum(axis=0)
+        share = weight[ends[i] - block.points : ends[i]]
+        share = share / (block.hits * np.where(total > 0, total, 1.0))
+        if left is not None:
+            seen = seen * left[some].reshape(shape)
+        of_block = rows[entries[i] : entries[i + 1]].reshape(block.points, -1)
+        found.append((seen * share) @ of_block)
+    return found
+
+
+def _add_paths(
+    of: _Sensors,
+    rows: mi.Float64,
+    paths: Ranges,
+    blocks: Sequence[_Block],
+    entries: NDArray[np.int64],
+    points: tuple[mi.Point3f, mi.Vector3f, mi.Float],
+    *,
+    first_point: mi.UInt32,
+    max_depth: int,
+    key_of: Callable[[mi.UInt32], mi.UInt32],
+) -> None:
+    """Add the row of irradiance at each point of some blocks.
+
+    Args: points: position, normal and reflectance; first_point: of each block.
+    """
+    room = np.array([block.room for block in blocks])
+    count = np.array([block.paths for block in blocks])
+    before = np.cumsum(of.widths) - of.widths  # patches of the groups of earlier rooms
+    begins = column(entries - before[room] & 0xFFFFFFFF, mi.UInt32)
+    tables = (column(values, mi.UInt32) for values in (count, of.widths[room], room))
+    path = dr.arange(mi.UInt32, paths.total)
+    block, path = paths.of(path)
+    each, width, of_room = (dr.gather(mi.UInt32, table, block) for table in tables)
+    each = dr.maximum(each, 1)  # where no lane is, too
+    hit, key = path // each, key_of(block)
+    point = hit + dr.gather(mi.UInt32, first_point, block)
+    position, face, weight = points
     add_view_paths(
-        tracer,
-        bins,
+        of.tracer,
+        of.bins,
         rows,
-        hit,
-        dr.gather(mi.Point3f, position, hit),
-        dr.gather(mi.Vector3f, face, hit),
+        dr.gather(mi.UInt32, begins, block) + hit * width,
+        dr.gather(mi.Point3f, position, point),
+        dr.gather(mi.Vector3f, face, point),
         later=dr.opaque(mi.UInt32, 0),
-        beta=dr.opaque(mi.Float, 1 / paths),
-        sample=path - hit * count,
+        beta=dr.gather(mi.Float, column(1 / count), block),
+        sample=path - hit * each,
         stream=mi.sample_tea_32(hit, key ^ mi.UInt32(0x3C6EF372))[0],
         generator=path_generator(path, key ^ mi.UInt32(0xA54FF53A)),
         max_depth=dr.opaque(mi.UInt32, max_depth - 1),
-        active=dr.gather(mi.Float, weight, hit) > 0,
-        carried=dr.gather(mi.Float, weight, hit),
+        active=dr.gather(mi.Float, weight, point) > 0,
+        carried=dr.gather(mi.Float, weight, point),
         mirrored=None,
         light=None,
+        room=of_room,
     )
-    return (exchange * share) @ sums_of(rows, (M, columns))
 
 
 def _hits(
-    tracer: TracedScene, place: mi.Point3f, normal: mi.Vector3f, hits: int, key: mi.UInt32
+    of: _Sensors,
+    points: Ranges,
+    key_of: Callable[[mi.UInt32], mi.UInt32],
+    first: mi.UInt32,
+    hits: mi.UInt32,
 ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.UInt32]:
     """Points [M], their normals, diffuse reflectances and triangles.
 
     The reflectance, that at normal incidence, is 0 where a ray met a window or nothing.
+
+    Args: first, hits: first sensor of each block, and hits of each of its sensors.
     """
-    count = dr.opaque(mi.UInt32, hits)
-    ray_number = dr.arange(mi.UInt32, dr.width(place) * hits)
-    sensor = ray_number // count
-    stream = mi.sample_tea_32(sensor, key ^ mi.UInt32(0xBB67AE85))[0]
-    local = mi.warp.square_to_cosine_hemisphere(lattice_2d(ray_number - sensor * count, stream, 0))
-    direction = mi.Frame3f(dr.gather(mi.Vector3f, normal, sensor)).to_world(local)
-    start = dr.gather(mi.Point3f, place, sensor)
-    ray = mi.Ray3f(start, direction)
+    tracer = of.tracer
+    block, number = points.of(dr.arange(mi.UInt32, points.total))
+    count = dr.maximum(dr.gather(mi.UInt32, hits, block), 1)
+    local = number // count
+    stream = mi.sample_tea_32(local, key_of(block) ^ mi.UInt32(0xBB67AE85))[0]
+    away = mi.warp.square_to_cosine_hemisphere(lattice_2d(number - local * count, stream, 0))
+    sensor = local + dr.gather(mi.UInt32, first, block)
+    direction = mi.Frame3f(dr.gather(mi.Vector3f, of.normal, sensor)).to_world(away)
+    start = dr.gather(mi.Point3f, of.place, sensor)
+    ray = tracer.ray(start, direction)
     hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=True)
     opaque = hit.is_valid()
     opaque &= dr.gather(mi.Int32, tracer.group, hit.prim_index, opaque) == OPAQUE
@@ -145,73 +287,73 @@ def _hits(
 
 
 def _exchange(
-    tracer: TracedScene,
-    place: mi.Point3f,
-    normal: mi.Vector3f,
-    position: mi.Point3f,
-    face: mi.Vector3f,
-    hits: int,
-) -> tuple[mi.Float, mi.Float]:
-    """G [C * M]: cosines over squared distance where a sensor sees a point; the point's cosine."""
-    C, M = dr.width(place), dr.width(position)
-    pair = dr.arange(mi.UInt32, C * M)
-    sensor = pair // dr.opaque(mi.UInt32, M)
-    point = pair - sensor * dr.opaque(mi.UInt32, M)
-    start = dr.gather(mi.Point3f, place, sensor)
-    to_point = dr.gather(mi.Point3f, position, point) - start
+    of: _Sensors,
+    pairs: Ranges,
+    blocks: tuple[mi.UInt32, ...],
+    points: tuple[mi.Point3f, mi.Vector3f],
+) -> tuple[mi.Float, mi.Float, mi.UInt32]:
+    """G of the sensors and points of each block: cosines over squared distance where one sees one.
+
+    Args: blocks: their number of points, first point, first sensor, hits of each sensor.
+
+    Returns: G, the point's cosine, and the point.
+    """
+    block, pair = pairs.of(dr.arange(mi.UInt32, pairs.total))
+    count, first, sensor, hits = (dr.gather(mi.UInt32, table, block) for table in blocks)
+    count, hits = dr.maximum(count, 1), dr.maximum(hits, 1)
+    local = pair // count
+    of_block = pair - local * count
+    point, sensor = first + of_block, sensor + local
+    start = dr.gather(mi.Point3f, of.place, sensor)
+    to_point = dr.gather(mi.Point3f, points[0], point) - start
     distance2 = dr.squared_norm(to_point)
     distance = dr.sqrt(distance2)
     omega = to_point / distance
-    cosines = dr.maximum(dr.dot(dr.gather(mi.Vector3f, normal, sensor), omega), 0)
-    slant = -dr.dot(dr.gather(mi.Vector3f, face, point), omega)
+    cosines = dr.maximum(dr.dot(dr.gather(mi.Vector3f, of.normal, sensor), omega), 0)
+    slant = -dr.dot(dr.gather(mi.Vector3f, points[1], point), omega)
     cosines *= dr.maximum(slant, 0)
     shadow = mi.Ray3f(start, omega, distance * (1 - 1e-4), 0.0, [])
-    own = point // dr.opaque(mi.UInt32, hits) == sensor  # seen, whatever rounding says
+    own = of_block // hits == local  # seen, whatever rounding says
     seen = cosines > 0  # false for a ray that has left through a seam: its point is nowhere
-    seen &= ~tracer.scene.ray_test(shadow, coherent=False, active=seen & ~own)
-    return dr.select(seen, cosines / distance2, 0.0), slant
+    seen &= ~of.tracer.scene.ray_test(shadow, coherent=False, active=seen & ~own)
+    return dr.select(seen, cosines / distance2, 0.0), slant, point
 
 
-def mirrored_rows(
-    tracer: TracedScene,
-    bins: DirectionBins,
-    place: mi.Point3f,  # [C]
-    normal: mi.Vector3f,  # [C]
-    *,
-    samples: int,
-    max_depth: int,
-    key: mi.UInt32,
-) -> NDArray[np.float64]:
-    """Part of the view matrix that the gloss of the first surfaces reflects [C, G * K]."""
-    C = dr.width(place)
-    columns = len(tracer.groups) * bins.size
-    rows = empty_sums(C * columns)
-    count = dr.opaque(mi.UInt32, samples)
-    path = dr.arange(mi.UInt32, C * samples)
-    sensor = path // count
-    sample = path - sensor * count
-    stream = mi.sample_tea_32(sensor, key ^ mi.UInt32(0x510E527F))[0]
-    local = mi.warp.square_to_cosine_hemisphere(lattice_2d(sample, stream, 0))
-    start = dr.gather(mi.Point3f, place, sensor)
-    away = mi.Frame3f(dr.gather(mi.Vector3f, normal, sensor)).to_world(local)
-    ray = mi.Ray3f(start, away)
-    hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=True)
-    generator = path_generator(path, key ^ mi.UInt32(0x9B05688C))
-    add_mirrored(
-        tracer, bins, rows, hit, start, away,
-        row=sensor, later=dr.opaque(mi.UInt32, 0), beta=dr.opaque(mi.Float, np.pi / samples),
-        sample=sample, stream=stream, generator=generator,
-        max_depth=dr.opaque(mi.UInt32, max_depth - 1), active=hit.is_valid(),
-    )  # fmt: skip
-    return sums_of(rows, (C, columns))
+def _add_mirrored(
+    of: _Sensors, matrix: mi.Float64, *, samples: int, max_depth: int, key: mi.UInt32
+) -> None:
+    """Add what the gloss of the first surfaces reflects to the view matrix."""
+    tracer = of.tracer
+    lanes = Ranges(of.counts * samples)
+    firsts, count = column(of.firsts, mi.UInt32), dr.opaque(mi.UInt32, samples)
+    for first in range(0, lanes.total, BLOCK_LANES):
+        lane = dr.arange(mi.UInt32, min(BLOCK_LANES, lanes.total - first))
+        room, path = lanes.of(lane + dr.opaque(mi.UInt32, first))
+        in_room = path // count
+        sensor = in_room + dr.gather(mi.UInt32, firsts, room)
+        sample = path - in_room * count
+        stream = mi.sample_tea_32(in_room, key ^ mi.UInt32(0x510E527F))[0]
+        local = mi.warp.square_to_cosine_hemisphere(lattice_2d(sample, stream, 0))
+        start = dr.gather(mi.Point3f, of.place, sensor)
+        away = mi.Frame3f(dr.gather(mi.Vector3f, of.normal, sensor)).to_world(local)
+        hit = tracer.scene.ray_intersect_preliminary(
+            tracer.ray(start, away), coherent=False, active=True
+        )
+        add_mirrored(
+            tracer, of.bins, matrix, hit, start, away,
+            entry=dr.gather(mi.UInt32, of.entry, sensor), later=dr.opaque(mi.UInt32, 0),
+            beta=dr.opaque(mi.Float, np.pi / samples), sample=sample, stream=stream,
+            generator=path_generator(path, key ^ mi.UInt32(0x9B05688C)),
+            max_depth=dr.opaque(mi.UInt32, max_depth - 1), active=hit.is_valid(), room=room,
+        )  # fmt: skip
 
 
 @dr.syntax
 def add_window_light(
     tracer: TracedScene,
     bins: DirectionBins,
-    matrix: mi.Float64,  # [rows * G * K], accumulated in place
-    row: mi.UInt32,  # row of the matrix that each lane adds to
+    matrix: mi.Float64,  # rows of G * K entries, accumulated in place
+    entry: mi.UInt32,  # of the lane's row, as of `add_view_paths`
     position: mi.Point3f,
     normal: mi.Vector3f,  # direction that the irradiance is measured about
     *,
@@ -281,7 +423,7 @@ def add_window_light(
     active &= whole > 0
     ray = mi.Ray3f(position, tracer.to_world_any(group, local), distance * (1 - 1e-4), 0.0, [])
     active &= ~tracer.scene.ray_test(ray, coherent=False, active=active)
-    slot = (row * opaque(len(tracer.groups), mi.UInt32) + mi.UInt32(group)) * bins.size + patch
+    slot = entry + mi.UInt32(group) * bins.size + patch
     dr.scatter_add(matrix, mi.Float64(whole * step), slot, active)
 
 
@@ -330,81 +472,125 @@ def view_matrix(
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method);
     balance heuristic of Veach, Guibas 1995.
     """
-    scenes = SceneCache() if scenes is None else scenes
-    points, directions = sensors_of(points, directions)
-    tracer = scenes.scene(surfaces, groups)
-    bins = DirectionBins(basis)
-    S, n = len(points), int(samples)
-    if S * n >= 2**32:
-        raise ValueError(f"{S} sensors x {n} samples: a batch must stay below 2**32 paths")
-    place = vectors(points - tracer.centre, mi.Point3f)
-    normal = vectors(directions)
-    shape = (S, len(groups), bins.size)
-    blocks = np.array_split(np.arange(S, dtype=np.uint32), -(-S // MOST_SENSORS))
+    room = TracedRoom(surfaces, tuple(groups), *sensors_of(points, directions))
+    ((found, _),) = views_of_rooms(
+        [room], basis=basis, samples=samples, max_depth=max_depth, stopping=stopping, seed=seed,
+        progress=progress, cache=cache, scenes=scenes,
+    )  # fmt: skip
+    return found
 
-    def batch(number: int) -> NDArray[np.float64]:
-        matrix = empty_sums(math.prod(shape))
-        key = batch_key(seed, number)
-        _add_direct(tracer, bins, matrix, place, normal, samples=n, key=key)
-        values = sums_of(matrix, (S, len(groups) * bins.size))
-        for block, sensors in enumerate(blocks if max_depth > 1 else []):
-            chosen = column(sensors, mi.UInt32)
-            here = [dr.gather(type(of), of, chosen) for of in (place, normal)]
-            block_key = mi.sample_tea_32(key, mi.UInt32(block))[0]
-            hits, paths = shares(len(sensors), n)
-            values[sensors] += indirect_rows(
-                tracer, bins, *here, hits=hits, paths=paths, max_depth=max_depth, key=block_key
-            )
-            if tracer.gloss is not None:
-                values[sensors] += mirrored_rows(
-                    tracer, bins, *here, samples=n, max_depth=max_depth, key=block_key
-                )
-        return values.reshape(shape)
 
-    return accumulate(
-        batch,
+def views_of_rooms(
+    rooms: Sequence[TracedRoom],
+    *,
+    with_direct: bool = False,
+    basis: KlemsBasis = KLEMS_FULL,
+    samples: int = 4096,
+    max_depth: int = 32,
+    stopping: Stopping | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+    cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
+) -> list[tuple[Estimate, Estimate | None]]:
+    """`view_matrix` of several rooms, traced together, and their direct parts from the same rays.
+
+    The random numbers of a room do not depend on the other rooms: each matrix is that of the room
+    alone but for the rounding of coordinates.
+
+    Args: with_direct: the matrices with a depth of 1 besides, entry by entry a part of the others.
+    """
+    n, scenes = int(samples), SceneCache() if scenes is None else scenes
+    bins, depths = DirectionBins(basis), (max_depth, 1) if with_direct else (max_depth,)
+    entries = [
+        cache_entry(
+            cache, "view matrix", room.surfaces, room.groups, room.points, room.directions, basis,
+            n, depth, seed, by=__name__, stopping=stopping,
+        )
+        for depth in depths
+        for room in rooms
+    ]  # fmt: skip
+
+    def traced(some: Sequence[int]) -> Callable[[int], NDArray[np.float64]]:
+        placed, tracer = scenes.together([rooms[i] for i in some])
+        return _batches(_Sensors.of(tracer, bins, placed), n, depths, seed)
+
+    found = of_rooms(
+        rooms,
+        traced,
+        entries,
+        shapes=[(len(room.points), len(room.groups), bins.size) for room in rooms],
         stopping=stopping,
         label="view matrix",
         progress=progress,
-        entry=cache_entry(
-            cache, "view matrix", surfaces, groups, points, directions, basis, n, max_depth,
-            seed, by=__name__, stopping=stopping,
-        ),
-    )  # fmt: skip
+        layers=len(depths),
+    )
+    count = len(rooms)
+    return list(zip(found[:count], found[count:] or [None] * count, strict=True))
 
 
-def _add_direct(
-    tracer: TracedScene,
-    bins: DirectionBins,
-    matrix: mi.Float64,
-    place: mi.Point3f,
-    normal: mi.Vector3f,
-    *,
-    samples: int,
-    key: mi.UInt32,
-) -> None:
+def _batches(
+    of: _Sensors, samples: int, depths: Sequence[int], seed: int
+) -> Callable[[int], NDArray[np.float64]]:
+    """Batches of the rows of all rooms [S * G of each, K], those of each depth.
+
+    Args: depths: most bounces; a second one is 1.
+    """
+    max_depth = depths[0]
+    most = int(of.counts.max())
+    if most * samples >= 2**32:
+        raise ValueError(f"{most} sensors x {samples} samples: a batch must stay below 2**32 paths")
+    blocks = of.blocks(samples) if max_depth > 1 else []
+
+    def batch(number: int) -> NDArray[np.float64]:
+        matrix = empty_sums(int(of.entries[-1]))
+        key = batch_key(seed, number)
+        _add_direct(of, matrix, samples=samples, key=key)
+        direct = [] if len(depths) == 1 else [np.array(sums_of(matrix, (int(of.entries[-1]),)))]
+        if of.tracer.gloss is not None and max_depth > 1:
+            _add_mirrored(of, matrix, samples=samples, max_depth=max_depth, key=key)
+        values = sums_of(matrix, (int(of.entries[-1]),))
+        for launch in _launches(of, blocks) if blocks else ():
+            added = indirect_rows(of, launch, max_depth=max_depth, key=key)
+            for block, rows in zip(launch, added, strict=True):
+                first = of.entries[block.room]
+                first += (block.first - of.firsts[block.room]) * of.widths[block.room]
+                values[first : first + rows.size] += rows.ravel()
+        return np.concatenate([values, *direct]).reshape(-1, of.bins.size)
+
+    return batch
+
+
+def _add_direct(of: _Sensors, matrix: mi.Float64, *, samples: int, key: mi.UInt32) -> None:
     """Add the windows that each sensor sees, patch by patch."""
-    S, T, K = dr.width(place), tracer.window_triangles, bins.size
-    strata = max(LEAST_STRATA, DIRECT_SHARE * samples // (T * K))
-    of_sensor = T * K * strata
-    block = max(1, BLOCK_LANES // of_sensor)
-    for first in range(0, S, block):
-        lane = dr.arange(mi.UInt32, min(block, S - first) * of_sensor)
-        lane += dr.opaque(mi.UInt32, first * of_sensor)
-        cell = lane // dr.opaque(mi.UInt32, strata)
-        view = cell // bins.size
-        sensor = view // T
+    K, triangles = of.bins.size, of.tracer.window_triangles
+    least = min(max(samples // COARSE, 1), LEAST_STRATA)
+    strata = np.maximum(least, DIRECT_SHARE * samples // (triangles * K))
+    lanes = Ranges(of.counts * triangles * K * strata)
+    tables = [
+        column(values, mi.UInt32)
+        for values in (strata, triangles, np.cumsum(triangles) - triangles, of.firsts)
+    ]
+    for first in range(0, lanes.total, BLOCK_LANES):
+        lane = dr.arange(mi.UInt32, min(BLOCK_LANES, lanes.total - first))
+        room, lane = lanes.of(lane + dr.opaque(mi.UInt32, first))
+        count, of_room, before, sensor = (dr.gather(mi.UInt32, table, room) for table in tables)
+        count, of_room = dr.maximum(count, 1), dr.maximum(of_room, 1)
+        cell = lane // count
+        view = cell // K
+        local = view // of_room
+        sensor += local
         generator = path_generator(lane, key ^ mi.UInt32(0x5BD1E995))
         add_window_light(
-            tracer,
-            bins,
+            of.tracer,
+            of.bins,
             matrix,
-            sensor,
-            dr.gather(mi.Point3f, place, sensor),
-            dr.gather(mi.Vector3f, normal, sensor),
-            triangle=view - sensor * T,
-            patch=cell - view * bins.size,
-            stratum=lane - cell * dr.opaque(mi.UInt32, strata),
-            strata=dr.opaque(mi.UInt32, strata),
+            dr.gather(mi.UInt32, of.entry, sensor),
+            dr.gather(mi.Point3f, of.place, sensor),
+            dr.gather(mi.Vector3f, of.normal, sensor),
+            triangle=before + view - local * of_room,
+            patch=cell - view * K,
+            stratum=lane - cell * count,
+            strata=count,
             u=mi.Point2f(generator.next_float32(), generator.next_float32()),
         )

@@ -91,7 +91,7 @@ def _density(
     """
     window = dr.select(
         glass_cosine > 1e-4,
-        distance * distance / (room.inside.window_area * dr.maximum(glass_cosine, 1e-4)),
+        distance * distance / (room.inside.window_area() * dr.maximum(glass_cosine, 1e-4)),
         0.0,
     )
     cone = dr.select(

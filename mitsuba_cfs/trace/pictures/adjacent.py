@@ -25,6 +25,7 @@ from mitsuba_cfs.trace.kernels.pixel_rows import Tiles, face_numbers, numbered, 
 from mitsuba_cfs.trace.kernels.sampling import (
     column,
     empty_sums,
+    opaque,
     path_generator,
     sums_of,
     tables,
@@ -263,16 +264,17 @@ class _MetInRoom:
         self, matrix: mi.Float64, path: NDArray[np.int64], row: NDArray[np.int64],
         places: SurfacePoints, max_depth: int, seed: int,
     ) -> None:  # fmt: skip
-        key, rows = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF), column(row, mi.UInt32)
+        key, width = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF), opaque(self._columns, mi.UInt32)
+        entry = column(row, mi.UInt32) * width
         first = path[np.unique(row, return_index=True)[1]]  # of each row, for its stream
         streams = column(first[row] & 0xFFFFFFFF, mi.UInt32)
         add_view_paths(
-            self.tracer, self.bins, matrix, rows, places.points(), places.normals(),
+            self.tracer, self.bins, matrix, entry, places.points(), places.normals(),
             later=mi.UInt32(0), beta=mi.Float(1), sample=column(numbered(row), mi.UInt32),
             stream=mi.sample_tea_32(streams, key)[0],
             generator=path_generator(column(path & 0xFFFFFFFF, mi.UInt32), key),
             max_depth=dr.opaque(mi.UInt32, max_depth), active=mi.Bool(True),
-            carried=None, mirrored=None, light=None,
+            carried=None, mirrored=None, light=None, room=None,
         )  # fmt: skip
 
 

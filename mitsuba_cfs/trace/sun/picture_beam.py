@@ -188,7 +188,7 @@ class _Look:
             local = inside.to_local(group, omega, found)
             cosine = dr.dot(normal, omega)
             seen = found & (local.z > 1e-4)
-            density_area = dr.square(distance) / (inside.window_area * local.z)
+            density_area = dr.square(distance) / (inside.window_area() * local.z)
             value = beta * cosine / (density_area + cosine * dr.inv_pi)
             value = dr.select(seen, value * self._through(group, local, seen), 0.0)
             beyond = mi.Point3f(position + omega * distance + inside.outward(group, seen))

@@ -12,6 +12,7 @@
     floor: [0.76, 0.73, 0.68, 1], ceiling: [0.88, 0.88, 0.88, 1], wall: [0.86, 0.85, 0.82, 1],
     door: [0.66, 0.54, 0.42, 1], frame: [0.5, 0.52, 0.55, 1], glass: [0.35, 0.65, 0.95, 0.3],
     furniture: [0.6, 0.55, 0.48, 1], outdoors: [0.55, 0.6, 0.66, 0.1], mark: [0.9, 0.1, 0.1, 1], before: [0.95, 0.45, 0.05, 0.18],
+    north: [0.75, 0.15, 0.15, 1],
   };
   const see = { azimuth: -2.2, elevation: 0.62, distance: 1, target: [0, 0, 0], room: -1, layer: 0, storey: -1 };
 
@@ -55,7 +56,7 @@
     });
     return { p: new Float32Array(p), c: new Float32Array(c) };
   }
-  const shows = { outdoors: () => byId("outdoors").checked, mark: () => true, before: () => byId("before").checked };
+  const shows = { outdoors: () => byId("outdoors").checked, mark: () => true, north: () => true, before: () => byId("before").checked };
   const visible = () => batches.filter((b) => (lifted() || !rise(b)) && (b.room < 0
     ? shows[b.kind]() : see.room < 0 || b.room === see.room));
 

@@ -1,0 +1,137 @@
+"""The matrices of the rooms of a run, traced for many rooms at a time ahead of their stages."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bim.model import Space, seasons
+from bim.to_tracer import orientation_groups, outdoors_of_rooms
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.errors import RoomError
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, matrices_together
+from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.sky.patches import ReinhartSky
+from scenes.inputs import Inputs
+from scenes.room.inputs import RoomInputs
+from scenes.room.light import visible_scene
+from scenes.room.room import inputs_of_room
+from scenes.run.options import JobOptions
+
+ENTRIES = 1 << 21  # of D of the rooms that are traced together: 16 MB in each of some ten arrays
+
+
+class RoomsTogether:
+    """Traces the matrices of a room with those of its neighbours in the order of the rooms.
+
+    The stages of each room find them in the cache; without one, in a folder that holds those of
+    one set of rooms.  Sets are the same in every process, and so are results to the last digit.
+    """
+
+    def __init__(
+        self,
+        inputs: Inputs,
+        spaces: Sequence[Space],
+        skies: AnnualSky,
+        options: JobOptions,
+        folder: Path,
+    ) -> None:
+        """Of the rooms of a run.
+
+        Args: folder: for matrices while there is no cache.
+        """
+        self._inputs, self._skies, self._options = inputs, skies, options
+        self._folder, self._set = folder, -1
+        windows = Counter(window.guid for space in spaces for window in space.windows)
+        self._spaces = [
+            space
+            for space in spaces
+            if space.windows and all(windows[window.guid] == 1 for window in space.windows)
+        ]
+        patches = ReinhartSky(options.room.sampling.subdivision).size
+        groups = np.cumsum([0, *(len(orientation_groups(space)) for space in self._spaces)])
+        number = groups[:-1] * KLEMS_FULL.size * patches // ENTRIES
+        self._set_of = {one.guid: int(i) for one, i in zip(self._spaces, number, strict=True)}
+
+    def cache_for(self, space: Space, progress: Progress) -> MatrixCache | None:
+        """The cache with the matrices of a room, which are traced now unless they have been."""
+        number = self._set_of.get(space.guid)
+        if number is None:
+            return self._cache() if self._options.cache else None
+        if number != self._set:
+            self._set = number
+            rooms = [one for one in self._spaces if self._set_of[one.guid] == number]
+            self._trace(rooms, progress)
+        cache = self._cache()
+        return cache if self._options.cache else replace(cache, stores=False)
+
+    def _cache(self) -> MatrixCache:
+        if self._options.cache:
+            return MatrixCache.of_user()
+        return MatrixCache(self._folder / str(os.getpid()))
+
+    def _trace(self, spaces: Sequence[Space], progress: Progress) -> None:
+        """Trace the matrices of some rooms, in place of those traced before."""
+        cache = self._cache()
+        if not self._options.cache and cache.folder.exists():
+            shutil.rmtree(cache.folder)
+        traced_together(self._inputs, spaces, self._skies, self._options, cache, progress=progress)
+
+
+def traced_together(
+    inputs: Inputs,
+    spaces: Sequence[Space],
+    skies: AnnualSky,
+    options: JobOptions,
+    cache: MatrixCache | None = None,
+    *,
+    cut: bool = True,
+    progress: Progress = silent,
+) -> list[tuple[RoomInputs, DaylightScene, PhaseMatrices | None]]:
+    """The matrices of rooms that can be traced together; None for the others.
+
+    Rooms without a place for sensors are left out.
+
+    Args: cut: windows where the view outdoors differs.
+    """
+    rooms: list[tuple[RoomInputs, DaylightScene]] = []
+    for space in spaces:
+        try:
+            room = inputs_of_room(
+                inputs.building, space, inputs.systems, inputs.weather, options.room,
+                operation=inputs.operation, skies=skies, inner=options.inner_glass,
+            )  # fmt: skip
+            rooms.append((room, visible_scene(room)))
+        except RoomError:  # the room's stages say so
+            continue
+    first = seasons(inputs.building)[0].building
+    glossy = bool(outdoors_of_rooms(first, [room.space for room, _ in rooms]).surfaces.glossy)
+    some = [
+        i for i, (_, scene) in enumerate(rooms)
+        if scene.groups
+        and not scene.adjacent
+        and len(scene.exterior.triangles)
+        and bool(scene.exterior.glossy) == glossy
+    ]  # fmt: skip
+    found: dict[int, PhaseMatrices] = {}
+    if len(some) > 1:
+        matrices = matrices_together(
+            [rooms[i][1] for i in some],
+            outdoors_of_rooms(first, [rooms[i][0].space for i in some]),
+            options.room.sampling,
+            five_phase=options.room.method != "three-phase",
+            cut=cut,
+            cache=cache,
+            progress=progress,
+        )
+        found = dict(zip(some, matrices, strict=True))
+    return [(room, scene, found.get(i)) for i, (room, scene) in enumerate(rooms)]

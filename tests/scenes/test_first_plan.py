@@ -1,0 +1,111 @@
+"""First figures of all rooms from few rays: near those of the run, and written before them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from bim.model import Element
+from mitsuba_cfs.errors import DataError
+from scenes.inputs import Inputs
+from scenes.result_folder import FolderMark, ResultFolder
+from scenes.room.options import RoomOptions
+from scenes.run import run
+from scenes.run.first_plan import (
+    COLUMNS,
+    PlannedRoom,
+    first_plan,
+    options_for_error,
+    plan_lines,
+    plan_page,
+    plan_table,
+)
+from scenes.run.options import JobOptions
+from scenes.run.run import run_inputs
+from tests.scenes.small_box import BOX
+from tests.scenes.test_equal_rooms import moved
+from tests.scenes.test_rooms_beside import box
+from tests.trace.rooms import quad
+
+WALL = quad((-20, -9, 0), (30, -9, 0), (30, -9, 9), (-20, -9, 9))
+FEW = RoomOptions.of(
+    sky_subdivision=1, sensor_spacing=1.0, sensor_samples=512, patch_samples=256, sun_points=32,
+    picture_size=64, picture_count=1, picture_samples=1, heat_step_s=3600.0,
+)  # fmt: skip
+
+
+@pytest.fixture
+def two_rooms(variant, weather, glass):
+    """Two rooms beside each other before a wall, and the options of a run."""
+    spaces = (box("near", 3.0), moved(replace(BOX, spaces=(box("far", 5.0),)), (9.0, 0, 0), "far"))
+    wall = Element("wall", "Wall", "IfcWall", WALL, 0.3, 0.3)
+    building = replace(BOX, spaces=spaces, elements=(wall,))
+    systems = {w.guid: (glass,) for s in spaces for w in s.windows}
+    options = JobOptions(Path(__file__), Path(__file__), cache=False, colour=False, room=FEW)
+    return Inputs(building, spaces, weather, systems, None), options
+
+
+def planned(name: str, error: float) -> PlannedRoom:
+    figures = dict.fromkeys(COLUMNS, 1.0)
+    return PlannedRoom(box(name, 3.0), figures, figures, error)
+
+
+@pytest.mark.slow
+def test_the_first_plan_is_near_the_run(two_rooms, monkeypatch):
+    inputs, options = two_rooms
+    monkeypatch.setattr(run, "FROM", 2)
+    heard: list[PlannedRoom] = []
+    result = run_inputs(inputs, options, on_plan=heard.extend)
+    assert [room.space.name for room in heard] == [room.space.name for room in result.spaces]
+    for plan, room in zip(heard, result.spaces, strict=True):
+        final = room.daylight.room_metrics
+        assert plan.figures["daylight_factor"] == pytest.approx(final["daylight_factor"], rel=0.15)
+        assert plan.figures["da300"] == pytest.approx(final["da300"], abs=8.0)
+        assert 0 < plan.mean_error < 0.2 and plan.errors["daylight_factor"] > 0
+        assert not plan.unshaded
+
+
+def test_the_first_plan_has_each_room_with_its_errors(two_rooms):
+    inputs, options = two_rooms
+    near, far = first_plan(inputs, inputs.spaces, options)
+    assert (near.space.name, far.space.name) == ("near", "far")
+    assert near.figures["daylight_factor"] > far.figures["daylight_factor"] > 0
+    for room in (near, far):
+        assert 0 < room.mean_error < 0.2 and 0 < room.errors["da300"] < 10 and not room.unshaded
+        assert 0 < room.errors["daylight_factor"] < 0.2 * room.figures["daylight_factor"]
+
+
+def test_paths_follow_from_the_error_of_the_worst_room():
+    options = RoomOptions.of(sensor_samples=4096, patch_samples=4096)
+    rooms = [planned("a", 0.02), planned("b", 0.1)]
+    coarse = options_for_error(options, rooms, 0.05).sampling
+    assert (coarse.sensor_samples, coarse.patch_samples) == (2048, 1024)
+    fine = options_for_error(options, rooms, 0.01).sampling
+    assert (fine.sensor_samples, fine.patch_samples) == (4096, 4096)
+
+
+def test_files_of_the_first_plan_last_until_the_results(tmp_path):
+    rooms = [planned("=1+1", 0.02), planned("b", 0.1)]
+    folder = ResultFolder(tmp_path / "out", "run")
+    folder.early({"first_plan.csv": plan_table(rooms), "report.html": plan_page(rooms)})
+    early = (tmp_path / "out" / "report.html").read_text()
+    assert "http-equiv" in early and "=1+1" in early
+    assert "'=1+1" in (tmp_path / "out" / "first_plan.csv").read_text()
+    assert len(plan_lines(rooms)) == 3
+    with folder.replaced() as part:
+        (part / "report.html").write_text("done")
+    assert (tmp_path / "out" / "report.html").read_text() == "done"
+    mark = FolderMark.read(tmp_path / "out")
+    assert mark is not None and mark.files == ("report.html",)
+    assert not (tmp_path / "out" / "first_plan.csv").exists()
+
+
+def test_a_first_plan_takes_no_file_of_others(tmp_path):
+    folder = ResultFolder(tmp_path / "out", "run")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "report.html").write_text("mine")
+    with pytest.raises(DataError, match="which no earlier run wrote"):
+        folder.early({"report.html": "plan"})
+    assert (tmp_path / "out" / "report.html").read_text() == "mine"
