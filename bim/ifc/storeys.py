@@ -50,10 +50,13 @@ def keep_storeys(
     left_out: dict[int, bool] = {}
 
     def is_left_out(product: Entity) -> bool:
-        """Whether it is of another storey; openings and what fills them follow their wall."""
+        """Whether it is of another storey; openings and what fills them follow their wall.
+
+        An opening of a whole without a body of its own (a roof of slabs) is decided by itself.
+        """
         if product.id() not in left_out:
             host = _host(product)
-            if host is not None:
+            if host is not None and host.Representation is not None:
                 answer = is_left_out(host)
             else:
                 storey = storey_of(product)

@@ -58,6 +58,20 @@ def test_a_wall_of_the_ground_storey_that_reaches_up_is_kept_with_its_window(mod
     assert len([one for one in model.by_type("IfcWall") if one.Name == "South wall"]) == 3
 
 
+def test_windows_of_a_whole_without_a_body_are_decided_by_their_opening(model_text):
+    """As in a roof that is an aggregate of slabs, whose openings void the whole."""
+    model = ifcopenshell.file.from_string(model_text)
+    for wall in model.by_type("IfcWall"):
+        wall.Representation = None
+    windows = len(model.by_type("IfcWindow"))
+    keep_storeys(model, ["Storey 3"], "tower.ifc", Damage())
+    assert {storey_of(one) for one in model.by_type("IfcWindow")} == {
+        "Storey 2", "Storey 3", "Storey 4",
+    }  # fmt: skip
+    assert len(model.by_type("IfcWindow")) == windows * 3 // STOREYS
+    assert all(window.FillsVoids for window in model.by_type("IfcWindow"))
+
+
 def test_a_storey_that_is_not_there_is_refused(tmp_path, model_text):
     path = tmp_path / "tower.ifc"
     path.write_text(model_text)

@@ -20,9 +20,8 @@ import numpy as np
 import pandas as pd
 
 from bim import shoebox
-from bim.defaults import default_construction
 from bim.fenestration import pane_transmissivity
-from bim.model import Building, Face, Space, Window
+from bim.model import Building, Construction, Face, MaterialLayer, Space, Window
 from bim.shoebox import WindowRectangle
 from mitsuba_cfs.gloss import pane_shares
 from mitsuba_cfs.sky.epw import read_epw
@@ -33,7 +32,9 @@ from scenes.room.options import RoomOptions
 from scenes.room.solar import GLASS_INDEX, SOLAR_CLEAR, seasonal_outdoors, solar_gains
 from scenes.room.windows import in_all_windows
 from scenes.room.zone import zone_surfaces
+from tests.validation import reference_room
 from tests.validation.energyplus_program import Model, merged, room_model, run_energyplus
+from tests.validation.reference_systems import clear_double
 
 Rectangle = tuple[float, float, float, float]  # x, sill, width, height [m]
 CASES: dict[str, tuple[float, Rectangle, Rectangle]] = {  # depth [m], window, inner pane
@@ -41,6 +42,8 @@ CASES: dict[str, tuple[float, Rectangle, Rectangle]] = {  # depth [m], window, i
     "winter garden": (2.5, (0.1, 0.1, 3.8, 2.8), (0.5, 0.1, 3.0, 2.4)),
     "double skin": (0.6, (0.1, 0.1, 3.8, 2.8), (0.1, 0.1, 3.8, 2.8)),
 }
+FLOAT = Construction("float", (MaterialLayer("float", 0.006, 1.0, 2500.0, 840.0),))
+GLASS_EMISSIVITY = 0.84
 REAR_DEPTH = TABLE_DEPTH = 5.0  # of the room behind, and of Table 15's room [m]
 REFLECTANCE = {"wall": 0.5, "floor": 0.2, "ceiling": 0.7}  # as in the models' materials
 FRONT = ("FACADE", "X0", "X4", "BACK", "FLOOR", "CEILING")
@@ -56,29 +59,52 @@ ENTERING = "Surface Window Transmitted Solar Radiation Rate"
 def two_rooms(
     reflectance: dict[str, float], case: str = "room", rear: dict[str, float] | None = None
 ) -> Building:
-    """The two rooms, joined by the pane.
+    """The two rooms, joined by wall and pane; layers are those of EnergyPlus' models.
 
     Args: rear: reflectances of the room behind; those of the front room without.
     """
     depth, window, pane = CASES[case]
+    wall, slab = _construction("left"), _construction("floor")
+    inside = {"left": wall, "right": wall, "floor": slab, "ceiling": slab}
     lit = shoebox(
         4.0, depth, 3.0, windows=(WindowRectangle(*window), WindowRectangle(*pane, "back")),
-        reflectance=reflectance, name="front",
+        reflectance=reflectance, name="front", adjacency={"back": "space"},
+        constructions=inside | {"front": _construction("facade"), "back": wall},
     )  # fmt: skip
     dark = shoebox(
         4.0, REAR_DEPTH, 3.0, windows=(WindowRectangle(*pane, "front"),),
         reflectance=reflectance if rear is None else rear, name="rear",
+        adjacency={"front": "space", "back": "outside"},
+        constructions=inside | {"front": wall, "back": _construction("facade")},
     )  # fmt: skip
     (front,) = lit.spaces
     behind = _moved(dark.spaces[0], depth)
-    front = replace(
-        front, windows=front.windows[:1],
-        faces=(*front.faces, _pane(front.windows[1], behind.guid)),
+    front, behind = (
+        replace(
+            space, windows=space.windows[:-1],
+            faces=(*(_towards(face, other.guid) for face in space.faces),
+                   _pane(space.windows[-1], other.guid)),
+        )
+        for space, other in ((front, behind), (behind, front))
     )  # fmt: skip
-    behind = replace(
-        behind, windows=(), faces=(*behind.faces, _pane(behind.windows[0], front.guid))
-    )
     return replace(lit, spaces=(front, behind))
+
+
+def _construction(surface: str) -> Construction:
+    """The layers of a surface of Table 15's room."""
+    (one,) = (s for s in reference_room.zone("S", clear_double().fenestration).surfaces
+              if s.name == surface)  # fmt: skip
+    layers = (
+        MaterialLayer(
+            f"{surface} {number}", x.thickness, x.conductivity, x.density, x.heat_capacity
+        )
+        for number, x in enumerate(one.layers)
+    )
+    return Construction(surface, tuple(layers))
+
+
+def _towards(face: Face, beyond: str) -> Face:
+    return replace(face, neighbour=beyond) if face.adjacency == "space" else face
 
 
 def _moved(space: Space, north: float) -> Space:
@@ -93,8 +119,8 @@ def _moved(space: Space, north: float) -> Space:
 def _pane(window: Window, beyond: str) -> Face:
     same = replace(window, guid="inner", solar_transmittance=SOLAR_CLEAR)
     return Face(
-        "inner pane", "wall", window.triangles, "space", default_construction("wall", "space"),
-        0.15, 0.15, neighbour=beyond, pane=same,
+        "inner pane", "wall", window.triangles, "space", FLOAT, 0.15, 0.15,
+        emissivity=GLASS_EMISSIVITY, neighbour=beyond, pane=same,
     )  # fmt: skip
 
 
@@ -158,8 +184,8 @@ def energyplus(case: str, weather: Path = WEATHER, albedo: float = 0.2) -> dict[
     }
 
 
-def energyplus_model(case: str, outputs: dict[str, str]) -> Model:
-    """The two rooms with an interior window."""
+def energyplus_model(case: str, outputs: dict[str, str], *changes: str) -> Model:
+    """The two rooms with an interior window, and changes by name (`room_model`)."""
     depth, window, inner_pane = CASES[case]
     cosine = np.ones(1)
     inner = pane_transmissivity(SOLAR_CLEAR, GLASS_INDEX)
@@ -186,7 +212,7 @@ def energyplus_model(case: str, outputs: dict[str, str]) -> Model:
         },
         "Zone": {"ROOM": {"volume": 12.0 * depth}},
     }
-    model = merged(room_model("S", "clear_double", "second_room", outputs=outputs), patch)
+    model = merged(room_model("S", "clear_double", "second_room", *changes, outputs=outputs), patch)
     return {
         kind: {name: _deep(one, depth) for name, one in objects.items()}
         for kind, objects in model.items()
@@ -227,15 +253,13 @@ def _interior_window(wall: str, other: str) -> dict:
     }  # fmt: skip
 
 
-def without_diffuse(folder: Path) -> Path:
-    """The weather file without diffuse radiation (EPW field 16)."""
+def without_fields(folder: Path, *fields: int) -> Path:
+    """The weather file with zero in fields of every hour: EPW's 16 is diffuse radiation."""
     lines = WEATHER.read_text("latin-1").splitlines()
     hours = [line.split(",") for line in lines[8:]]
-    path = folder / "beam.epw"
-    path.write_text(
-        "\n".join([*lines[:8], *(",".join([*h[:15], "0", *h[16:]]) for h in hours)]) + "\n",
-        "latin-1",
-    )
+    dark = (",".join("0" if n in fields else x for n, x in enumerate(h, 1)) for h in hours)
+    path = folder / "changed.epw"
+    path.write_text("\n".join([*lines[:8], *dark]) + "\n", "latin-1")
     return path
 
 
@@ -262,4 +286,4 @@ def main(*, beam: bool = False, patch_samples: int = 4096) -> pd.DataFrame:
     if not beam:
         return compare(patch_samples, WEATHER, 0.2)
     with tempfile.TemporaryDirectory() as folder:
-        return compare(patch_samples, without_diffuse(Path(folder)), 0.0)
+        return compare(patch_samples, without_fields(Path(folder), 16), 0.0)
