@@ -6,12 +6,16 @@
 The room of `energyplus_by_study` to the south, kept at 20 to 26 degC.  Outdoors a window loses what
 it takes from the room and what it absorbs: sun, and longwave of people and computers.  The first
 table has the means of these flows in January by EnergyPlus' steps [W/m2 of the window], the second
-heating and cooling of the year [kWh] by the radiant share of the gains.
+heating and cooling of the year [kWh] by the radiant share of the gains.  The third has the window's
+heat in EnergyPlus' hour of greatest cooling [W/m2]: as EnergyPlus reports it, by ISO 15099 layer by
+layer in the same surroundings, and what goes to the air behind the shade by the three conductances
+with which a year is computed.
 """
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +24,7 @@ import pandas as pd
 from tests.validation.energyplus_by_study import (
     KEPT,
     PATCHES,
+    clear_system,
     known_window,
     our_year,
     study_text,
@@ -27,12 +32,28 @@ from tests.validation.energyplus_by_study import (
 )
 from tests.validation.energyplus_program import Model, room_model, run_written
 from tests.validation.energyplus_reference import JOULES, LOADS
+from tests.validation.reference_systems import layers
+from thermal.glazing_unit import Environment, GlazingUnit
+from thermal.iso15099 import Conditions, UnitBalance, iso15099_data, unit_balance
+from thermal.layer_balance import SIGMA
+from thermal.window_model import bisected
 
 SYSTEMS = ("clear", "clear int_shade", "dgu", "int_shade")
 RADIANT_SHARES = (0.5, 0.0)  # of the gains; the first is the room's
 AREA, ROOM_AREA = 4.5, 94.0  # of the window and of all inner faces [m2]
 GAINS_W = 235.0  # of person and computers, from 8 to 18 h
 STEPS = 6  # per hour
+SHADED = {
+    "clear int_shade": lambda: clear_system(shaded=True)[1],
+    "int_shade": lambda: layers("int_shade"),
+}
+GLAZING_WIDTH = 3.0  # [m] as the study files state it
+KELVIN = 273.15
+ALL_REPORTS = {
+    "Output:Diagnostics": {"more": {"diagnostics": [{"key": "DisplayAdvancedReportVariables"}]}}
+}
+OUTSIDE, INSIDE = "WINDOW:Surface Outside Face ", "WINDOW:Surface Inside Face "
+FILM, NET_LONGWAVE = "Convection Heat Transfer Coefficient", "Net Thermal Radiation Heat Gain Rate"
 LOSSES = ("Convection Heat Gain Rate", "Net Thermal Radiation Heat Gain Rate")
 ROOM_GLASS = ("Glazing Zone Convection Heat Gain Rate", "Glazing Net Infrared Heat Transfer Rate")
 ROOM_SHADE = (
@@ -53,15 +74,12 @@ def balance(folder: Path, epw: Path, system: str) -> pd.DataFrame:
         "sun": ("Surface Window ", SUN_SHADE if shaded else SUN_GLASS, 1.0),
     }
     names = [head + name for head, group, _ in parts.values() for name in group]
-    patches, outputs = PATCHES.get(system, (system,)), dict.fromkeys(f"WINDOW:{n}" for n in names)
+    patches, outputs = PATCHES.get(system, (system,)), {f"WINDOW:{n}": n for n in names}
     model = room_model("S", *patches, "ideal_loads_20_26", outputs=outputs, steps=STEPS)
     for output in model["Output:Variable"].values():
         output["reporting_frequency"] = "Timestep"
     model["RunPeriod"]["year"]["end_month"] = 1
-    model["Output:Diagnostics"] = {
-        "more": {"diagnostics": [{"key": "DisplayAdvancedReportVariables"}]}
-    }
-    steps = _run(model, folder, epw)
+    steps = _run(model | ALL_REPORTS, folder, epw)
     flows = pd.DataFrame(
         {
             name: sign * sum(steps[f"WINDOW:{head}{column}"] for column in group) / AREA
@@ -102,6 +120,93 @@ def year_of_loads(folder: Path, reference: Path, epw: Path, system: str) -> pd.D
     return pd.DataFrame(rows)
 
 
+def hour_of_greatest_cooling(folder: Path, epw: Path, system: str) -> pd.DataFrame:
+    """The window's heat in EnergyPlus' hour of greatest cooling [W/m2], a row for each reckoning.
+
+    ISO 15099 takes films, air, what both sides radiate and what glass and shade absorb from
+    EnergyPlus' reports.  How the glass shares its sun among its panes is not reported: it is what
+    makes the outer face as warm as there; the shade's temperature is left to show the agreement.
+    """
+    names = [
+        *(f"{INSIDE[7:]}{n}" for n in ("Temperature", FILM)),
+        *(f"{OUTSIDE[7:]}{n}" for n in ("Temperature", FILM, *LOSSES)),
+        *(f"Surface Window Inside Face {n}" for n in ROOM_SHADE),
+        *(f"Surface Window {n}" for n in SUN_SHADE),
+        "Zone Mean Air Temperature", "Site Outdoor Air Drybulb Temperature",
+    ]  # fmt: skip
+    outputs = {f"X:{n}": n for n in names} | LOADS
+    patches = PATCHES.get(system, (system,))
+    model = room_model("S", *patches, "ideal_loads_20_26", outputs=outputs, steps=STEPS)
+    hours = _run(model | ALL_REPORTS, folder, epw)
+    at = int(hours[tuple(LOADS)[1]].argmax())
+    hour = hours.iloc[at]
+    unit = replace(SHADED[system](), width=GLAZING_WIDTH)
+    gap, face, longwave = (
+        hour[f"WINDOW:Surface Window Inside Face {n}"] / AREA for n in ROOM_SHADE
+    )
+    glass, shade = (hour[f"WINDOW:Surface Window {n}"] / AREA for n in SUN_SHADE)
+    outer_c, inner_c = hour[f"{OUTSIDE}Temperature"], hour[f"{INSIDE}Temperature"]
+    outdoors = -sum(hour[f"{OUTSIDE}{n}"] for n in LOSSES) / AREA
+    reported = {
+        "hour": at, "reckoning": "EnergyPlus", "outer c": outer_c, "shade c": inner_c,
+        "air behind": gap, "face": face, "longwave": longwave, "outdoors": outdoors,
+        "missing": gap + face + longwave + outdoors - glass - shade,
+    }  # fmt: skip
+    emissivity = unit.layers[0].emissivity[0], unit.layers[-1].emissivity[1]
+    lost = -hour[f"{OUTSIDE}{NET_LONGWAVE}"] / AREA, longwave
+    radiant = [
+        ((c + KELVIN) ** 4 - w / (e * SIGMA)) ** 0.25 - KELVIN
+        for c, w, e in zip((outer_c, inner_c), lost, emissivity, strict=True)
+    ]
+    air_c = hour["ROOM:Zone Mean Air Temperature"]
+    around = Conditions(
+        Environment(
+            hour["Environment:Site Outdoor Air Drybulb Temperature"],
+            hour[f"{OUTSIDE}{FILM}"],
+            radiant[0],
+        ),
+        Environment(air_c, hour[f"{INSIDE}{FILM}"], radiant[1]),
+    )
+
+    def absorbed(share: float) -> np.ndarray:
+        return np.array([share * glass, (1.0 - share) * glass, shade])
+
+    def warmer(share: float) -> float:
+        return float(unit_balance(unit, around, absorbed(share)).faces_c[0]) - outer_c
+
+    sun = absorbed(bisected(warmer, 0.0, 1.0))
+    layered = unit_balance(unit, around, sun)
+    return pd.DataFrame(
+        [
+            reported,
+            {"hour": at, "reckoning": "ISO 15099"} | _flows(layered, air_c, sun),
+            {"hour": at, "reckoning": "three conductances"}
+            | _by_network(unit, layered, air_c, sun),
+        ]
+    ).assign(system=system)
+
+
+def _flows(balance: UnitBalance, air_c: float, sun: np.ndarray) -> dict[str, float]:
+    """Temperatures [degC] and the heat [W/m2] to the air behind, by the face, to outdoors."""
+    face = float(balance.films[1] * (balance.faces_c[-1] - air_c))
+    return {
+        "outer c": float(balance.faces_c[0]), "shade c": float(balance.faces_c[-1]),
+        "air behind": balance.air_in, "face": face,
+        "longwave": balance.heat_in - balance.air_in - face,
+        "outdoors": float(sun.sum()) - balance.heat_in, "missing": 0.0,
+    }  # fmt: skip
+
+
+def _by_network(
+    unit: GlazingUnit, balance: UnitBalance, air_c: float, sun: np.ndarray
+) -> dict[str, float]:
+    """Heat [W/m2] to the air behind the shade by the conductances, at the faces of a balance."""
+    behind = iso15099_data(unit).behind
+    assert behind is not None  # the unit has an interior shade
+    outer, shade = balance.faces_c[[0, -1]] - air_c
+    return {"air behind": behind.extra * shade + behind.across * outer + float(sun @ behind.to_air)}
+
+
 def _run(model: Model, folder: Path, epw: Path) -> pd.DataFrame:
     run = folder / "energyplus"
     run.mkdir(parents=True, exist_ok=True)
@@ -110,9 +215,10 @@ def _run(model: Model, folder: Path, epw: Path) -> pd.DataFrame:
 
 
 def main(folder: Path, *, reference: Path, epw: Path) -> dict[str, pd.DataFrame]:
-    """Both tables."""
+    """All three tables."""
     folder.mkdir(parents=True, exist_ok=True)
     return {
         "Balance": pd.concat([balance(folder, epw, system) for system in SYSTEMS]),
         "Loads": pd.concat([year_of_loads(folder, reference, epw, s) for s in SYSTEMS]),
+        "Greatest cooling": pd.concat([hour_of_greatest_cooling(folder, epw, s) for s in SHADED]),
     }
