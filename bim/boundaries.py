@@ -17,6 +17,7 @@ from bim.defaults import (
     ROOM_REFLECTANCE,
     air_layer,
     default_construction,
+    glass_construction,
 )
 from bim.material_names import NamedMaterial
 from bim.model import Construction, Face, MaterialLayer, Window
@@ -143,14 +144,17 @@ def _face(
     if record is None and not own and not is_open:
         assumed["element"] += 1
     frame = own and kind == "window frame"
-    construction = None if frame else construction_of(spans, records, piece.facet.plane.normal)
+    is_pane = piece.role == "inner glass" and behind.neighbour is not None
+    if is_pane and own:
+        construction = glass_construction(filling.u_value)
+    else:
+        construction = None if frame else construction_of(spans, records, piece.facet.plane.normal)
     if construction is None:
         assumed["construction"] += not (frame or is_open)
         construction = default_construction(kind, behind.adjacency)
     if behind.adjacency == "unknown":
         assumed["adjacency"] += 1
     guid = filling.guid if own else (record.guid if record is not None else None)
-    is_pane = piece.role == "inner glass" and behind.neighbour is not None
     return Face(
         name, kind, triangles, behind.adjacency, construction, visible, solar, EMISSIVITY,
         behind.neighbour, guid, gloss, _window([(piece, triangles)]) if is_pane else None, hue,

@@ -57,11 +57,22 @@ ROOF = Construction("default roof", (INSULATION, CONCRETE, PLASTER))
 DOOR = Construction("default door", (TIMBER,))
 WINDOW_FRAME = Construction("default window frame", (FRAME,))
 
+GLASS = Construction("glass", (MaterialLayer("soda lime glass", 0.006, 1.0, 2500.0, 750.0),))
+FILMS = 0.17  # [m2 K/W] both films of a window whose U is stated, ISO 10077-1
+
 
 def resistance_layer(name: str, resistance: float, thickness: float = 0.0) -> MaterialLayer:
     """A layer of which a model states the resistance [m2 K/W] alone, as insulation of it."""
     thickness = thickness or EPS.conductivity * resistance
     return replace(EPS, name=name, thickness=thickness, conductivity=thickness / resistance)
+
+
+def glass_construction(u_value: float | None) -> Construction:
+    """Glass to another room: a layer of its stated U [W/(m2 K)] without films, else one pane."""
+    if u_value is None:
+        return GLASS
+    resistance = max(1.0 / u_value - FILMS, GLASS.resistance)
+    return Construction(f"glass, U {u_value:g}", (resistance_layer("glazing", resistance),))
 
 
 def air_layer(thickness: float, name: str = "air layer") -> MaterialLayer:

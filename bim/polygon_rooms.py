@@ -17,10 +17,16 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from bim.boundaries import floor_area
-from bim.defaults import EMISSIVITY, GLASS_REFLECTANCE, ROOM_REFLECTANCE, default_construction
+from bim.defaults import (
+    EMISSIVITY,
+    GLASS_REFLECTANCE,
+    ROOM_REFLECTANCE,
+    default_construction,
+    glass_construction,
+)
 from bim.fenestration import PlainGlass, ShadingState
 from bim.mesh_repair import wound_alike
-from bim.model import Construction, Face, MaterialLayer, Space, Window
+from bim.model import Construction, Face, Space, Window
 from bim.planes import Facet, Plane, newell_normal, plane_through, polygons_of, triangulated
 from bim.report.issue import Effect, Issue
 from bim.shell import conforming_triangles, enclosed_volume, open_edges, welded
@@ -32,7 +38,6 @@ TOLERANCE = 0.005  # corners nearer than this are one: half of honeybee's own to
 FLAT = 1e-4  # a polygon whose corners lie further from its plane is cut into triangles [m]
 OFF_THE_WALL = 0.1  # an opening this far before its wall is none of it [m]
 MOST_OUTSIDE = 0.01  # share of an opening that may lie beside its wall unsaid
-GLASS = Construction("glass", (MaterialLayer("soda lime glass", 0.006, 1.0, 2500.0, 750.0),))
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,7 +280,7 @@ def _face(part: _Part, triangles: NDArray[np.float64], count: Counter[str]) -> F
     construction = finish.construction or default_construction(kind, face.adjacency)
     visible, solar = (ROOM_REFLECTANCE[kind] if finish.visible is None else finish.visible), None
     if opening is not None and opening.glazing is not None:  # towards another room
-        visible, construction = GLASS_REFLECTANCE, GLASS
+        visible, construction = GLASS_REFLECTANCE, glass_construction(opening.glazing.u_value)
     elif finish.solar is not None:
         solar = finish.solar
     name = face.name if opening is None else opening.name

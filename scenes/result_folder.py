@@ -152,15 +152,19 @@ class ResultFolder:
         return self.folder / name
 
     def early(self, files: Mapping[str, str]) -> None:
-        """Write texts by file name that stay until `replaced` puts the results in their place."""
+        """Write texts by file name that stay until `replaced` puts the results in their place.
+
+        None is written where the folder has results of an earlier run, which stay until then.
+        """
+        if set(self._mark.files) - set(files):
+            return
         made: list[Path] = []
         try:
             made = _make_folders(self._place)
             for name in files:
                 if name not in self._mark.files and _taken(self._place, name):
                     raise self._error(f"holds {name}, which no earlier run wrote")
-            known = tuple(dict.fromkeys((*self._mark.files, *files)))
-            self._mark = replace(self._mark, files=known)
+            self._mark = replace(self._mark, files=tuple(files))
             self._mark.write(self._place)
             for name, text in files.items():
                 write_text(self._place / name, text)

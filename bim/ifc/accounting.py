@@ -79,7 +79,8 @@ def account_of(
 
 
 def _has_inner_glass_only(space: Space) -> bool:
-    return not space.windows and any(face.pane is not None for face in space.faces)
+    panes = (face.pane for face in space.faces if face.pane is not None)
+    return not space.windows and any(not pane.is_open for pane in panes)
 
 
 def _storeys(

@@ -239,7 +239,7 @@ def matrices_together(
     parts = [Parts.whole(scene.groups) for scene in scenes]
     if cut:
         parts = _parts_together(scenes, outdoors, sampling, common)
-    progress("V and D", 0.2)
+    progress("daylight of several rooms", 0.2)
     passes = [(OUTDOOR_DEPTH, False), *([(1, False)] if five_phase else [])]
     if five_phase and outdoors.surfaces.glossy:
         passes.append((1, True))
@@ -253,7 +253,7 @@ def matrices_together(
         _daylight_together(fronts, outdoors, options, depth, plain=plain, common=common)
         for depth, plain in passes
     )
-    progress("V and D", 0.5)
+    progress("daylight of several rooms", 0.5)
     matrices = []
     for i, (one, of) in enumerate(zip(scenes, parts, strict=True)):
         beams = [part[i].values for part in direct]
@@ -273,7 +273,7 @@ def matrices_together(
     views = views_of_rooms(
         rooms, max_depth=INDOOR_DEPTH, with_direct=any(sharp), **_view_options(sampling), **common
     )
-    progress("V and D", 1.0)
+    progress("daylight of several rooms", 1.0)
     return [
         replace(one, sensors=whole, direct_sensors=None if part is None else part.values)
         for one, (whole, part) in zip(matrices, views, strict=True)

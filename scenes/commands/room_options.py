@@ -181,7 +181,7 @@ needed_weather_option = click.option(
     "--weather", required=True, type=FILE, help="Hourly weather file (EPW)."
 )
 weather_option = click.option(
-    "--weather", type=FILE, help="Hourly weather file (EPW or WEA); required with BUILDING."
+    "--weather", type=FILE, help="Hourly weather file (EPW); also WEA, required with BUILDING."
 )
 system_option = click.option(
     "--cfs",

@@ -41,6 +41,7 @@ NEED_PHASES = {
     "annual_glare": "--annual-glare",
     "explore": "--explore",
     "inner_glass": "--inner-glass",
+    "error": "--error",
 }
 _DEFAULT = RoomOptions()
 
@@ -113,8 +114,8 @@ class Percentage(click.ParamType):
 @click.option(
     "--error",
     type=Percentage(),
-    help="Enough relative standard error of the rooms' yearly mean illuminance, such as 5%: the "
-    "number of rays follows from a first plan, up to the usual one.",
+    help="Relative standard error of the sensors' yearly means that is enough, such as 5%: fewer "
+    "rays are traced where a first plan shows that these suffice.",
 )
 @click.option(
     "--netcdf",

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bim.defaults import FILMS
 from bim.model import Building, Face, Space, Window
 from bim.outer_faces import OuterFaces, outer_faces
 from bim.to_thermal import (
@@ -56,7 +57,6 @@ from thermal.kernel import advance
 from thermal.ventilation import AirTransfer
 from thermal.zone import Gains, Layer, OpaqueSurface, Zone, dimmed_share, split_gains
 
-FILMS = 0.17  # [m2 K/W] both films of a frame, ISO 10077-1
 DOWNWARDS = -0.7  # z of a floor's normal
 
 

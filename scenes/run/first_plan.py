@@ -174,8 +174,9 @@ def plan_page(rooms: Sequence[PlannedRoom]) -> str:
         rows.append(f"<tr><td>{escape(room.space.label)}</td>{''.join(cells)}</tr>")
     title = gettext("First plan")
     note = gettext(
-        "From few rays, with the standard error of each figure. The run goes on; this page shows "
-        "its report when it is done."
+        "From few rays, with the standard error of each figure. This page loads itself again every "
+        "few seconds and shows the report as soon as the run is complete; if the run is stopped, "
+        "the page stays as it is."
     )
     return (
         f'<!doctype html><html><head><meta charset="utf-8"><title>{escape(title)}</title>'
@@ -205,6 +206,8 @@ def options_for_error(
     variance", Annals of Mathematical Statistics 16:243-258.
     """
     worst = max((room.mean_error for room in rooms), default=0.0)
+    if not worst > 0:  # a plan without light says nothing
+        return options
     share, first = 2 * (worst / error) ** 2, plan_options(options).sampling
     return options.changed(**{
         name: min(max(math.ceil(share * getattr(first, name)), 1), getattr(options.sampling, name))

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import atexit
 import platform
-import shutil
 import time
+import weakref
 from collections.abc import Callable, Generator, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from importlib import metadata
 from pathlib import Path
-from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any
 
 from bim.doorways import panes_between, source_rooms
@@ -23,7 +21,7 @@ from bim.templates import same_hues
 from bim.to_thermal import same_surfaces, shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import sha256
+from mitsuba_cfs.files import scratch_folder, sha256
 from mitsuba_cfs.matrices.cache import MatrixCache, digest
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -76,8 +74,8 @@ def computed_rooms(
     coupled = balanced_together(inputs, options)
     spaces = run_spaces(inputs, options)
     store = StoredArrays() if len(spaces) > 1 else None
-    with TemporaryDirectory(prefix="cfs-matrices-") as folder:
-        together = RoomsTogether(inputs, spaces, skies, options, Path(folder))
+    with scratch_folder() as folder:
+        together = RoomsTogether(inputs, spaces, skies, options, folder)
         work = RoomWork(inputs, spaces, skies, options, together, with_heat=not coupled)
         series = RoomSeries(
             inputs.building,
@@ -249,9 +247,11 @@ def _read(
         message = "a worker has other input files or another version of the program"
         raise DataError(message, field="--scheduler")
     skies = skies_for(inputs.weather, room.sampling, **room.sky)
-    spaces, folder = run_spaces(inputs, options), Path(mkdtemp(prefix="cfs-matrices-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return inputs, RoomsTogether(inputs, spaces, skies, options, folder), spaces, skies
+    spaces, folder = run_spaces(inputs, options), ExitStack()
+    place = folder.enter_context(scratch_folder())
+    together = RoomsTogether(inputs, spaces, skies, options, place)
+    weakref.finalize(together, folder.close)  # with the next run, and at the end
+    return inputs, together, spaces, skies
 
 
 def _failed(guid: str, error: BaseException) -> tuple[str, BaseException]:

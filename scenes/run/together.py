@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from bim.model import Space, seasons
+from bim.templates import template_rooms
 from bim.to_tracer import orientation_groups, outdoors_of_rooms
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import RoomError
@@ -35,6 +36,7 @@ class RoomsTogether:
 
     The stages of each room find them in the cache; without one, in a folder that holds those of
     one set of rooms.  Sets are the same in every process, and so are results to the last digit.
+    Of rooms of equal shape only the first is in a set: the others may take over its results.
     """
 
     def __init__(
@@ -51,12 +53,7 @@ class RoomsTogether:
         """
         self._inputs, self._skies, self._options = inputs, skies, options
         self._folder, self._set = folder, -1
-        windows = Counter(window.guid for space in spaces for window in space.windows)
-        self._spaces = [
-            space
-            for space in spaces
-            if space.windows and all(windows[window.guid] == 1 for window in space.windows)
-        ]
+        self._spaces = [rooms[0] for rooms in template_rooms(spaces) if rooms[0].windows]
         patches = ReinhartSky(options.room.sampling.subdivision).size
         groups = np.cumsum([0, *(len(orientation_groups(space)) for space in self._spaces)])
         number = groups[:-1] * KLEMS_FULL.size * patches // ENTRIES
@@ -113,11 +110,13 @@ def traced_together(
             rooms.append((room, visible_scene(room)))
         except RoomError:  # the room's stages say so
             continue
+    windows = Counter(window.guid for space in spaces for window in space.windows)
     first = seasons(inputs.building)[0].building
     glossy = bool(outdoors_of_rooms(first, [room.space for room, _ in rooms]).surfaces.glossy)
     some = [
-        i for i, (_, scene) in enumerate(rooms)
+        i for i, (room, scene) in enumerate(rooms)
         if scene.groups
+        and all(windows[window.guid] == 1 for window in room.space.windows)
         and not scene.adjacent
         and len(scene.exterior.triangles)
         and bool(scene.exterior.glossy) == glossy

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ifcopenshell
+import ifcopenshell.api.pset
 import ifcopenshell.guid
 import numpy as np
 import pytest
@@ -58,6 +59,21 @@ def test_an_enclosed_space_is_a_room_whatever_its_name(tmp_path):
     # the window between them is inner glass then, and the verdict says so
     assert building.account.inner_only == ("R1 Room", "2 Loggia")
     assert any("inner glass" in reason for reason in building.account.reasons)
+
+
+@pytest.mark.parametrize(("stated", "resistance"), [(None, 0.006), (1.1, 1.0 / 1.1 - 0.17)])
+def test_heat_passes_inner_glass_by_its_stated_u_or_as_one_pane(tmp_path, stated, resistance):
+    small = _balcony("Loggia", roof=True, front=HEIGHT)
+    if stated is not None:
+        (window,) = small.model.by_type("IfcWindow")
+        pset = ifcopenshell.api.pset.add_pset(small.model, window, "Pset_WindowCommon")
+        values = {"ThermalTransmittance": stated}
+        ifcopenshell.api.pset.edit_pset(small.model, pset, properties=values)
+    faces = [face for space in _read(small, tmp_path).spaces for face in space.faces]
+    panes = [face for face in faces if face.pane is not None]
+    assert len(panes) == 2
+    for face in panes:
+        assert face.construction.resistance == pytest.approx(resistance)
 
 
 def test_corrections_say_what_is_outdoors(tmp_path):

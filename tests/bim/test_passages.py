@@ -58,6 +58,7 @@ def test_a_doorway_is_a_face_of_both_rooms(tmp_path):
     for room in ("lit", "dark"):
         assert open_areas(building, room) == pytest.approx([2.1], rel=1e-6)
     assert not any(f.pane for s in building.spaces for f in s.faces if f.adjacency != "space")
+    assert building.account.inner_only == ()  # an opening is no glass
 
 
 def test_a_doorway_cut_deeper_than_it_is_wide(tmp_path):

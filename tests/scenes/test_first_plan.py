@@ -5,14 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bim.model import Element
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import TEMPORARY
+from mitsuba_cfs.progress import silent
+from scenes import cli
+from scenes.demo import OFFICE, WEATHER
 from scenes.inputs import Inputs
 from scenes.result_folder import FolderMark, ResultFolder
 from scenes.room.options import RoomOptions
-from scenes.run import run
+from scenes.run import run, together
 from scenes.run.first_plan import (
     COLUMNS,
     PlannedRoom,
@@ -77,6 +82,51 @@ def test_the_first_plan_has_each_room_with_its_errors(two_rooms):
         assert 0 < room.errors["daylight_factor"] < 0.2 * room.figures["daylight_factor"]
 
 
+def test_a_window_of_two_rooms_lights_both_in_the_first_plan(two_rooms):
+    inputs, options = two_rooms
+    panes = [space.windows[0].triangles for space in inputs.spaces]
+    before = np.concatenate([pane + np.array([0.0, -0.05, 0.0]) for pane in panes])
+    shared = [replace(s, windows=(replace(s.windows[0], guid="both"),)) for s in inputs.spaces]
+    element = Element("both", "Window", "IfcWindow", before, 0.3, 0.3)
+    elements = (*inputs.building.elements, element)
+    building = replace(inputs.building, spaces=tuple(shared), elements=elements)
+    systems = {"both": inputs.systems[inputs.spaces[0].windows[0].guid]}
+    inputs = replace(inputs, building=building, spaces=shared, systems=systems)
+    for room in first_plan(inputs, shared, options):
+        assert room.figures["daylight_factor"] > 0.5, room.space.name
+
+
+def test_rooms_of_equal_shape_are_not_traced_ahead(two_rooms, tmp_path, monkeypatch):
+    inputs, options = two_rooms
+    near, far = inputs.spaces
+    twin = moved(replace(BOX, spaces=(near,)), (20.0, 0.0, 0.0), "twin")
+    traced: list[list[str]] = []
+    monkeypatch.setattr(
+        together, "traced_together",
+        lambda inputs, spaces, *_, **__: traced.append([space.name for space in spaces]),
+    )  # fmt: skip
+    rooms = together.RoomsTogether(inputs, [near, far, twin], None, options, tmp_path)
+    assert rooms.cache_for(twin, silent) is None and not traced
+    assert rooms.cache_for(near, silent) is not None and traced == [["near", "far"]]
+
+
+def test_a_killed_run_leaves_no_matrices(two_rooms, tmp_path, monkeypatch):
+    inputs, options = two_rooms
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    places: list[Path] = []
+
+    def stopped(*arguments):
+        places.append(arguments[-1])
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run, "RoomsTogether", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        run.computed_rooms(inputs, None, options, silent)
+    (place,) = places
+    assert TEMPORARY.fullmatch(place.name), "the next run removes what a killed one left"
+    assert not place.exists()
+
+
 def test_paths_follow_from_the_error_of_the_worst_room():
     options = RoomOptions.of(sensor_samples=4096, patch_samples=4096)
     rooms = [planned("a", 0.02), planned("b", 0.1)]
@@ -84,6 +134,7 @@ def test_paths_follow_from_the_error_of_the_worst_room():
     assert (coarse.sensor_samples, coarse.patch_samples) == (2048, 1024)
     fine = options_for_error(options, rooms, 0.01).sampling
     assert (fine.sensor_samples, fine.patch_samples) == (4096, 4096)
+    assert options_for_error(options, [], 0.05) == options
 
 
 def test_files_of_the_first_plan_last_until_the_results(tmp_path):
@@ -102,6 +153,14 @@ def test_files_of_the_first_plan_last_until_the_results(tmp_path):
     assert not (tmp_path / "out" / "first_plan.csv").exists()
 
 
+def test_results_of_an_earlier_run_stay_beside_a_first_plan(tmp_path):
+    with ResultFolder(tmp_path / "out", "run").replaced() as part:
+        (part / "report.html").write_text("earlier")
+        (part / "run.json").write_text("{}")
+    ResultFolder(tmp_path / "out", "run").early({"report.html": "plan"})
+    assert (tmp_path / "out" / "report.html").read_text() == "earlier"
+
+
 def test_a_first_plan_takes_no_file_of_others(tmp_path):
     folder = ResultFolder(tmp_path / "out", "run")
     (tmp_path / "out").mkdir()
@@ -109,3 +168,9 @@ def test_a_first_plan_takes_no_file_of_others(tmp_path):
     with pytest.raises(DataError, match="which no earlier run wrote"):
         folder.early({"report.html": "plan"})
     assert (tmp_path / "out" / "report.html").read_text() == "mine"
+
+
+def test_an_error_needs_matrices(tmp_path, capsys):
+    words = ["run", str(OFFICE), "--weather", str(WEATHER), "--out", str(tmp_path / "out")]
+    assert cli.run([*words, "--method", "point-in-time", "--error", "5%"]) == 2
+    assert "--error needs --method three-phase or five-phase" in capsys.readouterr().err

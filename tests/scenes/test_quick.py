@@ -165,7 +165,9 @@ def test_one_picture_is_the_brightest_hours() -> None:
 @pytest.fixture
 def three_rooms(monkeypatch: pytest.MonkeyPatch, no_pictures: None) -> SimpleNamespace:
     """Rooms of which the third equals the first, each computed by a stub."""
-    rooms = [SimpleNamespace(guid=g, label=g.upper(), template="") for g in ("a", "b", "c")]
+    rooms = [
+        SimpleNamespace(guid=g, label=g.upper(), template="", windows=()) for g in ("a", "b", "c")
+    ]
     a, b, c = rooms
     monkeypatch.setattr(rooms_of_a_run, "template_rooms", lambda spaces: [(a, c), (b,)])
     monkeypatch.setattr(rooms_of_a_run, "same_systems", lambda *_: False)
@@ -198,7 +200,7 @@ def test_progress_counts_the_rooms(three_rooms, monkeypatch) -> None:
 
 
 def test_a_room_is_said_though_the_run_fails_later(monkeypatch, tmp_path, capsys) -> None:
-    def half(options, progress, files, *, on_room, on_light, on_head, workers):
+    def half(options, progress, files, *, on_room, on_light, on_head, on_plan, workers):
         on_light(first)
         on_room(first)
         on_room(SimpleNamespace(space=SimpleNamespace(guid="b", label="B"), daylight=light))

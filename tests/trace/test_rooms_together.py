@@ -107,3 +107,22 @@ def test_windows_together_have_the_daylight_of_each_alone(depth):
         assert change < 1e-4, f"{change:.1e} of the light"
         assert found.values.sum() == pytest.approx(alone.values.sum(), rel=1e-5)
         assert found.sum_error.mean() == pytest.approx(alone.sum_error.mean(), rel=1e-2)
+
+
+def test_windows_together_before_a_mountain_have_the_daylight_of_each_alone():
+    """Surroundings that reach kilometres do not make the rooms' own windows less exact."""
+    from mitsuba_cfs.trace.kernels.rooms import joined_surfaces
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix, daylight_of_rooms
+
+    each, outdoors = facade()
+    slope = rooms.quad((-900, -6000, 0), (900, -6000, 0), (900, -7000, 800), (-900, -7000, 800))
+    mountain = Surfaces(slope, np.full(2, 0.5), np.zeros(2))
+    before = SharedOutdoors(
+        joined_surfaces([mountain, outdoors.surfaces]), np.append([-1, -1], outdoors.owner)
+    )
+    far = [replace(one, surfaces=joined_surfaces([mountain, one.surfaces])) for one in each]
+    options = {"max_depth": 16, "subdivision": 1, "samples": 64, "seed": 2}
+    for room, found in zip(far, daylight_of_rooms(far, before, **options), strict=True):
+        alone = daylight_matrix(room.surfaces, room.groups, **options)
+        change = np.abs(found.values - alone.values).sum() / alone.values.sum()
+        assert change < 1e-3, f"{change:.1e} of the light"

@@ -123,3 +123,32 @@ def test_a_scene_is_found_again_whether_its_centre_is_said_or_not() -> None:
     found = cache.scene(interior, groups)
     assert cache.scene(interior, groups, centre=found.centre) is found
     assert cache.scene(interior, groups, centre=found.centre + 1e-3) is not found
+
+
+def test_sun_by_many_mirrors_has_a_kernel_for_each_number_of_mirrors():
+    """One kernel of all paths would take OptiX minutes to compile."""
+    import drjit as dr
+
+    from mitsuba_cfs.gloss import mirror
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, sunlight
+    from mitsuba_cfs.trace.sun.specular_paths import specular_sun_paths
+
+    panes = np.concatenate([
+        rooms.quad((x, y, 0), (x + 4, y + turn, 0), (x + 4, y + turn, 3), (x, y, 3))
+        for x, y, turn in [(0, -10, -1), (5, -11, 0), (10, -11, 1), (0, 0.5, 1), (5, 1.5, 0)]
+    ])  # fmt: skip
+    number = np.repeat(np.arange(5), 2)
+    there = Surfaces(panes, np.zeros(10), number, (), (mirror(0.8),) * 5)
+    outside = TracedScene(there, rooms.test_room()[1])
+    paths = specular_sun_paths(outside)
+    places = SurfacePoints(np.zeros((30, 3), np.float32), np.tile([0, -1.0, 0], (30, 1)))
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        sunlight(outside, places, np.array([[0.3, -0.8, 0.5], [0.0, -0.6, 0.8]]))
+        kernels = dr.kernel_history([dr.KernelType.JIT])
+    lengths = {len(path.planes) for path in paths}
+    assert len(paths) > 2 * len(lengths) > 4
+    tracing = {k["hash"] for k in kernels if k["operation_count"] > 200}
+    assert len(kernels) >= len(paths)
+    assert len(tracing) <= len(lengths), [k["operation_count"] for k in kernels]

@@ -25,7 +25,7 @@ import pandas as pd
 
 from mitsuba_cfs.variants import DEVICE, DEVICES
 
-RUNNERS = ("cie171", "gloss")
+RUNNERS = ("cie171", "gloss", "mirroring_street", "clear_equinox", "goniophotometer")
 BENCHMARKS = ("view-matrix", "daylight-matrix-shaded-c1000", "direct-sun", "annual-product")
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 SAME = 0.01  # of the larger of two figures

@@ -67,10 +67,24 @@ class OwnedMesh(SolidMesh):
         self.owner = owner[self.keep]
         if (self.owner[1:] < 0)[self.owner[:-1] >= 0].any():
             raise ValueError("owner: expected triangles of no room first")
+        self._of_rooms = triangles[owner >= 0].reshape(-1, 3)
         common = int(np.count_nonzero(self.owner < 0))
         solid = triangles[self.keep] - self.middle
         self.common = scene_of(solid[:common]) if common else None
         self.owned = scene_of(solid[common:]) if common < len(solid) else None
+
+    @property
+    def middle(self) -> NDArray[np.float64]:
+        """The middle of the rooms' windows, however far the surroundings reach [3]."""
+        if not len(self._of_rooms):
+            return super().middle
+        return (self._of_rooms.min(axis=0) + self._of_rooms.max(axis=0)) / 2
+
+    @property
+    def clear(self) -> float:
+        """How far beyond a window a ray that passes it continues: more than rounding there [m]."""
+        far = float(np.abs(self._of_rooms - self.middle).max(initial=0.0))
+        return CLEAR * max(1.0, 0.05 * far)
 
 
 class OwnedScene:
@@ -97,6 +111,7 @@ class OwnedScene:
         owner = mesh.owner[mesh.owner >= 0]
         room_of_owner = np.full(max(numbers.max(), owner.max(initial=0)) + 1, NOT_HERE)
         room_of_owner[numbers] = np.arange(len(numbers))
+        self._clear = opaque(mesh.clear)
         self._first = opaque(len(mesh.owner) - len(owner), mi.UInt32)
         self._first_pane = opaque(len(mesh.owner), mi.UInt32)
         self._owner = column(np.append(room_of_owner[owner], NOT_HERE), mi.UInt32)
@@ -148,7 +163,7 @@ class OwnedScene:
         hit = scene.ray_intersect_preliminary(way, coherent=False, active=active)
         passed = self._passes(owner, hit, active, passes)
         while passed:
-            step = hit.t * (1 + 1e-6) + CLEAR
+            step = hit.t * (1 + 1e-6) + self._clear
             gone += step
             way.o = mi.Point3f(way.o + way.d * step)
             way.maxt -= step

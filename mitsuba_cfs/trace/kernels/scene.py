@@ -398,10 +398,11 @@ class SceneCache:
         self._together: dict[
             tuple, tuple[tuple, list[TracedRoom], TracedScene]
         ] = {}  # the last one
-        self._building: tuple[tuple, tuple, OwnedMesh] | None = None
+        self._building: dict[tuple, tuple[tuple, OwnedMesh]] = {}  # the last one
         # surroundings of rooms in a building's mesh, by identity
         self._fronts: dict[int, tuple[Surfaces, SharedOutdoors, int]] = {}
-        for store in (self._scenes, self._meshes, self._together):  # at exit: before Dr.Jit ends
+        stores = (self._scenes, self._meshes, self._together, self._building)
+        for store in stores:  # at exit: before Dr.Jit ends
             weakref.finalize(self, store.clear)
 
     def scene(
@@ -454,10 +455,11 @@ class SceneCache:
         if key not in self._together:
             placed, reach = apart(rooms)
             groups = [group for room in placed for group in room.groups]
-            self._together = {key: (inputs, placed, TracedScene(
+            self._together.clear()  # it stays the dictionary that is cleared at exit
+            self._together[key] = inputs, placed, TracedScene(
                 joined_surfaces([room.surfaces for room in placed]), groups, centre=np.zeros(3),
                 rooms=[len(room.groups) for room in rooms], reach=reach,
-            ))}  # fmt: skip
+            )  # fmt: skip
         return self._together[key][1:]
 
     def outdoors(self, outdoors: SharedOutdoors, rooms: Sequence[TracedRoom]) -> TracedScene:
@@ -476,10 +478,11 @@ class SceneCache:
 
     def _building_mesh(self, outdoors: SharedOutdoors) -> OwnedMesh:
         of = outdoors.surfaces.triangles, outdoors.owner
-        variant = variants.activate()
-        if self._building is None or self._building[0] != (variant, *map(id, of)):
-            self._building = (variant, *map(id, of)), of, OwnedMesh(*of)
-        return self._building[-1]
+        key = (variants.activate(), *map(id, of))
+        if key not in self._building:
+            self._building.clear()
+            self._building[key] = of, OwnedMesh(*of)
+        return self._building[key][1]
 
     def _mesh(self, triangles: NDArray[np.float64]) -> SolidMesh:
         """The mesh of triangles [N, 3, 3]; equal triangles share one if it is large."""

@@ -223,6 +223,7 @@ def sunlight(
         point, normal, to_sun = points_and_suns(places, turned)
         middle = column((places.normal @ turned.T).ravel())
         light += _shone(way, point, normal, to_sun, middle)
+        dr.eval(light)  # one kernel for all paths by as many mirrors
     return light.numpy().reshape(places.size, len(suns))
 
 
@@ -249,6 +250,7 @@ def sunlight_of_each(
         to_sun = on_disc_of(vectors(turned), number)
         middle = column((places.normal * turned).sum(axis=1))
         light += _shone(way, places.points(), places.normals(), to_sun, middle)
+        dr.eval(light)
     return light.numpy()
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.sun import SUN_RADIUS
 from mitsuba_cfs.surfaces import triangle_areas
-from mitsuba_cfs.trace.kernels.sampling import lattice_2d, opaque_vector
+from mitsuba_cfs.trace.kernels.sampling import lattice_2d, opaque, opaque_vector
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 
 SPREAD = float(1.01 * SUN_RADIUS)  # of directions on the disc about its middle, at most
@@ -60,7 +60,7 @@ class SpecularPath:
             active &= self._may_meet(ray, plane)
             hit = outside.scene.ray_intersect_preliminary(ray, coherent=coherent, active=active)
             active &= hit.is_valid()
-            active &= gloss.plane_of(hit.prim_index, active) == plane
+            active &= gloss.plane_of(hit.prim_index, active) == opaque(plane, mi.Int32)
             normal = opaque_vector(gloss.normals[plane])
             normal = dr.mulsign(normal, -dr.dot(normal, ray.d))
             cosine = -dr.dot(normal, ray.d)
