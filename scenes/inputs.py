@@ -32,6 +32,8 @@ from scenes.room.operation import (
     unstated_note,
     used_operation,
 )
+from scenes.room.operation_tables import OperationTables
+from scenes.room.options import RoomOptions
 from scenes.room.windows import traced_building
 
 Systems = Mapping[str, States]  # by window GUID
@@ -109,6 +111,7 @@ def inputs_of(
     states: ChooseStates | None = None,
     inner: bool = False,
     fill: bool = True,
+    heat_of: RoomOptions | None = None,
 ) -> Inputs:
     """The inputs of a command, of a building that was read or made.
 
@@ -118,6 +121,8 @@ def inputs_of(
             operation, else the first.
         inner: light passes glass between rooms; rooms lit by that alone count as glazed.
         fill: whether the command needs to know what fills the windows.
+        heat_of: options of rooms whose heat the command balances; their gains and leaks hold
+            without an operation.
 
     Raises: `DataError` for a room that is not in the building, a window that nothing fills.
     """
@@ -146,11 +151,7 @@ def inputs_of(
         check_schedules(used.tables, files.weather, used.file)
     notes = (
         *stated_note(building, "" if operation is None else operation.file.name),
-        *(
-            ()
-            if operation is None
-            else unstated_note(operation.tables, building, operation.file.name)
-        ),
+        *_unstated(operation, used, building, heat_of),
         *_state_notes(options, operation, filled, systems, building),
     )
     building = traced_building(building, systems)
@@ -196,6 +197,22 @@ def first_states(systems: Systems) -> Systems:
 def every_state(systems: Systems) -> Systems:
     """Each window in all its states."""
     return systems
+
+
+def _unstated(
+    operation: Operation | None,
+    used: Operation | None,
+    building: Building,
+    heat_of: RoomOptions | None,
+) -> tuple[str, ...]:
+    """A sentence on gains and leaks that neither the operation nor the building states."""
+    if operation is not None:
+        return unstated_note(operation.tables, building, operation.file.name)
+    if heat_of is None:
+        return ()
+    if used is None:
+        return unstated_note(heat_of, building)
+    return unstated_note(OperationTables(), building, used.file.name)
 
 
 def _state_notes(

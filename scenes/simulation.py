@@ -150,7 +150,7 @@ def simulate(
     )
     overrides = overrides_of(chosen, system, operation)
     files = InputFiles(weather, overrides, operation)
-    inputs = inputs_of(building, chosen, files)
+    inputs = inputs_of(building, chosen, files, heat_of=chosen.room)
     run = run_inputs(inputs, chosen, progress)
     (year,) = run.spaces
     own = {name: getattr(year, name) for name in RoomYear.__dataclass_fields__}

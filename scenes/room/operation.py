@@ -31,6 +31,7 @@ from scenes.room.operation_tables import (
     ShadingRule,
     operated_tables,
 )
+from scenes.room.options import RoomOptions
 from scenes.room.schedules import WEEK, ScheduleTable, scheduled_fields
 from scenes.toml_file import TomlTable, read_table, validated
 from thermal.control import by_schedule, by_threshold
@@ -448,25 +449,32 @@ def stated_note(building: Building, before: str = "") -> tuple[str, ...]:
 
 
 ASSUMED = {"gains": ("equipment_w_m2", "persons", "occupied"), "air": ("infiltration_ach",)}
+ASSUMED_OF_ROOMS = "equipment_w_m2", "person_w", "floor_per_person", "occupied", "infiltration_ach"
 
 
-def unstated_note(tables: OperationTables, building: Building, file: str) -> tuple[str, ...]:
-    """A sentence on the gains and leaks that neither tables nor building state; empty without any.
+def unstated_note(
+    source: OperationTables | RoomOptions, building: Building, file: str = ""
+) -> tuple[str, ...]:
+    """A sentence on the gains and leaks that nobody states; empty without any.
 
-    Args: file: name of the file of the tables.
+    Args: source: tables, or the options of rooms without; file: name of the file of the tables.
     """
     if building.spaces and all(space.guid in building.uses for space in building.spaces):
         return ()
-    values = [
+    if isinstance(source, RoomOptions):
+        named = source.named()
+        values = ", ".join(f"{key} = {json.dumps(named[key])}" for key in ASSUMED_OF_ROOMS)
+        return (Note("{values}, as no operation file states gains and air.", values=values),)
+    unstated = [
         f"{name}.{key} = {json.dumps(getattr(table, key))}"
         for name, keys in ASSUMED.items()
-        for table in [getattr(tables, name)]
+        for table in [getattr(source, name)]
         for key in keys
         if key not in table.model_fields_set
     ]
-    if not values:
+    if not unstated:
         return ()
-    return (Note("{values}, not stated in {file}.", values=", ".join(values), file=file),)
+    return (Note("{values}, not stated in {file}.", values=", ".join(unstated), file=file),)
 
 
 def _entry(

@@ -297,7 +297,7 @@ def run_job(
     Raises: `DataError` for a file that cannot be used, before anything is traced.
     """
     start = time.monotonic()
-    inputs = read_inputs(options, files, progress, inner=options.inner_glass)
+    inputs = read_inputs(options, files, progress, inner=options.inner_glass, heat_of=options.room)
     if on_head is not None:
         on_head(inputs.head)
     return run_inputs(

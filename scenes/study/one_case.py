@@ -72,7 +72,8 @@ def case_inputs(
             raise DataError("is not the file that it was when the study began", file=source.path)
     files = read_files(case.inputs, weather=case_weather(case), table=SYSTEM_TABLE)
     options = replace(case.inputs, spaces=spaces) if spaces else case.inputs
-    return inputs_of(_building(case) if building is None else building, options, files)
+    building = _building(case) if building is None else building
+    return inputs_of(building, options, files, heat_of=case.options)
 
 
 def plan_head(plan: StudyPlan) -> Head:

@@ -95,8 +95,14 @@ def test_gains_and_leaks_that_nobody_states_are_named(used):
     stated = {"equipment_w_m2": 0, "persons": 0, "occupied": [0, 24]}
     whole = OperationTables(gains=stated, air={"infiltration_ach": 0.5})
     assert not unstated_note(whole, building, "use.toml")
+    (note,) = unstated_note(RoomOptions(), building)
+    assert note == (
+        "equipment_w_m2 = 8.0, person_w = 75.0, floor_per_person = 15.0, occupied = [8, 18], "
+        "infiltration_ach = 0.5, as no operation file states gains and air."
+    )
     both = replace(used, uses={space.guid: used.uses["Office"] for space in used.spaces})
     assert not unstated_note(OperationTables(), both, "use.toml")
+    assert not unstated_note(RoomOptions(), both)
 
 
 def test_values_that_cannot_be_name_the_file(used):

@@ -175,8 +175,12 @@ def main(
     orientations: Annotated[Sequence[str], ("S", "W", "N", "E")] = ("S", "W"),
     systems: Annotated[Sequence[str], tuple(LAYERS)] = tuple(LAYERS),
     inputs: Annotated[Sequence[str], INPUTS] = INPUTS,
+    energyplus_steps: int = 6,
 ) -> dict[str, pd.DataFrame]:
-    """Every case, and the root mean squares by system and inputs."""
+    """Every case, and the root mean squares by system and inputs.
+
+    Args: energyplus_steps: of EnergyPlus' floating rooms in an hour.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     known = {name: known_window(folder, reference, name) for name in systems}
     rows = []
@@ -184,7 +188,8 @@ def main(
         for orientation in orientations:
             for name in systems:
                 patches = PATCHES.get(name, (name,))
-                theirs = run_energyplus(room_model(orientation, *patches), epw)
+                model = room_model(orientation, *patches, steps=energyplus_steps)
+                theirs = run_energyplus(model, epw)
                 needs = load_hours(patches, orientation, epw)
                 for kind in inputs:
                     row: dict[str, object] = {
