@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
-from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -212,7 +206,8 @@ def pmv_ppd(
     humidity: relative [%]; metabolic_rate in met, clothing in clo.  Hours outside the standard's
     limits are computed all the same.
     """
-    pmv_ppd_iso = _model("pmv_ppd_iso")
+    from pythermalcomfort.models import pmv_ppd_iso
+
     air, mrt, speed, moist = _surroundings(air_c, mrt_c, air_speed, humidity)
     result = pmv_ppd_iso(
         tdb=air, tr=mrt, vr=speed, rh=moist, met=metabolic_rate, clo=clothing, **_PLAIN
@@ -230,30 +225,11 @@ def standard_effective_temperature(
     clothing: float = 0.5,
 ) -> NDArray[np.float64]:
     """SET [H] [degC] (Gagge two-node model, pythermalcomfort); arguments as for `pmv_ppd`."""
-    set_tmp = _model("set_tmp")
+    from pythermalcomfort.models import set_tmp
+
     air, mrt, speed, moist = _surroundings(air_c, mrt_c, air_speed, humidity)
     result = set_tmp(tdb=air, tr=mrt, v=speed, rh=moist, met=metabolic_rate, clo=clothing, **_PLAIN)
     return np.asarray(result.set, dtype=float)
-
-
-def _model(name: str) -> Callable[..., Any]:
-    """A function of `pythermalcomfort.models`, read without the sixty others of that package.
-
-    They are compiled or read from numba's cache when the package is imported, for half a second.
-    """
-    import pythermalcomfort
-
-    package = "pythermalcomfort.models"
-    if package in sys.modules:
-        return getattr(import_module(f"{package}.{name}"), name)
-    folder = Path(pythermalcomfort.__file__ or "").parent / "models"
-    bare = ModuleType(package)  # its own file is not run
-    bare.__path__ = [str(folder)]
-    sys.modules[package] = bare
-    try:
-        return getattr(import_module(f"{package}.{name}"), name)
-    finally:
-        del sys.modules[package]
 
 
 _PLAIN = {"limit_inputs": False, "round_output": False}

@@ -44,3 +44,7 @@ def test_rooms_find_the_matrices_that_were_traced_together(tmp_path, monkeypatch
             assert np.abs(found - alone).sum() < 1e-4 * alone.sum(), name
             np.testing.assert_array_equal(getattr(stored, name), found)
     assert {file.name for file in tmp_path.iterdir()} == files
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    phase_matrices(scenes[0], FEW, cache=MatrixCache(empty, stores=False))
+    assert not any(empty.iterdir())

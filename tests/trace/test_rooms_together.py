@@ -24,8 +24,8 @@ def sensors(groups: list[WindowGroup], count: int):
 
 
 def elsewhere() -> tuple[Surfaces, list[WindowGroup]]:
-    """The test room turned and moved, with two windows in groups of their own."""
-    turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    """The test room enlarged, turned and moved, with two windows in groups of their own."""
+    turn = 1.2 * np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
     walls, (group,) = rooms.test_room()
     glass = group.windows[0].triangles @ turn.T + [40.0, -7.0, 3.0]
     groups = [WindowGroup(str(i), (WindowSurface(str(i), glass[i : i + 1]),)) for i in range(2)]
