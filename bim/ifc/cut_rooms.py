@@ -116,10 +116,7 @@ def goes_through(record: SpaceRecord, lids: Sequence[Shape], boxes: Boxes) -> bo
 
 def _leaves(record: SpaceRecord, building: RayMesh) -> bool:
     """Whether a part of the top of a space is under the open sky and has a cover beneath it."""
-    down, height = (
-        np.array([[0.0, 0.0, -1.0]]),
-        float(np.ptp([record.solid.low[2], record.solid.high[2]])),
-    )
+    down, height = np.array([[0.0, 0.0, -1.0]]), float(record.solid.high[2] - record.solid.low[2])
     share = area = 0.0
     for facet in _tops(record.solid):
         points, _ = facet_grid(facet)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 
@@ -47,6 +47,7 @@ SET = 24  # rooms that are traced together: each has its surroundings in memory
 FROM = 6  # rooms; fewer are computed nearly as soon
 REFRESH_S = 5  # of the page
 COLUMNS = ("daylight_factor", "da300", "sda300_50", "glare_h")
+DIGITS = (2, 1, 0, 0)  # after the point
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,10 +141,7 @@ def plan_lines(rooms: Sequence[PlannedRoom]) -> list[str]:
     width = max(len(room.space.label) for room in rooms)
     lines = ["first plan".ljust(width) + "".join(f"{head:>16}" for head in heads)]
     for room in rooms:
-        cells = (
-            f"{room.figures[name]:.{digits}f} ±{room.errors[name]:.{digits}f}"
-            for name, digits in zip(COLUMNS, (2, 1, 0, 0), strict=True)
-        )
+        cells = (f"{figure} ±{error}" for figure, error in _cells(room))
         row = room.space.label.ljust(width) + "".join(f"{cell:>16}" for cell in cells)
         lines.append(row + (" (unshaded)" if room.unshaded else ""))
     return lines
@@ -167,10 +165,7 @@ def plan_page(rooms: Sequence[PlannedRoom]) -> str:
     head = "".join(f"<th>{escape(text)}</th>" for text in heads)
     rows = []
     for room in rooms:
-        cells = (
-            f"<td>{room.figures[name]:.{digits}f} ± {room.errors[name]:.{digits}f}</td>"
-            for name, digits in zip(COLUMNS, (2, 1, 0, 0), strict=True)
-        )
+        cells = (f"<td>{figure} ± {error}</td>" for figure, error in _cells(room))
         rows.append(f"<tr><td>{escape(room.space.label)}</td>{''.join(cells)}</tr>")
     title = gettext("First plan")
     note = gettext(
@@ -185,6 +180,12 @@ def plan_page(rooms: Sequence[PlannedRoom]) -> str:
         f"</style></head><body><h1>{escape(title)}</h1><p>{escape(note)}</p>"
         f"<table><tr>{head}</tr>{''.join(rows)}</table></body></html>"
     )
+
+
+def _cells(room: PlannedRoom) -> Iterator[tuple[str, str]]:
+    """The figures of a room and their errors, by `COLUMNS`, as text."""
+    for name, digits in zip(COLUMNS, DIGITS, strict=True):
+        yield f"{room.figures[name]:.{digits}f}", f"{room.errors[name]:.{digits}f}"
 
 
 def _head(name: str) -> str:
