@@ -94,7 +94,8 @@ def first_plan(
 def _planned(room: RoomInputs, matrices: PhaseMatrices) -> PlannedRoom:
     light = phase_light(matrices, room.windows.optics(), room.skies)
     of_room = RoomLight(matrices.scene, matrices, light, None)
-    unshaded = bool(control_signals(room) - READ) or bool(temperature_conditions(room))
+    by_light = bool(control_signals(room) - READ) or room.controller is not None
+    unshaded = by_light or bool(temperature_conditions(room))
     state = np.zeros((room.skies.hours, len(room.windows.groups)), dtype=np.int64)
     if not unshaded:
         state = shading_states(room, of_room, None)
