@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,9 +49,6 @@ from thermal.ventilation import (
     stack_height,
 )
 from thermal.zone import WindowElement
-
-if TYPE_CHECKING:
-    from scenes.room.control_hour import ControlHour
 
 FloatArray = NDArray[np.float64]
 
@@ -291,8 +288,8 @@ Tables = TypeVar("Tables", bound=OperationTables)
 PREFIX = "of the building's file: "  # of the names of schedules that the building's file contains
 
 
-# Shading states of the control groups of a room in an hour, from the hour's view
-Controller = Callable[["ControlHour"], "int | Sequence[int] | Mapping[str, int]"]
+# Shading states of the control groups of a room in an hour, from the hour's `ControlHour`
+Controller = Callable[[Any], int | Sequence[int] | Mapping[str, int]]
 FUNCTION = "function"  # the rule of windows that a `Controller` moves, in results
 
 

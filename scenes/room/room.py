@@ -61,7 +61,12 @@ from scenes.room.lobes import lobe_figures
 from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
-from scenes.room.shading import control_signals, shading_states, temperature_conditions
+from scenes.room.shading import (
+    control_signals,
+    predicts,
+    shading_states,
+    temperature_conditions,
+)
 from scenes.room.solar import SeasonalOutdoors, seasonal_outdoors
 from scenes.room.zone import (
     RoomAlternatives,
@@ -188,7 +193,8 @@ def lit_room(
         needs = light_needs(room, annual_glare=options.outputs.annual_glare)
         light = room_light(room, needs=needs, progress=progress)
         conditions = temperature_conditions(room)
-        controlled = room.controller is not None or predicts(room)
+        has_function = room.controller is not None and bool(space.windows)
+        controlled = has_function or predicts(room)
         if conditions or controlled or "irradiance" in control_signals(room):
             outdoors = seasonal_outdoors(room, light, progress=progress)
         if conditions and outdoors is not None:

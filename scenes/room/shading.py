@@ -66,6 +66,13 @@ def signal_of(rule: ShadingRule) -> str:
     return {"irradiance": "irradiance", "cut-off": "sun"}.get(rule.rule, "")
 
 
+def predicts(room: RoomInputs) -> bool:
+    """Whether the shading of a room follows plans of the hours ahead."""
+    if room.operation is None or room.controller is not None or not room.space.windows:
+        return False
+    return room.control.rules[0].rule == "predictive"
+
+
 Conditions = Mapping[TemperatureCondition, bool]
 NO_CONDITIONS: Conditions = {}
 
@@ -155,6 +162,8 @@ def _by_rule(
         if rule.rule == "irradiance":
             brightest = signals.irradiance(rule.sensor)[:, groups].max(axis=1)
             return by_threshold(brightest, rule.close_above, rule.open_below, closed=closed)
+        if rule.rule == "predictive":
+            raise ValueError("plans are made of the room's light: predictive_states")
         if rule.rule == "cut-off":
             return _by_cut_off(room, rule, groups, signals.beam(rule.sensor))
         return always(rule.state, room.skies.hours)

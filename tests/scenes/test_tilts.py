@@ -74,7 +74,7 @@ def test_the_light_between_two_tilts_is_their_mean_and_is_not_traced(
     lit = [illuminance_with_error(light, np.full(len(skies.lit), j)) for j in range(8)]
     for j, low, high, share in ((1, 0, 4, 0.25), (3, 0, 4, 0.75), (5, 4, 7, 1 / 3)):
         expected = (1 - share) * lit[low][0] + share * lit[high][0]
-        assert lit[j][0] == pytest.approx(expected, rel=1e-9)
+        assert lit[j][0] == pytest.approx(expected, rel=1e-6)  # a sky in single precision
         assert 0 < lit[j][1].max() < 1.5 * max(lit[low][1].max(), lit[high][1].max())
     # the same states, each traced: a system of its own, of the same BSDF
     alone = [replace(one, between=None) for one in states]
