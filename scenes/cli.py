@@ -147,7 +147,8 @@ def _print_version(ctx: click.Context, _parameter: click.Parameter, wanted: bool
 )  # fmt: skip
 @click.option(
     "--device", type=click.Choice(["cpu", "cuda"]), envvar="CFS_DEVICE", default="cpu",
-    show_default=True, help="Where rays are traced. No result has been verified on a GPU yet.",
+    show_default=True,
+    help="Where rays are traced; docs/benchmarks.md has the tables that were compared on a GPU.",
 )  # fmt: skip
 def cfs(verbose: int, device: str) -> None:
     """Daylight, glare, temperatures and comfort behind complex fenestration systems."""
