@@ -41,7 +41,7 @@ FOLDER = Path(__file__).parents[3] / "shared" / "cases" / "radiance"
 OFFICE = Path(__file__).parents[2] / "docs" / "tutorials" / "office.rad"
 HOURS = {"overcast": "12-21 09:00", "sunny": "03-21 12:00"}  # [month-day hour] of the EPW
 VIEW = "-vta -vp 2 4 1.2 -vd 0 -1 0 -vu 0 0 1 -vh 180 -vv 180"
-RTRACE = "-ab 12 -aa 0 -ad 20000 -as 0 -lw 1e-8 -lr 16"
+RTRACE = "-ab 12 -aa 0 -ad 20000 -as 0 -lw 1e-8 -lr -32"
 SUBDIVISION = 4
 LOBE = ["--see-through", f"{VENETIAN_BLIND.name}=lobe"]
 
