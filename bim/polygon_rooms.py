@@ -176,6 +176,10 @@ def _parts(face: DrawnFace, issues: list[Issue]) -> list[_Part]:
         return [_Part(facet, face) for facet in _bent(face.rings, whole, plane)]
     rest, cut = whole, []
     for opening in face.openings:
+        if opening.glazing is not None and face.adjacency not in ("outside", "space"):
+            values = {"element": opening.name, "surface": face.name}
+            effect = Effect("window", opening.area)
+            issues.append(Issue("glass-within-room", opening.guid, values, effect))
         own = plane.to_plane(opening.ring)
         outline = flat_polygon([own, *map(plane.to_plane, opening.holes)])
         inside = shapely.intersection(outline, rest)
