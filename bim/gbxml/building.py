@@ -204,8 +204,8 @@ class _Reader:
             self.issues.append(Issue("value-not-read", opening.get("id") or without_id, values))
         refers = kind not in DOORS and opening.get("windowTypeIdRef")
         if kind in GLAZED or refers or self.constructions.is_glass(opening):
-            values = self.constructions.window(opening)
-            return DrawnOpening(guid, _name(opening), ring, glazing=values)
+            values, own = self.constructions.window(opening), opening.get("id") or without_id
+            return DrawnOpening(guid, _name(opening), ring, glazing=values, both_sides=own)
         finish = self.constructions.finish(opening.get("constructionIdRef"))
         return DrawnOpening(guid, _name(opening), ring, finish.turned() if number else finish)
 

@@ -217,7 +217,7 @@ class _Reader:
         up = self._up(one, modifier, rings[0]) if states else None
         return DrawnOpening(
             one.identifier, one.label, rings[0], glazing=glazing, states=states,
-            holes=rings[1:], up=up,
+            holes=rings[1:], up=up, both_sides=min(one.identifier, *_other_side(one)),
         )  # fmt: skip
 
     def _by_modifier(
@@ -368,6 +368,11 @@ def _set_field(condition: Condition, *, energy: bool) -> str:
     if condition.type == "Ground" and energy:
         return "ground_construction"
     return f"{'exterior' if condition.type in OUTDOORS else 'interior'}_{noun}"
+
+
+def _other_side(one: HoneybeeAperture) -> list[str]:
+    """The identifier of the same opening in the room beyond."""
+    return one.boundary_condition.boundary_condition_objects[:1] or [one.identifier]
 
 
 def _opening_set(one: HoneybeeAperture, face: RoomFace) -> tuple[str, str]:
