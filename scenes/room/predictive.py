@@ -30,7 +30,7 @@ FloatArray = NDArray[np.float64]
 LIMIT = 0.40  # DGP, the default of `limit_dgp`
 PENALTY = 1e7  # [Wh] for each unit of DGP above the limit: before any energy
 CLOSED = 0.1  # [Wh] of an hour with all groups closed: of equal plans the more open one
-# Least DGP by Ev: Wienold and Christoffersen 2006 without glare sources, and 5 % for the noise of Ev
+# Least DGP by Ev: Wienold and Christoffersen 2006 without sources, less 5 % for the noise of Ev
 LEAST = 0.95 * 5.87e-5, 0.16
 BY_EYE = 6.2e-5, 0.184  # of AFC's glare term by Ev, after Wienold 2009, equation of DGPs
 ROUNDS = 25  # of plans, each with the glare of those before
