@@ -106,8 +106,8 @@ def simulate(
 
     Args:
         room: of a building, `read_building("house.ifc").room("Office")`.
-        system: in all windows, a file or `read_system("blind.xml")`; None: what the building's
-            file holds for each.
+        system: in all windows, a file or `read_system("blind.xml")`; None: the states of the
+            operation, else what the building's file holds for each.
         weather: of the year, a file or `read_weather("city.epw")`.
         operation: shading control, gains, set points: a file, or `read_operation("office.toml")`;
             without it the first state holds all year and the room floats freely.
@@ -134,7 +134,8 @@ def simulate(
     ):  # fmt: skip
         if value is not None:
             check_type(name, value, kind)
-    if system is None and building.file is None:
+    states = () if operation is None else operation.systems
+    if system is None and not states and building.file is None:
         raise DataError("a building that is not from a file needs a system", element="simulate")
     if system is not None:
         checked_system(system, system.file)
