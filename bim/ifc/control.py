@@ -12,6 +12,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import ifcopenshell
@@ -19,6 +20,7 @@ import ifcopenshell
 from bim.ifc.project import open_ifc
 from bim.ifc.property_sets import Entity, give_set, new_guid, owner_of, save, take_off
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import json_text
 
 KIND = "CFS shading control"  # ObjectType of the groups
 SET_NAME = "CFS shading control"
@@ -36,7 +38,7 @@ class StoredGroup:
 
 
 def write_control(
-    path: str | PathLike[str], out: str | PathLike[str], groups: Sequence[StoredGroup]
+    path: str | PathLike[str], out: str | Path, groups: Sequence[StoredGroup]
 ) -> None:
     """Write `out`: the model with these groups, in place of those that it has.
 
@@ -113,7 +115,7 @@ def _property(model: ifcopenshell.file, name: str, value: Any) -> Entity:
     elif isinstance(value, float):
         kind = "IfcReal"
     elif not isinstance(value, str):
-        stored = json.dumps(value)
+        stored = json_text(value)
     return model.create_entity(
         "IfcPropertySingleValue", name, None, model.create_entity(kind, stored), None
     )

@@ -22,6 +22,7 @@ from tests.scenes.study_files import study_file
 from tests.thermal.test_study import study_file as thermal_file
 
 PV_STUDY = REPOSITORY / "scenes" / "demo" / "facade_pv.toml"
+CONTROLLED = STUDY.with_name("controlled.toml")
 ONE_LINE = 1
 
 
@@ -112,7 +113,7 @@ JOBS = {
     "ifc correct": Job(_corrected, "out.ifc"),
     "ifc attach": Job(lambda _, out: ["ifc", "attach", OFFICE, "--all", "--u", 1.1, "-o", out],
                       "out.ifc"),
-    "ifc control": Job(lambda _, out: ["ifc", "control", OFFICE, STUDY.with_name("controlled.toml"), "-o", out], "out.ifc"),
+    "ifc control": Job(lambda _, out: ["ifc", "control", OFFICE, CONTROLLED, "-o", out], "out.ifc"),
     "export --radiance": Job(lambda _, out: ["export", OFFICE, "--radiance", out],
                                  folder=True, adds=True),
     "export --mitsuba": Job(lambda _, out: ["export", OFFICE, "--mitsuba", out],
