@@ -240,7 +240,7 @@ def system(
     plain = Fenestration(
         name, u, R_OUTER, R_INNER, resistance, emissivity_in=emissivity, emissivity_out=outside
     )
-    window, air = None, np.zeros_like(optics.tau)
+    window = None
     if closure in STATED:
         window, optics = _of_stated(folder, name, optics, u, closure)
     if closure == "layers":
@@ -248,19 +248,21 @@ def system(
     if window is not None:
         u = window.data.u_value
         plain = window.closure.close(replace(plain, u_value=u, resistance=None))
-        air = np.broadcast_to(window.to_air(), optics.tau.shape)
     if closure == "films":
         plain = with_realised_films(
             plain,
             r_inner_realised=state["R_i"] if name == "int_shade" else None,
             r_outer_realised=state["R_e"] if name.startswith("ext") else None,
         )
-    films = {"r_outer": plain.r_outer, "r_inner": plain.r_inner, "item": name}
-    films |= {"inward": plain.inward_shares()}
-    direct = layer_absorptances(optics.tau, optics.rho, optics.g, u, room_air=air, **films)
-    tau, rho, g = optics.diffuse.T
-    of_diffuse = _of_diffuse(folder, optics, air)
-    diffuse = layer_absorptances(tau, rho, g, u, room_air=of_diffuse, **films)
+    if window is not None and plain.shade is not None:
+        direct = window.absorptances(optics.tau, optics.rho, optics.g, plain, item=name)
+        nodes = direct.outer, direct.inner, np.asarray(direct.middle)
+        outer, inner, middle = (_of_diffuse(folder, optics, one) for one in nodes)
+        diffuse = LayerAbsorptances(outer, inner, 0.0, middle)
+    else:
+        films = {"r_outer": plain.r_outer, "r_inner": plain.r_inner, "item": name}
+        direct = layer_absorptances(optics.tau, optics.rho, optics.g, u, **films)
+        diffuse = layer_absorptances(*optics.diffuse.T, u, **films)
     return ReferenceSystem(plain, optics, direct, diffuse, _back_layers(data, optics, plain))
 
 
