@@ -25,8 +25,7 @@ from bim.gbxml.use import UseReader
 from bim.model import Building, Element
 from bim.planes import newell_normal
 from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, triangles_of_rings
-from bim.report.issue import Effect, Issue
-from mitsuba_cfs.surfaces import triangle_areas
+from bim.report.issue import Issue
 
 KINDS = {  # of a surface: kind of the face of its first room, and what lies beyond with one room
     "InteriorWall": ("wall", "adiabatic"),
@@ -102,7 +101,6 @@ class _Reader:
             elif kind not in KINDS:
                 unplaced[kind] += 1
             else:
-                self._note_inner_glass(surface, beside)
                 for number, guid in enumerate(beside):
                     faces[guid].append(self._face(surface, ring @ self.turn.T, beside, number))
         self.issues += [
@@ -159,21 +157,6 @@ class _Reader:
                 raise self.document.fault(f"no Space {name!r:.60}", surface, "AdjacentSpaceId")
         return list(dict.fromkeys(named))[:2]
 
-    def _note_inner_glass(self, surface: ElementTree.Element, beside: Sequence[str]) -> None:
-        """Report the glass of a surface that has the same room on both sides: it lights nothing."""
-        if len(beside) == 2 or KINDS[surface.get("surfaceType", "")][1] == "outside":
-            return
-        for opening in surface.iterfind("Opening"):
-            ring = self.document.ring(opening)
-            if opening.get("openingType", "") in GLAZED and ring is not None:
-                area = float(triangle_areas(triangles_of_rings((ring,))).sum())
-                values = {"element": _name(opening), "surface": _name(surface)}
-                self.issues.append(
-                    Issue(
-                        "glass-within-room", opening.get("id", ""), values, Effect("window", area)
-                    )
-                )
-
     def _face(
         self,
         surface: ElementTree.Element,
@@ -219,9 +202,10 @@ class _Reader:
             reason = f"{kind[:40]!r}, expected of {', '.join((*GLAZED, *DOORS))}"
             values = {"field": "openingType", "reason": reason}
             self.issues.append(Issue("value-not-read", opening.get("id") or without_id, values))
-        if kind in GLAZED or (kind not in DOORS and opening.get("windowTypeIdRef")):
-            values = self.constructions.window(opening)
-            return DrawnOpening(guid, _name(opening), ring, glazing=values)
+        refers = kind not in DOORS and opening.get("windowTypeIdRef")
+        if kind in GLAZED or refers or self.constructions.is_glass(opening):
+            values, own = self.constructions.window(opening), opening.get("id") or without_id
+            return DrawnOpening(guid, _name(opening), ring, glazing=values, both_sides=own)
         finish = self.constructions.finish(opening.get("constructionIdRef"))
         return DrawnOpening(guid, _name(opening), ring, finish.turned() if number else finish)
 

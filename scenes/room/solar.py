@@ -324,7 +324,7 @@ def sunlit_rooms(room: RoomInputs, zone: ThermalRoom) -> SunlitRooms:
     for one in (room.space, *others):
         through = {
             face.name: (guid, face, back)
-            for guid, pairs in panes_between(room.building, one).items()
+            for guid, pairs in panes_between(room.building.spaces, one).items()
             if guid in reached
             for face, back in pairs
         }

@@ -257,3 +257,16 @@ def test_air_changes_of_gbxml_are_of_the_rooms_volume(tmp_path, changes):
     (use,) = building.uses.values()
     assert "value-not-read" not in {one.code for one in building.issues}
     assert use.ventilation_m3_s.peak == pytest.approx(changes * 120.0 / 3600.0)
+
+
+@pytest.mark.parametrize(
+    ("unit", "area"), [("SquareMPerPerson", 10.0), ("SquareFtPerPerson", 0.9290304)]
+)
+def test_the_floor_of_a_person_has_a_unit(tmp_path, unit, area):
+    """10 square feet are 0.929 m2."""
+    path = tmp_path / "used.xml"
+    path.write_text(used_gbxml().replace('"SquareMPerPerson">10', f'"{unit}">10'))
+    building = read_gbxml(path)
+    ((guid, use),) = building.uses.items()
+    (space,) = [one for one in building.spaces if one.guid == guid]
+    assert use.persons.peak == pytest.approx(space.floor_area / area)

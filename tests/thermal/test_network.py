@@ -16,10 +16,14 @@ from thermal.blackbox import Fenestration
 from thermal.convection import doe2_outside, iso15099_inside, local_wind_factor, tarp_inside
 from thermal.errors import ThermalInputError
 from thermal.network import (
+    OUTDOOR,
+    PARTITION,
+    PARTNER,
     closed_exchange,
     exchange_from_view_factors,
     exchange_star,
     frame_surface,
+    known_surfaces,
     network,
     outside_factors,
     window_mix,
@@ -242,3 +246,52 @@ def test_closed_exchange_areas_sum_to_the_areas():
     area = rng.uniform(0.01, 200.0, 9)
     closed = closed_exchange(rng.uniform(0.2, 2.0, (9, 9)) * area, area)
     np.testing.assert_allclose(closed.sum(axis=1), area, rtol=1e-7)
+
+
+def _partitioned(partner: str = "there", back: str = "here", behind: str = "one") -> list[Zone]:
+    """Two zones with a wall between them, drawn from either side."""
+    east, outside = np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])
+    here = OpaqueSurface("here", 12.0, (CONCRETE,), east, "other", partner=partner)
+    there = OpaqueSurface("there", 12.0, (CONCRETE,), -east, behind, partner=back)
+    facades = [OpaqueSurface(f"facade {k}", 8.0, (CONCRETE,), outside) for k in range(2)]
+    return [Zone("one", 60.0, (facades[0], here)), Zone("other", 60.0, (there, facades[1]))]
+
+
+def _network(zones: list[Zone]):
+    mixes = [window_mix(zone, None, 1) for zone in zones]
+    return network(
+        zones, mixes, step_s=600.0, terrain="suburbs", cell=0.02, link=np.zeros((len(zones),) * 2)
+    )
+
+
+def test_a_wall_between_zones_is_stored_by_its_first_side():
+    faces = _network(_partitioned()).faces
+    assert faces.kind.tolist() == [OUTDOOR, PARTITION, PARTNER, OUTDOOR]
+    assert faces.partner.tolist() == [-1, 2, 1, -1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"back": "facade 0"}, "does not name it back"),
+        ({"behind": "other"}, "does not name it back"),
+        ({"behind": "outdoor"}, "does not name it back"),
+        ({"partner": "nothing"}, "has no surface 'nothing'"),
+    ],
+)
+def test_a_wall_between_zones_names_its_other_side_and_is_named_back(changes, message):
+    with pytest.raises(ThermalInputError, match=message):
+        _network(_partitioned(**changes))
+
+
+def test_temperatures_beyond_faces_are_numbered_by_the_faces_that_have_them():
+    """0 is the ground's; facades and the ground have none of their own."""
+    up, hours = np.array([0.0, 0.0, 1.0]), np.zeros(2)
+    kinds = ["outdoor", "known", "ground", "known", "adiabatic"]
+    walls = tuple(
+        OpaqueSurface(str(k), 5.0, (CONCRETE,), up, one, beyond_c=hours if one == "known" else None)
+        for k, one in enumerate(kinds)
+    )
+    zone = Zone("room", 60.0, walls, _two_windows().windows)
+    assert _network([zone]).faces.beyond.tolist() == [0, 1, 0, 2, 0, 0, 0]
+    assert [one.name for one in known_surfaces([*walls, *zone.windows])] == ["1", "3"]
