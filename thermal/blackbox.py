@@ -145,7 +145,7 @@ class LayerAbsorptances:
     outer: NDArray[np.float64]  # [...]
     inner: NDArray[np.float64]  # [...] of the shade where it is a node
     clipped: float  # largest absorptance that had to be moved to stay between 0 and alpha
-    middle: NDArray[np.float64] | float = 0.0  # [...] of the innermost pane behind the shade
+    middle: NDArray[np.float64] | float = 0.0  # [...] of the innermost pane outside of the shade
 
     def two_layers(self, system: Fenestration) -> LayerAbsorptances:
         """Those of Kuhn's two layers with U and films of a system: as much goes indoors."""

@@ -102,6 +102,11 @@ def read_optics(folder: Path, name: str) -> Optics:
     if name == "ext_blind":
         return _klems_optics(folder, back)
     rows = sorted(data["angular"], key=lambda row: row["theta"])
+    if (
+        data["cfs"] != "dgu"
+    ):  # by matrices of the Klems basis: 75 and 80 degrees repeat others' rows
+        rows = [row for row in rows if row["theta"] not in (75, 80)]
+        rows = [row | {"theta": 82.5} if row["theta"] == 85 else row for row in rows]
     theta, tau, rho, g = (np.array([r[k] for r in rows]) for k in ("theta", "tau", "rho", "g"))
     d = data["diffuse"]
     both = np.array([[d["tau"], d["rho"], d["g"]]] * 2)
