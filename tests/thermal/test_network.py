@@ -325,11 +325,16 @@ def test_each_zone_has_its_own_shares_of_radiant_gains():
     """By area and emissivity: the second zone has walls of 8 and 12 m2."""
     alone = replace(_partitioned()[0], name="alone")
     walls = tuple(replace(s, outside="adiabatic", partner=None) for s in alone.surfaces)
-    net = _network([_two_windows(), replace(alone, surfaces=walls)])
-    weights = [10.0 * 0.6, 2.0 * 0.84, 2.0 * 0.84], [8.0, 12.0]
+    zones = [_two_windows(), replace(alone, surfaces=walls), replace(_two_windows(), name="third")]
+    net = _network(zones)
+    weights = (
+        [10.0 * 0.6, 2.0 * 0.84, 2.0 * 0.84],
+        [8.0, 12.0],
+        [10.0 * 0.6, 2.0 * 0.84, 2.0 * 0.84],
+    )
     for z, weight in enumerate(weights):
         np.testing.assert_allclose(net.radiation.shares(z), [np.array(weight) / sum(weight)])
-    assert net.radiation.first_face.tolist() == [0, 3, 5]
+    assert net.radiation.first_face.tolist() == [0, 3, 5, 8]
 
 
 def _shaded_windows() -> Zone:
