@@ -43,6 +43,8 @@ RULES = {
     "rain": N_("open in rain"),
     "any": N_("several rules, the most closed state"),
     "all": N_("several rules, the most open state"),
+    "function": N_("by a function in Python"),
+    "predictive": N_("by plans of the hours ahead (predictive control)"),
 }
 
 
