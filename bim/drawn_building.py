@@ -43,7 +43,7 @@ def drawn_building(
         join: rooms to make one, as "Hall + Living".
         furniture: whether furniture is in the light and the views of its room.
     """
-    rooms = list(model.rooms)
+    rooms = _unique(model.rooms, model.path)
     for text in join:
         rooms = _joined(rooms, text, model.path)
     issues = list(model.issues)
@@ -70,6 +70,29 @@ def drawn_building(
         model.latitude_deg, model.longitude_deg, model.elevation, model.path,
         _account(model, rooms, spaces, issues),
     )  # fmt: skip
+
+
+def _unique(rooms: Sequence[DrawnRoom], path: Path) -> list[DrawnRoom]:
+    """The rooms with openings of an identity each; the systems of windows go by it.
+
+    Raises: `DataError` for two rooms of one identity.
+    """
+    count: Counter[str] = Counter()
+    names: set[str] = set()
+
+    def own(opening: DrawnOpening) -> DrawnOpening:
+        count[opening.guid] += 1
+        number = count[opening.guid]
+        return opening if number == 1 else replace(opening, guid=f"{opening.guid} ({number})")
+
+    found = []
+    for room in rooms:
+        if room.guid in names:
+            raise DataError("two rooms have this identifier", file=path, element=room.guid)
+        names.add(room.guid)
+        faces = [replace(face, openings=tuple(map(own, face.openings))) for face in room.faces]
+        found.append(replace(room, faces=tuple(faces)))
+    return found
 
 
 def _joined(rooms: Sequence[DrawnRoom], text: str, path: Path) -> list[DrawnRoom]:

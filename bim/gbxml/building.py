@@ -86,7 +86,10 @@ class _Reader:
     def drawn(self) -> DrawnModel:
         """The document as polygons."""
         document, root = self.document, self.document.root
-        spaces = {s.get("id", ""): s for s in document.all("Campus/Building/Space")}
+        spaces: dict[str, ElementTree.Element] = {}
+        for space in document.all("Campus/Building/Space"):
+            if spaces.setdefault(space.get("id", ""), space) is not space:
+                raise document.fault("is the id of another space too", space, "id")
         faces: dict[str, list[DrawnFace]] = {guid: [] for guid in spaces}
         elements: list[Element] = []
         unplaced: Counter[str] = Counter()
@@ -96,6 +99,7 @@ class _Reader:
                 raise document.fault("has no polygon", surface, "PlanarGeometry/PolyLoop")
             beside = self._beside(surface, spaces)
             kind = surface.get("surfaceType", "")
+            self._note_glass(surface, of_room=kind not in OUTDOORS and bool(beside))
             if kind in OUTDOORS or not beside:
                 elements += self._shade(surface, ring @ self.turn.T)
             elif kind not in KINDS:
@@ -156,6 +160,16 @@ class _Reader:
             if name not in spaces:
                 raise self.document.fault(f"no Space {name!r:.60}", surface, "AdjacentSpaceId")
         return list(dict.fromkeys(named))[:2]
+
+    def _note_glass(self, surface: ElementTree.Element, *, of_room: bool) -> None:
+        """Report a surface whose construction transmits light, and openings of shades."""
+        materials = [surface.get("constructionIdRef", "")]
+        materials = materials if self.constructions.transmittance(surface) else []
+        if not of_room:
+            materials += [_name(opening) for opening in surface.iterfind("Opening")]
+        for material in materials:
+            values = {"element": _name(surface), "material": material}
+            self.issues.append(Issue("shade-taken-as-opaque", surface.get("id", ""), values))
 
     def _face(
         self,

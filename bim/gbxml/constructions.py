@@ -107,10 +107,14 @@ class Constructions:
 
     def is_glass(self, opening: ElementTree.Element) -> bool:
         """Whether an opening of any type has a window type, or a construction that passes light."""
-        if opening.get("windowTypeIdRef", "") in self._by_id["WindowType"]:
-            return True
-        one = self._by_id["Construction"].get(opening.get("constructionIdRef", ""))
-        return one is not None and bool(self._share(one, "Transmittance", "Visible"))
+        return opening.get("windowTypeIdRef", "") in self._by_id["WindowType"] or bool(
+            self.transmittance(opening)
+        )
+
+    def transmittance(self, surface: ElementTree.Element) -> float | None:
+        """Visible transmittance that a surface's construction states."""
+        one = self._by_id["Construction"].get(surface.get("constructionIdRef", ""))
+        return None if one is None else self._share(one, "Transmittance", "Visible")
 
     def window(self, opening: ElementTree.Element) -> GlazingValues:
         """What an opening's window type, else its construction states."""

@@ -430,3 +430,22 @@ def test_a_global_set_may_be_named(tmp_path):
     energy |= {"construction_sets": [default], "global_construction_set": "Default"}
     found = read_honeybee(write(model, tmp_path)).space("Office").windows[0]
     assert found.u_value == 1.1
+
+
+def test_windows_of_one_identifier_are_two_windows(tmp_path):
+    """Systems go by the identifier; in one room they became a single window."""
+    model = two_rooms()
+    windows = model["rooms"][0]["faces"][0]["apertures"]
+    other = json.loads(json.dumps(windows[0])) | {"outdoor_shades": []}
+    other["geometry"]["boundary"] = [[4.2, 0, 0.9], [4.8, 0, 0.9], [4.8, 0, 2.4], [4.2, 0, 2.4]]
+    windows.append(other)
+    found = read_honeybee(write(model, tmp_path)).space("Office").windows
+    assert [one.area for one in found] == pytest.approx([4.5, 0.9])
+    assert len({one.guid for one in found}) == 2
+
+
+def test_two_rooms_of_one_identifier_are_refused(tmp_path):
+    model = two_rooms()
+    model["rooms"][1]["identifier"] = "Office"
+    with pytest.raises(DataError, match="Office: two rooms have this identifier"):
+        read_honeybee(write(model, tmp_path))

@@ -161,3 +161,10 @@ def test_a_picture_has_so_many_pixels_along_its_longer_side():
         )
         assert (wide.width, wide.height) == (300, round(300 * ratio))
         assert (high.width, high.height) == (wide.height, wide.width)
+
+
+def test_a_parallel_view_has_a_ray_everywhere_along_its_direction():
+    view = parse_view("-vtl -vp 0 0 0 -vd 0 1 0 -vu 0 0 1 -vh 2 -vv 2", width=3, height=3)
+    directions, exists = rays(view, np.array([0.1, 0.5, 0.9]), np.array([0.2, 0.5, 1.0]))
+    assert exists.all()
+    np.testing.assert_allclose(directions, [(0.0, 1.0, 0.0)] * 3)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import pytest
 from pydantic import BaseModel
@@ -246,3 +246,9 @@ def test_the_type_within_a_list_that_may_be_a_number_is_found() -> None:
     assert keys_of(found) == keys_of(toml_file.OutdoorTable)
     assert toml_file._at(float | dict[str, int], ("x",)) is int
     assert toml_file._at(float, (0,)) is None
+
+
+def test_what_annotates_a_table_is_passed_over() -> None:
+    assert keys_of(Annotated[toml_file.OutdoorTable, "of a study"]) == keys_of(
+        toml_file.OutdoorTable
+    )
