@@ -34,13 +34,15 @@ CLOSED = 0.1  # [Wh] of an hour with all groups closed: of equal plans the more 
 LEAST = 0.95 * 5.87e-5, 0.16
 BY_EYE = 6.2e-5, 0.184  # of AFC's glare term by Ev, after Wienold 2009, equation of DGPs
 ROUNDS = 25  # of plans, each with the glare of those before
+FEW = 0.005  # share of the occupied hours that a round may add: the last plan does without
 
 
 def predictive_states(year: ControlYear, *, progress: Progress = silent) -> NDArray[np.int64]:
     """States of the control groups in every hour [H, N], by plans of the hours ahead.
 
-    Plans are repeated until the glare of all that they choose in occupied hours has been rated,
-    first those of single hours, which cost a fraction of a day's.
+    Plans are repeated until the glare of nearly all that they choose in occupied hours has been
+    rated, first those of single hours, which cost a fraction of a day's; the last one chooses
+    among what has been rated.
     """
     tables, (rule, *_) = year.room.operation, year.room.control.rules
     if tables is None:
@@ -50,11 +52,9 @@ def predictive_states(year: ControlYear, *, progress: Progress = silent) -> NDAr
         for number in range(ROUNDS):
             progress("plans", number / ROUNDS)
             plan = planner.plan(ahead)
-            if not planner.rate(plan.states):
+            if planner.rate(plan.states) <= FEW * len(planner.used):
                 break
-        else:  # among what is rated
-            plan = planner.plan(ahead, of_rated=True)
-    return year.combinations[plan.states]
+    return year.combinations[planner.plan(of_rated=True).states]
 
 
 class Planner:
@@ -69,7 +69,7 @@ class Planner:
         self._combinations = combinations
         self.zone, self._hours = predicted_hours(year, tables)
         count = year.room.skies.hours
-        self._used = np.flatnonzero((year.present > 0) & (year.lit_hours >= 0))
+        self.used = np.flatnonzero((year.present > 0) & (year.lit_hours >= 0))
         eye = np.stack(
             [year.room.skies.whole_year(year.eye_lx(one, self._seat)) for one in combinations], 1
         )
@@ -93,9 +93,9 @@ class Planner:
                 temperature_error_k=table.temperature_error_k, seed=table.seed,
             )  # fmt: skip
         penalty = np.zeros_like(self.glare)
-        penalty[self._used] = PENALTY * np.maximum(self.glare[self._used] - self._limit, 0.0)
+        penalty[self.used] = PENALTY * np.maximum(self.glare[self.used] - self._limit, 0.0)
         if of_rated:
-            penalty[self._used] += np.where(self.rated[self._used], 0.0, 2 * PENALTY)
+            penalty[self.used] += np.where(self.rated[self.used], 0.0, 2 * PENALTY)
         most = np.maximum(np.array(self._year.counts) - 1, 1)
         penalty += CLOSED * (self._year.combinations / most).mean(axis=1)
         hours = PredictedHours(
@@ -113,7 +113,7 @@ class Planner:
         A combination that glares says the same of those that are more open in each group and give
         the eye more light, before they are rated.
         """
-        used = self._used[~self.rated[self._used, states[self._used]]]
+        used = self.used[~self.rated[self.used, states[self.used]]]
         numbers = states[used]
         order = self._year.combinations
         for number in np.unique(numbers):

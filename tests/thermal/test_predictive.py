@@ -7,10 +7,14 @@ from itertools import product
 import numpy as np
 import pytest
 
+from tests.thermal.rooms import box, climate, sun
+from thermal.balance import simulate
+from thermal.blackbox import Fenestration
 from thermal.climate import Climate
+from thermal.emitters import IdealLoads
 from thermal.predictive import Forecast, PredictedHours, noisy_forecast, predicted_year
 from thermal.reduced import MASS_FILM, SURFACE_FILM, ReducedZone, reduced_zone, responses
-from thermal.zone import Layer, OpaqueSurface, Zone
+from thermal.zone import Gains, Layer, OpaqueSurface, Zone
 
 AIR, WINDOWS, OPAQUE, MASS, MASS_AREA, AREA = 20.0, 15.0, 10.0, 6e6, 50.0, 90.0
 
@@ -130,14 +134,14 @@ def test_the_reduced_model_of_a_zone() -> None:
     wall = OpaqueSurface("wall", 12.0, (concrete, wool, plaster), np.array([0.0, -1.0, 0.0]))
     floor = OpaqueSurface("floor", 20.0, (concrete,), np.array([0.0, 0.0, -1.0]), "adiabatic")
     hours = 24
-    climate = Climate(
+    weather = Climate(
         np.zeros(hours), np.zeros(hours), np.zeros(hours), np.zeros(hours), np.zeros(hours),
         np.full(hours, 1e5),
     )  # fmt: skip
     zone = Zone("z", 60.0, (wall, floor), infiltration_ach=0.6, bridges=2.0)
     facade = np.zeros((hours, 2))
     facade[12, 0] = 500.0
-    reduced = reduced_zone(zone, climate, facade, np.zeros((1, 0), dtype=np.int64))
+    reduced = reduced_zone(zone, weather, facade, np.zeros((1, 0), dtype=np.int64))
     kappa = np.array([0.02 * 1200e3, 0.1 * 2400e3])
     assert reduced.mass == pytest.approx(12 * kappa[0] + 20 * kappa[1])
     assert reduced.mass_area == pytest.approx(
@@ -147,3 +151,27 @@ def test_the_reduced_model_of_a_zone() -> None:
     assert reduced.air[0] == pytest.approx(60 * 0.6 / 3600 * 1200)
     assert reduced.windows.tolist() == [2.0]
     assert reduced.behind_c[12] == pytest.approx(0.6 * 0.04 * 500)
+
+
+def test_the_reduced_model_has_the_loads_of_the_detailed_balance() -> None:
+    """Nothing is fitted: a year of a concrete room, heating 9 % and cooling 1 % lower."""
+    hours = np.arange(24 * 365)
+    outdoor = 9 - 12 * np.cos(2 * np.pi * hours / len(hours))
+    outdoor += 5 * np.sin(2 * np.pi * (hours % 24 - 9) / 24)
+    weather, glass = climate(len(hours), outdoor=outdoor, sky=outdoor - 8), Fenestration("g", 1.1)
+    used = ((hours % 24 >= 8) & (hours % 24 < 18)).astype(float)
+    zone = box(window=glass, gains=Gains(150 * used, 150 * used), loads=IdealLoads(20.0, 26.0))
+    solar = sun(len(hours), zone, strength=0.6 - 0.4 * np.cos(2 * np.pi * hours / len(hours)))
+    detailed = simulate(zone, weather, solar, step_s=3600.0)
+    outer, inner = glass.inward_shares()
+    absorbed = (solar.absorbed_outer * outer + solar.absorbed_inner * inner) @ [4.5]
+    reduced = reduced_zone(zone, weather, solar.facade, np.zeros((1, 1), dtype=np.int64))
+    acts = PredictedHours(
+        (solar.inside.sum(axis=1) + absorbed)[:, None], np.zeros((len(hours), 1)),
+        np.zeros(len(hours)), 0.0, 300 * used, np.zeros((len(hours), 1)),
+    )  # fmt: skip
+    year = predicted_year(reduced, acts, ahead=1)
+    assert year.heating.sum() == pytest.approx(detailed.heating.sum(), rel=0.12)
+    assert year.cooling.sum() == pytest.approx(detailed.cooling.sum(), rel=0.05)
+    both = detailed.heating - detailed.cooling, year.heating - year.cooling
+    assert np.corrcoef(*both)[0, 1] > 0.98
