@@ -64,8 +64,8 @@ def zone_of(hours: int, **changed) -> ReducedZone:
     return ReducedZone(**values)
 
 
-def acting(hours: int, **changed) -> PredictedHours:
-    random = np.random.default_rng(3)
+def acting(hours: int, seed: int = 3, **changed) -> PredictedHours:
+    random = np.random.default_rng(seed)
     values = {
         "sun": random.uniform(0, 2500, (hours, 2)), "daylight": random.uniform(0, 800, (hours, 2)),
         "lamps": np.full(hours, 400.0), "target_lx": 500.0, "internal": np.full(hours, 200.0),
@@ -90,14 +90,15 @@ def cost_of(zone: ReducedZone, hours: PredictedHours, states, start_c: float) ->
     return total
 
 
-def test_a_plan_is_the_cheapest_of_all_sequences() -> None:
-    zone, hours = zone_of(8), acting(8)
+@pytest.mark.parametrize(("mass", "seed"), [(MASS, 3), (5e5, 3), (5e5, 4), (5e5, 5)])
+def test_a_plan_is_the_cheapest_of_all_sequences(mass, seed) -> None:
+    zone, hours = zone_of(8, mass=mass), acting(8, seed)
     plan = predicted_year(zone, hours, ahead=8, start_c=21.0)
     every = {s: cost_of(zone, hours, s, 21.0) for s in product((0, 1), repeat=8)}
     chosen = cost_of(zone, hours, plan.states.tolist(), 21.0)
     assert plan.heating.sum() + plan.cooling.sum() + plan.lamps.sum() == pytest.approx(chosen)
     assert chosen <= 1.001 * min(every.values())  # the grid is a kelvin wide
-    assert chosen < 0.97 * np.median(list(every.values()))
+    assert chosen < 0.98 * np.median(list(every.values()))
 
 
 def test_a_receding_plan_comes_near_and_a_penalty_goes_before_energy() -> None:
