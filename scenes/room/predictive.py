@@ -99,7 +99,7 @@ class Planner:
         most = np.maximum(np.array(self._year.counts) - 1, 1)
         penalty += CLOSED * (self._year.combinations / most).mean(axis=1)
         hours = PredictedHours(
-            self._hours.sun, self._hours.daylight, self._hours.lamps, self._hours.target_lx,
+            self._hours.sun, self._hours.daylight, self._hours.lamps, self._hours.dimming,
             self._hours.internal, penalty,
         )  # fmt: skip
         weights = table.heating_weight, table.cooling_weight, table.lighting_weight
@@ -139,7 +139,7 @@ def predicted_hours(
     hours, zone = OperationHours(tables, room.weather), year.zone.zone
     windows = year.combinations[:, room.control.number]
     sun, daylight = [], []
-    dimmed = bool(tables.gains.lighting_dimmed and tables.gains.lighting_w_m2)
+    dimming = tables.gains.dimming
     areas = np.array([window.area for window in zone.windows])
     for states in map(tuple, year.combinations.tolist()):
         solar, *_ = year.sun_by_states.of(year.of_windows(states).tolist())
@@ -154,12 +154,14 @@ def predicted_hours(
             middle = [0.0 if one.shade is None else one.shade.inward[1] for one in systems]
             absorbed = absorbed + solar.absorbed_middle * np.array(middle)
         sun.append(solar.inside.sum(axis=1) + absorbed @ areas)
-        daylight.append(year.work_plane_lx(states) if dimmed else np.zeros(room.skies.hours))
+        daylight.append(
+            np.zeros(room.skies.hours) if dimming is None else year.work_plane_lx(states)
+        )
     reduced = reduced_zone(zone, climate(room.weather), solar.facade, windows)
-    lamps = hours.lamps(room.space.floor_area)
+    area = room.space.floor_area
+    lamps, other = hours.lamps(area), hours.heat(area) + tables.gains.lighting_standby_w_m2 * area
     return reduced, PredictedHours(
         np.stack(sun, axis=1), np.stack(daylight, axis=1), lamps,
-        tables.gains.lighting_target_lx if dimmed else 0.0,
-        np.broadcast_to(hours.heat(room.space.floor_area), lamps.shape).copy(),
+        dimming, np.broadcast_to(other, lamps.shape).copy(),
         np.zeros((1, 1)),
     )  # fmt: skip

@@ -14,8 +14,9 @@ from thermal.climate import Climate
 from thermal.emitters import IdealLoads
 from thermal.predictive import Forecast, PredictedHours, noisy_forecast, predicted_year
 from thermal.reduced import MASS_FILM, SURFACE_FILM, ReducedZone, reduced_zone, responses
-from thermal.zone import Gains, Layer, OpaqueSurface, Zone
+from thermal.zone import Dimming, Gains, Layer, OpaqueSurface, Zone, dimmed_share
 
+DIMMING = Dimming(500.0, 0.2, 0.3, off=True, sensor_factor=0.9)
 AIR, WINDOWS, OPAQUE, MASS, MASS_AREA, AREA = 20.0, 15.0, 10.0, 6e6, 50.0, 90.0
 
 
@@ -68,7 +69,7 @@ def acting(hours: int, seed: int = 3, **changed) -> PredictedHours:
     random = np.random.default_rng(seed)
     values = {
         "sun": random.uniform(0, 2500, (hours, 2)), "daylight": random.uniform(0, 800, (hours, 2)),
-        "lamps": np.full(hours, 400.0), "target_lx": 500.0, "internal": np.full(hours, 200.0),
+        "lamps": np.full(hours, 400.0), "dimming": DIMMING, "internal": np.full(hours, 200.0),
         "penalty": np.zeros((hours, 2)),
     } | changed  # fmt: skip
     return PredictedHours(**values)
@@ -78,7 +79,7 @@ def cost_of(zone: ReducedZone, hours: PredictedHours, states, start_c: float) ->
     """Energy of a sequence of states [Wh], hour by hour."""
     mass_c, total, out = start_c, 0.0, np.zeros(6)
     for h, m in enumerate(states):
-        lamps = hours.lamps[h] * min(max(1 - hours.daylight[h, m] / hours.target_lx, 0), 1)
+        lamps = hours.lamps[h] * dimmed_share(hours.daylight[h, m], DIMMING)
         responses(
             zone.air[h], zone.windows[m], zone.opaque, zone.mass, zone.mass_area, zone.area,
             zone.outdoor_c[h], zone.behind_c[h], hours.internal[h] + lamps, hours.sun[h, m], out,
@@ -169,7 +170,7 @@ def test_the_reduced_model_has_the_loads_of_the_detailed_balance() -> None:
     reduced = reduced_zone(zone, weather, solar.facade, np.zeros((1, 1), dtype=np.int64))
     acts = PredictedHours(
         (solar.inside.sum(axis=1) + absorbed)[:, None], np.zeros((len(hours), 1)),
-        np.zeros(len(hours)), 0.0, 300 * used, np.zeros((len(hours), 1)),
+        np.zeros(len(hours)), None, 300 * used, np.zeros((len(hours), 1)),
     )  # fmt: skip
     year = predicted_year(reduced, acts, ahead=1)
     assert year.heating.sum() == pytest.approx(detailed.heating.sum(), rel=0.12)
