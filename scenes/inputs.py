@@ -29,6 +29,7 @@ from scenes.room.operation import (
     Operation,
     check_schedules,
     check_states,
+    ground_note,
     stated_note,
     unstated_note,
     used_operation,
@@ -153,6 +154,7 @@ def inputs_of(
     notes = (
         *stated_note(building, "" if operation is None else operation.file.name),
         *_unstated(operation, used, building, heat_of),
+        *(() if operation is None else ground_note(operation.tables)),
         *_state_notes(options, operation, filled, systems, building),
         *(() if operation is None else tilt_note(operation.systems)),
     )

@@ -138,7 +138,7 @@ def _driven(
     return {
         "inner": np.concatenate([part for inner, _ in suns for part in inner], axis=1),
         "outer": np.concatenate([part for _, outer in suns for part in outer], axis=1),
-        "air": np.stack([_air_sun(*pair, stretch) for pair in pairs], axis=1),
+        "middle": np.concatenate([_middle_sun(*pair, stretch) for pair in pairs], axis=1),
         "state": np.concatenate([_states(*pair, stretch) for pair in pairs], axis=1),
         "mix": mix,
         "convective": _hourly([g.convective for g in gains], stretch, "convective gains"),
@@ -192,10 +192,14 @@ def _zone_sun(
     return inner, outer
 
 
-def _air_sun(zone: Zone, sun: Solar, stretch: Stretch) -> FloatArray:
-    """Sun [R] [W] that warms a zone's air behind interior shades."""
-    values = np.zeros_like(sun.absorbed_inner) if sun.absorbed_air is None else sun.absorbed_air
-    return stretch.of(np.asarray(values)) @ np.array([w.area for w in zone.windows])
+def _middle_sun(zone: Zone, sun: Solar, stretch: Stretch) -> FloatArray:
+    """Sun [R, N] [W/m2] that panes behind interior shades absorb."""
+    glass = (
+        np.zeros_like(sun.absorbed_inner) if sun.absorbed_middle is None else sun.absorbed_middle
+    )
+    part = stretch.of(np.asarray(glass))
+    walls, frames = (np.zeros((len(part), n)) for n in (len(zone.surfaces), len(framed(zone))))
+    return np.concatenate([walls, part, frames], axis=1)
 
 
 def _states(zone: Zone, sun: Solar, stretch: Stretch) -> NDArray[np.int64]:
@@ -618,6 +622,7 @@ def _start(net: Network, conditions: tuple[int, int], start_c: float) -> records
     return records.State(
         inner=np.full(n, start_c),
         outer=np.full(n, start_c),
+        glass=np.full((n, 3), start_c),
         mode=net.modes.even * start_c,
         air=np.full(zones, start_c),
         load=np.zeros(zones),
@@ -657,7 +662,8 @@ def _work(net: Network, state: records.State) -> records.Workspace:
         still=np.zeros(m),
         ends=np.zeros((n, 2)),
         film=np.zeros(n),
-        outdoor=np.zeros((n, 6)),
+        outdoor=np.zeros((n, 5)),
+        nodes=np.zeros((n, 3, 3)),
         old_inner=state.inner.copy(),
         old_outer=state.outer.copy(),
         old_air=state.air.copy(),

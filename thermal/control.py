@@ -195,7 +195,7 @@ def switched(suns: Sequence[Solar], chosen: ArrayLike, states: ArrayLike | None 
         require(same, f"solar {name}", "the combinations differ in shape")
         return np.stack(arrays)[at, np.arange(rows)]
 
-    names = ("absorbed_outer", "absorbed_inner", "absorbed_air", "inside", "facade")
+    names = ("absorbed_outer", "absorbed_inner", "absorbed_middle", "inside", "facade")
     parts: dict[str, Any] = {
         name: pick(name) for name in (*names, "window_inside", "window_facade")
     }

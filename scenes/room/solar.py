@@ -462,7 +462,7 @@ def _gains_in_states(
         directional_sums(outdoors, skies, np.concatenate(shares), zone.sun),
         np.cumsum([len(s) for s in shares[:-1]]),
     )
-    taken, outer, inner, air, whole = (rows.T for rows in sums)
+    taken, outer, inner, middle, whole = (rows.T for rows in sums)
     B = len(zone.sunlit.beyond)
     retained = np.array([h.back_absorptance / max(1.0 - h.back_reflectance, 1e-9) for h in heats])
 
@@ -475,13 +475,13 @@ def _gains_in_states(
         inside=year(taken[:, :F]),
         facade=facade,
         window_inside=year((retained * taken[:, F + B :] / area)[:, group]),
-        absorbed_air=year(air[:, group]),
+        absorbed_middle=year(middle[:, group]),
     )
     gains = {
         "incident_w": whole[:, 0],
         "transmitted_w": whole[:, 1],
         "absorbed_outer_w": outer @ area,
-        "absorbed_inner_w": (inner + air) @ area,
+        "absorbed_inner_w": (inner + middle) @ area,
         "absorbed_room_w": taken[:, :F].sum(axis=1),
     }
     if B:
@@ -509,8 +509,8 @@ def absorbed_shares(
     """Weights of the groups' irradiance by direction [n, G, K] for `directional_sums`.
 
     What the room's surfaces and windows absorb [W]; outer and inner layers of each group, and the
-    room's air behind an interior shade [W/m2];
-    what is incident on all windows and what they transmit [W].
+    pane behind an interior shade [W/m2]; what is incident on all windows and what they transmit
+    [W].
 
     Args: transmission: [G, K, K]; area: [G] [m2]; absorption: [G, K, F + G].
     """
@@ -520,6 +520,6 @@ def absorbed_shares(
     each = np.eye(len(area))[..., None]
     outer = each * np.stack([heat.absorptances.outer for heat in heats])
     inner = each * np.stack([heat.absorptances.inner for heat in heats])
-    air = each * np.stack([np.broadcast_to(h.absorptances.air, omega.shape) for h in heats])
+    middle = each * np.stack([np.broadcast_to(h.absorptances.middle, omega.shape) for h in heats])
     whole = np.stack([np.tile(area[:, None], len(omega)), entering.sum(axis=1)])
-    return [(absorbed @ entering)[:, :, 0], outer, inner, air, whole]
+    return [(absorbed @ entering)[:, :, 0], outer, inner, middle, whole]

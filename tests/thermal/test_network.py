@@ -11,11 +11,10 @@ from tests.thermal.rooms import CONCRETE, INSULATION
 from tests.validation.room_exchange import (
     absorbed_after_reflections,
     area_view_factors,
-    layer_absorption,
     spread_evenly,
     window_share,
 )
-from thermal.blackbox import Fenestration, LayerAbsorptances
+from thermal.blackbox import Fenestration
 from thermal.convection import doe2_outside, iso15099_inside, local_wind_factor, tarp_inside
 from thermal.errors import ThermalInputError
 from thermal.network import (
@@ -174,12 +173,7 @@ def test_sun_in_a_room_of_two_faces_by_hand():
     absorbed_after_reflections([[1.0, 1.0]], [0.0, 0.5], np.eye(2))
 
 
-def test_sun_in_the_layers_and_the_windows_share_by_hand():
-    layers = LayerAbsorptances(np.array([0.1, 0.2]), np.array([0.3, 0.4]), 0.0)
-    outer, inner, air = layer_absorption([[10.0, 100.0]], layers)
-    assert (outer, inner, air) == (pytest.approx(21.0), pytest.approx(43.0), 0.0)
-    with pytest.raises(ThermalInputError, match="irradiance: expected"):
-        layer_absorption([[10.0]], layers)
+def test_the_windows_share_by_hand():
     # 8 W not reflected, of 1 - 0.2: the inner layer keeps 0.3 of 0.8
     assert window_share([8.0], 0.5, 0.3, 0.2) == pytest.approx(3.0)
     assert window_share(8.0, 0.5, 0.3 + 5e-7, 0.2) == pytest.approx(3.0, rel=1e-5)
