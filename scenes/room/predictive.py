@@ -34,7 +34,7 @@ CLOSED = 0.1  # [Wh] of an hour with all groups closed: of equal plans the more 
 LEAST = 0.95 * 5.87e-5, 0.16
 BY_EYE = 6.2e-5, 0.184  # of AFC's glare term by Ev, after Wienold 2009, equation of DGPs
 ROUNDS = 25  # of plans, each with the glare of those before
-FEW = 0.005  # share of the occupied hours that a round may add: the last plan does without
+FEW = 0.005  # share of the occupied hours with unrated glare at which plans end
 
 
 def predictive_states(year: ControlYear, *, progress: Progress = silent) -> NDArray[np.int64]:
