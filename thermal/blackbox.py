@@ -121,14 +121,14 @@ class Fenestration:
         require_range(self.emissivity_out, 0.0, 1.0, f"{item}: outside emissivity")
         require_range(self.inner_report, 0.0, 1.5, f"{item}: inner report weight")
 
-    def inward_shares(self) -> tuple[float, float]:
-        """Shares of the heat absorbed in the outer and in the inner layer that go indoors.
+    def inward_shares(self) -> tuple[float, float, float]:
+        """Shares of the heat absorbed in the outer, middle and inner layer that go indoors.
 
-        With the films of the measurement; the inner layer is the shade where it is a node.
+        With the films of the measurement; without a shade of its own there is no middle layer.
         """
         if self.shade is not None:
-            return self.shade.inward[0], self.shade.inward[2]
-        return self.u_value * self.r_outer, 1.0 - self.u_value * self.r_inner
+            return self.shade.inward
+        return self.u_value * self.r_outer, 0.0, 1.0 - self.u_value * self.r_inner
 
     def in_series(self) -> Fenestration:
         """As two layers: an interior shade with the film that it has in the dark."""

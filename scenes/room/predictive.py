@@ -137,10 +137,10 @@ def predicted_hours(
             window.states[min(j, len(window.states) - 1)].inward_shares()
             for window, j in zip(zone.windows, chosen, strict=True)
         ]
-        outer, inner = np.array(parts).reshape(-1, 2).T
+        outer, middle, inner = np.array(parts).reshape(-1, 3).T
         absorbed = solar.absorbed_outer * outer + solar.absorbed_inner * inner
-        if solar.absorbed_air is not None:
-            absorbed = absorbed + solar.absorbed_air
+        if solar.absorbed_middle is not None:
+            absorbed = absorbed + solar.absorbed_middle * middle
         sun.append(solar.inside.sum(axis=1) + absorbed @ areas)
         daylight.append(year.work_plane_lx(states) if dimmed else np.zeros(room.skies.hours))
     reduced = reduced_zone(zone, climate(room.weather), solar.facade, windows)
