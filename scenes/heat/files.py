@@ -50,9 +50,10 @@ def read_files(study: StudyFile, file: Path | None = None) -> HeatFiles:
         weather = read_measured(study.weather, study.measured)
         _fits_measured(study, weather, file)
     check_schedules(study, weather, file)
-    if study.tilt_step_deg is not None:
-        message = "belongs to an operation file of `cfs run` and `cfs study`"
-        raise DataError(message, file=file, field="tilt_step_deg")
+    for key in ("tilt_step_deg", "control_of"):
+        if getattr(study, key) is not None:
+            message = "belongs to an operation file of `cfs run` and `cfs study`"
+            raise DataError(message, file=file, field=key)
     by = "[[system]] of the study,"
     systems = tuple(
         replace(read_state(table, table.bsdf, by=by), tilt_deg=table.tilt_deg)

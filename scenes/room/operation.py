@@ -317,7 +317,8 @@ class Operation:
         states = [table.placed(self.file.parent) for table in self.tables.system]
         panes = [layer.pane for table in states if table.bsdf is None for layer in table.layers]
         named = [None if table.bsdf is None else self.file.parent / table.bsdf for table in states]
-        return tuple(path for path in (*named, *panes, *tables) if path is not None)
+        files = (*named, *panes, *tables, self.tables.control_of)
+        return tuple(path for path in files if path is not None)
 
     def outdoors(self, weather: Weather) -> Weather:
         """The weather of its rooms, with the urban heat island that the file states.
@@ -335,6 +336,7 @@ def read_operation(path: str | PathLike[str]) -> Operation:
     """
     path = Path(path)
     tables = schedules_there(validated(OperationTables, read_table(path), path), path)
+    tables = _with_stored_control(tables, path)
     systems = []
     for number, state in enumerate(tables.system):
         bsdf = None if state.bsdf is None else path.parent / state.bsdf
@@ -350,6 +352,19 @@ def read_operation(path: str | PathLike[str]) -> Operation:
     except DataError as error:
         file = path if error.file is None else error.file
         raise DataError(error.message, file=file, field=error.field) from None
+
+
+def _with_stored_control(tables: OperationTables, path: Path) -> OperationTables:
+    """The tables with the control of the IFC file that they name."""
+    if tables.control_of is None:
+        return tables
+    file = (path.parent / tables.control_of).absolute()
+    if not file.is_file():
+        message = f"no such file: {tables.control_of}"
+        raise DataError(message, file=path, field="control_of")
+    from scenes.room.stored_control import stored_control  # ifcopenshell, only here
+
+    return tables.model_copy(update={"control": stored_control(file), "control_of": file})
 
 
 def _with_tilts(

@@ -535,6 +535,7 @@ class OperationTables(TomlTable):
     system: tuple[StateTable, ...] = ()  # states, open to closed; none: the building file's
     # states at tilts between those of [[system]] with `tilt_deg`, in about these steps [deg]
     tilt_step_deg: Annotated[float, Field(ge=1, le=90)] | None = None
+    control_of: Path | None = None  # an IFC file that holds the rules, in place of `control`
     control: ControlTable = ControlTable()
     gains: GainsTable = GainsTable()
     air: AirTable = AirTable()
@@ -547,6 +548,12 @@ class OperationTables(TomlTable):
     rooms: tuple[RoomsTable, ...] = ()  # the first entry that names a room applies to it
     schedules: dict[str, ScheduleTable] = Field(default_factory=dict)
     calendar: CalendarTable = CalendarTable()
+
+    @model_validator(mode="after")
+    def _has_one_control(self) -> OperationTables:
+        if self.control_of is not None and "control" in self.model_fields_set:
+            raise ValueError("control_of: the file has [control] of its own")
+        return self
 
     @model_validator(mode="after")
     def _schedules_are_there(self) -> OperationTables:

@@ -39,17 +39,21 @@ ROUNDS = 25  # of plans, each with the glare of those before
 def predictive_states(year: ControlYear, *, progress: Progress = silent) -> NDArray[np.int64]:
     """States of the control groups in every hour [H, N], by plans of the hours ahead.
 
-    Plans are repeated until the glare of all that they choose in occupied hours has been rated.
+    Plans are repeated until the glare of all that they choose in occupied hours has been rated,
+    first those of single hours, which cost a fraction of a day's.
     """
     tables, (rule, *_) = year.room.operation, year.room.control.rules
     if tables is None:
         raise ValueError("predictive control needs the tables of an operation")
     planner = Planner(year, tables, rule)
-    for number in range(ROUNDS):
-        progress("plans", number / ROUNDS)
-        plan = planner.plan()
-        if not planner.rate(plan.states):
-            break
+    for ahead in (1, tables.control.predictive.horizon_h):
+        for number in range(ROUNDS):
+            progress("plans", number / ROUNDS)
+            plan = planner.plan(ahead)
+            if not planner.rate(plan.states):
+                break
+        else:  # among what is rated
+            plan = planner.plan(ahead, of_rated=True)
     return year.combinations[plan.states]
 
 
@@ -74,8 +78,13 @@ class Planner:
         self.glare = np.where(eye > 0, slope * eye + least, 0.0)  # [H, M]
         self.rated = np.full((count, len(combinations)), not by_picture)
 
-    def plan(self) -> PredictedYear:
-        """The year that the plans carry out."""
+    def plan(self, ahead: int | None = None, *, of_rated: bool = False) -> PredictedYear:
+        """The year that the plans carry out.
+
+        Args:
+            ahead: hours that are planned; by default those of the table.
+            of_rated: in occupied hours choose among combinations whose glare was rated.
+        """
         table = self._table
         forecast = Forecast(shift=24 if table.forecast == "yesterday" else 0)
         if table.forecast == "error":
@@ -85,6 +94,8 @@ class Planner:
             )  # fmt: skip
         penalty = np.zeros_like(self.glare)
         penalty[self._used] = PENALTY * np.maximum(self.glare[self._used] - self._limit, 0.0)
+        if of_rated:
+            penalty[self._used] += np.where(self.rated[self._used], 0.0, 2 * PENALTY)
         most = np.maximum(np.array(self._year.counts) - 1, 1)
         penalty += CLOSED * (self._year.combinations / most).mean(axis=1)
         hours = PredictedHours(
@@ -93,7 +104,7 @@ class Planner:
         )  # fmt: skip
         weights = table.heating_weight, table.cooling_weight, table.lighting_weight
         return predicted_year(
-            self.zone, hours, ahead=table.horizon_h, forecast=forecast, weights=weights
+            self.zone, hours, ahead=ahead or table.horizon_h, forecast=forecast, weights=weights
         )
 
     def rate(self, states: NDArray[np.int64]) -> int:
@@ -133,11 +144,11 @@ def predicted_hours(
     for states in map(tuple, year.combinations.tolist()):
         solar, *_ = year.sun_by_states.of(year.of_windows(states).tolist())
         chosen = np.array(states, dtype=np.int64)[room.control.number]
-        parts = [
-            window.states[min(j, len(window.states) - 1)].inward_shares()
+        systems = [
+            window.states[min(j, len(window.states) - 1)]
             for window, j in zip(zone.windows, chosen, strict=True)
         ]
-        outer, middle, inner = np.array(parts).reshape(-1, 3).T
+        outer, middle, inner = np.array([one.inward_shares() for one in systems]).reshape(-1, 3).T
         absorbed = solar.absorbed_outer * outer + solar.absorbed_inner * inner
         if solar.absorbed_middle is not None:
             absorbed = absorbed + solar.absorbed_middle * middle
