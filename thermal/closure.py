@@ -138,11 +138,12 @@ class Closure:
                 emissivity_in=ends[1].emissivity[1] + ends[1].infrared_transmittance,
             )
             if data.shade is not None and films == (None, None):
+                side = "emissivity_out" if data.shade.exterior else "emissivity_in"
                 return replace(
                     closed,
                     resistance=data.shade.panes,
-                    emissivity_in=data.shade.emissivity_in,
                     shade=data.shade,
+                    **{side: data.shade.emissivity},
                 )
             films = (
                 data.r_inner if place == "internal" and films[0] is None else films[0],
