@@ -101,7 +101,7 @@ def test_realised_films_keep_the_sum_of_conductances():
     assert 1 / closed.u_value == pytest.approx(0.03 + resistance + 0.073)
     # the extra conductances are in the realised films, not beside them
     assert closed.inward_shares() == pytest.approx(
-        (closed.u_value * 0.03, 1 - closed.u_value * 0.073)
+        (closed.u_value * 0.03, 0.0, 1 - closed.u_value * 0.073)
     )
 
 
