@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 from mitsuba_cfs.interpreter import own_paths, own_python
 from scenes.app.actions import Action
 from scenes.app.project import LOGS, Project
@@ -160,7 +161,7 @@ class Jobs:
             process = self._start(job.action)
         except OSError as error:
             with self._changed:
-                job.lines.append(f"error: the command cannot be started: {error.strerror}")
+                job.lines.append(f"error: the command cannot be started: {reason(error)}")
                 self._end(job, 1)
             return
         with self._changed:

@@ -45,7 +45,7 @@ GAINS = ("equipment_w_m2", "lighting_w_m2", "lighting_target_lx")
 
 
 @dataclass(frozen=True, slots=True)
-class InputFile:
+class ProjectFile:
     """A file of a project, relative to its folder."""
 
     path: str
@@ -157,17 +157,17 @@ class Project:
 
     # ---- files
 
-    def files(self) -> list[InputFile]:
+    def files(self) -> list[ProjectFile]:
         """The input files, those of unknown kinds left out."""
         found = []
         for path in sorted((self.folder / INPUTS).rglob("*")):
             if path.is_file() and not path.is_symlink() and not path.name.startswith("."):
                 with suppress(DataError):
                     place = path.relative_to(self.folder).as_posix()
-                    found.append(InputFile(place, kind_of(path), path.stat().st_size))
+                    found.append(ProjectFile(place, kind_of(path), path.stat().st_size))
         return found
 
-    def take(self, part: Path, name: str) -> InputFile:
+    def take(self, part: Path, name: str) -> ProjectFile:
         """Put an uploaded file into its place and into the study.
 
         Raises: `DataError` for a file that no command reads, whose upload is removed.
@@ -186,11 +186,11 @@ class Project:
             raise DataError(error.message, file=name, field=error.field) from None
         size = named.stat().st_size
         named.replace(target)
-        file = InputFile(target.relative_to(self.folder).as_posix(), kind, size)
+        file = ProjectFile(target.relative_to(self.folder).as_posix(), kind, size)
         self._join(file)
         return file
 
-    def _join(self, file: InputFile) -> None:
+    def _join(self, file: ProjectFile) -> None:
         """Use a new file in the study; several IFC files are one building."""
         study = self.study() or {"quick": True}  # a new project's first answer comes soon
         if file.kind == "building":

@@ -63,7 +63,7 @@ BODY = 1 << 20  # most bytes of a request that is no upload
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class UploadLimits:
     """What may be uploaded."""
 
     file_bytes: int = 1 << 30  # of one file
@@ -138,11 +138,16 @@ class AppServer:
     """The page, its data and its commands for one project."""
 
     def __init__(
-        self, project: Project, jobs: Jobs, *, language: str = "en", limits: Limits | None = None
+        self,
+        project: Project,
+        jobs: Jobs,
+        *,
+        language: str = "en",
+        limits: UploadLimits | None = None,
     ) -> None:
         """Serve a project."""
         self._project, self._jobs, self._language = project, jobs, language
-        self._limits = limits or Limits()
+        self._limits = limits or UploadLimits()
         self._known = Secrets()
         self._rules: list[dict[str, str]] | None = None
         self._taking = 0  # bytes of uploads under way

@@ -17,7 +17,7 @@ import uvicorn
 
 from scenes.app.jobs import Jobs
 from scenes.app.project import Project
-from scenes.app.server import AppServer, Limits
+from scenes.app.server import AppServer, UploadLimits
 
 WAIT_S = 240.0  # for a command: the processor may be shared with many
 
@@ -82,7 +82,7 @@ class Served:
 
 @contextmanager
 def serving(
-    folder: Path, *, language: str = "en", limits: Limits | None = None
+    folder: Path, *, language: str = "en", limits: UploadLimits | None = None
 ) -> Iterator[Served]:
     """A server of a project folder on a free port."""
     project = Project(folder)

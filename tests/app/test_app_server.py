@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from scenes.app.server import Limits
+from scenes.app.server import UploadLimits
 from scenes.demo import OFFICE, VENETIAN_BLIND
 from tests.app.served import serving
 
@@ -142,7 +142,7 @@ def test_a_file_that_no_command_reads_is_refused_by_name(served, name, content, 
 
 
 def test_limits_of_size_and_number(tmp_path) -> None:
-    limits = Limits(file_bytes=600_000, total_bytes=900_000, files=2)
+    limits = UploadLimits(file_bytes=600_000, total_bytes=900_000, files=2)
     with serving(tmp_path / "project", limits=limits) as served:
         status, answer = served.page("POST", "/api/upload?name=a.xml", b"x" * 600_001)
         assert status == 422 and "larger than the 1 MB" in answer["error"]

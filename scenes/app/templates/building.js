@@ -32,7 +32,7 @@ function tint() {
 }
 
 function select(index) {
-  selected = index === selected ? -1 : index;
+  selected = index;
   tint();
   drawRoom();
   for (const [i, row] of [...byId("room-rows").rows].entries()) row.classList.toggle("selected", i === selected);

@@ -124,7 +124,7 @@ function go() {
   page.step = STEPS.includes(name) ? name : "files";
   page.show();
   byId(page.step).querySelector("h2")?.focus({ preventScroll: true });
-  scrollTo(0, 0);
+  scrollTo({ top: 0, behavior: "instant" });
 }
 
 addEventListener("hashchange", go);
