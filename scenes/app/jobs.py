@@ -21,6 +21,7 @@ from scenes.app.actions import Action
 from scenes.app.project import LOGS, Project
 
 KEPT = 400  # lines of a command that the page shows
+ENDED = 80  # of those of a command that has ended
 MOST = 100  # commands that wait
 PATIENCE_S = 20.0  # after SIGINT, before SIGTERM
 WAITING, RUNNING, DONE, FAILED, STOPPED = "waiting", "running", "done", "failed", "stopped"
@@ -41,12 +42,13 @@ class Job:
     progress: dict[str, Any] = field(default_factory=dict)  # the latest, see `cfs --progress json`
 
     def facts(self) -> dict[str, Any]:
-        """What the page shows of it."""
+        """What the page shows of it; of one that has ended the last lines."""
+        shown = KEPT if self.state == RUNNING else ENDED
         return {
             "number": self.number, "kind": self.action.kind, "title": self.action.title,
             "command": self.action.text, "out": self.action.out, "state": self.state,
             "started": self.started, "ended": self.ended, "code": self.code,
-            "progress": self.progress, "lines": list(self.lines),
+            "progress": self.progress, "lines": list(self.lines)[-shown:],
         }  # fmt: skip
 
 

@@ -63,6 +63,7 @@ function draw() {
       type: "button", "data-key": `remove ${file.path}`, "aria-label": gettext("Remove {name}", { name: file.path }), onclick: () => remove(file),
     }, gettext("Remove"))))));
   byId("file-table").hidden = !state.files.length;
+  byId("title-text").value = state.title || state.name;
   byId("demo").hidden = state.files.length > 0;
 }
 
@@ -88,4 +89,5 @@ document.addEventListener("drop", (event) => {
   location.hash = "#files";
   send([...event.dataTransfer.files]);
 });
+byId("title-text").addEventListener("change", (event) => page.change({ title: event.target.value }));
 byId("demo").querySelector("button").addEventListener("click", demo);

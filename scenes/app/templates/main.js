@@ -63,6 +63,7 @@ const page = {
   },
   show() {
     if (!this.state) return;
+    byId("title").textContent = this.state.title || this.state.name;
     byId("folder").textContent = this.state.folder;
     document.title = `${this.state.title || this.state.name} · mitsuba-cfs`;
     for (const name of STEPS) {
