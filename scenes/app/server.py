@@ -42,7 +42,7 @@ from scenes.app.project import (
     plain_name,
     slug,
 )
-from scenes.app.variants import variants
+from scenes.app.variants import answers, variants
 from scenes.fenestration.library import Sheet, glazing_entry, library, shade_entry, sheets
 from scenes.language.catalogue import gettext, in_language
 from scenes.user_errors import user_message
@@ -244,6 +244,10 @@ class AppServer:
         results = self._project.results()
         for result in results:
             result["title"] = _result_title(result["name"], systems)
+            pages = [result["pages"].get(name) for name in ("report", "dossier")]
+            result["answers"] = [
+                text for page in pages if page for text in answers(self._project.folder / page)
+            ]
         return {
             "name": self._project.folder.name,
             "folder": str(self._project.folder),

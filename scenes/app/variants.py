@@ -1,9 +1,12 @@
-"""Key figures of the variants side by side, from the table of `cfs study`."""
+"""Answers of finished pages, and key figures of the variants side by side (`cfs study`)."""
 
 from __future__ import annotations
 
 import csv
 import json
+from functools import lru_cache
+from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any
 
 from scenes.app.project import RESULTS, Project
@@ -58,3 +61,46 @@ def _number(text: str) -> float | None:
         return float(text)
     except ValueError:
         return None
+
+
+class _Answers(HTMLParser):
+    """Collects the paragraphs of class "answer", with which a page of results begins."""
+
+    def __init__(self) -> None:
+        super().__init__(convert_charrefs=True)
+        self.found: list[str] = []
+        self._within = False
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Begin a paragraph."""
+        if tag == "p" and ("class", "answer") in attrs:
+            self._within = True
+            self.found.append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        """End it."""
+        self._within = self._within and tag != "p"
+
+    def handle_data(self, data: str) -> None:
+        """Add its text."""
+        if self._within:
+            self.found[-1] += data
+
+
+HEAD = 400_000  # characters of a page in which its answers are
+MOST_ANSWERS = 40
+
+
+def answers(page: Path) -> tuple[str, ...]:
+    """The sentences that a report or dossier begins with."""
+    status = page.stat()
+    return _answers(page, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=200)
+def _answers(page: Path, _time: int, _size: int) -> tuple[str, ...]:
+    reader = _Answers()
+    with page.open(encoding="utf-8", errors="replace") as file:
+        reader.feed(file.read(HEAD))
+    texts = (" ".join(text.split()) for text in reader.found[:MOST_ANSWERS])
+    return tuple(text for text in texts if text)

@@ -32,6 +32,12 @@ function drawVariants() {
     }));
 }
 
+// What a folder of results is, by its name
+function kindOf(name) {
+  if (name === "comparison") return gettext("Comparison of the variants");
+  return name.startsWith("report-") ? gettext("Report") : name.startsWith("rules-") ? gettext("Dossier") : name;
+}
+
 function remove(result) {
   return tried(async () => {
     page.state = await post("remove", { results: result.name });
@@ -48,7 +54,8 @@ function drawFolders() {
   const results = page.state.results.toSorted((a, b) => b.time - a.time), when = new Intl.DateTimeFormat(page.language, { dateStyle: "medium", timeStyle: "short" });
   byId("no-results").hidden = results.length > 0;
   fill(byId("folders"), results.map((result) => h("li", { class: "card" },
-    h("h3", {}, result.title || result.name), h("p", { class: "soft" }, `results/${result.name}, ${when.format(result.time * 1000)}`),
+    h("h3", {}, kindOf(result.name), result.title ? `: ${result.title}` : ""), h("p", { class: "soft" }, `results/${result.name}, ${when.format(result.time * 1000)}`),
+    result.answers.length ? h("ul", { class: "answers" }, result.answers.map((text) => h("li", {}, text))) : null,
     h("p", { class: "links" }, Object.entries(result.pages).map(([key, path], i) => h("a", { href: page.link(path), target: "_blank", rel: "noopener", class: i ? "" : "main", ...(path.endsWith(".csv") ? { download: true } : {}) }, names[key]))),
     h("button", { type: "button", class: "quiet", "data-key": `clear ${result.name}`, "aria-label": gettext("Remove {name}", { name: result.name }), onclick: () => remove(result) }, gettext("Remove")))));
 }
