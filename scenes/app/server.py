@@ -329,7 +329,7 @@ class AppServer:
             self._jobs.touch()
             return None
         self._made.setdefault(missing[-1], []).append(made)
-        makes = [actions.library(glazing, ""), actions.library(glazing, shade)]
+        makes = (actions.library(glazing, one) for one in dict.fromkeys(("", shade)))
         self._jobs.add([one for one in makes if one.out in missing])
         return None
 
