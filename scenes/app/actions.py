@@ -10,6 +10,7 @@ from typing import Any
 
 from mitsuba_cfs.errors import DataError
 from scenes.app.project import INPUTS, RESULTS, STUDY, USES, Project, slug
+from scenes.language.catalogue import gettext
 
 CHECK = f"{RESULTS}/check.json"
 EXPORTS = {  # options of `cfs export`, and the names of their files
@@ -180,9 +181,17 @@ def library_file(glazing: str, shade: str) -> str:
     return f"{INPUTS}/{slug(f'{glazing} {shade}')}.xml"
 
 
-def rule_sets() -> Sequence[dict[str, str]]:
-    """Names, titles and editions of the rule sets."""
+def rule_sets() -> Sequence[dict[str, str | bool]]:
+    """Names, titles and editions of the rule sets, and whether they ask for glare."""
     from scenes.comply.rules import read_rule, rule_names
 
     rules = [(name, read_rule(name)) for name in rule_names()]
-    return [{"name": n, "title": str(r.title), "edition": str(r.edition)} for n, r in rules]
+    return [
+        {
+            "name": name,
+            "title": gettext(rule.title),
+            "edition": rule.edition,
+            "glare": "glare" in rule.parts,
+        }
+        for name, rule in rules
+    ]

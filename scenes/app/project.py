@@ -98,7 +98,9 @@ def _root(path: Path) -> str:
     try:
         for _, element in ElementTree.iterparse(path, events=("start",)):
             return str(element.tag).rpartition("}")[2]
-    except (ElementTree.ParseError, UnicodeError, OSError, ValueError) as error:
+    except OSError as error:
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
+    except (ElementTree.ParseError, ValueError) as error:
         raise DataError(f"is no XML: {error}", file=path) from None
     return ""
 

@@ -149,7 +149,7 @@ class AppServer:
         self._project, self._jobs, self._language = project, jobs, language
         self._limits = limits or UploadLimits()
         self._known = Secrets()
-        self._rules: list[dict[str, str]] | None = None
+        self._rules: list[dict[str, str | bool]] | None = None
         self._taking = 0  # bytes of uploads under way
         self._made: dict[str, list[MadeSystem]] = {}  # systems that wait for a file, by its name
         jobs.on_done = self._use_made

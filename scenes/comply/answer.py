@@ -50,7 +50,7 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
         )  # fmt: skip
     elif asked and not unknown:
         parts.append(ngettext("The one room meets it.", "All {count} rooms meet it.", len(asked)))
-    if unknown:
+    if unknown and len(unknown) < len(asked):  # else the level says so
         parts.append(gettext("Not computed: {rooms}.", rooms=_names(unknown)))
     return " ".join(parts)
 

@@ -35,7 +35,8 @@ function drawRules() {
       onchange: (event) => {
         const rest = page.wanted.standards.filter((name) => name !== rule.name);
         page.wanted.standards = event.target.checked ? [...rest, rule.name] : rest;
-        plan();
+        if (event.target.checked && rule.glare) page.wanted.annual_glare = true;  // else it has no verdict
+        draw();
       },
     }), h("span", {}, rule.title, h("small", {}, ` ${rule.edition}`)))));
 }
