@@ -13,6 +13,13 @@ from bim.shoebox import shoebox
 from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.spectra.channels import channels_of
+from mitsuba_cfs.spectra.detectors import (
+    NANOMETRES,
+    colour_temperature,
+    daylight_efficacy_ratio,
+    detected,
+    illuminant,
+)
 from scenes.cli import cfs
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system
@@ -55,12 +62,15 @@ def test_amber_light_is_hardly_melanopic(blind) -> None:
     room = inputs_of_room(building, space, systems, read_weather(WEATHER), options)
     light, state = room_light(room), np.zeros((8760, 1), dtype=np.int64)
     year = room_spectral(room, light, state, len(light.scene.points) - 3)
-    # of D65 beyond 510 nm: 0.16 by the action spectra of CIE S 026
-    assert 0.1 < year.summary["melanopic_der"] < 0.25
+    # D65 through the fabric; bands of 25 to 35 nm at its edge
+    fabric = np.interp(NANOMETRES, [380, 500, 520, 780], [0.0, 0.0, 0.2, 0.2])
+    expected = daylight_efficacy_ratio(illuminant("D65") * fabric)
+    assert year.summary["melanopic_der"] == pytest.approx(expected, rel=0.1)
     assert year.summary["outdoor_melanopic_der"] == pytest.approx(0.97, abs=0.02)
     assert not year.notes
     lit = year.eye["photopic_lx"] > 10
-    assert year.eye["cct_k"][lit].median() < 2800
+    temperature, _ = colour_temperature(detected(illuminant("D65") * fabric)[-3:])
+    assert year.eye["cct_k"][lit].median() == pytest.approx(float(temperature), rel=0.1)
     assert year.eye["cct_k"][year.eye["photopic_lx"] == 0].isna().all()
     assert year.spectrum.shape == (8760, 9)
     assert year.melanopic.shape == (8760, len(year.sensor_metrics))
