@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,9 +20,9 @@ THINNEST = 1e-3  # walls up to this have no reveal [m]
 Key = tuple[str, str]  # GUID of a room, name of its face
 
 
-def panes_between(building: Building, space: Space) -> dict[str, list[tuple[Face, Face]]]:
+def panes_between(spaces: Iterable[Space], space: Space) -> dict[str, list[tuple[Face, Face]]]:
     """Panes of a room and the same as the room beyond has them, by the GUID of that room."""
-    rooms = {other.guid: other for other in building.spaces}
+    rooms = {other.guid: other for other in spaces}
     found: dict[str, list[tuple[Face, Face]]] = {}
     for face in space.faces:
         other = rooms.get(face.neighbour or "")
@@ -48,7 +48,7 @@ def rooms_through_panes(building: Building, space: Space, among: Collection[str]
     rooms = {other.guid: other for other in building.spaces if other.guid in among}
     reached, queue = {space.guid: space}, [space]
     while queue:
-        for guid in panes_between(building, queue.pop(0)):
+        for guid in panes_between(building.spaces, queue.pop(0)):
             if guid in rooms and guid not in reached:
                 reached[guid] = rooms[guid]
                 queue.append(rooms[guid])
@@ -92,7 +92,7 @@ def touching(building: Building) -> tuple[Building, dict[Key, Key]]:
     sides: dict[Key, Key] = {}
     spaces = []
     for space in building.spaces:
-        pairs = [pair for own in panes_between(building, space).values() for pair in own]
+        pairs = [pair for own in panes_between(building.spaces, space).values() for pair in own]
         open_ = [(face, back) for face, back in pairs if face.pane.is_open]
         moved: dict[str, list[Face]] = {}
         for face, back in open_:
@@ -178,7 +178,7 @@ def panes_to_windows(building: Building) -> dict[str, int]:
     newest = list(panes)
     while newest:
         reached = {
-            guid for one in newest for guid in panes_between(building, rooms[one])
+            guid for one in newest for guid in panes_between(building.spaces, rooms[one])
         } - panes.keys()
         panes |= dict.fromkeys(reached, panes[newest[0]] + 1)
         newest = sorted(reached)
@@ -189,7 +189,7 @@ def light_sources(
     building: Building, space: Space, away: Mapping[str, int], below: int
 ) -> list[Space]:
     """The rooms behind a room's panes that are fewer than `below` panes away from a window."""
-    pairs = panes_between(building, space)
+    pairs = panes_between(building.spaces, space)
     return [
         other
         for other in building.spaces

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from bim.account import Account, StoreyAccount
 from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE
+from bim.doorways import panes_between
 from bim.model import Building, Element, Space
 from bim.names import JOINT, AmbiguousName, UnknownName, item_named, label_of
 from bim.outdoors import shut_in_area, simplified, unblinded
@@ -42,7 +43,7 @@ def drawn_building(
         join: rooms to make one, as "Hall + Living".
         furniture: whether furniture is in the light and the views of its room.
     """
-    rooms = list(model.rooms)
+    rooms = _unique(model.rooms, model.path)
     for text in join:
         rooms = _joined(rooms, text, model.path)
     issues = list(model.issues)
@@ -59,7 +60,7 @@ def drawn_building(
         issues += more
         spaces.append(space)
     spaces, more = _furnished(spaces, model, furniture)
-    issues += more
+    issues += [*more, *_inner_glass(spaces)]
     elements = [*_envelope(rooms, spaces), *model.elements]
     outdoors = unblinded(elements, spaces)
     traced, fine = simplified(list(outdoors.elements))
@@ -69,6 +70,29 @@ def drawn_building(
         model.latitude_deg, model.longitude_deg, model.elevation, model.path,
         _account(model, rooms, spaces, issues),
     )  # fmt: skip
+
+
+def _unique(rooms: Sequence[DrawnRoom], path: Path) -> list[DrawnRoom]:
+    """The rooms with openings of an identity each; the systems of windows go by it.
+
+    Raises: `DataError` for two rooms of one identity.
+    """
+    count: Counter[str] = Counter()
+    names: set[str] = set()
+
+    def own(opening: DrawnOpening) -> DrawnOpening:
+        count[opening.guid] += 1
+        number = count[opening.guid]
+        return opening if number == 1 else replace(opening, guid=f"{opening.guid} ({number})")
+
+    found = []
+    for room in rooms:
+        if room.guid in names:
+            raise DataError("two rooms have this identifier", file=path, element=room.guid)
+        names.add(room.guid)
+        faces = [replace(face, openings=tuple(map(own, face.openings))) for face in room.faces]
+        found.append(replace(room, faces=tuple(faces)))
+    return found
 
 
 def _joined(rooms: Sequence[DrawnRoom], text: str, path: Path) -> list[DrawnRoom]:
@@ -143,6 +167,25 @@ def _furnished(
         return list(spaces), [left] if count else []
     found = [replace(s, furniture=tuple(model.furniture.get(s.guid, ()))) for s in spaces]
     return found, [Issue("furniture-included", "furniture", {"count": count})]
+
+
+def _inner_glass(spaces: Sequence[Space]) -> list[Issue]:
+    """Glass between two rooms; that which the room beyond does not have is opaque."""
+    rooms = {space.guid: space for space in spaces}
+    found: dict[tuple[str, str], Issue] = {}
+    for space in spaces:
+        pairs = panes_between(spaces, space)
+        both = {face.name for own in pairs.values() for face, _ in own}
+        for face in space.faces:
+            if face.pane is None:
+                continue
+            beyond = rooms.get(face.neighbour or "")
+            names = tuple(sorted({space.label, beyond.label if beyond else face.neighbour or ""}))
+            values = {"element": face.pane.name, "rooms": names}
+            code = "glass-between-rooms" if face.name in both else "glass-on-one-side"
+            where = face.pane.guid
+            found.setdefault((code, where), Issue(code, where, values, Effect("window")))
+    return list(found.values())
 
 
 def _envelope(rooms: Sequence[DrawnRoom], spaces: Sequence[Space]) -> list[Element]:

@@ -54,7 +54,7 @@ class WindowOptics:
         known = panes and self.panes is not None
         if not known and one.layer_resistance.kind != "constant":
             found.append("its layers' resistance, which varies, is that of its U")
-        if one.extra_inner or one.extra_outer:
+        if one.shade is not None or one.extra_inner or one.extra_outer:
             found.append("what a shade gives to the air behind it counts in its U alone")
         return tuple(f"{one.name}: {what}" for what in found)
 
@@ -79,13 +79,11 @@ def complex_state(model: Model, name: str, optics: WindowOptics, *, panes: bool)
             spectral[key] = _matrix(model, f"{name} {band} {side}", values)
     gaps, stack = _layers(model, optics, panes=panes)
     still = [(np.zeros(size), np.zeros(size))] * (len(gaps) - 1)
+    sun = optics.absorptances.two_layers(optics.fenestration)
     absorbed = [
-        (optics.absorptances.outer, np.zeros(size)),
+        (sun.outer, np.zeros(size)),
         *still,
-        (
-            optics.absorptances.inner + optics.absorptances.air,
-            np.full(size, optics.back_absorptance),
-        ),
+        (sun.inner, np.full(size, optics.back_absorptance)),
     ]
     layers: dict[str, str] = {f"gap_{k}_name": gap for k, gap in enumerate(gaps, 1)}
     for k, (pair, pane) in enumerate(zip(absorbed, stack, strict=True), 1):
@@ -228,7 +226,7 @@ def _resistance(system: Fenestration) -> float:
     So what a shade gives to the air behind it, which has no object of its own, counts in U.
     """
     of_u = 1.0 / system.u_value - R_OUTER - R_INNER
-    return of_u if of_u > 0 else float(system.layer_resistance.at(*TYPICAL))
+    return of_u if of_u > 0 else float(system.in_series().layer_resistance.at(*TYPICAL))
 
 
 def _gaps(model: Model, resistance: float) -> list[str]:

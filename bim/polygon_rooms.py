@@ -83,6 +83,7 @@ class DrawnOpening:
     states: tuple[ShadingState, ...] = ()  # BSDFs that the file holds for it
     holes: tuple[NDArray[np.float64], ...] = ()  # each [N, 3] [m]: there is wall
     up: NDArray[np.float64] | None = None  # [3] of its BSDFs
+    both_sides: str = ""  # identity that it shares with the same opening of the room beyond
 
     @property
     def area(self) -> float:
@@ -176,6 +177,10 @@ def _parts(face: DrawnFace, issues: list[Issue]) -> list[_Part]:
         return [_Part(facet, face) for facet in _bent(face.rings, whole, plane)]
     rest, cut = whole, []
     for opening in face.openings:
+        if opening.glazing is not None and face.adjacency not in ("outside", "space"):
+            values = {"element": opening.name, "surface": face.name}
+            effect = Effect("window", opening.area)
+            issues.append(Issue("glass-within-room", opening.guid, values, effect))
         own = plane.to_plane(opening.ring)
         outline = flat_polygon([own, *map(plane.to_plane, opening.holes)])
         inside = shapely.intersection(outline, rest)
@@ -279,8 +284,11 @@ def _face(part: _Part, triangles: NDArray[np.float64], count: Counter[str]) -> F
     kind = kind or _kind_by_slope(triangles, face.adjacency)
     construction = finish.construction or default_construction(kind, face.adjacency)
     visible, solar = (ROOM_REFLECTANCE[kind] if finish.visible is None else finish.visible), None
+    pane = None
     if opening is not None and opening.glazing is not None:  # towards another room
         visible, construction = GLASS_REFLECTANCE, glass_construction(opening.glazing.u_value)
+        if face.neighbour is not None:
+            pane = replace(_window([(part, triangles)]), guid=opening.both_sides or opening.guid)
     elif finish.solar is not None:
         solar = finish.solar
     name = face.name if opening is None else opening.name
@@ -290,6 +298,7 @@ def _face(part: _Part, triangles: NDArray[np.float64], count: Counter[str]) -> F
     return Face(
         name, kind, triangles, face.adjacency, construction, visible,
         visible if solar is None else solar, finish.emissivity, face.neighbour, guid, finish.gloss,
+        pane,
     )  # fmt: skip
 
 

@@ -5,7 +5,9 @@ from .fenestration.systems import (
     FenestrationSystem as FenestrationSystem,
     read_system as read_system,
 )
+from .fenestration.tilts import tilt_states as tilt_states
 from .input_files import read_weather as read_weather
+from .room.control_hour import ControlHour as ControlHour
 from .room.operation import Operation as Operation, read_operation as read_operation
 from .room.options import RoomOptions as RoomOptions
 from .results import (

@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from difflib import get_close_matches
 from importlib import import_module, metadata
 from types import FrameType
 
@@ -114,8 +115,21 @@ class LazyGroup(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The subcommand, imported now; None if there is no such one."""
-        known = cmd_name in COMMANDS
-        return import_module(f"scenes.commands.{cmd_name}").command if known else None
+        if cmd_name not in COMMANDS:
+            return None
+        from scenes.commands.examples import with_examples
+
+        return with_examples(import_module(f"scenes.commands.{cmd_name}").command, cmd_name)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """As click's; the error of an unknown name says which commands are near."""
+        near = get_close_matches(args[0], COMMANDS, n=2)
+        if args[0] not in COMMANDS and near:
+            hint = " or ".join(f"'{name}'" for name in near)
+            ctx.fail(f"No such command {args[0]!r}. (Did you mean {hint}?)")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the subcommands by the table, without importing them."""
@@ -147,7 +161,8 @@ def _print_version(ctx: click.Context, _parameter: click.Parameter, wanted: bool
 )  # fmt: skip
 @click.option(
     "--device", type=click.Choice(["cpu", "cuda"]), envvar="CFS_DEVICE", default="cpu",
-    show_default=True, help="Where rays are traced. No result has been verified on a GPU yet.",
+    show_default=True,
+    help="Where rays are traced; docs/benchmarks.md has the tables that were compared on a GPU.",
 )  # fmt: skip
 def cfs(verbose: int, device: str) -> None:
     """Daylight, glare, temperatures and comfort behind complex fenestration systems."""

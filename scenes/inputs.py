@@ -21,6 +21,7 @@ from mitsuba_cfs.sky.annual import with_albedo
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import fill_windows, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
+from scenes.fenestration.tilts import tilt_note
 from scenes.head import Head, head_of
 from scenes.input_files import InputFiles, building_of, named_files, read_files
 from scenes.input_options import NO_OPTIONS, InputOptions
@@ -28,6 +29,7 @@ from scenes.room.operation import (
     Operation,
     check_schedules,
     check_states,
+    ground_note,
     stated_note,
     unstated_note,
     used_operation,
@@ -152,7 +154,9 @@ def inputs_of(
     notes = (
         *stated_note(building, "" if operation is None else operation.file.name),
         *_unstated(operation, used, building, heat_of),
+        *(() if operation is None else ground_note(operation.tables)),
         *_state_notes(options, operation, filled, systems, building),
+        *(() if operation is None else tilt_note(operation.systems)),
     )
     building = traced_building(building, systems)
     weather = with_albedo(files.weather, options.albedo)

@@ -177,6 +177,36 @@ class ShadingYear:
         """The state of each window [H, W]."""
         return self.states[:, self.number]
 
+    def figures(self, occupied: NDArray[np.bool_], per_day: int) -> pd.DataFrame:
+        """By group: its rule, moves a day, and hours by state while the room is occupied [%].
+
+        Args: occupied: [H]; per_day: hours, or steps, of a day.
+        """
+        moved = np.diff(self.states, axis=0) != 0
+        used = self.states[occupied]
+        table = {
+            "group": self.groups,
+            "rule": self.rules,
+            "moves_per_day": moved.sum(axis=0) * per_day / max(len(self.states), 1),
+        }
+        for state in range(int(self.states.max(initial=0)) + 1):
+            share = (used == state).sum(axis=0) / max(len(used), 1)
+            table[f"state_{state}_percent"] = 100.0 * share
+        return pd.DataFrame(table)
+
+    def moves(self, times: pd.DatetimeIndex) -> pd.DataFrame:
+        """One row for each move: time, group, rule, state before and after."""
+        rows, columns = np.nonzero(np.diff(self.states, axis=0))
+        return pd.DataFrame(
+            {
+                "time": times[rows + 1],
+                "group": [self.groups[c] for c in columns],
+                "rule": [self.rules[c] for c in columns],
+                "from_state": self.states[rows, columns],
+                "to_state": self.states[rows + 1, columns],
+            }
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class OperationResult:

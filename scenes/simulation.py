@@ -23,7 +23,7 @@ from scenes.report import write_report
 from scenes.report.headline import cards
 from scenes.result_folder import ResultFolder
 from scenes.results import RoomYear, RunResult
-from scenes.room.operation import Operation, read_operation
+from scenes.room.operation import Controller, Operation, read_operation
 from scenes.room.options import RoomOptions
 from scenes.run.netcdf import year_dataset
 from scenes.run.options import JobOptions
@@ -94,6 +94,7 @@ def simulate(
     weather: Weather | str | PathLike[str],
     *,
     operation: Operation | str | PathLike[str] | None = None,
+    control: Controller | None = None,
     quick: bool = False,
     cache: bool = True,
     progress: Progress = silent,
@@ -105,11 +106,13 @@ def simulate(
 
     Args:
         room: of a building, `read_building("house.ifc").room("Office")`.
-        system: in all windows, a file or `read_system("blind.xml")`; None: what the building's
-            file holds for each.
+        system: in all windows, a file or `read_system("blind.xml")`; None: the states of the
+            operation, else what the building's file holds for each.
         weather: of the year, a file or `read_weather("city.epw")`.
         operation: shading control, gains, set points: a file, or `read_operation("office.toml")`;
             without it the first state holds all year and the room floats freely.
+        control: function of each hour (`ControlHour`) that returns the shading states, in place of
+            the operation's rules; see `Operation.controlled_by`.
         quick: few rays and one small picture, for a first look, as `--quick`.
         cache: keep traced matrices in the user's cache and find them again.
         progress: called with each stage and how much of it is done.
@@ -131,10 +134,16 @@ def simulate(
     ):  # fmt: skip
         if value is not None:
             check_type(name, value, kind)
-    if system is None and building.file is None:
+    states = () if operation is None else operation.systems
+    if system is None and not states and building.file is None:
         raise DataError("a building that is not from a file needs a system", element="simulate")
     if system is not None:
         checked_system(system, system.file)
+    if control is not None:
+        if operation is None:
+            message = "needs an operation, whose file has the shading states: operation=..."
+            raise DataError(message, element="simulate", field="control")
+        operation = operation.controlled_by(control)
     if quick:
         options = quick_run.picks(quick_run.ROOM, options) | options
     chosen = JobOptions(

@@ -76,7 +76,8 @@ def _keys() -> Iterator[Capability]:
         if ".evidence" not in found.name:
             importlib.import_module(found.name)
     models = {one for one in _subclasses(BaseModel) if one.__module__.startswith("scenes.")}
-    models = {one for one in models if not one.__subclasses__() and "[" not in one.__name__}
+    models = {one for one in models if "[" not in one.__name__}
+    models = {one for one in models if all("[" in sub.__name__ for sub in one.__subclasses__())}
     inner = {
         held for one in models for field in one.model_fields.values()
         for held in _types(field.annotation)

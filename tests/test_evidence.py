@@ -25,6 +25,7 @@ NO_EVIDENCE = {
     "thermal.md": {
         "| to | read |", "| closure | absorptances from | layer resistance | film resistances |",
     },
+    "control.md": {"| of `ControlHour` | what |"},
     "comply.md": {
         "| in the folder of results | what |", "| option | what |",
         "| rule | quantity | set-up | weather that it asks for |",

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar, overload
 
 import numpy as np
@@ -138,7 +138,7 @@ def _driven(
     return {
         "inner": np.concatenate([part for inner, _ in suns for part in inner], axis=1),
         "outer": np.concatenate([part for _, outer in suns for part in outer], axis=1),
-        "air": np.stack([_air_sun(*pair, stretch) for pair in pairs], axis=1),
+        "middle": np.concatenate([_middle_sun(*pair, stretch) for pair in pairs], axis=1),
         "state": np.concatenate([_states(*pair, stretch) for pair in pairs], axis=1),
         "mix": mix,
         "convective": _hourly([g.convective for g in gains], stretch, "convective gains"),
@@ -192,10 +192,14 @@ def _zone_sun(
     return inner, outer
 
 
-def _air_sun(zone: Zone, sun: Solar, stretch: Stretch) -> FloatArray:
-    """Sun [R] [W] that warms a zone's air behind interior shades."""
-    values = np.zeros_like(sun.absorbed_inner) if sun.absorbed_air is None else sun.absorbed_air
-    return stretch.of(np.asarray(values)) @ np.array([w.area for w in zone.windows])
+def _middle_sun(zone: Zone, sun: Solar, stretch: Stretch) -> FloatArray:
+    """Sun [R, N] [W/m2] that panes behind interior shades absorb."""
+    glass = (
+        np.zeros_like(sun.absorbed_inner) if sun.absorbed_middle is None else sun.absorbed_middle
+    )
+    part = stretch.of(np.asarray(glass))
+    walls, frames = (np.zeros((len(part), n)) for n in (len(zone.surfaces), len(framed(zone))))
+    return np.concatenate([walls, part, frames], axis=1)
 
 
 def _states(zone: Zone, sun: Solar, stretch: Stretch) -> NDArray[np.int64]:
@@ -472,6 +476,83 @@ def simulate_zones(
     return tuple(reversed(whole))
 
 
+class SteppedZone:
+    """The balance of one zone row by row, its windows in states that are chosen as it goes."""
+
+    def __init__(
+        self,
+        zone: Zone,
+        climate: Climate,
+        states: NDArray[np.int64],
+        *,
+        step_s: float = 600.0,
+        row_s: float = HOUR,
+        options: BalanceOptions | None = None,
+    ) -> None:
+        """A zone before its first row.
+
+        Args:
+            states: [M, W] the combinations of its windows' states.
+            step_s, row_s, options: as of `simulate_zones`.
+        """
+        self._options = BalanceOptions() if options is None else options
+        self._zone, self._climate = zone, climate
+        self._steps, self._row_s = _steps_per_row(step_s, row_s), row_s
+        self._mix, no_conditions = window_mix(zone, states, len(states)), (1, 0)
+        self._net = network(
+            [zone], [self._mix], step_s=step_s, terrain=self._options.terrain,
+            cell=self._options.cell, link=_links(None, 1),
+        )  # fmt: skip
+        self._method = _method(self._options, self._steps, step_s)
+        self._weather = _weather(climate, self._steps)
+        self._state = _start(self._net, no_conditions, self._options.start_c)
+        self._work = _work(self._net, self._state)
+        self._row, self._number = 0, 0
+
+    def warm_up(self, number: int, solar: Solar, gains: Gains) -> None:
+        """Repeat the first day until it ends as it began.
+
+        Args: as of `advance`.
+        """
+        rows = min(round(24 * HOUR / self._row_s), self._climate.hours)
+        drive, weather = self._drive(number, solar, gains, rows)
+        kernel.warm_up(self._net, self._state, self._work, weather, drive, self._method, rows=rows)
+
+    def advance(self, number: int, solar: Solar, gains: Gains) -> None:
+        """Balance the next row.
+
+        Args: number: of the combination that holds; solar, gains: of the year in that combination.
+        """
+        drive, weather = self._drive(number, solar, gains, 1)
+        means = kernel.hourly_means(1, self._state)
+        kernel.advance(self._net, self._state, self._work, weather, drive, self._method, 1, means)
+        self._row += 1
+
+    @property
+    def air_c(self) -> float:
+        """Temperature of the air at the end of the last row [degC]."""
+        return float(self._state.air[0])
+
+    @property
+    def operative_c(self) -> float:
+        """Mean of that and the mean radiant temperature [degC]."""
+        shares = self._net.radiation.shares(0)[self._mix.of_hour[self._number]]
+        return 0.5 * (self.air_c + float(shares @ self._state.inner[: len(shares)]))
+
+    def _drive(
+        self, number: int, solar: Solar, gains: Gains, rows: int
+    ) -> tuple[records.Drive, records.OutdoorConditions]:
+        """What acts on the zone in the next rows."""
+        hours = self._climate.hours
+        stretch = Stretch(self._row, self._row + rows, hours, self._steps)
+        self._number = number
+        mix = self._mix._replace(of_hour=np.full(hours, self._mix.of_hour[number]))
+        zone = replace(self._zone, gains=gains)
+        drive, every = drive_of([zone], self._climate, [solar], stretch, [mix])
+        self._method = self._method._replace(solar_every=every)
+        return drive, records.OutdoorConditions(*map(stretch.of, self._weather))
+
+
 def _mixes(zone: Zone, suns: Sequence[Solar], hours: int) -> WindowMix:
     """The emissivities of a zone's windows in all its alternatives, one after the other."""
     if len(suns) == 1:
@@ -541,6 +622,7 @@ def _start(net: Network, conditions: tuple[int, int], start_c: float) -> records
     return records.State(
         inner=np.full(n, start_c),
         outer=np.full(n, start_c),
+        glass=np.full((n, 3), start_c),
         mode=net.modes.even * start_c,
         air=np.full(zones, start_c),
         load=np.zeros(zones),
@@ -580,7 +662,8 @@ def _work(net: Network, state: records.State) -> records.Workspace:
         still=np.zeros(m),
         ends=np.zeros((n, 2)),
         film=np.zeros(n),
-        outdoor=np.zeros((n, 6)),
+        outdoor=np.zeros((n, 5)),
+        nodes=np.zeros((n, 3, 3)),
         old_inner=state.inner.copy(),
         old_outer=state.outer.copy(),
         old_air=state.air.copy(),

@@ -65,6 +65,25 @@ class LayerResistance:
 
 
 @dataclass(frozen=True, slots=True)
+class InteriorShade:
+    """A shade on the room side of panes, and the air behind it; see `thermal.shaded_window`."""
+
+    width: float  # [m] of the gap behind it
+    height: float  # [m]
+    tilt: float  # [rad] from horizontal
+    impedance: float  # of its openings (ISO 15099:2003, 7.4.2)
+    exchange: float  # longwave between it and the innermost pane, of that between black faces
+    pane_weight: float  # of the pane in what the room's longwave sees
+    emissivity_in: float  # of both to the room
+    panes: LayerResistance  # between outermost and innermost face of the panes
+    sun: tuple[float, ...]  # [N - 1] of the sun that each pane absorbs, the share of the innermost
+    inward: tuple[float, float, float]  # heat of outer pane, inner pane and shade that goes indoors
+    # the whole window as two layers with the film of the dark state
+    two_layers: LayerResistance
+    film: float  # [m2 K/W]
+
+
+@dataclass(frozen=True, slots=True)
 class Fenestration:
     """A fenestration system between two films, as the room balance needs it.
 
@@ -79,10 +98,10 @@ class Fenestration:
     resistance: LayerResistance | None = None  # None: constant, from U
     extra_outer: float = 0.0  # [W/(m2 K)] outer layer to outdoor air, besides the film
     extra_inner: float = 0.0  # [W/(m2 K)] inner layer to room air, besides the film
-    room_to_outer: float = 0.0  # [W/(m2 K)] room air to outer layer, behind an interior shade
     inner_report: float = 1.0  # share of (T_inner - T_room) that the visible face shows
     emissivity_in: float = 0.84
     emissivity_out: float = 0.84
+    shade: InteriorShade | None = None  # a node of its own, inside panes that are the two layers
     layer_resistance: LayerResistance = field(init=False)
 
     def __post_init__(self) -> None:
@@ -96,7 +115,7 @@ class Fenestration:
             object.__setattr__(self, "layer_resistance", LayerResistance("constant", (r,)))
         else:
             object.__setattr__(self, "layer_resistance", self.resistance)
-        for name in ("extra_outer", "extra_inner", "room_to_outer"):
+        for name in ("extra_outer", "extra_inner"):
             require_range(getattr(self, name), 0.0, 200.0, f"{item}: {name}", "W/(m2 K)")
         require_range(self.emissivity_in, 0.0, 1.0, f"{item}: inside emissivity")
         require_range(self.emissivity_out, 0.0, 1.0, f"{item}: outside emissivity")
@@ -105,49 +124,39 @@ class Fenestration:
     def inward_shares(self) -> tuple[float, float]:
         """Shares of the heat absorbed in the outer and in the inner layer that go indoors.
 
-        With the films of the measurement, and the layer resistance that gives U with them.
+        With the films of the measurement; the inner layer is the shade where it is a node.
         """
-        across = self.room_to_outer
-        if across == 0.0:  # the extra conductances are in realised films
-            return self.u_value * self.r_outer, 1.0 - self.u_value * self.r_inner
-        outer, inner = 1.0 / self.r_outer, 1.0 / self.r_inner + self.extra_inner
-        through = 1.0 / middle_resistance(self.u_value, outer, inner, across)
-        network = [[outer + across + through, -through], [-through, inner + through]]
-        shares = np.linalg.solve(network, [across, inner])  # by reciprocity
-        return float(shares[0]), float(shares[1])
+        if self.shade is not None:
+            return self.shade.inward[0], self.shade.inward[2]
+        return self.u_value * self.r_outer, 1.0 - self.u_value * self.r_inner
 
     def in_series(self) -> Fenestration:
-        """With the film of the dark state in place of the path from the room to the outer layer."""
-        if self.room_to_outer == 0.0:
+        """As two layers: an interior shade with the film that it has in the dark."""
+        if self.shade is None:
             return self
-        past = self.room_to_outer * (1.0 - self.u_value * self.r_outer)
-        share = (self.u_value - past) / self.u_value  # of the heat that passes both layers
-        film = share / (1.0 / self.r_inner + self.extra_inner)
-        layers = self.layer_resistance
-        resistance = replace(layers, coefficients=tuple(c / share for c in layers.coefficients))
-        plain = replace(self, resistance=resistance, extra_inner=0.0, room_to_outer=0.0)
-        return with_realised_films(plain, r_inner_realised=film)
-
-
-def middle_resistance(u_value: float, outer: float, inner: float, across: float) -> float:
-    """Resistance [m2 K/W] between the layers with which all paths together pass U.
-
-    Args: conductances [W/(m2 K)]: outer layer to outdoors, inner layer to the room, and room to
-        outer layer.
-    """
-    at_outer = u_value / outer  # temperatures at 1 indoors and 0 outdoors
-    through = u_value - across * (1.0 - at_outer)
-    return (1.0 - through / inner - at_outer) / through
+        plain = replace(self, resistance=self.shade.two_layers, shade=None)
+        return with_realised_films(plain, r_inner_realised=self.shade.film)
 
 
 @dataclass(frozen=True, slots=True)
 class LayerAbsorptances:
-    """Solar absorptances of the two virtual layers, per direction."""
+    """Solar absorptances of the two layers, per direction; of panes and an interior shade."""
 
     outer: NDArray[np.float64]  # [...]
-    inner: NDArray[np.float64]  # [...]
+    inner: NDArray[np.float64]  # [...] of the shade where it is a node
     clipped: float  # largest absorptance that had to be moved to stay between 0 and alpha
-    air: NDArray[np.float64] | float = 0.0  # [...] to the room's air behind an interior shade
+    middle: NDArray[np.float64] | float = 0.0  # [...] of the innermost pane outside of the shade
+
+    def two_layers(self, system: Fenestration) -> LayerAbsorptances:
+        """Those of Kuhn's two layers with U and films of a system: as much goes indoors."""
+        if system.shade is None:
+            return self
+        nodes = self.outer, self.middle, self.inner
+        q_i = sum(share * node for share, node in zip(system.shade.inward, nodes, strict=True))
+        alpha = self.outer + self.middle + self.inner
+        low, high = system.u_value * system.r_outer, 1.0 - system.u_value * system.r_inner
+        inner = np.clip((q_i - low * alpha) / (high - low), 0.0, alpha)
+        return LayerAbsorptances(alpha - inner, inner, self.clipped)
 
 
 def layer_absorptances(
@@ -158,8 +167,6 @@ def layer_absorptances(
     *,
     r_outer: float = R_OUTER,
     r_inner: float = R_INNER,
-    inward: tuple[float, float] | None = None,
-    room_air: ArrayLike = 0.0,
     item: str = "fenestration",
 ) -> LayerAbsorptances:
     """Absorptances of the outer and inner layer, from data of one measuring condition.
@@ -170,8 +177,6 @@ def layer_absorptances(
     Args:
         transmittance, reflectance, g_value: [...] solar, per direction (or diffuse).
         u_value: [W/(m2 K)]; r_outer, r_inner: [m2 K/W] films at which g and U were measured.
-        inward: shares of `Fenestration.inward_shares`; None: those of U and the films.
-        room_air: [...] absorbed sun that goes to the room's air behind an interior shade.
 
     Raises: `ThermalInputError` for g below the transmittance, R not positive, values out of range.
 
@@ -190,17 +195,44 @@ def layer_absorptances(
     message = f"{stated:g} is below the solar transmittance {least:.3f}, the least that g can be"
     require(least - stated <= 0.01, f"{item}: g", message)
     alpha, q_i = np.maximum(1.0 - tau - rho, 0.0), np.maximum(g - tau, 0.0)
-    outer_share, inner_share = inward or (u_value * r_outer, u_value * (r_outer + r))
-    to_room = np.minimum(np.broadcast_to(room_air, alpha.shape), np.minimum(alpha, q_i))
-    layers = alpha - to_room
-    inner = (q_i - to_room - layers * outer_share) / (inner_share - outer_share)
-    kept = np.clip(inner, 0.0, layers)
+    inner = (q_i / u_value - alpha * r_outer) / r
+    kept = np.clip(inner, 0.0, alpha)
     clipped = float(np.max(np.abs(inner - kept), initial=0.0))
     message = f"a layer's absorptance is out of range by {clipped:.3f}"
     require(clipped <= MEASUREMENT_SLACK, f"{item}: g and U", message)
     if clipped > 1e-6:
         _log.warning("%s: %s; clipped", item, message)
-    return LayerAbsorptances(outer=layers - kept, inner=kept, clipped=clipped, air=to_room)
+    return LayerAbsorptances(outer=alpha - kept, inner=kept, clipped=clipped)
+
+
+def node_absorptances(
+    by_layer: ArrayLike, shade: InteriorShade, more: ArrayLike = 0.0
+) -> LayerAbsorptances:
+    """Absorptances of outer pane, innermost pane and interior shade, from those of all layers.
+
+    A pane between both divides its heat by the resistances to either side.
+
+    Args:
+        by_layer: [..., N] solar, outermost first, the shade last.
+        more: [...] what the stated g has over that of these layers; so much more goes indoors
+            where absorbed sun moves from outer pane to shade (less: back), then from the innermost
+            pane.
+    """
+    layers = np.asarray(by_layer, dtype=float)
+    share = np.array(shade.sun)
+    outer, middle = layers[..., :-1] @ (1.0 - share), layers[..., :-1] @ share
+    inner, left = layers[..., -1].copy(), np.broadcast_to(more, layers.shape[:-1]).copy()
+    low, between, high = shade.inward
+    up = np.clip(left / (high - low), 0.0, outer)
+    outer, inner, left = outer - up, inner + up, left - up * (high - low)
+    up = np.clip(left / (high - between), 0.0, middle)
+    middle, inner, left = middle - up, inner + up, left - up * (high - between)
+    down = np.clip(-left / (high - low), 0.0, inner)
+    outer, inner, left = outer + down, inner - down, left + down * (high - low)
+    down = np.clip(-left / (between - low), 0.0, middle)
+    outer, middle, left = outer + down, middle - down, left + down * (between - low)
+    clipped = float(np.max(np.abs(left), initial=0.0))
+    return LayerAbsorptances(outer, inner, clipped, middle)
 
 
 def linear_u(u_value: float, *, slope: float = SLOPE, reference_c: float = 10.0) -> LayerResistance:

@@ -81,8 +81,8 @@ class Solar:
     # [T, W] light of the room absorbed at the room side of the windows [W/m2 of glazing]
     window_inside: NDArray[np.float64] | None = None
     window_facade: NDArray[np.float64] | None = None  # [T, W] irradiance on the frames [W/m2]
-    # [T, W] sun that warms the room's air behind an interior shade [W/m2 of glazing]
-    absorbed_air: NDArray[np.float64] | None = None
+    # [T, W] by the innermost pane behind an interior shade [W/m2 of glazing]
+    absorbed_middle: NDArray[np.float64] | None = None
     state: NDArray[np.int64] | None = None  # [H, W] shading state of every hour
 
     def __post_init__(self) -> None:

@@ -137,12 +137,12 @@ class Closure:
                 emissivity_out=ends[0].emissivity[0] + ends[0].infrared_transmittance,
                 emissivity_in=ends[1].emissivity[1] + ends[1].infrared_transmittance,
             )
-            if data.behind is not None and films == (None, None):
+            if data.shade is not None and films == (None, None):
                 return replace(
                     closed,
-                    resistance=data.behind.resistance,
-                    extra_inner=data.behind.extra,
-                    room_to_outer=data.behind.across,
+                    resistance=data.shade.panes,
+                    emissivity_in=data.shade.emissivity_in,
+                    shade=data.shade,
                 )
             films = (
                 data.r_inner if place == "internal" and films[0] is None else films[0],

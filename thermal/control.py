@@ -138,9 +138,10 @@ def by_cut_off(
     """The most open slat tilt [H] that stops the beam; the last one where none does.
 
     Args: sun_local: [H, 3]; beam: [H] on the facade [W/m2] (0: slats stay open); tilts: [J] [rad]
-        of the states, from open to closed.
+        of the states, from open to closed; NaN: no slats, which stop nothing.
     """
     limits = cut_off_angle(tilts, width, spacing)
+    limits = np.where(np.isnan(limits), np.inf, limits)
     stops = profile_angle(sun_local)[None, :] >= limits[:, None]
     state = np.where(stops.any(axis=0), stops.argmax(axis=0), len(limits) - 1)
     return np.where(np.asarray(beam, dtype=float) > 0, state, 0).astype(np.int64)
@@ -194,7 +195,7 @@ def switched(suns: Sequence[Solar], chosen: ArrayLike, states: ArrayLike | None 
         require(same, f"solar {name}", "the combinations differ in shape")
         return np.stack(arrays)[at, np.arange(rows)]
 
-    names = ("absorbed_outer", "absorbed_inner", "absorbed_air", "inside", "facade")
+    names = ("absorbed_outer", "absorbed_inner", "absorbed_middle", "inside", "facade")
     parts: dict[str, Any] = {
         name: pick(name) for name in (*names, "window_inside", "window_facade")
     }

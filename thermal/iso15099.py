@@ -6,20 +6,13 @@ films belong to the measuring condition and not to a climate.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal.blackbox import (
-    R_INNER,
-    R_OUTER,
-    LayerResistance,
-    fit_conductance_surface,
-    middle_resistance,
-)
+from thermal.blackbox import InteriorShade, LayerResistance, fit_conductance_surface
 from thermal.errors import ThermalInputError, require
 from thermal.glazing_unit import Environment, GlazingUnit
 from thermal.layer_balance import INDOORS, UnitArrays, UnitState, settle
@@ -160,21 +153,6 @@ def _yearly_g(unit: GlazingUnit, tau: bytes, absorbed: bytes) -> bytes:
 
 
 @dataclass(frozen=True, slots=True)
-class AirBehind:
-    """Three conductances that stand for an interior shade, the air behind it and the panes.
-
-    A linear network between the shade's face, the outer pane and the room's air, whatever is
-    between them, is equal to a conductance between each two.  With the film of one state alone
-    (`r_inner`) the sun on a shade before clear glass warmed it by 5 instead of 9 K.
-    """
-
-    extra: float  # of the shade to the air behind it [W/(m2 K)]
-    across: float  # of this air to the outer pane [W/(m2 K)]
-    resistance: LayerResistance  # between the shade's face and the outer pane
-    to_air: tuple[float, ...]  # [N] share of the sun absorbed in each layer that goes to this air
-
-
-@dataclass(frozen=True, slots=True)
 class Iso15099Data:
     """Data of a system for the Blackbox model."""
 
@@ -182,7 +160,7 @@ class Iso15099Data:
     r_outer: float  # [m2 K/W] realised in that state: face to environment
     r_inner: float
     resistance: LayerResistance  # between the two faces, with the realised films
-    behind: AirBehind | None  # None: the room's air passes behind no shade
+    shade: InteriorShade | None  # None: the room's air passes behind no shade
 
 
 @lru_cache(maxsize=64)
@@ -192,11 +170,9 @@ def iso15099_data(unit: GlazingUnit, u_value: float | None = None) -> Iso15099Da
     Args: u_value: measured [W/(m2 K)]; R is shifted by the difference to the computed one.
     """
     found, r_outer, _, r_inner, _ = _dark_state(unit, *U_STATE_C)
-    apart = [(e, i) for e in OUTDOOR_C for i in INDOOR_C if abs(i - e) > 5.0]
-    states = [state for at in apart if (state := _settled_state(unit, *at)) is not None]
-    require(2 * len(states) > len(apart), "glazing", "most dark states have no balance")
     mean, difference, resistance = (
-        np.array(column) for column in zip(*(_middle(state) for state in states), strict=True)
+        np.array(column)
+        for column in zip(*(_middle(state) for state in _dark_states(unit)), strict=True)
     )
     computed = found
     if u_value is not None:
@@ -205,61 +181,56 @@ def iso15099_data(unit: GlazingUnit, u_value: float | None = None) -> Iso15099Da
         require(bool(resistance.min() > 1e-4), "glazing", message)
         found = u_value
     fit = fit_conductance_surface(mean, difference, resistance)
-    return Iso15099Data(found, r_outer, r_inner, fit, _air_behind(unit, computed, found, states))
+    shade = _interior_shade(unit, 1.0 / found - 1.0 / computed, fit, r_inner)
+    return Iso15099Data(found, r_outer, r_inner, fit, shade)
 
 
-SHADE_SUN = 0.3  # of the sun, absorbed by one layer in the states of its conductances
+def _interior_shade(
+    unit: GlazingUnit, shift: float, two_layers: LayerResistance, film: float
+) -> InteriorShade | None:
+    """The interior shade of a unit, whose gap the room's air passes; None without one.
 
-
-def _air_behind(
-    unit: GlazingUnit, computed: float, stated: float, dark: Sequence[DarkState]
-) -> AirBehind | None:
-    """The conductances of an interior shade, of least squares in a dark and in two sunny states.
-
-    Args: computed, stated: U [W/(m2 K)]; the resistance is shifted by the difference.
+    Args: shift: of the panes' resistance [m2 K/W], from a stated U; `two_layers`, film: of the
+        dark unit, from face to face and from the shade to the room.
     """
-    if unit.shade_place != "internal":
+    arrays = unit.arrays(*(Environment(t, CONVECTION_INSIDE) for t in U_STATE_C))
+    if unit.shade_place != "internal" or arrays.air[-1] != INDOORS:
         return None
-    sun_on_shade = np.eye(len(unit.layers))[-1] * SHADE_SUN
-    rows, flows = [], []
-    for outdoor, indoor, sun in ((*U_STATE_C, 0.0), *G_STATES):
-        balance = unit_balance(unit, prescribed(outdoor, indoor), sun * sun_on_shade)
-        outer, shade = balance.faces_c[[0, -1]]
-        front = balance.heat_in - balance.air_in
-        rows += [[shade - outer, shade - indoor, 0.0], [0.0, shade - indoor, outer - indoor]]
-        flows += [SHADE_SUN * sun - front, balance.air_in]
-    extra, across = np.maximum(np.linalg.lstsq(rows, flows, rcond=None)[0][1:], 0.0).tolist()
-    if across < 1e-6:
-        return None
-    found = []
-    for _, _, resistance, r_inner, (outer, shade) in dark:
-        heat = (shade - outer) / resistance
-        through = heat - across * (shade + heat * r_inner - outer)
-        if through * heat > 0.0:
-            found.append((0.5 * (outer + shade), shade - outer, (shade - outer) / through))
-    mean, difference, middle = np.array(found).T
-    paths = 1.0 / R_OUTER, 1.0 / R_INNER + extra, across
-    middle = middle + middle_resistance(stated, *paths) - middle_resistance(computed, *paths)
-    return AirBehind(
-        extra, across, fit_conductance_surface(mean, difference, middle),
-        tuple(_to_air(unit, extra, across).tolist()),
-    )  # fmt: skip
-
-
-def _to_air(unit: GlazingUnit, extra: float, across: float) -> FloatArray:
-    """Share [N] of the sun absorbed in each layer that goes to the air behind an interior shade.
-
-    It is what the air takes besides the conductances from both faces, in the mean of `G_STATES`.
-    """
-    shares = []
-    for outdoor, indoor, sun in G_STATES:
-        taken = []
-        for absorbed in SHADE_SUN * sun * np.eye(len(unit.layers) + 1, len(unit.layers), -1):
-            balance = unit_balance(unit, prescribed(outdoor, indoor), absorbed)
-            outer, shade = balance.faces_c[[0, -1]]
-            taken.append(balance.air_in - extra * shade - across * outer)
-        shares.append((np.array(taken[1:]) - taken[0]) / (SHADE_SUN * sun))
-    return np.clip(np.mean(shares, axis=0), 0.0, 1.0)
+    pane, shade = unit.layers[-2:]
+    bare = replace(unit, layers=unit.layers[:-1], gaps=unit.gaps[:-1])
+    found = [_middle(state) for state in _dark_states(bare)]
+    mean, difference, resistance = (np.array(column) for column in zip(*found, strict=True))
+    message = f"U is {-shift:.3g} m2 K/W too high for the resistance of the panes"
+    require(bool((resistance + shift).min() > 1e-4), "glazing", message)
+    dark = unit_balance(unit, prescribed(*U_STATE_C))
+    faces = dark.faces_c
+    u_value = 1.0 / (shift - (U_STATE_C[1] - U_STATE_C[0]) / dark.heat_in)
+    outer = u_value * (faces[0] - U_STATE_C[0]) / -dark.heat_in
+    beyond = u_value * (U_STATE_C[1] - faces[-3]) / -dark.heat_in
+    of_shade = (U_STATE_C[1] - faces[-1]) / (U_STATE_C[1] - faces[-3])
+    shares = (faces[:-2] - faces[0]) / (faces[-3] - faces[0])
+    # longwave between pane and shade, and from both to the room, by the pane and the openings too.
+    # It is one flow with the room, divided by weights: what that gives the shade of the pane's own
+    # is between both
+    passes, reflects = shade.infrared_transmittance, 1.0 - pane.emissivity[1]
+    front, back = shade.emissivity
+    bounces = 1.0 - reflects * (1.0 - front - passes)
+    of_pane = pane.emissivity[1] * passes / bounces
+    whole = of_pane + back + front * reflects * passes / bounces
+    return InteriorShade(
+        width=unit.gaps[-1].width,
+        height=unit.height,
+        tilt=float(np.radians(unit.tilt_deg)),
+        impedance=float(arrays.impedance[-1]),
+        exchange=pane.emissivity[1] * front / bounces + of_pane * (1.0 - of_pane / whole),
+        pane_weight=of_pane / whole,
+        emissivity_in=whole,
+        panes=fit_conductance_surface(mean, difference, resistance + shift),
+        sun=tuple(shares.reshape(-1, 2).mean(axis=1).tolist()),
+        inward=(float(outer), float(1.0 - beyond), float(1.0 - beyond * of_shade)),
+        two_layers=two_layers,
+        film=film,
+    )
 
 
 DarkState = tuple[float, float, float, float, tuple[float, float]]
@@ -272,6 +243,14 @@ def _dark_state(unit: GlazingUnit, outdoor: float, indoor: float) -> DarkState:
     outer, inner = float(balance.faces_c[0]), float(balance.faces_c[-1])
     resistances = ((outer - outdoor) / heat, (inner - outer) / heat, (indoor - inner) / heat)
     return heat / (indoor - outdoor), *resistances, (outer, inner)
+
+
+def _dark_states(unit: GlazingUnit) -> list[DarkState]:
+    """The states of a grid of temperatures outdoors and indoors."""
+    apart = [(e, i) for e in OUTDOOR_C for i in INDOOR_C if abs(i - e) > 5.0]
+    states = [state for at in apart if (state := _settled_state(unit, *at)) is not None]
+    require(2 * len(states) > len(apart), "glazing", "most dark states have no balance")
+    return states
 
 
 def _settled_state(unit: GlazingUnit, outdoor: float, indoor: float) -> DarkState | None:

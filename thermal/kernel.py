@@ -41,7 +41,6 @@ def _account(
     heat = weather.density[t] * AIR_HEAT
     for z in range(work.old_air.size):
         warmer = weather.outdoor[t] - state.air[z]
-        terms[z, on.SUN] += drive.air[sun, z]
         terms[z, on.GAINS] += drive.convective[hour, z] + drive.radiant[hour, z]
         terms[z, on.AIR] += heat * (work.flow[z] + work.aired[z]) * warmer + work.carried[z]
         terms[z, on.AIR] -= work.passed[z] * state.air[z]
@@ -63,7 +62,7 @@ def _account(
         t_o = state.outer[i]
         terms[z, on.SUN] += drive.inner[sun, i]
         if kind == WINDOW:
-            terms[z, on.GLASS_SUN] += area * drive.outer[sun, i]
+            terms[z, on.GLASS_SUN] += area * (drive.outer[sun, i] + drive.middle[sun, i])
             terms[z, on.WINDOWS] += area * (work.outdoor[i, 4] - work.outdoor[i, 3] * t_o)
             continue
         stored = _move_modes(net, i, state, work)
@@ -144,8 +143,6 @@ def _take_alternative(
         drive.mix[hour, z] = some.mix[now, hour, z]
         drive.convective[hour, z] = some.convective[now, hour, z]
         drive.radiant[hour, z] = some.radiant[now, hour, z]
-        for sun in range(hour * per_hour, (hour + 1) * per_hour):
-            drive.air[sun, z] = some.air[now, sun, z]
         for i in range(net.radiation.first_face[z], net.radiation.first_face[z + 1]):
             if net.faces.kind[i] == WINDOW:
                 w = net.faces.window[i]
@@ -153,6 +150,7 @@ def _take_alternative(
             for sun in range(hour * per_hour, (hour + 1) * per_hour):
                 drive.inner[sun, i] = some.inner[now, sun, i]
                 drive.outer[sun, i] = some.outer[now, sun, i]
+                drive.middle[sun, i] = some.middle[now, sun, i]
 
 
 @compiled(**ENTRY)

@@ -23,7 +23,8 @@ from thermal.records import ENTRY, inlined
 
 GRAVITY = 9.807  # [m/s2]
 REFERENCE_K = 283.0  # of the density that drives the air
-HALVINGS = 60  # of the interval in which the air's speed is looked for
+HALVINGS = 60  # at most, of the interval in which the air's speed is looked for
+LEAST_EXCESS = 1e-10  # [m/s] of the speed that the air drives over the one that it has
 
 FloatArray = NDArray[np.float64]
 
@@ -153,17 +154,56 @@ def speed_by_air(
     inlet: float,
     at: float,
 ) -> float:
-    """Speed [m/s] of a gap's air that comes from and goes to air of one temperature [K]."""
+    """Speed [m/s] of a gap's air that comes from and goes to air of one temperature [K].
+
+    By the Illinois method (Dowell and Jarratt 1971, doi:10.1007/BF01934364).
+    """
     a, b = pressure_terms(fractions, gap, width, height, impedance, at)
     low, high = 0.0, driven_speed(a, b, mean, inlet, height, tilt)
+    if high <= 1e-12:
+        return 0.0
+    # the speed that the air drives less that which it has: above zero at `low`, not so at `high`
+    over = high
+    under = _drives(
+        fractions, gap, width, height, tilt, closed, mean, inlet, at, a, b, high
+    ) - high  # fmt: skip
+    side = 0
     for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        average = air_in_gap(fractions, gap, width, height, closed, middle, mean, inlet, at)[1]
-        if driven_speed(a, b, average, inlet, height, tilt) > middle:
-            low = middle
+        speed = (low * under - high * over) / (under - over)
+        excess = _drives(
+            fractions, gap, width, height, tilt, closed, mean, inlet, at, a, b, speed
+        ) - speed  # fmt: skip
+        if abs(excess) < LEAST_EXCESS:
+            return speed
+        if excess > 0.0:
+            low, over = speed, excess
+            under = 0.5 * under if side > 0 else under
+            side = 1
         else:
-            high = middle
+            high, under = speed, excess
+            over = 0.5 * over if side < 0 else over
+            side = -1
     return 0.5 * (low + high)
+
+
+@inlined
+def _drives(
+    fractions: FloatArray,
+    gap: int,
+    width: float,
+    height: float,
+    tilt: float,
+    closed: float,
+    mean: float,
+    inlet: float,
+    at: float,
+    a: float,
+    b: float,
+    speed: float,
+) -> float:
+    """Speed [m/s] that a gap's air drives where it moves with another."""
+    average = air_in_gap(fractions, gap, width, height, closed, speed, mean, inlet, at)[1]
+    return driven_speed(a, b, average, inlet, height, tilt)
 
 
 @inlined

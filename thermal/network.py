@@ -247,8 +247,10 @@ class Glass(NamedTuple):
 
     kind: NDArray[np.int64]  # [W, J] of the layer resistance
     coefficient: NDArray[np.float64]  # [W, J, 6]
-    # [W, J, 3] conductances [W/(m2 K)]: outer and inner extra, room air to the outer layer
-    extra: NDArray[np.float64]
+    extra: NDArray[np.float64]  # [W, J, 2] conductances [W/(m2 K)] to outdoor and room air
+    # [W, J, 6] interior shades: gap's width (0: none), height, tilt, impedance; longwave to the
+    # pane; weight of the pane in what the room sees
+    shade: NDArray[np.float64]
     emissivity_out: NDArray[np.float64]  # [W, J]
 
 
@@ -572,7 +574,8 @@ def _glass(elements: list[tuple[int, OpaqueSurface | WindowElement]]) -> Glass:
     states = max((len(w.states) for w in windows), default=1)
     kind = np.zeros((len(windows), states), dtype=np.int64)
     coefficient = np.zeros((len(windows), states, 6))
-    extra = np.zeros((len(windows), states, 3))
+    extra = np.zeros((len(windows), states, 2))
+    shade = np.zeros((len(windows), states, 6))
     emissivity = np.zeros((len(windows), states))
     for w, window in enumerate(windows):
         for j in range(states):
@@ -580,6 +583,10 @@ def _glass(elements: list[tuple[int, OpaqueSurface | WindowElement]]) -> Glass:
             r = state.layer_resistance
             kind[w, j] = _RESISTANCE_KINDS[r.kind]
             coefficient[w, j, : len(r.coefficients)] = r.coefficients
-            extra[w, j] = state.extra_outer, state.extra_inner, state.room_to_outer
+            extra[w, j] = state.extra_outer, state.extra_inner
             emissivity[w, j] = state.emissivity_out
-    return Glass(kind, coefficient, extra, emissivity)
+            if (one := state.shade) is not None:
+                shade[w, j] = (
+                    one.width, one.height, one.tilt, one.impedance, one.exchange, one.pane_weight
+                )  # fmt: skip
+    return Glass(kind, coefficient, extra, shade, emissivity)

@@ -55,7 +55,7 @@ class Alternatives(NamedTuple):
     limits: NDArray[np.float64]
     inner: NDArray[np.float64]  # [A, R, N]
     outer: NDArray[np.float64]  # [A, R, N]
-    air: NDArray[np.float64]  # [A, R, Z]
+    middle: NDArray[np.float64]  # [A, R, N]
     state: NDArray[np.int64]  # [A, H, W]
     mix: NDArray[np.int64]  # [A, H, Z]
     convective: NDArray[np.float64]  # [A, H, Z]
@@ -67,7 +67,7 @@ class Drive(NamedTuple):
 
     inner: NDArray[np.float64]  # [R, N] absorbed at the inside faces [W]
     outer: NDArray[np.float64]  # [R, N] absorbed at the outside faces or outer layers [W/m2]
-    air: NDArray[np.float64]  # [R, Z] sun that warms the air behind interior shades [W]
+    middle: NDArray[np.float64]  # [R, N] absorbed by panes behind interior shades [W/m2]
     state: NDArray[np.int64]  # [H, W] shading state
     mix: NDArray[np.int64]  # [H, Z] emissivities of the zone's windows: `WindowMix`
     convective: NDArray[np.float64]  # [H, Z] gains [W]
@@ -93,6 +93,7 @@ class State(NamedTuple):
 
     inner: NDArray[np.float64]  # [N] inside faces
     outer: NDArray[np.float64]  # [N] outside faces
+    glass: NDArray[np.float64]  # [N, 3] of windows with interior shades: outer, inner pane, shade
     mode: NDArray[np.float64]  # [M] amplitudes of the modes of the walls' inner nodes [K]
     air: NDArray[np.float64]  # [Z]
     load: NDArray[np.float64]  # [Z] ideal load of the step [W], heating positive
@@ -133,9 +134,11 @@ class Workspace(NamedTuple):
     still: NDArray[np.float64]  # [M] amplitudes that the step before alone would give
     ends: NDArray[np.float64]  # [N, 2] what these give the outermost and innermost inner node
     film: NDArray[np.float64]  # [N] conductance between inside face and room air [W/(m2 K)]
-    # [N, 6] outer face: diagonal, right side, coupling to inside, film sum, sum of film times T,
-    # coupling to room air
+    # [N, 5] outer face: diagonal, right side, coupling to inside, film sum, sum of film times T
     outdoor: NDArray[np.float64]
+    # [N, 3, 3] nodes of windows with interior shades: by outdoors and sun alone, with the room's
+    # air 1 K warmer, with 1 W/m2 of the room's longwave
+    nodes: NDArray[np.float64]
     old_inner: NDArray[np.float64]  # [N]
     old_outer: NDArray[np.float64]  # [N]
     old_air: NDArray[np.float64]  # [Z]

@@ -56,6 +56,7 @@ from thermal.records import (
     inlined,
     summed,
 )
+from thermal.shaded_window import shaded_row, take_nodes
 from thermal.ventilation import REFERENCE_DENSITY
 
 SHUT, OPEN = 0, 1  # windows of a zone in an iterate
@@ -537,28 +538,54 @@ def _window_row(
     outer_sun: float,
     method: Method,
 ) -> tuple[float, float]:
-    """Diagonal and right side [per m2] of an inner window layer, its outer layer eliminated.
-
-    Without what goes to the room air.
-    """
+    """Diagonal and right side [per m2] of an inner window layer, its outer layer eliminated."""
     w = net.faces.window[i]
     emissivity = net.glass.emissivity_out[w, shading]
     h, h_t = _outside_exchange(net.faces, i, state.outer[i], emissivity, weather, t, method)
-    extra, _, to_room = net.glass.extra[w, shading]
+    extra = net.glass.extra[w, shading, 0]
     c = _layer_conductance(
         net.glass.kind[w, shading],
         net.glass.coefficient[w, shading],
         state.inner[i],
         state.outer[i],
     )
-    outer_diagonal = h + extra + c + to_room
+    outer_diagonal = h + extra + c
     h_t += extra * weather.outdoor[t]
     outer_right = h_t + outer_sun
     row = work.outdoor[i]
     row[0], row[1], row[2], row[3], row[4] = outer_diagonal, outer_right, c, h + extra, h_t
-    row[5] = to_room
     passed = c / outer_diagonal
-    return c - (c + to_room) * passed, outer_right * passed
+    return c - c * passed, outer_right * passed
+
+
+@inlined
+def _shaded_row(
+    net: Network,
+    i: int,
+    state: State,
+    work: Workspace,
+    weather: OutdoorConditions,
+    drive: Drive,
+    t: int,
+    method: Method,
+) -> tuple[float, float, float]:
+    """Diagonal, film and right side [per m2] of a window with an interior shade, as it is seen."""
+    faces, glass = net.faces, net.glass
+    w, z, sun = faces.window[i], faces.zone[i], t // method.solar_every
+    shading = drive.state[t // method.steps, w]
+    outer, middle, shade = state.glass[i]
+    emissivity = glass.emissivity_out[w, shading]
+    h, h_t = _outside_exchange(faces, i, outer, emissivity, weather, t, method)
+    row = work.outdoor[i]
+    row[3], row[4] = h, h_t
+    c = _layer_conductance(glass.kind[w, shading], glass.coefficient[w, shading], middle, outer)
+    film = _inside_film(faces, i, shade, state.air[z], method) + glass.extra[w, shading, 1]
+    nodes = work.nodes[i]
+    nodes[0, 0] = h_t + drive.outer[sun, i]
+    nodes[0, 1], nodes[0, 2] = drive.middle[sun, i], drive.inner[sun, i] / faces.area[i]
+    return shaded_row(
+        glass.shade[w, shading], state.glass[i], state.air[z], work, z, i, h, c, film, faces.area[i]
+    )
 
 
 @inlined
@@ -590,17 +617,17 @@ def _assemble(
     for i in range(n):
         z, kind, area, k = faces.zone[i], faces.kind[i], faces.area[i], place[i]
         film = _inside_film(faces, i, state.inner[i], state.air[z], method)
+        inner_sun = drive.inner[sun, i]
         if kind == WINDOW:
             shading = drive.state[hour, faces.window[i]]
             film += net.glass.extra[faces.window[i], shading, 1]
-            own, r = _window_row(
-                net, i, state, work, weather, t, shading, drive.outer[sun, i], method
-            )
-            row = work.outdoor[i]
-            share = row[5] / row[0]  # of what reaches the outer layer from the room's air
-            film += row[2] * share  # by way of the outer layer
-            work.air[z, 0] += area * row[3] * share  # and to outdoors
-            work.air[z, 1] += area * row[1] * share
+            if net.glass.shade[faces.window[i], shading, 0] > 0.0:
+                own, film, r = _shaded_row(net, i, state, work, weather, drive, t, method)
+                inner_sun = 0.0  # it is in the row
+            else:
+                own, r = _window_row(
+                    net, i, state, work, weather, t, shading, drive.outer[sun, i], method
+                )
         elif kind == PARTNER:
             p = faces.partner[i]
             c_o, _, g_o, _, u_o, v_o, _, _ = faces.port[p]
@@ -614,7 +641,7 @@ def _assemble(
         work.film[i] = film
         d[k] = area * (own + film)
         share = _share(net, drive, hour, z, i)
-        b[k] = area * r + drive.inner[sun, i] + drive.radiant[hour, z] * share
+        b[k] = area * r + inner_sun + drive.radiant[hour, z] * share
         b[k] += _radiated(net, work, drive, z, i, share)
         work.air[z, 0] += area * film
         if is_held(work.plant[z]):
@@ -673,7 +700,6 @@ def _assemble_air(
         work.air[z, 0] = store + outdoor + work.supply[z, 0]
         work.air[z, 1] = store * work.old_air[z] + outdoor * weather.outdoor[t]
         work.air[z, 1] += work.supply[z, 1] + drive.convective[hour, z]
-        work.air[z, 1] += drive.air[t // method.solar_every, z]
         work.carried[z], work.passed[z] = 0.0, 0.0
     for q in range(net.paths.beside.size):
         z, beyond = net.paths.beside[q], drive.beside_c[t, q]
@@ -702,14 +728,17 @@ def _assemble_air(
 
 
 @inlined
-def _outer_from_inner(net: Network, state: State, work: Workspace, drive: Drive, t: int) -> None:
+def _outer_from_inner(
+    net: Network, state: State, work: Workspace, drive: Drive, t: int, hour: int
+) -> None:
     faces = net.faces
     for i in range(faces.area.size):
         kind = faces.kind[i]
         if kind == OUTDOOR or kind == WINDOW or kind == ADIABATIC:
             row = work.outdoor[i]
-            reached = row[1] + row[2] * state.inner[i] + row[5] * state.air[faces.zone[i]]
-            state.outer[i] = reached / row[0]
+            state.outer[i] = (row[1] + row[2] * state.inner[i]) / row[0]
+            if kind == WINDOW:
+                take_nodes(net, state, work, drive.state[hour, faces.window[i]], i)
         elif kind == KNOWN:
             state.outer[i] = drive.beyond[t, faces.beyond[i]]
         elif kind == TWIN:
@@ -759,7 +788,7 @@ def step(
         for z in range(work.old_air.size):
             change = max(change, abs(work.unknown[n + z] - state.air[z]))
             state.air[z] = work.unknown[n + z]
-        _outer_from_inner(net, state, work, drive, t)
+        _outer_from_inner(net, state, work, drive, t, hour)
         if change < method.tolerance:
             break
     for z in range(work.plant.size):

@@ -15,6 +15,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermal.blackbox import (
+    Fenestration,
+    LayerAbsorptances,
+    layer_absorptances,
+    node_absorptances,
+)
 from thermal.closure import Closure
 from thermal.errors import require
 from thermal.glazing import Gap
@@ -207,13 +213,30 @@ class WindowModel:
     likely: tuple[GlazingUnit, ...] = ()  # others that are as likely
     absorbed: FloatArray | None = None  # [K, N] by the layers, stated or typical
 
-    def to_air(self) -> FloatArray | float:
-        """Absorbed sun [K] that goes to the room's air behind an interior shade."""
-        films = self.closure.states_films
-        layered = None if films else self.closure.layers(self.data.u_value)
-        if layered is None or layered.behind is None or self.absorbed is None:
-            return 0.0
-        return self.absorbed @ np.array(layered.behind.to_air)
+    def absorptances(
+        self,
+        transmittance: ArrayLike,
+        reflectance: ArrayLike,
+        g_value: ArrayLike,
+        closed: Fenestration,
+        *,
+        item: str = "fenestration",
+    ) -> LayerAbsorptances:
+        """Absorptances [K] of the nodes of the system that this closure gives.
+
+        With an interior shade those of the layers, so moved between them that g is the stated one;
+        else Kuhn's, from U and g.
+
+        Args: transmittance, reflectance, g_value: [K] of the system, the year's g.
+        """
+        unit = self.closure.unit
+        if closed.shade is None or unit is None or self.absorbed is None:
+            return layer_absorptances(
+                transmittance, reflectance, g_value, closed.u_value,
+                r_outer=closed.r_outer, r_inner=closed.r_inner, item=item,
+            )  # fmt: skip
+        of_layers = yearly_g_values(unit, transmittance, self.absorbed)
+        return node_absorptances(self.absorbed, closed.shade, np.asarray(g_value) - of_layers)
 
 
 def window_model(

@@ -25,8 +25,7 @@ from bim.gbxml.use import UseReader
 from bim.model import Building, Element
 from bim.planes import newell_normal
 from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, triangles_of_rings
-from bim.report.issue import Effect, Issue
-from mitsuba_cfs.surfaces import triangle_areas
+from bim.report.issue import Issue
 
 KINDS = {  # of a surface: kind of the face of its first room, and what lies beyond with one room
     "InteriorWall": ("wall", "adiabatic"),
@@ -87,7 +86,10 @@ class _Reader:
     def drawn(self) -> DrawnModel:
         """The document as polygons."""
         document, root = self.document, self.document.root
-        spaces = {s.get("id", ""): s for s in document.all("Campus/Building/Space")}
+        spaces: dict[str, ElementTree.Element] = {}
+        for space in document.all("Campus/Building/Space"):
+            if spaces.setdefault(space.get("id", ""), space) is not space:
+                raise document.fault("is the id of another space too", space, "id")
         faces: dict[str, list[DrawnFace]] = {guid: [] for guid in spaces}
         elements: list[Element] = []
         unplaced: Counter[str] = Counter()
@@ -97,12 +99,12 @@ class _Reader:
                 raise document.fault("has no polygon", surface, "PlanarGeometry/PolyLoop")
             beside = self._beside(surface, spaces)
             kind = surface.get("surfaceType", "")
+            self._note_glass(surface, of_room=kind not in OUTDOORS and bool(beside))
             if kind in OUTDOORS or not beside:
                 elements += self._shade(surface, ring @ self.turn.T)
             elif kind not in KINDS:
                 unplaced[kind] += 1
             else:
-                self._note_inner_glass(surface, beside)
                 for number, guid in enumerate(beside):
                     faces[guid].append(self._face(surface, ring @ self.turn.T, beside, number))
         self.issues += [
@@ -159,20 +161,15 @@ class _Reader:
                 raise self.document.fault(f"no Space {name!r:.60}", surface, "AdjacentSpaceId")
         return list(dict.fromkeys(named))[:2]
 
-    def _note_inner_glass(self, surface: ElementTree.Element, beside: Sequence[str]) -> None:
-        """Report the glass of a surface that has the same room on both sides: it lights nothing."""
-        if len(beside) == 2 or KINDS[surface.get("surfaceType", "")][1] == "outside":
-            return
-        for opening in surface.iterfind("Opening"):
-            ring = self.document.ring(opening)
-            if opening.get("openingType", "") in GLAZED and ring is not None:
-                area = float(triangle_areas(triangles_of_rings((ring,))).sum())
-                values = {"element": _name(opening), "surface": _name(surface)}
-                self.issues.append(
-                    Issue(
-                        "glass-within-room", opening.get("id", ""), values, Effect("window", area)
-                    )
-                )
+    def _note_glass(self, surface: ElementTree.Element, *, of_room: bool) -> None:
+        """Report a surface whose construction transmits light, and openings of shades."""
+        materials = [surface.get("constructionIdRef", "")]
+        materials = materials if self.constructions.transmittance(surface) else []
+        if not of_room:
+            materials += [_name(opening) for opening in surface.iterfind("Opening")]
+        for material in materials:
+            values = {"element": _name(surface), "material": material}
+            self.issues.append(Issue("shade-taken-as-opaque", surface.get("id", ""), values))
 
     def _face(
         self,
@@ -219,9 +216,10 @@ class _Reader:
             reason = f"{kind[:40]!r}, expected of {', '.join((*GLAZED, *DOORS))}"
             values = {"field": "openingType", "reason": reason}
             self.issues.append(Issue("value-not-read", opening.get("id") or without_id, values))
-        if kind in GLAZED or (kind not in DOORS and opening.get("windowTypeIdRef")):
-            values = self.constructions.window(opening)
-            return DrawnOpening(guid, _name(opening), ring, glazing=values)
+        refers = kind not in DOORS and opening.get("windowTypeIdRef")
+        if kind in GLAZED or refers or self.constructions.is_glass(opening):
+            values, own = self.constructions.window(opening), opening.get("id") or without_id
+            return DrawnOpening(guid, _name(opening), ring, glazing=values, both_sides=own)
         finish = self.constructions.finish(opening.get("constructionIdRef"))
         return DrawnOpening(guid, _name(opening), ring, finish.turned() if number else finish)
 

@@ -17,6 +17,7 @@ PARTS = (
     "Glaze", "Gap", "Frame", "Blind", "Shade", "ShadeControl", "ShadingCoeff", "Reflectance",
     "Emittance", "GlazeConductivity",
 )  # fmt: skip
+ANGLES = ("incidentAngle", "solarIncidentAngle")  # attributes [deg]
 SHADES = ("interiorShadeType", "exteriorShadeType")  # attributes of an opening, not read
 
 
@@ -104,6 +105,17 @@ class Constructions:
         except ValueError as error:
             raise self.document.fault(str(error), material) from None
 
+    def is_glass(self, opening: ElementTree.Element) -> bool:
+        """Whether an opening of any type has a window type, or a construction that passes light."""
+        return opening.get("windowTypeIdRef", "") in self._by_id["WindowType"] or bool(
+            self.transmittance(opening)
+        )
+
+    def transmittance(self, surface: ElementTree.Element) -> float | None:
+        """Visible transmittance that a surface's construction states."""
+        one = self._by_id["Construction"].get(surface.get("constructionIdRef", ""))
+        return None if one is None else self._share(one, "Transmittance", "Visible")
+
     def window(self, opening: ElementTree.Element) -> GlazingValues:
         """What an opening's window type, else its construction states."""
         name = opening.get("windowTypeIdRef") or opening.get("constructionIdRef") or ""
@@ -129,10 +141,7 @@ class Constructions:
     def _values(self, known: ElementTree.Element) -> GlazingValues:
         """What a window type states; where its U and g are both nought, it states nothing."""
         name, panes = _name(known), len(known.findall("Glaze")) or None
-        g_text = known.find("SolarHeatGainCoeff")
-        g_value = None if g_text is None else self.document.optional(
-            lambda: self._fraction(known, g_text), self.issues
-        )  # fmt: skip
+        g_value = self._share(known, "SolarHeatGainCoeff")
         u_value = self._quantity(known, "U-value") or None
         if u_value is None and g_value == 0:
             values = {"type": name}
@@ -151,15 +160,21 @@ class Constructions:
         """A quantity [SI]; None where it is not stated or cannot be read."""
         return self.document.optional(lambda: self.document.quantity(owner, name), self.issues)
 
-    def _share(self, owner: ElementTree.Element, what: str, kind: str) -> float | None:
-        """A share of 1 of that kind, near normal incidence; None as for `_quantity`."""
+    def _share(
+        self, owner: ElementTree.Element, what: str, kind: str | None = None
+    ) -> float | None:
+        """A share of 1 of that kind at normal incidence; None as for `_quantity`."""
         return self.document.optional(lambda: self._stated(owner, what, kind), self.issues)
 
-    def _stated(self, owner: ElementTree.Element, what: str, kind: str) -> float | None:
-        kinds = (kind, kind.replace("Visible", "Vis"))  # the schema's word, and earlier exports'
-        for one in owner.iterfind(what):
-            if one.get("type") in kinds and one.get("incidentAngle", "0") in ("0", "0.0", ""):
+    def _stated(self, owner: ElementTree.Element, what: str, kind: str | None) -> float | None:
+        """Raises: `DataError` where it is stated at other angles alone."""
+        kinds = (kind, kind and kind.replace("Visible", "Vis"))  # of the schema, earlier exports
+        stated = [one for one in owner.iterfind(what) if kind is None or one.get("type") in kinds]
+        for one in stated:
+            if {one.get(angle, "0") for angle in ANGLES} <= {"0", "0.0", ""}:
                 return self._fraction(owner, one)
+        if stated:
+            raise self.document.fault("expected the value of normal incidence", owner, what)
         return None
 
     def _fraction(self, owner: ElementTree.Element, one: ElementTree.Element) -> float:

@@ -197,7 +197,7 @@ class UseReader:
             return YearSchedule(values.name, self._celsius(values.values, file_unit, zone))
         if design is None:
             return None
-        stated = np.array(self.document.number(design, least=-459.67, most=400.0))
+        stated = np.array(self.document.number(design, least=-459.67, most=1000.0))
         constant = float(self._celsius(stated, design.get("unit", file_unit), zone))
         self._issues.append(
             Issue("set-point-without-schedule", self.document.file.name, {"field": field})

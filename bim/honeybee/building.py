@@ -118,6 +118,7 @@ class _Reader:
         if many:
             self.issues.append(Issue("room-multipliers", self.path.name, {"rooms": many}))
         self.issues += shade_issues(model, self.path)
+        self.issues += [*self.energy.objects.issues, *self.light.objects.issues]
         self._group_issues()
         return DrawnModel(
             self.path, model.label, rooms, tuple(elements), furniture, tuple(self.issues)
@@ -135,9 +136,10 @@ class _Reader:
         openings += [self._opening(one, face, room) for one in face.doors or ()]
         part = PARTS.get(face.face_type, "")
         field = _set_field(condition, energy=True)
-        name = self.energy.objects.name(face.properties.energy, room.properties.energy, part, field)
-        if face.face_type == "AirBoundary":
-            name = None
+        own, of_room = face.properties, room.properties
+        name = None
+        if face.face_type != "AirBoundary":
+            name = self.energy.objects.name(own.energy, of_room.energy, part, field)
         kind = KINDS.get(face.face_type, "")
         return DrawnFace(
             face.identifier, face.label, kind, face.geometry.rings(self.scale), adjacency,
@@ -147,6 +149,9 @@ class _Reader:
 
     def _behind(self, face: RoomFace, condition: Condition) -> tuple[str, str | None]:
         adjacency = ADJACENCY.get(condition.type, "adiabatic")
+        if condition.type not in (*ADJACENCY, "Adiabatic"):
+            known = {"element": face.label, "condition": condition.type[:40]}
+            self.issues.append(Issue("boundary-not-computed", face.identifier, known))
         if adjacency != "space":
             return adjacency, None
         others = [name for name in condition.boundary_condition_objects if name in self.rooms]
@@ -168,7 +173,10 @@ class _Reader:
         own, of_room = one.properties.radiance, room.properties.radiance
         modifier = self.light.objects.name(own, of_room, part, field)
         material = None if modifier is None else self.light.material(modifier)
-        if material is None or not material.is_opaque or material.kind == "trans":
+        if material is not None and (not material.is_opaque or material.kind == "trans"):
+            known = {"element": one.label, "material": material.name}
+            self.issues.append(Issue("shade-taken-as-opaque", one.identifier, known))
+        if material is None or not material.is_opaque:
             return _by_construction(opaque)
         solar = None if opaque is None or opaque.inner_solar is None else opaque.inner_solar
         gloss = material.gloss
@@ -183,6 +191,11 @@ class _Reader:
 
     def _opening(self, one: HoneybeeAperture, face: RoomFace, room: HoneybeeRoom) -> DrawnOpening:
         rings = one.geometry.rings(self.scale)
+        if one.boundary_condition.type not in (face.boundary_condition.type, "Outdoors"):
+            behind = (repr(c.boundary_condition.type[:40]) for c in (one, face))
+            reason = "{} in a face whose condition is {}".format(*behind)
+            known = {"field": "boundary_condition", "reason": reason}
+            self.issues.append(Issue("value-not-read", one.label, known))
         part, fields = _opening_set(one, face)
         own, of_room = one.properties, room.properties
         name = self.energy.objects.name(own.energy, of_room.energy, part, f"{fields}_construction")
@@ -204,7 +217,7 @@ class _Reader:
         up = self._up(one, modifier, rings[0]) if states else None
         return DrawnOpening(
             one.identifier, one.label, rings[0], glazing=glazing, states=states,
-            holes=rings[1:], up=up,
+            holes=rings[1:], up=up, both_sides=min(one.identifier, *_other_side(one)),
         )  # fmt: skip
 
     def _by_modifier(
@@ -357,9 +370,14 @@ def _set_field(condition: Condition, *, energy: bool) -> str:
     return f"{'exterior' if condition.type in OUTDOORS else 'interior'}_{noun}"
 
 
+def _other_side(one: HoneybeeAperture) -> list[str]:
+    """The identifier of the same opening in the room beyond."""
+    return one.boundary_condition.boundary_condition_objects[:1] or [one.identifier]
+
+
 def _opening_set(one: HoneybeeAperture, face: RoomFace) -> tuple[str, str]:
     """The set of an opening and the first word of its field there."""
-    inside = one.boundary_condition.type not in OUTDOORS
+    inside = face.boundary_condition.type not in OUTDOORS
     if isinstance(one, HoneybeeDoor):
         where = "interior" if inside else "exterior"
         if one.is_glass:

@@ -18,6 +18,7 @@ from bim.defaults import air_layer, resistance_layer
 from bim.honeybee.library import NamedObjects
 from bim.model import Construction, MaterialLayer
 from bim.polygon_rooms import GlazingValues
+from bim.report.issue import Issue
 from mitsuba_cfs.bsdf.glazing import PaneOptics, stack
 from mitsuba_cfs.errors import DataError
 from thermal.errors import ThermalInputError
@@ -27,6 +28,8 @@ from thermal.iso15099 import NFRC, iso15099_g_values, iso15099_u_value
 GASES = {"Air": "air", "Argon": "argon", "Krypton": "krypton", "Xenon": "xenon"}
 GAPS = ("EnergyWindowMaterialGas", "EnergyWindowMaterialGasMixture")
 PASSED = {"visible": 0.9, "solar": 0.85}  # transmittances that honeybee-schema takes by default
+VEGETATION = "EnergyMaterialVegetation"  # a green roof's soil and plants
+BLINDS = ("Shade", "Blind")  # ends of the types of shading materials
 SHADED = ("WindowConstructionShade", "WindowConstructionDynamic")
 
 
@@ -53,15 +56,27 @@ class EnergyLibrary:
     def _construction(self, name: str) -> dict[str, Any]:
         return self.objects.find("constructions", name) or {}
 
+    def _inner(self, one: Any) -> dict[str, Any]:
+        """A construction that another one holds, or names."""
+        return one if isinstance(one, dict) else self._construction(str(one))
+
     def opaque(self, name: str) -> OpaqueValues | None:
         """The layers of a construction; None for what is no opaque one (air boundary, unknown)."""
         if name not in self._opaque:
             one = self._construction(name)
             layers = self._layers(one)
             if not layers or not str(one.get("type", "")).startswith("Opaque"):
+                self._not_of_kind(name, one, "an opaque construction")
                 return None
             self._opaque[name] = self._opaque_values(name, layers)
         return self._opaque[name]
+
+    def _not_of_kind(self, name: str, construction: Mapping[str, Any], expected: str) -> None:
+        """Report a construction that is not of the kind that a surface needs."""
+        reason = f"{name!r:.60} is of type {construction.get('type')!r:.60}, expected {expected}"
+        issue = Issue("value-not-read", self.file.name, {"field": "construction", "reason": reason})
+        if issue not in self.objects.issues:
+            self.objects.issues.append(issue)
 
     def _opaque_values(self, name: str, layers: Sequence[dict]) -> OpaqueValues:
         inner, outer = layers[-1], layers[0]
@@ -97,13 +112,18 @@ class EnergyLibrary:
         if kind == "EnergyWindowMaterialGas":  # an air layer of a wall, such as honeybee's default
             thickness = self.objects.number(material, "thickness", 0.0125, least=1e-4)
             return air_layer(thickness, name)
+        if kind == VEGETATION:
+            issue = Issue("vegetation-not-computed", self.file.name, {"material": name})
+            if issue not in self.objects.issues:
+                self.objects.issues.append(issue)
         fields = ("thickness", "conductivity", "density", "specific_heat")
         return MaterialLayer(name, *(self.objects.number(material, f, least=1e-9) for f in fields))
 
     def _reflectance(self, material: Mapping[str, Any], band: str) -> float | None:
         """1 - absorptance; the visible one is the solar one where it is not stated."""
-        solar = self.objects.number(material, "solar_absorptance", 0.7, most=1.0)
-        field = f"{band}_absorptance"
+        of = "soil_" if material.get("type") == VEGETATION else ""
+        solar = self.objects.number(material, f"{of}solar_absorptance", 0.7, most=1.0)
+        field = f"{of}{band}_absorptance"
         return 1.0 - self.objects.number(material, field, solar, most=1.0)
 
     def window(self, name: str, height: float) -> GlazingValues | None:
@@ -116,12 +136,13 @@ class EnergyLibrary:
             construction = self._construction(name)
             kind = str(construction.get("type", ""))
             if kind.startswith(SHADED[1]):
-                states = construction.get("constructions") or [{}]
-                construction = states[0] if isinstance(states[0], dict) else {}
+                states = construction.get("constructions")
+                construction = self._inner(states[0] if states and isinstance(states, list) else "")
             elif kind.startswith(SHADED[0]):
-                construction = construction.get("window_construction") or {}
+                construction = self._inner(construction.get("window_construction"))
             values = self._glazing(name, self._layers(construction), height)
             if values is None:
+                self._not_of_kind(name, construction, "a window construction")
                 return None
             self._windows[name] = values
         return self._windows[name]
@@ -130,9 +151,7 @@ class EnergyLibrary:
         """Whether a window's construction has a shade, or states that are not read."""
         one = self._construction(name)
         layered = str(one.get("type", "")).startswith(SHADED)
-        return layered or any(
-            str(m.get("type", "")).endswith(("Shade", "Blind")) for m in self._layers(one)
-        )
+        return layered or any(str(m.get("type", "")).endswith(BLINDS) for m in self._layers(one))
 
     def unread_parts(self, name: str) -> list[str]:
         """Parts of a window's construction that are not computed: its frame, panes that scatter."""
@@ -159,16 +178,37 @@ class EnergyLibrary:
         if "EnergyWindowMaterialGasCustom" in kinds:
             message = f"a gas of its own is not computed: give one of {', '.join(GASES)}"
             raise DataError(message, file=self.file, element=name, field="materials")
-        panes = [
-            m for m, k in zip(layers, kinds, strict=True) if k == "EnergyWindowMaterialGlazing"
-        ]
-        gaps = [m for m, k in zip(layers, kinds, strict=True) if k in GAPS]
-        if not panes or len(gaps) != len(panes) - 1:
+        layers = self._without_shade(layers)
+        kinds = ["gap" if str(one.get("type", "")) in GAPS else one.get("type") for one in layers]
+        panes, gaps = layers[::2], layers[1::2]
+        if "EnergyWindowMaterialGlazing" not in kinds:
             return None
+        if {*kinds[::2]} != {"EnergyWindowMaterialGlazing"} or {*kinds[1::2]} - {"gap"}:
+            message = "expected panes with one gap between each two"
+            raise DataError(message, file=self.file, element=name, field="materials")
         try:
             return self._layered(name, panes, gaps, height)
         except ThermalInputError as error:
             raise DataError(str(error), file=self.file, element=name) from None
+
+    def _without_shade(self, layers: Sequence[dict]) -> list[dict]:
+        """The layers of a glazing without shades; the gaps on both sides of one are one gap."""
+        found: list[dict] = []
+        behind_shade = False
+        for one in layers:
+            kind = str(one.get("type", ""))
+            after_gap = bool(found) and str(found[-1].get("type", "")) in GAPS
+            if kind.endswith(BLINDS):
+                behind_shade = True
+                continue
+            if behind_shade and kind in GAPS and after_gap:
+                widths = [self._width(gap) for gap in (found[-1], one)]
+                found[-1] = found[-1] | {"thickness": sum(widths)}
+            elif not (behind_shade and kind in GAPS and not found):
+                found.append(one)
+            behind_shade = False
+        ends_in_gap = bool(found) and str(found[-1].get("type", "")) in GAPS
+        return found[:-1] if behind_shade and ends_in_gap else found
 
     def _layered(
         self, name: str, panes: Sequence[dict], gaps: Sequence[dict], height: float
@@ -212,15 +252,19 @@ class EnergyLibrary:
             )
         return PaneOptics(np.array(tau), np.array(rho), np.array(back))
 
+    def _width(self, gap: Mapping[str, Any]) -> float:
+        """Of a gap [m]."""
+        return self.objects.number(gap, "thickness", 0.0125, least=5e-4, most=1.0)
+
     def _gap(self, gap: Mapping[str, Any]) -> GasGap:
-        width = self.objects.number(gap, "thickness", 0.0125, least=5e-4, most=1.0)
         names = gap.get("gas_types") or [gap.get("gas_type", "Air")]
         shares = gap.get("gas_fractions") or [1.0]
         known = isinstance(names, list) and isinstance(shares, list) and len(names) == len(shares)
         if not known or not all(one in GASES for one in names):
             raise self.objects.fault(f"expected of {', '.join(GASES)}", gap, "gas_type")
         return GasGap(
-            width, tuple((GASES[n], float(s)) for n, s in zip(names, shares, strict=True))
+            self._width(gap),
+            tuple((GASES[n], float(s)) for n, s in zip(names, shares, strict=True)),
         )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
 
 OUTDOORS = ("Outdoors", "Ground")
@@ -22,12 +23,14 @@ class NamedObjects:
     ) -> None:
         """kinds: lists of objects, such as "materials"; sets: the extension's noun."""
         self.file = file
+        self.issues: list[Issue] = []  # names of objects that are not in the file
+        self._sets = self._listed(properties, f"{sets}_sets")
         default = properties.get(f"global_{sets}_set")
+        default = self._sets.get(default) if isinstance(default, str) else default
         self._global = default if isinstance(default, dict) else {}
         inner = {kind: self._listed(self._global, kind) for kind in kinds}
         self._objects = {kind: inner[kind] | self._listed(properties, kind) for kind in kinds}
-        self._sets = self._listed(properties, f"{sets}_sets")
-        self._noun = sets
+        self._noun, self._kind = sets, kinds[-1]
 
     def find(self, kind: str, name: str) -> dict[str, Any] | None:
         """The object of that identifier."""
@@ -38,16 +41,44 @@ class NamedObjects:
     ) -> str | None:
         """What a surface names itself, else its room's set, else the global one; None if none does.
 
+        An object in place of a name, as files that are not abridged have it, is known by its name
+        from then on; a name that the file lacks is reported, and the next one counts.
+
         Args: part, field: where a set has it, such as "wall_set"; part "": in the set itself.
         """
-        if isinstance(own.get(self._noun), str):
-            return own[self._noun]
-        for one in (self._sets.get(str(room.get(f"{self._noun}_set")), {}), self._global):
+        of_room = room.get(f"{self._noun}_set")
+        if isinstance(of_room, str) and of_room not in self._sets:
+            self._missing(f"{self._noun}_set", of_room)
+        sets = of_room if isinstance(of_room, dict) else self._sets.get(str(of_room), {})
+        candidates = [own.get(self._noun)]
+        for one in (sets, self._global):
             inner = one.get(part) if part else one
-            found = inner.get(field) if isinstance(inner, dict) else None
-            if isinstance(found, str):
-                return found
+            candidates.append(inner.get(field) if isinstance(inner, dict) else None)
+        for one in candidates:
+            if isinstance(one, dict) and isinstance(one.get("identifier"), str):
+                return self._held(one)
+            if isinstance(one, str) and one in self._objects[self._kind]:
+                return one
+            if one is not None:
+                self._missing(self._noun, one)
         return None
+
+    def _held(self, one: dict[str, Any]) -> str:
+        """The identifier of an object that stands in place of its name.
+
+        Raises: `DataError` where another object has that identifier.
+        """
+        name = one["identifier"]
+        if self._objects[self._kind].setdefault(name, one) != one:
+            raise self.fault("there is another one with this identifier", one, self._noun)
+        return name
+
+    def _missing(self, field: str, name: Any) -> None:
+        """Report a name that nothing in the file has."""
+        values = {"field": field, "reason": f"{name!r:.60} is not in the file"}
+        issue = Issue("value-not-read", self.file.name, values)
+        if issue not in self.issues:
+            self.issues.append(issue)
 
     def number(
         self,

@@ -21,6 +21,7 @@ from bim.polygon_rooms import GlazingValues
 from bim.radiance.materials import RadianceMaterial, material_of
 from bim.radiance.primitives import VOID, Primitive
 from bim.radiance.xform import read_xform
+from bim.report.issue import Issue
 from mitsuba_cfs.bsdf.angular import glass_table, specular_matrices
 from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
@@ -59,6 +60,10 @@ class ModifierLibrary:
     def _material(self, modifier: Mapping[str, Any]) -> RadianceMaterial:
         kind = _kind(modifier)
         numbers: list[float] = []
+        under = modifier.get("modifier")
+        if under is not None and under != VOID and _kind(under) != VOID:
+            known = {"modifier": modifier["identifier"], "type": _kind(under) or "?"}
+            self.objects.issues.append(Issue("modifier-of-modifier", self.file.name, known))
         if kind in OPAQUE_FIELDS:
             numbers = [self.objects.number(modifier, f"{c}_reflectance", 0.0) for c in COLOURS]
             numbers += [self.objects.number(modifier, field, 0.0) for field in OPAQUE_FIELDS[kind]]
@@ -146,9 +151,9 @@ class ModifierLibrary:
         return ShadingState(bands=dict(bands))
 
 
-def _kind(modifier: Mapping[str, Any]) -> str:
+def _kind(modifier: Any) -> str:
     """Radiance's name of a modifier's type, which files write with either first letter."""
-    kind = str(modifier.get("type", ""))
+    kind = str(modifier.get("type", "") if isinstance(modifier, Mapping) else modifier)
     return kind if kind.upper() == kind else kind[:1].lower() + kind[1:]
 
 

@@ -23,7 +23,7 @@ from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.isolated_solids import parted
-from bim.planes import Facet, area_vectors
+from bim.planes import area_vectors
 from bim.rays import RayMesh, ray_mesh
 from bim.report.issue import Issue
 from bim.rooms import RoomSolid, room_solid
@@ -116,30 +116,33 @@ def goes_through(record: SpaceRecord, lids: Sequence[Shape], boxes: Boxes) -> bo
 
 def _leaves(record: SpaceRecord, building: RayMesh) -> bool:
     """Whether a part of the top of a space is under the open sky and has a cover beneath it."""
-    down, height = np.array([[0.0, 0.0, -1.0]]), float(record.solid.high[2] - record.solid.low[2])
-    share = area = 0.0
-    for facet in _tops(record.solid):
-        points, _ = facet_grid(facet)
-        open_above = _open_above(points, building)
-        start = points + THROUGH * down
-        _, below = building.first_hits(start, np.tile(down, (len(points), 1)), height - 2 * THROUGH)
-        share += facet.polygon.area * float(np.mean(open_above & (below >= 0)))
-        area += facet.polygon.area
-    return share > PARTLY * area > 0
+    height = float(record.solid.high[2] - record.solid.low[2])
+    return _open_share(record.solid, building, covered_within=height - 2 * THROUGH) > PARTLY
 
 
 def _outdoors(solid: RoomSolid, building: RayMesh) -> bool:
     """Whether most of the top of a solid is under the open sky."""
+    return _open_share(solid, building) > OPEN
+
+
+def _open_share(solid: RoomSolid, building: RayMesh, covered_within: float | None = None) -> float:
+    """Share of the area of a solid's top that is under the open sky; 0 without a top.
+
+    Args: covered_within: count only what has a cover beneath it within this distance [m].
+    """
     area = free = 0.0
-    for facet in _tops(solid):
+    for facet in solid.facets:
+        if facet.plane.normal[2] <= 0.5:
+            continue
         points, _ = facet_grid(facet)
+        counts = _open_above(points, building)
+        if covered_within is not None:
+            down = np.tile([[0.0, 0.0, -1.0]], (len(points), 1))
+            _, below = building.first_hits(points + THROUGH * down, down, covered_within)
+            counts &= below >= 0
         area += facet.polygon.area
-        free += facet.polygon.area * float(np.mean(_open_above(points, building)))
-    return free > OPEN * area > 0
-
-
-def _tops(solid: RoomSolid) -> list[Facet]:
-    return [facet for facet in solid.facets if facet.plane.normal[2] > 0.5]
+        free += facet.polygon.area * float(np.mean(counts))
+    return free / area if area > 0 else 0.0
 
 
 def _open_above(points: NDArray[np.float64], building: RayMesh) -> NDArray[np.bool_]:

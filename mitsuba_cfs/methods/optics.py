@@ -55,11 +55,24 @@ class SystemOptics(Protocol):
 States = Sequence[SystemOptics]  # shading states of a window group, such as open and closed
 
 
+@dataclass(frozen=True)
+class BetweenOptics:
+    """Two optics whose mean is the optics of a state between them."""
+
+    low: BsdfOptics
+    high: BsdfOptics
+    share: float  # of `high`, 0 to 1
+
+
 class BsdfOptics:
     """The optics of BSDF data; the form of each method is made at its first use."""
 
     def __init__(
-        self, bsdf: Bsdf, fine: Bsdf | None = None, angular: AngularTable | None = None
+        self,
+        bsdf: Bsdf,
+        fine: Bsdf | None = None,
+        angular: AngularTable | None = None,
+        between: BetweenOptics | None = None,
     ) -> None:
         """From one band of a BSDF file.
 
@@ -68,14 +81,17 @@ class BsdfOptics:
             fine: tensor tree of the same system, where `bsdf` is its Klems matrices.
             angular: transmittance and reflectances of a specular system by angle; the matrices
                 have their means over patches.
+            between: two optics that `bsdf` is the mean of. Where both are states of the same
+                window, the sensors' light is the mean of theirs and is not traced.
         """
+        self.between = between
         coarse = bsdf if isinstance(bsdf, KlemsBsdf) else klems_of(bsdf)
         self._coarse = coarse if angular is None else replace(coarse, see_through=1.0)
         self._fine, self._angular = bsdf if fine is None else fine, angular
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         """Pickle the data without the forms that have been made."""
-        return BsdfOptics, (self._coarse, self._fine, self._angular)
+        return BsdfOptics, (self._coarse, self._fine, self._angular, self.between)
 
     @cached_property
     def transmission(self) -> NDArray[np.float64]:
@@ -240,6 +256,18 @@ def check_systems(systems: Sequence[States], scene_groups: Sequence[object]) -> 
                 raise ValueError(
                     f"systems[{number}]: expected BsdfOptics or AngularOptics, got {state!r:.60}"
                 )
+
+
+def neighbours(states: States, j: int) -> tuple[int, int, float] | None:
+    """Numbers of two states that a state is the mean of, and the share of the second; else None."""
+    optics = states[j]
+    if not isinstance(optics, BsdfOptics) or optics.between is None:
+        return None
+    numbers = {id(one): number for number, one in enumerate(states)}
+    of = optics.between
+    if id(of.low) not in numbers or id(of.high) not in numbers:
+        return None
+    return numbers[id(of.low)], numbers[id(of.high)], of.share
 
 
 def straight_transmittance(optics: SystemOptics) -> NDArray[np.float64]:

@@ -39,6 +39,7 @@ from mitsuba_cfs.methods.optics import (
     combinations,
     hourly_states,
     in_state,
+    neighbours,
 )
 from mitsuba_cfs.methods.phase_matrices import (
     DEFAULT_NEEDS,
@@ -187,22 +188,73 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
         return light
     light = replace(light, matrices=with_sensors(light.matrices, progress=progress))
     light = with_reflected_sun(light)
-    coefficients = group_coefficients(light.matrices, light.systems)
-    if not light.matrices.five_phase:
-        return replace(
-            light, sensors=tuple(tuple(map(SensorLight, group)) for group in coefficients)
-        )
-    hours = shining_hours(light)
-    suns = _direct_sun(light, hours, progress)
-    reflected = _reflected_to_sensors(light, coefficients)
-    sensors = tuple(
-        tuple(
-            _sensor_light(light, one, g, reflected.get((g, j)), (suns[j], hours))
-            for j, one in enumerate(group)
-        )
-        for g, group in enumerate(coefficients)
+    # states that are the mean of two others are added up after these
+    traced = tuple(
+        tuple(j for j in range(len(states)) if neighbours(states, j) is None)
+        for states in light.systems
     )
-    return replace(light, sensors=sensors)
+    chosen = [
+        [states[j] for j in numbers] for states, numbers in zip(light.systems, traced, strict=True)
+    ]
+    coefficients = group_coefficients(light.matrices, chosen)
+    if not light.matrices.five_phase:
+        sensors = [list(map(SensorLight, group)) for group in coefficients]
+    else:
+        hours = shining_hours(light)
+        suns = _direct_sun(light, chosen, hours, progress)
+        reflected = _reflected_to_sensors(light, coefficients)
+        sensors = [
+            [
+                _sensor_light(light, one, g, reflected.get((g, j)), (suns[j], hours))
+                for j, one in enumerate(group)
+            ]
+            for g, group in enumerate(coefficients)
+        ]
+    whole = zip(light.systems, traced, sensors, strict=True)
+    return replace(light, sensors=tuple(_with_means(*of_group) for of_group in whole))
+
+
+def _with_means(
+    states: States, traced: Sequence[int], sensors: Sequence[SensorLight]
+) -> tuple[SensorLight, ...]:
+    """The light of the sensors in all states of a group, from that of the `traced` ones."""
+    known = dict(zip(traced, sensors, strict=True))
+    result = []
+    for j, optics in enumerate(states):
+        pair = neighbours(states, j)
+        if pair is None:
+            result.append(known[j])
+        else:
+            low, high, share = pair
+            result.append(_mean_light(optics, known[low], known[high], share))
+    return tuple(result)
+
+
+def _mean_light(
+    optics: SystemOptics, low: SensorLight, high: SensorLight, share: float
+) -> SensorLight:
+    """The mean of the sensors' light in two states, `share` of `high`."""
+
+    def mean(one: Array | None, other: Array | None) -> Array | None:
+        if one is None or other is None:
+            alone, weight = (other, share) if one is None else (one, 1 - share)
+            return None if alone is None else weight * alone
+        return (1 - share) * one + share * other
+
+    first, second = low.coefficients, high.coefficients
+    coefficients = GroupCoefficients(
+        optics,
+        (1 - share) * first.beam + share * second.beam,
+        (second if share > 0.5 else first).straight,  # read for the noise alone
+        (1 - share) * first.whole + share * second.whole,
+        mean(first.by_sun, second.by_sun),
+    )
+    noise = tuple(
+        replace(one, factor=weight * one.factor)
+        for of_state, weight in ((low, 1 - share), (high, share))
+        for one in of_state.sun_noise
+    )
+    return SensorLight(coefficients, mean(low.added, high.added), mean(low.sun, high.sun), noise)
 
 
 def sensor_light(light: PhaseLight) -> tuple[tuple[SensorLight, ...], ...]:
@@ -345,22 +397,26 @@ def _without_direct_sun(
 
 
 def _direct_sun(
-    light: PhaseLight, hours: NDArray[np.int64], progress: Progress
+    light: PhaseLight, systems: Sequence[States], hours: NDArray[np.int64], progress: Progress
 ) -> list[Estimate | None]:
-    """C_ds [J][G, S, h] of the hours in which the sun shines on a window; None without any."""
+    """C_ds [J][G, S, h] of the hours in which the sun shines on a window; None without any.
+
+    Args: systems: states of each group that are traced [G][J].
+    """
+    states = max(map(len, systems))
     if not len(hours):
-        return [None] * light.states
+        return [None] * states
     scene, chosen = light.scene, light.matrices.sampling
     matrices: list[Estimate | None] = []
-    for j in range(light.states):
-        scattering = [o.scattering for o in in_state(light.systems, [j] * len(scene.groups))]
+    for j in range(states):
+        scattering = [o.scattering for o in in_state(systems, [j] * len(scene.groups))]
         matrices.append(
             direct_sun_matrix(
                 scene.interior, scene.exterior, scene.groups, scattering, *scene.sensors(),
                 suns=light.sky.direction[hours],
                 window_points=max(chosen.sun_points // SUN_BATCHES, 1),
                 stopping=Stopping(batches=SUN_BATCHES), seed=chosen.seed, by_group=True,
-                progress=part(progress, j / light.states, (j + 1) / light.states, "daylight"),
+                progress=part(progress, j / states, (j + 1) / states, "daylight"),
                 cache=light.matrices.cache, scenes=light.matrices.scenes,
             )
         )  # fmt: skip

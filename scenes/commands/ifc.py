@@ -149,6 +149,28 @@ def attach(
 
 @command.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
+@click.argument("operation", type=FILE, metavar="OPERATION.toml")
+@out_option
+def control(building: Path, operation: Path, out: Path) -> None:
+    """Write the rules of shading control of an operation file into an IFC file.
+
+    The windows of each room that move together become an IfcGroup with its rule as property set.
+    An operation file with `control_of = "BUILDING.ifc"` takes the rules from there.
+    """
+    check_file(out, inputs=[building, operation])
+    from bim.ifc.control import write_control
+    from scenes.input_files import read_building
+    from scenes.room.operation import read_operation
+    from scenes.room.stored_control import stored_groups
+
+    tables = read_operation(operation).tables
+    groups = stored_groups(read_building(building), tables, operation)
+    write_control(building, out, groups)
+    click.echo(f"{out}: groups of windows with a rule: {len(groups)}")
+
+
+@command.command()
+@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @out_option
 def correct(building: Path, out: Path) -> None:
     """Write the corrections beside an IFC file into a copy of it.

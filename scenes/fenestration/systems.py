@@ -58,6 +58,8 @@ class FenestrationSystem:
     panes: Panes = ()  # all its layers, where each is known by wavelength
     spectrum: SpectralFactor | None = None  # of its panes and shade; None: not known
     from_values: bool = False  # modelled from U, g and transmittances, without a BSDF
+    tilt_deg: float | None = None  # of its slats; None: not stated, or none
+    between: NeighbourTilts | None = None  # that it is interpolated from
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -69,6 +71,15 @@ class FenestrationSystem:
     def fine(self) -> Bsdf:
         """The visible band as finely as the data have it."""
         return self.visible if self.tree is None else self.tree
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NeighbourTilts:
+    """Two systems of a family between whose tilts another is interpolated."""
+
+    low: FenestrationSystem
+    high: FenestrationSystem
+    share: float  # of `high`, 0 to 1
 
 
 # of a window: its system in each shading state, from open to closed

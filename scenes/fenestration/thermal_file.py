@@ -493,6 +493,7 @@ class StateTable(WindowHeatTable):
     """One shading state: a BSDF file, or `layers` of panes alone, and what else was measured."""
 
     bsdf: Path | None = None
+    tilt_deg: Annotated[float, Field(ge=-90, le=90)] | None = None  # of its slats, as in a family
 
     @model_validator(mode="after")
     def _has_optics(self) -> StateTable:

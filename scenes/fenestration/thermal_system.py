@@ -17,11 +17,7 @@ from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.notes import Note
 from scenes.fenestration.systems import FenestrationSystem
-from thermal.blackbox import (
-    Fenestration,
-    LayerAbsorptances,
-    layer_absorptances,
-)
+from thermal.blackbox import Fenestration, LayerAbsorptances
 from thermal.closure import Closure
 from thermal.errors import ThermalInputError, require
 from thermal.glazing_unit import GlazingUnit
@@ -110,11 +106,7 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     by_patch = system.g_by_patch is not None
     g_value = system.g_by_patch if by_patch else data.g_value
     fenestration = closure.close(Fenestration(system.name, data.u_value))
-    films = {"r_outer": fenestration.r_outer, "r_inner": fenestration.r_inner}
-    absorptances = layer_absorptances(
-        tau, rho, g_value, data.u_value, item=system.name, **films,
-        inward=fenestration.inward_shares(), room_air=window.to_air(),
-    )  # fmt: skip
+    absorptances = window.absorptances(tau, rho, g_value, fenestration, item=system.name)
     model = closure.described(window.position, g_by_direction=by_patch)
     layers = None if by_patch or system.from_values else window.typical
     optics = (tau, rho, incidence)

@@ -26,7 +26,7 @@ from thermal.zone import Gains, Zone
 
 FloatArray = NDArray[np.float64]
 SUNS = ("absorbed_outer", "absorbed_inner", "inside", "facade", "window_inside", "window_facade",
-        "absorbed_air", "state")  # fmt: skip
+        "absorbed_middle", "state")  # fmt: skip
 
 
 def with_air_nodes(

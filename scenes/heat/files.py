@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
@@ -50,8 +50,15 @@ def read_files(study: StudyFile, file: Path | None = None) -> HeatFiles:
         weather = read_measured(study.weather, study.measured)
         _fits_measured(study, weather, file)
     check_schedules(study, weather, file)
+    for key in ("tilt_step_deg", "control_of"):
+        if getattr(study, key) is not None:
+            message = "belongs to an operation file of `cfs run` and `cfs study`"
+            raise DataError(message, file=file, field=key)
     by = "[[system]] of the study,"
-    systems = tuple(read_state(table, table.bsdf, by=by) for table in study.system)
+    systems = tuple(
+        replace(read_state(table, table.bsdf, by=by), tilt_deg=table.tilt_deg)
+        for table in study.system
+    )
     for one, table in zip(systems, study.system, strict=True):
         checked_system(one, table.bsdf or file)
     return HeatFiles(InputFiles(weather, _overrides(study, systems)), systems)

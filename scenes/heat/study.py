@@ -46,6 +46,7 @@ from scenes.room.light import visible_scene
 from scenes.room.operation import (
     OperationHours,
     check_schedules,
+    ground_note,
     stated_note,
     unstated_note,
     with_stated_uses,
@@ -362,5 +363,5 @@ def study_inputs(
     rooms = "all" if study.couple or study.box is not None else "glazed"
     inputs = inputs_of(building, options, files.inputs, rooms=rooms, states=every_state)
     notes = *stated_note(building, "the study"), *unstated_note(study, building, "the study")
-    inputs = replace(inputs, notes=notes)
+    inputs = replace(inputs, notes=(*notes, *ground_note(study)))
     return replace(inputs, spaces=shared_constructions(inputs.spaces)) if study.couple else inputs

@@ -178,6 +178,9 @@ class StudyFile(OperationTables, ReadTable, OutdoorTable):
             if isinstance(one.m3_h, str) and one.m3_h not in self.schedules:
                 fault = unknown_name(one.m3_h, self.schedules)
                 raise ValueError(f"transfer.{number}.m3_h: {fault}")
+        for one in self.variants:
+            if any(r.rule == "predictive" for _, rule in one.control.rules for r in rule.leaves):
+                raise ValueError('control.rule: "predictive" is of `cfs run` and `cfs study`')
         if not self.system:
             if self.box is not None and self.box.window:
                 raise ValueError("system: is missing; a box holds no fenestration data")

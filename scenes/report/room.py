@@ -44,6 +44,8 @@ RULES = {
     "rain": N_("open in rain"),
     "any": N_("several rules, the most closed state"),
     "all": N_("several rules, the most open state"),
+    "function": N_("by a function in Python"),
+    "predictive": N_("by plans of the hours ahead (predictive control)"),
 }
 
 
@@ -55,7 +57,11 @@ def state_carpets(result: RunResult, room: RoomYear) -> tuple[Chart, ...]:
     lit, shading = result.sun[:, 2] > 0, ran.shading
     several = len(shading.groups) > 1
     charts = []
-    for group, rule, state in zip(shading.groups, shading.rules, shading.states.T, strict=True):
+    per_day = round(pd.Timedelta(days=1) / (result.times[1] - result.times[0]))
+    figures = shading.figures(room.heat.comfort["occupied"].to_numpy(bool), per_day)
+    for number, (group, rule, state) in enumerate(
+        zip(shading.groups, shading.rules, shading.states.T, strict=True)
+    ):
         count = np.bincount(state[lit], minlength=len(ran.states))
         legend = tuple(
             (STATE_COLOURS[i % len(STATE_COLOURS)], f"{name}: {percent(100 * n / lit.sum())} %")
@@ -69,9 +75,11 @@ def state_carpets(result: RunResult, room: RoomYear) -> tuple[Chart, ...]:
                 legend,
                 title=f"{title}: {group}" if several else title,
                 explanation=gettext(
-                    "Control: {rule}. Hours with the sun up; optical and thermal properties change "
-                    "together.",
+                    "Control: {rule}. {moves} moves a day; open in {open} % of the occupied hours. "
+                    "Hours with the sun up; optical and thermal properties change together.",
                     rule=gettext(RULES[rule]) if rule in RULES else rule,
+                    moves=rounded(float(figures["moves_per_day"][number]), 1),
+                    open=percent(float(figures["state_0_percent"][number])),
                 ),
             )
         )

@@ -91,7 +91,7 @@ def _inner_glass(
     panes, used = [], []
     dark = AngularScattering(np.zeros(2), np.zeros(2))  # the sun is part of the sky patches
     for other in light_sources(building, space, away, below):
-        pairs = panes_between(building, space)[other.guid]
+        pairs = panes_between(building.spaces, space)[other.guid]
         onward = _inner_glass(building, other, systems, away, away[other.guid])
         scene, through = _room_beyond(building, other, pairs, systems, onward)
         used += [face for face, _ in pairs]

@@ -21,7 +21,7 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import States
 from scenes.results import ShadingYear
 from scenes.room.control_groups import ControlGroups, control_groups
-from scenes.room.operation import OperationHours
+from scenes.room.operation import FUNCTION, Controller, OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.windows import RoomWindows, room_windows
@@ -67,6 +67,7 @@ class RoomInputs:
     inner_glass: bool  # whether light passes through glass between rooms
     cache: MatrixCache | None
     together: frozenset[str] = frozenset()  # GUIDs of the rooms that are balanced with this one
+    controller: Controller | None = None  # in place of the operation's rules of shading
 
     @property
     def season(self) -> NDArray[np.int64]:
@@ -89,6 +90,8 @@ class RoomInputs:
         """The year of the control groups, from the states of the window groups [H, G]."""
         firsts = [int(np.argmax(self.windows.control == c)) for c in range(len(self.control.names))]
         rules = tuple(rule.rule for rule in self.control.rules)
+        if self.controller is not None:
+            rules = (FUNCTION,) * len(rules)
         return ShadingYear(self.control.names, rules, state[:, firsts], self.control.number)
 
 
@@ -106,6 +109,7 @@ def room_inputs(
     file_sensors: FileSensors = NO_SENSORS,
     inner_glass: bool = False,
     together: Collection[str] = (),
+    controller: Controller | None = None,
 ) -> RoomInputs:
     """The inputs of one room.
 
@@ -116,6 +120,7 @@ def room_inputs(
         grids: sensor grids in place of the grid of the options.
         together: GUIDs of the rooms whose heat is balanced with this one's: sun passes the glass
             and open doorways between them.
+        controller: of the shading states, in place of the rules of the tables.
 
     Raises: `ValueError` for a window without a system, `DataError` for a room that the tables name
         and the building does not contain.
@@ -140,6 +145,7 @@ def room_inputs(
         inner_glass,
         cache,
         frozenset(together),
+        controller,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
@@ -23,6 +23,7 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import FenestrationSystem, read_system, system_of_panes
 from scenes.fenestration.thermal_file import StateTable
 from scenes.fenestration.thermal_system import checked_system
+from scenes.fenestration.tilts import tilt_states
 from scenes.room.operation_tables import (
     PARTS,
     WEATHER_RULES,
@@ -287,6 +288,11 @@ Tables = TypeVar("Tables", bound=OperationTables)
 PREFIX = "of the building's file: "  # of the names of schedules that the building's file contains
 
 
+# Shading states of the control groups of a room in an hour, from the hour's `ControlHour`
+Controller = Callable[[Any], int | Sequence[int] | Mapping[str, int]]
+FUNCTION = "function"  # the rule of windows that a `Controller` moves, in results
+
+
 @dataclass(frozen=True, slots=True)
 class Operation:
     """An operation file and its fenestration systems."""
@@ -294,6 +300,15 @@ class Operation:
     file: Path
     tables: OperationTables
     systems: tuple[FenestrationSystem, ...]  # states of every window; empty: the building file's
+    controller: Controller | None = None  # of the shading states, in place of the file's rules
+
+    def controlled_by(self, controller: Controller) -> Operation:
+        """The operation with a function of each hour in place of the file's rules of shading.
+
+        Args: controller: called with the `ControlHour` of each hour of a room, in order; returns
+            the state of all its control groups, of each [N], or by name of those that move.
+        """
+        return replace(self, controller=controller)
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -302,7 +317,8 @@ class Operation:
         states = [table.placed(self.file.parent) for table in self.tables.system]
         panes = [layer.pane for table in states if table.bsdf is None for layer in table.layers]
         named = [None if table.bsdf is None else self.file.parent / table.bsdf for table in states]
-        return tuple(path for path in (*named, *panes, *tables) if path is not None)
+        files = (*named, *panes, *tables, self.tables.control_of)
+        return tuple(path for path in files if path is not None)
 
     def outdoors(self, weather: Weather) -> Weather:
         """The weather of its rooms, with the urban heat island that the file states.
@@ -320,6 +336,7 @@ def read_operation(path: str | PathLike[str]) -> Operation:
     """
     path = Path(path)
     tables = schedules_there(validated(OperationTables, read_table(path), path), path)
+    tables = _with_stored_control(tables, path)
     systems = []
     for number, state in enumerate(tables.system):
         bsdf = None if state.bsdf is None else path.parent / state.bsdf
@@ -329,8 +346,33 @@ def read_operation(path: str | PathLike[str]) -> Operation:
         if any(system.name == other.name for other in systems):
             name = f"{system.name} ({number + 1})" if bsdf is None else bsdf.stem
             system = replace(system, name=name)
-        systems.append(system)
-    return Operation(path, tables, tuple(systems))
+        systems.append(replace(system, tilt_deg=state.tilt_deg))
+    try:
+        return Operation(path, tables, _with_tilts(systems, tables))
+    except DataError as error:
+        file = path if error.file is None else error.file
+        raise DataError(error.message, file=file, field=error.field) from None
+
+
+def _with_stored_control(tables: OperationTables, path: Path) -> OperationTables:
+    """The tables with the control of the IFC file that they name."""
+    if tables.control_of is None:
+        return tables
+    file = (path.parent / tables.control_of).absolute()
+    if not file.is_file():
+        message = f"no such file: {tables.control_of}"
+        raise DataError(message, file=path, field="control_of")
+    from scenes.room.stored_control import stored_control  # ifcopenshell, only here
+
+    return tables.model_copy(update={"control": stored_control(file), "control_of": file})
+
+
+def _with_tilts(
+    systems: Sequence[FenestrationSystem], tables: OperationTables
+) -> tuple[FenestrationSystem, ...]:
+    """The states of the tables' systems and of the tilts between them."""
+    step = tables.tilt_step_deg
+    return tuple(systems) if step is None else tilt_states(systems, step)
 
 
 def check_systems(operation: Operation) -> None:
@@ -338,7 +380,8 @@ def check_systems(operation: Operation) -> None:
 
     A state given by its panes names the operation file.
     """
-    for table, system in zip(operation.tables.system, operation.systems, strict=True):
+    stated = [system for system in operation.systems if system.between is None]
+    for table, system in zip(operation.tables.system, stated, strict=True):
         bsdf = table.placed(operation.file.parent).bsdf
         checked_system(system, operation.file if bsdf is None else operation.file.parent / bsdf)
 
@@ -401,7 +444,8 @@ def used_operation(operation: Operation | None, building: Building) -> Operation
     tables = OperationTables() if operation is None else operation.tables
     file = building.file if operation is None else operation.file
     systems = () if operation is None else operation.systems
-    return Operation(file, with_stated_uses(tables, building), systems)
+    controller = None if operation is None else operation.controller
+    return Operation(file, with_stated_uses(tables, building), systems, controller)
 
 
 def with_stated_uses(tables: Tables, building: Building) -> Tables:
@@ -476,6 +520,19 @@ def unstated_note(
     if not unstated:
         return ()
     return (Note("{values}, not stated in {file}.", values=", ".join(unstated), file=file),)
+
+
+def ground_note(tables: OperationTables) -> tuple[str, ...]:
+    """A sentence on what the ground around a basement lacks; empty without a basement."""
+    grounds = [one.envelope.ground for one in tables.variants]
+    if not any(one is not None and one.kind.endswith("basement") for one in grounds):
+        return ()
+    note = Note(
+        "Basement by ISO 13370: sun and longwave radiation at the surface of the ground are "
+        "neglected. Below bare ground in a sunny climate (Boulder, Colorado) a basement is warmer "
+        "than computed, by 0.9 K in the annual mean and up to 3.4 K in summer."
+    )
+    return (note,)
 
 
 def _entry(

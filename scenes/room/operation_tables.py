@@ -333,7 +333,7 @@ class ShadingRule(TomlTable):
 
     rule: Literal[
         "always", "schedule", "irradiance", "glare", "cut-off", "outdoor temperature", "wind",
-        "rain", "air temperature", "operative temperature", "any", "all",
+        "rain", "air temperature", "operative temperature", "any", "all", "predictive",
     ] = "always"  # fmt: skip
     parts: tuple[ShadingRule, ...] = ()  # of "any", the most closed state, and "all", the most open
     open_delay_h: Annotated[float, plausible.HOURS] = 0.0  # opens after more light for so long [h]
@@ -357,7 +357,7 @@ class ShadingRule(TomlTable):
     limit_dgp: Share | None = None  # "glare": DGP of every hour's picture in place of Ev
     seat: tuple[float, float, float] | None = None  # "glare": the eye [m]; default: the room's view
     looks_deg: float | None = None  # "glare": azimuth of the line of sight from north by east
-    slat_tilts_deg: tuple[float, ...] = ()  # "cut-off": of each state
+    slat_tilts_deg: tuple[float, ...] = ()  # "cut-off": of each state; default: of its system
     slat_width: Annotated[Positive, plausible.SLAT] = 0.08  # [m]
     slat_spacing: Annotated[Positive, plausible.SLAT] = 0.072  # [m]
 
@@ -388,7 +388,7 @@ class ShadingRule(TomlTable):
             return "schedule", f"expected {CLOCK} states, got {len(self.schedule)}"
         if any(not 0 <= state < states for state in used):
             return "state", f"a state outside 0 to {states - 1}: the windows have {states}"
-        if self.rule == "cut-off" and len(self.slat_tilts_deg) != states:
+        if self.rule == "cut-off" and self.slat_tilts_deg and len(self.slat_tilts_deg) != states:
             return "slat_tilts_deg", f"expected one for each of {states} states"
         return None
 
@@ -409,6 +409,22 @@ class ShadingRule(TomlTable):
         if self.rule not in ("any", "all"):
             return (self,)
         return tuple(leaf for one in self.parts for leaf in one.leaves)
+
+
+class PredictiveTable(TomlTable):
+    """Control that looks ahead, of all groups of a room together."""
+
+    horizon_h: Annotated[int, Field(ge=1, le=8784)] = 24  # planned; a year: one plan
+    # how the hours ahead are known: as yesterday's, as what comes with an error, or as what comes
+    forecast: Literal["yesterday", "error", "perfect"] = "yesterday"
+    sun_error: Share = 0.25  # of "error", relative standard deviation 24 h ahead
+    temperature_error_k: Annotated[float, Field(ge=0, le=10)] = 1.5  # likewise [K]
+    seed: Annotated[int, Field(ge=0)] = 0  # of the errors
+    # what counts as glare: DGP of the pictures of each combination, or 6.2e-5 Ev + 0.184
+    glare: Literal["DGP", "Ev"] = "DGP"
+    heating_weight: Annotated[float, Field(ge=0, le=100)] = 1.0  # of 1 kWh of heat
+    cooling_weight: Annotated[float, Field(ge=0, le=100)] = 1.0
+    lighting_weight: Annotated[float, Field(ge=0, le=100)] = 1.0
 
 
 class GroupTable(ShadingRule):
@@ -432,6 +448,15 @@ class ControlTable(ShadingRule):
     # all of a room
     groups: Literal["facade", "window", "room"] = "facade"
     group: tuple[GroupTable, ...] = ()  # the first entry that names a window applies to it
+    predictive: PredictiveTable = PredictiveTable()  # of the rule "predictive"
+
+    @model_validator(mode="after")
+    def _predicts_all(self) -> ControlTable:
+        rules = [rule for _, rule in self.rules]
+        ahead = [rule for rule in rules if any(r.rule == "predictive" for r in rule.leaves)]
+        if ahead and any(rule.rule != "predictive" for rule in rules):
+            raise ValueError('rule: "predictive" plans all groups of a room together, and alone')
+        return self
 
     def rule_of(self, group: GroupTable | None) -> ShadingRule:
         """The rule of an entry of `group`; None: of the windows that no entry names."""
@@ -508,6 +533,9 @@ class OperationTables(TomlTable):
     """Operation of rooms: a file of `cfs run` and `cfs study`, a part of `cfs thermal`'s file."""
 
     system: tuple[StateTable, ...] = ()  # states, open to closed; none: the building file's
+    # states at tilts between those of [[system]] with `tilt_deg`, in about these steps [deg]
+    tilt_step_deg: Annotated[float, Field(ge=1, le=90)] | None = None
+    control_of: Path | None = None  # an IFC file that holds the rules, in place of `control`
     control: ControlTable = ControlTable()
     gains: GainsTable = GainsTable()
     air: AirTable = AirTable()
@@ -522,6 +550,12 @@ class OperationTables(TomlTable):
     calendar: CalendarTable = CalendarTable()
 
     @model_validator(mode="after")
+    def _has_one_control(self) -> OperationTables:
+        if self.control_of is not None and "control" in self.model_fields_set:
+            raise ValueError("control_of: the file has [control] of its own")
+        return self
+
+    @model_validator(mode="after")
     def _schedules_are_there(self) -> OperationTables:
         for number, tables in enumerate((self, *self.rooms), -1):
             place = "" if number < 0 else f"rooms.{number}."
@@ -534,10 +568,15 @@ class OperationTables(TomlTable):
 
     def control_fault(self, states: int) -> tuple[str, str] | None:
         """The path of the key that does not fit windows with `states` states, and the fault."""
+        tilted = any(one.tilt_deg is not None for one in self.system)
         for place, rule in self.control.rules:
             fault = rule.fault(states, self.schedules)
             if fault is not None:
                 return f"{place}.{fault[0]}", fault[1]
+            bare = [r for r in rule.leaves if r.rule == "cut-off" and not r.slat_tilts_deg]
+            if bare and not tilted:
+                message = f"expected one for each of {states} states, or `tilt_deg` of [[system]]"
+                return f"{place}.slat_tilts_deg", message
         return None
 
     def with_rooms(self, rooms: RoomsTable) -> OperationTables:

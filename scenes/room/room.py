@@ -42,6 +42,7 @@ from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.trace.kernels.scattering import through_beams
 from scenes.fenestration.systems import States
 from scenes.results import ExploredRoom, GlareResults, RoomYear
+from scenes.room.control_hour import controlled_states
 from scenes.room.daylight import room_daylight
 from scenes.room.glare import (
     annual_glare,
@@ -60,7 +61,12 @@ from scenes.room.lobes import lobe_figures
 from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
-from scenes.room.shading import control_signals, shading_states, temperature_conditions
+from scenes.room.shading import (
+    control_signals,
+    predicts,
+    shading_states,
+    temperature_conditions,
+)
 from scenes.room.solar import SeasonalOutdoors, seasonal_outdoors
 from scenes.room.spectral import room_spectral
 from scenes.room.zone import (
@@ -188,12 +194,16 @@ def lit_room(
         needs = light_needs(room, annual_glare=options.outputs.annual_glare)
         light = room_light(room, needs=needs, progress=progress)
         conditions = temperature_conditions(room)
-        if conditions or "irradiance" in control_signals(room):
+        has_function = room.controller is not None and bool(space.windows)
+        controlled = has_function or predicts(room)
+        if conditions or controlled or "irradiance" in control_signals(room):
             outdoors = seasonal_outdoors(room, light, progress=progress)
         if conditions and outdoors is not None:
             surfaces = zone_surfaces(room)
             choice = controlled_zone(room, surfaces, outdoors, light, progress=progress)
             state = _states_by_balance(room, choice)
+        elif controlled and outdoors is not None:
+            state = controlled_states(room, light, outdoors, progress=progress)
         else:
             state = shading_states(room, light, outdoors, progress=progress)
         daylight = room_daylight(room, light, state, progress=progress)
@@ -259,7 +269,7 @@ def inputs_of_room(
         building, space, systems, weather, options,
         operation=None if operation is None else operation.tables, skies=skies, cache=cache,
         file_sensors=FileSensors.of(building, space), inner_glass=inner,
-        together=together,
+        together=together, controller=None if operation is None else operation.controller,
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 
 import numpy as np
@@ -20,6 +20,7 @@ from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.surfaces import Surfaces, even_numbers, points_on_triangles
 from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
 from mitsuba_cfs.trace.sun.shade import sunlit_shares
+from scenes.fenestration.systems import FenestrationSystem
 from scenes.room.glare import rating_of
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
@@ -41,6 +42,8 @@ StateArray = NDArray[np.int64]
 SUN_POINTS = 64  # on each window group, for its sunlit share
 DISC_RAYS = 4  # from each of them
 MOST_COMBINATIONS = 1024  # of states of groups that avoid glare together
+# An eye: position [m] and azimuth of the line of sight [deg] from north by east, None of the view
+Seat = tuple[tuple[float, float, float] | None, float | None]
 
 
 def control_signals(room: RoomInputs) -> frozenset[str]:
@@ -48,7 +51,7 @@ def control_signals(room: RoomInputs) -> frozenset[str]:
 
     "irradiance" of the windows, "sun" on them, "eye": illuminance at an eye, "dgp" of every hour.
     """
-    if room.operation is None:
+    if room.operation is None or room.controller is not None:
         return frozenset()
     leaves = (leaf for rule in room.control.rules for leaf in rule.leaves)
     return frozenset(map(signal_of, leaves)) - {""}
@@ -63,6 +66,13 @@ def signal_of(rule: ShadingRule) -> str:
     return {"irradiance": "irradiance", "cut-off": "sun"}.get(rule.rule, "")
 
 
+def predicts(room: RoomInputs) -> bool:
+    """Whether the shading of a room follows plans of the hours ahead."""
+    if room.operation is None or room.controller is not None or not room.space.windows:
+        return False
+    return room.control.rules[0].rule == "predictive"
+
+
 Conditions = Mapping[TemperatureCondition, bool]
 NO_CONDITIONS: Conditions = {}
 
@@ -72,7 +82,7 @@ def temperature_conditions(room: RoomInputs) -> tuple[TemperatureCondition, ...]
 
     Raises: `DataError` for more than `MOST_CONDITIONS`.
     """
-    if room.operation is None or not room.space.windows:
+    if room.operation is None or room.controller is not None or not room.space.windows:
         return ()
     leaves = (leaf for rule in room.control.rules for leaf in rule.leaves)
     step_h = room.weather.step_h
@@ -152,6 +162,8 @@ def _by_rule(
         if rule.rule == "irradiance":
             brightest = signals.irradiance(rule.sensor)[:, groups].max(axis=1)
             return by_threshold(brightest, rule.close_above, rule.open_below, closed=closed)
+        if rule.rule == "predictive":
+            raise ValueError("plans are made of the room's light: predictive_states")
         if rule.rule == "cut-off":
             return _by_cut_off(room, rule, groups, signals.beam(rule.sensor))
         return always(rule.state, room.skies.hours)
@@ -204,12 +216,12 @@ def _by_cut_off(
     room: RoomInputs, rule: ShadingRule, groups: NDArray[np.int64], beam: FloatArray
 ) -> StateArray:
     """The state that stops the sun on all of some window groups [H], each by its profile angle."""
-    sun, tilts = sun_directions(room.weather), np.radians(rule.slat_tilts_deg)
+    sun = sun_directions(room.weather)
     each = [
         by_cut_off(
             sun @ room.windows.groups[g].frame.T,
             beam[:, g],
-            tilts,
+            _tilts(rule, room.windows.systems[g]),
             rule.slat_width,
             rule.slat_spacing,
         )
@@ -217,6 +229,17 @@ def _by_cut_off(
     ]
     states: StateArray = np.max(each, axis=0)
     return states
+
+
+def _tilts(rule: ShadingRule, states: Sequence[FenestrationSystem]) -> FloatArray:
+    """The slat tilt [J] [rad] by a rule, else by the systems."""
+    stated = rule.slat_tilts_deg
+    return np.radians(np.array(stated) if stated else slat_tilts_deg(states))
+
+
+def slat_tilts_deg(states: Sequence[FenestrationSystem]) -> FloatArray:
+    """The slat tilt of each state [J] [deg]; NaN without slats, or raised."""
+    return np.array([np.nan if s.tilt_deg is None else s.tilt_deg for s in states], dtype=float)
 
 
 def group_states(room: RoomInputs, c: int) -> int:
@@ -318,7 +341,7 @@ def _limits(room: RoomInputs, light: RoomLight, rules: list[ShadingRule]) -> lis
     for rule in rules:
         seat = rule.seat, rule.looks_deg
         if seat not in lights:
-            view = None if seat == (None, None) else _seat_view(room, rule, light.scene.eye)
+            view = None if seat == (None, None) else seat_view(room, seat, light.scene.eye)
             lights[seat] = light.light if view is None else with_view(light.light, view)
         limit = rule.limit_dgp
         limits[seat, rule.limit_lx, limit] = (
@@ -345,11 +368,11 @@ def _excess_dgp(light: PhaseLight | SeasonalLight, limit: float, rating: GlareOp
     return excess
 
 
-def _seat_view(room: RoomInputs, rule: ShadingRule, view: View) -> View:
-    """The view of a seat; what the rule does not say is that of the room's view."""
-    direction = np.asarray(view.direction)
-    if rule.looks_deg is not None:
-        angle = np.radians(rule.looks_deg)
+def seat_view(room: RoomInputs, seat: Seat, view: View) -> View:
+    """The view of a seat; what it does not state is that of the room's view."""
+    (position, looks_deg), direction = seat, np.asarray(view.direction)
+    if looks_deg is not None:
+        angle = np.radians(looks_deg)
         direction = np.array([np.sin(angle), np.cos(angle), 0.0])
-    position = view.position if rule.seat is None else rule.seat
+    position = view.position if position is None else position
     return fisheye(position, direction, room.options.outputs.picture_size)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -45,6 +45,7 @@ FloatArray = NDArray[np.float64]
 Gains = dict[str, FloatArray]  # [H] [W] by name: incident_w, transmitted_w, absorbed_..._w
 Place = tuple[str, int]  # GUID of a room, number of its face
 SunBeyond = dict[Place, FloatArray]  # [H] absorbed [W] at panes of the room and in those beyond
+SunOfYear = tuple[Solar, Gains, SunBeyond]
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,32 +201,9 @@ def solar_gains(
         outer: points in front of the outer faces of the zone's surfaces.
         thermals: thermal data of the window groups in each state [G][J].
     """
-    steps = part(progress, 0.0, 0.8, "heat")
-    in_sun = ZoneInSun(
-        sunlit_rooms(room, zone),
-        room.windows,
-        thermals,
-        facade_irradiance(
-            outdoors, outer, len(zone.zone.surfaces), room.skies, progress=part(steps, 0.4, 0.6)
-        ),
-        _sun_alone(room) if room.options.sky_light == "hemispherical" else None,
-    )
-    absorption: dict[bytes, FloatArray] = {}  # states with equal back reflectances share it
-    suns = []
+    by_states = SunByStates(room, outdoors, zone, outer, thermals=thermals, progress=progress)
     kinds, kind = combinations_of(state)
-    for combination in kinds:
-        heats = _in_states(thermals, combination)
-        back = np.array([heat.back_reflectance for heat in heats])
-        if heats and back.tobytes() not in absorption:
-            absorption[back.tobytes()] = absorption_matrix(
-                in_sun.sunlit.interior,
-                outdoors.first.scene.groups,
-                window_reflectance=back,
-                progress=part(steps, 0.6, 1.0),
-                **_sampled(outdoors.first),
-            ).values
-        absorbed = absorption.get(back.tobytes())
-        suns.append(_gains_in_states(in_sun, combination, outdoors, room.skies, absorbed))
+    suns = [by_states.of(combination) for combination in kinds]
     hours = np.arange(len(kind))
     gains = {
         name: np.stack([sums[name] for _, sums, _ in suns])[kind, hours] for name in suns[0][1]
@@ -235,6 +213,78 @@ def solar_gains(
     }
     of_windows = state[:, room.windows.group]
     return switched([solar for solar, *_ in suns], kind, of_windows), gains, beyond
+
+
+class SunByStates:
+    """Sun of a room's zone in combinations of the states of its window groups.
+
+    Absorption indoors is traced once for each set of back reflectances.
+    """
+
+    def __init__(
+        self,
+        room: RoomInputs,
+        outdoors: SeasonalOutdoors,
+        zone: ThermalRoom,
+        outer: OuterFaces,
+        *,
+        thermals: Sequence[Sequence[ThermalSystem]],
+        progress: Progress = silent,
+    ) -> None:
+        """Args as of `solar_gains`."""
+        steps = part(progress, 0.0, 0.8, "heat")
+        self._room, self._outdoors, self._progress = room, outdoors, part(steps, 0.6, 1.0)
+        facade = facade_irradiance(
+            outdoors, outer, len(zone.zone.surfaces), room.skies, progress=part(steps, 0.4, 0.6)
+        )
+        sun = _sun_alone(room) if room.options.sky_light == "hemispherical" else None
+        self._zone = ZoneInSun(sunlit_rooms(room, zone), room.windows, thermals, facade, sun)
+        self._absorption: dict[bytes, FloatArray] = {}
+        self._known: dict[tuple[int, ...], SunOfYear] = {}
+
+    def of(self, state: Sequence[int]) -> SunOfYear:
+        """Sun of the year with each window group in a state [G], its sums, and the sun beyond."""
+        windows = self._room.windows
+        for g, j in enumerate(state):
+            pair = windows.neighbours(g, j)
+            if pair is not None:  # a tilt between two: the mean of the sun in these
+                low, high, share = pair
+                first, second = (self.of([*state[:g], k, *state[g + 1 :]]) for k in (low, high))
+                return _mean_sun(first, second, share)
+        key = tuple(state)
+        if key not in self._known:
+            self._known[key] = self._balanced(state)
+        return self._known[key]
+
+    def _balanced(self, state: Sequence[int]) -> SunOfYear:
+        heats = _in_states(self._zone.thermals, state)
+        back = np.array([heat.back_reflectance for heat in heats])
+        if heats and back.tobytes() not in self._absorption:
+            self._absorption[back.tobytes()] = absorption_matrix(
+                self._zone.sunlit.interior,
+                self._outdoors.first.scene.groups,
+                window_reflectance=back,
+                progress=self._progress,
+                **_sampled(self._outdoors.first),
+            ).values
+        absorbed = self._absorption.get(back.tobytes())
+        return _gains_in_states(self._zone, state, self._outdoors, self._room.skies, absorbed)
+
+
+def _mean_sun(first: SunOfYear, second: SunOfYear, share: float) -> SunOfYear:
+    """The mean of the sun in two combinations of states, `share` of the second."""
+
+    def mean(one: FloatArray | None, other: FloatArray | None) -> FloatArray | None:
+        return None if one is None or other is None else (1 - share) * one + share * other
+
+    suns: dict[str, Any] = {
+        field.name: mean(getattr(first[0], field.name), getattr(second[0], field.name))
+        for field in fields(Solar)
+        if field.name != "state"
+    }
+    gains = {key: (1 - share) * value + share * second[1][key] for key, value in first[1].items()}
+    beyond = {key: (1 - share) * value + share * second[2][key] for key, value in first[2].items()}
+    return Solar(**suns), gains, beyond
 
 
 def sun_by_hour(suns: Sequence[Solar], number: NDArray[np.int64]) -> Solar:
@@ -324,7 +374,7 @@ def sunlit_rooms(room: RoomInputs, zone: ThermalRoom) -> SunlitRooms:
     for one in (room.space, *others):
         through = {
             face.name: (guid, face, back)
-            for guid, pairs in panes_between(room.building, one).items()
+            for guid, pairs in panes_between(room.building.spaces, one).items()
             if guid in reached
             for face, back in pairs
         }
@@ -412,7 +462,7 @@ def _gains_in_states(
         directional_sums(outdoors, skies, np.concatenate(shares), zone.sun),
         np.cumsum([len(s) for s in shares[:-1]]),
     )
-    taken, outer, inner, air, whole = (rows.T for rows in sums)
+    taken, outer, inner, middle, whole = (rows.T for rows in sums)
     B = len(zone.sunlit.beyond)
     retained = np.array([h.back_absorptance / max(1.0 - h.back_reflectance, 1e-9) for h in heats])
 
@@ -425,13 +475,13 @@ def _gains_in_states(
         inside=year(taken[:, :F]),
         facade=facade,
         window_inside=year((retained * taken[:, F + B :] / area)[:, group]),
-        absorbed_air=year(air[:, group]),
+        absorbed_middle=year(middle[:, group]),
     )
     gains = {
         "incident_w": whole[:, 0],
         "transmitted_w": whole[:, 1],
         "absorbed_outer_w": outer @ area,
-        "absorbed_inner_w": (inner + air) @ area,
+        "absorbed_inner_w": (inner + middle) @ area,
         "absorbed_room_w": taken[:, :F].sum(axis=1),
     }
     if B:
@@ -459,8 +509,8 @@ def absorbed_shares(
     """Weights of the groups' irradiance by direction [n, G, K] for `directional_sums`.
 
     What the room's surfaces and windows absorb [W]; outer and inner layers of each group, and the
-    room's air behind an interior shade [W/m2];
-    what is incident on all windows and what they transmit [W].
+    pane behind an interior shade [W/m2]; what is incident on all windows and what they transmit
+    [W].
 
     Args: transmission: [G, K, K]; area: [G] [m2]; absorption: [G, K, F + G].
     """
@@ -470,6 +520,6 @@ def absorbed_shares(
     each = np.eye(len(area))[..., None]
     outer = each * np.stack([heat.absorptances.outer for heat in heats])
     inner = each * np.stack([heat.absorptances.inner for heat in heats])
-    air = each * np.stack([np.broadcast_to(h.absorptances.air, omega.shape) for h in heats])
+    middle = each * np.stack([np.broadcast_to(h.absorptances.middle, omega.shape) for h in heats])
     whole = np.stack([np.tile(area[:, None], len(omega)), entering.sum(axis=1)])
-    return [(absorbed @ entering)[:, :, 0], outer, inner, air, whole]
+    return [(absorbed @ entering)[:, :, 0], outer, inner, middle, whole]

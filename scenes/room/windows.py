@@ -38,14 +38,33 @@ class RoomWindows:
 
     def optics(self) -> list[list[BsdfOptics]]:
         """Optics of each group's systems by state [G][J]."""
-        from mitsuba_cfs.methods.optics import BsdfOptics  # a tracer, which no export needs
+        from mitsuba_cfs.methods.optics import (  # a tracer, which no export needs
+            BetweenOptics,
+            BsdfOptics,
+        )
 
         known: dict[int, BsdfOptics] = {}
-        for states in self.systems:
-            for system in states:
-                if id(system) not in known:
-                    known[id(system)] = BsdfOptics(system.visible, system.fine, system.angular)
-        return [[known[id(system)] for system in states] for states in self.systems]
+
+        def of(system: FenestrationSystem) -> BsdfOptics:
+            if id(system) not in known:
+                tilts = system.between
+                between = tilts and BetweenOptics(of(tilts.low), of(tilts.high), tilts.share)
+                known[id(system)] = BsdfOptics(system.visible, system.fine, system.angular, between)
+            return known[id(system)]
+
+        return [[of(system) for system in states] for states in self.systems]
+
+    def neighbours(self, g: int, state: int) -> tuple[int, int, float] | None:
+        """Numbers of two states of a group that a state is the mean of, and the second's share."""
+        states = self.systems[g]
+        tilts = states[min(state, len(states) - 1)].between
+        if tilts is None:
+            return None
+        low, high = (
+            next((n for n, one in enumerate(states) if one is tilt), None)
+            for tilt in (tilts.low, tilts.high)
+        )
+        return None if low is None or high is None else (low, high, tilts.share)
 
     def in_state(self, state: int) -> list[FenestrationSystem]:
         """The system of each group [G] in a state; a group with fewer states is in its last."""

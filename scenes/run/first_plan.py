@@ -34,7 +34,12 @@ from scenes.room.daylight import room_daylight
 from scenes.room.inputs import RoomInputs, skies_for
 from scenes.room.light import RoomLight
 from scenes.room.options import RoomOptions
-from scenes.room.shading import control_signals, shading_states, temperature_conditions
+from scenes.room.shading import (
+    control_signals,
+    predicts,
+    shading_states,
+    temperature_conditions,
+)
 from scenes.run.options import JobOptions
 from scenes.run.together import traced_together
 
@@ -94,7 +99,8 @@ def first_plan(
 def _planned(room: RoomInputs, matrices: PhaseMatrices) -> PlannedRoom:
     light = phase_light(matrices, room.windows.optics(), room.skies)
     of_room = RoomLight(matrices.scene, matrices, light, None)
-    unshaded = bool(control_signals(room) - READ) or bool(temperature_conditions(room))
+    by_light = bool(control_signals(room) - READ) or room.controller is not None
+    unshaded = by_light or predicts(room) or bool(temperature_conditions(room))
     state = np.zeros((room.skies.hours, len(room.windows.groups)), dtype=np.int64)
     if not unshaded:
         state = shading_states(room, of_room, None)

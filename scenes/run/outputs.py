@@ -161,6 +161,7 @@ def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
     if room.operation is not None:
         _csv(room.operation.hours, place / "operation.csv")
         _csv(pd.DataFrame([room.operation.summary]), place / "loads.csv", index=False)
+        _write_shading(room, times, place)
     if room.annual_glare is not None:
         _csv(room.annual_glare, place / "annual_glare.csv")
     if room.spectral is not None:
@@ -187,6 +188,17 @@ def eye_spectrum(spectral: SpectralYear, times: pd.DatetimeIndex) -> pd.DataFram
     """Irradiance of the eye [W/m2] in each band in every hour; columns are named by the bands."""
     names = [f"{a:g}-{b:g}_nm_w_m2" for a, b in pairwise(spectral.edges_nm)]
     return pd.DataFrame(spectral.spectrum, index=times, columns=names).rename_axis("time")
+
+
+def _write_shading(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
+    """Figures of each group of windows that moves, and every move; of windows with states."""
+    if room.operation is None or len(room.operation.states) < 2:
+        return
+    shading = room.operation.shading
+    occupied = room.heat.comfort["occupied"].to_numpy(bool)
+    per_day = round(pd.Timedelta(days=1) / (times[1] - times[0]))
+    _csv(shading.figures(occupied, per_day), place / "shading.csv", index=False)
+    _csv(shading.moves(times), place / "shading_moves.csv", index=False)
 
 
 def _write_grids(grids: Sequence[GridDaylight], place: Path) -> None:

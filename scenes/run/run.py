@@ -137,7 +137,7 @@ def _interchangeable(inputs: Inputs, options: JobOptions, one: Space, other: Spa
         return False
     if not balanced_together(inputs, options):
         return True
-    if any(panes_between(building, room) for room in rooms):
+    if any(panes_between(building.spaces, room) for room in rooms):
         return False  # sun passes to the rooms beyond
     return same_surfaces(one, other)
 

@@ -71,6 +71,8 @@ def case_inputs(
         if sha256(source.path) != source.sha256:
             raise DataError("is not the file that it was when the study began", file=source.path)
     files = read_files(case.inputs, weather=case_weather(case), table=SYSTEM_TABLE)
+    if case.control is not None and files.operation is not None:
+        files = replace(files, operation=files.operation.controlled_by(case.control.function))
     options = replace(case.inputs, spaces=spaces) if spaces else case.inputs
     building = _building(case) if building is None else building
     return inputs_of(building, options, files, heat_of=case.options)

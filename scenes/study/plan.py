@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
+from uuid import uuid4
 
 from bim.building_file import chosen_spaces, held_states
 from bim.model import Building, Space
@@ -19,7 +20,7 @@ from scenes.fenestration.thermal_file import files_beside
 from scenes.heat.box import building_or_box
 from scenes.input_files import named_files
 from scenes.input_options import InputOptions
-from scenes.room.operation import Operation, read_operation
+from scenes.room.operation import Controller, Operation, read_operation
 from scenes.room.options import RoomOptions
 from scenes.study.study_file import NO_SYSTEM, RoomTable, Study
 from scenes.toml_file import ReadTable
@@ -46,6 +47,14 @@ class InputFile:
 
 
 @dataclass(frozen=True, slots=True)
+class PlannedControl:
+    """A control function of a case; what it does is not in a file, so that no result is reused."""
+
+    function: Controller
+    run: str = field(default_factory=lambda: uuid4().hex)  # of this plan alone
+
+
+@dataclass(frozen=True, slots=True)
 class Case:
     """Everything that one result depends on; can be sent to another process."""
 
@@ -62,6 +71,7 @@ class Case:
     program: str  # `program_version()` of the plan
     glare: str  # DGP, eDGP, sDGP or none
     chosen: str = ""  # why this method, where `auto` chose it
+    control: PlannedControl | None = None  # in place of the operation's rules
 
     @property
     def key(self) -> str:
@@ -74,6 +84,7 @@ class Case:
             self.orientation_deg % 360.0,
             _plain(self.options.named()),
             self.glare,
+            *(() if self.control is None else (self.control.run,)),
         )[:32]
 
     @property
@@ -164,17 +175,18 @@ def _of_space(
         systems = []
         for system in study.system or (NO_SYSTEM,):
             options = study.inputs(room, system, climate, spaces=(space.guid,))
-            systems.append((system.name, options, _input_files(options, held, read)))
+            control = None if system.control is None else PlannedControl(system.control)
+            systems.append((system.name, options, _input_files(options, held, read), control))
         for angle in study.orientations_deg:
             for method in study.methods:
                 # an open method keeps the default's place until `auto` is settled
                 chosen = {} if method == AUTO else {"method": method}
                 chosen |= study.options.model_dump()
-                for name, options, files in systems:
+                for name, options, files, control in systems:
                     yield Case(
                         room.name, room.name if room.box else space.label, name, climate.name,
                         options, files, room.box, room.specular, angle, RoomOptions.of(**chosen),
-                        program_version(), study.glare, AUTO if method == AUTO else "",
+                        program_version(), study.glare, AUTO if method == AUTO else "", control,
                     )  # fmt: skip
 
 

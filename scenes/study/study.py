@@ -140,7 +140,7 @@ def run_study(
     )
     with closing(results_of_left):
         for result in results_of_left:
-            if not result.error:
+            if not result.error and cases[result.key].control is None:
                 store.save(result)
             found[result.key] = result
             under_way()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -83,6 +84,8 @@ class SystemTable(_Table):
     u_value: Annotated[float, Field(ge=0.1, le=7)] | None = None  # [W/(m2 K)]
     g_value: Annotated[float, Field(ge=0, le=1)] | None = None
     see_through: tuple[Peak, ...] = ()  # as `--see-through`
+    # from Python alone: in place of the rules of its operation, see `Operation.controlled_by`
+    control: Annotated[Callable[..., Any] | None, Field(exclude=True)] = None
 
     @model_validator(mode="after")
     def _of_a_file(self) -> SystemTable:
@@ -90,6 +93,8 @@ class SystemTable(_Table):
             raise ValueError("give `bsdf`, or `operation` with [[system]] tables in it")
         if self.bsdf is None and not (self.u_value is None and self.g_value is None):
             raise ValueError("`u_value` and `g_value` belong to a `bsdf`")
+        if self.control is not None and (self.operation is None or self.bsdf is not None):
+            raise ValueError("`control` needs an `operation` with [[system]] tables")
         return self
 
 

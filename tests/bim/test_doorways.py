@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 
 import pytest
 
-from bim.doorways import panes_between, touching
+import tests.bim.test_read_gbxml as drawn
+from bim.doorways import panes_between, source_rooms, touching, wall_depth
 from bim.gbxml.building import read_gbxml
 from bim.gbxml.write import SCHEMA, write_gbxml
 from bim.honeybee.building import read_honeybee
 from bim.honeybee.write import write_honeybee
 from bim.shell import open_edges
+from tests.bim import honeybee_models
 from tests.bim.small_ifc import DEPTH, HEIGHT, WIDTH
 from tests.bim.test_passages import DOORWAY, SOUTH, partition, read, two_rooms
 from tests.issues import of_code
@@ -36,7 +39,7 @@ def test_the_way_through_a_wall_belongs_to_the_first_room(tmp_path, thick):
     building = open_rooms(tmp_path, thick)
     moved, sides = touching(building)
     assert len(sides) == 2 and all(sides[other] == key for key, other in sides.items())
-    ((_, ((face, back),)),) = panes_between(moved, moved.spaces[0]).items()
+    ((_, ((face, back),)),) = panes_between(moved.spaces, moved.spaces[0]).items()
     assert face.area == pytest.approx(2.1 if thick else 1.1 * HEIGHT)
     assert face.triangles.mean(axis=(0, 1)) == pytest.approx(back.triangles.mean(axis=(0, 1)))
     reveals = [f for f in moved.spaces[0].faces if f.name.startswith(f"{face.name} reveal")]
@@ -84,3 +87,44 @@ def test_gbxml_air_is_one_surface_of_two_spaces(tmp_path):
     (air,) = root.findall(f".//{{{SCHEMA}}}Surface[@surfaceType='Air']")
     spaces = [one.get("spaceIdRef") for one in air.findall(f"{{{SCHEMA}}}AdjacentSpaceId")]
     assert spaces == ["space-0", "space-1"]
+
+
+def _glass_between(folder, suffix, *, one_sided: bool = False):
+    """Two rooms with 2 m2 of glass between them, in the file of a format."""
+    path = folder / f"glass.{suffix}"
+    if suffix == "gbxml":
+        named = 'openingType="FixedWindow" windowTypeIdRef="unit"'
+        path.write_text(drawn.two_rooms().replace('openingType="NonSlidingDoor"', named))
+        return read_gbxml(path)
+    model = honeybee_models.two_rooms()
+    ring = [[5.0, 4.0, 1.0], [5.0, 6.0, 1.0], [5.0, 6.0, 2.0], [5.0, 4.0, 2.0]]
+    sides = {"here": (0, 1, ring, "there"), "there": (1, 3, ring[::-1], "here")}
+    for name, (room, face, corners, other) in sides.items():
+        behind = {"type": "Surface", "boundary_condition_objects": [other, "face", "room"]}
+        pane = honeybee_models.opening(name, corners, boundary_condition=behind)
+        pane["properties"]["energy"]["construction"] = "Glazing"
+        if name == "here" or not one_sided:
+            model["rooms"][room]["faces"][face]["apertures"] = [pane]
+    path.write_text(json.dumps(model))
+    return read_honeybee(path)
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_glass_between_rooms_is_one_pane_of_both(tmp_path, suffix):
+    building = _glass_between(tmp_path, suffix)
+    office, hall = building.spaces
+    ((other, ((face, back),)),) = panes_between(building.spaces, office).items()
+    assert other == hall.guid and wall_depth(face, back) == pytest.approx(0.0, abs=1e-9)
+    assert face.pane.visible_transmittance == back.pane.visible_transmittance == 0.7
+    assert face.pane.area == pytest.approx(2.0) and face.pane.normal == pytest.approx([1, 0, 0])
+    (issue,) = of_code(building, "glass-between-rooms")
+    assert issue.values["rooms"] == ("Hall", "Office")
+    (source,) = source_rooms(building, replace(hall, windows=()))
+    assert source.guid == office.guid
+
+
+def test_glass_that_one_room_alone_has_is_named(tmp_path):
+    building = _glass_between(tmp_path, "hbjson", one_sided=True)
+    assert not panes_between(building.spaces, building.spaces[0])
+    (issue,) = of_code(building, "glass-on-one-side")
+    assert issue.where == "here"

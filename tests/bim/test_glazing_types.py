@@ -79,6 +79,45 @@ def whole(kind: str) -> Callable:
     return build
 
 
+def set_of_rooms(extension: str, part: dict) -> Callable:
+    """Rooms with a set that holds whole objects."""
+
+    def build(folder: Path) -> Building:
+        model = two_rooms()
+        noun = "construction" if extension == "energy" else "modifier"
+        whole = {"type": f"{noun.title()}Set", "identifier": "own", "aperture_set": part}
+        model["properties"][extension][f"{noun}_sets"] = [whole]
+        for room in model["rooms"]:
+            room["properties"][extension][f"{noun}_set"] = "own"
+        return read_building_file(write(model, folder))
+
+    return build
+
+
+def own_construction(name: str) -> Callable:
+    """The window's construction by that name."""
+
+    def build(folder: Path) -> Building:
+        model = two_rooms()
+        window = model["rooms"][0]["faces"][0]["apertures"][0]
+        window["properties"]["energy"]["construction"] = name
+        return read_building_file(write(model, folder))
+
+    return build
+
+
+def wall_towards(kind: str) -> Callable:
+    """The window's wall with another boundary condition."""
+
+    def build(folder: Path) -> Building:
+        model = two_rooms()
+        model["rooms"][0]["faces"][0]["boundary_condition"] = {"type": kind}
+        del model["rooms"][1]["faces"][0]["doors"]
+        return read_building_file(write(model, folder))
+
+    return build
+
+
 def modifier(states: list | None = None, **one: Any) -> Callable:
     """The window's modifier, and those of its states."""
 
@@ -124,12 +163,13 @@ def window_opening(inner: str) -> Callable:
     return build
 
 
-def opening(kind: str) -> Callable:
-    """A gbXML whose window is of that type of opening."""
+def opening(kind: str, *, of_type: bool = True) -> Callable:
+    """A gbXML whose window is of that type of opening, with its window type or without."""
 
     def build(folder: Path) -> Building:
         path = folder / "two.gbxml"
-        path.write_text(gbxml().replace('"FixedWindow"', f'"{kind}"'))
+        text = gbxml() if of_type else gbxml().replace(' windowTypeIdRef="unit"', "")
+        path.write_text(text.replace('"FixedWindow"', f'"{kind}"'))
         return read_building_file(path)
 
     return build
@@ -179,6 +219,9 @@ def attached(*options: str) -> Callable:
 
 
 GAS = {"type": "EnergyWindowMaterialGas", "thickness": 0.012}
+HALF_GAP = {"type": "EnergyWindowMaterialGas", "thickness": 0.006}
+WHOLE = {"type": "WindowConstruction", "identifier": "own glazing",
+         "materials": [SIMPLE | {"identifier": "own unit"}]}  # fmt: skip
 MIXTURE = {"type": "EnergyWindowMaterialGasMixture", "thickness": 0.012,
            "gas_types": ["Argon", "Air"], "gas_fractions": [0.9, 0.1]}  # fmt: skip
 CUSTOM = {"type": "EnergyWindowMaterialGasCustom", "thickness": 0.012}
@@ -189,6 +232,7 @@ U, G = (
     '<U-value unit="WPerSquareMeterK">1.1</U-value>',
     "<SolarHeatGainCoeff>.5</SolarHeatGainCoeff>",
 )
+G_60 = '<SolarHeatGainCoeff solarIncidentAngle="60">.3</SolarHeatGainCoeff>'
 VISIBLE = '<Transmittance type="Visible" unit="Fraction">0.7</Transmittance>'
 PANES = '<Glaze id="g"/><Gap id="a"/><Glaze id="h"/>'
 CASES: dict[str, Callable] = {
@@ -232,7 +276,19 @@ CASES: dict[str, Callable] = {
     **{one: drawn_shade(one) for one in ("interiorShadeType", "exteriorShadeType")},
     **{kind: opening(kind) for kind in ("FixedWindow", "OperableWindow", "FixedSkylight",
                                         "OperableSkylight", "SlidingDoor")},
-    "NonSlidingDoor": opening("NonSlidingDoor"),
+    "NonSlidingDoor": opening("NonSlidingDoor", of_type=False),
+    "NonSlidingDoor with a window type": opening("NonSlidingDoor"),
+    "g at several angles": window_type(U + G_60 + G + VISIBLE),
+    "g at 60 degrees alone": window_type(U + G_60 + VISIBLE),
+    "ConstructionSet": set_of_rooms("energy", {"window_construction": WHOLE}),
+    "ModifierSet": set_of_rooms("radiance", {"window_modifier": {
+        "type": "Glass", "identifier": "own glass"} | CLEAR}),
+    "two gaps in a row": construction(PANE, GAS, GAS, PANE),
+    "blind between panes": construction(PANE, HALF_GAP, BLIND, HALF_GAP, PANE),
+    "name not in the file": own_construction("elsewhere"),
+    "OpaqueConstruction": own_construction("Wall"),
+    "Aperture in a face on the ground": wall_towards("Ground"),
+    "Aperture in an adiabatic face": wall_towards("Adiabatic"),
     "Air": opening("Air"),
     "Pset_WindowCommon": property_set("Pset_WindowCommon", ThermalTransmittance=1.1),
     "Pset_DoorWindowGlazingType": property_set(
@@ -267,7 +323,9 @@ EXPECTED: dict[str, tuple[float | None, ...]] = {
     "EnergyWindowMaterialGasMixture": (2.578, 0.7736, 0.81458),
     "EnergyWindowMaterialShade": CLEAR_PANE, "EnergyWindowMaterialBlind": CLEAR_PANE,
     "EnergyWindowFrame": UNIT, "dirt_correction": (5.710, None, 0.72),
-    "solar_diffusing": CLEAR_PANE,
+    "solar_diffusing": CLEAR_PANE, "blind between panes": TWO_PANES, "ConstructionSet": UNIT,
+    "ModifierSet": (1.1, 0.5, 0.5503), "OpaqueConstruction": NONE,
+    "g at 60 degrees alone": (1.1, None, 0.7),
     **{kind: UNIT for kind in ("WindowConstruction", "WindowConstructionShade",
                                "WindowConstructionDynamic")},
     "Glass": (1.1, 0.5, 0.5503), "states: Glass": (1.1, 0.5, 0.5503),

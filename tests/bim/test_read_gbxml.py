@@ -407,3 +407,39 @@ def test_openings_without_a_polygon_or_of_air(tmp_path):
     assert "glass-within-room" not in {one.code for one in changed(tmp_path, within).issues}
     odd = changed(tmp_path, ('openingType="FixedWindow"', f'openingType="{"W" * 50}"'))
     assert [one for one in odd.issues if f"'{'W' * 40}', expected of" in str(one)]
+
+
+def test_surfaces_that_transmit_light_are_named(tmp_path):
+    """A wall whose construction has a transmittance; a window in a shade."""
+    glass = (
+        '<Construction id="glass"><Transmittance type="Visible">0.6</Transmittance></Construction>'
+    )
+    ring = loop([(2, 0, 2.5), (3, 0, 2.5), (3, -1, 2.5)])
+    pane = f'<Opening id="pane" openingType="FixedWindow">{ring}</Opening>'
+    shade = '<Surface id="Overhang" surfaceType="Shade">'
+    found = changed(
+        tmp_path, ("</gbXML>", f"{glass}</gbXML>"), (shade, shade + pane),
+        ('id="Office-north" surfaceType="ExteriorWall" constructionIdRef="wall"',
+         'id="Office-north" surfaceType="ExteriorWall" constructionIdRef="glass"'),
+    )  # fmt: skip
+    said = [(one.where, one.values["material"]) for one in of_code(found, "shade-taken-as-opaque")]
+    assert said == [("Office-north", "glass"), ("Overhang", "pane")]
+
+
+def test_two_spaces_of_one_id_are_refused(tmp_path):
+    with pytest.raises(DataError, match="Space Office: id: is the id of another space too"):
+        changed(tmp_path, ('<Space id="Hall"', '<Space id="Office"'))
+
+
+def test_a_door_whose_construction_transmits_light_is_glass(tmp_path):
+    """Without a window type; a door of another construction is opaque."""
+    glass = (
+        '<Construction id="glass"><U-value unit="WPerSquareMeterK">1.4</U-value>'
+        '<Transmittance type="Visible">0.6</Transmittance></Construction></gbXML>'
+    )
+    door = 'openingType="NonSlidingDoor" constructionIdRef="{}"'
+    window = 'openingType="FixedWindow" windowTypeIdRef="unit"'
+    found = changed(tmp_path, ("</gbXML>", glass), (window, door.format("glass")))
+    (pane,) = found.windows
+    assert (pane.u_value, pane.visible_transmittance) == (1.4, 0.6)
+    assert not changed(tmp_path, (window, door.format("wall"))).windows

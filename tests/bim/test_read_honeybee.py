@@ -319,3 +319,133 @@ def test_odd_values_give_one_line(tmp_path):
             refused += 1
             assert "\n" not in str(error)
     assert 10 < refused < 90
+
+
+def _other_side(model):
+    model["rooms"][0]["faces"][2]["boundary_condition"] = {"type": "OtherSideTemperature"}
+
+
+def _green_roof(model):
+    energy = model["properties"]["energy"]["global_construction_set"]
+    energy["materials"].append(
+        {"type": "EnergyMaterialVegetation", "identifier": "green", "thickness": 0.1,
+         "conductivity": 0.35, "density": 1100, "specific_heat": 1200,
+         "soil_solar_absorptance": 0.8}
+    )  # fmt: skip
+    roof = {"type": "OpaqueConstructionAbridged", "identifier": "roof",
+            "materials": ["green", "Wool"]}  # fmt: skip
+    energy["constructions"].append(roof)
+    model["rooms"][0]["faces"][5]["properties"]["energy"]["construction"] = "roof"
+
+
+def _trans_wall(model):
+    trans = {"type": "Trans", "identifier": "tr", "transmitted_diff": 0.5}
+    model["properties"]["radiance"]["modifiers"].append(
+        trans | {f"{c}_reflectance": 0.5 for c in "rgb"}
+    )
+    model["rooms"][0]["faces"][2]["properties"]["radiance"]["modifier"] = "tr"
+
+
+def _patterned(model):
+    model["properties"]["radiance"]["modifiers"][0]["modifier"] = {"type": "Plastic"}
+
+
+def _missing_set(model):
+    model["rooms"][0]["properties"]["energy"]["construction_set"] = "elsewhere"
+
+
+def _door_of_glazing(model):
+    model["rooms"][0]["faces"][1]["doors"][0]["properties"]["energy"]["construction"] = "Glazing"
+
+
+def _adiabatic_window(model):
+    window = model["rooms"][0]["faces"][0]["apertures"][0]
+    window["boundary_condition"] = {"type": "Adiabatic"}
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "value"),
+    [
+        (_other_side, "boundary-not-computed", "OtherSideTemperature"),
+        (_green_roof, "vegetation-not-computed", "green"),
+        (_trans_wall, "shade-taken-as-opaque", "tr"),
+        (_patterned, "modifier-of-modifier", "plastic"),
+        (_missing_set, "value-not-read", "'elsewhere' is not in the file"),
+        (_door_of_glazing, "value-not-read", "expected an opaque construction"),
+        (_adiabatic_window, "value-not-read", "'Adiabatic' in a face"),
+    ],
+)
+def test_what_is_not_computed_is_named(tmp_path, change, code, value):
+    model = two_rooms()
+    change(model)
+    found = read_honeybee(write(model, tmp_path))
+    (issue,) = [one for one in found.issues if one.code == code]
+    assert any(value in str(one) for one in issue.values.values())
+    assert len(found.spaces) == 2 and len(found.windows) == 2
+    if change is _green_roof:
+        roof = next(f for f in found.spaces[0].faces if f.name == "Office_ceiling")
+        assert [layer.name for layer in roof.construction.layers] == ["green", "Wool"]
+        (outer,) = [e for e in found.elements if e.name == "Office_ceiling"]
+        assert outer.reflectance_visible == pytest.approx(0.2)
+    if change is _trans_wall:  # half of it is transmitted
+        wall = next(f for f in found.spaces[0].faces if f.name == "Office_north")
+        assert wall.reflectance_visible == pytest.approx(0.25, abs=1e-3)
+
+
+def test_an_object_in_place_of_a_name_is_read(tmp_path):
+    """Files that are not abridged have it; two of one name are refused."""
+    model = two_rooms()
+    window = model["rooms"][0]["faces"][0]["apertures"][0]["properties"]
+    unit = {"type": "EnergyWindowMaterialSimpleGlazSys", "identifier": "dark", "u_factor": 2.0,
+            "shgc": 0.3, "vt": 0.25}  # fmt: skip
+    window["energy"]["construction"] = {
+        "type": "WindowConstruction", "identifier": "dark", "materials": [unit]
+    }  # fmt: skip
+    found = read_honeybee(write(model, tmp_path)).space("Office").windows[0]
+    assert (found.u_value, found.g_value, found.visible_transmittance) == (2.0, 0.3, 0.25)
+    window["energy"]["construction"]["identifier"] = "Glazing"
+    with pytest.raises(DataError, match="another one with this identifier"):
+        read_honeybee(write(model, tmp_path))
+
+
+def test_states_of_a_construction_may_be_named(tmp_path):
+    model = two_rooms()
+    energy = model["properties"]["energy"]
+    energy["constructions"] = [
+        {"type": "WindowConstructionDynamicAbridged", "identifier": "dynamic",
+         "constructions": ["Glazing", "Glazing"]}
+    ]  # fmt: skip
+    window = model["rooms"][0]["faces"][0]["apertures"][0]["properties"]
+    window["energy"]["construction"] = "dynamic"
+    found = read_honeybee(write(model, tmp_path)).space("Office").windows[0]
+    assert (found.u_value, found.g_value) == (1.1, 0.5)
+
+
+def test_a_global_set_may_be_named(tmp_path):
+    """As in the first versions of the format."""
+    model = two_rooms()
+    energy = model["properties"]["energy"]
+    default = energy.pop("global_construction_set") | {"identifier": "Default"}
+    energy |= {key: default.pop(key) for key in ("materials", "constructions")}
+    energy |= {"construction_sets": [default], "global_construction_set": "Default"}
+    found = read_honeybee(write(model, tmp_path)).space("Office").windows[0]
+    assert found.u_value == 1.1
+
+
+def test_windows_of_one_identifier_are_two_windows(tmp_path):
+    """Systems go by the identifier; in one room they became a single window."""
+    model = two_rooms()
+    windows = model["rooms"][0]["faces"][0]["apertures"]
+    other = json.loads(json.dumps(windows[0])) | {"outdoor_shades": []}
+    other["geometry"]["boundary"] = [[4.2, 0, 0.9], [4.8, 0, 0.9], [4.8, 0, 2.4], [4.2, 0, 2.4]]
+    windows.append(other)
+    found = read_honeybee(write(model, tmp_path)).space("Office").windows
+    assert [one.area for one in found] == pytest.approx([4.5, 0.9])
+    assert len({one.guid for one in found}) == 2
+
+
+def test_two_rooms_of_one_identifier_are_refused(tmp_path):
+    model = two_rooms()
+    model["rooms"][1]["identifier"] = "Office"
+    with pytest.raises(DataError, match="Office: two rooms have this identifier"):
+        read_honeybee(write(model, tmp_path))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import re
 
 import numpy as np
 import pytest
@@ -257,3 +258,40 @@ def test_air_changes_of_gbxml_are_of_the_rooms_volume(tmp_path, changes):
     (use,) = building.uses.values()
     assert "value-not-read" not in {one.code for one in building.issues}
     assert use.ventilation_m3_s.peak == pytest.approx(changes * 120.0 / 3600.0)
+
+
+@pytest.mark.parametrize(
+    ("unit", "area"), [("SquareMPerPerson", 10.0), ("SquareFtPerPerson", 0.9290304)]
+)
+def test_the_floor_of_a_person_has_a_unit(tmp_path, unit, area):
+    """10 square feet are 0.929 m2."""
+    path = tmp_path / "used.xml"
+    path.write_text(used_gbxml().replace('"SquareMPerPerson">10', f'"{unit}">10'))
+    building = read_gbxml(path)
+    ((guid, use),) = building.uses.items()
+    (space,) = [one for one in building.spaces if one.guid == guid]
+    assert use.persons.peak == pytest.approx(space.floor_area / area)
+
+
+@pytest.mark.parametrize(
+    ("unit", "text"), [("C", "25"), ("F", "77"), ("K", "298.15"), ("R", "536.67")]
+)
+def test_a_design_temperature_has_a_unit(tmp_path, unit, text):
+    path = tmp_path / "used.xml"
+    path.write_text(used_gbxml().replace('unit="F">77', f'unit="{unit}">{text}'))
+    (use,) = read_gbxml(path).uses.values()
+    assert use.cooling_c.values == pytest.approx(25.0)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "is_split"), [("Total", False), ("Total Sensible", True), ("Sensible", True)]
+)
+def test_heat_of_people_that_is_not_split_is_named(tmp_path, kinds, is_split):
+    path, text = tmp_path / "used.xml", used_gbxml()
+    for kind in {"Total", "Sensible"} - set(kinds.split()):
+        text = re.sub(rf'<PeopleHeatGain[^>]*"{kind}">[^<]*</PeopleHeatGain>', "", text)
+    path.write_text(text)
+    building = read_gbxml(path)
+    assert is_split != ("heat-gain-not-split" in {one.code for one in building.issues})
+    (use,) = building.uses.values()
+    assert (use.person_w is not None) == is_split

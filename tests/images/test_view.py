@@ -12,6 +12,7 @@ import pytest
 from mitsuba_cfs.images.view import (
     View,
     fisheye,
+    fitted,
     format_view,
     parse_view,
     pixel_directions,
@@ -146,3 +147,24 @@ def test_the_smallest_picture_has_one_pixel():
     assert (one.width, one.height, one.up, one.horizontal_deg) == (1, 1, (0, 0, 1), 180)
     with pytest.raises(ValueError, match="size"):
         fisheye((0, 0, 0), (0, 1, 0), 0)
+
+
+def test_a_picture_has_so_many_pixels_along_its_longer_side():
+    """By the tangent of half the angle in perspective, by the angle in an angular view."""
+    for kind, longer, shorter, ratio in (
+        ("v", 90, 60, np.tan(np.radians(30))), ("a", 180, 120, 120 / 180),
+    ):  # fmt: skip
+        text = f"-vt{kind} -vp 0 0 0 -vd 0 1 0 -vu 0 0 1 -vh {{}} -vv {{}}"
+        wide, high = (
+            fitted(parse_view(text.format(*pair)), 300)
+            for pair in ((longer, shorter), (shorter, longer))
+        )
+        assert (wide.width, wide.height) == (300, round(300 * ratio))
+        assert (high.width, high.height) == (wide.height, wide.width)
+
+
+def test_a_parallel_view_has_a_ray_everywhere_along_its_direction():
+    view = parse_view("-vtl -vp 0 0 0 -vd 0 1 0 -vu 0 0 1 -vh 2 -vv 2", width=3, height=3)
+    directions, exists = rays(view, np.array([0.1, 0.5, 0.9]), np.array([0.2, 0.5, 1.0]))
+    assert exists.all()
+    np.testing.assert_allclose(directions, [(0.0, 1.0, 0.0)] * 3)

@@ -17,6 +17,7 @@ SHOWN = {
     "room": ("Spatial daylight autonomy", "operative_c", "room_results/report.html"),
     "study": ("Blind down", "straight_view_percent"),
     "light": (),
+    "control": ("By use", "straight_view_percent"),
 }
 WITH_CLIENT = pytest.mark.skipif(
     importlib.util.find_spec("nbclient") is None or importlib.util.find_spec("ipykernel") is None,
@@ -24,7 +25,7 @@ WITH_CLIENT = pytest.mark.skipif(
 )
 
 
-def test_there_are_three() -> None:
+def test_each_is_known() -> None:
     assert [path.stem for path in NOTEBOOKS] == sorted(SHOWN)
 
 

@@ -19,7 +19,13 @@ from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
 from scenes.input_files import read_weather
 from scenes.room.inputs import FileSensors
-from scenes.room.operation import OperationHours, stated_note, unstated_note, with_stated_uses
+from scenes.room.operation import (
+    OperationHours,
+    ground_note,
+    stated_note,
+    unstated_note,
+    with_stated_uses,
+)
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.room import compute_room
@@ -83,6 +89,17 @@ def test_a_file_without_uses_changes_nothing():
     building, tables = read_honeybee(TWO_ROOMS), OperationTables()
     assert with_stated_uses(tables, building) is tables
     assert not stated_note(building)
+
+
+def test_a_basement_says_that_its_ground_has_no_sun():
+    ground = {"kind": "basement", "perimeter": 20.0, "depth": 2.5, "area": 20.0}
+    below = {"ground": ground}
+    (note,) = ground_note(OperationTables(envelope=below))
+    assert "sun and longwave radiation" in note
+    one_room = OperationTables(rooms=[{"spaces": ["Cellar"], "envelope": below}])
+    assert ground_note(one_room) == (note,)
+    slab = {"ground": {"kind": "slab", "perimeter": 20.0}}
+    assert not ground_note(OperationTables(envelope=slab)) and not ground_note(OperationTables())
 
 
 def test_gains_and_leaks_that_nobody_states_are_named(used):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import pytest
 from pydantic import BaseModel
@@ -239,3 +239,16 @@ def test_reading_options_are_the_keys_that_a_table_has() -> None:
     }  # fmt: skip
     both = toml_file.read_options(toml_file.ReadTable(), toml_file.OutdoorTable(albedo="file"))
     assert both["albedo"] == "file" and both["furniture"] is False and len(both) == 7
+
+
+def test_the_type_within_a_list_that_may_be_a_number_is_found() -> None:
+    found = toml_file._at(float | tuple[toml_file.OutdoorTable, ...], (0,))
+    assert keys_of(found) == keys_of(toml_file.OutdoorTable)
+    assert toml_file._at(float | dict[str, int], ("x",)) is int
+    assert toml_file._at(float, (0,)) is None
+
+
+def test_what_annotates_a_table_is_passed_over() -> None:
+    assert keys_of(Annotated[toml_file.OutdoorTable, "of a study"]) == keys_of(
+        toml_file.OutdoorTable
+    )

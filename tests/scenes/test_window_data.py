@@ -74,14 +74,15 @@ def test_layers_give_u_g_films_and_resistance_by_default():
     heat = thermal_system(grey_system(closure=Closure("layers", unit=INTERNAL)))
     data = iso15099_data(INTERNAL)
     assert heat.fenestration.u_value == pytest.approx(data.u_value)
-    assert heat.fenestration.room_to_outer == data.behind.across > 0.1
-    assert heat.fenestration.layer_resistance == data.behind.resistance
+    shade, panes = heat.fenestration.shade, heat.fenestration.layer_resistance
+    assert shade.inward == pytest.approx(data.shade.inward) and shade.width == data.shade.width
+    assert panes.coefficients == pytest.approx(data.shade.panes.coefficients, abs=1e-9)
     series = heat.fenestration.in_series()
     assert series.r_inner == pytest.approx(data.r_inner, rel=0.2)
     assert float(series.layer_resistance.at(10.0, 16.0)) == pytest.approx(
         float(data.resistance.at(10.0, 16.0)), rel=0.1
     )
-    assert heat.absorptances.air.min() > 0.0
+    assert np.asarray(heat.absorptances.middle).min() > 0.0
     assert heat.transmittance[0] < heat.g_value[0] < 0.9
     assert "ISO 15099, layer by layer, with films of the shade" in heat.model
     assert len(heat.notes) == 2  # U and g are from the layers
@@ -194,7 +195,7 @@ def test_assumed_layers_find_another_glazing_by_u_and_g(shaded):
     closed = window.closure.close(Fenestration("clear", u)).layer_resistance
     for mean, apart in ((5.0, 15.0), (25.0, 10.0)):
         data = iso15099_data(unit)
-        own = (data.behind or data).resistance.at(mean, apart)
+        own = (data.shade.panes if data.shade else data.resistance).at(mean, apart)
         assert closed.at(mean, apart) == pytest.approx(float(own), rel=0.03)
 
 

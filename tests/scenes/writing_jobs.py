@@ -14,7 +14,7 @@ from mitsuba_cfs.files import TEMPORARY
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import fisheye
 from scenes import cli
-from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.demo import OFFICE, STUDY, VENETIAN_BLIND, WEATHER
 from scenes.explore.case_files import CASE
 from scenes.explore.folder import write_data
 from tests.conftest import REPOSITORY
@@ -22,6 +22,7 @@ from tests.scenes.study_files import study_file
 from tests.thermal.test_study import study_file as thermal_file
 
 PV_STUDY = REPOSITORY / "scenes" / "demo" / "facade_pv.toml"
+CONTROLLED = STUDY.with_name("controlled.toml")
 ONE_LINE = 1
 
 
@@ -112,6 +113,7 @@ JOBS = {
     "ifc correct": Job(_corrected, "out.ifc"),
     "ifc attach": Job(lambda _, out: ["ifc", "attach", OFFICE, "--all", "--u", 1.1, "-o", out],
                       "out.ifc"),
+    "ifc control": Job(lambda _, out: ["ifc", "control", OFFICE, CONTROLLED, "-o", out], "out.ifc"),
     "export --radiance": Job(lambda _, out: ["export", OFFICE, "--radiance", out],
                                  folder=True, adds=True),
     "export --mitsuba": Job(lambda _, out: ["export", OFFICE, "--mitsuba", out],

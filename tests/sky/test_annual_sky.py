@@ -84,6 +84,8 @@ def test_skies_have_the_sun_alone_and_no_heat_unless_asked():
 def test_numbers_of_hours():
     assert hour_numbers([0, 4], 5).tolist() == [0, 4]
     assert hour_numbers([], 0).tolist() == []
+    with pytest.raises(ValueError, match="hours: expected numbers from 0 to 0"):
+        hour_numbers([1], 1)
     for wrong in ([5], [-1], [[0]]):
         with pytest.raises(ValueError, match="hours: expected numbers from 0 to 4"):
             hour_numbers(wrong, 5)

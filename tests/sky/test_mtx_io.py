@@ -163,3 +163,9 @@ def test_luminance_of_one_component_and_of_three():
     for wrong in (np.ones((2, 3)), np.ones((2, 3, 2))):
         with pytest.raises(ValueError, match="1 or 3"):
             luminance(wrong)
+
+
+def test_components_of_a_matrix_that_has_them_have_to_agree(tmp_path):
+    write_matrix(tmp_path / "m.mtx", numbers(2, 4, 3), components=3)
+    with pytest.raises(ValueError, match="expected"):
+        write_matrix(tmp_path / "m.mtx", numbers(2, 4, 3), components=4)

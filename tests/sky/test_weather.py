@@ -183,7 +183,13 @@ def test_fog_a_desert_and_a_storm_are_weather(tmp_path, year, column, text):
 def test_a_spike_is_one_value_far_from_both_of_its_neighbours():
     assert spikes(np.array([10.0, 10, 40, 10, 10])).tolist() == [False, False, True, False, False]
     assert spikes(np.array([10.0, 10, -20, 10, 10])).tolist() == [False, False, True, False, False]
-    for sound in ([10.0, 10, 40, 40, 10, 10], [10.0, 24, 10, 10], [-20.0, -6, 8, 22, 22, 8, -6]):
+    assert spikes(np.array([10.0, 10, 25.5, 10, 10])).tolist() == [False, False, True, False, False]
+    for sound in (
+        [10.0, 10, 40, 40, 10, 10],
+        [10.0, 24, 10, 10],
+        [10.0, 24.9, 10, 10],
+        [-20.0, -6, 8, 22, 22, 8, -6],
+    ):
         assert not spikes(np.array(sound)).any()
 
 

@@ -7,15 +7,17 @@ import logging
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from tests.conftest import WINDOW_GLAZING
 from thermal.blackbox import (
     Fenestration,
+    InteriorShade,
+    LayerAbsorptances,
     LayerResistance,
     fit_conductance_surface,
     layer_absorptances,
     linear_u,
+    node_absorptances,
     with_realised_films,
 )
 from thermal.errors import ThermalInputError
@@ -108,20 +110,36 @@ def test_fenestration_refuses_what_cannot_be():
         LayerResistance("surface", (1.0,))
 
 
-def test_an_interior_shade_shares_heat_by_its_three_paths():
-    """The resistance that gives U, sought numerically; heat of each layer by the nodes' balance."""
-    u, across = 1.4, 0.8
-    window = Fenestration("shade", u, extra_inner=1.5, room_to_outer=across)
-    outer, inner = 1 / window.r_outer, 1 / window.r_inner + window.extra_inner
+SHADE = InteriorShade(
+    width=0.05, height=1.5, tilt=np.pi / 2, impedance=3.0, exchange=0.8, pane_weight=0.0,
+    emissivity_in=0.9, panes=LayerResistance("constant", (0.2,)), sun=(0.1, 0.6, 1.0),
+    inward=(0.1, 0.5, 0.8), two_layers=LayerResistance("constant", (0.4,)), film=0.08,
+)  # fmt: skip
 
-    def to_room(through, room, heat):  # [W/m2] and temperatures, outdoors at 0
-        network = [[outer + across + through, -through], [-through, inner + through]]
-        nodes = np.linalg.solve(network, np.add(heat, [across * room, inner * room]))
-        return across * (nodes[0] - room) + inner * (nodes[1] - room)
 
-    through = brentq(lambda one: -to_room(one, 1.0, [0.0, 0.0]) - u, 1e-6, 1e3, xtol=1e-14)
-    shares = [to_room(through, 0.0, heat) for heat in ([1.0, 0.0], [0.0, 1.0])]
-    np.testing.assert_allclose(window.inward_shares(), shares, rtol=1e-9)
+@pytest.mark.parametrize("more", [-0.3, -0.05, 0.0, 0.05, 0.15])
+def test_a_stated_g_moves_sun_between_panes_and_shade(more):
+    """Of g so much more goes indoors, of the same sun; beyond what can be moved it is clipped."""
+    sun = np.array([[0.1, 0.05, 0.2, 0.3]])
+    plain, moved = (node_absorptances(sun, SHADE, one) for one in (0.0, more))
+    nodes = [np.stack([one.outer, one.middle, one.inner]) for one in (plain, moved)]
+    np.testing.assert_allclose(nodes[0][:, 0], [0.09 + 0.02, 0.01 + 0.03 + 0.2, 0.3])
+    assert nodes[1].sum() == pytest.approx(0.65) and nodes[1].min() >= 0.0
+    gained = SHADE.inward @ (nodes[1] - nodes[0])[:, 0]
+    assert gained == pytest.approx(np.clip(more, -0.306, 0.149))
+    assert moved.clipped == pytest.approx(abs(more - gained), abs=1e-12)
+
+
+def test_two_layers_take_as_much_indoors_as_panes_and_shade():
+    system = Fenestration("shade", 1.3, shade=SHADE)
+    nodes = LayerAbsorptances(np.array([0.2]), np.array([0.3]), 0.0, np.array([0.1]))
+    two = nodes.two_layers(system)
+    low, high = 1.3 * system.r_outer, 1.0 - 1.3 * system.r_inner
+    taken = low * two.outer + high * two.inner
+    assert taken == pytest.approx(0.1 * 0.2 + 0.5 * 0.1 + 0.8 * 0.3)
+    assert two.outer + two.inner == pytest.approx(0.6)
+    series = system.in_series()
+    assert series.shade is None and series.r_inner == 0.08
 
 
 @pytest.mark.parametrize(

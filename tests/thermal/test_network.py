@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,18 +11,23 @@ from tests.thermal.rooms import CONCRETE, INSULATION
 from tests.validation.room_exchange import (
     absorbed_after_reflections,
     area_view_factors,
-    layer_absorption,
     spread_evenly,
     window_share,
 )
-from thermal.blackbox import Fenestration, LayerAbsorptances
+from thermal.blackbox import Fenestration
 from thermal.convection import doe2_outside, iso15099_inside, local_wind_factor, tarp_inside
 from thermal.errors import ThermalInputError
 from thermal.network import (
+    OUTDOOR,
+    PARTITION,
+    PARTNER,
     closed_exchange,
     exchange_from_view_factors,
     exchange_star,
     frame_surface,
+    framed,
+    known_surfaces,
+    named_faces,
     network,
     outside_factors,
     window_mix,
@@ -166,12 +173,7 @@ def test_sun_in_a_room_of_two_faces_by_hand():
     absorbed_after_reflections([[1.0, 1.0]], [0.0, 0.5], np.eye(2))
 
 
-def test_sun_in_the_layers_and_the_windows_share_by_hand():
-    layers = LayerAbsorptances(np.array([0.1, 0.2]), np.array([0.3, 0.4]), 0.0)
-    outer, inner, air = layer_absorption([[10.0, 100.0]], layers)
-    assert (outer, inner, air) == (pytest.approx(21.0), pytest.approx(43.0), 0.0)
-    with pytest.raises(ThermalInputError, match="irradiance: expected"):
-        layer_absorption([[10.0]], layers)
+def test_the_windows_share_by_hand():
     # 8 W not reflected, of 1 - 0.2: the inner layer keeps 0.3 of 0.8
     assert window_share([8.0], 0.5, 0.3, 0.2) == pytest.approx(3.0)
     assert window_share(8.0, 0.5, 0.3 + 5e-7, 0.2) == pytest.approx(3.0, rel=1e-5)
@@ -248,3 +250,112 @@ def test_closed_exchange_areas_sum_to_the_areas():
     area = rng.uniform(0.01, 200.0, 9)
     closed = closed_exchange(rng.uniform(0.2, 2.0, (9, 9)) * area, area)
     np.testing.assert_allclose(closed.sum(axis=1), area, rtol=1e-7)
+
+
+def _partitioned(partner: str = "there", back: str = "here", behind: str = "one") -> list[Zone]:
+    """Two zones with a wall between them, drawn from either side."""
+    east, outside = np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])
+    here = OpaqueSurface("here", 12.0, (CONCRETE,), east, "other", partner=partner)
+    there = OpaqueSurface("there", 12.0, (CONCRETE,), -east, behind, partner=back)
+    facades = [OpaqueSurface(f"facade {k}", 8.0, (CONCRETE,), outside) for k in range(2)]
+    return [Zone("one", 60.0, (facades[0], here)), Zone("other", 60.0, (there, facades[1]))]
+
+
+def _network(zones: list[Zone]):
+    mixes = [window_mix(zone, None, 1) for zone in zones]
+    return network(
+        zones, mixes, step_s=600.0, terrain="suburbs", cell=0.02, link=np.zeros((len(zones),) * 2)
+    )
+
+
+def test_a_wall_between_zones_is_stored_by_its_first_side():
+    faces = _network(_partitioned()).faces
+    assert faces.kind.tolist() == [OUTDOOR, PARTITION, PARTNER, OUTDOOR]
+    assert faces.partner.tolist() == [-1, 2, 1, -1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"back": "facade 0"}, "does not name it back"),
+        ({"behind": "other"}, "does not name it back"),
+        ({"behind": "outdoor"}, "does not name it back"),
+        ({"partner": "nothing"}, "has no surface 'nothing'"),
+    ],
+)
+def test_a_wall_between_zones_names_its_other_side_and_is_named_back(changes, message):
+    with pytest.raises(ThermalInputError, match=message):
+        _network(_partitioned(**changes))
+
+
+def test_temperatures_beyond_faces_are_numbered_by_the_faces_that_have_them():
+    """0 is the ground's; facades and the ground have none of their own."""
+    up, hours = np.array([0.0, 0.0, 1.0]), np.zeros(2)
+    kinds = ["outdoor", "known", "ground", "known", "adiabatic"]
+    walls = tuple(
+        OpaqueSurface(str(k), 5.0, (CONCRETE,), up, one, beyond_c=hours if one == "known" else None)
+        for k, one in enumerate(kinds)
+    )
+    zone = Zone("room", 60.0, walls, _two_windows().windows)
+    assert _network([zone]).faces.beyond.tolist() == [0, 1, 0, 2, 0, 0, 0]
+    assert [one.name for one in known_surfaces([*walls, *zone.windows])] == ["1", "3"]
+
+
+def _framed_zones() -> list[Zone]:
+    """A zone of one wall and two windows, the first with a frame, and a zone of two walls."""
+    first = _two_windows()
+    windows = (replace(first.windows[0], frame_area=0.4), first.windows[1])
+    return [replace(first, windows=windows), _partitioned()[0]]
+
+
+def test_faces_are_numbered_zone_by_zone_walls_windows_frames():
+    zones = _framed_zones()
+    assert named_faces(zones, [zones[0].surfaces[0].name, "facade 0"]) == [0, 4]
+    assert named_faces(zones, ["", "here"]) == [-1, 5]
+    assert [window.name for window in framed(zones[0])] == ["left"]
+
+
+def test_each_zone_has_its_own_shares_of_radiant_gains():
+    """By area and emissivity: the second zone has walls of 8 and 12 m2."""
+    alone = replace(_partitioned()[0], name="alone")
+    walls = tuple(replace(s, outside="adiabatic", partner=None) for s in alone.surfaces)
+    zones = [_two_windows(), replace(alone, surfaces=walls), replace(_two_windows(), name="third")]
+    net = _network(zones)
+    weights = (
+        [10.0 * 0.6, 2.0 * 0.84, 2.0 * 0.84],
+        [8.0, 12.0],
+        [10.0 * 0.6, 2.0 * 0.84, 2.0 * 0.84],
+    )
+    for z, weight in enumerate(weights):
+        np.testing.assert_allclose(net.radiation.shares(z), [np.array(weight) / sum(weight)])
+    assert net.radiation.first_face.tolist() == [0, 3, 5, 8]
+
+
+def _shaded_windows() -> Zone:
+    south = np.array([0.0, -1.0, 0.0])
+    states = tuple(
+        Fenestration(name, 1.1, emissivity_in=inner, emissivity_out=outer)
+        for name, inner, outer in (("pane", 0.84, 0.8), ("shade", 0.3, 0.7))
+    )
+    left, right = (WindowElement(name, 2.0, south, s) for name, s in
+                   (("left", states), ("right", states[:1])))  # fmt: skip
+    return replace(_two_windows(), windows=(left, right))
+
+
+def test_windows_have_a_mix_of_emissivities_for_each_state():
+    zone = _shaded_windows()
+    mix = window_mix(zone, np.array([[0, 0], [1, 0], [0, 0]]), 3)
+    found = [mix.emissivity[k].tolist() for k in mix.of_hour]
+    assert found == [[0.84, 0.84], [0.3, 0.84], [0.84, 0.84]] and len(mix.emissivity) == 2
+    same = window_mix(zone, np.array([[1, 0], [1, 0]]), 2)
+    assert same.emissivity.tolist() == [[0.3, 0.84]] and same.of_hour.tolist() == [0, 0]
+    bare = window_mix(replace(zone, windows=()), None, 2)
+    assert bare.emissivity.shape == (1, 0) and bare.of_hour.tolist() == [0, 0]
+    with pytest.raises(ThermalInputError, match="a state that no window has"):
+        window_mix(zone, np.array([[0, 1]]), 1)
+
+
+def test_a_window_of_fewer_states_keeps_its_last():
+    zone = _shaded_windows()
+    net = _network([zone])
+    np.testing.assert_allclose(net.glass.emissivity_out, [[0.8, 0.7], [0.8, 0.8]])

@@ -218,3 +218,18 @@ def test_a_shade_within_by_en_13363():
     by_hand = 0.76 * 0.2 + 0.76 * (0.3 + (1 - 0.76) * 0.5) * whole / 3
     assert within.g_value == pytest.approx(by_hand)
     assert within.transmittance == pytest.approx(0.2 * 0.69 / (1 - 0.5 * 0.14))
+
+
+def test_european_rating_takes_the_emissivity_of_the_innermost_face():
+    """Three panes; the rooms' side of the last one is coated."""
+    panes = tuple(
+        GlazingLayer(0.004, 1.0, (0.837, inner), solar=(0.8, 0.07, 0.07))
+        for inner in (0.837, 0.837, 0.2)
+    )
+    gaps = (GasGap(0.012, (("argon", 1.0),)),) * 2
+    rating = layered_ratings(GlazingUnit(panes, gaps), 0.5, [0.1, 0.08, 0.06])[-1]
+    own = [Gap(0.012, gap.gas, (0.837, 0.837)) for gap in gaps]
+    expected = en673_u_value(
+        [0.004] * 3, own, position="vertical", emissivity_in=0.2, conductivity=1.0
+    )
+    assert rating.u_value == pytest.approx(expected)

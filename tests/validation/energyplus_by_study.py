@@ -33,7 +33,7 @@ from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
 from tests.validation.ashrae140_sun import ANGLES, PANE
 from tests.validation.differences import rmse_and_bias
-from tests.validation.energyplus_program import room_model, run_energyplus
+from tests.validation.energyplus_program import room_model, run_energyplus, with_held_sun
 from tests.validation.energyplus_reference import load_hours
 from tests.validation.energyplus_study import COLUMNS, FIRST_HOUR, GLAZING, STUDY
 from tests.validation.energyplus_traced import traced_system
@@ -176,21 +176,25 @@ def main(
     systems: Annotated[Sequence[str], tuple(LAYERS)] = tuple(LAYERS),
     inputs: Annotated[Sequence[str], INPUTS] = INPUTS,
     energyplus_steps: int = 6,
+    held_sun: bool = False,
 ) -> dict[str, pd.DataFrame]:
     """Every case, and the root mean squares by system and inputs.
 
-    Args: energyplus_steps: of EnergyPlus' floating rooms in an hour.
+    Args:
+        energyplus_steps: of EnergyPlus' floating rooms in an hour.
+        held_sun: EnergyPlus has each hour's sun in all steps of that hour, as the file states it.
     """
     folder.mkdir(parents=True, exist_ok=True)
     known = {name: known_window(folder, reference, name) for name in systems}
     rows = []
     for epw in climates:
+        told = with_held_sun(epw, folder / f"held {epw.name}") if held_sun else epw
         for orientation in orientations:
             for name in systems:
                 patches = PATCHES.get(name, (name,))
                 model = room_model(orientation, *patches, steps=energyplus_steps)
-                theirs = run_energyplus(model, epw)
-                needs = load_hours(patches, orientation, epw)
+                theirs = run_energyplus(model, told)
+                needs = load_hours(patches, orientation, told)
                 for kind in inputs:
                     row: dict[str, object] = {
                         "climate": epw.stem, "facing": orientation, "system": name, "inputs": kind,

@@ -14,6 +14,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from tests.validation.reference_room import ORIENTATIONS
@@ -92,6 +93,35 @@ def run_energyplus(
     if missing:
         raise RuntimeError(f"EnergyPlus wrote no {', '.join(missing)}")
     return table[list(outputs)].rename(columns=outputs).astype(float)
+
+
+HEADER_LINES = 8  # of an EPW file
+AT_ENDS = [6, 7, 8, 9, 12, 21]  # its columns with values at the ends of hours, wind's direction not
+
+
+def with_held_sun(epw: Path, written: Path, steps: int = 6) -> Path:
+    """Write the weather in rows of a step, each hour's sun in all its steps; return where.
+
+    From hourly rows EnergyPlus makes the sun of each step from those of two hours, so that a bright
+    hour beside a dull one loses a twentieth; from rows of its own steps it takes what they say.
+    """
+    lines = epw.read_text(encoding="latin-1").splitlines()
+    head = lines[:HEADER_LINES]
+    periods = head[-1].split(",")
+    head[-1] = ",".join([*periods[:2], str(steps), *periods[3:]])
+    rows = [line.split(",") for line in lines[HEADER_LINES:] if line.strip()]
+    ends = np.array([[float(row[i]) for i in AT_ENDS] for row in rows])
+    before = np.roll(ends, 1, axis=0)
+    text = head
+    for row, first, last in zip(rows, before, ends, strict=True):
+        for k in range(1, steps + 1):
+            cells = row.copy()
+            cells[4] = str(60 * k // steps)
+            for i, value in zip(AT_ENDS, first + (last - first) * k / steps, strict=True):
+                cells[i] = f"{value:.4f}"
+            text.append(",".join(cells))
+    written.write_text("\n".join(text) + "\n", encoding="latin-1")
+    return written
 
 
 def run_written(model: Path, epw: Path) -> pd.DataFrame:

@@ -187,7 +187,7 @@ def with_their_sun(zone: str, room: RoomZone, theirs: pd.DataFrame) -> RoomZone:
             falls = [c for c in parts if c.endswith(f":{INCIDENT}")]
             facade[:, index] = theirs[falls].to_numpy().mean(axis=1)
     solar = replace(
-        sun, absorbed_outer=outer, absorbed_inner=inner, absorbed_air=None, inside=inside,
+        sun, absorbed_outer=outer, absorbed_inner=inner, absorbed_middle=None, inside=inside,
         facade=facade,
         window_inside=None if sun.window_inside is None else np.zeros_like(sun.window_inside),
     )  # fmt: skip

@@ -7,9 +7,8 @@ The room of `energyplus_by_study` to the south, kept at 20 to 26 degC.  Outdoors
 it takes from the room and what it absorbs: sun, and longwave of people and computers.  The first
 table has the means of these flows in January by EnergyPlus' steps [W/m2 of the window], the second
 heating and cooling of the year [kWh] by the radiant share of the gains.  The third has the window's
-heat in EnergyPlus' hour of greatest cooling [W/m2]: as EnergyPlus reports it, by ISO 15099 layer by
-layer in the same surroundings, and what goes to the air behind the shade by the three conductances
-with which a year is computed.
+heat in EnergyPlus' hour of greatest cooling [W/m2]: as EnergyPlus reports it, and by ISO 15099
+layer by layer in the same surroundings.
 """
 
 from __future__ import annotations
@@ -33,8 +32,8 @@ from tests.validation.energyplus_by_study import (
 from tests.validation.energyplus_program import Model, room_model, run_written
 from tests.validation.energyplus_reference import JOULES, LOADS
 from tests.validation.reference_systems import layers
-from thermal.glazing_unit import Environment, GlazingUnit
-from thermal.iso15099 import Conditions, UnitBalance, iso15099_data, unit_balance
+from thermal.glazing_unit import Environment
+from thermal.iso15099 import Conditions, UnitBalance, unit_balance
 from thermal.layer_balance import SIGMA
 from thermal.window_model import bisected
 
@@ -180,8 +179,6 @@ def hour_of_greatest_cooling(folder: Path, epw: Path, system: str) -> pd.DataFra
         [
             reported,
             {"hour": at, "reckoning": "ISO 15099"} | _flows(layered, air_c, sun),
-            {"hour": at, "reckoning": "three conductances"}
-            | _by_network(unit, layered, air_c, sun),
         ]
     ).assign(system=system)
 
@@ -195,16 +192,6 @@ def _flows(balance: UnitBalance, air_c: float, sun: np.ndarray) -> dict[str, flo
         "longwave": balance.heat_in - balance.air_in - face,
         "outdoors": float(sun.sum()) - balance.heat_in, "missing": 0.0,
     }  # fmt: skip
-
-
-def _by_network(
-    unit: GlazingUnit, balance: UnitBalance, air_c: float, sun: np.ndarray
-) -> dict[str, float]:
-    """Heat [W/m2] to the air behind the shade by the conductances, at the faces of a balance."""
-    behind = iso15099_data(unit).behind
-    assert behind is not None  # the unit has an interior shade
-    outer, shade = balance.faces_c[[0, -1]] - air_c
-    return {"air behind": behind.extra * shade + behind.across * outer + float(sun @ behind.to_air)}
 
 
 def _run(model: Model, folder: Path, epw: Path) -> pd.DataFrame:

@@ -24,7 +24,6 @@ ROOS = (0.03, 4.0, 2.9, 75.0)  # of the fabric: normal transmittance, p, q, cut-
 DIFFUSE = 0.02  # transmittance of the fabric that scatters
 REFLECTED = 0.1  # diffuse reflectance of the fabric on either side
 ANGLES = 512  # even steps of the cosine of incidence
-NEW_YEAR = 1  # the day that `gendaylit -ang` takes for the distance to the sun
 
 
 @dataclass(frozen=True)
@@ -98,8 +97,12 @@ def reference(folder: Path, case: str, number: int) -> Reference:
 
 
 def sky(folder: Path, hours: NDArray[np.int64]) -> cfs.AnnualSky:
-    """The skies of some hours of the year, as `gendaylit -ang` makes them."""
+    """The skies of some hours of the year, with the distance to the sun of their day.
+
+    `gendaylit -ang` takes that of 1 January; the reference does not (docs/evidence_glare.md).
+    """
     rows = np.loadtxt(folder / "refs/skydata.txt")
+    days = 1 + np.arange(len(rows)) // 24
     return cfs.given_sky(
-        rows[:, :3], rows[:, 3], rows[:, 4], day_of_year=NEW_YEAR, hours=hours, ground="gendaylit"
+        rows[:, :3], rows[:, 3], rows[:, 4], day_of_year=days, hours=hours, ground="gendaylit"
     )  # fmt: skip

@@ -111,13 +111,13 @@ def solar(sun: FacadeSun, system: ReferenceSystem, light: RoomLight) -> Solar:
     optics = system.optics
     sky_ground = np.stack([sun.sky, sun.ground], axis=1)
     lit = sun.beam > 0
-    direct = {key: np.zeros(len(sun.beam)) for key in ("tau", "outer", "inner", "air")}
+    direct = {key: np.zeros(len(sun.beam)) for key in ("tau", "outer", "inner", "middle")}
     local = sun.local[lit]
     for key, values in (
         ("tau", optics.tau),
         ("outer", system.direct.outer),
         ("inner", system.direct.inner),
-        ("air", np.broadcast_to(system.direct.air, optics.tau.shape)),
+        ("middle", np.broadcast_to(system.direct.middle, optics.tau.shape)),
     ):
         direct[key][lit] = at_directions(values, optics, local)
     hits = _first_hits(sun, system, light, direct["tau"], lit, sky_ground)
@@ -129,7 +129,8 @@ def solar(sun: FacadeSun, system: ReferenceSystem, light: RoomLight) -> Solar:
     at_window = kept[:, 6] / ROOM.window_area / lost
     outer = sun.beam * direct["outer"] + sky_ground @ system.diffuse.outer
     inner = sun.beam * direct["inner"] + sky_ground @ system.diffuse.inner
-    air = sun.beam * direct["air"] + sky_ground @ np.broadcast_to(system.diffuse.air, (2,))
+    of_diffuse = np.broadcast_to(system.diffuse.middle, (2,))
+    middle = sun.beam * direct["middle"] + sky_ground @ of_diffuse
     facade = np.zeros((len(hits), 6))
     facade[:, 0] = sun.total
     return Solar(
@@ -137,7 +138,7 @@ def solar(sun: FacadeSun, system: ReferenceSystem, light: RoomLight) -> Solar:
         absorbed_inner=(inner + at_window * system.back_layers[1])[:, None],
         inside=kept[:, :6],
         facade=facade,
-        absorbed_air=air[:, None],
+        absorbed_middle=middle[:, None],
     )
 
 

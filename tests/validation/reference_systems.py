@@ -102,6 +102,11 @@ def read_optics(folder: Path, name: str) -> Optics:
     if name == "ext_blind":
         return _klems_optics(folder, back)
     rows = sorted(data["angular"], key=lambda row: row["theta"])
+    if (
+        data["cfs"] != "dgu"
+    ):  # by matrices of the Klems basis: 75 and 80 degrees repeat others' rows
+        rows = [row for row in rows if row["theta"] not in (75, 80)]
+        rows = [row | {"theta": 82.5} if row["theta"] == 85 else row for row in rows]
     theta, tau, rho, g = (np.array([r[k] for r in rows]) for k in ("theta", "tau", "rho", "g"))
     d = data["diffuse"]
     both = np.array([[d["tau"], d["rho"], d["g"]]] * 2)
@@ -240,7 +245,7 @@ def system(
     plain = Fenestration(
         name, u, R_OUTER, R_INNER, resistance, emissivity_in=emissivity, emissivity_out=outside
     )
-    window, air = None, np.zeros_like(optics.tau)
+    window = None
     if closure in STATED:
         window, optics = _of_stated(folder, name, optics, u, closure)
     if closure == "layers":
@@ -248,19 +253,21 @@ def system(
     if window is not None:
         u = window.data.u_value
         plain = window.closure.close(replace(plain, u_value=u, resistance=None))
-        air = np.broadcast_to(window.to_air(), optics.tau.shape)
     if closure == "films":
         plain = with_realised_films(
             plain,
             r_inner_realised=state["R_i"] if name == "int_shade" else None,
             r_outer_realised=state["R_e"] if name.startswith("ext") else None,
         )
-    films = {"r_outer": plain.r_outer, "r_inner": plain.r_inner, "item": name}
-    films |= {"inward": plain.inward_shares()}
-    direct = layer_absorptances(optics.tau, optics.rho, optics.g, u, room_air=air, **films)
-    tau, rho, g = optics.diffuse.T
-    of_diffuse = _of_diffuse(folder, optics, air)
-    diffuse = layer_absorptances(tau, rho, g, u, room_air=of_diffuse, **films)
+    if window is not None and plain.shade is not None:
+        direct = window.absorptances(optics.tau, optics.rho, optics.g, plain, item=name)
+        nodes = direct.outer, direct.inner, np.asarray(direct.middle)
+        outer, inner, middle = (_of_diffuse(folder, optics, one) for one in nodes)
+        diffuse = LayerAbsorptances(outer, inner, 0.0, middle)
+    else:
+        films = {"r_outer": plain.r_outer, "r_inner": plain.r_inner, "item": name}
+        direct = layer_absorptances(optics.tau, optics.rho, optics.g, u, **films)
+        diffuse = layer_absorptances(*optics.diffuse.T, u, **films)
     return ReferenceSystem(plain, optics, direct, diffuse, _back_layers(data, optics, plain))
 
 

@@ -5,23 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal.blackbox import LayerAbsorptances
 from thermal.errors import require
-
-
-def layer_absorption(
-    irradiance: ArrayLike, absorptances: LayerAbsorptances
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Sun absorbed by the outer and the inner window layer, and to the air [H] [W/m2 of glazing].
-
-    Args: irradiance: [H, K] on the window from each direction of the BSDF's basis [W/m2], that is
-        radiance times projected solid angle.
-    """
-    incident = np.asarray(irradiance, dtype=float)
-    k = absorptances.outer.shape
-    require(incident.shape[-1:] == k, "irradiance", f"expected [H, {k}], got {incident.shape}")
-    air = np.broadcast_to(absorptances.air, k)
-    return incident @ absorptances.outer, incident @ absorptances.inner, incident @ air
 
 
 def absorbed_after_reflections(

@@ -5,7 +5,9 @@
 The room, cases and sensors of `cut_groups`; 800 W/m2 from the sun, 100 W/m2 of sky, the sun at four
 places.  Illuminance of the twelve sensors in the four hours over that by paths, lowest and highest,
 and the share of them within 3 %; the spread of five phases over seeds and the error of the paths,
-root mean squares; the processor time over that with the window in one part.
+root mean squares; the processor time over that with the window in one part.  The error of three
+phases in a sensor's sunny hours against paths, and as `sunny_hour_error` states it: root mean
+square over the mean illuminance by three phases, mean and greatest of the sensors.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from mitsuba_cfs.methods.phase_light import phase_light
 from mitsuba_cfs.methods.phase_matrices import phase_matrices
 from mitsuba_cfs.methods.point_in_time import PathLight
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+from mitsuba_cfs.methods.sun_by_patches import sunny_hour_error
 from mitsuba_cfs.sky.annual import AnnualSky, given_sky
 from mitsuba_cfs.surfaces import Surfaces
 from tests.validation.cut_groups import (
@@ -83,7 +86,12 @@ def row(name: str, glass: KlemsBsdf, paths: int) -> str:
     expected, error = by_paths(scene, glass, paths)
     _, whole, _ = by_phases(scene, glass, five_phase=True, parts=1)
     found = [by_phases(scene, glass, five_phase=True, seed=seed) for seed in range(SEEDS)]
-    three, *_ = by_phases(scene, glass, five_phase=False)
+    traced = phase_matrices(scene, Sampling(), five_phase=False)
+    light = phase_light(traced, [[BsdfOptics(glass)]], sunny())
+    three = illuminance(light)
+    stated = 100 * sunny_hour_error(light, None, three)
+    measured = 100 * np.sqrt(np.mean((three - expected) ** 2, axis=1)) / three.mean(axis=1)
+    apart = np.abs(stated - measured).max()
     bright = expected > BRIGHT
     values = np.stack([values for values, *_ in found])
     five = (values[0] / expected)[bright]
@@ -93,6 +101,8 @@ def row(name: str, glass: KlemsBsdf, paths: int) -> str:
     return (
         f"| {name} | {five.min():.3f} to {five.max():.3f} | {100 * np.mean(off <= 0.03):.0f} % | "
         f"{quotient.min():.2f} to {quotient.max():.2f} | "
+        f"{measured.mean():.0f}, {measured.max():.0f} % | "
+        f"{stated.mean():.0f}, {stated.max():.0f} %, {apart:.1f} points | "
         f"{100 * np.sqrt(np.mean(noise**2)):.1f} % | "
         f"{100 * np.sqrt(np.mean((error / expected)[bright] ** 2)):.1f} %, "
         f"{100 * (error / expected)[bright].max():.1f} % | {found[0][2]} | "
@@ -112,8 +122,9 @@ def main(
     for parts in (1, 0):
         by_phases(compiled, glass, five_phase=True, parts=parts)
     print(
-        "| before the window | 5-phase | within 3 % | 3-phase | 5-phase's noise | paths' error, "
-        "largest | parts | time, times |\n|---|---|---|---|---|---|---|---|"
+        "| before the window | 5-phase | within 3 % | 3-phase | its error | stated, largest "
+        "difference | 5-phase's noise | paths' error, largest | parts | time, times |\n"
+        f"{'|---' * 10}|"
     )
     for name in cases:
         print(row(name, glass, paths), flush=True)

@@ -1,0 +1,165 @@
+"""Predictive control of a room: states, lamps, heating and cooling of the hours ahead.
+
+Light of each combination of states is that of the matrices, heat that of a reduced model of the
+room's zone (`thermal.reduced`), glare the DGP of the pictures that plans choose:
+until it is rated, its part of vertical illuminance stands for it, which is its least value, so that
+no combination is left out for a proxy.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.progress import Progress, silent
+from scenes.room.control_year import ControlYear
+from scenes.room.operation import OperationHours
+from scenes.room.operation_tables import OperationTables, ShadingRule
+from scenes.room.shading import Seat
+from scenes.room.zone import climate
+from thermal.predictive import (
+    Forecast,
+    PredictedHours,
+    PredictedYear,
+    noisy_forecast,
+    predicted_year,
+)
+from thermal.reduced import ReducedZone, reduced_zone
+
+FloatArray = NDArray[np.float64]
+LIMIT = 0.40  # DGP, the default of `limit_dgp`
+PENALTY = 1e7  # [Wh] for each unit of DGP above the limit: before any energy
+CLOSED = 0.1  # [Wh] of an hour with all groups closed: of equal plans the more open one
+# Least DGP by Ev: Wienold and Christoffersen 2006 without sources, less 5 % for the noise of Ev
+LEAST = 0.95 * 5.87e-5, 0.16
+BY_EYE = 6.2e-5, 0.184  # of AFC's glare term by Ev, after Wienold 2009, equation of DGPs
+ROUNDS = 25  # of plans, each with the glare of those before
+
+
+def predictive_states(year: ControlYear, *, progress: Progress = silent) -> NDArray[np.int64]:
+    """States of the control groups in every hour [H, N], by plans of the hours ahead.
+
+    Plans are repeated until the glare of all that they choose in occupied hours has been rated,
+    first those of single hours, which cost a fraction of a day's.
+    """
+    tables, (rule, *_) = year.room.operation, year.room.control.rules
+    if tables is None:
+        raise ValueError("predictive control needs the tables of an operation")
+    planner = Planner(year, tables, rule)
+    for ahead in (1, tables.control.predictive.horizon_h):
+        for number in range(ROUNDS):
+            progress("plans", number / ROUNDS)
+            plan = planner.plan(ahead)
+            if not planner.rate(plan.states):
+                break
+        else:  # among what is rated
+            plan = planner.plan(ahead, of_rated=True)
+    return year.combinations[plan.states]
+
+
+class Planner:
+    """Plans of a room's year, with the glare of the combinations that were rated so far."""
+
+    def __init__(self, year: ControlYear, tables: OperationTables, rule: ShadingRule) -> None:
+        """Before any plan."""
+        self._year, self._table = year, tables.control.predictive
+        self._seat: Seat = (rule.seat, rule.looks_deg)
+        self._limit = LIMIT if rule.limit_dgp is None else rule.limit_dgp
+        combinations = [tuple(row) for row in year.combinations.tolist()]
+        self._combinations = combinations
+        self.zone, self._hours = predicted_hours(year, tables)
+        count = year.room.skies.hours
+        self._used = np.flatnonzero((year.present > 0) & (year.lit_hours >= 0))
+        eye = np.stack(
+            [year.room.skies.whole_year(year.eye_lx(one, self._seat)) for one in combinations], 1
+        )
+        by_picture = self._table.glare == "DGP"
+        slope, least = LEAST if by_picture else BY_EYE
+        self.glare = np.where(eye > 0, slope * eye + least, 0.0)  # [H, M]
+        self.rated = np.full((count, len(combinations)), not by_picture)
+
+    def plan(self, ahead: int | None = None, *, of_rated: bool = False) -> PredictedYear:
+        """The year that the plans carry out.
+
+        Args:
+            ahead: hours that are planned; by default those of the table.
+            of_rated: in occupied hours choose among combinations whose glare was rated.
+        """
+        table = self._table
+        forecast = Forecast(shift=24 if table.forecast == "yesterday" else 0)
+        if table.forecast == "error":
+            forecast = noisy_forecast(
+                len(self.glare), table.horizon_h, sun_error=table.sun_error,
+                temperature_error_k=table.temperature_error_k, seed=table.seed,
+            )  # fmt: skip
+        penalty = np.zeros_like(self.glare)
+        penalty[self._used] = PENALTY * np.maximum(self.glare[self._used] - self._limit, 0.0)
+        if of_rated:
+            penalty[self._used] += np.where(self.rated[self._used], 0.0, 2 * PENALTY)
+        most = np.maximum(np.array(self._year.counts) - 1, 1)
+        penalty += CLOSED * (self._year.combinations / most).mean(axis=1)
+        hours = PredictedHours(
+            self._hours.sun, self._hours.daylight, self._hours.lamps, self._hours.target_lx,
+            self._hours.internal, penalty,
+        )  # fmt: skip
+        weights = table.heating_weight, table.cooling_weight, table.lighting_weight
+        return predicted_year(
+            self.zone, hours, ahead=ahead or table.horizon_h, forecast=forecast, weights=weights
+        )
+
+    def rate(self, states: NDArray[np.int64]) -> int:
+        """Rate the glare of the states [H] of occupied hours; returns how many were not known.
+
+        A combination that glares says the same of those that are more open in each group and give
+        the eye more light, before they are rated.
+        """
+        used = self._used[~self.rated[self._used, states[self._used]]]
+        numbers = states[used]
+        order = self._year.combinations
+        for number in np.unique(numbers):
+            hours = used[numbers == number]
+            values = self._year.dgp_of(self._combinations[number], hours, self._seat)
+            more_open = np.flatnonzero((order <= order[number]).all(axis=1))
+            for hour, value in zip(hours.tolist(), values.tolist(), strict=True):
+                least = self.glare[hour, number]
+                self.glare[hour, number], self.rated[hour, number] = value, True
+                if value > self._limit:
+                    same = more_open[
+                        (self.glare[hour, more_open] >= least) & ~self.rated[hour, more_open]
+                    ]
+                    self.glare[hour, same] = np.maximum(self.glare[hour, same], value)
+        return len(used)
+
+
+def predicted_hours(
+    year: ControlYear, tables: OperationTables
+) -> tuple[ReducedZone, PredictedHours]:
+    """The reduced zone of a room, and what acts on it in each combination of states, no glare."""
+    room = year.room
+    hours, zone = OperationHours(tables, room.weather), year.zone.zone
+    windows = year.combinations[:, room.control.number]
+    sun, daylight = [], []
+    dimmed = bool(tables.gains.lighting_dimmed and tables.gains.lighting_w_m2)
+    areas = np.array([window.area for window in zone.windows])
+    for states in map(tuple, year.combinations.tolist()):
+        solar, *_ = year.sun_by_states.of(year.of_windows(states).tolist())
+        chosen = np.array(states, dtype=np.int64)[room.control.number]
+        systems = [
+            window.states[min(j, len(window.states) - 1)]
+            for window, j in zip(zone.windows, chosen, strict=True)
+        ]
+        outer, inner = np.array([one.inward_shares() for one in systems]).reshape(-1, 2).T
+        absorbed = solar.absorbed_outer * outer + solar.absorbed_inner * inner
+        if solar.absorbed_middle is not None:  # of the pane behind an interior shade
+            middle = [0.0 if one.shade is None else one.shade.inward[1] for one in systems]
+            absorbed = absorbed + solar.absorbed_middle * np.array(middle)
+        sun.append(solar.inside.sum(axis=1) + absorbed @ areas)
+        daylight.append(year.work_plane_lx(states) if dimmed else np.zeros(room.skies.hours))
+    reduced = reduced_zone(zone, climate(room.weather), solar.facade, windows)
+    lamps = hours.lamps(room.space.floor_area)
+    return reduced, PredictedHours(
+        np.stack(sun, axis=1), np.stack(daylight, axis=1), lamps,
+        tables.gains.lighting_target_lx if dimmed else 0.0,
+        np.broadcast_to(hours.heat(room.space.floor_area), lamps.shape).copy(),
+        np.zeros((1, 1)),
+    )  # fmt: skip

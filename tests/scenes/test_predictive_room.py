@@ -1,0 +1,106 @@
+"""Predictive control of a room: the cheapest combination without glare, rated by its pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.methods.glare import hourly_glare
+from mitsuba_cfs.methods.light import with_pictures
+from scenes.heat.study_file import StudyFile
+from scenes.room.control_hour import ControlHour, controlled_states
+from scenes.room.control_year import ControlYear
+from scenes.room.glare import rating_of
+from scenes.room.inputs import room_inputs
+from scenes.room.light import room_light
+from scenes.room.operation_tables import OperationTables
+from scenes.room.predictive import Planner, predictive_states
+from scenes.room.solar import seasonal_outdoors
+from scenes.room.windows import in_all_windows
+from tests.scenes.small_box import HOURS
+from tests.scenes.test_control_function import FEW, TWO
+
+TABLES = {
+    "gains": {"lighting_w_m2": 10.0, "occupied": [0, 24]},
+    "loads": {"heating_c": 20.0, "cooling_c": 26.0},
+}
+
+
+@pytest.fixture(scope="module")
+def of(variant, glass, milk, blind, weather, skies):
+    """The year of the room with a table of `predictive`, and keys of its control."""
+
+    def year(limit: float, controller=None, **predictive) -> ControlYear:
+        control = {"rule": "predictive", "limit_dgp": limit, "predictive": predictive}
+        room = room_inputs(
+            TWO, TWO.spaces[0], in_all_windows(TWO.spaces[0], glass, milk, blind), weather, FEW,
+            operation=OperationTables.model_validate({"control": control} | TABLES),
+            skies=skies, controller=controller,
+        )  # fmt: skip
+        light = room_light(room)
+        return ControlYear(room, light, seasonal_outdoors(room, light))
+
+    return year
+
+
+@pytest.fixture(scope="module")
+def every_dgp(of) -> np.ndarray:
+    """DGP of each combination in the four hours [M, 4], rated each for itself."""
+    year = of(0.4)
+    light = with_pictures(year.light.light)
+    rated = []
+    for states in year.combinations:
+        rows = year.light.states(np.tile(year.of_windows(states), (8760, 1)))
+        rows_of = rating_of(FEW.outputs)
+        rated.append(hourly_glare(light, "DGP", rows, options=rows_of).dgp)
+    return np.array(rated)
+
+
+@pytest.mark.parametrize("limit", [0.25, 0.32])
+def test_an_hour_takes_the_cheapest_combination_without_glare(of, every_dgp, limit) -> None:
+    """Horizon of one hour: the hour's energy of all nine combinations, by the same model."""
+    year = of(limit, horizon_h=1, forecast="perfect")
+    found = predictive_states(year)
+    planner = Planner(year, year.room.operation, year.room.control.rules[0])
+    planner.glare[list(HOURS)], planner.rated[:] = every_dgp.T, True
+    known = planner.plan()
+    assert (every_dgp.min(axis=0) < limit).any() and (every_dgp.max(axis=0) > limit).any()
+    for number, hour in enumerate(HOURS):
+        chosen = year.number_of(found[hour])
+        assert chosen == known.states[hour]
+        fine = every_dgp[:, number] <= limit
+        if fine.any():
+            assert fine[chosen]
+        else:
+            assert chosen == every_dgp[:, number].argmin()
+
+
+def test_plans_are_the_control_of_a_file(of) -> None:
+    """As states of the window groups, and as a function of the hour."""
+    year = of(0.32)
+    expected = predictive_states(year)[:, year.room.windows.control]
+    assert np.array_equal(controlled_states(year.room, year.light, year.outdoors), expected)
+    called = of(0.32, ControlHour.by_rules)
+    states = controlled_states(called.room, called.light, called.outdoors)
+    assert np.array_equal(states, expected)
+
+
+def test_the_glare_term_of_the_eye_is_used_where_it_is_asked_for(of) -> None:
+    year = of(0.32, glare="Ev")
+    planner = Planner(year, year.room.operation, year.room.control.rules[0])
+    assert planner.rated.all()
+    eye = np.stack([year.eye_lx(tuple(s)) for s in year.combinations.tolist()], axis=1)
+    assert planner.glare[list(HOURS)] == pytest.approx(6.2e-5 * eye + 0.184)
+    room = of(0.32).room
+    by_picture = Planner(of(0.32), room.operation, room.control.rules[0])
+    assert by_picture.glare[list(HOURS)] == pytest.approx(0.95 * 5.87e-5 * eye + 0.16)
+    assert not by_picture.rated.any()
+
+
+def test_plans_are_of_all_groups_and_need_light() -> None:
+    groups = [{"facades": ["N"], "rule": "always"}]
+    with pytest.raises(ValueError, match="plans all groups"):
+        OperationTables.model_validate({"control": {"rule": "predictive", "group": groups}})
+    study = {"weather": "a.epw", "building": "a.ifc", "control": {"rule": "predictive"}}
+    with pytest.raises(ValueError, match="is of `cfs run`"):
+        StudyFile.model_validate(study)

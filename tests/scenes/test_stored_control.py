@@ -1,0 +1,130 @@
+"""Rules of shading control in an IFC file: written by the command, read by an operation file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import ifcopenshell
+import pytest
+
+import scenes as cfs
+from bim.ifc.control import KIND, StoredGroup, read_control, write_control
+from mitsuba_cfs.errors import DataError
+from scenes.cli import run
+from scenes.demo import OFFICE
+from scenes.room.control_groups import control_groups
+from scenes.room.operation import read_operation
+
+RULES = """
+[control]
+rule = "any"
+hold_h = 2
+[[control.parts]]
+rule = "irradiance"
+close_above = 180.0
+open_below = 90.0
+[[control.parts]]
+rule = "glare"
+seat = [2.0, 2.0, 1.2]
+looks_deg = 90.0
+"""
+PLANS = """
+[control]
+rule = "predictive"
+limit_dgp = 0.35
+[control.predictive]
+horizon_h = 12
+forecast = "error"
+"""
+
+
+@pytest.fixture
+def written(tmp_path):
+    def of(rules: str, building: Path = OFFICE) -> Path:
+        file, out = tmp_path / "rules.toml", tmp_path / f"of {building.stem}.ifc"
+        file.write_text(rules)
+        assert run(["ifc", "control", str(building), str(file), "-o", str(out)]) == 0
+        return out
+
+    return of
+
+
+def taken(model: Path, folder: Path):
+    """The operation that has its rules from a model."""
+    file = folder / "office.toml"
+    file.write_text(f'control_of = "{model.name}"\n[loads]\nheating_c = 20\n')
+    return read_operation(file)
+
+
+@pytest.mark.parametrize("rules", [RULES.replace("seat = [2.0, 2.0, 1.2]\n", ""), PLANS])
+def test_rules_come_back_from_the_model_as_they_were(written, tmp_path, rules) -> None:
+    out = written(rules)
+    operation = taken(out, tmp_path)
+    assert out in operation.files and operation.tables.loads.heating_c == 20
+    stated = read_operation(tmp_path / "rules.toml").tables
+    building = cfs.read_building(str(out))
+    assert building.spaces and any(space.windows for space in building.spaces)
+    for space in building.spaces:
+        expected = control_groups(space, stated.of_room(building, space).control)
+        found = control_groups(space, operation.tables.of_room(building, space).control)
+        assert found.names == expected.names and found.rules == expected.rules
+        assert found.number.tolist() == expected.number.tolist()
+    assert operation.tables.control.predictive == stated.control.predictive
+
+
+def test_the_groups_are_those_of_ifc_and_are_replaced(written, tmp_path) -> None:
+    first = written("[control]\nrule = 'irradiance'\n")
+    model = ifcopenshell.open(str(first))
+    groups = [one for one in model.by_type("IfcGroup") if one.ObjectType == KIND]
+    assert groups and len({one.Name for one in groups}) == len(groups)
+    for group in groups:
+        (relation,) = group.IsGroupedBy
+        assert all(w.is_a("IfcWindow") or w.is_a("IfcDoor") for w in relation.RelatedObjects)
+        (defined,) = group.IsDefinedBy
+        values = {p.Name: p.NominalValue.wrappedValue
+                  for p in defined.RelatingPropertyDefinition.HasProperties}  # fmt: skip
+        assert values["rule"] == "irradiance"
+    again = written("[control]\nrule = 'always'\nstate = 1\n", first)
+    stored = read_control(again)
+    assert len(stored) == len(groups)
+    assert all(one.rule == {"rule": "always", "state": 1} for one in stored)
+
+
+def test_a_model_of_ifc2x3_holds_them_too(tmp_path) -> None:
+    model = ifcopenshell.file(schema="IFC2X3")
+    person = model.create_entity("IfcPerson", FamilyName="x")
+    organisation = model.create_entity("IfcOrganization", Name="x")
+    both = model.create_entity("IfcPersonAndOrganization", person, organisation)
+    program = model.create_entity("IfcApplication", organisation, "1", "x", "x")
+    owner = model.create_entity(
+        "IfcOwnerHistory", both, program, None, "ADDED", None, None, None, 0
+    )
+    guid = ifcopenshell.guid.new()
+    model.create_entity("IfcWindow", guid, owner, "W1")
+    path, out = tmp_path / "in.ifc", tmp_path / "out.ifc"
+    path.write_text(model.to_string())
+    rule = {"rule": "cut-off", "slat_tilts_deg": [0.0, 45.0], "slat_width": 0.06, "state": 1}
+    write_control(path, out, [StoredGroup("S", (guid,), rule, "Office")])
+    (stored,) = read_control(out)
+    assert stored == StoredGroup("S", (guid,), rule)
+    with pytest.raises(DataError, match="S"):
+        write_control(path, out, [StoredGroup("S", (ifcopenshell.guid.new(),), rule)])
+
+
+def test_what_a_model_cannot_hold_or_lacks_is_refused(tmp_path, capsys) -> None:
+    file = tmp_path / "rules.toml"
+    file.write_text(
+        "[control]\nrule = 'schedule'\nschedule = 'use'\n[schedules.use]\n"
+        "weekday = [{ hours = [8, 18], value = 0 }]\n"
+    )
+    out = tmp_path / "out.ifc"
+    assert run(["ifc", "control", str(OFFICE), str(file), "-o", str(out)]) == 1
+    assert "control.schedule: 'use': an IFC file holds 24 states" in capsys.readouterr().err
+    (tmp_path / "bare.ifc").write_bytes(OFFICE.read_bytes())
+    with pytest.raises(DataError, match=r"bare\.ifc: holds no rules of shading control"):
+        taken(tmp_path / "bare.ifc", tmp_path)
+    with pytest.raises(DataError, match=r"control_of: no such file"):
+        taken(tmp_path / "none.ifc", tmp_path)
+    (tmp_path / "both.toml").write_text('control_of = "a.ifc"\n[control]\nrule = "always"\n')
+    with pytest.raises(DataError, match=r"control_of: the file has"):
+        read_operation(tmp_path / "both.toml")

@@ -1,0 +1,149 @@
+"""The simple hourly method as three nodes, and plans of window states beside all sequences."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from thermal.climate import Climate
+from thermal.predictive import Forecast, PredictedHours, noisy_forecast, predicted_year
+from thermal.reduced import MASS_FILM, SURFACE_FILM, ReducedZone, reduced_zone, responses
+from thermal.zone import Layer, OpaqueSurface, Zone
+
+AIR, WINDOWS, OPAQUE, MASS, MASS_AREA, AREA = 20.0, 15.0, 10.0, 6e6, 50.0, 90.0
+
+
+def steady(outdoor: float, behind: float, internal: float, sun: float, power: float) -> np.ndarray:
+    """Air, surfaces and mass of the standard's network in a steady state, by its three balances."""
+    to_mass, to_air = MASS_FILM * MASS_AREA, SURFACE_FILM * AREA
+    em = 1 / (1 / OPAQUE - 1 / to_mass)
+    rest = 0.5 * internal + sun
+    matrix = [
+        [AIR + to_air, -to_air, 0],
+        [-to_air, to_air + WINDOWS + to_mass, -to_mass],
+        [0, -to_mass, to_mass + em],
+    ]
+    right = [
+        AIR * outdoor + 0.5 * internal + power,
+        WINDOWS * outdoor + (1 - MASS_AREA / AREA - WINDOWS / (MASS_FILM * AREA)) * rest,
+        em * behind + MASS_AREA / AREA * rest,
+    ]
+    return np.linalg.solve(matrix, right)
+
+
+def test_a_steady_state_is_that_of_three_nodes() -> None:
+    out, mass_c, power = np.zeros(6), 10.0, 300.0
+    responses(AIR, WINDOWS, OPAQUE, MASS, MASS_AREA, AREA, 3.0, 8.0, 250.0, 400.0, out)
+    for _ in range(3000):
+        mass_c = out[3] + out[4] * mass_c + out[5] * power
+    air, _, mass = steady(3.0, 8.0, 250.0, 400.0, power)
+    assert mass_c == pytest.approx(mass, abs=1e-9)
+    assert out[0] + out[1] * mass_c + out[2] * power == pytest.approx(air, abs=1e-9)
+
+
+def test_an_hour_stores_what_does_not_leave() -> None:
+    """Of a sudden power, mass and losses account for all: mass moves by its heat over C_m."""
+    out = np.zeros(6)
+    responses(1e-6, 1e-6, 1e-6, MASS, MASS_AREA, AREA, 0.0, 0.0, 0.0, 0.0, out)
+    assert out[5] * MASS / 3600.0 == pytest.approx(1.0, rel=1e-3)  # closed: all stays
+
+
+def zone_of(hours: int, **changed) -> ReducedZone:
+    values = {
+        "windows": np.array([15.0, 12.0]), "opaque": OPAQUE, "mass": MASS, "mass_area": MASS_AREA,
+        "area": AREA, "air": np.full(hours, AIR), "outdoor_c": np.linspace(-5, 12, hours),
+        "behind_c": np.full(hours, 5.0), "heating_c": np.full(hours, 20.0),
+        "cooling_c": np.full(hours, 24.0), "heating_limit": np.inf, "cooling_limit": np.inf,
+    } | changed  # fmt: skip
+    return ReducedZone(**values)
+
+
+def acting(hours: int, **changed) -> PredictedHours:
+    random = np.random.default_rng(3)
+    values = {
+        "sun": random.uniform(0, 2500, (hours, 2)), "daylight": random.uniform(0, 800, (hours, 2)),
+        "lamps": np.full(hours, 400.0), "target_lx": 500.0, "internal": np.full(hours, 200.0),
+        "penalty": np.zeros((hours, 2)),
+    } | changed  # fmt: skip
+    return PredictedHours(**values)
+
+
+def cost_of(zone: ReducedZone, hours: PredictedHours, states, start_c: float) -> float:
+    """Energy of a sequence of states [Wh], hour by hour."""
+    mass_c, total, out = start_c, 0.0, np.zeros(6)
+    for h, m in enumerate(states):
+        lamps = hours.lamps[h] * min(max(1 - hours.daylight[h, m] / hours.target_lx, 0), 1)
+        responses(
+            zone.air[h], zone.windows[m], zone.opaque, zone.mass, zone.mass_area, zone.area,
+            zone.outdoor_c[h], zone.behind_c[h], hours.internal[h] + lamps, hours.sun[h, m], out,
+        )  # fmt: skip
+        free = out[0] + out[1] * mass_c
+        power = max((20.0 - free) / out[2], 0) if free < 24 else (24.0 - free) / out[2]
+        mass_c = out[3] + out[4] * mass_c + out[5] * power
+        total += lamps + abs(power) + hours.penalty[h, m]
+    return total
+
+
+def test_a_plan_is_the_cheapest_of_all_sequences() -> None:
+    zone, hours = zone_of(8), acting(8)
+    plan = predicted_year(zone, hours, ahead=8, start_c=21.0)
+    every = {s: cost_of(zone, hours, s, 21.0) for s in product((0, 1), repeat=8)}
+    chosen = cost_of(zone, hours, plan.states.tolist(), 21.0)
+    assert plan.heating.sum() + plan.cooling.sum() + plan.lamps.sum() == pytest.approx(chosen)
+    assert chosen <= 1.001 * min(every.values())  # the grid is a kelvin wide
+    assert chosen < 0.97 * np.median(list(every.values()))
+
+
+def test_a_receding_plan_comes_near_and_a_penalty_goes_before_energy() -> None:
+    zone, hours = zone_of(96), acting(96)
+    whole = predicted_year(zone, hours, ahead=96)
+    day = predicted_year(zone, hours, ahead=24)
+
+    def energy(year) -> float:
+        return float((year.heating + year.cooling + year.lamps).sum())
+
+    assert energy(whole) <= energy(day) * 1.002 < energy(whole) * 1.02
+    assert (day.states == 0).any()
+    glaring = acting(96, penalty=np.tile([1e6, 0.0], (96, 1)))
+    assert (predicted_year(zone, glaring, ahead=24).states == 1).all()
+
+
+def test_forecasts_know_the_present_hour_alone_exactly() -> None:
+    forecast = noisy_forecast(4000, 25, sun_error=0.25, temperature_error_k=1.5, seed=1)
+    assert np.all(forecast.sun[:, 0] == 1) and np.all(forecast.warmer_k[:, 0] == 0)
+    assert forecast.warmer_k[:, 24].std() == pytest.approx(1.5, rel=0.05)
+    assert forecast.warmer_k[:, 6].std() == pytest.approx(0.75, rel=0.05)
+    assert forecast.sun.min() >= 0
+    zone, hours = zone_of(72), acting(72)
+    one = predicted_year(zone, hours, ahead=1, forecast=Forecast(shift=24))
+    assert np.array_equal(one.states, predicted_year(zone, hours, ahead=1).states)
+    day = predicted_year(zone, hours, ahead=24, forecast=Forecast(shift=24))
+    assert not np.array_equal(day.states, predicted_year(zone, hours, ahead=24).states)
+
+
+def test_the_reduced_model_of_a_zone() -> None:
+    """Concrete outside, wool, plaster inside: mass up to the wool; a tenth of a metre of a slab."""
+    plaster, wool = Layer(0.02, 0.5, 1200.0, 1000.0), Layer(0.1, 0.04, 50.0, 1000.0)
+    concrete = Layer(0.2, 2.0, 2400.0, 1000.0)
+    wall = OpaqueSurface("wall", 12.0, (concrete, wool, plaster), np.array([0.0, -1.0, 0.0]))
+    floor = OpaqueSurface("floor", 20.0, (concrete,), np.array([0.0, 0.0, -1.0]), "adiabatic")
+    hours = 24
+    climate = Climate(
+        np.zeros(hours), np.zeros(hours), np.zeros(hours), np.zeros(hours), np.zeros(hours),
+        np.full(hours, 1e5),
+    )  # fmt: skip
+    zone = Zone("z", 60.0, (wall, floor), infiltration_ach=0.6, bridges=2.0)
+    facade = np.zeros((hours, 2))
+    facade[12, 0] = 500.0
+    reduced = reduced_zone(zone, climate, facade, np.zeros((1, 0), dtype=np.int64))
+    kappa = np.array([0.02 * 1200e3, 0.1 * 2400e3])
+    assert reduced.mass == pytest.approx(12 * kappa[0] + 20 * kappa[1])
+    assert reduced.mass_area == pytest.approx(
+        reduced.mass**2 / (12 * kappa[0] ** 2 + 20 * kappa[1] ** 2)
+    )
+    assert reduced.opaque == pytest.approx(12 / (0.13 + 0.04 + 0.04 + 2.5 + 0.1))
+    assert reduced.air[0] == pytest.approx(60 * 0.6 / 3600 * 1200)
+    assert reduced.windows.tolist() == [2.0]
+    assert reduced.behind_c[12] == pytest.approx(0.6 * 0.04 * 500)

@@ -1,0 +1,241 @@
+"""States of a zone's windows that cost least over the hours ahead: a dynamic programme.
+
+The state of the programme is the temperature of the mass of a `ReducedZone`, on a grid.  In each
+hour a combination of window states costs its lamps, heating and cooling, and a penalty:
+
+    V_t(T) = min over m of  [ w_l lamps + w_h heating + w_c cooling + penalty ](t, m, T) + V_t+1(T')
+
+The horizon recedes: of each plan only its first hour is carried out.  A horizon of the whole year
+is one plan with perfect foresight.
+
+Source: Bellman 1957, Dynamic Programming; EN ISO 13790:2008, annex C.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.compiled import compiled
+from thermal.reduced import ReducedZone, responses
+
+FloatArray = NDArray[np.float64]
+COLDEST_C, WARMEST_C, STEPS = 5.0, 45.0, 41  # grid of the mass
+
+
+@dataclass(frozen=True, slots=True)
+class PredictedHours:
+    """What acts on a zone in the hours of a year, in M combinations of window states."""
+
+    sun: FloatArray  # [H, M] absorbed indoors [W]
+    daylight: FloatArray  # [H, M] on the work plane [lx]
+    lamps: FloatArray  # [H] full power [W]
+    target_lx: float  # to which daylight dims them; 0: it does not
+    internal: FloatArray  # [H] other heat indoors [W]
+    penalty: FloatArray  # [H, M] [Wh] of glare, or of a preference
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """How the hours ahead are known, besides the present one."""
+
+    shift: int = 0  # hours: what acted so long ago is expected again; 0: what will come
+    sun: FloatArray | None = None  # [H, N] factor of sun and daylight, N hours ahead; None: 1
+    warmer_k: FloatArray | None = None  # [H, N] added to the outdoor temperature; None: 0
+
+
+@dataclass(frozen=True, slots=True)
+class PredictedYear:
+    """The states that a plan carries out, and the loads by the reduced model."""
+
+    states: NDArray[np.int64]  # [H] numbers of combinations
+    heating: FloatArray  # [H] [W]
+    cooling: FloatArray  # [H] [W]
+    lamps: FloatArray  # [H] [W]
+
+
+def noisy_forecast(
+    hours: int, ahead: int, *, sun_error: float, temperature_error_k: float, seed: int = 0
+) -> Forecast:
+    """A forecast whose error grows with the square root of the hours ahead to its value at 24 h.
+
+    Errors of one forecast are a random walk, of two forecasts independent.
+
+    Args:
+        sun_error: relative standard deviation of sun and daylight; temperature_error_k: of the
+            outdoor temperature [K].
+    """
+    random = np.random.default_rng(seed)
+    walks = random.standard_normal((2, hours, ahead)).cumsum(axis=2) / np.sqrt(24.0)
+    walks -= walks[:, :, :1]  # the present hour is measured
+    sun = np.maximum(1.0 + sun_error * walks[0], 0.0)
+    return Forecast(0, sun, temperature_error_k * walks[1])
+
+
+def predicted_year(
+    zone: ReducedZone,
+    hours: PredictedHours,
+    *,
+    ahead: int = 24,
+    forecast: Forecast | None = None,
+    weights: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    start_c: float = 20.0,
+) -> PredictedYear:
+    """The year of a zone whose window states are those of the cheapest plan in each hour.
+
+    Args:
+        ahead: hours that are planned, the present one with them; all hours of the year: one plan.
+        weights: of heating, cooling and lamps.
+        start_c: temperature of the mass at the beginning.
+    """
+    count = len(hours.lamps)
+    forecast = forecast or Forecast()
+    once = ahead >= count
+    none = np.zeros((1, 1))
+    result = np.zeros((count, 4))
+    _run(
+        np.array([zone.opaque, zone.mass, zone.mass_area, zone.area, zone.heating_limit,
+                  zone.cooling_limit, hours.target_lx, *weights, start_c]),
+        zone.windows, zone.air, zone.outdoor_c, zone.behind_c, zone.heating_c, zone.cooling_c,
+        hours.sun, hours.daylight, hours.lamps, hours.internal, hours.penalty,
+        count if once else max(ahead, 1), once, forecast.shift,
+        none + 1.0 if forecast.sun is None else forecast.sun,
+        none if forecast.warmer_k is None else forecast.warmer_k,
+        result,
+    )  # fmt: skip
+    return PredictedYear(result[:, 0].astype(np.int64), *result[:, 1:].T)
+
+
+@compiled()
+def _hour(
+    constants: NDArray[np.float64],
+    windows: float,
+    air: float,
+    outdoor_c: float,
+    behind_c: float,
+    sun: float,
+    daylight: float,
+    lamps: float,
+    internal: float,
+    out: NDArray[np.float64],
+) -> float:
+    """Write the `responses` of a combination into out [6]; returns the power of its lamps."""
+    target = constants[6]
+    if target > 0:
+        lamps *= min(max(1.0 - daylight / target, 0.0), 1.0)
+    responses(
+        air, windows, constants[0], constants[1], constants[2], constants[3], outdoor_c, behind_c,
+        internal + lamps, sun, out,
+    )  # fmt: skip
+    return lamps
+
+
+@compiled()
+def _power(
+    mass_c: float, out: NDArray[np.float64], low: float, high: float,
+    constants: NDArray[np.float64],
+) -> float:  # fmt: skip
+    """Power of heating, negative of cooling, that holds the set points [W]."""
+    free = out[0] + out[1] * mass_c
+    if free < low:
+        return min((low - free) / out[2], constants[4])
+    if free > high:
+        return max((high - free) / out[2], -constants[5])
+    return 0.0
+
+
+@compiled()
+def _value(values: NDArray[np.float64], mass_c: float) -> float:
+    """Value at a temperature of the mass, linear between those of the grid."""
+    step = (WARMEST_C - COLDEST_C) / (STEPS - 1)
+    place = (mass_c - COLDEST_C) / step
+    first = min(max(int(np.floor(place)), 0), STEPS - 2)
+    share = place - first
+    return values[first] * (1.0 - share) + values[first + 1] * share
+
+
+@compiled()
+def _run(
+    constants: NDArray[np.float64],
+    windows: NDArray[np.float64],
+    air: NDArray[np.float64],
+    outdoor_c: NDArray[np.float64],
+    behind_c: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    sun: NDArray[np.float64],
+    daylight: NDArray[np.float64],
+    lamps: NDArray[np.float64],
+    internal: NDArray[np.float64],
+    penalty: NDArray[np.float64],
+    ahead: int,
+    once: bool,
+    shift: int,
+    factor: NDArray[np.float64],
+    warmer: NDArray[np.float64],
+    result: NDArray[np.float64],
+) -> None:
+    """Carry out the plans of the year: state, heating, cooling and lamps into result [H, 4]."""
+    H, M = sun.shape
+    step = (WARMEST_C - COLDEST_C) / (STEPS - 1)
+    out, mass_c = np.zeros(6), constants[10]
+    kept = np.zeros((H + 1 if once else ahead + 1, STEPS))
+    for hour in range(H):
+        if not once or hour == 0:
+            last = H - 1 if once else ahead - 1
+            kept[last + 1] = 0.0
+            for t in range(last, 0, -1):
+                at = (hour + t) % H
+                known = (at - shift) % H
+                scale = factor[hour, t] if factor.shape[0] > 1 else 1.0
+                more = warmer[hour, t] if warmer.shape[0] > 1 else 0.0
+                kept[t] = np.inf
+                for m in range(M):
+                    lit = _hour(
+                        constants,
+                        windows[m],
+                        air[at],
+                        outdoor_c[known] + more,
+                        behind_c[known] + more,
+                        scale * sun[known, m],
+                        scale * daylight[known, m],
+                        lamps[at],
+                        internal[at],
+                        out,
+                    )
+                    base = constants[9] * lit + penalty[at if shift == 0 else known, m]
+                    for k in range(STEPS):
+                        temperature = COLDEST_C + k * step
+                        power = _power(temperature, out, low[at], high[at], constants)
+                        cost = constants[7] * power if power > 0 else -constants[8] * power
+                        after = out[3] + out[4] * temperature + out[5] * power
+                        cost += base + _value(kept[t + 1], after)
+                        if cost < kept[t, k]:
+                            kept[t, k] = cost
+        best, best_after = np.inf, mass_c
+        ahead_values = kept[hour + 1] if once else kept[1]
+        for m in range(M):
+            lit = _hour(
+                constants,
+                windows[m],
+                air[hour],
+                outdoor_c[hour],
+                behind_c[hour],
+                sun[hour, m],
+                daylight[hour, m],
+                lamps[hour],
+                internal[hour],
+                out,
+            )
+            power = _power(mass_c, out, low[hour], high[hour], constants)
+            cost = constants[7] * power if power > 0 else -constants[8] * power
+            after = out[3] + out[4] * mass_c + out[5] * power
+            cost += constants[9] * lit + penalty[hour, m] + _value(ahead_values, after)
+            if cost < best:
+                best, best_after = cost, after
+                result[hour, 0] = m
+                result[hour, 1], result[hour, 2] = max(power, 0.0), max(-power, 0.0)
+                result[hour, 3] = lit
+        mass_c = best_after
