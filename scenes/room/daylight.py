@@ -28,7 +28,7 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.provision_levels import level_number
 from scenes.results import SUNNY_HOUR_ERROR, DaylightResult, GridDaylight
 from scenes.room.inputs import RoomInputs
-from scenes.room.light import EYE_TURNS, RoomLight, picture_light
+from scenes.room.light import RoomLight, picture_light
 
 
 def room_daylight(
@@ -78,8 +78,7 @@ def room_daylight(
         return table, of_room
 
     counts = [len(grid.points) for grid in room.file_sensors.grids]
-    turned = len(EYE_TURNS) if room.options.outputs.spectral else 0
-    plane = slice(0, len(points) - sum(counts) - turned)
+    plane = slice(0, len(points) - room.other_sensors)
     ends = np.cumsum([plane.stop, *counts])
     grids = []
     for grid, first, last in zip(room.file_sensors.grids, ends[:-1], ends[1:], strict=True):

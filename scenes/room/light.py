@@ -30,15 +30,12 @@ from mitsuba_cfs.methods.point_in_time import PathLight
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, in_shares, part, silent
 from scenes.room.inner_glass import InnerGlass, inner_glass
-from scenes.room.inputs import NO_SENSORS, FileSensors, RoomInputs
+from scenes.room.inputs import EYE_TURNS, NO_SENSORS, FileSensors, RoomInputs
 from scenes.room.options import SensorGrid
 from scenes.room.windows import RoomWindows
 
 # Share of the daylight stage that traces the sensors' matrices; those of the view report their own
 TRACED = {"daylight": 0.6}
-
-
-EYE_TURNS = (90, 180, 270)  # [degrees] anticlockwise, of the eye's other directions
 
 
 @dataclass(frozen=True, slots=True, weakref_slot=True)
@@ -109,7 +106,7 @@ def _scene(room: RoomInputs, building: Building) -> tuple[DaylightScene, InnerGl
         building, room.space, room.windows, room.grids, room.options.outputs.picture_size,
         inner=glass, file_sensors=room.file_sensors,
     )  # fmt: skip
-    return with_turned_eyes(scene) if room.options.outputs.spectral else scene, glass
+    return with_turned_eyes(scene) if room.turned_eyes else scene, glass
 
 
 def with_turned_eyes(scene: DaylightScene) -> DaylightScene:

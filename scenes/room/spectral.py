@@ -26,8 +26,8 @@ from mitsuba_cfs.spectra.detectors import (
     equivalent_daylight,
 )
 from scenes.results import MELANOPIC_BY_DAY, SpectralYear
-from scenes.room.inputs import RoomInputs
-from scenes.room.light import EYE_TURNS, RoomLight
+from scenes.room.inputs import EYE_TURNS, RoomInputs
+from scenes.room.light import RoomLight
 
 MELANOPIC = DETECTORS.index("melanopic")
 LEAST_LX = 1.0  # illuminance at the eye below which colour is not stated
