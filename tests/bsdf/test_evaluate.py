@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.evaluate import BLOCKS, _block, bsdf_values, direct_hemispherical, klems_of
+from mitsuba_cfs.bsdf.evaluate import (
+    BLOCKS,
+    _block,
+    bsdf_values,
+    direct_hemispherical,
+    klems_of,
+    tree_position,
+)
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_HALF, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_merge import merged_tree
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf, morton
@@ -104,3 +111,17 @@ def test_the_share_that_is_seen_through_stays_and_is_all_by_default() -> None:
     for stated, share in ((None, 1.0), (0.4, 0.4)):
         bsdf = KlemsBsdf(KLEMS_HALF, KLEMS_HALF, *blocks, see_through=stated)
         assert klems_of(bsdf, KLEMS_FULL).see_through == share
+
+
+def test_an_isotropic_tree_goes_by_the_sine_of_incidence_in_its_first_half():
+    """(1 - sin(theta)) / 2, below 1/2 at normal incidence; outgoing light turned by the azimuth."""
+    tree = TensorTree(3, np.zeros(1, dtype=np.int64), np.ones(1))
+    theta, phi = np.radians([0.0, 30.0, 90.0]), np.radians(70.0)
+    incident = np.stack(
+        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1
+    )
+    at = tree_position(tree, incident, -incident)
+    np.testing.assert_allclose(at[:, 0], [0.5, 0.25, 0.0], atol=2e-6)
+    assert at[0, 0] < 0.5
+    flat = np.stack([np.sin(theta), np.zeros(3), np.cos(theta)], axis=1)
+    np.testing.assert_allclose(at[1:], tree_position(tree, flat, -flat)[1:], atol=1e-9)

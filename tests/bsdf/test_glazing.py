@@ -138,3 +138,10 @@ def test_transmittance_at_the_ends_of_its_ranges() -> None:
     ):  # fmt: skip
         assert solar_transmittance(u, g) == pytest.approx(by_hand)
     assert solar_transmittance(5.8, 1.0) <= 1.0
+
+
+def test_a_dark_pane_returns_its_normal_values():
+    """Of the transmittance 0.01 to 0.1, whose inner transmittance is a small number."""
+    for tau in (0.01, 0.05, 0.1):
+        pane = glass([0.0], tau, 0.045)
+        assert (pane.tau[0], pane.rho_front[0]) == pytest.approx((tau, 0.045), rel=1e-6)

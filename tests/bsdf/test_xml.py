@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from test_tensor_tree import random_tree
@@ -205,3 +207,14 @@ def test_lengths_are_metres(text, tmp_path, unit, metres):
     changed = text.replace('<Thickness unit="meter">0.024<', f'<Thickness unit="{unit}">0.5<')
     assert changed != text
     assert read_bsdf_xml(write(tmp_path, changed)).thickness == pytest.approx(0.5 * metres)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [("Thickness", -0.5, "of at least 0"), ("EmissivityFront", 8.4, "from 0 to 1")],
+)
+def test_a_number_beyond_its_bounds_is_refused_with_them(text, tmp_path, field, value, message):
+    changed = re.sub(f"(<{field}[^>]*>)[^<]*<", rf"\g<1>{value}<", text)
+    assert changed != text
+    with pytest.raises(DataError, match=f"{field}: expected a number {message}, got {value:g}"):
+        read_bsdf_xml(write(tmp_path, changed))

@@ -320,3 +320,10 @@ def test_figures_of_a_room_by_hand():
         assert figures[name] == pytest.approx(value), name
     dark = room_metrics(lux, weather)
     assert dark.annual_sunlight_exposure is None and dark.sunlit_hours is None
+
+
+def test_the_daylight_factor_is_a_share_of_the_light_outdoors():
+    np.testing.assert_allclose(daylight_factor([0.0, 250.0, 1e4], 1e4), [0.0, 0.025, 1.0])
+    for wrong in (-1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="illuminance: expected finite values"):
+            daylight_factor([100.0, wrong], 1e4)

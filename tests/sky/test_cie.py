@@ -66,6 +66,7 @@ def test_overcast_sky_has_its_closed_form():
     # the zenith's luminance from patches of 2 degrees
     assert patches[-1] == pytest.approx(10_000 * 9 / (7 * np.pi), rel=2e-4)
     assert patches[0] == pytest.approx(0.2 * 10_000 / np.pi)
+    assert cie_patches("overcast", FINE, 1.0)[0] == pytest.approx(0.2 / np.pi)  # of the sky alone
     np.testing.assert_allclose(FINE.horizontal_weights @ patches, 10_000)
 
 

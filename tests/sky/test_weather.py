@@ -180,6 +180,20 @@ def test_fog_a_desert_and_a_storm_are_weather(tmp_path, year, column, text):
     assert not any("implausible" in note for note in notes)
 
 
+@pytest.mark.parametrize(
+    ("column", "text", "named"),
+    [(DRY, "-67.9", False), (DRY, "-68.1", True), (DRY, "56.9", False), (DRY, "57.1", True),
+     (WIND, "59.9", False), (WIND, "60.1", True)],
+)  # fmt: skip
+def test_records_of_the_earth_bound_what_is_named(tmp_path, year, column, text, named):
+    """-67.8 degC outside Antarctica, 56.7 degC, 60 m/s, all year so that nothing jumps."""
+    for row in year:
+        row[column] = text
+    notes = read_epw(write_epw(tmp_path / "a.epw", year)).notes
+    field = {DRY: "dry bulb", WIND: "wind speed"}[column]
+    assert named == any(field in note and "implausible" in note for note in notes)
+
+
 def test_a_spike_is_one_value_far_from_both_of_its_neighbours():
     assert spikes(np.array([10.0, 10, 40, 10, 10])).tolist() == [False, False, True, False, False]
     assert spikes(np.array([10.0, 10, -20, 10, 10])).tolist() == [False, False, True, False, False]

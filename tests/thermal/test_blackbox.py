@@ -99,6 +99,10 @@ def test_realised_films_keep_the_sum_of_conductances():
     assert closed.r_inner == 0.073 and closed.r_outer == 0.03
     resistance = closed.layer_resistance.at(10.0, 10.0)
     assert 1 / closed.u_value == pytest.approx(0.03 + resistance + 0.073)
+    # the extra conductances are in the realised films, not beside them
+    assert closed.inward_shares() == pytest.approx(
+        (closed.u_value * 0.03, 1 - closed.u_value * 0.073)
+    )
 
 
 def test_fenestration_refuses_what_cannot_be():

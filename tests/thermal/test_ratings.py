@@ -220,16 +220,22 @@ def test_a_shade_within_by_en_13363():
     assert within.transmittance == pytest.approx(0.2 * 0.69 / (1 - 0.5 * 0.14))
 
 
-def test_european_rating_takes_the_emissivity_of_the_innermost_face():
-    """Three panes; the rooms' side of the last one is coated."""
+def test_european_rating_of_three_panes_by_the_formulas():
+    """Panes of three thicknesses; the rooms' side of the last one is coated."""
+    thicknesses = (0.004, 0.006, 0.01)
     panes = tuple(
-        GlazingLayer(0.004, 1.0, (0.837, inner), solar=(0.8, 0.07, 0.07))
-        for inner in (0.837, 0.837, 0.2)
+        GlazingLayer(thickness, 1.0, (0.837, inner), solar=(0.8, 0.07, 0.07))
+        for thickness, inner in zip(thicknesses, (0.837, 0.837, 0.2), strict=True)
     )
     gaps = (GasGap(0.012, (("argon", 1.0),)),) * 2
-    rating = layered_ratings(GlazingUnit(panes, gaps), 0.5, [0.1, 0.08, 0.06])[-1]
+    alpha = [0.1, 0.08, 0.06]
+    rating = layered_ratings(GlazingUnit(panes, gaps), 0.5, alpha)[-1]
     own = [Gap(0.012, gap.gas, (0.837, 0.837)) for gap in gaps]
     expected = en673_u_value(
-        [0.004] * 3, own, position="vertical", emissivity_in=0.2, conductivity=1.0
+        thicknesses, own, position="vertical", emissivity_in=0.2, conductivity=1.0
     )
     assert rating.u_value == pytest.approx(expected)
+    solid = np.array(thicknesses)
+    between = 1 / gap_conductances(own, "vertical") + (solid[:-1] + solid[1:]) / 2
+    expected = float(en410_g_value(np.array([0.5]), np.array([alpha]), between)[0])
+    assert rating.g_value == pytest.approx(expected)

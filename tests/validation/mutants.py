@@ -61,7 +61,7 @@ MODULES = {
     "mitsuba_cfs/metrics/lm83": ["metrics/test_autonomy_error", "metrics/test_metrics"],
     "mitsuba_cfs/bsdf/en410": ["bsdf/test_en410"],
     "mitsuba_cfs/bsdf/klems": ["bsdf/test_klems"],
-    "mitsuba_cfs/bsdf/evaluate": ["bsdf/test_evaluate"],
+    "mitsuba_cfs/bsdf/evaluate": ["bsdf/test_evaluate", "bsdf/test_peak_kind"],
     "mitsuba_cfs/bsdf/xml": ["bsdf/test_xml"],
     "mitsuba_cfs/bsdf/layers": ["bsdf/test_layers"],
     "mitsuba_cfs/bsdf/angular": ["bsdf/test_angular"],
