@@ -380,7 +380,8 @@ def spectral_transmittance(
     """
     angles = np.atleast_1d(np.asarray(theta, dtype=float))
     nm, whole = _whole(panes, angles)
-    return np.stack([np.interp(wavelength_nm, nm, tau) for tau in whole.tau.T])
+    wanted = np.asarray(wavelength_nm, dtype=float)
+    return np.stack([np.interp(wanted, nm, tau) for tau in whole.tau.T])
 
 
 @dataclass(frozen=True, slots=True)

@@ -189,11 +189,11 @@ def _to_sensors(
 
     traced = accumulate(light_of, stopping=Stopping(BATCHES))
     by_patches = _by_patches(matrices, sun, group, rest, g)
-    beam = np.zeros(traced.values.shape)
+    in_hours = np.zeros(traced.values.shape)
     for values in in_room:
-        beam += values / BATCHES
+        in_hours += values / BATCHES
     added = np.asarray(_all_hours(sun, traced.values) - by_patches, dtype=float)
-    return added, _all_hours(sun, beam), traced
+    return added, _all_hours(sun, in_hours), traced
 
 
 def replaced_luminance(sun: ReflectedSun, weights: NDArray[Any], on_patches: NDArray[Any]) -> Array:

@@ -42,14 +42,14 @@ def spectral_figures(result: RunResult, room: RoomYear) -> SpectralFigures | Non
         return None
     charts = [_melanopic_carpet(result, room, year)]
     if room.annual_glare is not None:
-        charts.insert(0, melanopic_against_glare(room, year))
+        dgp = room.annual_glare["dgp"].to_numpy(dtype=float)
+        charts.insert(0, melanopic_against_glare(room, year, dgp))
     table = tables.values_table(gettext("Light at the eye by wavelength"), year.summary)
     return SpectralFigures(tuple(charts), table, " ".join(map(translated, year.notes)))
 
 
-def melanopic_against_glare(room: RoomYear, year: SpectralYear) -> Chart:
-    """Melanopic EDI and DGP of each occupied hour with daylight, in the colour of its state."""
-    dgp = room.annual_glare["dgp"].to_numpy(dtype=float)
+def melanopic_against_glare(room: RoomYear, year: SpectralYear, dgp: NDArray[np.float64]) -> Chart:
+    """Melanopic EDI and DGP [H] of each occupied hour with daylight, in the colour of its state."""
     edi = year.eye["melanopic_edi_lx"].to_numpy(dtype=float)
     used = occupied(room).to_numpy()
     shown = used & np.isfinite(dgp) & (edi >= LOWEST_LX)
@@ -59,7 +59,7 @@ def melanopic_against_glare(room: RoomYear, year: SpectralYear) -> Chart:
     x = (np.log(edi[shown]) - np.log(LOWEST_LX)) / (np.log(high) - np.log(LOWEST_LX))
     y = (np.clip(dgp[shown], LEAST_DGP, top) - LEAST_DGP) / (top - LEAST_DGP)
     calm = np.nan_to_num(dgp) <= GLARE_LIMIT
-    both, count = used & calm & (edi >= MELANOPIC_BY_DAY), max(np.count_nonzero(used), 1)
+    both, count = used & calm & (edi >= MELANOPIC_BY_DAY), max(int(np.count_nonzero(used)), 1)
     x_range, y_range = (np.log(LOWEST_LX), np.log(high)), (LEAST_DGP, top)
     enough = np.log(MELANOPIC_BY_DAY)
     marks = (
