@@ -662,7 +662,7 @@ def _work(net: Network, state: records.State) -> records.Workspace:
         still=np.zeros(m),
         ends=np.zeros((n, 2)),
         film=np.zeros(n),
-        outdoor=np.zeros((n, 5)),
+        outdoor=np.zeros((n, 6)),
         nodes=np.zeros((n, 3, 3)),
         old_inner=state.inner.copy(),
         old_outer=state.outer.copy(),

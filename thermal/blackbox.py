@@ -65,20 +65,22 @@ class LayerResistance:
 
 
 @dataclass(frozen=True, slots=True)
-class InteriorShade:
-    """A shade on the room side of panes, and the air behind it; see `thermal.shaded_window`."""
+class ShadeNode:
+    """A shade outside or on the room side of panes, and the air between; see `shaded_window`."""
 
-    width: float  # [m] of the gap behind it
+    exterior: bool
+    width: float  # [m] of the gap beside it
     height: float  # [m]
     tilt: float  # [rad] from horizontal
     impedance: float  # of its openings (ISO 15099:2003, 7.4.2)
-    exchange: float  # longwave between it and the innermost pane, of that between black faces
-    pane_weight: float  # of the pane in what the room's longwave sees
-    emissivity_in: float  # of both to the room
+    exchange: float  # longwave between it and the pane beside it, of that between black faces
+    pane_weight: float  # of that pane in what the longwave of the shade's side sees
+    emissivity: float  # of both to that side
     panes: LayerResistance  # between outermost and innermost face of the panes
     sun: tuple[float, ...]  # [N - 1] of the sun that each pane absorbs, the share of the innermost
-    inward: tuple[float, float, float]  # heat of outer pane, inner pane and shade that goes indoors
-    # the whole window as two layers with the film of the dark state
+    # heat of the three nodes that goes indoors: shade and panes, or panes and shade, outside first
+    inward: tuple[float, float, float]
+    # the whole window as two layers with the shade's film of the dark state
     two_layers: LayerResistance
     film: float  # [m2 K/W]
 
@@ -101,7 +103,7 @@ class Fenestration:
     inner_report: float = 1.0  # share of (T_inner - T_room) that the visible face shows
     emissivity_in: float = 0.84
     emissivity_out: float = 0.84
-    shade: InteriorShade | None = None  # a node of its own, inside panes that are the two layers
+    shade: ShadeNode | None = None  # a node of its own beside the panes, which are two more
     layer_resistance: LayerResistance = field(init=False)
 
     def __post_init__(self) -> None:
@@ -121,31 +123,32 @@ class Fenestration:
         require_range(self.emissivity_out, 0.0, 1.0, f"{item}: outside emissivity")
         require_range(self.inner_report, 0.0, 1.5, f"{item}: inner report weight")
 
-    def inward_shares(self) -> tuple[float, float]:
-        """Shares of the heat absorbed in the outer and in the inner layer that go indoors.
+    def inward_shares(self) -> tuple[float, float, float]:
+        """Shares of the heat absorbed in the outer, middle and inner layer that go indoors.
 
-        With the films of the measurement; the inner layer is the shade where it is a node.
+        With the films of the measurement; without a shade of its own there is no middle layer.
         """
         if self.shade is not None:
-            return self.shade.inward[0], self.shade.inward[2]
-        return self.u_value * self.r_outer, 1.0 - self.u_value * self.r_inner
+            return self.shade.inward
+        return self.u_value * self.r_outer, 0.0, 1.0 - self.u_value * self.r_inner
 
     def in_series(self) -> Fenestration:
-        """As two layers: an interior shade with the film that it has in the dark."""
+        """As two layers: a shade with the film that it has in the dark."""
         if self.shade is None:
             return self
         plain = replace(self, resistance=self.shade.two_layers, shade=None)
-        return with_realised_films(plain, r_inner_realised=self.shade.film)
+        film = "r_outer_realised" if self.shade.exterior else "r_inner_realised"
+        return with_realised_films(plain, **{film: self.shade.film})
 
 
 @dataclass(frozen=True, slots=True)
 class LayerAbsorptances:
-    """Solar absorptances of the two layers, per direction; of panes and an interior shade."""
+    """Solar absorptances of the two layers, per direction; of the three with a `ShadeNode`."""
 
     outer: NDArray[np.float64]  # [...]
-    inner: NDArray[np.float64]  # [...] of the shade where it is a node
+    inner: NDArray[np.float64]  # [...]
     clipped: float  # largest absorptance that had to be moved to stay between 0 and alpha
-    middle: NDArray[np.float64] | float = 0.0  # [...] of the innermost pane outside of the shade
+    middle: NDArray[np.float64] | float = 0.0  # [...] of the pane beside the shade
 
     def two_layers(self, system: Fenestration) -> LayerAbsorptances:
         """Those of Kuhn's two layers with U and films of a system: as much goes indoors."""
@@ -206,22 +209,26 @@ def layer_absorptances(
 
 
 def node_absorptances(
-    by_layer: ArrayLike, shade: InteriorShade, more: ArrayLike = 0.0
+    by_layer: ArrayLike, shade: ShadeNode, more: ArrayLike = 0.0
 ) -> LayerAbsorptances:
-    """Absorptances of outer pane, innermost pane and interior shade, from those of all layers.
+    """Absorptances of a shade, the outermost and the innermost pane, from those of all layers.
 
     A pane between both divides its heat by the resistances to either side.
 
     Args:
-        by_layer: [..., N] solar, outermost first, the shade last.
+        by_layer: [..., N] solar, outermost first.
         more: [...] what the stated g has over that of these layers; so much more goes indoors
-            where absorbed sun moves from outer pane to shade (less: back), then from the innermost
-            pane.
+            where absorbed sun moves from the outer node to the inner (less: back), then from the
+            middle one.
     """
     layers = np.asarray(by_layer, dtype=float)
-    share = np.array(shade.sun)
-    outer, middle = layers[..., :-1] @ (1.0 - share), layers[..., :-1] @ share
-    inner, left = layers[..., -1].copy(), np.broadcast_to(more, layers.shape[:-1]).copy()
+    panes = layers[..., 1:] if shade.exterior else layers[..., :-1]
+    share, left = np.array(shade.sun), np.broadcast_to(more, layers.shape[:-1]).copy()
+    outside, inside = panes @ (1.0 - share), panes @ share
+    if shade.exterior:
+        outer, middle, inner = layers[..., 0].copy(), outside, inside
+    else:
+        outer, middle, inner = outside, inside, layers[..., -1].copy()
     low, between, high = shade.inward
     up = np.clip(left / (high - low), 0.0, outer)
     outer, inner, left = outer - up, inner + up, left - up * (high - low)

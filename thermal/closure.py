@@ -138,12 +138,10 @@ class Closure:
                 emissivity_in=ends[1].emissivity[1] + ends[1].infrared_transmittance,
             )
             if data.shade is not None and films == (None, None):
-                return replace(
-                    closed,
-                    resistance=data.shade.panes,
-                    emissivity_in=data.shade.emissivity_in,
-                    shade=data.shade,
-                )
+                closed = replace(closed, resistance=data.shade.panes, shade=data.shade)
+                if data.shade.exterior:
+                    return replace(closed, emissivity_out=data.shade.emissivity)
+                return replace(closed, emissivity_in=data.shade.emissivity)
             films = (
                 data.r_inner if place == "internal" and films[0] is None else films[0],
                 data.r_outer if place == "external" and films[1] is None else films[1],

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal.blackbox import InteriorShade, LayerResistance, fit_conductance_surface
+from thermal.blackbox import LayerResistance, ShadeNode, fit_conductance_surface
 from thermal.errors import ThermalInputError, require
 from thermal.glazing_unit import Environment, GlazingUnit
-from thermal.layer_balance import INDOORS, UnitArrays, UnitState, settle
+from thermal.layer_balance import INDOORS, OUTDOORS, UnitArrays, UnitState, settle
 
 FloatArray = NDArray[np.float64]
 CONVECTION_OUTSIDE, CONVECTION_INSIDE = 20.0, 2.7  # [W/(m2 K)]; with radiation about 25 and 7.7
@@ -160,7 +161,7 @@ class Iso15099Data:
     r_outer: float  # [m2 K/W] realised in that state: face to environment
     r_inner: float
     resistance: LayerResistance  # between the two faces, with the realised films
-    shade: InteriorShade | None  # None: the room's air passes behind no shade
+    shade: ShadeNode | None  # None: no shade with air of the room or of outdoors behind it
 
 
 @lru_cache(maxsize=64)
@@ -181,56 +182,80 @@ def iso15099_data(unit: GlazingUnit, u_value: float | None = None) -> Iso15099Da
         require(bool(resistance.min() > 1e-4), "glazing", message)
         found = u_value
     fit = fit_conductance_surface(mean, difference, resistance)
-    shade = _interior_shade(unit, 1.0 / found - 1.0 / computed, fit, r_inner)
+    shade = _shade_node(unit, 1.0 / found - 1.0 / computed, fit, (r_outer, r_inner))
     return Iso15099Data(found, r_outer, r_inner, fit, shade)
 
 
-def _interior_shade(
-    unit: GlazingUnit, shift: float, two_layers: LayerResistance, film: float
-) -> InteriorShade | None:
-    """The interior shade of a unit, whose gap the room's air passes; None without one.
+def _shade_node(
+    unit: GlazingUnit, shift: float, two_layers: LayerResistance, films: tuple[float, float]
+) -> ShadeNode | None:
+    """The shade of a unit whose gap has air of the room or of outdoors; None without one.
 
-    Args: shift: of the panes' resistance [m2 K/W], from a stated U; `two_layers`, film: of the
-        dark unit, from face to face and from the shade to the room.
+    Args: shift: of the panes' resistance [m2 K/W], from a stated U; two_layers, films: of the
+        dark unit, from face to face, and realised ones outdoors and indoors.
     """
     arrays = unit.arrays(*(Environment(t, CONVECTION_INSIDE) for t in U_STATE_C))
-    if unit.shade_place != "internal" or arrays.air[-1] != INDOORS:
+    exterior = unit.shade_place == "external"
+    at = 0 if exterior else -1  # of the shade, and of its gap
+    if unit.shade_place not in ("internal", "external") or arrays.air[at] not in (
+        INDOORS, OUTDOORS
+    ):  # fmt: skip
         return None
-    pane, shade = unit.layers[-2:]
-    bare = replace(unit, layers=unit.layers[:-1], gaps=unit.gaps[:-1])
+    shade, pane = (unit.layers[k] for k in ((0, 1) if exterior else (-1, -2)))
+    kept, gaps = (slice(1, None), slice(1, None)) if exterior else (slice(-1), slice(-1))
+    bare = replace(unit, layers=unit.layers[kept], gaps=unit.gaps[gaps])
     found = [_middle(state) for state in _dark_states(bare)]
     mean, difference, resistance = (np.array(column) for column in zip(*found, strict=True))
     message = f"U is {-shift:.3g} m2 K/W too high for the resistance of the panes"
     require(bool((resistance + shift).min() > 1e-4), "glazing", message)
-    dark = unit_balance(unit, prescribed(*U_STATE_C))
-    faces = dark.faces_c
-    u_value = 1.0 / (shift - (U_STATE_C[1] - U_STATE_C[0]) / dark.heat_in)
-    outer = u_value * (faces[0] - U_STATE_C[0]) / -dark.heat_in
-    beyond = u_value * (U_STATE_C[1] - faces[-3]) / -dark.heat_in
-    of_shade = (U_STATE_C[1] - faces[-1]) / (U_STATE_C[1] - faces[-3])
-    shares = (faces[:-2] - faces[0]) / (faces[-3] - faces[0])
-    # longwave between pane and shade, and from both to the room, by the pane and the openings too.
-    # It is one flow with the room, divided by weights: what that gives the shade of the pane's own
-    # is between both
-    passes, reflects = shade.infrared_transmittance, 1.0 - pane.emissivity[1]
-    front, back = shade.emissivity
-    bounces = 1.0 - reflects * (1.0 - front - passes)
-    of_pane = pane.emissivity[1] * passes / bounces
-    whole = of_pane + back + front * reflects * passes / bounces
-    return InteriorShade(
-        width=unit.gaps[-1].width,
+    # longwave between pane and shade, and from both to the shade's side, by the pane and the
+    # openings too.  With the room it is one flow, divided by weights: what that gives the shade of
+    # the pane's own is between both
+    side, turned = (0, 1) if exterior else (1, 0)  # of the shade's faces: away, towards the pane
+    reflects = 1.0 - pane.emissivity[side]
+    passes = shade.infrared_transmittance
+    away, towards = shade.emissivity[side], shade.emissivity[turned]
+    bounces = 1.0 - reflects * (1.0 - towards - passes)
+    of_pane = pane.emissivity[side] * passes / bounces
+    whole = of_pane + away + towards * reflects * passes / bounces
+    between = 0.0 if exterior else of_pane * (1.0 - of_pane / whole)
+    return ShadeNode(
+        exterior=exterior,
+        width=unit.gaps[at].width,
         height=unit.height,
         tilt=float(np.radians(unit.tilt_deg)),
-        impedance=float(arrays.impedance[-1]),
-        exchange=pane.emissivity[1] * front / bounces + of_pane * (1.0 - of_pane / whole),
+        impedance=float(arrays.impedance[at]),
+        exchange=pane.emissivity[side] * towards / bounces + between,
         pane_weight=of_pane / whole,
-        emissivity_in=whole,
+        emissivity=whole,
         panes=fit_conductance_surface(mean, difference, resistance + shift),
-        sun=tuple(shares.reshape(-1, 2).mean(axis=1).tolist()),
-        inward=(float(outer), float(1.0 - beyond), float(1.0 - beyond * of_shade)),
+        **_dark_shares(unit, shift, exterior),
         two_layers=two_layers,
-        film=film,
+        film=films[0 if exterior else 1],
     )
+
+
+def _dark_shares(unit: GlazingUnit, shift: float, exterior: bool) -> dict[str, Any]:
+    """`ShadeNode.sun` and `inward` by the temperatures of the dark unit: by reciprocity.
+
+    Args: shift: of the panes' resistance [m2 K/W].
+    """
+    dark = unit_balance(unit, prescribed(*U_STATE_C))
+    faces, heat = (dark.faces_c - U_STATE_C[0]), -dark.heat_in
+    warm = U_STATE_C[1] - U_STATE_C[0]
+    of_panes = faces[2:] if exterior else faces[:-2]
+    shares = (of_panes - of_panes[0]) / (of_panes[-1] - of_panes[0])
+    u_value = 1.0 / (shift + warm / heat)
+    outer = u_value * of_panes[0] / heat  # of the resistance, from outdoors
+    inner = 1.0 - u_value * (warm - of_panes[-1]) / heat
+    if exterior:
+        nodes = outer * faces[0] / of_panes[0], outer, inner
+    else:
+        nodes = outer, inner, 1.0 - (1.0 - inner) * (warm - faces[-1]) / (warm - of_panes[-1])
+    return {
+        "sun": tuple(shares.reshape(-1, 2).mean(axis=1).tolist()),
+        "inward": tuple(float(node) for node in nodes),
+    }
 
 
 DarkState = tuple[float, float, float, float, tuple[float, float]]

@@ -63,7 +63,8 @@ def _account(
         terms[z, on.SUN] += drive.inner[sun, i]
         if kind == WINDOW:
             terms[z, on.GLASS_SUN] += area * (drive.outer[sun, i] + drive.middle[sun, i])
-            terms[z, on.WINDOWS] += area * (work.outdoor[i, 4] - work.outdoor[i, 3] * t_o)
+            row, pane = work.outdoor[i], state.glass[i, 1]
+            terms[z, on.WINDOWS] += area * (row[4] - row[3] * t_o - row[5] * pane)
             continue
         stored = _move_modes(net, i, state, work)
         if kind == OUTDOOR:

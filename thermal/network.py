@@ -248,8 +248,8 @@ class Glass(NamedTuple):
     kind: NDArray[np.int64]  # [W, J] of the layer resistance
     coefficient: NDArray[np.float64]  # [W, J, 6]
     extra: NDArray[np.float64]  # [W, J, 2] conductances [W/(m2 K)] to outdoor and room air
-    # [W, J, 6] interior shades: gap's width (0: none), height, tilt, impedance; longwave to the
-    # pane; weight of the pane in what the room sees
+    # [W, J, 7] shades that are nodes: gap's width (0: none), height, tilt, impedance; longwave to
+    # the pane; weight of the pane in what the shade's side sees; 1: outside
     shade: NDArray[np.float64]
     emissivity_out: NDArray[np.float64]  # [W, J]
 
@@ -575,7 +575,7 @@ def _glass(elements: list[tuple[int, OpaqueSurface | WindowElement]]) -> Glass:
     kind = np.zeros((len(windows), states), dtype=np.int64)
     coefficient = np.zeros((len(windows), states, 6))
     extra = np.zeros((len(windows), states, 2))
-    shade = np.zeros((len(windows), states, 6))
+    shade = np.zeros((len(windows), states, 7))
     emissivity = np.zeros((len(windows), states))
     for w, window in enumerate(windows):
         for j in range(states):
@@ -587,6 +587,7 @@ def _glass(elements: list[tuple[int, OpaqueSurface | WindowElement]]) -> Glass:
             emissivity[w, j] = state.emissivity_out
             if (one := state.shade) is not None:
                 shade[w, j] = (
-                    one.width, one.height, one.tilt, one.impedance, one.exchange, one.pane_weight
+                    one.width, one.height, one.tilt, one.impedance, one.exchange, one.pane_weight,
+                    one.exterior,
                 )  # fmt: skip
     return Glass(kind, coefficient, extra, shade, emissivity)

@@ -93,7 +93,7 @@ class State(NamedTuple):
 
     inner: NDArray[np.float64]  # [N] inside faces
     outer: NDArray[np.float64]  # [N] outside faces
-    glass: NDArray[np.float64]  # [N, 3] of windows with interior shades: outer, inner pane, shade
+    glass: NDArray[np.float64]  # [N, 3] nodes of windows, of those without a shade two
     mode: NDArray[np.float64]  # [M] amplitudes of the modes of the walls' inner nodes [K]
     air: NDArray[np.float64]  # [Z]
     load: NDArray[np.float64]  # [Z] ideal load of the step [W], heating positive
@@ -134,7 +134,8 @@ class Workspace(NamedTuple):
     still: NDArray[np.float64]  # [M] amplitudes that the step before alone would give
     ends: NDArray[np.float64]  # [N, 2] what these give the outermost and innermost inner node
     film: NDArray[np.float64]  # [N] conductance between inside face and room air [W/(m2 K)]
-    # [N, 5] outer face: diagonal, right side, coupling to inside, film sum, sum of film times T
+    # [N, 6] outer face: diagonal, right side, coupling to inside, film sum, sum of film times T
+    # (with that of the next), film of the pane beside an exterior shade
     outdoor: NDArray[np.float64]
     # [N, 3, 3] nodes of windows with interior shades: by outdoors and sun alone, with the room's
     # air 1 K warmer, with 1 W/m2 of the room's longwave

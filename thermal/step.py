@@ -26,14 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal.climate import SIGMA
-from thermal.convection import (
-    constant_inside,
-    doe2_outside,
-    iso15099_inside,
-    mowitt_outside,
-    tarp_inside,
-)
 from thermal.elimination import eliminate
+from thermal.films import cube, inside_film, layer_conductance, outside_exchange
 from thermal.network import (
     ADIABATIC,
     KNOWN,
@@ -399,7 +393,6 @@ def _plant(
     return COOLS if air > drive.cooling_c[t, z] + ROUNDING else FREE
 
 
-UPRIGHT = 0.7071  # of the normal's z: faces within 45 degrees of upright
 MOST_CHANGES = 50  # of the plants in an iterate; each changes a few times at the most
 
 
@@ -410,63 +403,6 @@ def _go_on(now: NDArray[np.float64], before: NDArray[np.float64]) -> None:
         last = now[i]
         now[i] = last + (last - before[i])
         before[i] = last
-
-
-@inlined
-def _cube(a_c: float, b_c: float) -> float:
-    a, b = a_c + 273.15, b_c + 273.15
-    return (a * a + b * b) * (a + b)
-
-
-@inlined
-def _layer_conductance(kind: int, c: NDArray[np.float64], inner: float, outer: float) -> float:
-    x, d = 0.5 * (inner + outer) - 10.0, abs(inner - outer)
-    if kind == 0:
-        return 1.0 / c[0]
-    if kind == 1:
-        u = min(max(c[0] + c[1] * x, 0.05), 0.95 / c[2])
-        return 1.0 / (1.0 / u - c[2])
-    return max(c[0] + c[1] * x + c[2] * d + c[3] * d * d + c[4] * x * d + c[5] * x * x, 0.02)
-
-
-@inlined
-def _inside_film(faces: Faces, i: int, surface: float, air: float, method: Method) -> float:
-    nz = faces.normal[i, 2]
-    if method.inside == 1:
-        return constant_inside(surface, air, nz)
-    if method.inside == 2:
-        if abs(nz) < UPRIGHT:
-            return method.inside_films[0]
-        return method.inside_films[1 if (surface - air) * nz < 0.0 else 2]
-    if faces.kind[i] == WINDOW and abs(nz) < 0.1:
-        return iso15099_inside(surface, air, faces.height[i])
-    return tarp_inside(surface, air, nz)
-
-
-@inlined
-def _outside_exchange(
-    faces: Faces, i: int, surface: float, emissivity: float,
-    weather: OutdoorConditions, t: int, method: Method,
-) -> tuple[float, float]:  # fmt: skip
-    """Sum of the outside coefficients [W/(m2 K)], and of them times their temperatures."""
-    out, sky = weather.outdoor[t], weather.sky[t]
-    nx, ny, nz = faces.normal[i]
-    faces_wind = abs(nz) > 0.98 or nx * weather.origin[t, 0] + ny * weather.origin[t, 1] >= -1e-9
-    if faces_wind:
-        forced = faces.wind[i, 0] * weather.windward[t]
-    else:
-        forced = faces.wind[i, 1] * weather.leeward[t]
-    if method.outside == 0:
-        h = doe2_outside(surface, out, nz, forced, faces.roughness[i])
-    elif method.outside == 1:
-        h = mowitt_outside(surface, out, forced)
-    else:
-        h = method.outside_film
-    radiant = SIGMA * emissivity
-    h_sky = radiant * faces.hemisphere[i, 0] * _cube(surface, sky)
-    share = faces.hemisphere[i, 1] + faces.hemisphere[i, 2]
-    h_out = h + radiant * share * _cube(surface, out)
-    return h_sky + h_out, h_sky * sky + h_out * out
 
 
 @summed
@@ -515,7 +451,7 @@ def _wall_row(
     h, h_t = 0.0, 0.0
     if kind == OUTDOOR:
         emissivity = faces.emissivity_out[i]
-        h, h_t = _outside_exchange(faces, i, state.outer[i], emissivity, weather, t, method)
+        h, h_t = outside_exchange(faces, i, state.outer[i], emissivity, weather, t, method)
     outer_diagonal = c_o + g_o * (1.0 - u_o) + h
     outer_right = c_o * work.old_outer[i] + g_o * y_o + h_t
     if kind == OUTDOOR:
@@ -541,9 +477,9 @@ def _window_row(
     """Diagonal and right side [per m2] of an inner window layer, its outer layer eliminated."""
     w = net.faces.window[i]
     emissivity = net.glass.emissivity_out[w, shading]
-    h, h_t = _outside_exchange(net.faces, i, state.outer[i], emissivity, weather, t, method)
+    h, h_t = outside_exchange(net.faces, i, state.outer[i], emissivity, weather, t, method)
     extra = net.glass.extra[w, shading, 0]
-    c = _layer_conductance(
+    c = layer_conductance(
         net.glass.kind[w, shading],
         net.glass.coefficient[w, shading],
         state.inner[i],
@@ -554,38 +490,9 @@ def _window_row(
     outer_right = h_t + outer_sun
     row = work.outdoor[i]
     row[0], row[1], row[2], row[3], row[4] = outer_diagonal, outer_right, c, h + extra, h_t
+    row[5] = 0.0
     passed = c / outer_diagonal
     return c - c * passed, outer_right * passed
-
-
-@inlined
-def _shaded_row(
-    net: Network,
-    i: int,
-    state: State,
-    work: Workspace,
-    weather: OutdoorConditions,
-    drive: Drive,
-    t: int,
-    method: Method,
-) -> tuple[float, float, float]:
-    """Diagonal, film and right side [per m2] of a window with an interior shade, as it is seen."""
-    faces, glass = net.faces, net.glass
-    w, z, sun = faces.window[i], faces.zone[i], t // method.solar_every
-    shading = drive.state[t // method.steps, w]
-    outer, middle, shade = state.glass[i]
-    emissivity = glass.emissivity_out[w, shading]
-    h, h_t = _outside_exchange(faces, i, outer, emissivity, weather, t, method)
-    row = work.outdoor[i]
-    row[3], row[4] = h, h_t
-    c = _layer_conductance(glass.kind[w, shading], glass.coefficient[w, shading], middle, outer)
-    film = _inside_film(faces, i, shade, state.air[z], method) + glass.extra[w, shading, 1]
-    nodes = work.nodes[i]
-    nodes[0, 0] = h_t + drive.outer[sun, i]
-    nodes[0, 1], nodes[0, 2] = drive.middle[sun, i], drive.inner[sun, i] / faces.area[i]
-    return shaded_row(
-        glass.shade[w, shading], state.glass[i], state.air[z], work, z, i, h, c, film, faces.area[i]
-    )
 
 
 @inlined
@@ -616,13 +523,13 @@ def _assemble(
     _assemble_air(net, state, work, weather, drive, t, method)
     for i in range(n):
         z, kind, area, k = faces.zone[i], faces.kind[i], faces.area[i], place[i]
-        film = _inside_film(faces, i, state.inner[i], state.air[z], method)
+        film = inside_film(faces, i, state.inner[i], state.air[z], method)
         inner_sun = drive.inner[sun, i]
         if kind == WINDOW:
             shading = drive.state[hour, faces.window[i]]
             film += net.glass.extra[faces.window[i], shading, 1]
             if net.glass.shade[faces.window[i], shading, 0] > 0.0:
-                own, film, r = _shaded_row(net, i, state, work, weather, drive, t, method)
+                own, film, r = shaded_row(net, i, state, work, weather, drive, t, method)
                 inner_sun = 0.0  # it is in the row
             else:
                 own, r = _window_row(
@@ -656,7 +563,7 @@ def _assemble(
             area = net.radiation.exchange[at + q]
             h = method.inside_radiation * area
             if h == 0.0:
-                h = SIGMA * area * _cube(state.inner[i], state.inner[j])
+                h = SIGMA * area * cube(state.inner[i], state.inner[j])
             e[pairs.at_exchange[q]] -= h
             d[place[i]] += h
             d[place[j]] += h

@@ -148,11 +148,10 @@ def predicted_hours(
             window.states[min(j, len(window.states) - 1)]
             for window, j in zip(zone.windows, chosen, strict=True)
         ]
-        outer, inner = np.array([one.inward_shares() for one in systems]).reshape(-1, 2).T
+        outer, middle, inner = np.array([one.inward_shares() for one in systems]).reshape(-1, 3).T
         absorbed = solar.absorbed_outer * outer + solar.absorbed_inner * inner
-        if solar.absorbed_middle is not None:  # of the pane behind an interior shade
-            middle = [0.0 if one.shade is None else one.shade.inward[1] for one in systems]
-            absorbed = absorbed + solar.absorbed_middle * np.array(middle)
+        if solar.absorbed_middle is not None:
+            absorbed = absorbed + solar.absorbed_middle * middle
         sun.append(solar.inside.sum(axis=1) + absorbed @ areas)
         daylight.append(year.work_plane_lx(states) if dimmed else np.zeros(room.skies.hours))
     reduced = reduced_zone(zone, climate(room.weather), solar.facade, windows)

@@ -148,8 +148,9 @@ def test_blackbox_of_the_layers_gives_their_u_and_films():
 @pytest.mark.parametrize("openness", [0.0, 0.3])
 @pytest.mark.parametrize("inner_emissivity", [0.84, 0.05])
 @pytest.mark.parametrize("absorbed", [(0.0, 0.0, 0.0), (20.0, 30.0, 150.0), (0.0, 150.0, 20.0)])
-def test_an_interior_shade_in_the_balance_is_that_of_its_layers(
-    absorbed, inner_emissivity, openness
+@pytest.mark.parametrize("exterior", [False, True])
+def test_a_shade_in_the_balance_is_that_of_its_layers(
+    absorbed, inner_emissivity, openness, exterior
 ):
     """Faces, heat to the air and to the room, by hourly balance and by ISO 15099 layer by layer.
 
@@ -159,6 +160,8 @@ def test_an_interior_shade_in_the_balance_is_that_of_its_layers(
     shade = sheet_layer(openness, thickness=0.0005, conductivity=0.15, edges=(0.05,) * 4)
     gap = GasGap(0.016, (("argon", 0.9), ("air", 0.1)))
     unit = GlazingUnit((*panes, shade), (gap, GasGap(0.05)))
+    if exterior:
+        unit, absorbed = GlazingUnit((shade, *panes), (GasGap(0.05), gap)), absorbed[::-1]
     data = iso15099_data(unit)
     window = Closure("layers", unit=unit).close(Fenestration("shade", data.u_value))
     surroundings = Conditions(Environment(10.0, 20.0), Environment(25.0, None))
@@ -184,7 +187,7 @@ def test_an_interior_shade_in_the_balance_is_that_of_its_layers(
         replace(room, surfaces=walls), climate(24, outdoor=10.0), light, options=options
     )
     assert np.abs(result.residual).max() < 1e-6
-    seen = data.shade.pane_weight
+    seen = 0.0 if exterior else data.shade.pane_weight
     shade, pane = balance.faces_c[-1], balance.faces_c[-3]
     # of two temperatures the mean, where longwave has that of their fourth powers
     face, apart = (1.0 - seen) * shade + seen * pane, 0.02 * seen * abs(pane - shade)

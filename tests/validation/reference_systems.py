@@ -277,6 +277,6 @@ def _back_layers(data: dict, optics: Optics, f: Fenestration) -> tuple[float, fl
     if data["cfs"] == "dgu":
         alpha = alpha[::-1]  # the engine lists a specular system's back side the other way round
     inward = np.array(data["N_inward_fractions"])
-    outer, behind = f.inward_shares()
+    outer, _, behind = f.inward_shares()
     inner = np.clip((inward - outer) / (behind - outer), 0.0, 1.0)
     return float(alpha @ (1 - inner)), float(alpha @ inner)
