@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal.comfort_models import gagge_set, predicted_mean_vote
 from thermal.errors import ThermalInputError, require
 
 KELVIN = 273.15
@@ -202,14 +201,18 @@ def pmv_ppd(
     metabolic_rate: float = 1.2,
     clothing: float = 0.5,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Predicted mean vote [H] and percentage dissatisfied [H] (ISO 7730).
+    """Predicted mean vote [H] and percentage dissatisfied [H] (ISO 7730, pythermalcomfort).
 
     humidity: relative [%]; metabolic_rate in met, clothing in clo.  Hours outside the standard's
     limits are computed all the same.
     """
-    surroundings = _surroundings(air_c, mrt_c, air_speed, humidity)
-    vote = predicted_mean_vote(*surroundings, metabolic_rate=metabolic_rate, clothing=clothing)
-    return vote, 100.0 - 95.0 * np.exp(-0.03353 * vote**4 - 0.2179 * vote**2)
+    from pythermalcomfort.models import pmv_ppd_iso
+
+    air, mrt, speed, moist = _surroundings(air_c, mrt_c, air_speed, humidity)
+    result = pmv_ppd_iso(
+        tdb=air, tr=mrt, vr=speed, rh=moist, met=metabolic_rate, clo=clothing, **_PLAIN
+    )
+    return np.asarray(result.pmv, dtype=float), np.asarray(result.ppd, dtype=float)
 
 
 def standard_effective_temperature(
@@ -221,9 +224,15 @@ def standard_effective_temperature(
     metabolic_rate: float = 1.2,
     clothing: float = 0.5,
 ) -> NDArray[np.float64]:
-    """SET [H] [degC] (Gagge's two-node model); arguments as for `pmv_ppd`."""
-    surroundings = _surroundings(air_c, mrt_c, air_speed, humidity)
-    return gagge_set(*surroundings, metabolic_rate=metabolic_rate, clothing=clothing)
+    """SET [H] [degC] (Gagge two-node model, pythermalcomfort); arguments as for `pmv_ppd`."""
+    from pythermalcomfort.models import set_tmp
+
+    air, mrt, speed, moist = _surroundings(air_c, mrt_c, air_speed, humidity)
+    result = set_tmp(tdb=air, tr=mrt, v=speed, rh=moist, met=metabolic_rate, clo=clothing, **_PLAIN)
+    return np.asarray(result.set, dtype=float)
+
+
+_PLAIN = {"limit_inputs": False, "round_output": False}
 
 
 def _surroundings(

@@ -256,3 +256,11 @@ def test_scattering_is_measured_against_all_that_passes(share, message):
     else:
         with pytest.raises(DataError, match=message):
             check_specular(bsdf, table, Path("a.xml"))
+
+
+def test_a_table_passes_no_more_than_it_gets():
+    theta = np.radians([0.0, 90.0])
+    AngularTable(theta, np.array([1.0, 0.0]))
+    for wrong in ([1.01, 0.0], [-0.01, 0.0]):
+        with pytest.raises(ValueError, match="transmittance: expected a share of 1"):
+            AngularTable(theta, np.array(wrong))

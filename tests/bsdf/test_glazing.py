@@ -12,11 +12,14 @@ from mitsuba_cfs.bsdf.glazing import (
     Pane,
     hemispherical_mean,
     pane_optics,
+    pane_values,
     solar_reflectance,
     solar_transmittance,
+    specular_klems,
     stack,
     visible_reflectances,
 )
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 
 ANGLES = np.radians(np.arange(0.0, 90.0, 10.0))
 
@@ -145,3 +148,14 @@ def test_a_dark_pane_returns_its_normal_values():
     for tau in (0.01, 0.05, 0.1):
         pane = glass([0.0], tau, 0.045)
         assert (pane.tau[0], pane.rho_front[0]) == pytest.approx((tau, 0.045), rel=1e-6)
+
+
+def test_a_ring_has_the_pane_at_the_middle_of_its_projected_area():
+    """With one angle a ring: sin2 half way between its bounds."""
+    pane = Pane("clear", 0.8, 0.08, 0.08)
+    found = specular_klems(pane, KLEMS_FULL, subdivision=1)
+    sine2 = np.sin(KLEMS_FULL.theta_bounds) ** 2
+    theta = np.arcsin(np.sqrt((sine2[1:] + sine2[:-1]) / 2))
+    rings = np.repeat(pane_values(pane, theta)[0], KLEMS_FULL.phi_counts)
+    through = np.diag(found.transmission_front) * KLEMS_FULL.projected_solid_angles()
+    np.testing.assert_allclose(through, rings, rtol=1e-9)

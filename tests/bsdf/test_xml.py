@@ -218,3 +218,13 @@ def test_a_number_beyond_its_bounds_is_refused_with_them(text, tmp_path, field, 
     assert changed != text
     with pytest.raises(DataError, match=f"{field}: expected a number {message}, got {value:g}"):
         read_bsdf_xml(write(tmp_path, changed))
+
+
+@pytest.mark.parametrize(
+    ("element", "expected"),
+    [("", "Other"), ("<DeviceType/>", "Other"), ("<DeviceType>Shade</DeviceType>", "Shade")],
+)
+def test_the_type_of_a_device_is_other_where_none_is_stated(text, tmp_path, element, expected):
+    changed = re.sub("<DeviceType>[^<]*</DeviceType>", element, text)
+    assert changed != text or element
+    assert read_bsdf_xml(write(tmp_path, changed)).device_type == expected
