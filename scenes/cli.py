@@ -64,6 +64,7 @@ def open_streams() -> None:
 
 # name: help in one line. The module scenes.commands.<name> defines `command`.
 COMMANDS = {
+    "app": "Open a project in a browser: files, rooms, systems, results, without a shell.",
     "run": "Compute daylight, glare, heat and comfort of the rooms of a building.",
     "comply": "Check rooms against EN 17037, LM-83, LEED, BREEAM; write a printable dossier.",
     "demo": "Compare an office with its blind up, down and controlled.",
@@ -164,9 +165,14 @@ def _print_version(ctx: click.Context, _parameter: click.Parameter, wanted: bool
     show_default=True,
     help="Where rays are traced; docs/benchmarks.md has the tables that were compared on a GPU.",
 )  # fmt: skip
-def cfs(verbose: int, device: str) -> None:
+@click.option(
+    "--progress", type=click.Choice(["bar", "json"]), envvar="CFS_PROGRESS", default="bar",
+    show_default=True, help="Progress on standard error: bars or lines, or a JSON object a line.",
+)  # fmt: skip
+def cfs(verbose: int, device: str, progress: str) -> None:
     """Daylight, glare, temperatures and comfort behind complex fenestration systems."""
     os.environ["CFS_DEVICE"] = device  # worker processes inherit it
+    os.environ["CFS_PROGRESS"] = progress
     level = (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
     logging.basicConfig(level=level, format="%(message)s", handlers=[_StderrHandler()], force=True)
     for noisy in ("matplotlib", "numba", "h5py", "PIL"):

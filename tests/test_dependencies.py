@@ -126,6 +126,7 @@ def test_locked_versions_are_of_what_is_asked_for() -> None:
     asked = [*PROJECT["dependencies"]]
     asked += [line for lines in PROJECT["optional-dependencies"].values() for line in lines]
     todo, closure = [_name(line) for line in asked] + ["distributed"], {"setuptools"}
+    installed = True
     while todo:
         name = todo.pop()
         if name in closure:
@@ -134,7 +135,9 @@ def test_locked_versions_are_of_what_is_asked_for() -> None:
         try:
             lines = metadata.requires(name) or []
         except metadata.PackageNotFoundError:
+            installed = False
             continue
         todo += [_name(line) for line in lines if "extra ==" not in line]
     assert {_name(line) for line in asked} - locked == set()
-    assert locked - closure == set()
+    if installed:  # else lines may be of what a missing one asks for
+        assert locked - closure == set()

@@ -49,6 +49,7 @@ RANKS = {
          "simulation", "year_of_glare"},
         {"study", "view_picture"},
         {"study_report"},
+        {"app"},
         {"commands"},
         {"cli"},
     ),

@@ -19,6 +19,7 @@ from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, json_text, replacing, write_table, write_text
 from scenes.commands.room_options import seed_option
+from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
 
 if TYPE_CHECKING:
     from mitsuba_cfs.bsdf.measured import Pattern, ScatteringInterpolant
@@ -322,6 +323,43 @@ def generate(out: Path, **options) -> None:
         file, exact = generated_file(progress=progress, **options)
     write_bsdf_xml(file, out)
     click.echo(f"{out}: {exact}")
+
+
+@command.command("library")
+@click.option(
+    "--glazing",
+    type=click.Choice(list(GENERIC_GLAZINGS)),
+    help="Reference glazing by name; of the system to write.",
+)
+@click.option("--shade", metavar="NAME", help="Shade of the library; default: none.")
+@seed_option
+@click.option("--out", type=FILE, help="XML file to write; a .toml with the layers goes beside it.")
+def library(glazing: str | None, shade: str | None, seed: int, out: Path | None) -> None:
+    """List the generic glazings and shades that come with the program, or write a system of them.
+
+    No entry is a product. U and g follow from the layers by ISO 15099; blinds are traced, fabrics
+    follow from usual values. Without --out the figures of every pair are printed.
+    """
+    from scenes.fenestration import library as entries
+
+    if out is None:
+        if shade is not None:
+            entries.shade_entry(shade)
+        for sheet in entries.sheets().values():
+            if glazing in (None, sheet.glazing) and shade in (None, sheet.shade):
+                click.echo(sheet.line)
+        for one in (*entries.library().glazing, *entries.library().shade):
+            click.echo(f"{one.name}: {one.title}; {one.source}")
+        return
+    from scenes.commands.progress_bar import ProgressBar
+
+    check_file(out)
+    check_file(out.with_suffix(".toml"))
+    with ProgressBar() as progress:
+        sheet = entries.write_library_system(
+            glazing or entries.GLAZED, shade or "", out, seed=seed, progress=progress
+        )
+    click.echo(f"{out}: {sheet.line}")
 
 
 @command.command()

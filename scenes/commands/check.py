@@ -53,9 +53,21 @@ UNCUT = 100_000  # columns of a table that nobody sees
     help="Also write a page: the 3D model with a mark at each leak, the rooms without the "
     "corrections beside those with them, and the problems.",
 )
+@click.option(
+    "--json",
+    "record",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.json",
+    help="Also write rooms, windows, problems and the 3D model as data for other programs.",
+)
 @no_cache_option
 def command(
-    issues: Path | None, fix: Path | None, bcf: Path | None, html: Path | None, **chosen
+    issues: Path | None,
+    fix: Path | None,
+    bcf: Path | None,
+    html: Path | None,
+    record: Path | None,
+    **chosen,
 ) -> None:
     """List rooms, windows and problems of a building model as the simulation reads them.
 
@@ -78,6 +90,8 @@ def command(
         check_file(bcf, field="--bcf", inputs=options.building_files)
     if html is not None:
         check_file(html, field="--html", inputs=options.building_files)
+    if record is not None:
+        check_file(record, field="--json", inputs=options.building_files)
     from rich.console import Console
 
     from bim.building_file import named_spaces
@@ -122,6 +136,17 @@ def command(
             before = _uncorrected(options, progress)
         write_check(read, head.model, html, before)
         console.print(f"page: {html}", markup=False, highlight=False)
+    if record is not None:
+        from mitsuba_cfs.files import json_text
+        from scenes.comply.dwellings import uses_of_rooms
+        from scenes.comply.uses import read_uses
+        from scenes.report.checked import check_record
+
+        uses = uses_of_rooms(read, read.spaces, read_uses(), options.linked)
+        facts = {guid: (use.key, str(use.source), use.assumed) for guid, use in uses.items()}
+        data = check_record(read, head.lines, facts)
+        write_text(record, json_text(data, ensure_ascii=False) + "\n")
+        console.print(f"data: {record}", markup=False, highlight=False)
     if issues is not None:
         import pandas as pd
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 EXAMPLES = {
+    "app": ("cfs app house", "cfs app house --language de --no-browser"),
     "run": (
         "cfs run house.ifc --weather city.epw --out results --quick",
         "cfs run house.ifc --weather city.epw --cfs blind.xml --u 1.1 --g 0.25 --out results",
@@ -65,6 +66,10 @@ EXAMPLES = {
     "bsdf generate": (
         "cfs bsdf generate --tilt-deg 45 --depth-mm 80 --spacing-mm 72 --out slats.xml",
         "cfs bsdf generate --shape perforated --openness 0.1 --out sheet.xml",
+    ),
+    "bsdf library": (
+        "cfs bsdf library",
+        "cfs bsdf library --glazing 'triple low-e' --shade 'screen 5 %, grey' --out screen.xml",
     ),
     "bsdf combine": ("cfs bsdf combine blind.xml glazing.xml --out system.xml",),
     "bsdf interpolate": ("cfs bsdf interpolate sample*.txt --out sample.xml",),

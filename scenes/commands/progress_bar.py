@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
@@ -22,11 +23,13 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
+from mitsuba_cfs.files import json_text
 from mitsuba_cfs.interpreter import own_paths, own_python
 from mitsuba_cfs.progress import Stage, TimeLeft, spoken_left
 
 NEXT_ITEM_S = 10.0  # of a log: items that are shorter do not get a line each
 SILENCE_S = 60.0  # of a log: a longer stage says how far it is
+REPORTED_S = 0.2  # of JSON lines: least time between two of one stage
 
 
 @dataclass(slots=True)
@@ -46,7 +49,8 @@ class ProgressBar:
     A bar never moves backwards, and a ticked bar stays ticked: a stage that begins again gets a new
     bar.  Of items alike (`mitsuba_cfs.progress.item`) one bar says which is computed and how
     long the others take; only its own stages are shown.  Where stderr is no terminal, one line per
-    finished stage, and lines of the items from time to time.  Use as a context manager:
+    finished stage, and lines of the items from time to time; with `cfs --progress json` one JSON
+    object a line for other programs.  Use as a context manager:
 
         with ProgressBar() as progress:
             annual_run(..., progress=progress)
@@ -56,7 +60,10 @@ class ProgressBar:
         self, *, terminal: bool | None = None, clock: Callable[[], float] = time.monotonic
     ) -> None:
         """Draw on a terminal or write lines; by default what stderr is."""
+        self._json = os.environ.get("CFS_PROGRESS") == "json"
         self._terminal = sys.stderr.isatty() if terminal is None else terminal
+        self._terminal = self._terminal and not self._json
+        self._reported = ("", -REPORTED_S)  # label and time of the last JSON line
         self._clock = clock
         self._bars = Progress(
             SpinnerColumn(finished_text="[green]✓"),
@@ -87,7 +94,7 @@ class ProgressBar:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        if error is None:
+        if error is None and not self._json:
             self._finish(self._current)
             self._end_items()
         if self._terminal:
@@ -96,6 +103,9 @@ class ProgressBar:
     def __call__(self, stage: str, fraction: float) -> None:
         """Show that `fraction` (0 to 1) of `stage` is done; a new stage ends the one before."""
         fraction = min(max(fraction, 0.0), 1.0)
+        if self._json:
+            self._report(stage, fraction)
+            return
         if isinstance(stage, Stage):
             self._show_item(stage, fraction)
         elif stage != self._label and self._item is not None:
@@ -103,6 +113,18 @@ class ProgressBar:
             self._end_items()
         if stage:
             self._show_stage(str(stage), fraction)
+
+    def _report(self, stage: str, fraction: float) -> None:
+        """One JSON line: stage and fraction, of items their noun, number, total and time left."""
+        now = self._clock()
+        if stage == self._reported[0] and fraction < 1.0 and now < self._reported[1] + REPORTED_S:
+            return
+        self._reported = (str(stage), now)
+        line: dict[str, str | int | float | None] = {"stage": str(stage), "fraction": fraction}
+        if isinstance(stage, Stage):
+            line |= {"item": stage.noun, "number": stage.number, "total": stage.total}
+            line["left_s"] = self._left.seconds(stage, fraction)
+        click.echo(json_text(line), err=True)
 
     @property
     def _label(self) -> str:

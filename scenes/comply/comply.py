@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.building_file import is_ifc, no_window
+from bim.building_file import no_window
 from bim.model import Building, Space, in_month
 from bim.report.issue import Effect, Issue
 from bim.sensors import plane_sides
@@ -31,7 +31,7 @@ from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from scenes.comply.assess import asked_of, assess_room, values_of
 from scenes.comply.blinds import DEFAULT_NAME, open_and_closed
-from scenes.comply.dwellings import dwelling_words, dwellings_of, judged
+from scenes.comply.dwellings import dwelling_words, judged, uses_of_rooms
 from scenes.comply.files import ComplyFiles, read_files
 from scenes.comply.findings import Findings, GridLight, RoomHeat, SeatGlare, calendar_of
 from scenes.comply.glass import sight_through, windows_without_view
@@ -41,7 +41,7 @@ from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLigh
 from scenes.comply.rules import GridTable
 from scenes.comply.sunlight import SunExposure, sun_day, sun_exposure
 from scenes.comply.tables import USE_WORDS
-from scenes.comply.uses import UNKNOWN, RoomUse
+from scenes.comply.uses import RoomUse
 from scenes.comply.view_out import ViewOut, view_out
 from scenes.fenestration.ratings import system_ratings
 from scenes.fenestration.systems import FenestrationSystem, States
@@ -340,30 +340,8 @@ class Check:
         return "glare" in self.parts and self.options.room.outputs.annual_glare
 
     def uses_of(self, spaces: list[Space]) -> dict[str, RoomUse]:
-        """The use of each room by GUID; rooms without a window and without a use count as none."""
-        texts = {}
-        if self.building.file is not None and is_ifc(self.building.file):
-            from bim.ifc.room_uses import read_room_uses  # reads IFC: only where there is a file
-
-            texts = read_room_uses(self.building.file, *self.options.linked)
-        found = {}
-        homes = dwellings_of(self.building)
-        for space in spaces:
-            use = self.files.uses.of(space, texts.get(space.guid, ()))
-            if not use.dwelling and not self.files.uses.dwellings:
-                use = replace(use, dwelling=homes.get(space.guid, ""))
-            if use.key == UNKNOWN and use.dwelling and space.windows:
-                source = Note(
-                    "in {dwelling}, no information on its use, taken as a habitable room",
-                    dwelling=use.dwelling,
-                )
-                use = replace(use, key="living", source=source, assumed=True)
-            if use.key == UNKNOWN and not space.windows:
-                use = replace(
-                    use, occupied=False, source=Note("no window and no use, not occupied")
-                )
-            found[space.guid] = use
-        return found
+        """The use of each room by GUID."""
+        return uses_of_rooms(self.building, spaces, self.files.uses, self.options.linked)
 
     def views(
         self, spaces: list[Space]

@@ -5,13 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
-from bim.model import Building
+from bim.building_file import is_ifc
+from bim.model import Building, Space
 from bim.names import plain_text
 from mitsuba_cfs.notes import Note
 from scenes.comply.assess import NOT_COMPUTED, BuildingVerdict, RoomVerdict, assess_building
 from scenes.comply.results import CheckedRoom
 from scenes.comply.rules import NOT_MET
+from scenes.comply.uses import UNKNOWN, RoomUse, RoomUses
 
 HOME = re.compile(  # words for a dwelling, without accents
     r"dwelling|\bflats?\b|apartment|residential unit|wohnung|\bwhg\b|wohneinheit|logement"
@@ -24,6 +27,36 @@ TECHNICAL = re.compile(
     r"|light|licht|acoust|akust|security|access|rent|miet|floor|storey|geschoss|etage|planta|piano"
 )
 OF_DWELLING = "room of each dwelling"
+
+
+def uses_of_rooms(
+    building: Building, spaces: Sequence[Space], known: RoomUses, linked: Sequence[Path] = ()
+) -> dict[str, RoomUse]:
+    """The use of each room by GUID; rooms without a window and without a use count as none.
+
+    Args: linked: further files of the building.
+    """
+    texts = {}
+    if building.file is not None and is_ifc(building.file):
+        from bim.ifc.room_uses import read_room_uses  # reads IFC: only where there is a file
+
+        texts = read_room_uses(building.file, *linked)
+    found = {}
+    homes = dwellings_of(building)
+    for space in spaces:
+        use = known.of(space, texts.get(space.guid, ()))
+        if not use.dwelling and not known.dwellings:
+            use = replace(use, dwelling=homes.get(space.guid, ""))
+        if use.key == UNKNOWN and use.dwelling and space.windows:
+            source = Note(
+                "in {dwelling}, no information on its use, taken as a habitable room",
+                dwelling=use.dwelling,
+            )
+            use = replace(use, key="living", source=source, assumed=True)
+        if use.key == UNKNOWN and not space.windows:
+            use = replace(use, occupied=False, source=Note("no window and no use, not occupied"))
+        found[space.guid] = use
+    return found
 
 
 def dwellings_of(building: Building) -> dict[str, str]:

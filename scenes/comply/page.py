@@ -11,6 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from scenes.comply import tables
+from scenes.comply.answer import answers
 from scenes.comply.findings import SeatGlare
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary
 from scenes.comply.rules import RuleTable
@@ -230,6 +231,8 @@ def _filled(result: Compliance, *, quick: bool, page: PageOptions) -> str:
         page=page,
         title=page.title or result.building.name or gettext("Building"),
         facts=summary(result) + page.facts,
+        answers=[(title, tied(text)) for title, text in answers(result)],
+        quick=translated(NOTE) if quick else "",
         notes=head_lines(result.head, (*([NOTE] if quick else []), *result.notes)),
         assumptions=[translated(text) for text in result.assumptions],
         rules=[dossier_rule(result, name) for name in result.rules],

@@ -103,13 +103,16 @@ def write_page(folder: Path, head: Sequence[str]) -> None:
         write_text(folder / name, text)
 
 
-def script_words() -> dict[str, str | tuple[str, str]]:
-    """Translations of the scripts' messages, by their English text; of plurals both forms."""
+def script_words(scripts: str = SCRIPTS) -> dict[str, str | tuple[str, str]]:
+    """Translations of the scripts' messages, by their English text; of plurals both forms.
+
+    Args: scripts: the folder of the page's scripts.
+    """
     if current_language() == "en":
         return {}
     words = {}
     for message in messages(current_language()):
-        if any(path.startswith(SCRIPTS) for path, _ in message.locations):
+        if any(path.startswith(scripts) for path, _ in message.locations):
             words[message.id[0] if message.pluralizable else message.id] = message.string
     return words
 

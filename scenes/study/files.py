@@ -20,7 +20,8 @@ def check_files(study: Study) -> None:
     for room in study.room:
         check_names(room.spaces, f"room {room.name}: spaces")
         if room.building is not None:
-            check_building_file(room.building)
+            for path in (room.building, *room.linked):
+                check_building_file(path)
         else:
             box_building(room.box)
     first, *others = [read_weather(climate.weather) for climate in study.climate]

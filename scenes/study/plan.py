@@ -31,7 +31,12 @@ if TYPE_CHECKING:
 
 AUTO = "auto"
 COMPUTED_BY = "scenes.study.one_case"  # the module of a case's results
-OF_BUILDING = ("building", "corrections", "surroundings")  # names of files that a room is made of
+OF_BUILDING = (
+    "building",
+    "linked",
+    "corrections",
+    "surroundings",
+)  # names of files that a room is made of
 # options that are no files, of the room and of what is in its windows and outdoors
 OF_ROOM = ("spaces", "surroundings_offset", *ReadTable.model_fields)
 OF_CASE = ("u_value", "g_value", "see_through", "albedo")

@@ -58,6 +58,7 @@ class RoomTable(_Table, ReadTable):
 
     name: str = ""
     building: Path | None = None
+    linked: tuple[Path, ...] = ()  # further files of the same building: facade, structure, site
     spaces: tuple[Name, ...] = ()  # names or GUIDs; none: every space with a window
     box: BoxTable | None = None
     specular: bool = False  # something in the room mirrors: glare then needs full pictures
@@ -67,8 +68,9 @@ class RoomTable(_Table, ReadTable):
     def _one_source(self) -> RoomTable:
         if (self.building is None) == (self.box is None):
             raise ValueError("give either `building` or `box`")
-        if self.box is not None and self.spaces:
-            raise ValueError("`spaces` belong to a `building`; a box is one room")
+        if self.box is not None and (self.spaces or self.linked):
+            key = "spaces" if self.spaces else "linked"
+            raise ValueError(f"`{key}` belong to a `building`; a box is one room")
         return self
 
 
@@ -182,14 +184,15 @@ class Study(_Table, OutdoorTable):
             None if room is None else room.building,
             None if climate is None else climate.weather,
             system.bsdf, spaces, u_value=system.u_value, g_value=system.g_value,
-            see_through=peaks,
+            see_through=peaks, linked=() if room is None else room.linked,
             operation=system.operation or self.operation, **read_options(*tables),
         )  # fmt: skip
 
     @property
     def files(self) -> tuple[Path, ...]:
         """Every file that the study names."""
-        named = [room.building for room in self.room] + [system.bsdf for system in self.system]
+        named = [room.building for room in self.room] + [one for r in self.room for one in r.linked]
+        named += [system.bsdf for system in self.system]
         named += [system.operation for system in self.system]
         named += [climate.weather for climate in self.climate] + [self.operation]
         named += self.surroundings
@@ -259,7 +262,12 @@ def _with_places(study: Study, path: Path) -> Study:
         entries = []
         for number, entry in enumerate(getattr(study, key)):
             named = [name for name in (file, "operation") if name in type(entry).model_fields]
-            update = {n: there(getattr(entry, n), f"{key}.{number}.{n}") for n in named}
+            update: dict[str, Any] = {
+                n: there(getattr(entry, n), f"{key}.{number}.{n}") for n in named
+            }
+            if key == "room":
+                field = f"room.{number}.linked"
+                update["linked"] = tuple(there(name, field) for name in entry.linked)
             entries.append(entry.model_copy(update=update))
         result[key] = tuple(entries)
     result["operation"] = there(study.operation, "operation")

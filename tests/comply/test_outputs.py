@@ -16,6 +16,7 @@ from click.testing import CliRunner
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
 from scenes.commands.comply import command
+from scenes.comply.answer import answers
 from scenes.comply.comply import check_rooms
 from scenes.comply.files import ComplyFiles, least_altitude, read_files
 from scenes.comply.findings import SeatGlare
@@ -139,6 +140,24 @@ def test_the_dossier_says_all(result):
                    "Sunlight at the reference points of the openings"):  # fmt: skip
         assert wanted in html
     assert "<script" not in html and "http:" not in html.replace("http://www.w3.org", "")
+
+
+def test_the_dossier_begins_with_its_answers(result):
+    """One sentence for each criterion; the rooms that miss it have their names."""
+    found = dict(answers(result))
+    assert list(found) == ["2026 <draft>, View & distance", "2026 <draft>, Sun"]
+    assert "Meeting room" in found["2026 <draft>, Sun"]
+    for name, text in found.items():
+        key = "view" if "View" in name else "sun"
+        missed = [room for room, by_key in verdicts(result).items() if by_key[key] == "not met"]
+        met = [room for room, by_key in verdicts(result).items() if by_key[key] == "met"]
+        assert all((room in text) == (room in missed) for room in verdicts(result)), text
+        assert f"{len(met)} of {len(met) + len(missed)} rooms meet it" in text
+    html = dossier_html(result)
+    assert html.index('class="answer"') < html.index('id="contents"') < html.index("Cell.")
+    assert 'class="preview"' not in html
+    assert html.count('class="answer"') == 2
+    assert '<p class="preview" role="note">Quick run' in dossier_html(result, quick=True)
 
 
 def test_a_dossier_with_a_title_and_without_its_rooms(result):

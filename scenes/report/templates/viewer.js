@@ -1,9 +1,8 @@
 // The 3D view: WebGL where there is one, else the same picture painted back to front on a canvas.
-(() => {
+// `picked` is called with the index of a room that is clicked.
+const cfsViewer = (data, picked) => {
   "use strict";
   const canvas = document.getElementById("viewer");
-  if (!canvas) return;  // the page does without it
-  const data = JSON.parse(document.getElementById("viewer-data").textContent);
   const byId = (id) => document.getElementById("viewer-" + id);
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   const points = (text) => Float32Array.from(new Int16Array(bytes(text).buffer), (v) => v * data.unit);
@@ -15,6 +14,7 @@
     north: [0.75, 0.15, 0.15, 1],
   };
   const see = { azimuth: -2.2, elevation: 0.62, distance: 1, target: [0, 0, 0], room: -1, layer: 0, storey: -1 };
+  let tints = [];  // of rooms, by index: a colour that their floor and walls are mixed with
 
   // ---- the model as arrays: position and unit normal of each triangle corner
   function normals(p) {
@@ -103,6 +103,11 @@
   }
   const shade = (n) => 0.86 + 0.12 * Math.abs(n[2]) + 0.14 * Math.abs(n[0] * 0.6 + n[1] * 0.8);
   const toned = (c) => (dark.matches ? [c[0] * 0.5, c[1] * 0.52, c[2] * 0.56, c[3]] : c);
+  const TINTED = { floor: 0.75, wall: 0.4, ceiling: 0.4 };
+  const colourOf = (b) => {
+    const tint = b.room >= 0 && tints[b.room], share = TINTED[b.kind];
+    return toned(tint && share ? [...tint.map((v, i) => share * v + (1 - share) * COLOURS[b.kind][i]), 1] : COLOURS[b.kind]);
+  };
   const lineColour = () => (dark.matches ? [0.9, 0.93, 0.97] : [0.12, 0.16, 0.2]);
 
   // ---- WebGL
@@ -174,7 +179,7 @@
         const shown = visible(), solid = shown.filter((b) => COLOURS[b.kind][3] === 1);
         gl.enable(gl.CULL_FACE);
         gl.cullFace(gl.FRONT);
-        for (const b of solid) draw(gl.TRIANGLES, stored.get(b).p, stored.get(b).s, b.p.length / 3, toned(COLOURS[b.kind]), 0, rise(b));
+        for (const b of solid) draw(gl.TRIANGLES, stored.get(b).p, stored.get(b).s, b.p.length / 3, colourOf(b), 0, rise(b));
         gl.disable(gl.CULL_FACE);
         draw(gl.TRIANGLES, sensors.p, sensors.c, sensors.count, [1, 1, 1, 1], 0);
         gl.depthMask(false);
@@ -212,7 +217,7 @@
         };
         const ink = lineColour();
         for (const b of visible()) {
-          const c = toned(COLOURS[b.kind]), up = rise(b);
+          const c = colourOf(b), up = rise(b);
           for (let i = 0; i < b.p.length; i += 9) {
             const n = b.n.subarray(i, i + 3);
             const facing = n[0] * (eye[0] - b.p[i]) + n[1] * (eye[1] - b.p[i + 1]) + n[2] * (eye[2] - b.p[i + 2] - up);
@@ -259,14 +264,43 @@
   }
   const zoom = (factor) => { see.distance *= factor; repaint(); };
   const reset = () => { see.azimuth = -2.2; see.elevation = 0.62; fit(); repaint(); };
-  let held = null;
-  canvas.addEventListener("pointerdown", (event) => { held = [event.clientX, event.clientY]; canvas.setPointerCapture(event.pointerId); });
+  // The nearest room whose drawn surfaces the line through a place of the canvas meets; -1: none
+  function roomAt(x, y) {
+    const { back, right, up, eye } = camera(), tan = Math.tan(0.3), aspect = canvas.clientWidth / canvas.clientHeight;
+    const across = (2 * x / canvas.clientWidth - 1) * tan * aspect, upwards = (1 - 2 * y / canvas.clientHeight) * tan;
+    const d = back.map((v, i) => -v + across * right[i] + upwards * up[i]);
+    let nearest = Infinity, room = -1;
+    for (const b of visible()) {
+      if (b.room < 0) continue;
+      const lift = rise(b);
+      for (let i = 0; i < b.p.length; i += 9) {
+        const a = [b.p[i], b.p[i + 1], b.p[i + 2] + lift];
+        if (b.kind !== "glass" && b.n[i] * d[0] + b.n[i + 1] * d[1] + b.n[i + 2] * d[2] < 0) continue;
+        const u = [0, 1, 2].map((k) => b.p[i + 3 + k] - b.p[i + k]), v = [0, 1, 2].map((k) => b.p[i + 6 + k] - b.p[i + k]);
+        const h = [d[1] * v[2] - d[2] * v[1], d[2] * v[0] - d[0] * v[2], d[0] * v[1] - d[1] * v[0]];
+        const det = u[0] * h[0] + u[1] * h[1] + u[2] * h[2];
+        if (Math.abs(det) < 1e-12) continue;
+        const s = eye.map((value, k) => value - a[k]), first = (s[0] * h[0] + s[1] * h[1] + s[2] * h[2]) / det;
+        const q = [s[1] * u[2] - s[2] * u[1], s[2] * u[0] - s[0] * u[2], s[0] * u[1] - s[1] * u[0]];
+        const second = (d[0] * q[0] + d[1] * q[1] + d[2] * q[2]) / det, t = (v[0] * q[0] + v[1] * q[1] + v[2] * q[2]) / det;
+        if (first >= 0 && second >= 0 && first + second <= 1 && t > 0 && t < nearest) { nearest = t; room = b.room; }
+      }
+    }
+    return room;
+  }
+  let held = null, moved = false;
+  canvas.addEventListener("pointerdown", (event) => { held = [event.clientX, event.clientY]; moved = false; canvas.setPointerCapture(event.pointerId); });
   canvas.addEventListener("pointermove", (event) => {
-    if (!held) return;
+    if (!held || (!moved && Math.hypot(event.clientX - held[0], event.clientY - held[1]) < 4)) return;
+    moved = true;
     turn((event.clientX - held[0]) * 0.008, (event.clientY - held[1]) * 0.008);
     held = [event.clientX, event.clientY];
   });
-  for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => { held = null; });
+  canvas.addEventListener("pointerup", (event) => {
+    if (held && !moved) picked?.(roomAt(event.offsetX, event.offsetY));
+    held = null;
+  });
+  canvas.addEventListener("pointercancel", () => { held = null; });
   canvas.addEventListener("wheel", (event) => {
     if (document.activeElement !== canvas && !event.ctrlKey) return;
     event.preventDefault();
@@ -303,4 +337,6 @@
   new ResizeObserver(repaint).observe(canvas);
   renderer.sensorsChanged();
   reset();
-})();
+  return { tint(colours) { tints = colours; repaint(); } };
+};
+if (document.getElementById("viewer-data")) cfsViewer(JSON.parse(document.getElementById("viewer-data").textContent));

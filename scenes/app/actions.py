@@ -1,0 +1,197 @@
+"""Command lines of the page's buttons: what a click does is what the shell does in the project."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mitsuba_cfs.errors import DataError
+from scenes.app.project import INPUTS, RESULTS, STUDY, USES, Project, slug
+from scenes.language.catalogue import gettext
+
+CHECK = f"{RESULTS}/check.json"
+EXPORTS = {  # options of `cfs export`, and the names of their files
+    "gltf": "building.glb", "radiance": "radiance", "mitsuba": "mitsuba",
+    "epjson": "model.epJSON", "honeybee": "model.hbjson", "gbxml": "model.gbxml",
+}  # fmt: skip
+AS_IN_FILE = "as in the building's file"
+LANGUAGES = ("en", "de", "fr")
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """A command of the page."""
+
+    kind: str  # check, run, comply, study, export, systems
+    title: str  # the system or the files that it is for
+    command: tuple[str, ...]  # after `cfs`, run in the project's folder
+    out: str  # file or folder that it writes, relative to the project
+
+    @property
+    def text(self) -> str:
+        """The command as it is typed."""
+        return shlex.join(("cfs", *self.command))
+
+
+def check(project: Project) -> Action:
+    """Read the building: rooms, windows, problems and the 3D model."""
+    files = _files(project)
+    around = [part for one in project.study().get("surroundings", []) for part in _pair(one)]
+    html = f"{RESULTS}/check.html"
+    command = ("check", *files, *around, "--json", CHECK, "--html", html)
+    return Action("check", ", ".join(Path(one).name for one in files), command, CHECK)
+
+
+def _pair(path: str) -> tuple[str, str]:
+    return ("--surroundings", path)
+
+
+def _files(project: Project) -> list[str]:
+    files = project.building()
+    if not files:
+        raise DataError("drop an IFC, HBJSON or gbXML file first", field="building")
+    return files
+
+
+def computations(project: Project, wanted: Mapping[str, Any]) -> list[Action]:
+    """The commands of what is wanted, the quick ones first.
+
+    Args:
+        wanted: `report`, `annual_glare`, `explore`, `compare`: true or false; `standards`: names of
+            rule sets; `language` of the pages.
+
+    Raises: `DataError` for what is missing.
+    """
+    study = project.study()
+    systems: list[dict[str, Any]] = study.get("system", []) or [{"name": AS_IN_FILE}]
+    language = wanted.get("language", "en")
+    if language not in LANGUAGES:
+        raise DataError(f"expected one of {', '.join(LANGUAGES)}", field="language")
+    standards = wanted.get("standards", [])
+    if not isinstance(standards, list) or not all(isinstance(one, str) for one in standards):
+        raise DataError("expected names of rule sets", field="standards")
+    pages = ("--language", language) if language != "en" else ()
+    found: list[Action] = []
+    for system in systems:
+        name = slug(system["name"])
+        shared = _inputs(project, study)
+        if wanted.get("report"):
+            command = ["run", *shared, *_filled(project, study, system), *_options(study)]
+            command += ["--annual-glare"] if wanted.get("annual_glare") else []
+            command += ["--explore"] if wanted.get("explore") else []
+            out = f"{RESULTS}/report-{name}"
+            found.append(Action("run", system["name"], (*command, *pages, "--out", out), out))
+        if standards:
+            command = ["comply", *shared, *_states(project, system), *_options(study)]
+            command += [part for one in standards for part in ("--standard", one)]
+            command += ["--annual-glare"] if wanted.get("annual_glare") else []
+            command += ["--uses", USES] if (project.folder / USES).is_file() else []
+            out = f"{RESULTS}/rules-{name}"
+            found.append(Action("comply", system["name"], (*command, *pages, "--out", out), out))
+    if wanted.get("compare"):
+        _weather(study)
+        _files(project)
+        out = f"{RESULTS}/comparison"
+        found.append(Action("study", "", ("study", STUDY, *pages, "--out", out), out))
+    return found
+
+
+def export(project: Project, form: str) -> Action:
+    """Write the rooms for another program."""
+    if form not in EXPORTS:
+        raise DataError(f"expected one of {', '.join(EXPORTS)}", field="export")
+    study = project.study()
+    out = f"{RESULTS}/export/{EXPORTS[form]}"
+    building = _files(project)
+    command = ["export", *building, *_rooms(study), f"--{form}", out]
+    climate = study.get("climate", [])
+    command += ["--weather", climate[0]["weather"]] if form == "epjson" and climate else []
+    return Action("export", form, tuple(command), out)
+
+
+def _weather(study: Mapping[str, Any]) -> str:
+    climate = study.get("climate", [])
+    if not climate:
+        raise DataError("drop a weather file (EPW) first", field="weather")
+    return str(climate[0]["weather"])
+
+
+def _entry(study: Mapping[str, Any]) -> Mapping[str, Any]:
+    return next((one for one in study.get("room", []) if "building" in one), {})
+
+
+def _rooms(study: Mapping[str, Any]) -> list[str]:
+    entry = _entry(study)
+    flags = [part for one in entry.get("spaces", []) for part in ("--space", one)]
+    flags += [part for one in entry.get("join", []) for part in ("--join", one)]
+    flags += ["--furniture"] if entry.get("furniture") else []
+    return flags + [part for one in study.get("surroundings", []) for part in _pair(one)]
+
+
+def _inputs(project: Project, study: Mapping[str, Any]) -> list[str]:
+    building = _files(project)
+    return [*building, "--weather", _weather(study), *_rooms(study)]
+
+
+def _filled(project: Project, study: Mapping[str, Any], system: Mapping[str, Any]) -> list[str]:
+    """The options of `cfs run` for a system and the operation of the rooms."""
+    flags = _bsdf(system)
+    flags += [part for one in system.get("see_through", []) for part in ("--see-through", one)]
+    for key, option in (("u_value", "--u"), ("g_value", "--g")):
+        flags += [option, f"{system[key]:g}"] if key in system else []
+    operation = system.get("operation") or study.get("operation")
+    return [*flags, "--operation", operation] if operation else flags
+
+
+def _states(project: Project, system: Mapping[str, Any]) -> list[str]:
+    """The options of `cfs comply` for a system: a moving one has an open and a closed state."""
+    operation = system.get("operation")
+    if "bsdf" in system or not operation:
+        return _bsdf(system)
+    paths = project.states(operation)
+    return ["--cfs", paths[0], "--closed", paths[-1]] if paths else []
+
+
+def _bsdf(system: Mapping[str, Any]) -> list[str]:
+    return ["--cfs", system["bsdf"]] if "bsdf" in system else []
+
+
+def _options(study: Mapping[str, Any]) -> list[str]:
+    flags = ["--quick"] if study.get("quick") else []
+    for name, value in study.get("options", {}).items():
+        text = str(value).lower() if isinstance(value, bool) else str(value)
+        flags += ["--set", f"{name}={text}"]
+    return flags
+
+
+def library(glazing: str, shade: str) -> Action:
+    """Make a system of the library in the project's inputs."""
+    named = [glazing, shade] if shade else [glazing]
+    out = library_file(glazing, shade)
+    command = ["bsdf", "library", "--glazing", glazing]
+    command += ["--shade", shade] if shade else []
+    return Action("systems", " + ".join(named), (*command, "--out", out), out)
+
+
+def library_file(glazing: str, shade: str) -> str:
+    """Where a system of the library is kept, relative to the project."""
+    return f"{INPUTS}/{slug(f'{glazing} {shade}')}.xml"
+
+
+def rule_sets() -> Sequence[dict[str, str | bool]]:
+    """Names, titles and editions of the rule sets, and whether they ask for glare."""
+    from scenes.comply.rules import read_rule, rule_names
+
+    rules = [(name, read_rule(name)) for name in rule_names()]
+    return [
+        {
+            "name": name,
+            "title": gettext(rule.title),
+            "edition": rule.edition,
+            "glare": "glare" in rule.parts,
+        }
+        for name, rule in rules
+    ]

@@ -1,0 +1,524 @@
+"""A project folder: input files, a study file that `cfs study` reads, results.
+
+    inputs/             building, weather, systems, surroundings
+    study.toml          rooms, systems, weather, options: a study file, see docs/studies.md
+    operation.toml      gains and set points, where some are chosen
+    uses.toml           uses of rooms that the page states, for `cfs comply --uses`
+    results/NAME/       what the commands write
+    commands.jsonl      every command that was run, when, and how it ended
+
+The page changes only what it shows; keys and entries of others in these files stay.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import unicodedata
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from bim.building_file import check_building_file
+from bim.ifc.corrections import corrections_file, read_corrections
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import json_text, reason, write_text
+from scenes.input_files import read_weather
+from scenes.toml_file import read_table
+
+INPUTS, RESULTS, LOGS = "inputs", "results", "log"
+STUDY, OPERATION, USES, JOURNAL = "study.toml", "operation.toml", "uses.toml", "commands.jsonl"
+BUILDINGS = (".ifc", ".ifczip", ".hbjson", ".gbxml", ".rad")
+WEATHER = (".epw",)
+AROUND = (".obj", ".stl", ".ply", ".gltf", ".glb", ".cityjson", ".gml", ".geojson", ".hor")
+BESIDE = (".toml", ".csv")  # data of a system or a building, beside it
+NAME = re.compile(r"[^\w .()+-]")
+WRITTEN = "# written by cfs app\n"
+OPERATED = "controlled "  # beginning of the file names of systems that the page makes
+EXPORTED = 200  # files for other programs that the page lists
+LOADS = {"heating_c": 20.0, "cooling_c": 26.0}
+GAINS = ("equipment_w_m2", "lighting_w_m2", "lighting_target_lx")
+
+
+@dataclass(frozen=True, slots=True)
+class ProjectFile:
+    """A file of a project, relative to its folder."""
+
+    path: str
+    kind: str  # building, weather, system, surroundings or beside
+    size: int  # [byte]
+
+
+@dataclass(frozen=True, slots=True)
+class MadeSystem:
+    """A system of the library: its name on the page and its files, the open state first."""
+
+    name: str
+    files: tuple[str, ...]
+
+
+def plain_name(text: str) -> str:
+    """A file name without folders and without what file systems refuse; "" where none is left."""
+    text = unicodedata.normalize("NFC", text).replace("\\", "/").rsplit("/", 1)[-1]
+    return NAME.sub("_", text).strip(" .")[-120:]
+
+
+def slug(text: str) -> str:
+    """A text as the name of a folder."""
+    return re.sub(r"[^\w-]+", "-", unicodedata.normalize("NFC", text)).strip("-").lower() or "as-is"
+
+
+def kind_of(path: Path) -> str:
+    """What a file is for, by its ending and, of XML, its first element.
+
+    Raises: `DataError` for a file that no command reads.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".xml":
+        root = _root(path)
+        if root in ("WindowElement", "gbXML"):
+            return "system" if root == "WindowElement" else "building"
+        raise DataError(f"is XML with <{root}>; expected a BSDF file or gbXML", file=path)
+    kinds = {
+        **dict.fromkeys(BUILDINGS, "building"), **dict.fromkeys(WEATHER, "weather"),
+        **dict.fromkeys(AROUND, "surroundings"), **dict.fromkeys(BESIDE, "beside"),
+    }  # fmt: skip
+    if suffix in kinds:
+        return kinds[suffix]
+    known = ", ".join((*BUILDINGS, *WEATHER, ".xml", *BESIDE, *AROUND))
+    raise DataError(f"has an ending that is not read; expected one of {known}", file=path)
+
+
+def _root(path: Path) -> str:
+    """The name of a file's first XML element, its namespace left out."""
+    try:
+        for _, element in ElementTree.iterparse(path, events=("start",)):
+            return str(element.tag).rpartition("}")[2]
+    except OSError as error:
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
+    except (ElementTree.ParseError, ValueError) as error:
+        raise DataError(f"is no XML: {error}", file=path) from None
+    return ""
+
+
+def toml_text(table: Mapping[str, Any]) -> str:
+    """A table as TOML: plain keys first, then tables, then lists of tables."""
+    return "\n".join(_lines(table, ())).strip() + "\n"
+
+
+def _lines(table: Mapping[str, Any], place: tuple[str, ...]) -> list[str]:
+    tables = {key: value for key, value in table.items() if isinstance(value, dict)}
+    lists = {
+        key: value
+        for key, value in table.items()
+        if isinstance(value, list) and value and all(isinstance(one, dict) for one in value)
+    }
+    lines = [
+        f"{_key(key)} = {_value(value)}"
+        for key, value in table.items()
+        if key not in tables and key not in lists and value is not None
+    ]
+    for key, value in tables.items():
+        lines += ["", f"[{'.'.join(map(_key, (*place, key)))}]", *_lines(value, (*place, key))]
+    for key, entries in lists.items():
+        for entry in entries:
+            lines += ["", f"[[{'.'.join(map(_key, (*place, key)))}]]"]
+            lines += _lines(entry, (*place, key))
+    return lines
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json_text(name)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, str | bool | int | float):
+        return json_text(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return str(value)  # a date
+
+
+class Project:
+    """A project folder, read anew at each call: the command line may change it meanwhile."""
+
+    def __init__(self, folder: Path) -> None:
+        """Make the folder where there is none; `DataError` where it cannot be."""
+        self.folder = folder.absolute()
+        try:
+            for name in (INPUTS, RESULTS, LOGS):
+                (self.folder / name).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise DataError(f"cannot be written: {reason(error)}", file=folder) from None
+
+    # ---- files
+
+    def files(self) -> list[ProjectFile]:
+        """The input files, those of unknown kinds left out."""
+        found = []
+        for path in sorted((self.folder / INPUTS).rglob("*")):
+            if path.is_file() and not path.is_symlink() and not path.name.startswith("."):
+                with suppress(DataError):
+                    place = path.relative_to(self.folder).as_posix()
+                    found.append(ProjectFile(place, kind_of(path), path.stat().st_size))
+        return found
+
+    def take(self, part: Path, name: str) -> ProjectFile:
+        """Put an uploaded file into its place and into the study.
+
+        Raises: `DataError` for a file that no command reads, whose upload is removed.
+        """
+        target = self.folder / INPUTS / name
+        named = part.with_name(f"{part.name}{Path(name).suffix}")
+        part.rename(named)
+        try:
+            kind = kind_of(named)
+            if kind == "building":
+                check_building_file(named)
+            elif kind == "weather":
+                read_weather(named)
+        except DataError as error:
+            named.unlink()
+            raise DataError(error.message, file=name, field=error.field) from None
+        size = named.stat().st_size
+        named.replace(target)
+        file = ProjectFile(target.relative_to(self.folder).as_posix(), kind, size)
+        self._join(file)
+        return file
+
+    def _join(self, file: ProjectFile) -> None:
+        """Use a new file in the study; several IFC files are one building."""
+        study = self.study() or {"quick": True}  # a new project's first answer comes soon
+        if file.kind == "building":
+            files = self._building(study)
+            if file.path not in files:
+                ifc = (".ifc", ".ifczip")
+                both = all(path.lower().endswith(ifc) for path in (*files, file.path))
+                self._set_building(study, [*files, file.path] if both else [file.path])
+        elif file.kind == "weather":
+            study["climate"] = [{"name": Path(file.path).stem, "weather": file.path}]
+        elif file.kind == "system":
+            systems = study.setdefault("system", [])
+            if all(one.get("bsdf") != file.path for one in systems):
+                systems.append(
+                    {"name": free_name(Path(file.path).stem, systems), "bsdf": file.path}
+                )
+        elif file.kind == "surroundings":
+            around = study.setdefault("surroundings", [])
+            around += [file.path] if file.path not in around else []
+        self.write_study(study)
+
+    def remove(self, path: str) -> None:
+        """Remove an input file, and its entries of the study.
+
+        Raises: `DataError` for what is no input file of the project.
+        """
+        if path not in {file.path for file in self.files()}:
+            raise DataError("is no input file of this project", file=path)
+        (self.folder / path).unlink()
+        study = self.study()
+        files = self._building(study)
+        if path in files:
+            self._set_building(study, [one for one in files if one != path])
+        for key, name in (("climate", "weather"), ("system", "bsdf"), ("system", "operation")):
+            entries = study.get(key)
+            if entries is not None:
+                study[key] = [one for one in entries if one.get(name) != path]
+        if path in study.get("surroundings", []):
+            study["surroundings"].remove(path)
+        self.write_study(study)
+
+    # ---- the study
+
+    def study(self) -> dict[str, Any]:
+        """The tables of the study file; empty where there is none."""
+        path = self.folder / STUDY
+        return read_table(path) if path.is_file() else {}
+
+    def write_study(self, study: Mapping[str, Any]) -> None:
+        """Write the study file, empty lists left out."""
+        kept = {key: value for key, value in study.items() if value not in ([], {}, None, "")}
+        write_text(self.folder / STUDY, toml_text(kept))
+
+    @staticmethod
+    def _building(study: Mapping[str, Any]) -> list[str]:
+        """The files of the building that the page shows: those of the first room entry with one."""
+        entry: Mapping[str, Any] = next(
+            (one for one in study.get("room", []) if "building" in one), {}
+        )
+        return [entry["building"], *entry.get("linked", [])] if entry else []
+
+    @staticmethod
+    def _set_building(study: dict[str, Any], files: Sequence[str]) -> None:
+        rooms = study.setdefault("room", [])
+        entry = next((one for one in rooms if "building" in one), None)
+        if not files:
+            if entry is not None:
+                rooms.remove(entry)
+            return
+        if entry is None:
+            entry = {}
+            rooms.insert(0, entry)
+        if entry.get("building") != files[0]:
+            entry.pop("spaces", None)
+            entry["name"] = Path(files[0]).stem
+        entry |= {"building": files[0], "linked": list(files[1:])}
+        if not entry["linked"]:
+            del entry["linked"]
+
+    def building(self) -> list[str]:
+        """The building's files, relative to the project."""
+        return self._building(self.study())
+
+    def change(self, wanted: Mapping[str, Any]) -> None:
+        """Change rooms, systems, title, loads and uses as the page states them.
+
+        Raises: `DataError` for a key or value that the page has not.
+        """
+        study = self.study()
+        for key, value in wanted.items():
+            change = CHANGES.get(key)
+            if change is None:
+                raise DataError(f"is none of {', '.join(CHANGES)}", field=key)
+            change(self, study, value)
+        self.write_study(study)
+
+    def _change_title(self, study: dict[str, Any], value: Any) -> None:
+        study["title"] = _text(value, "title")
+
+    def _change_spaces(self, study: dict[str, Any], value: Any) -> None:
+        entry = next((one for one in study.get("room", []) if "building" in one), None)
+        if entry is None:
+            raise DataError("there is no building yet", field="spaces")
+        entry["spaces"] = [_text(one, "spaces") for one in _list(value, "spaces")]
+        if not entry["spaces"]:
+            del entry["spaces"]
+
+    def _change_furniture(self, study: dict[str, Any], value: Any) -> None:
+        for entry in study.get("room", []):
+            if "building" in entry:
+                entry["furniture"] = value is True
+
+    def _change_systems(self, study: dict[str, Any], value: Any) -> None:
+        """Systems with their names, in the order of the page; files are inputs of the project."""
+        files = {file.path for file in self.files()}
+        systems: list[dict[str, Any]] = []
+        for one in _list(value, "systems"):
+            if not isinstance(one, dict):
+                raise DataError("expected a system", field="systems")
+            entry = {key: one[key] for key in SYSTEM_KEYS if one.get(key) not in (None, "")}
+            entry["name"] = free_name(_text(entry.get("name", "system"), "systems"), systems)
+            for key in ("bsdf", "operation"):
+                if key in entry and entry[key] not in files:
+                    raise DataError("is no input file of this project", file=str(entry[key]))
+            systems.append(entry)
+        study["system"] = systems
+
+    def _change_quick(self, study: dict[str, Any], value: Any) -> None:
+        study["quick"] = value is True
+        if not study["quick"]:
+            del study["quick"]
+
+    def _change_loads(self, study: dict[str, Any], value: Any) -> None:
+        """Set points [C] and gains of all rooms; None of both set points: free-running."""
+        if not isinstance(value, dict):
+            raise DataError("expected a table", field="loads")
+        numbers = {key: _number(value.get(key), key) for key in (*LOADS, *GAINS)}
+        operation = self.operation()
+        for table, keys in (("loads", tuple(LOADS)), ("gains", GAINS)):
+            entries = {key: numbers[key] for key in keys if numbers[key] is not None}
+            rest = {k: v for k, v in operation.get(table, {}).items() if k not in keys}
+            operation[table] = rest | entries
+        operation = {key: one for key, one in operation.items() if one != {}}
+        if operation:
+            write_text(self.folder / OPERATION, WRITTEN + toml_text(operation))
+            study["operation"] = OPERATION
+        else:
+            (self.folder / OPERATION).unlink(missing_ok=True)
+            study.pop("operation", None)
+        for one in study.get("system", []):
+            if Path(one.get("operation", "")).name.startswith(OPERATED):
+                path = self.folder / one["operation"]
+                kept = {k: v for k, v in read_table(path).items() if k in ("system", "control")}
+                write_text(path, WRITTEN + toml_text(kept | operation))
+
+    def _change_uses(self, _study: dict[str, Any], value: Any) -> None:
+        """Uses of rooms by GUID; an empty text takes the file's."""
+        if not isinstance(value, dict):
+            raise DataError("expected a table", field="uses")
+        path = self.folder / USES
+        table = read_table(path) if path.is_file() else {}
+        rooms = dict(table.get("rooms", {}))
+        for guid, use in value.items():
+            rooms[guid] = _text(use, "uses") if use else ""
+        table["rooms"] = {guid: use for guid, use in rooms.items() if use}
+        if table["rooms"] or len(table) > 1:
+            write_text(path, toml_text(table))
+        else:
+            path.unlink(missing_ok=True)
+
+    def _change_corrections(self, study: dict[str, Any], value: Any) -> None:
+        """North [deg] and spaces that are outdoors, in the corrections file beside an IFC file."""
+        files = self._building(study)
+        if not files or not files[0].lower().endswith(".ifc"):
+            raise DataError("corrections are of IFC files", field="corrections")
+        path = corrections_file(self.folder / files[0])
+        before = path.read_text(encoding="utf-8") if path.is_file() else None
+        table = read_table(path) if before is not None else {}
+        if not isinstance(value, dict) or not set(value) <= {"north", "outdoors", "indoors"}:
+            raise DataError("expected north, outdoors or indoors", field="corrections")
+        if "north" in value:
+            table["north"] = _number(value["north"], "north")
+        for key in ("outdoors", "indoors"):
+            if key in value:
+                table[key] = [_text(one, key) for one in _list(value[key], key)]
+        table = {key: one for key, one in table.items() if one not in (None, [], {})}
+        if not table:
+            path.unlink(missing_ok=True)
+            return
+        write_text(path, toml_text(table))
+        try:
+            read_corrections(path)
+        except DataError:
+            if before is None:
+                path.unlink()
+            else:
+                write_text(path, before)
+            raise
+
+    def operation(self) -> dict[str, Any]:
+        """Gains and set points of all rooms."""
+        path = self.folder / OPERATION
+        return read_table(path) if path.is_file() else {}
+
+    def corrections(self) -> dict[str, Any]:
+        """The corrections beside the building's first file."""
+        files = self.building()
+        path = corrections_file(self.folder / files[0]) if files else None
+        return read_table(path) if path is not None and path.is_file() else {}
+
+    def uses(self) -> dict[str, str]:
+        """Uses of rooms that the page states, by GUID."""
+        path = self.folder / USES
+        return dict(read_table(path).get("rooms", {})) if path.is_file() else {}
+
+    def use_made(self, made: MadeSystem) -> None:
+        """Take a system as a variant; one of several files moves between them, by glare."""
+        study = self.study()
+        systems = study.setdefault("system", [])
+        name = free_name(made.name, systems)
+        if len(made.files) == 1:
+            systems.append({"name": name, "bsdf": made.files[0]})
+        else:
+            path = self.folder / INPUTS / f"{OPERATED}{Path(made.files[-1]).stem}.toml"
+            states = [{"bsdf": Path(one).relative_to(INPUTS).as_posix()} for one in made.files]
+            table = {"system": states, "control": {"rule": "glare"}} | self.operation()
+            write_text(path, WRITTEN + toml_text(table))
+            file = path.relative_to(self.folder).as_posix()
+            systems.append({"name": name, "operation": file})
+        self.write_study(study)
+
+    def states(self, operation: str) -> list[str]:
+        """The BSDF files of a moving system, the open one first, relative to the project."""
+        path = self.folder / operation
+        tables = read_table(path).get("system", []) if path.is_file() else []
+        folder = Path(operation).parent
+        return [(folder / one["bsdf"]).as_posix() for one in tables if "bsdf" in one]
+
+    # ---- results
+
+    def results(self) -> list[dict[str, Any]]:
+        """Folders of results with the pages and tables in them."""
+        found = []
+        for folder in sorted((self.folder / RESULTS).iterdir()):
+            if not folder.is_dir() or folder.is_symlink():
+                continue
+            pages = {
+                name: f"{RESULTS}/{folder.name}/{file}"
+                for name, file in PAGES.items()
+                if (folder / file).is_file()
+            }
+            if pages:
+                time = max((self.folder / page).stat().st_mtime for page in pages.values())
+                found.append({"name": folder.name, "pages": pages, "time": time})
+        return found
+
+    def exported(self) -> list[str]:
+        """Files for other programs, relative to the project; of folders the files in them."""
+        folder = self.folder / RESULTS / "export"
+        paths = (path for path in sorted(folder.rglob("*")) if path.is_file())
+        return [path.relative_to(self.folder).as_posix() for path in paths][:EXPORTED]
+
+    def clear(self, name: str) -> None:
+        """Remove a folder of results that this program wrote."""
+        folder = self.folder / RESULTS / plain_name(name)
+        if not (folder / "cfs-results.json").is_file() or folder.is_symlink():
+            raise DataError("is no folder of results of this project", file=name)
+        shutil.rmtree(folder)
+
+    def record(self, line: Mapping[str, Any]) -> None:
+        """Append a line to the journal of commands."""
+        with (self.folder / JOURNAL).open("a", encoding="utf-8") as file:
+            file.write(json_text(line, ensure_ascii=False) + "\n")
+
+    def journal(self) -> list[dict[str, Any]]:
+        """The commands that were run, the latest last; lines that are none are left out."""
+        path = self.folder / JOURNAL
+        lines = []
+        for text in path.read_text("utf-8").splitlines() if path.is_file() else ():
+            with suppress(ValueError):
+                line = json.loads(text)
+                if isinstance(line, dict) and isinstance(line.get("command"), list):
+                    lines.append(line)
+        return lines
+
+
+PAGES = {  # of a folder of results, by what they are called
+    "report": "report.html", "dossier": "dossier.html", "explorer": "explore/index.html",
+    "table": "results.csv", "check": "check.html", "problems": "problems.csv",
+}  # fmt: skip
+SYSTEM_KEYS = ("name", "bsdf", "operation", "u_value", "g_value", "see_through")
+CHANGES = {
+    "title": Project._change_title,
+    "spaces": Project._change_spaces,
+    "furniture": Project._change_furniture,
+    "systems": Project._change_systems,
+    "quick": Project._change_quick,
+    "loads": Project._change_loads,
+    "uses": Project._change_uses,
+    "corrections": Project._change_corrections,
+}
+
+
+def free_name(name: str, entries: Sequence[Mapping[str, Any]]) -> str:
+    """The name, with a number where an entry has it already."""
+    names, result, number = {one.get("name") for one in entries}, name, 2
+    while result in names:
+        result, number = f"{name} {number}", number + 1
+    return result
+
+
+def _text(value: Any, field: str) -> str:
+    if not isinstance(value, str) or not value.strip() or len(value) > 200:
+        raise DataError("expected a text of at most 200 letters", field=field)
+    return value.strip()
+
+
+def _list(value: Any, field: str) -> list[Any]:
+    if not isinstance(value, list) or len(value) > 2000:
+        raise DataError("expected a list", field=field)
+    return value
+
+
+def _number(value: Any, field: str) -> float | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > 1e5:
+        raise DataError("expected a number", field=field)
+    return float(value)

@@ -1,0 +1,486 @@
+"""The server of the page: this machine only, with a token, and for pages of its own alone.
+
+Three rules guard it. A request's Host must be the loopback address with this port, so that no name
+of another's leads here. The page and its data need a cookie, which the address with the token sets;
+a request that changes something needs the page's own Origin besides. Result files are served under
+a path with a secret of its own, sandboxed: a script in them has no access to the page.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import json
+import mimetypes
+import os
+import secrets
+import shutil
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from mitsuba_cfs.errors import CfsError
+from mitsuba_cfs.files import json_text
+from scenes.app import actions
+from scenes.app.jobs import Jobs
+from scenes.app.page import PAGE_FILES, page_html
+from scenes.app.project import (
+    GAINS,
+    INPUTS,
+    LOADS,
+    RESULTS,
+    MadeSystem,
+    Project,
+    plain_name,
+    slug,
+)
+from scenes.app.variants import answers, variants
+from scenes.fenestration.library import Sheet, glazing_entry, library, shade_entry, sheets
+from scenes.language.catalogue import gettext, in_language
+from scenes.user_errors import user_message
+
+LOOPBACK = "127.0.0.1"
+SELF_ONLY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data:; connect-src 'self'; frame-src 'self'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'"
+)
+SANDBOXED = (
+    "sandbox allow-scripts allow-popups allow-downloads allow-modals; frame-ancestors 'self'"
+)
+JSON = "application/json"
+POLL_S = 20.0  # a request for news is answered at the latest after that
+STEP_S = 0.1  # between two looks for news
+BODY = 1 << 20  # most bytes of a request that is no upload
+
+
+@dataclass(frozen=True, slots=True)
+class UploadLimits:
+    """What may be uploaded."""
+
+    file_bytes: int = 1 << 30  # of one file
+    total_bytes: int = 4 << 30  # of all inputs
+    files: int = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Secrets:
+    """What a request shows to be let in."""
+
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(24))  # of the page
+    files: str = field(default_factory=lambda: secrets.token_urlsafe(24))  # of the result files
+
+
+class Guard:
+    """Lets only requests of this machine's own page through."""
+
+    def __init__(self, app: ASGIApp, port: int, known: Secrets) -> None:
+        """Guard an application at a port."""
+        self._app, self._known = app, known
+        self._hosts = {f"{name}:{port}" for name in (LOOPBACK, "localhost")}
+        self._origins = {f"http://{host}" for host in self._hosts}
+        self.cookie = f"cfs_app_{port}"  # cookies are shared by all ports of a host
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer, or refuse."""
+        if scope["type"] != "http":
+            if scope["type"] == "lifespan":
+                await self._app(scope, receive, send)
+            return
+        request = Request(scope, receive)
+        fault = self._fault(request)
+        if fault is not None:
+            await Response(fault, 403, media_type="text/plain")(scope, receive, send)
+            return
+        if request.url.path == "/" and "token" in request.query_params:
+            answer = RedirectResponse("/", 303, {"Referrer-Policy": "no-referrer"})
+            answer.set_cookie(self.cookie, self._known.token, httponly=True, samesite="strict")
+            await answer(scope, receive, send)
+            return
+        await self._app(scope, receive, send)
+
+    def _fault(self, request: Request) -> str | None:
+        """Why a request is refused; None where it is not."""
+        host, origin = request.headers.get("host", ""), request.headers.get("origin")
+        if host not in self._hosts:
+            return "This page is served to this machine only."
+        path = request.url.path
+        if path.startswith("/files/"):
+            known = _same(path.split("/")[2], self._known.files)
+            return None if known and request.method in ("GET", "HEAD") else "Wrong address."
+        if request.method not in ("GET", "HEAD") and origin not in self._origins:
+            return "Only the page itself may change something."
+        if path == "/" and "token" in request.query_params:
+            known = _same(request.query_params["token"], self._known.token)
+        elif request.headers.get("sec-fetch-site", "none") not in ("none", "same-origin"):
+            return "Another page asked."
+        else:
+            known = _same(request.cookies.get(self.cookie, ""), self._known.token)
+        return None if known else "Open the address that `cfs app` printed: it holds the token."
+
+
+def _same(one: str, other: str) -> bool:
+    return hmac.compare_digest(one.encode(), other.encode())
+
+
+Answer = Callable[[Request], Awaitable[Response]]
+
+
+class AppServer:
+    """The page, its data and its commands for one project."""
+
+    def __init__(
+        self,
+        project: Project,
+        jobs: Jobs,
+        *,
+        language: str = "en",
+        limits: UploadLimits | None = None,
+    ) -> None:
+        """Serve a project."""
+        self._project, self._jobs, self._language = project, jobs, language
+        self._limits = limits or UploadLimits()
+        self._known = Secrets()
+        self._rules: list[dict[str, str | bool]] | None = None
+        self._taking = 0  # bytes of uploads under way
+        self._made: dict[str, list[MadeSystem]] = {}  # systems that wait for a file, by its name
+        jobs.on_done = self._use_made
+
+    @property
+    def token(self) -> str:
+        """What the address of the page holds."""
+        return self._known.token
+
+    def app(self, port: int) -> Guard:
+        """The guarded application at a port."""
+        routes = [
+            Route("/", self._page),
+            Route("/app/{name}", self._script),
+            Route("/files/{secret}/{path:path}", self._file),
+            Route("/api/state", self._answered(self._state)),
+            Route("/api/jobs", self._answered(self._news)),
+            Route("/api/check", self._answered(self._check)),
+            Route("/api/rules", self._answered(self._rule_sets)),
+            Route("/api/variants", self._answered(self._variants)),
+            Route("/api/library", self._answered(self._library)),
+            Route("/api/library", self._answered(self._from_library), methods=["POST"]),
+            Route("/api/demo", self._answered(self._demo), methods=["POST"]),
+            Route("/api/again", self._answered(self._again), methods=["POST"]),
+            Route("/api/upload", self._answered(self._upload), methods=["POST"]),
+            Route("/api/change", self._answered(self._change), methods=["POST"]),
+            Route("/api/remove", self._answered(self._remove), methods=["POST"]),
+            Route("/api/plan", self._answered(self._plan), methods=["POST"]),
+            Route("/api/run", self._answered(self._run), methods=["POST"]),
+            Route("/api/stop", self._answered(self._stop), methods=["POST"]),
+        ]
+
+        @asynccontextmanager
+        async def lifespan(_: Starlette) -> Any:
+            yield
+            self._jobs.close()
+
+        return Guard(Starlette(routes=routes, lifespan=lifespan), port, self._known)
+
+    # ---- pages and files
+
+    async def _page(self, _: Request) -> Response:
+        text = page_html(self._project.folder.name, self._language, f"/files/{self._known.files}/")
+        return HTMLResponse(text, headers=_headers(SELF_ONLY))
+
+    async def _script(self, request: Request) -> Response:
+        text = PAGE_FILES.get(request.path_params["name"])
+        if text is None:
+            return Response("Not found.", 404)
+        kind = mimetypes.guess_type(request.path_params["name"])[0] or "text/plain"
+        return Response(text, media_type=kind, headers=_headers(SELF_ONLY))
+
+    async def _file(self, request: Request) -> Response:
+        """A file of results, or a log; nothing else of the machine."""
+        path = self._project.folder / request.path_params["path"]
+        place = Path(os.path.realpath(path))
+        inside = (Path(os.path.realpath(self._project.folder / one)) for one in (RESULTS, "log"))
+        if not any(place.is_relative_to(one) for one in inside) or not place.is_file():
+            return Response("Not found.", 404, headers=_headers(SANDBOXED))
+        return FileResponse(place, headers=_headers(SANDBOXED))
+
+    def _answered(self, answer: Callable[[Request], Awaitable[Any]]) -> Answer:
+        """A handler that gives JSON, and a user's mistake in one line."""
+
+        async def handler(request: Request) -> Response:
+            try:
+                with in_language(self._language):
+                    value = await answer(request)
+            except ClientDisconnect:
+                return Response(status_code=499)
+            except (CfsError, ValueError, OSError) as error:
+                message = user_message(error)
+                if message is None:
+                    raise
+                return _json({"error": message}, 422)
+            return _json(value)
+
+        return handler
+
+    # ---- data
+
+    async def _state(self, _: Request) -> Any:
+        return await asyncio.to_thread(self._facts)
+
+    def _facts(self) -> dict[str, Any]:
+        study, operation = self._project.study(), self._project.operation()
+        entry: Mapping[str, Any] = next(
+            (one for one in study.get("room", []) if "building" in one), {}
+        )
+        gains = operation.get("gains", {})
+        systems = study.get("system", [])
+        results = self._project.results()
+        for result in results:
+            result["title"] = _result_title(result["name"], systems)
+            pages = [result["pages"].get(name) for name in ("report", "dossier")]
+            result["answers"] = [
+                text for page in pages if page for text in answers(self._project.folder / page)
+            ]
+        return {
+            "name": self._project.folder.name,
+            "folder": str(self._project.folder),
+            "title": study.get("title", ""),
+            "files": [asdict(file) for file in self._project.files()],
+            "building": self._project.building(),
+            "spaces": entry.get("spaces", []),
+            "furniture": entry.get("furniture", False),
+            "weather": [one.get("weather") for one in study.get("climate", [])],
+            "surroundings": study.get("surroundings", []),
+            "systems": systems,
+            "sheets": self._sheets(systems),
+            "quick": study.get("quick", False),
+            "loads": {key: operation.get("loads", {}).get(key) for key in LOADS}
+            | {key: gains.get(key) for key in GAINS},
+            "uses": self._project.uses(),
+            "corrections": self._project.corrections(),
+            "others": sum("building" not in one for one in study.get("room", [])),
+            "results": results,
+            "exported": self._project.exported(),
+            "journal": self._project.journal()[-50:],
+        }
+
+    async def _news(self, request: Request) -> Any:
+        """The commands, once they differ from what the page has."""
+        known = request.query_params.get("version", "")
+        for _ in range(round(POLL_S / STEP_S)):
+            if str(self._jobs.version) != known or await request.is_disconnected():
+                break
+            await asyncio.sleep(STEP_S)
+        return {"version": self._jobs.version, "jobs": self._jobs.facts()}
+
+    async def _check(self, _: Request) -> Any:
+        path = self._project.folder / actions.CHECK
+        if not path.is_file():
+            return None
+        return await asyncio.to_thread(lambda: json.loads(path.read_text("utf-8")))
+
+    async def _rule_sets(self, _: Request) -> Any:
+        if self._rules is None:
+            self._rules = list(await asyncio.to_thread(actions.rule_sets))
+        return self._rules
+
+    async def _variants(self, _: Request) -> Any:
+        return await asyncio.to_thread(variants, self._project, self._language)
+
+    async def _library(self, _: Request) -> Any:
+        return await asyncio.to_thread(_library_facts)
+
+    def _sheets(self, systems: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+        """Figures of the systems that are of the library, by their files."""
+        known = {
+            actions.library_file(one.glazing, one.shade): _sheet_facts(one)
+            for one in sheets().values()
+        }
+        found = {}
+        for system in systems:
+            file = system.get("bsdf") or system.get("operation", "")
+            states = self._project.states(file) if "bsdf" not in system and file else [file]
+            if states and states[-1] in known:
+                found[file] = known[states[-1]]
+        return found
+
+    # ---- changes
+
+    async def _from_library(self, request: Request) -> Any:
+        """Make a system of the library and take it as a variant once it is there."""
+        wanted = await _body(request)
+        glazing, shade = str(wanted.get("glazing", "")), str(wanted.get("shade", ""))
+        titles = [glazing_entry(glazing).title]
+        titles = [shade_entry(shade).title, *titles] if shade else titles
+        moving = bool(shade) and wanted.get("moving") is True
+        files = [actions.library_file(glazing, shade)]
+        files = [actions.library_file(glazing, ""), *files] if moving else files
+        missing = [one for one in files if not (self._project.folder / one).is_file()]
+        made = MadeSystem(titles[0] + (", moving" if moving else ""), tuple(files))
+        if not missing:
+            await asyncio.to_thread(self._project.use_made, made)
+            self._jobs.touch()
+            return None
+        self._made.setdefault(missing[-1], []).append(made)
+        makes = (actions.library(glazing, one) for one in dict.fromkeys(("", shade)))
+        self._jobs.add([one for one in makes if one.out in missing])
+        return None
+
+    def _use_made(self, action: actions.Action) -> None:
+        for made in self._made.pop(action.out, ()):
+            self._project.use_made(made)
+
+    async def _demo(self, _: Request) -> Any:
+        """Copy the demo's office and weather into the project."""
+        from scenes.demo import OFFICE, WEATHER
+
+        for source in (OFFICE, WEATHER):
+            part = self._project.folder / INPUTS / f".upload-{secrets.token_hex(8)}"
+            await asyncio.to_thread(shutil.copyfile, source, part)
+            await asyncio.to_thread(self._project.take, part, Path(source).name)
+        self._jobs.add([actions.check(self._project)])
+        return self._facts()
+
+    async def _again(self, request: Request) -> Any:
+        number = (await _body(request)).get("number")
+        self._jobs.again(number if isinstance(number, int) else 0)
+        return None
+
+    async def _upload(self, request: Request) -> Any:
+        name = plain_name(request.query_params.get("name", ""))
+        if not name:
+            raise UploadError("the file has no name")
+        files = await asyncio.to_thread(self._project.files)
+        if len(files) >= self._limits.files:
+            raise UploadError(f"a project has at most {self._limits.files} input files")
+        room = self._limits.total_bytes - sum(file.size for file in files) - self._taking
+        most = min(self._limits.file_bytes, room)
+        stated = request.headers.get("content-length", "")
+        if stated.isdigit() and int(stated) > most:
+            raise UploadError(f"{name}: {_too_large(most)}")
+        part = self._project.folder / INPUTS / f".upload-{secrets.token_hex(8)}"
+        size = 0
+        try:
+            with part.open("wb") as file:
+                async for chunk in request.stream():
+                    size += len(chunk)
+                    self._taking += len(chunk)
+                    if size > most:
+                        raise UploadError(f"{name}: {_too_large(most)}")
+                    await asyncio.to_thread(file.write, chunk)
+            taken = await asyncio.to_thread(self._project.take, part, name)
+        finally:
+            self._taking -= size
+            part.unlink(missing_ok=True)
+        if taken.kind in ("building", "surroundings", "beside") and self._project.building():
+            self._jobs.add([actions.check(self._project)])
+        return asdict(taken)
+
+    async def _change(self, request: Request) -> Any:
+        wanted = await _body(request)
+        await asyncio.to_thread(self._project.change, wanted)
+        if "corrections" in wanted:
+            self._jobs.add([actions.check(self._project)])
+        return self._facts()
+
+    async def _remove(self, request: Request) -> Any:
+        wanted = await _body(request)
+        if "results" in wanted:
+            await asyncio.to_thread(self._project.clear, str(wanted["results"]))
+        else:
+            before = self._project.building()
+            await asyncio.to_thread(self._project.remove, str(wanted.get("file", "")))
+            if self._project.building() not in ([], before):
+                self._jobs.add([actions.check(self._project)])
+        return self._facts()
+
+    async def _plan(self, request: Request) -> Any:
+        return [
+            {"command": one.text, "kind": one.kind} for one in self._wanted(await _body(request))
+        ]
+
+    async def _run(self, request: Request) -> Any:
+        wanted = await _body(request)
+        return [job.number for job in self._jobs.add(self._wanted(wanted))]
+
+    def _wanted(self, wanted: Mapping[str, Any]) -> list[actions.Action]:
+        if wanted.get("check"):
+            return [actions.check(self._project)]
+        if "export" in wanted:
+            return [actions.export(self._project, str(wanted["export"]))]
+        return actions.computations(self._project, wanted)
+
+    async def _stop(self, request: Request) -> Any:
+        number = (await _body(request)).get("number")
+        self._jobs.stop(number if isinstance(number, int) else 0)
+        return None
+
+
+def _result_title(folder: str, systems: Sequence[Mapping[str, Any]]) -> str:
+    """The system that a folder of results is of, as the page names it."""
+    kind, _, rest = folder.partition("-")
+    names = {slug(one["name"]): one["name"] for one in systems}
+    return str(names.get(rest, rest.replace("-", " "))) if kind in ("report", "rules") else ""
+
+
+def _sheet_facts(sheet: Sheet) -> dict[str, Any]:
+    source = shade_entry(sheet.shade).source if sheet.shade else glazing_entry(sheet.glazing).source
+    return asdict(sheet) | {"source": gettext(source)}
+
+
+def _library_facts() -> dict[str, Any]:
+    """Glazings, shades and the figures of each pair."""
+    known = library()
+    return {
+        "glazings": [_entry_facts(one.name, one.title, one.source) for one in known.glazing],
+        "shades": [_entry_facts(one.name, one.title, one.source) for one in known.shade],
+        "sheets": [asdict(one) for one in sheets().values()],
+    }
+
+
+def _entry_facts(name: str, title: str, source: str) -> dict[str, str]:
+    return {"name": name, "title": gettext(title), "source": gettext(source)}
+
+
+class UploadError(CfsError, ValueError):
+    """An upload that is refused."""
+
+
+def _too_large(most: int) -> str:
+    return f"is larger than the {max(most, 0) / 1e6:.0f} MB that are left or allowed"
+
+
+async def _body(request: Request) -> dict[str, Any]:
+    """The JSON object of a request."""
+    if request.headers.get("content-type", "").partition(";")[0] != JSON:
+        raise UploadError("expected a JSON object")
+    text = b""
+    async for chunk in request.stream():
+        text += chunk
+        if len(text) > BODY:
+            raise UploadError("the request is too long")
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError):
+        value = None
+    if not isinstance(value, dict):
+        raise UploadError("expected a JSON object")
+    return value
+
+
+def _json(value: Any, status: int = 200) -> Response:
+    return Response(json_text(value), status, headers=_headers(SELF_ONLY), media_type=JSON)
+
+
+def _headers(policy: str) -> dict[str, str]:
+    return {
+        "Content-Security-Policy": policy, "X-Content-Type-Options": "nosniff",
+        "Referrer-Policy": "no-referrer", "Cache-Control": "no-store",
+    }  # fmt: skip

@@ -1,0 +1,96 @@
+"""Commands of `cfs app`: each in a process that may be stopped or die; the journal keeps them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from scenes.app import actions
+from scenes.app.jobs import Jobs
+from scenes.app.project import Project
+from scenes.demo import OFFICE
+
+WAIT_S = 240.0
+
+
+@pytest.fixture
+def project(tmp_path) -> Project:
+    one = Project(tmp_path / "project")
+    part = one.folder / "inputs" / ".upload"
+    shutil.copyfile(OFFICE, part)
+    one.take(part, Path(OFFICE).name)
+    return one
+
+
+@pytest.fixture
+def jobs(project):
+    one = Jobs(project)
+    yield one
+    one.close()
+
+
+def until(happened) -> None:
+    end = time.monotonic() + WAIT_S
+    while not happened():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_a_command_reports_its_progress_and_leaves_its_results(project, jobs) -> None:
+    seen: list[str] = []
+    jobs.on_done = lambda action: seen.append(action.out)
+    check = actions.check(project)
+    jobs.add([replace(check, command=(*check.command, "--no-cache"))])  # a stored one has no stages
+    until(lambda: not jobs.busy)
+    (job,) = jobs.facts()
+    assert job["state"] == "done" and job["code"] == 0, job["lines"]
+    assert job["progress"]["fraction"] == 1.0 and job["progress"]["stage"]
+    assert "Model: usable" in job["lines"] and not any('"stage"' in line for line in job["lines"])
+    assert (project.folder / "results" / "check.json").is_file() and seen == [job["out"]]
+    (line,) = project.journal()
+    assert line["command"][:2] == ["cfs", "check"] and line["state"] == "done"
+    (log,) = (project.folder / "log").iterdir()
+    assert log.read_text("utf-8").startswith("$ cfs check inputs/office.ifc")
+
+
+def test_stop_and_resume(project, jobs) -> None:
+    blind = actions.library("double clear", "venetian 25 mm inside, 45 deg")  # traced for seconds
+    jobs.add([blind, actions.check(project)])
+    until(lambda: jobs.facts()[0]["progress"])
+    jobs.stop(2)
+    jobs.stop(1)
+    until(lambda: not jobs.busy)
+    assert [job["state"] for job in jobs.facts()] == ["stopped", "stopped"]
+    assert jobs.facts()[0]["code"] == 130 and not (project.folder / blind.out).exists()
+    jobs.again(2)
+    until(lambda: not jobs.busy)
+    assert [job["state"] for job in jobs.facts()] == ["stopped", "stopped", "done"]
+    assert [line["state"] for line in project.journal()] == ["stopped", "done"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="SIGKILL is of Linux")
+def test_a_command_that_dies_takes_nothing_with_it(project, jobs) -> None:
+    check = actions.check(project)
+    jobs.add([check])
+    until(lambda: jobs._process is not None)
+    os.kill(jobs._process.pid, signal.SIGKILL)
+    until(lambda: not jobs.busy)
+    assert jobs.facts()[0]["state"] == "failed"
+    jobs.add([check])
+    until(lambda: not jobs.busy)
+    assert jobs.facts()[1]["state"] == "done"
+
+
+def test_the_same_command_waits_once(project, jobs) -> None:
+    check = actions.check(project)
+    jobs.add([check])
+    until(lambda: jobs.facts()[0]["state"] == "running")
+    jobs.add([check])
+    jobs.add([check])
+    assert len(jobs.facts()) == 2

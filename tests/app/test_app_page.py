@@ -1,0 +1,228 @@
+"""The page of `cfs app` in headless Chromium: from files to results by mouse and by keyboard."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import pytest
+
+from scenes.demo import OFFICE, WEATHER
+from scenes.fenestration.library import write_library_system
+from tests.app.served import serving
+from tests.devtools import Page, chromium
+from tests.report.test_accessibility import AXE, FAULTS, GRAVE
+
+pytestmark = [
+    pytest.mark.early,
+    pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
+]
+STEPS = ("files", "building", "systems", "compute", "results")
+DONE_S = 900.0  # for the slow test's commands
+
+
+def choose(page: Page, selector: str, *files: Path) -> None:
+    """Choose files as a file dialog does."""
+    root = page.send("DOM.getDocument")["root"]["nodeId"]
+    node = page.send("DOM.querySelector", nodeId=root, selector=selector)["nodeId"]
+    page.send("DOM.setFileInputFiles", nodeId=node, files=[str(file) for file in files])
+
+
+def go(page: Page, step: str) -> None:
+    page.click(f'nav [href="#{step}"]')
+    page.until(f"!document.getElementById('{step}').hidden")
+
+
+def select(page: Page, name: str, value: str) -> None:
+    page.value(
+        f"(() => {{ const e = document.getElementById({json.dumps(name)});"
+        f"e.value = {json.dumps(value)}; e.dispatchEvent(new Event('change')); }})()"
+    )
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory):
+    with serving(tmp_path_factory.mktemp("app") / "My project") as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def browser(served, tmp_path_factory):
+    with Page(tmp_path_factory.mktemp("browser")) as page:
+        page.open(served.address)
+        yield page
+        assert page.faults == []
+        hosts = {address.split("/")[2] for address in page.requests if "//" in address}
+        assert hosts <= {f"127.0.0.1:{served.port}"}
+
+
+def test_dropped_files_are_a_project(browser, served) -> None:
+    browser.send("DOM.enable")
+    choose(browser, "#drop", OFFICE, WEATHER)
+    browser.until("document.querySelectorAll('#file-rows tr').length === 2")
+    served.idle()
+    browser.until("document.querySelector('nav [href=\"#building\"] .mark.done') !== null")
+    study = served.project.study()
+    assert study["room"][0]["building"] == "inputs/office.ifc"
+    assert study["climate"][0]["weather"].endswith(".epw")
+    assert "token" not in browser.value("location.href")
+
+
+def test_the_building_is_seen_and_a_room_is_chosen_in_the_view(browser, served) -> None:
+    go(browser, "building")
+    browser.until("document.getElementById('viewer')?.dataset.painted === 'yes'")
+    picture = "document.getElementById('viewer').toDataURL()"
+    before = browser.value(picture)
+    browser.click("#viewer", 0.45, 0.6)
+    browser.until("document.querySelector('#room h3') !== null")
+    name = browser.value("document.querySelector('#room h3').textContent")
+    assert name in ("A South office", "B East office")
+    browser.until(f"{picture} !== {json.dumps(before)}")
+    assert (
+        browser.value("document.querySelector('#room-rows tr.selected').innerText").find(name) > 0
+    )
+
+
+def test_a_room_is_left_out_and_its_use_stated_by_click(browser, served) -> None:
+    go(browser, "building")
+    browser.click("#room-rows tr:nth-child(2) input")
+    browser.until("document.getElementById('room-count').textContent.startsWith('1 room')")
+    guid = browser.value("document.querySelector('#room-rows input').dataset.key").split()[1]
+    assert served.project.study()["room"][0]["spaces"] == [guid]
+    browser.click("#room-rows tr:nth-child(1) button")
+    browser.until("document.querySelector('#room select') !== null")
+    browser.value(
+        "(() => { const e = document.querySelector('#room select'); e.value = 'meeting';"
+        "e.dispatchEvent(new Event('change')); })()"
+    )
+    browser.until("document.querySelector('#room-rows tr').innerText.includes('meeting')")
+    assert served.project.uses() == {guid: "meeting"}
+
+
+def test_a_system_of_the_library_is_a_variant_with_its_sheet(browser, served) -> None:
+    go(browser, "systems")
+    select(browser, "glazing", "double low-e")
+    select(browser, "shade", "screen 5 %, grey")
+    assert "0.12" in browser.value("document.getElementById('library-sheet').innerText")
+    browser.click("#moving")
+    browser.click("#add-system")
+    browser.until("document.querySelectorAll('#chosen .card').length === 1")
+    served.idle()
+    (system,) = served.project.study()["system"]
+    states = served.project.states(system["operation"])
+    assert [Path(one).name for one in states] == [
+        "double-low-e.xml", "double-low-e-screen-5-grey.xml",
+    ]  # fmt: skip
+    assert browser.value("document.querySelector('#chosen .sheet') !== null")
+
+
+def test_the_commands_are_shown_before_they_run(browser, served) -> None:
+    go(browser, "compute")
+    browser.click("#compute input[data-key='rule en17037']")
+    browser.until("document.querySelectorAll('#plan code').length === 2")
+    run, comply = browser.value(
+        "[...document.querySelectorAll('#plan code')].map((e) => e.textContent)"
+    )
+    assert run.startswith("cfs run inputs/office.ifc --weather ") and "--operation" in run
+    assert "--quick" in run and "--out results/report-" in run
+    assert comply.startswith("cfs comply ") and "--standard en17037" in comply
+    select(browser, "conditioned", "heated")
+    browser.until("document.getElementById('heating_c').value === '20'")
+    assert served.project.operation()["loads"] == {"heating_c": 20.0, "cooling_c": 26.0}
+
+
+def test_a_fault_is_said_and_the_page_goes_on(browser, served) -> None:
+    go(browser, "files")
+    bad = served.project.folder.parent / "house.ifc"
+    bad.write_text("no IFC")
+    choose(browser, "#drop", bad)
+    browser.until("document.querySelector('#notices .notice') !== null")
+    assert "house.ifc" in browser.value("document.getElementById('notices').innerText")
+    browser.click("#notices button")
+    browser.until("document.querySelector('#notices .notice') === null")
+    browser.faults[:] = [one for one in browser.faults if "422" not in one]
+
+
+def test_the_steps_are_walked_by_keyboard(browser) -> None:
+    go(browser, "files")
+    browser.value("document.querySelector('nav a').focus()")
+    for step in STEPS[1:]:
+        browser.press("Tab")
+        browser.press("Enter")
+        browser.until(f"!document.getElementById('{step}').hidden")
+        assert browser.value("document.activeElement.closest('section')?.id") == step
+        browser.value(f"document.querySelector('nav [href=\"#{step}\"]').focus()")
+
+
+@pytest.mark.parametrize("width", [1440, 390])
+def test_nothing_is_wider_than_the_window(browser, width) -> None:
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    browser.send("Emulation.setDeviceMetricsOverride", **size)
+    for step in STEPS:
+        browser.value(f"location.hash = '#{step}'")
+        browser.until(f"!document.getElementById('{step}').hidden")
+        assert browser.value("document.documentElement.scrollWidth") <= width, step
+
+
+@pytest.mark.skipif(not AXE.is_file(), reason="no axe-core")
+@pytest.mark.parametrize("flags", [(), ("--force-dark-mode",)], ids=["light", "dark"])
+def test_no_step_has_a_serious_fault(served, tmp_path, flags) -> None:
+    with Page(tmp_path, *flags) as page:
+        page.open(served.address)
+        page.send("Page.setBypassCSP", enabled=True)
+        found = {}
+        page.value(AXE.read_text(encoding="utf-8") + "; 0")
+        for step in STEPS:
+            page.value(f"location.hash = '#{step}'")
+            page.until(f"!document.getElementById('{step}').hidden")
+            found[step] = [fault for fault in page.value(FAULTS) if fault[0] in GRAVE]
+    assert not {step: some for step, some in found.items() if some}
+
+
+def test_the_page_is_german_where_it_is_asked_to_be(tmp_path) -> None:
+    with serving(tmp_path / "projekt", language="de") as served, Page(tmp_path) as page:
+        page.open(served.address)
+        assert page.value("document.documentElement.lang") == "de"
+        text = page.value("document.body.innerText")
+        assert "Dateien" in text and "Choose" not in text and "Next" not in text
+
+
+@pytest.mark.slow
+def test_from_drop_to_dossier_without_a_shell(tmp_path) -> None:
+    """Files, a variant, a report and a dossier, and both pages opened by their links."""
+    with serving(tmp_path / "project") as served, Page(tmp_path) as page:
+        page.send("DOM.enable")
+        page.open(served.address)
+        choose(page, "#drop", OFFICE, WEATHER)
+        page.until("document.querySelector('nav [href=\"#building\"] .mark.done') !== null")
+        go(page, "compute")
+        page.click("#compute input[data-key='rule en17037']")
+        page.until("document.querySelectorAll('#plan code').length === 2")
+        page.click("#start")
+        end = time.monotonic() + DONE_S
+        while served.jobs.facts()[-1]["state"] not in ("done", "failed"):
+            assert time.monotonic() < end
+            time.sleep(0.5)
+        assert [job["state"] for job in served.jobs.facts()] == ["done"] * 3, served.jobs.facts()
+        go(page, "results")
+        page.until("document.querySelectorAll('#folders a').length >= 2")
+        links = page.value("[...document.querySelectorAll('#folders a')].map((e) => e.href)")
+        for name in ("report.html", "dossier.html"):
+            (link,) = [one for one in links if one.endswith(name)]
+            page.open(link, ready="document.readyState === 'complete'")
+            assert page.value("document.querySelector('#verdict, h1') !== null")
+        page.faults[:] = [one for one in page.faults if "sandboxed" not in one]
+        assert page.faults == []
+
+
+def test_a_variant_is_made_once(tmp_path) -> None:
+    """A system of the library that is there already is taken as it is."""
+    with serving(tmp_path / "project") as served:
+        write_library_system(
+            "double clear", "", served.project.folder / "inputs" / "double-clear.xml"
+        )
+        assert served.page("POST", "/api/library", {"glazing": "double clear"})[0] == 200
+        assert not served.jobs.facts()
+        assert served.project.study()["system"][0]["bsdf"] == "inputs/double-clear.xml"
+        assert served.page("POST", "/api/library", {"glazing": "none"})[0] == 422
