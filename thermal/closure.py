@@ -41,14 +41,14 @@ ERRORS: dict[str, dict[str, tuple[float, float]]] = {
         "linear": (0.61, 0.85), "layers": (0.17, 0.21),
     },
     "external": {
-        "typical": (0.17, 0.25), "typical" + BY_DIRECTION: (0.27, 0.39),
-        "gap": (0.16, 0.23), "constant": (0.17, 0.27),
-        "linear": (0.35, 0.52), "layers": (0.17, 0.28),
+        "typical": (0.23, 0.32), "typical" + BY_DIRECTION: (0.34, 0.48),
+        "gap": (0.22, 0.30), "constant": (0.18, 0.28),
+        "linear": (0.35, 0.52), "layers": (0.12, 0.18),
     },
     "internal": {
-        "typical": (0.40, 0.38), "typical" + BY_DIRECTION: (0.54, 0.52),
-        "gap": (0.37, 0.37), "constant": (0.49, 0.34),
-        "linear": (0.55, 1.03), "layers": (0.40, 0.40),
+        "typical": (0.18, 0.17), "typical" + BY_DIRECTION: (0.39, 0.39),
+        "gap": (0.19, 0.16), "constant": (0.37, 0.35),
+        "linear": (0.55, 1.03), "layers": (0.20, 0.25),
     },
 }  # fmt: skip
 

@@ -54,6 +54,7 @@ EXAMPLES = {
         "cfs ifc attach house.ifc --facade S --bsdf blind.xml --u 1.1 --g 0.25 -o out.ifc",
         "cfs ifc attach house.ifc --all --bsdf closed.xml --state closed -o out.ifc",
     ),
+    "ifc control": ("cfs ifc control house.ifc shading.toml -o controlled.ifc",),
     "ifc correct": ("cfs ifc correct house.ifc -o corrected.ifc",),
     "ifc query": ("cfs ifc query house.ifc 'IfcWindow, location=\"Level 2\"'",),
     "ifc survey": ("cfs ifc survey models/*.ifc --markdown survey.md",),
