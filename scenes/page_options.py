@@ -20,8 +20,8 @@ from scenes.toml_file import TomlTable, read_table, validated
 # Optional sections of a page, by their names in a file; those of a room apply to each room.
 # Assumptions and notes are always shown: figures without them mislead.
 RunSection = Literal[
-    "verdict", "orientation", "rooms", "daylight", "glare", "operation", "temperatures", "glazing",
-    "model", "problems", "method", "inputs", "glossary",
+    "verdict", "orientation", "rooms", "daylight", "glare", "spectral", "operation",
+    "temperatures", "glazing", "model", "problems", "method", "inputs", "glossary",
 ]  # fmt: skip
 StudySection = Literal["verdict", "comparison", "model", "problems", "method", "inputs", "glossary"]
 DossierSection = Literal["rooms", "problems", "sources"]

@@ -104,6 +104,28 @@ class GlareResults:
         return max(picture.glare["dgp"] for picture in self.pictures)
 
 
+MELANOPIC_BY_DAY = 250.0  # [lx] melanopic EDI at the eye: Brown et al. 2022, CIE PS 001:2024
+
+
+@dataclass(frozen=True, slots=True)
+class SpectralYear:
+    """Daylight of a year by wavelength: alpha-opic quantities of CIE S 026 and colour.
+
+    The eye is that of the glare view; its other directions are turned anticlockwise by the degrees
+    in their names.
+    """
+
+    edges_nm: tuple[float, ...]  # [C + 1] of the bands
+    # [H] index time: melanopic_edi_lx, melanopic_der, photopic_lx, *_irradiance_mw_m2, cct_k, duv,
+    # melanopic_edi_90_lx, ...; NaN in the dark where a ratio is not defined
+    eye: pd.DataFrame
+    melanopic: NDArray[np.float32]  # [H, S] melanopic EDI of the work plane's sensors [lx]
+    sensor_metrics: pd.DataFrame  # by sensor: melanopic_edi_mean_lx, melanopic_der, ...
+    spectrum: NDArray[np.float32]  # [H, C] irradiance of the eye in each band [W/m2]
+    summary: dict[str, float]  # of the year, by name
+    notes: tuple[str, ...] = ()  # assumptions
+
+
 @dataclass(frozen=True, slots=True)
 class ThermalResult:
     """Temperatures of a year and adaptive comfort."""
@@ -227,6 +249,7 @@ class RoomYear:
     seconds: dict[str, float]  # by stage
     operation: OperationResult | None = None  # None: first shading state all year, floating freely
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
+    spectral: SpectralYear | None = None  # of `spectral`
     dgp: AnnualGlare | None = None  # [n] by the metric and in the hours of `rate`
     dgp_sunny_hour_error: float = 0.0  # of three-phase `dgp`
     as_lobe: dict[str, float] = field(default_factory=dict)  # of `scenes.room.lobes`
@@ -249,7 +272,21 @@ class RoomYear:
             tables.append(self.operation.hours)
         if self.annual_glare is not None:
             tables.append(self.annual_glare)
+        if self.spectral is not None:
+            tables.append(self.spectral.eye)
         return pd.concat(tables, axis=1).rename_axis("time")
+
+    @property
+    def melanopic(self) -> pd.DataFrame:
+        """Melanopic EDI [lx], DER and colour of the light at the eye in every hour [H].
+
+        Raises: `ValueError` for a year that was not computed by wavelength.
+        """
+        if self.spectral is None:
+            raise ValueError(
+                "the year was not computed by wavelength: simulate(..., spectral=True)"
+            )
+        return self.spectral.eye
 
     def __repr__(self) -> str:
         operative = self.heat.operative_c

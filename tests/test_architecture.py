@@ -36,7 +36,7 @@ SOLVERS = tuple(
     for name in (
         "coefficients", "colour_view", "glare", "light", "optics", "phase_light",
         "phase_matrices", "phase_pictures", "point_in_time", "reflected_sun", "standard_error",
-        "sun_by_patches", "view_cache", "window_reflection",
+        "spectral_light", "sun_by_patches", "view_cache", "window_reflection",
     )
 )  # fmt: skip
 IFC = ("bim/ifc/", "scenes/demo/")

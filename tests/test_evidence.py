@@ -30,6 +30,7 @@ NO_EVIDENCE = {
         "| in the folder of results | what |", "| option | what |",
         "| rule | quantity | set-up | weather that it asks for |",
     },
+    "spectral.md": {"| file | content |", "| part | spectrum |"},
     "studies.md": {"| in the folder | what |", "| event | what is done |"},
     "pv.md": {"| key | meaning |"},
 }  # fmt: skip

@@ -22,7 +22,7 @@ RANKS = {
         {"directions", "errors", "interpreter", "llvm", "notes", "phases", "processes",
          "progress", "source_code"},
         {"gloss"},
-        {"compiled", "files", "surfaces", "variants"},
+        {"compiled", "files", "spectra", "surfaces", "variants"},
         {"bsdf", "images", "sky", "stored_arrays", "window_parts"},
         {"glare", "matrices", "metrics"},
         {"picture_year", "trace"},

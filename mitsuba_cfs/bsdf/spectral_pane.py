@@ -371,6 +371,19 @@ def spectral_glazing(
     return result
 
 
+def spectral_transmittance(
+    panes: Sequence[SpectralPane], wavelength_nm: ArrayLike, theta: ArrayLike
+) -> FloatArray:
+    """Transmittance [A, N] of panes in series by angle of incidence [A] [rad] and wavelength [N].
+
+    Source: as of `spectral_glazing`.
+    """
+    angles = np.atleast_1d(np.asarray(theta, dtype=float))
+    nm, whole = _whole(panes, angles)
+    wanted = np.asarray(wavelength_nm, dtype=float)
+    return np.stack([np.interp(wanted, nm, tau) for tau in whole.tau.T])
+
+
 @dataclass(frozen=True, slots=True)
 class SpectralRating:
     """UV transmittance and colour rendering of a glazing by EN 410."""

@@ -99,18 +99,26 @@ def _by_sun(matrices: PhaseMatrices, group: GroupCoefficients, g: int) -> Array:
 
     V_d T D_d + (V - V_d) T_b D_d + B_d - V_d diag(tau) D_d
     """
-    view, direct_view = sensor_matrix(matrices), direct_sensor_matrix(matrices)
     daylight = direct_daylight(matrices)
-    lost, beams = group.optics.transmission, beam_matrix(group.optics)
-    if group.straight is not None:
-        lost = lost - np.diag(group.beam)
-    coefficients = np.zeros((len(direct_view), daylight.shape[-1]))
+    coefficients = np.zeros((len(direct_sensor_matrix(matrices)), daylight.shape[-1]))
     for q in matrices.parts.of(g):
-        whole, direct = view.values[:, q], direct_view[:, q]
-        coefficients += (direct @ lost + (whole - direct) @ beams) @ daylight[q]
+        coefficients += sun_shares(matrices, group, q) @ daylight[q]
     if group.straight is None or group.straight.direct is None:
         return coefficients
     return coefficients + group.straight.direct
+
+
+def sun_shares(matrices: PhaseMatrices, group: GroupCoefficients, q: int) -> Array:
+    """Light of the sensors per unit luminance of D_d before a part, replaced by the sun [S, K].
+
+    V_d T + (V - V_d) T_b - V_d diag(tau)
+    """
+    whole, direct = sensor_matrix(matrices).values[:, q], direct_sensor_matrix(matrices)[:, q]
+    lost, beams = group.optics.transmission, beam_matrix(group.optics)
+    if group.straight is not None:
+        lost = lost - np.diag(group.beam)
+    shares: Array = direct @ lost + (whole - direct) @ beams
+    return shares
 
 
 def without_straight(matrices: PhaseMatrices, group: GroupCoefficients, q: int) -> Array:

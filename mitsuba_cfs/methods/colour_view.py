@@ -21,19 +21,15 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+from mitsuba_cfs.spectra.daylight import sky_temperature, sun_spectra
+from mitsuba_cfs.spectra.detectors import detected
 from mitsuba_cfs.trace.paths.scene import Sky
 from mitsuba_cfs.trace.pictures.point_in_time import colour_picture
 
 FEWER = 8  # paths of the luminance for one of a band: colour varies less than light
-OVERCAST_K = 6514.0  # correlated colour temperature of an overcast sky
-LEAST_K, MOST_K = 4000.0, 25000.0  # that CIE's daylight is defined for
-NANOMETRES = np.arange(380.0, 781.0, 5.0)
-# Of the standard spectra of ASTM G173-03
-WATER_CM, OZONE_CM, AEROSOL_500NM, PRESSURE_PA = 1.42, 0.34, 0.084, 101325.0
 NEUTRAL = 0.02  # greatest share by which a band of what is called grey differs from its luminance
 SMOOTHING_STEPS = (1, 2, 4, 8)  # pixels between the places that are averaged
 ALIKE = 0.1  # of the logarithm of luminances that belong together
-LOWEST_SUN = 0.05  # sine of the altitude below which its colour stays as there (87 degrees zenith)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,13 +64,6 @@ def daylight_colour(sky: AnnualSky, hour: int) -> DaylightColour:
     return DaylightColour(sun / white, patches / white)
 
 
-def sky_temperature(luminance: ArrayLike, clear: float) -> NDArray[np.float64]:
-    """Correlated colour temperature of sky of a luminance [cd/m2] [K]; clear: 0 overcast to 1."""
-    mired = -132.1 + 59.77 * np.log10(np.maximum(np.asarray(luminance, dtype=float), 1.0))
-    mixed = clear * np.clip(mired, 1e6 / MOST_K, 1e6 / LEAST_K) + (1 - clear) * 1e6 / OVERCAST_K
-    return 1e6 / mixed
-
-
 def daylight_rgb(temperature: ArrayLike) -> NDArray[np.float64]:
     """Linear sRGB over luminance [..., 3] of CIE daylight of a colour temperature [K]."""
     from colour.temperature import CCT_to_xy_CIE_D  # a second, which only colour takes
@@ -85,20 +74,7 @@ def daylight_rgb(temperature: ArrayLike) -> NDArray[np.float64]:
 
 def sun_colour(height: float) -> NDArray[np.float64]:
     """Linear sRGB over luminance [3] of the sun's beam, by the sine of its altitude."""
-    import colour
-    import pvlib
-
-    zenith = float(np.degrees(np.arccos(np.clip(height, LOWEST_SUN, 1.0))))
-    spectrum = pvlib.spectrum.spectrl2(
-        apparent_zenith=zenith, aoi=zenith, surface_tilt=0.0, ground_albedo=0.2,
-        surface_pressure=PRESSURE_PA, precipitable_water=WATER_CM, ozone=OZONE_CM,
-        relative_airmass=pvlib.atmosphere.get_relative_airmass(zenith),
-        aerosol_turbidity_500nm=AEROSOL_500NM, dayofyear=1,
-    )  # fmt: skip
-    beam = np.interp(NANOMETRES, spectrum["wavelength"], np.ravel(spectrum["dni"]))
-    shape = colour.SpectralShape(NANOMETRES[0], NANOMETRES[-1], 5)
-    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape)
-    x, y, z = beam @ observer.values
+    x, y, z = detected(sun_spectra(height))[0, -3:]
     return _rgb(x / y, z / y)
 
 

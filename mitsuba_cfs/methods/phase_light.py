@@ -106,6 +106,7 @@ class SensorLight:
     added: Array | None = None  # [S, L] the reflected sun in place of `coefficients.by_sun` [lx]
     sun: Array | None = None  # [S, L] C_ds s_sun [lx]; None with the three-phase method
     sun_noise: tuple[SunNoise, ...] = ()  # of these two
+    beam_in_room: Array | None = None  # [S, L] of `added` that the sun's own beam lights [lx]
 
 
 @dataclass(frozen=True)
@@ -444,7 +445,7 @@ def _sunlit_room(
 
 def _reflected_to_sensors(
     light: PhaseLight, coefficients: Sequence[Sequence[GroupCoefficients]]
-) -> dict[tuple[int, int], tuple[Array, Estimate]]:
+) -> dict[tuple[int, int], tuple[Array, Array, Estimate]]:
     """The reflected sun at the sensors through each group that looks outdoors, in each state."""
     if light.reflected is None:
         return {}
@@ -465,7 +466,7 @@ def _sensor_light(
     light: PhaseLight,
     one: GroupCoefficients,
     g: int,
-    reflected: tuple[Array, Estimate] | None,
+    reflected: tuple[Array, Array, Estimate] | None,
     direct: tuple[Estimate | None, NDArray[np.int64]],
 ) -> SensorLight:
     """The light of the sensors through a group in a state, with the five-phase method.
@@ -474,19 +475,19 @@ def _sensor_light(
         reflected: of `_reflected_to_sensors`.
         direct: C_ds [G, S, h], and the hours h that it is of.
     """
-    added = None
+    added = in_room = None
     noise: list[SunNoise] = []
     if light.reflected is None:
-        added = _beam_in_room(light, one, g) if _passes_beam(one) else None
+        added = in_room = _beam_in_room(light, one, g) if _passes_beam(one) else None
     elif reflected is not None:
-        (added, traced), shining = reflected, light.reflected.shining
+        (added, in_room, traced), shining = reflected, light.reflected.shining
         noise.append(SunNoise(traced, np.ones(len(shining)), shining))
     sun, (matrix, hours) = np.zeros((len(one.whole), len(light.sky.lit))), direct
     if matrix is not None:
         luminance, of_group = light.sky.illuminance[hours] / SUN_SOLID_ANGLE, matrix.part(np.s_[g])
         sun[:, hours] = of_group.values * luminance
         noise.append(SunNoise(of_group, luminance, hours))
-    return SensorLight(one, added, sun, tuple(noise))
+    return SensorLight(one, added, sun, tuple(noise), in_room)
 
 
 def _beam_in_room(light: PhaseLight, one: GroupCoefficients, g: int) -> Array:

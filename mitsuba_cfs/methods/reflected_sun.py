@@ -128,12 +128,13 @@ def reflected_to_sensors(
     sun: ReflectedSun,
     room: SunlitRoom | None,
     groups: Sequence[tuple[int, GroupCoefficients]],
-) -> list[tuple[NDArray[np.float64], Estimate]]:
+) -> list[tuple[NDArray[np.float64], NDArray[np.float64], Estimate]]:
     """Illuminance to add to that of the sensors through groups in a state each [S, L] [lx].
 
     Args: room: None where no beam of the sun passes any group.
 
-    Returns: of each group what is added, and what was traced of it, in the hours h with sun [S, h].
+    Returns: of each group what is added, the part of it that is the sun's beam in the room, and
+        what was traced of it, in the hours h with sun [S, h].
     """
     seen = iter(_outdoors_seen(matrices, sun, groups))
     return [
@@ -165,7 +166,7 @@ def _to_sensors(
     group: GroupCoefficients,
     g: int,
     seen: Sequence[NDArray[np.float32]],
-) -> tuple[NDArray[np.float64], Estimate]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64], Estimate]:
     """`reflected_to_sensors` of one group; seen: of `_outdoors_seen`, none without a beam."""
     parts, in_room = matrices.parts.of(g), []
     rest = [without_straight(matrices, group, q) for q in parts]
@@ -188,7 +189,11 @@ def _to_sensors(
 
     traced = accumulate(light_of, stopping=Stopping(BATCHES))
     by_patches = _by_patches(matrices, sun, group, rest, g)
-    return np.asarray(_all_hours(sun, traced.values) - by_patches, dtype=float), traced
+    in_hours = np.zeros(traced.values.shape)
+    for values in in_room:
+        in_hours += values / BATCHES
+    added = np.asarray(_all_hours(sun, traced.values) - by_patches, dtype=float)
+    return added, _all_hours(sun, in_hours), traced
 
 
 def replaced_luminance(sun: ReflectedSun, weights: NDArray[Any], on_patches: NDArray[Any]) -> Array:
@@ -220,6 +225,24 @@ def replaced_before(sun: ReflectedSun, shares: Array | None, hours: NDArray[np.i
         light = shares.astype(np.float32) @ light
     values[:, number[hours] >= 0] = light
     return values - times_sky(by_patches, sun.sky.sun_alone(hours))
+
+
+def replaced_through(
+    sun: ReflectedSun, parts: NDArray[np.int64], shares: Sequence[Array]
+) -> NDArray[np.float64]:
+    """Light of sensors from outdoors by shadow rays less by patches, in all hours [S, L].
+
+    Without what they see straight through the window.
+
+    Args: shares: of the luminance outside each of some window parts [S, K].
+    """
+    if not sun.before:
+        return np.zeros((len(shares[0]), len(sun.sky.illuminance)))
+    Q, K = sun.by_patches.shape[:2]
+    mean = sun.mean.reshape(Q, K, -1)[parts].reshape(len(parts) * K, -1)
+    whole = np.concatenate(shares, axis=1).astype(np.float32) @ mean
+    coefficients = sum(one @ sun.by_patches[q] for one, q in zip(shares, parts, strict=True))
+    return _all_hours(sun, whole.astype(float)) - times_sky(coefficients, sun.sky.lit_sun)
 
 
 def _by_patches(

@@ -108,7 +108,8 @@ def command(
     # a file or a program that reads on gets every line whole, however long
     console = Console(width=None if Console().is_terminal else UNCUT)
     head = head_of(read, light_only=True).with_assumptions(known.notes("a run needs --cfs"))
-    for line in (*head.model, *(f"assumed: {text}" for text in head.assumed)):
+    lines = (*head.model, *(f"assumed: {text}" for text in head.assumed))
+    for line in lines:
         console.print(line, markup=False, highlight=False)
     console.print(_rooms(read.name, spaces))
     if read.issues:
@@ -144,7 +145,7 @@ def command(
 
         uses = uses_of_rooms(read, read.spaces, read_uses(), options.linked)
         facts = {guid: (use.key, str(use.source), use.assumed) for guid, use in uses.items()}
-        data = check_record(read, head.lines, facts)
+        data = check_record(read, lines, facts)
         write_text(record, json_text(data, ensure_ascii=False) + "\n")
         console.print(f"data: {record}", markup=False, highlight=False)
     if issues is not None:

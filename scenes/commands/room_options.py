@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from mitsuba_cfs.sky.options import GROUNDS, SUBDIVISIONS, SUN_MODELS
+from mitsuba_cfs.spectra.channels import CHANNEL_SETS
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
 from scenes.room.options import GLARE_SOURCES, GLARE_SUN, SensorGrid
@@ -283,6 +284,20 @@ annual_glare_option = click.option(
     "--annual-glare", is_flag=True, help="Compute DGP for every daylight hour."
 )
 
+spectral_option = click.option(
+    "--spectral",
+    is_flag=True,
+    help="Compute melanopic illuminance and colour of the light; see docs/spectral.md.",
+)
+channels_option = click.option(
+    "--channels",
+    type=click.Choice(list(map(str, CHANNEL_SETS))),
+    default="20",
+    show_default=True,
+    callback=lambda _context, _parameter, value: int(value),
+    help="Bands of wavelength for --spectral.",
+)
+
 
 def _keep_language(context: click.Context, _: click.Parameter, value: str | None) -> None:
     context.meta[LANGUAGE] = value
@@ -413,8 +428,8 @@ def light_options(command: Callable) -> Callable:
 def room_options(command: Callable) -> Callable:
     """The options that `cfs run` and `cfs comply` share beside the inputs."""
     return _all_of(
-        out_folder_option, annual_glare_option, subdivide_option, light_options, set_option,
-        no_cache_option, quick_option, page_option,
+        out_folder_option, annual_glare_option, spectral_option, channels_option,
+        subdivide_option, light_options, set_option, no_cache_option, quick_option, page_option,
     )(command)  # fmt: skip
 
 

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 LOADS = ("heating", "cooling", "lighting")
 NEED_PHASES = {
     "annual_glare": "--annual-glare",
+    "spectral": "--spectral",
     "explore": "--explore",
     "inner_glass": "--inner-glass",
     "error": "--error",

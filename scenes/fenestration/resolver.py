@@ -131,6 +131,7 @@ def held_thermal(state: ShadingState) -> dict[str, Any]:
         "shading_position": state.shading_position or beside.shading_position,
         "angular": state.angular or beside.angular,
         "see_through": beside.see_through,
+        "spectrum": beside.spectrum,
     }
 
 

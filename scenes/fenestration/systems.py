@@ -21,6 +21,7 @@ from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.evaluate import klems_of
 from mitsuba_cfs.bsdf.glazing import Pane
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
 from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, spectral_glazing
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
@@ -55,6 +56,7 @@ class FenestrationSystem:
     source: str = ""  # where the system comes from, in words
     angular: AngularTable | None = None  # visible, of a specular system: exact at every angle
     panes: Panes = ()  # all its layers, where each is known by wavelength
+    spectrum: SpectralFactor | None = None  # of its panes and shade; None: not known
     from_values: bool = False  # modelled from U, g and transmittances, without a BSDF
     tilt_deg: float | None = None  # of its slats; None: not stated, or none
     between: NeighbourTilts | None = None  # that it is interpolated from
@@ -132,6 +134,7 @@ def read_system(
         shading_position=beside.shading_position,
         angular=beside.angular,
         panes=beside.panes,
+        spectrum=beside.spectrum,
         notes=file.notes,
         file=path,
         source=f"{by} {path.name}".strip(),
@@ -165,7 +168,15 @@ def system_of(
     *,
     path: Path,
     notes: Sequence[str] = (),
-    **more: float | str | Path | NDArray[np.float64] | Closure | AngularTable | Panes | None,
+    **more: float
+    | str
+    | Path
+    | NDArray[np.float64]
+    | Closure
+    | AngularTable
+    | Panes
+    | SpectralFactor
+    | None,
 ) -> FenestrationSystem:
     """The system of BSDF data by band, Klems full or tensor trees.
 
@@ -239,6 +250,7 @@ def system_of_panes(layers: Sequence[GlazingLayerTable]) -> FenestrationSystem:
     return FenestrationSystem(
         name, visible, solar, shading_position="none", notes=tuple(notes),
         angular=tables["Visible"], panes=panes,
+        spectrum=SpectralFactor.of_panes(panes) if panes else None,
     )  # fmt: skip
 
 

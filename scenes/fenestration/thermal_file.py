@@ -35,6 +35,7 @@ from pydantic import Field, model_validator
 from mitsuba_cfs.bsdf.angular import AngularTable, roos_table, stack_table
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
 from mitsuba_cfs.bsdf.spectral_pane import (
     SpectralPane,
     read_glazing_layers,
@@ -44,6 +45,7 @@ from mitsuba_cfs.bsdf.spectral_pane import (
 )
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
+from mitsuba_cfs.spectra.detectors import NANOMETRES
 from scenes import plausible
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 from thermal.closure import U_MODELS, Closure
@@ -63,10 +65,12 @@ from thermal.gvalue import TYPICAL_SYSTEMS
 
 ANGULAR_COLUMNS = ("theta_deg", "transmittance")
 ANGULAR_OPTIONAL = ("reflectance_front", "reflectance_back")
+SPECTRUM_COLUMNS = ("wavelength_nm", "transmittance")
 Film = Annotated[Positive, plausible.RESISTANCE]  # [m2 K/W]
 PATCHES = KLEMS_FULL.size
 ByPatch = Annotated[tuple[float, ...], Field(min_length=PATCHES, max_length=PATCHES)]
 Table = TypeVar("Table", bound="ClosureTable")
+WindowTable = TypeVar("WindowTable", bound="WindowHeatTable")
 # the model of U that a key belongs to
 OF_MODEL = {"gap": "gap", "surface": "surface", "layers": "layers", "u_slope": "linear"}
 SHADES = ("slats", "threads", "holes", "openness")  # what makes a layer a shade
@@ -154,14 +158,25 @@ class AngularData(TomlTable):
 
 def read_angular_table(path: Path) -> AngularTable:
     """A CSV file of `ANGULAR_COLUMNS`, and of `ANGULAR_OPTIONAL` those that are known."""
+    columns = _columns(path, ANGULAR_COLUMNS, ANGULAR_OPTIONAL)
+    try:
+        return AngularTable(np.radians(columns.pop("theta_deg")), **columns)
+    except ValueError as error:
+        raise DataError(str(error), file=path) from error
+
+
+def _columns(
+    path: Path, required: Sequence[str], optional: Sequence[str] = ()
+) -> dict[str, NDArray[np.float64]]:
+    """The columns of numbers of a CSV file; `DataError` where one is missing or no number."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             rows = list(csv.DictReader(line for line in stream if line.strip()))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DataError(f"cannot be read: {reason(error)}", file=path) from None
-    if not rows or not set(ANGULAR_COLUMNS) <= set(rows[0]):
-        raise DataError(f"expected the columns {', '.join(ANGULAR_COLUMNS)}", file=path)
-    names = [*ANGULAR_COLUMNS, *(name for name in ANGULAR_OPTIONAL if name in rows[0])]
+    if not rows or not set(required) <= set(rows[0]):
+        raise DataError(f"expected the columns {', '.join(required)}", file=path)
+    names = [*required, *(name for name in optional if name in rows[0])]
     values: dict[str, list[float]] = {name: [] for name in names}
     for number, row in enumerate(rows, start=2):
         for name in names:
@@ -170,11 +185,7 @@ def read_angular_table(path: Path) -> AngularTable:
             except (TypeError, ValueError):
                 message = f"{row[name]!r} is not a number"
                 raise DataError(message, file=path, element=f"line {number}", field=name) from None
-    columns = {name: np.array(column) for name, column in values.items()}
-    try:
-        return AngularTable(np.radians(columns.pop("theta_deg")), **columns)
-    except ValueError as error:
-        raise DataError(str(error), file=path) from error
+    return {name: np.array(column) for name, column in values.items()}
 
 
 Length = Annotated[Positive, plausible.LAYER]
@@ -383,8 +394,52 @@ class ClosureTable(TomlTable):
 PEAK_SHARES = {"specular": 1.0, "lobe": 0.0}  # that pass straight on
 
 
+class SpectralTable(TomlTable):
+    """Spectrum of a system whose BSDF has a visible band alone: of its panes and its shade."""
+
+    panes: tuple[Path, ...] = ()  # Optics or IGSDB files
+    shade: Path | None = None  # CSV file of `SPECTRUM_COLUMNS`
+
+    @model_validator(mode="after")
+    def _has_some(self) -> SpectralTable:
+        if not self.panes and self.shade is None:
+            raise ValueError("expected panes, shade or both")
+        return self
+
+    def placed(self, folder: Path) -> SpectralTable:
+        """The table with its files in a folder."""
+        shade = None if self.shade is None else folder / self.shade
+        panes = tuple(folder / pane for pane in self.panes)
+        return self.model_copy(update={"panes": panes, "shade": shade})
+
+    def factor(self) -> SpectralFactor:
+        """Transmittance by wavelength and angle; `DataError` for a file that cannot be read."""
+        # no transmittance depends on the thickness, which some files do not state
+        panes = [read_spectral_pane(pane, thickness=0.004) for pane in self.panes]
+        if self.shade is None:
+            return SpectralFactor.of_panes(panes)
+        nm, tau = read_spectrum(self.shade)
+        return SpectralFactor.of_panes(panes, np.interp(NANOMETRES, nm, tau))
+
+
+def read_spectrum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Wavelengths [N] [nm] and transmittance [N] of a CSV file of `SPECTRUM_COLUMNS`.
+
+    Raises: `DataError` for a file that cannot be read or does not span 380 to 780 nm.
+    """
+    (nm, tau) = _columns(path, SPECTRUM_COLUMNS).values()
+    if len(nm) < 2 or np.any(np.diff(nm) <= 0) or tau.min() < 0 or not tau.any():
+        message = "expected rising wavelengths and a transmittance that is not 0"
+        raise DataError(message, file=path)
+    if nm[0] > NANOMETRES[0] or nm[-1] < NANOMETRES[-1]:
+        raise DataError("expected wavelengths from 380 to 780 nm", file=path)
+    return nm, tau
+
+
 class WindowHeatTable(ClosureTable):
     """What else is known of a system: in a study, and beside a BSDF file."""
+
+    spectral: SpectralTable | None = None  # in place of the panes of `layers`
 
     u_value: Annotated[float, Field(ge=0.1, le=7)] | None = None  # [W/(m2 K)]
     g_value: Share | None = None  # at normal incidence
@@ -402,6 +457,20 @@ class WindowHeatTable(ClosureTable):
         if angles and (angles != sorted(set(angles)) or angles[0] < 0 or angles[-1] > 90):
             raise ValueError("g_value_by_angle: expected rising angles from 0 to 90 degrees")
         return self
+
+    def placed(self: WindowTable, folder: Path) -> WindowTable:
+        """The table with the files that it names in a folder."""
+        whole = super().placed(folder)
+        if self.spectral is None:
+            return whole
+        return whole.model_copy(update={"spectral": self.spectral.placed(folder)})
+
+    def spectrum(self) -> SpectralFactor | None:
+        """Spectrum that the table states, else that of the panes of its layers; None: not known."""
+        if self.spectral is not None:
+            return self.spectral.factor()
+        panes = [layer.spectral() for layer in self.layers if layer.pane is not None]
+        return SpectralFactor.of_panes(panes) if panes else None
 
     def g_by_patch(self) -> NDArray[np.float64] | None:
         """g [K] of the Klems full patches where it is stated by patch or by angle."""
@@ -459,8 +528,11 @@ def files_beside(bsdf: Path) -> tuple[Path, ...]:
     if not path.is_file():
         return ()
     table = validated(ThermalTable, read_table(path), path)
-    panes = (layer.pane for layer in table.layers if layer.pane is not None)
-    named = (*panes, *(() if table.angular is None else table.angular.files))
+    named = [layer.pane for layer in table.layers if layer.pane is not None]
+    named += () if table.angular is None else table.angular.files
+    if table.spectral is not None:
+        named += table.spectral.panes
+        named += () if table.spectral.shade is None else (table.spectral.shade,)
     there = (path.parent / file for file in named)
     return path, *(file for file in there if file.is_file())
 
@@ -479,6 +551,7 @@ class ThermalFile:
     shading_position: str | None = None
     angular: AngularTable | None = None  # visible, of a specular system
     panes: tuple[SpectralPane, ...] = ()  # all layers, where each is a file of spectra
+    spectrum: SpectralFactor | None = None  # None: not known
     see_through: float | None = None  # share of the transmission peak that passes straight on
 
     @classmethod
@@ -500,5 +573,6 @@ class ThermalFile:
             table.shading_position,
             None if table.angular is None else table.angular.read(path),
             spectral_panes(placed.layers),
+            placed.spectrum(),
             table.straight_share,
         )

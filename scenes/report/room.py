@@ -18,6 +18,7 @@ from scenes.language.numbers import percent, rounded, share
 from scenes.report import (
     daylight_figures,
     glare_figures,
+    spectral_figures,
     tables,
     thermal_figures,
 )
@@ -162,6 +163,7 @@ class RoomPage(RoomSection):
     glare: glare_figures.GlareGallery | None
     glare_table: tables.Table | None
     glare_year: Chart | None
+    spectral: spectral_figures.SpectralFigures | None
     temperature: Chart
     comfort: Chart | None
     duration: Chart
@@ -195,6 +197,7 @@ def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
         if room.glare.pictures
         else None,
         glare_year=glare_carpet(result, room),
+        spectral=spectral_figures.spectral_figures(result, room),
         temperature=thermal_figures.temperature_carpet(result, room),
         comfort=thermal_figures.comfort_carpet(result, room),
         duration=thermal_figures.duration_curve(room),

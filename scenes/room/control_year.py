@@ -128,9 +128,8 @@ class ControlYear:
     def sensors_lx(self, states: tuple[int, ...]) -> NDArray[np.float32]:
         """Illuminance of the work plane's sensors in the lit hours [S, L] [lx]."""
         if states not in self._sensors:
-            count = sum(len(grid.points) for grid in self.room.file_sensors.grids)
             values = illuminance(self.light.light, self._rows(states))
-            plane = values[: len(values) - count].astype(np.float32)
+            plane = values[: len(values) - self.room.other_sensors].astype(np.float32)
             self._sensors[states] = plane
         return self._sensors[states]
 

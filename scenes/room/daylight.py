@@ -78,7 +78,7 @@ def room_daylight(
         return table, of_room
 
     counts = [len(grid.points) for grid in room.file_sensors.grids]
-    plane = slice(0, len(points) - sum(counts))
+    plane = slice(0, len(points) - room.other_sensors)
     ends = np.cumsum([plane.stop, *counts])
     grids = []
     for grid, first, last in zip(room.file_sensors.grids, ends[:-1], ends[1:], strict=True):
@@ -111,10 +111,10 @@ def overcast_factor_error(light: PhaseLight | SeasonalLight) -> NDArray[np.float
     return relative * overcast_factor(light)
 
 
-def illuminance_table(result: DaylightResult, times: pd.DatetimeIndex) -> pd.DataFrame:
-    """Illuminance [H, S] with the sensors' numbers as columns."""
-    columns = [f"sensor_{i}" for i in range(len(result.points))]
-    return pd.DataFrame(result.illuminance, index=times, columns=columns).rename_axis("time")
+def sensor_table(values: NDArray[np.float32], times: pd.DatetimeIndex) -> pd.DataFrame:
+    """Values of sensors [H, S] with the sensors' numbers as columns."""
+    columns = [f"sensor_{i}" for i in range(values.shape[1])]
+    return pd.DataFrame(values, index=times, columns=columns).rename_axis("time")
 
 
 SENSOR_COLUMNS = {  # column of a run: column of the library

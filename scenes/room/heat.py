@@ -24,6 +24,7 @@ from scenes.results import (
     GlareResults,
     OperationResult,
     RoomYear,
+    SpectralYear,
     ThermalResult,
 )
 from scenes.room.operation_tables import ComfortTable, OperationTables
@@ -204,6 +205,7 @@ class DaylitRoom:
     zone: RoomZone
     seconds: dict[str, float]  # by stage
     annual_glare: pd.DataFrame | None = None
+    spectral: SpectralYear | None = None
     dgp: AnnualGlare | None = None
     dgp_sunny_hour_error: float = 0.0
     as_lobe: dict[str, float] = field(default_factory=dict)

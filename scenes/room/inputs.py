@@ -46,6 +46,7 @@ class FileSensors:
 
 
 NO_SENSORS = FileSensors()
+EYE_TURNS = (90, 180, 270)  # [degrees] anticlockwise, of the eye's other directions
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +69,16 @@ class RoomInputs:
     cache: MatrixCache | None
     together: frozenset[str] = frozenset()  # GUIDs of the rooms that are balanced with this one
     controller: Controller | None = None  # in place of the operation's rules of shading
+
+    @property
+    def turned_eyes(self) -> int:
+        """Sensors at the eye that look in `EYE_TURNS`, the last of the scene's."""
+        return len(EYE_TURNS) if self.options.outputs.spectral else 0
+
+    @property
+    def other_sensors(self) -> int:
+        """Sensors of the scene that are not of the work plane: the last ones."""
+        return sum(len(grid.points) for grid in self.file_sensors.grids) + self.turned_eyes
 
     @property
     def season(self) -> NDArray[np.int64]:

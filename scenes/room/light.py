@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from mitsuba_cfs.methods.point_in_time import PathLight
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, in_shares, part, silent
 from scenes.room.inner_glass import InnerGlass, inner_glass
-from scenes.room.inputs import NO_SENSORS, FileSensors, RoomInputs
+from scenes.room.inputs import EYE_TURNS, NO_SENSORS, FileSensors, RoomInputs
 from scenes.room.options import SensorGrid
 from scenes.room.windows import RoomWindows
 
@@ -106,7 +106,26 @@ def _scene(room: RoomInputs, building: Building) -> tuple[DaylightScene, InnerGl
         building, room.space, room.windows, room.grids, room.options.outputs.picture_size,
         inner=glass, file_sensors=room.file_sensors,
     )  # fmt: skip
-    return scene, glass
+    return with_turned_eyes(scene) if room.turned_eyes else scene, glass
+
+
+def with_turned_eyes(scene: DaylightScene) -> DaylightScene:
+    """The scene with sensors at its eye, after all others, that look in `EYE_TURNS`."""
+    position, direction = (
+        np.asarray(a, dtype=float) for a in (scene.eye.position, scene.eye.direction)
+    )
+    angle = np.radians(EYE_TURNS)
+    x, y, z = direction
+    turned = np.stack(
+        [
+            np.cos(angle) * x - np.sin(angle) * y,
+            np.sin(angle) * x + np.cos(angle) * y,
+            np.full_like(angle, z),
+        ],
+        axis=1,
+    )
+    points = np.concatenate([scene.points, np.tile(position, (len(angle), 1))])
+    return replace(scene, points=points, normals=np.concatenate([scene.normals, turned]))
 
 
 def _optics(room: RoomInputs, inner: InnerGlass | None) -> list[Sequence[SystemOptics]]:

@@ -424,6 +424,7 @@ def read_state(table: StateTable, path: Path | None, *, by: str = "") -> Fenestr
         closure=table.closure() or system.closure,
         g_by_patch=system.g_by_patch if by_patch is None else by_patch,
         shading_position=table.shading_position or system.shading_position,
+        spectrum=table.spectrum() or system.spectrum,
     )
 
 

@@ -14,6 +14,7 @@ from mitsuba_cfs.errors import check_number
 from mitsuba_cfs.methods import METHODS
 from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.sky.options import GROUNDS, SUN_MODELS
+from mitsuba_cfs.spectra.channels import CHANNEL_SETS
 
 GLARE_SOURCES = ("evalglare", "pixels")  # see `mitsuba_cfs.glare.evaluation.GROUPINGS`
 GLARE_SUN = ("source", "pixels")
@@ -46,6 +47,8 @@ class Outputs:
     picture_count: int = 10  # at most, without `picture_hours`
     picture_size: int = 600  # pixels of a side of the fisheye picture
     annual_glare: bool = False  # rate every lit hour, not only the pictures
+    spectral: bool = False  # alpha-opic quantities and colour of the light
+    channels: int = 20  # bands of wavelength for that, a key of CHANNEL_SETS
     glare_sources: str = "evalglare"  # one of GLARE_SOURCES
     glare_sun: str = "source"  # its disc: a source of its own, or part of its pixels
 
@@ -82,6 +85,8 @@ class RoomOptions:
         check_number("infiltration_ach", self.infiltration_ach, 0.0)
         if self.outputs.annual_glare and self.method == "point-in-time":
             raise ValueError("annual glare needs the three-phase or the five-phase method")
+        if self.outputs.spectral and self.method == "point-in-time":
+            raise ValueError("spectral needs the three-phase or the five-phase method")
 
     @property
     def sky(self) -> dict[str, str]:
@@ -138,6 +143,8 @@ NAMES = {
     "sun_points": ("sampling", "sun_points"),
     "window_parts": ("sampling", "window_parts"),
     "annual_glare": ("outputs", "annual_glare"),
+    "spectral": ("outputs", "spectral"),
+    "channels": ("outputs", "channels"),
     "glare_sources": ("outputs", "glare_sources"),
     "glare_sun": ("outputs", "glare_sun"),
     "sun_model": ("", "sun_model"),
@@ -168,6 +175,7 @@ CHOICES = {
     "sun_model": SUN_MODELS,
     "sky_ground": GROUNDS,
     "sky_light": SKY_LIGHTS,
+    "channels": tuple(CHANNEL_SETS),
 }
 
 

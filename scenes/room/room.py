@@ -68,6 +68,7 @@ from scenes.room.shading import (
     temperature_conditions,
 )
 from scenes.room.solar import SeasonalOutdoors, seasonal_outdoors
+from scenes.room.spectral import room_spectral
 from scenes.room.zone import (
     RoomAlternatives,
     RoomZone,
@@ -185,7 +186,7 @@ def lit_room(
         message = "the explorer knows one state of the trees: give them one transmittance"
         raise DataError(message, file=building.file, field="--explore")
     hours = wanted_hours(options.outputs.picture_hours, weather.midpoints, room.skies.lit)
-    outdoors = year = dgp = rated = explored = surfaces = choice = None
+    outdoors = year = dgp = rated = explored = surfaces = choice = spectral = None
     dgp_error = 0.0
     times = StageTimes()
 
@@ -230,6 +231,10 @@ def lit_room(
             explored = explored_room(
                 room, light, state, sensors=len(daylight.points), progress=progress
             )
+    if options.outputs.spectral:
+        with times.stage("spectral"):
+            sensors = len(daylight.points)
+            spectral = room_spectral(room, light, state, sensors, progress=progress)
     with times.stage("thermal"):
         surfaces = surfaces or zone_surfaces(room)
         if outdoors is None:
@@ -238,7 +243,7 @@ def lit_room(
         if choice is not None:
             zone = replace(zone, alternatives=choice.alternatives)
     return DaylitRoom(
-        space, daylight, glare, zone, times.seconds, year, dgp=dgp,
+        space, daylight, glare, zone, times.seconds, year, spectral=spectral, dgp=dgp,
         dgp_sunny_hour_error=dgp_error, as_lobe=as_lobe, issues=leaks, explored=explored,
         borrowed=borrowed_share(space, light.light, light.inner),
     )  # fmt: skip

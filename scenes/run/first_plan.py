@@ -70,7 +70,7 @@ def plan_options(options: RoomOptions) -> RoomOptions:
     """The options of a first plan."""
     fewer = {name: min(paths, getattr(options.sampling, name)) for name, paths in PATHS.items()}
     return options.changed(
-        method="three-phase", sky_subdivision=1, annual_glare=False,
+        method="three-phase", sky_subdivision=1, annual_glare=False, spectral=False,
         sensor_spacing=max(options.grid.spacing, SPACING), **fewer,
     )  # fmt: skip
 

@@ -9,7 +9,7 @@ Source: CF Metadata Conventions 1.11; units as UDUNITS knows them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import metadata
 from os import PathLike
 from pathlib import Path
@@ -126,13 +126,15 @@ def _hours(rooms: Iterable[RoomYear]) -> Variables:
     return result
 
 
-def _sensors(rooms: Iterable[RoomYear], names: Iterable[str]) -> Variables:
+def _sensors(rooms: Sequence[RoomYear], names: Iterable[str]) -> Variables:
     """Illuminance by time and sensor, and the sensors' metrics of the year."""
     tables, light, owners = [], [], []
     for room, name in zip(rooms, names, strict=True):
         daylight = room.daylight
         metrics = daylight.sensor_metrics.copy()
         metrics["relative_standard_error"] = daylight.relative_error
+        if room.spectral is not None:
+            metrics = metrics.join(room.spectral.sensor_metrics)
         tables.append(metrics)
         light.append(np.asarray(daylight.illuminance, dtype=np.float32))
         owners += [name] * len(metrics)
@@ -142,6 +144,10 @@ def _sensors(rooms: Iterable[RoomYear], names: Iterable[str]) -> Variables:
         "illuminance": (("time", "sensor"), np.concatenate(light, axis=1), lux),
         "sensor_room": (("sensor",), np.array(owners), {"long_name": "room of the sensor"}),
     }
+    melanopic = [room.spectral.melanopic for room in rooms if room.spectral is not None]
+    if melanopic:
+        edi = attributes("melanopic_edi_lx") | {"comment": "of the work plane's sensors"}
+        variables["melanopic_edi"] = (("time", "sensor"), np.concatenate(melanopic, axis=1), edi)
     for name in whole:
         own = name if name in PLACES else f"sensor_{name}"
         what = PLACES.get(name) or attributes(name)
@@ -197,7 +203,10 @@ def _years(rooms: Iterable[RoomYear]) -> Variables:
     tables: list[Mapping[str, float]] = []
     for room in rooms:
         loads = {} if room.operation is None else room.operation.summary
-        tables.append({**room.daylight.room_metrics, **room.heat.comfort_summary, **loads})
+        spectral = {} if room.spectral is None else room.spectral.summary
+        tables.append(
+            {**room.daylight.room_metrics, **room.heat.comfort_summary, **loads, **spectral}
+        )
     keys = dict.fromkeys(key for table in tables for key in table)
     return {
         f"room_{key}": (

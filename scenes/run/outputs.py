@@ -8,7 +8,7 @@ import shutil
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +29,8 @@ from scenes.language.catalogue import current_language, in_language
 from scenes.language.numbers import rounded, spoken
 from scenes.pictures import write_falsecolour, write_tone_mapped
 from scenes.result_folder import EXPLORER, ResultFolder
-from scenes.results import GridDaylight, RoomYear, RunResult
-from scenes.room.daylight import illuminance_table
+from scenes.results import GridDaylight, RoomYear, RunResult, SpectralYear
+from scenes.room.daylight import sensor_table
 from scenes.room.glare import glare_table
 from scenes.run.netcdf import NAME as NETCDF
 from scenes.run.netcdf import write_netcdf
@@ -148,7 +148,7 @@ class _Files:
 
 
 def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
-    table = illuminance_table(room.daylight, times)
+    table = sensor_table(room.daylight.illuminance, times)
     write_table(table, place / "illuminance.parquet")
     metrics = room.daylight.sensor_metrics.copy()
     metrics["relative_standard_error"] = room.daylight.relative_error
@@ -164,6 +164,13 @@ def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
         _write_shading(room, times, place)
     if room.annual_glare is not None:
         _csv(room.annual_glare, place / "annual_glare.csv")
+    if room.spectral is not None:
+        _csv(room.spectral.eye, place / "melanopic.csv")
+        sensors = metrics[list("xyz")].join(room.spectral.sensor_metrics)
+        _csv(sensors, place / "melanopic_sensors.csv")
+        _csv(pd.DataFrame([room.spectral.summary]), place / "melanopic_year.csv", index=False)
+        write_table(sensor_table(room.spectral.melanopic, times), place / "melanopic.parquet")
+        write_table(eye_spectrum(room.spectral, times), place / "eye_spectrum.parquet")
     _csv(pd.DataFrame([heat.comfort_summary]), place / "comfort.csv", index=False)
     for picture in room.glare.pictures:
         name = f"view_{times[picture.hour]:%m-%d_%Hh}"
@@ -175,6 +182,12 @@ def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
         write_hdr(place / f"{name}.hdr", colour.radiance, room.glare.view)
         title = spoken(times[colour.hour])
         write_tone_mapped(place / f"{name}.png", colour.radiance, scale=True, title=title)
+
+
+def eye_spectrum(spectral: SpectralYear, times: pd.DatetimeIndex) -> pd.DataFrame:
+    """Irradiance of the eye [W/m2] in each band in every hour; columns are named by the bands."""
+    names = [f"{a:g}-{b:g}_nm_w_m2" for a, b in pairwise(spectral.edges_nm)]
+    return pd.DataFrame(spectral.spectrum, index=times, columns=names).rename_axis("time")
 
 
 def _write_shading(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:

@@ -103,7 +103,7 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     groups = [one for (one,) in group_coefficients(matrices, [[one] for one in chosen])]
     sun = reflected_sun(matrices, sky)
     expected -= np.einsum("sgk,gkh->sh", view - direct_view, by_patch)
-    for added, _ in reflected_to_sensors(
+    for added, _, _ in reflected_to_sensors(
         matrices, sun, sunlit_room(matrices, sun), list(enumerate(groups))
     ):
         expected += added

@@ -120,7 +120,7 @@ function drawIssues() {
   const severity = SEVERITY();
   fill(byId("issues"), page.check.issues.map((issue) => h("li", {},
     h("span", { class: `chip ${issue.severity}` }, severity[issue.severity]),
-    h("div", {}, h("b", {}, issue.count > 1 ? `${issue.count} × ` : "", issue.what), h("p", {}, `${issue.effect}${issue.fix ? `; ${issue.fix}` : ""}`),
+    h("div", {}, h("b", {}, issue.what), h("p", {}, `${issue.effect}${issue.fix ? `; ${issue.fix}` : ""}`),
       h("p", { class: "soft" }, issue.where, issue.glass_m2 ? `, ${fixed(issue.glass_m2, 2)} m² ${gettext("of glass")}` : "")))));
   byId("no-issues").hidden = page.check.issues.length > 0;
 }

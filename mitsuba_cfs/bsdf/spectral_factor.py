@@ -1,0 +1,67 @@
+"""Transmittance of systems by wavelength and angle of incidence, relative to visible light."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, spectral_transmittance
+from mitsuba_cfs.spectra.channels import Channels
+from mitsuba_cfs.spectra.detectors import NANOMETRES, illuminant, sensitivities
+
+Array = NDArray[np.float64]
+ANGLES = np.radians(np.arange(0.0, 89.1, 1.0))  # up to grazing incidence, where nothing passes
+PATCH_ANGLES = 32  # angles of incidence in each patch, for its mean
+
+
+@dataclass(frozen=True)
+class SpectralFactor:
+    """Transmittance of a system by angle of incidence and wavelength, relative to visible light.
+
+    `ANGLES` are the angles of incidence A.
+    """
+
+    transmittance: Array  # [A, N] at `ANGLES` and `NANOMETRES`, of any scale
+
+    @staticmethod
+    def of_panes(panes: Sequence[SpectralPane], shade: ArrayLike = 1.0) -> SpectralFactor:
+        """That of panes in series; shade: of a shade besides [N], at all angles, of any scale."""
+        tau = spectral_transmittance(panes, NANOMETRES, ANGLES) if panes else np.ones((1, 1))
+        whole = tau * np.asarray(shade, dtype=float)
+        return SpectralFactor(np.broadcast_to(whole, (len(ANGLES), len(NANOMETRES))))
+
+    @staticmethod
+    def neutral() -> SpectralFactor:
+        """That of a system that transmits all wavelengths equally."""
+        return SpectralFactor.of_panes(())
+
+    @cached_property
+    def visible(self) -> Array:
+        """Transmittance [A] for D65 and V(lambda)."""
+        weight = illuminant("D65") * sensitivities()[0]
+        visible: Array = self.transmittance @ weight / weight.sum()
+        return visible
+
+    def at(self, channels: Channels, theta: ArrayLike) -> Array:
+        """r_c at angles of incidence [..] [rad]: [C, ..]."""
+        ratio = (channels.mean(self.transmittance) / self.visible[:, None]).T
+        angles = np.asarray(theta, dtype=float)
+        return np.stack([np.interp(angles, ANGLES, row) for row in ratio])
+
+    def of_patches(self, channels: Channels) -> Array:
+        """r_c of the patches of the full Klems basis [C, K], by their means of transmittance."""
+        places = (np.arange(PATCH_ANGLES) + 0.5) / PATCH_ANGLES
+        theta, _ = KLEMS_FULL.angles_within(np.arange(KLEMS_FULL.size)[:, None], places, 0.5)
+        theta = np.minimum(theta, ANGLES[-1])
+        visible = np.interp(theta, ANGLES, self.visible).mean(axis=1)
+        means = [
+            np.interp(theta, ANGLES, row).mean(axis=1)
+            for row in channels.mean(self.transmittance).T
+        ]
+        factors: Array = np.array(means) / visible
+        return factors

@@ -1,0 +1,166 @@
+"""Spectra of the sun and of the sky by hour.
+
+sky    CIE daylight (D-series) of a correlated colour temperature that follows the luminance of
+       each patch where the sky is clear and is 6514 K where it is overcast
+sun    Bird and Riordan's beam through the hour's air mass and water vapour
+ground neutral, under the whole daylight of the hour
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs.spectra.channels import Channels
+from mitsuba_cfs.spectra.detectors import NANOMETRES, detected
+
+FloatArray = NDArray[np.float64]
+OVERCAST_K = 6514.0  # correlated colour temperature of an overcast sky
+LEAST_K, MOST_K = 4000.0, 25000.0  # that CIE's daylight is defined for
+# Of the standard spectra of ASTM G173-03
+WATER_CM, OZONE_CM, AEROSOL_500NM, PRESSURE_PA = 1.42, 0.34, 0.084, 101325.0
+LOWEST_SUN = 0.05  # sine of the altitude below which its colour stays as there (87 degrees zenith)
+COMPONENTS = 3  # S_0, S_1, S_2 of CIE daylight
+
+
+def sky_temperature(luminance: ArrayLike, clear: ArrayLike) -> FloatArray:
+    """Correlated colour temperature of sky of a luminance [cd/m2] [K]; clear: 0 overcast to 1.
+
+    Between clear and overcast, reciprocal temperatures are mixed (our choice).
+
+    Source: Chain, Dumortier, Fontoynont 1999, Solar Energy 65, 285-295, as quoted by
+    frudawski.de/specsky.
+    """
+    mired = -132.1 + 59.77 * np.log10(np.maximum(np.asarray(luminance, dtype=float), 1.0))
+    clear = np.asarray(clear, dtype=float)
+    mixed = clear * np.clip(mired, 1e6 / MOST_K, 1e6 / LEAST_K) + (1 - clear) * 1e6 / OVERCAST_K
+    temperature: FloatArray = 1e6 / mixed
+    return temperature
+
+
+def daylight_shares(temperature: ArrayLike) -> FloatArray:
+    """Shares 1, M_1, M_2 [3, ..] of the components of CIE daylight of a temperature [K].
+
+    Source: CIE 015:2018, 4.1.2.
+    """
+    from colour.temperature import CCT_to_xy_CIE_D  # a second, which only colour takes
+
+    x, y = np.moveaxis(np.asarray(CCT_to_xy_CIE_D(np.asarray(temperature))), -1, 0)
+    m = 0.0241 + 0.2562 * x - 0.7341 * y
+    first = (-1.3515 - 1.7703 * x + 5.9114 * y) / m
+    second = (0.0300 - 31.4424 * x + 30.0717 * y) / m
+    return np.stack([np.ones_like(first), first, second])
+
+
+@cache
+def daylight_components() -> FloatArray:
+    """Spectra S_0, S_1, S_2 of CIE daylight [3, N]."""
+    from colour.colorimetry.datasets import illuminants
+
+    tables = illuminants.SDS_BASIS_FUNCTIONS_CIE_ILLUMINANT_D_SERIES
+    return np.stack([
+        np.interp(NANOMETRES, tables[name].wavelengths, tables[name].values)
+        for name in ("S0", "S1", "S2")
+    ])  # fmt: skip
+
+
+def sun_spectra(height: ArrayLike, water_cm: ArrayLike = WATER_CM) -> FloatArray:
+    """Relative spectra [L, N] of the sun's beam by the sine of its altitude [L].
+
+    Ozone, aerosol and pressure are those of ASTM G173.
+
+    Source: Bird and Riordan 1986 (`pvlib.spectrum.spectrl2`).
+    """
+    import pvlib
+
+    sine = np.atleast_1d(np.clip(np.asarray(height, dtype=float), LOWEST_SUN, 1.0))
+    zenith = np.degrees(np.arccos(sine))
+    water = np.broadcast_to(np.asarray(water_cm, dtype=float), zenith.shape)
+    spectrum = pvlib.spectrum.spectrl2(
+        apparent_zenith=zenith, aoi=zenith, surface_tilt=0.0, ground_albedo=0.2,
+        surface_pressure=PRESSURE_PA, precipitable_water=water, ozone=OZONE_CM,
+        relative_airmass=pvlib.atmosphere.get_relative_airmass(zenith),
+        aerosol_turbidity_500nm=AEROSOL_500NM, dayofyear=np.ones_like(zenith),
+    )  # fmt: skip
+    nm, beam = spectrum["wavelength"], np.reshape(spectrum["dni"], (-1, len(zenith)))
+    return np.stack([np.interp(NANOMETRES, nm, column) for column in beam.T])
+
+
+def water_vapour_cm(dry_bulb_c: ArrayLike, relative_humidity: ArrayLike) -> FloatArray:
+    """Precipitable water of the atmosphere [cm] by air at the ground; humidity 0 to 1.
+
+    Source: Gueymard 1994 (`pvlib.atmosphere.gueymard94_pw`).
+    """
+    import pvlib
+
+    percent = 100.0 * np.asarray(relative_humidity, dtype=float)
+    return np.asarray(pvlib.atmosphere.gueymard94_pw(np.asarray(dry_bulb_c, dtype=float), percent))
+
+
+@dataclass(frozen=True, slots=True)
+class SpectralSky:
+    """Spectra of the skies and suns of hours L.
+
+    The radiance of a patch is the sum over the components of CIE daylight of `amount` times the
+    component; the ground's is its luminance times `ground`.
+    """
+
+    amount: NDArray[np.float32]  # [3, P, L] of each component, the ground first and 0
+    horizontal: FloatArray  # [L, N] irradiance of a horizontal plane outdoors [W/(m2 nm)]
+    ground: FloatArray  # [L, N] the same per lumen
+    ground_luminance: FloatArray  # [L] [cd/m2]
+    sun: FloatArray  # [L, N] spectrum of the beam per lumen [W/(lm nm)]
+
+    def diffuse(self, channels: Channels, c: int) -> NDArray[np.float32]:
+        """Radiance [P, L] of sky and ground in a band [W/(m2 sr)]."""
+        parts = channels.power(daylight_components())[:, c].astype(np.float32)
+        radiance: NDArray[np.float32] = parts[0] * self.amount[0]
+        for part, amount in zip(parts[1:], self.amount[1:], strict=True):
+            radiance += part * amount
+        ground = channels.power(self.ground)[:, c] * self.ground_luminance
+        radiance[0] = ground
+        return radiance
+
+    def of_sun(self, channels: Channels) -> FloatArray:
+        """Power of the beam in each band per lumen [L, C] [W/lm]."""
+        return channels.power(self.sun)
+
+
+def spectral_sky(
+    luminance: NDArray[np.floating],
+    weights: FloatArray,
+    beam: FloatArray,
+    height: FloatArray,
+    water_cm: ArrayLike = WATER_CM,
+) -> SpectralSky:
+    """The spectra of sky, ground and sun of hours.
+
+    Args:
+        luminance: [P, L] of ground and sky without the sun, the ground first [cd/m2].
+        weights: [P] projected solid angles of the patches for a horizontal plane; the ground's 0.
+        beam: [L] normal illuminance of the sun [lx]; height: [L] sine of its altitude.
+    """
+    horizontal = beam * np.maximum(height, 0.0)
+    sky = np.asarray(weights, dtype=np.float32) @ luminance
+    share = horizontal / np.maximum(horizontal + sky, 1e-9)
+    per_lumen = detected(daylight_components())[:, 0].astype(np.float32)
+    # shares depend on one number: a table is much faster than the patches of all hours
+    steps = np.linspace(1e6 / MOST_K, 1e6 / LEAST_K, 4096)
+    table = daylight_shares(1e6 / steps).astype(np.float32)
+    table /= per_lumen @ table
+    mired = 1e6 / sky_temperature(luminance, share)
+    amount = np.empty((COMPONENTS, *luminance.shape), dtype=np.float32)
+    for own, values in zip(amount, table, strict=True):
+        own[:] = np.interp(mired, steps, values)
+        own *= luminance
+    amount[:, 0] = 0.0
+    sun = sun_spectra(height, water_cm)
+    sun /= detected(sun)[:, :1]
+    diffuse = np.einsum("kpl,p->lk", amount, weights) @ daylight_components()
+    whole = diffuse + horizontal[:, None] * sun
+    lumens = detected(whole)[:, :1]
+    ground = np.divide(whole, lumens, out=sun.copy(), where=lumens > 0)
+    return SpectralSky(amount, whole, ground, np.asarray(luminance[0], dtype=float), sun)

@@ -1,0 +1,206 @@
+"""Daylight of a room by wavelength: alpha-opic quantities of CIE S 026 and colour."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
+from mitsuba_cfs.methods.optics import SystemOptics
+from mitsuba_cfs.methods.spectral_light import channel_irradiance, sky_spectra
+from mitsuba_cfs.notes import Note
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.spectra.channels import Channels, channels_of
+from mitsuba_cfs.spectra.daylight import WATER_CM, water_vapour_cm
+from mitsuba_cfs.spectra.detectors import (
+    ALPHA_OPIC,
+    DETECTORS,
+    colour_rendering,
+    colour_temperature,
+    detected,
+    equivalent_daylight,
+)
+from scenes.results import MELANOPIC_BY_DAY, SpectralYear
+from scenes.room.inputs import EYE_TURNS, RoomInputs
+from scenes.room.light import RoomLight
+
+MELANOPIC = DETECTORS.index("melanopic")
+LEAST_LX = 1.0  # illuminance at the eye below which colour is not stated
+
+
+def room_spectral(
+    room: RoomInputs,
+    light: RoomLight,
+    state: NDArray[np.int64],
+    sensors: int,
+    *,
+    progress: Progress = silent,
+) -> SpectralYear:
+    """Alpha-opic quantities and colour of a year with the shading states of each hour [H, G].
+
+    Args: sensors: number of sensors of the work plane, the first of the scene's.
+    """
+    channels = channels_of(room.options.outputs.channels)
+    factors, notes = _factors(room, light)
+    eyes = 1 + len(EYE_TURNS)
+    hours = len(room.skies.lit)
+    # of the work plane photopic [lx] and melanopic [W/m2]; of the eyes in every band
+    plane = np.zeros((2, sensors, hours), dtype=np.float32)
+    bands = np.zeros((channels.count, eyes, hours), dtype=np.float32)
+    count = channels.count
+    water = _water(room.weather)[room.skies.lit]
+    rows = light.states(state)
+    irradiance = channel_irradiance(light.light, factors, channels, rows, water_cm=water)
+    for c, values in enumerate(irradiance):
+        plane += channels.detection[[0, MELANOPIC], c, None, None] * values[:sensors]
+        bands[c] = values[-eyes:]
+        progress("spectral", (c + 1) / count)
+    return spectral_year(room, channels, plane, bands, notes)
+
+
+def spectral_year(
+    room: RoomInputs,
+    channels: Channels,
+    plane: NDArray[np.float32],
+    bands: NDArray[np.float32],
+    notes: Sequence[str],
+) -> SpectralYear:
+    """The results of a year from its irradiances.
+
+    Args:
+        plane: photopic [lx] and melanopic [W/m2] of the work plane's sensors [2, S, L].
+        bands: of the eyes in each band [C, E, L] [W/m2], the view's own direction last.
+    """
+    skies, occupied = room.skies, room.occupied
+    received = np.einsum("dc,cel->edl", channels.detection, bands)  # [E, 9, L]
+    own = received[-1]
+    illuminance = skies.whole_year(own[0])
+    melanopic = skies.whole_year(equivalent_daylight(received[:, MELANOPIC]))  # [E, H]
+    temperature, distance = colour_temperature(np.where(own[0] >= LEAST_LX, own[-3:], 0.0).T)
+    table = pd.DataFrame({"melanopic_edi_lx": melanopic[-1]}, index=room.weather.midpoints)
+    table["melanopic_der"] = _ratio(melanopic[-1], illuminance)
+    table["photopic_lx"] = illuminance
+    for name in ALPHA_OPIC:
+        alpha = skies.whole_year(own[DETECTORS.index(name)])
+        table[f"{name}_irradiance_mw_m2"] = 1e3 * alpha
+    for column, values in (("cct_k", temperature), ("duv", distance)):
+        whole = np.full(skies.hours, np.nan)
+        whole[skies.lit] = values
+        table[column] = whole
+    for turn, values in zip(EYE_TURNS, melanopic, strict=False):
+        table[f"melanopic_edi_{turn}_lx"] = values
+    edi = skies.whole_year(equivalent_daylight(plane[1])).T.astype(np.float32)
+    return SpectralYear(
+        channels.edges_nm,
+        table.rename_axis("time"),
+        edi,
+        _sensors(plane, edi, occupied),
+        np.moveaxis(skies.whole_year(bands[:, -1]), 0, 1).astype(np.float32),
+        _summary(channels, table, bands[:, -1], skies, room.weather, occupied),
+        tuple(notes),
+    )
+
+
+def _sensors(
+    plane: NDArray[np.float32], edi: NDArray[np.float32], occupied: NDArray[np.bool_]
+) -> pd.DataFrame:
+    """Mean melanopic EDI [lx], DER and share of occupied hours at 250 lx or more, by sensor."""
+    photopic, melanopic = plane.sum(axis=2, dtype=float)
+    return pd.DataFrame(
+        {
+            "melanopic_edi_mean_lx": edi.mean(axis=0, dtype=float),
+            "melanopic_der": _ratio(equivalent_daylight(melanopic), photopic),
+            "melanopic_250_percent": _share(edi >= MELANOPIC_BY_DAY, occupied),
+        }
+    ).rename_axis("sensor")
+
+
+def _summary(
+    channels: Channels,
+    table: pd.DataFrame,
+    bands: NDArray[np.float32],
+    skies: AnnualSky,
+    weather: Weather,
+    occupied: NDArray[np.bool_],
+) -> dict[str, float]:
+    """Figures of the year at the eye; colour is that of the sum of its light."""
+    edi, lit = table["melanopic_edi_lx"].to_numpy(), table["photopic_lx"].to_numpy()
+    enough = edi >= MELANOPIC_BY_DAY
+    figures = {
+        "melanopic_250_percent": float(_share(enough[:, None], occupied)[0]),
+        "melanopic_250_h": float(np.count_nonzero(enough) * weather.step_h),
+        "melanopic_edi_median_lx": float(np.median(edi[occupied])) if occupied.any() else 0.0,
+        "melanopic_der": float(_ratio(edi.sum(), lit.sum())),
+    }
+    total = bands.sum(axis=1, dtype=float)
+    if total.any():
+        temperature, distance = colour_temperature(channels.detection[-3:] @ total)
+        index, fidelity = colour_rendering(channels.spectrum(total))
+        figures |= {
+            "cct_k": float(temperature), "duv": float(distance),
+            "colour_rendering_index": index, "colour_fidelity_index": fidelity,
+        }  # fmt: skip
+    outdoors = outdoor_light(skies, weather)
+    figures["outdoor_melanopic_der"] = float(
+        _ratio(equivalent_daylight(outdoors[MELANOPIC]), outdoors[0])
+    )
+    return figures
+
+
+def outdoor_light(skies: AnnualSky, weather: Weather) -> NDArray[np.float64]:
+    """What `DETECTORS` receive of the year's daylight on an open horizontal plane [9]."""
+    spectra = sky_spectra(skies, _water(weather)[skies.lit])
+    whole: NDArray[np.float64] = detected(spectra.horizontal).sum(axis=0)
+    return whole
+
+
+def _factors(room: RoomInputs, light: RoomLight) -> tuple[list[list[SpectralFactor]], list[str]]:
+    """The spectra of each window group's systems [G][J], and a note for each that is not known."""
+    notes: list[str] = []
+    known: dict[int, SpectralFactor] = {}
+    for states in room.windows.systems:
+        for system in states:
+            if id(system) in known:
+                continue
+            known[id(system)] = system.spectrum or SpectralFactor.neutral()
+            if system.spectrum is None:
+                notes.append(
+                    Note(
+                        "{system}: its spectrum is not known; it transmits all wavelengths "
+                        "equally. State [spectral] panes in its .toml file.",
+                        system=system.name,
+                    )
+                )
+    factors = [[known[id(system)] for system in states] for states in room.windows.systems]
+    inner: Sequence[Sequence[SystemOptics]] = light.light.systems[len(factors) :]
+    if inner:
+        notes.append(Note("Glass between rooms transmits all wavelengths equally."))
+    factors += [[SpectralFactor.neutral() for _ in states] for states in inner]
+    return factors, notes
+
+
+def _water(weather: Weather) -> NDArray[np.float64]:
+    """Precipitable water of the atmosphere [H] [cm]; that of ASTM G173 without humidity."""
+    if weather.dry_bulb_c is None or weather.relative_humidity is None:
+        return np.full(len(weather.times), WATER_CM)
+    return np.clip(water_vapour_cm(weather.dry_bulb_c, weather.relative_humidity), 0.1, 8.0)
+
+
+def _share(enough: NDArray[np.bool_], occupied: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Share of the occupied hours [%] of conditions [H, S]; 0 where there are none."""
+    if not occupied.any():
+        return np.zeros(enough.shape[1])
+    share: NDArray[np.float64] = 100.0 * enough[occupied].mean(axis=0)
+    return share
+
+
+def _ratio(a: NDArray[np.float64] | float, b: NDArray[np.float64] | float) -> NDArray[np.float64]:
+    """a / b, NaN where b is 0."""
+    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    ratio: NDArray[np.float64] = np.divide(a, b, out=np.full(a.shape, np.nan), where=b > 0)
+    return ratio

@@ -1,0 +1,127 @@
+"""A run by wavelength: files, spectra of systems, what is said of systems without a spectrum."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from bim.shoebox import shoebox
+from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.spectra.channels import channels_of
+from mitsuba_cfs.spectra.detectors import (
+    NANOMETRES,
+    colour_temperature,
+    daylight_efficacy_ratio,
+    detected,
+    illuminant,
+)
+from scenes.cli import cfs
+from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.fenestration.systems import read_system
+from scenes.fenestration.thermal_file import read_spectrum
+from scenes.input_files import read_weather
+from scenes.room.light import room_light
+from scenes.room.options import RoomOptions
+from scenes.room.room import inputs_of_room
+from scenes.room.spectral import room_spectral
+from scenes.room.windows import in_all_windows
+
+FEW = {
+    "method": "three-phase", "sensor_samples": 64, "patch_samples": 64, "sky_subdivision": 1,
+    "sensor_spacing": 2.0, "picture_size": 32, "picture_count": 1, "picture_samples": 1,
+}  # fmt: skip
+
+
+def amber(path: Path) -> Path:
+    """The spectrum of an amber fabric: nothing below 500 nm."""
+    path.write_text("wavelength_nm,transmittance\n380,0\n500,0\n520,0.2\n780,0.2\n", "utf-8")
+    return path
+
+
+@pytest.fixture
+def blind(tmp_path):
+    """The demo's blind, with an amber spectrum in the file beside it."""
+    system = tmp_path / "blind.xml"
+    system.write_bytes(VENETIAN_BLIND.read_bytes())
+    beside = VENETIAN_BLIND.with_suffix(".toml").read_text("utf-8")
+    amber(tmp_path / "amber.csv")
+    text = f'{beside}\n[spectral]\nshade = "amber.csv"\n'
+    system.with_suffix(".toml").write_text(text, "utf-8")
+    return system
+
+
+def test_amber_light_is_hardly_melanopic(blind) -> None:
+    building = shoebox()
+    space, options = building.spaces[0], RoomOptions.of(spectral=True, channels=9, **FEW)
+    systems = in_all_windows(space, read_system(blind))
+    room = inputs_of_room(building, space, systems, read_weather(WEATHER), options)
+    light, state = room_light(room), np.zeros((8760, 1), dtype=np.int64)
+    year = room_spectral(room, light, state, len(light.scene.points) - 3)
+    # D65 through the fabric; bands of 25 to 35 nm at its edge
+    fabric = np.interp(NANOMETRES, [380, 500, 520, 780], [0.0, 0.0, 0.2, 0.2])
+    expected = daylight_efficacy_ratio(illuminant("D65") * fabric)
+    assert year.summary["melanopic_der"] == pytest.approx(expected, rel=0.1)
+    assert year.summary["outdoor_melanopic_der"] == pytest.approx(0.97, abs=0.02)
+    assert not year.notes
+    lit = year.eye["photopic_lx"] > 10
+    temperature, _ = colour_temperature(detected(illuminant("D65") * fabric)[-3:])
+    assert year.eye["cct_k"][lit].median() == pytest.approx(float(temperature), rel=0.1)
+    assert year.eye["cct_k"][year.eye["photopic_lx"] == 0].isna().all()
+    assert year.spectrum.shape == (8760, 9)
+    assert year.melanopic.shape == (8760, len(year.sensor_metrics))
+
+
+@pytest.mark.slow
+def test_run_writes_tables_and_names_systems_without_a_spectrum(tmp_path) -> None:
+    settings = [f"--set={name}={value}" for name, value in FEW.items() if name != "method"]
+    inputs = ["--weather", str(WEATHER), "--cfs", str(VENETIAN_BLIND), "--space", "A"]
+    options = ["--spectral", "--channels", "3", "--method", "three-phase", "--no-cache"]
+    out = ["--no-colour", "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(cfs, ["run", str(OFFICE), *inputs, *options, *out, *settings])
+    assert result.exit_code == 0, result.output
+    table = pd.read_csv(tmp_path / "out" / "melanopic.csv", index_col="time")
+    assert len(table) == 8760
+    lit = table["photopic_lx"] > 0
+    ratio = table["melanopic_edi_lx"] / table["photopic_lx"]
+    assert ratio[lit].to_numpy() == pytest.approx(table["melanopic_der"][lit].to_numpy(), rel=1e-4)
+    sensors = pd.read_csv(tmp_path / "out" / "melanopic_sensors.csv")
+    assert {"x", "y", "z", "melanopic_der", "melanopic_250_percent"} <= set(sensors)
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "its spectrum is not known" in page and "Melanopic light through the year" in page
+
+
+def test_spectrum_of_panes_and_shade(blind) -> None:
+    factor = read_system(blind).spectrum
+    assert isinstance(factor, SpectralFactor)
+    blue, _, red = factor.of_patches(channels_of(3))[:, 0]
+    assert blue == 0 and red > 1
+    assert read_system(VENETIAN_BLIND).spectrum is None
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("wavelength_nm,transmittance\n400,0.1\n780,0.2\n", "from 380 to 780 nm"),
+        ("wavelength_nm,transmittance\n780,0.1\n380,0.2\n", "rising wavelengths"),
+        ("wavelength_nm,transmittance\n380,0\n780,0\n", "not 0"),
+        ("nm,t\n380,0\n780,0\n", "expected the columns wavelength_nm, transmittance"),
+        ("wavelength_nm,transmittance\n380,a\n", "'a' is not a number"),
+    ],
+)
+def test_faults_of_a_spectrum(tmp_path, text: str, message: str) -> None:
+    path = tmp_path / "shade.csv"
+    path.write_text(text, "utf-8")
+    with pytest.raises(DataError, match=message):
+        read_spectrum(path)
+
+
+def test_path_tracing_has_no_spectrum() -> None:
+    with pytest.raises(ValueError, match="spectral needs the three-phase or the five-phase"):
+        RoomOptions.of(spectral=True, method="point-in-time")
+    with pytest.raises(ValueError, match="channels: expected one of"):
+        RoomOptions.of(channels=4)

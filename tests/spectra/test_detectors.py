@@ -1,0 +1,70 @@
+"""Quantities of CIE S 026 against published values."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.spectra.detectors import (
+    ALPHA_OPIC,
+    D65_EFFICACY,
+    DETECTORS,
+    NANOMETRES,
+    colour_rendering,
+    colour_temperature,
+    daylight_efficacy_ratio,
+    detected,
+    illuminant,
+    sensitivities,
+)
+
+# frudawski.de/cieedq and /ciemedi (CIE S 026 at 1 nm): EDI [lx] of 100 lx, S-, M-, L-cone, rod, mel
+FL12 = (35.929, 79.904, 100.440, 50.848, 40.420)
+MELANOPIC_A = 49.581
+
+
+def test_equivalent_daylight_of_fl12() -> None:
+    # 1e-4: the source's table has every nanometre, ours every fifth
+    spectrum = illuminant("FL12")
+    for name, value in zip(ALPHA_OPIC, FL12, strict=True):
+        ratio = float(daylight_efficacy_ratio(spectrum, name))
+        assert ratio == pytest.approx(value / 100, abs=1.01e-4), name
+
+
+def test_melanopic_ratio_of_illuminant_a() -> None:
+    ratio = float(daylight_efficacy_ratio(illuminant("A")))
+    assert ratio == pytest.approx(MELANOPIC_A / 100, abs=1e-4)
+
+
+def test_efficacy_of_d65_is_that_of_the_standard() -> None:
+    received = detected(illuminant("D65"))
+    for name, efficacy in D65_EFFICACY.items():
+        own = received[DETECTORS.index(name)] / received[0]
+        assert own == pytest.approx(efficacy, rel=1.2e-4), name  # 817.36 against 817.3 uW/lm
+
+
+def test_action_spectra_peak_where_the_standard_has_them() -> None:
+    # CIE S 026, figure 1: S-cone 448, M-cone 541, L-cone 569, rod 507, melanopic 490 nm; to 2 nm
+    peaks = NANOMETRES[np.argmax(sensitivities()[1:6], axis=1)]
+    assert np.abs(peaks - [448, 541, 569, 507, 490]).max() <= 2
+
+
+def test_colour_temperature_and_duv() -> None:
+    both = np.array([detected(illuminant("D65"))[6:], [0, 0, 0]])
+    temperature, distance = colour_temperature(both)
+    assert temperature[0] == pytest.approx(6503, abs=10)  # Robertson's table: some kelvin
+    assert distance[0] == pytest.approx(0.0032, abs=2e-4)  # ANSI C78.377
+    assert np.isnan(temperature[1]) and np.isnan(distance[1])
+
+
+def test_colour_rendering() -> None:
+    # CIE 13.3 and CIE 015, table T.8: R_a 64 of FL2
+    index, fidelity = colour_rendering(illuminant("FL2"))
+    assert round(index) == 64
+    assert fidelity == pytest.approx(70, abs=0.5)  # TM-30's calculator
+    assert colour_rendering(illuminant("D65"))[0] == pytest.approx(100, abs=0.05)  # cut at 780 nm
+
+
+def test_unknown_illuminant() -> None:
+    with pytest.raises(ValueError, match="illuminant 'D66'"):
+        illuminant("D66")

@@ -1,0 +1,106 @@
+"""Light by channel from the photopic light, against light traced for each channel."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.bsdf.angular import AngularTable, specular_matrices
+from mitsuba_cfs.bsdf.spectral_factor import ANGLES, SpectralFactor
+from mitsuba_cfs.methods.light import illuminance
+from mitsuba_cfs.methods.optics import BsdfOptics
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.spectral_light import channel_irradiance, sky_spectra
+from mitsuba_cfs.sky.annual import given_sky
+from mitsuba_cfs.spectra.channels import channels_of
+from mitsuba_cfs.spectra.detectors import NANOMETRES
+from mitsuba_cfs.surfaces import Surfaces
+from tests.trace.phase_rooms import traced
+
+from . import rooms
+
+pytestmark = pytest.mark.usefixtures("variant")
+CHANNELS = channels_of(3)
+
+
+def tinted() -> SpectralFactor:
+    """Blue glass: what it absorbs grows with the wavelength and with the way through it."""
+    way = 1 / np.sqrt(1 - (np.sin(ANGLES) / 1.5) ** 2)
+    passed = np.exp(-way[:, None] * (NANOMETRES - 380) / 200)
+    return SpectralFactor(passed * (1 - (1 - np.cos(ANGLES)) ** 5)[:, None])
+
+
+def optics(transmittance: np.ndarray) -> BsdfOptics:
+    """Glass by its transmittance at `ANGLES`, which mirrors a tenth of the room's light."""
+    mirrored = np.full(len(ANGLES), 0.1)
+    table = AngularTable(ANGLES, transmittance * 0.9, mirrored, mirrored)
+    return BsdfOptics(specular_matrices(table), angular=table)
+
+
+def sky(height_deg: float = 35.0):
+    """Four hours: clear from three sides, and overcast."""
+    azimuth, height = np.radians([150.0, 180.0, 250.0, 200.0]), np.radians(height_deg)
+    towards = np.stack(
+        [np.sin(azimuth) * np.cos(height), np.cos(azimuth) * np.cos(height),
+         np.full(4, np.sin(height))], axis=1,
+    )  # fmt: skip
+    beam, diffuse = [700.0, 800.0, 300.0, 0.0], [90.0, 100.0, 200.0, 180.0]
+    return given_sky(towards, beam, diffuse, 1, day_of_year=80)
+
+
+def traced_by_channel(matrices, factor, whole) -> np.ndarray:
+    """Irradiance [C, S, L] with the optics of each channel traced, no factor of the visible's."""
+    spectra, found = sky_spectra(whole), []
+    for c in range(CHANNELS.count):
+        own = whole.in_channel(spectra.diffuse(CHANNELS, c), spectra.of_sun(CHANNELS)[:, c])
+        system = optics(CHANNELS.mean(factor.transmittance)[:, c])
+        groups = len(matrices.scene.groups)
+        found.append(illuminance(phase_light(matrices, [[system]] * groups, own)))
+    return np.stack(found)
+
+
+@pytest.fixture(scope="module")
+def corner():
+    """Windows to two sides below a shade that reflects, three sensors."""
+    room, groups, shade = rooms.l_shaped_room()
+    points = np.array([[2.0, 1.0, 0.8], [1.0, 4.5, 0.8], [5.0, 4.5, 0.8]])
+    return room, groups, shade, points
+
+
+@pytest.mark.parametrize(("open_site", "most"), [(True, 2e-3), (False, 6e-3)])
+def test_light_is_that_traced_for_each_channel(corner, open_site: bool, most: float) -> None:
+    # Factors at the middles of sky patches (10 degrees), and means for what the shade reflects:
+    # some thousandths of glass that turns by a tenth between 0 and 70 degrees
+    room, groups, shade, points = corner
+    exterior = Surfaces.none() if open_site else shade
+    matrices = traced(room, exterior, groups, points, subdivision=1, window_parts=1)
+    factor, whole = tinted(), sky()
+    visible = phase_light(matrices, [[optics(factor.visible)]] * len(groups), whole)
+    own = np.stack(list(channel_irradiance(visible, [[factor]] * len(groups), CHANNELS)))
+    true = traced_by_channel(matrices, factor, whole)
+    assert own[:, : len(points)] == pytest.approx(true, rel=most)
+
+
+def test_neutral_glass_gives_the_photopic_light(corner) -> None:
+    room, groups, shade, points = corner
+    matrices = traced(room, shade, groups, points, subdivision=1, window_parts=1)
+    factor, channels = SpectralFactor.neutral(), channels_of(81)
+    light = phase_light(matrices, [[optics(np.full(len(ANGLES), 0.7))]] * len(groups), sky())
+    bands = channel_irradiance(light, [[factor]] * len(groups), channels)
+    lux = sum(channels.detection[0, c] * one for c, one in enumerate(bands))
+    # 2e-4: light beyond 380 to 780 nm and the cells of 5 nm
+    assert lux[: len(points)] == pytest.approx(illuminance(light), rel=2e-4)
+
+
+def test_states_are_those_of_their_hours(corner) -> None:
+    room, groups, shade, points = corner
+    matrices = traced(room, shade, groups, points, subdivision=1, window_parts=1)
+    blue, grey = tinted(), SpectralFactor.neutral()
+    states = [optics(blue.visible), optics(np.full(len(ANGLES), 0.3))]
+    light = phase_light(matrices, [states] * len(groups), sky())
+    factors = [[blue, grey]] * len(groups)
+    rows = np.tile([0, 1, 0, 1], (len(groups), 1))
+    mixed = next(channel_irradiance(light, factors, CHANNELS, rows))
+    for j in (0, 1):
+        alone = next(channel_irradiance(light, factors, CHANNELS, np.full_like(rows, j)))
+        assert mixed[:, rows[0] == j] == pytest.approx(alone[:, rows[0] == j], rel=1e-5)

@@ -1,0 +1,195 @@
+"""Light by wavelength against Radiance: melanopic EDI, DER and CCT in three rooms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.shoebox import shoebox
+from bim.to_tracer import interior_surfaces, window_groups
+from mitsuba_cfs.bsdf.angular import spectral_tables, specular_matrices
+from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
+from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, read_spectral_pane
+from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.methods.light import daylight
+from mitsuba_cfs.methods.optics import BsdfOptics
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
+from mitsuba_cfs.methods.spectral_light import channel_irradiance
+from mitsuba_cfs.sky.annual import AnnualSky, given_sky
+from mitsuba_cfs.spectra.channels import channels_of
+from mitsuba_cfs.spectra.daylight import (
+    OVERCAST_K,
+    daylight_components,
+    daylight_shares,
+    sun_spectra,
+)
+from mitsuba_cfs.spectra.detectors import (
+    NANOMETRES,
+    colour_temperature,
+    detected,
+    equivalent_daylight,
+)
+from mitsuba_cfs.surfaces import Surfaces
+from tests.radiance import polygon, run, write_surfaces
+
+PANES = {  # of the IGSDB, in ../shared/data: file and number of panes in series
+    "clear": ("CLEAR_3.DAT", 1),
+    "green float": ("913.json", 1),
+    "three panes of green float": ("913.json", 3),
+}
+SKY_AND_GROUND = (
+    "skyfunc glow sky_glow 0 0 4 1 1 1 0 sky_glow source sky 0 0 4 0 0 1 180 "
+    "skyfunc glow ground_glow 0 0 4 1 1 1 0 ground_glow source ground 0 0 4 0 0 -1 180\n"
+)
+ALTITUDE, AZIMUTH = 35.0, 170.0  # of the sun [degrees], from north by east
+BANDS = 20  # of the peer, 380 to 780 nm; its build has at most 24
+POINTS = np.array([[2.0, 3.0, 0.8], [2.0, 3.0, 1.2], [2.0, 3.0, 1.2]])
+NORMALS = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+NAMES = ("desk", "eye towards the window", "eye along the window")
+
+
+@dataclass(frozen=True)
+class Light:
+    """Melanopic EDI [lx], DER and CCT [K] of the points [S]."""
+
+    edi: NDArray[np.float64]
+    ratio: NDArray[np.float64]
+    kelvin: NDArray[np.float64]
+
+    @staticmethod
+    def of(received: NDArray[np.float64]) -> Light:
+        """From what detectors receive [S, 9]."""
+        edi = equivalent_daylight(received[:, 5])
+        return Light(edi, edi / received[:, 0], colour_temperature(received[:, -3:])[0])
+
+
+def main(
+    *, data: Path = Path("../shared/data/bsdf/products_spectral"), bounces: int = 8,
+    divisions: int = 20000,
+) -> str:  # fmt: skip
+    """The table of docs/evidence_daylight.md."""
+    rows = [
+        "| panes | sky | point | EDI [lx] | Radiance | difference % | DER | difference % | CCT, "
+        "difference [K] |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for name, (file, count) in PANES.items():
+        panes = [read_spectral_pane(data / file)] * count
+        for sky in ("overcast", "sun"):
+            own, peer = ours(panes, sky), radiances(panes, sky, bounces, divisions)
+            for s, point in enumerate(NAMES):
+                edi, ratio = own.edi[s], own.ratio[s]
+                rows.append(
+                    f"| {name} | {sky} | {point} | {edi:.1f} | {peer.edi[s]:.1f} | "
+                    f"{100 * (edi / peer.edi[s] - 1):.1f} | {ratio:.4f} | "
+                    f"{100 * (ratio / peer.ratio[s] - 1):.2f} | "
+                    f"{own.kelvin[s] - peer.kelvin[s]:.0f} |"
+                )
+    return "\n".join(rows)
+
+
+def room_scene() -> DaylightScene:
+    """A box of 4 x 6 x 3 m with a window to the south; its eye is the last of the points."""
+    space = shoebox().spaces[0]
+    view = fisheye(tuple(POINTS[-1]), tuple(NORMALS[-1]), 16)
+    return DaylightScene(
+        interior_surfaces(space, "visible"), Surfaces.none(), window_groups(space), POINTS[:-1],
+        NORMALS[:-1], view,
+    )  # fmt: skip
+
+
+def hour(kind: str) -> AnnualSky:
+    """An overcast sky, or the sun alone."""
+    height, azimuth = np.radians([ALTITUDE, AZIMUTH])
+    towards = [np.sin(azimuth) * np.cos(height), np.cos(azimuth) * np.cos(height), np.sin(height)]
+    beam, diffuse = (0.0, 200.0) if kind == "overcast" else (800.0, 50.0)
+    sky = given_sky([towards], [beam], [diffuse], 4, day_of_year=1, ground="gendaylit")
+    return sky if kind == "overcast" else replace(sky, whole=sky.sun_alone())
+
+
+def ours(panes: Sequence[SpectralPane], kind: str) -> Light:
+    """The project's own, from the photopic light of the panes' visible band."""
+    scene, sky, channels = room_scene(), hour(kind), channels_of(20)
+    table = spectral_tables(panes)["Visible"]
+    system = BsdfOptics(specular_matrices(table), angular=table)
+    sampling = Sampling(sensor_samples=1 << 16, patch_samples=1 << 14, sun_points=1 << 13)
+    light = daylight(scene, [[system]], sky, sampling=sampling)
+    factor = SpectralFactor.of_panes(panes)
+    bands = np.stack(list(channel_irradiance(light, [[factor]], channels)))[..., 0]
+    return Light.of(bands.T @ channels.detection.T)
+
+
+def radiances(panes: Sequence[SpectralPane], kind: str, bounces: int, divisions: int) -> Light:
+    """Radiance's: spectra as its own primitives, each pane a `glass`."""
+    scene = room_scene()
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        write_surfaces(scene.interior, folder / "room.rad")
+        (folder / "glass.rad").write_text(_glass(scene, panes), "utf-8")
+        azimuth = AZIMUTH - 180.0  # gendaylit's: west of south
+        beam, diffuse = (0.0, 200.0) if kind == "overcast" else (800.0, 50.0)
+        made = run(f"gendaylit -ang {ALTITUDE} {azimuth} -W {beam} {diffuse}", folder).decode()
+        (folder / "sky.rad").write_text(_sky(made, kind), "utf-8")
+        run("oconv sky.rad room.rad glass.rad > scene.oct", folder)
+        lines = "".join(
+            " ".join(f"{v:g}" for v in (*p, *n)) + "\n"
+            for p, n in zip(POINTS, NORMALS, strict=True)
+        )
+        options = (
+            f"-I+ -h -ab {bounces} -aa 0 -ad {divisions} -as 0 -lw 1e-7 -dj 0 -dc 1 -dt 0 "
+            f"-cs {BANDS} -co+"
+        )
+        text = run(f"rtrace {options} scene.oct", folder, lines.encode()).decode()
+    values = np.array([[float(v) for v in line.split()] for line in text.splitlines()])
+    if values[0].size != BANDS:
+        raise ValueError(f"rtrace gave {values[0].size} values a point")
+    # a spectrum of 1 has 179 lm/W in Radiance
+    flat = detected(np.ones(len(NANOMETRES)))[0]
+    power = values[:, ::-1] * 400.0 / BANDS  # from red to blue
+    return Light.of(power @ channels_of(BANDS).detection.T * 179.0 / flat)
+
+
+def _spectrum(name: str, values: NDArray[np.float64]) -> str:
+    """A primitive `spectrum` of values [N]."""
+    text = " ".join(f"{v:.6g}" for v in values)
+    return f"void spectrum {name}\n0\n0\n{len(values) + 2} 380 780 {text}\n"
+
+
+def _unit(spectrum: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A spectrum with the luminance of a flat one of 1."""
+    return spectrum * detected(np.ones(len(NANOMETRES)))[0] / detected(spectrum)[0]
+
+
+def _sky(made: str, kind: str) -> str:
+    """The sky of `gendaylit`, coloured; the overcast sky, or the sun alone."""
+    overcast = _unit(daylight_shares(OVERCAST_K) @ daylight_components())
+    sun = _unit(sun_spectra(np.sin(np.radians(ALTITUDE)))[0])
+    lines = [line for line in made.splitlines() if not line.startswith("#")]
+    text = "\n".join(lines)
+    start = text.index("void brightfunc skyfunc")
+    if kind == "overcast":
+        sky = text[start:].replace("void brightfunc", "day brightfunc")
+        return f"{_spectrum('day', overcast)}\n{sky}\n{SKY_AND_GROUND}"
+    return _spectrum("beam", sun) + text[:start].replace("void light", "beam light")
+
+
+def _glass(scene: DaylightScene, panes: Sequence[SpectralPane]) -> str:
+    """Panes as `glass`, a centimetre apart, the inner one in the window's plane."""
+    parts = []
+    for i, pane in enumerate(reversed(panes)):
+        tau = np.interp(NANOMETRES, pane.wavelength_nm, pane.transmittance)
+        # Radiance's transmissivity of a transmittance at normal incidence, n = 1.52
+        passed = (np.sqrt(0.8402528435 + 0.0072522239 * tau**2) - 0.9166530661) / 0.0036261119 / tau
+        parts.append(_spectrum(f"tint{i}", passed))
+        parts.append(f"tint{i} glass pane{i}\n0\n0\n3 1 1 1\n")
+        for group in scene.groups:
+            for window in group.windows:
+                for k, triangle in enumerate(window.triangles):
+                    moved = triangle + 0.01 * i * group.frame[2]
+                    parts.append(polygon(f"pane{i}", f"glass{i}_{k}", moved))
+    return "\n".join(parts)
