@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.compiled import compiled
 from thermal.reduced import ReducedZone, responses
+from thermal.zone import Dimming, lamp_share
 
 FloatArray = NDArray[np.float64]
 COLDEST_C, WARMEST_C, STEPS = 5.0, 45.0, 41  # grid of the mass
@@ -32,7 +33,7 @@ class PredictedHours:
     sun: FloatArray  # [H, M] absorbed indoors [W]
     daylight: FloatArray  # [H, M] on the work plane [lx]
     lamps: FloatArray  # [H] full power [W]
-    target_lx: float  # to which daylight dims them; 0: it does not
+    dimming: Dimming | None  # by the daylight; None: they are not dimmed
     internal: FloatArray  # [H] other heat indoors [W]
     penalty: FloatArray  # [H, M] [Wh] of glare, or of a preference
 
@@ -97,7 +98,8 @@ def predicted_year(
     result = np.zeros((count, 4))
     _run(
         np.array([zone.opaque, zone.mass, zone.mass_area, zone.area, zone.heating_limit,
-                  zone.cooling_limit, hours.target_lx, *weights, start_c]),
+                  zone.cooling_limit, hours.dimming is not None, *weights, start_c,
+                  *(hours.dimming or Dimming(1.0)).numbers]),
         zone.windows, zone.air, zone.outdoor_c, zone.behind_c, zone.heating_c, zone.cooling_c,
         hours.sun, hours.daylight, hours.lamps, hours.internal, hours.penalty,
         count if once else max(ahead, 1), once, forecast.shift,
@@ -106,6 +108,9 @@ def predicted_year(
         result,
     )  # fmt: skip
     return PredictedYear(result[:, 0].astype(np.int64), *result[:, 1:].T)
+
+
+_lamp_share = compiled()(lamp_share)
 
 
 @compiled()
@@ -122,9 +127,10 @@ def _hour(
     out: NDArray[np.float64],
 ) -> float:
     """Write the `responses` of a combination into out [6]; returns the power of its lamps."""
-    target = constants[6]
-    if target > 0:
-        lamps *= min(max(1.0 - daylight / target, 0.0), 1.0)
+    if constants[6] > 0:
+        lamps *= _lamp_share(
+            daylight, constants[11], constants[12], constants[13], constants[14], constants[15]
+        )
     responses(
         air, windows, constants[0], constants[1], constants[2], constants[3], outdoor_c, behind_c,
         internal + lamps, sun, out,

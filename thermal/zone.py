@@ -16,6 +16,7 @@ from thermal.emitters import HeatedSlab, IdealLoads
 from thermal.errors import require, require_range
 from thermal.ventilation import Leakage, NeighbourAir, SupplyAir, WindowAiring
 
+FloatArray = NDArray[np.float64]
 ROUGHNESS = {  # DOE-2 roughness multiplier R_f; EnergyPlus Engineering Reference
     "very rough": 2.17,
     "rough": 1.67,
@@ -213,17 +214,52 @@ def _set_unit_normal(element: OpaqueSurface | WindowElement, item: str) -> None:
     object.__setattr__(element, "normal", normal / length)
 
 
-def dimmed_share(
-    illuminance: ArrayLike, target_lx: float, *, least: float = 0.0
-) -> NDArray[np.float64]:
-    """Share [H] of the lamps' power that daylight leaves to be given: 1 - E/target, dimmed.
+@dataclass(frozen=True, slots=True)
+class Dimming:
+    """How lamps follow the daylight at their sensor.
 
-    illuminance: [H] daylight at the control point [lx]; least: share at full dimming.
+    Power falls from all at no daylight to `least_power` where `least_light` of the lamps' light is
+    still needed, and stays there, or is 0 with `off`: EnergyPlus' Continuous and ContinuousOff.
     """
-    require(target_lx > 0, "lighting", f"target illuminance must be positive, got {target_lx} lx")
-    require_range(least, 0.0, 1.0, "lighting: least share")
-    missing = np.clip(1.0 - np.asarray(illuminance, dtype=float) / target_lx, 0.0, 1.0)
-    return np.maximum(missing, least)
+
+    target_lx: float
+    least_light: float = 0.0  # share of the lamps' light
+    least_power: float = 0.0  # share of their power that gives it
+    off: bool = False  # less light than that is none
+    sensor_factor: float = 1.0  # what the sensor reads, over the mean daylight of the work plane
+
+    def __post_init__(self) -> None:
+        valid = self.target_lx > 0
+        require(valid, "lighting", f"target illuminance must be positive, got {self.target_lx} lx")
+        require_range(self.least_light, 0.0, 0.99, "lighting: least light")
+        require_range(self.least_power, 0.0, 1.0, "lighting: least power")
+
+    @property
+    def numbers(self) -> tuple[float, float, float, float, float]:
+        """The arguments of `lamp_share` after the daylight."""
+        off = self.least_light if self.off else -1.0
+        return self.target_lx, self.least_light, self.least_power, off, self.sensor_factor
+
+
+def lamp_share(
+    daylight: FloatArray, target: float, least_light: float, least_power: float, off: float,
+    factor: float,
+) -> FloatArray:  # fmt: skip
+    """Share of the lamps' power by daylight [lx], of arrays, or compiled of numbers.
+
+    Args: off: share of light up to which the lamps are off; below 0: never.
+    """
+    missing = np.minimum(np.maximum(1.0 - factor * daylight / target, 0.0), 1.0)
+    above = np.maximum(missing - least_light, 0.0) / (1.0 - least_light)
+    return (least_power + (1.0 - least_power) * above) * (missing > off)
+
+
+def dimmed_share(illuminance: ArrayLike, dimming: Dimming) -> FloatArray:
+    """Share [H] of the lamps' power that daylight leaves to be given.
+
+    illuminance: [H] daylight of the work plane [lx].
+    """
+    return lamp_share(np.asarray(illuminance, dtype=float), *dimming.numbers)
 
 
 def split_gains(power: ArrayLike, radiant_share: float, *others: tuple[ArrayLike, float]) -> Gains:

@@ -251,8 +251,7 @@ class ControlYear:
         solar = per_window(replace(solar, state=of_windows), zone)
         if tables is None:
             return ZoneHeat(solar, zone.gains, np.zeros(self.room.skies.hours))
-        dimmed = tables.gains.lighting_w_m2 and tables.gains.lighting_dimmed
-        plane = self.work_plane_lx(states) if dimmed else None
+        plane = None if tables.gains.dimming is None else self.work_plane_lx(states)
         area = self.room.space.floor_area
         zone, lamps = operated(zone, tables, area, self.room.weather, plane)
         return ZoneHeat(solar, zone.gains, lamps)

@@ -124,6 +124,7 @@ def operated_year(room: RoomZone, result: ZoneResult, weather: Weather) -> Opera
         "heating_kwh": result.heating.sum() * weather.step_h / 1e3,
         "cooling_kwh": result.cooling.sum() * weather.step_h / 1e3,
         "lighting_kwh": room.lamps.sum() * weather.step_h / 1e3,
+        "leni_kwh_m2": room.lamps.sum() * weather.step_h / 1e3 / room.space.floor_area,
         "peak_heating_w": result.heating.max(),
         "peak_cooling_w": result.cooling.max(),
     }

@@ -30,7 +30,7 @@ from scenes.room.schedules import (
 from scenes.toml_file import Positive, Share, TomlTable
 from thermal.ground import SHIELDS, SOILS
 from thermal.ventilation import BLAST, DOE2, DOOR_DISCHARGE, Leakage, aim2, sherman_grimsrud
-from thermal.zone import OUTSIDE_ABSORPTANCE, ROUGHNESS
+from thermal.zone import OUTSIDE_ABSORPTANCE, ROUGHNESS, Dimming
 
 
 class HeatIslandTable(TomlTable):
@@ -487,9 +487,28 @@ class GainsTable(TomlTable):
         500.0  # mean of the work plane, to which the lamps are dimmed
     )
     lighting_dimmed: bool = True  # False: daylight does not dim the lamps
+    lighting_least_light: Annotated[float, Field(ge=0, le=0.99)] = 0.0  # dimmed no further: share
+    lighting_least_power: Share = 0.0  # of their power that gives this light
+    lighting_off: bool = False  # lamps are off where less light than that is needed
+    # what the sensor reads over the mean daylight of the work plane: its error, or its place
+    lighting_sensor_factor: Annotated[float, Field(ge=0.1, le=10)] = 1.0
+    lighting_standby_w_m2: Annotated[float, plausible.LAMPS] = 0.0  # at all hours, EN 15193-1's W_P
     radiant_share: Share = 0.5
     # clock hours of every day, or a schedule of the share of people; multiplies the constants above
     occupied: Annotated[tuple[int, int] | str, OrSchedule(plausible.SHARE, clock_or_name)] = (8, 18)
+
+    @property
+    def dimming(self) -> Dimming | None:
+        """How daylight dims the lamps; None: it does not."""
+        if not (self.lighting_dimmed and self.lighting_w_m2):
+            return None
+        return Dimming(
+            self.lighting_target_lx,
+            self.lighting_least_light,
+            self.lighting_least_power,
+            self.lighting_off,
+            self.lighting_sensor_factor,
+        )
 
 
 class ComfortTable(TomlTable):

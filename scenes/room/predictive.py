@@ -34,13 +34,15 @@ CLOSED = 0.1  # [Wh] of an hour with all groups closed: of equal plans the more 
 LEAST = 0.95 * 5.87e-5, 0.16
 BY_EYE = 6.2e-5, 0.184  # of AFC's glare term by Ev, after Wienold 2009, equation of DGPs
 ROUNDS = 25  # of plans, each with the glare of those before
+FEW = 0.005  # share of the occupied hours with unrated glare at which plans end
 
 
 def predictive_states(year: ControlYear, *, progress: Progress = silent) -> NDArray[np.int64]:
     """States of the control groups in every hour [H, N], by plans of the hours ahead.
 
-    Plans are repeated until the glare of all that they choose in occupied hours has been rated,
-    first those of single hours, which cost a fraction of a day's.
+    Plans are repeated until the glare of nearly all that they choose in occupied hours has been
+    rated, first those of single hours, which cost a fraction of a day's; the last one chooses
+    among what has been rated.
     """
     tables, (rule, *_) = year.room.operation, year.room.control.rules
     if tables is None:
@@ -50,11 +52,9 @@ def predictive_states(year: ControlYear, *, progress: Progress = silent) -> NDAr
         for number in range(ROUNDS):
             progress("plans", number / ROUNDS)
             plan = planner.plan(ahead)
-            if not planner.rate(plan.states):
+            if planner.rate(plan.states) <= FEW * len(planner.used):
                 break
-        else:  # among what is rated
-            plan = planner.plan(ahead, of_rated=True)
-    return year.combinations[plan.states]
+    return year.combinations[planner.plan(of_rated=True).states]
 
 
 class Planner:
@@ -69,7 +69,7 @@ class Planner:
         self._combinations = combinations
         self.zone, self._hours = predicted_hours(year, tables)
         count = year.room.skies.hours
-        self._used = np.flatnonzero((year.present > 0) & (year.lit_hours >= 0))
+        self.used = np.flatnonzero((year.present > 0) & (year.lit_hours >= 0))
         eye = np.stack(
             [year.room.skies.whole_year(year.eye_lx(one, self._seat)) for one in combinations], 1
         )
@@ -93,13 +93,13 @@ class Planner:
                 temperature_error_k=table.temperature_error_k, seed=table.seed,
             )  # fmt: skip
         penalty = np.zeros_like(self.glare)
-        penalty[self._used] = PENALTY * np.maximum(self.glare[self._used] - self._limit, 0.0)
+        penalty[self.used] = PENALTY * np.maximum(self.glare[self.used] - self._limit, 0.0)
         if of_rated:
-            penalty[self._used] += np.where(self.rated[self._used], 0.0, 2 * PENALTY)
+            penalty[self.used] += np.where(self.rated[self.used], 0.0, 2 * PENALTY)
         most = np.maximum(np.array(self._year.counts) - 1, 1)
         penalty += CLOSED * (self._year.combinations / most).mean(axis=1)
         hours = PredictedHours(
-            self._hours.sun, self._hours.daylight, self._hours.lamps, self._hours.target_lx,
+            self._hours.sun, self._hours.daylight, self._hours.lamps, self._hours.dimming,
             self._hours.internal, penalty,
         )  # fmt: skip
         weights = table.heating_weight, table.cooling_weight, table.lighting_weight
@@ -113,7 +113,7 @@ class Planner:
         A combination that glares says the same of those that are more open in each group and give
         the eye more light, before they are rated.
         """
-        used = self._used[~self.rated[self._used, states[self._used]]]
+        used = self.used[~self.rated[self.used, states[self.used]]]
         numbers = states[used]
         order = self._year.combinations
         for number in np.unique(numbers):
@@ -139,7 +139,7 @@ def predicted_hours(
     hours, zone = OperationHours(tables, room.weather), year.zone.zone
     windows = year.combinations[:, room.control.number]
     sun, daylight = [], []
-    dimmed = bool(tables.gains.lighting_dimmed and tables.gains.lighting_w_m2)
+    dimming = tables.gains.dimming
     areas = np.array([window.area for window in zone.windows])
     for states in map(tuple, year.combinations.tolist()):
         solar, *_ = year.sun_by_states.of(year.of_windows(states).tolist())
@@ -153,12 +153,14 @@ def predicted_hours(
         if solar.absorbed_middle is not None:
             absorbed = absorbed + solar.absorbed_middle * middle
         sun.append(solar.inside.sum(axis=1) + absorbed @ areas)
-        daylight.append(year.work_plane_lx(states) if dimmed else np.zeros(room.skies.hours))
+        daylight.append(
+            np.zeros(room.skies.hours) if dimming is None else year.work_plane_lx(states)
+        )
     reduced = reduced_zone(zone, climate(room.weather), solar.facade, windows)
-    lamps = hours.lamps(room.space.floor_area)
+    area = room.space.floor_area
+    lamps, other = hours.lamps(area), hours.heat(area) + tables.gains.lighting_standby_w_m2 * area
     return reduced, PredictedHours(
         np.stack(sun, axis=1), np.stack(daylight, axis=1), lamps,
-        tables.gains.lighting_target_lx if dimmed else 0.0,
-        np.broadcast_to(hours.heat(room.space.floor_area), lamps.shape).copy(),
+        dimming, np.broadcast_to(other, lamps.shape).copy(),
         np.zeros((1, 1)),
     )  # fmt: skip

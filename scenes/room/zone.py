@@ -494,9 +494,9 @@ def reads_work_plane(room: RoomInputs) -> bool:
     tables = room.operation
     if tables is None or not room.space.windows:
         return False
-    dimmed = tables.gains.lighting_w_m2 and tables.gains.lighting_dimmed
+    dimmed = tables.gains.dimming is not None
     leaves = (leaf for rule in room.control.rules for leaf in rule.leaves)
-    return any(leaf.rule == "glare" for leaf in leaves) or bool(dimmed)
+    return any(leaf.rule == "glare" for leaf in leaves) or dimmed
 
 
 def room_zone(
@@ -665,8 +665,9 @@ def operated(
     """
     hours, gains = OperationHours(tables, weather), tables.gains
     lamps = hours.lamps(floor_area)
-    if daylight is not None and gains.lighting_dimmed:
-        lamps = lamps * dimmed_share(daylight, gains.lighting_target_lx)
+    if daylight is not None and gains.dimming is not None:
+        lamps = lamps * dimmed_share(daylight, gains.dimming)
+    lamps = lamps + gains.lighting_standby_w_m2 * floor_area
     result = replace(
         zone,
         **hours.outdoor_air(),

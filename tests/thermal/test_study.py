@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 from scenes.cli import run as main
 from scenes.heat.study_file import read_study
 from thermal.errors import ThermalInputError
-from thermal.zone import dimmed_share, split_gains
+from thermal.zone import Dimming, dimmed_share, split_gains
 
 DEMO = Path(__file__).parents[2] / "scenes" / "demo"
 WEATHER = DEMO / "USA_IL_Chicago-OHare.Intl.AP.725300_TMY3.epw"
@@ -140,12 +141,22 @@ def test_study_needs_one_room(tmp_path):
 
 
 def test_lamps_dim_to_what_is_missing():
-    share = dimmed_share([0.0, 250.0, 500.0, 900.0], 500.0, least=0.1)
-    np.testing.assert_allclose(share, [1.0, 0.5, 0.1, 0.1])
+    daylight = [0.0, 250.0, 450.0, 500.0, 900.0]
+    np.testing.assert_allclose(dimmed_share(daylight, Dimming(500.0)), [1.0, 0.5, 0.1, 0.0, 0.0])
+    # EnergyPlus' Continuous: (f_L + (1 - f_L) least power - least light)/(1 - least light)
+    curve = Dimming(500.0, least_light=0.2, least_power=0.3)
+    half = (0.5 + 0.5 * 0.3 - 0.2) / 0.8
+    np.testing.assert_allclose(dimmed_share(daylight, curve), [1.0, half, 0.3, 0.3, 0.3])
+    off = replace(curve, off=True)
+    np.testing.assert_allclose(dimmed_share(daylight, off), [1.0, half, 0.0, 0.0, 0.0])
+    low = replace(curve, sensor_factor=0.8)  # it reads 200 of 250 lx
+    assert dimmed_share(250.0, low) == pytest.approx(0.3 + 0.7 * (0.6 - 0.2) / 0.8)
     gains = split_gains(np.array([100.0]), 0.5, (np.array([40.0]), 0.25))
     assert gains.convective[0] == pytest.approx(80.0) and gains.radiant[0] == pytest.approx(60.0)
     with pytest.raises(ThermalInputError, match="target"):
-        dimmed_share([1.0], 0.0)
+        Dimming(0.0)
+    with pytest.raises(ThermalInputError, match="least light"):
+        Dimming(500.0, least_light=1.0)
 
 
 def test_coupled_rooms_of_an_ifc(tmp_path, variant, capsys):

@@ -54,9 +54,9 @@ PLANS = {
 }
 LIMITS_W_M2 = (100.0, 150.0, 200.0, 300.0, 400.0)  # of the fixed rules
 OPTIONS = {
-    "sensor_spacing": 1.0, "sensor_samples": 2048, "patch_samples": 1024, "sky_subdivision": 2,
-    "picture_size": 100, "picture_samples": 4, "picture_count": 1, "annual_glare": True,
-    "heat_step_s": 1800.0,
+    "sensor_spacing": 1.0, "sensor_samples": 2048, "patch_samples": 1024, "sky_subdivision": 1,
+    "picture_size": 80, "picture_samples": 4, "picture_count": 1, "annual_glare": True,
+    "heat_step_s": 3600.0,
 }  # fmt: skip
 CUT_OFF = f'rule = "cut-off"\nslat_width = {WIDTH}\nslat_spacing = {SPACING}\n'
 
