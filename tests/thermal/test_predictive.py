@@ -165,7 +165,7 @@ def test_the_reduced_model_has_the_loads_of_the_detailed_balance() -> None:
     zone = box(window=glass, gains=Gains(150 * used, 150 * used), loads=IdealLoads(20.0, 26.0))
     solar = sun(len(hours), zone, strength=0.6 - 0.4 * np.cos(2 * np.pi * hours / len(hours)))
     detailed = simulate(zone, weather, solar, step_s=3600.0)
-    outer, inner = glass.inward_shares()
+    outer, *_, inner = glass.inward_shares()
     absorbed = (solar.absorbed_outer * outer + solar.absorbed_inner * inner) @ [4.5]
     reduced = reduced_zone(zone, weather, solar.facade, np.zeros((1, 1), dtype=np.int64))
     acts = PredictedHours(
