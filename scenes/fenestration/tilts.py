@@ -149,8 +149,8 @@ def tilt_note(systems: Sequence[FenestrationSystem]) -> tuple[str, ...]:
     if not errors:
         return (
             Note(
-                "Slat tilts ({count}) are interpolated between two: their error is unknown, which a "
-                "third tilt would show.",
+                "Slat tilts ({count}) are interpolated between two: their error is unknown, which "
+                "a third tilt would show.",
                 count=between,
             ),
         )
