@@ -31,6 +31,7 @@ NO_EVIDENCE = {
         "| rule | quantity | set-up | weather that it asks for |",
     },
     "spectral.md": {"| file | content |", "| part | spectrum |"},
+    "app.md": {"| file | content | read by |"},
     "studies.md": {"| in the folder | what |", "| event | what is done |"},
     "pv.md": {"| key | meaning |"},
 }  # fmt: skip

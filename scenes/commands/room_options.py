@@ -428,8 +428,8 @@ def light_options(command: Callable) -> Callable:
 def room_options(command: Callable) -> Callable:
     """The options that `cfs run` and `cfs comply` share beside the inputs."""
     return _all_of(
-        out_folder_option, annual_glare_option, spectral_option, channels_option,
-        subdivide_option, light_options, set_option, no_cache_option, quick_option, page_option,
+        out_folder_option, annual_glare_option, subdivide_option, light_options, set_option,
+        no_cache_option, quick_option, page_option,
     )(command)  # fmt: skip
 
 

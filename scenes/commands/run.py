@@ -14,6 +14,7 @@ from scenes import quick as quick_run
 from scenes.commands.room_options import (
     FILE,
     PrintedHead,
+    channels_option,
     chosen_language,
     explore_option,
     height_option,
@@ -25,6 +26,7 @@ from scenes.commands.room_options import (
     scheduler_option,
     size_option,
     spacing_option,
+    spectral_option,
     stated_options,
     taken,
     u_option,
@@ -70,6 +72,8 @@ class Percentage(click.ParamType):
 @click.command()
 @input_options("all with a window")
 @room_options
+@spectral_option
+@channels_option
 @method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g-value at normal incidence.")

@@ -149,15 +149,15 @@ def tilt_note(systems: Sequence[FenestrationSystem]) -> tuple[str, ...]:
     if not errors:
         return (
             Note(
-                "{count} slat tilts are interpolated between two: their error is unknown, which a "
-                "third tilt would show.",
+                "Slat tilts ({count}) are interpolated between two: their error is unknown, which "
+                "a third tilt would show.",
                 count=between,
             ),
         )
     worst = max(errors, key=lambda one: one.relative)
     return (
         Note(
-            "{count} slat tilts are interpolated. At the tilts of the files, interpolation from "
+            "Slat tilts ({count}) are interpolated. At the tilts of the files, interpolation from "
             "the two neighbours is off by at most {transmittance:.3f} of the light (transmittance, "
             "root mean square over directions) and {relative:.0f} % of the BSDF ({tilt:.0f}°, "
             "neighbours {spacing:.0f}° apart); between the files' tilts it is about a third.",
