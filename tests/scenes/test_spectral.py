@@ -125,3 +125,10 @@ def test_path_tracing_has_no_spectrum() -> None:
         RoomOptions.of(spectral=True, method="point-in-time")
     with pytest.raises(ValueError, match="channels: expected one of"):
         RoomOptions.of(channels=4)
+
+
+def test_a_spectrum_that_is_no_number_is_refused(tmp_path) -> None:
+    file = tmp_path / "shade.csv"
+    file.write_text("wavelength_nm,transmittance\n380,0.1\n500,nan\n780,0.2\n", "utf-8")
+    with pytest.raises(DataError, match=r"line 3.*transmittance: 'nan' is not a number"):
+        read_spectrum(file)
