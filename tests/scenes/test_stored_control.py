@@ -128,3 +128,20 @@ def test_what_a_model_cannot_hold_or_lacks_is_refused(tmp_path, capsys) -> None:
     (tmp_path / "both.toml").write_text('control_of = "a.ifc"\n[control]\nrule = "always"\n')
     with pytest.raises(DataError, match=r"control_of: the file has"):
         read_operation(tmp_path / "both.toml")
+
+
+def test_a_name_may_begin_as_a_list_does(written, tmp_path) -> None:
+    model = written("[control]\nrule = 'always'\n")
+    window = ifcopenshell.open(str(model)).by_type("IfcWindow")[0].GlobalId
+    group = StoredGroup("[A] south", (window,), {"rule": "always"})
+    write_control(model, tmp_path / "named.ifc", [group])
+    assert read_control(tmp_path / "named.ifc") == (group,)
+
+
+def test_a_key_that_no_rule_has_is_refused(written, tmp_path) -> None:
+    model = written("[control]\nrule = 'always'\n")
+    window = ifcopenshell.open(str(model)).by_type("IfcWindow")[0].GlobalId
+    out = tmp_path / "other.ifc"
+    write_control(model, out, [StoredGroup("S", (window,), {"rule": "always", "close_over": 3})])
+    with pytest.raises(DataError, match=r"other\.ifc: .*close_over"):
+        taken(out, tmp_path)
