@@ -104,3 +104,23 @@ def test_plans_are_of_all_groups_and_need_light() -> None:
     study = {"weather": "a.epw", "building": "a.ifc", "control": {"rule": "predictive"}}
     with pytest.raises(ValueError, match="is of `cfs run`"):
         StudyFile.model_validate(study)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"hold_h": 2.0}, "hold_h: the rule .* does not wait"),
+        ({"group": [{"windows": ["w"], "limit_dgp": 0.3}]}, "group.0.limit_dgp: .* one for all"),
+    ],
+)
+def test_keys_that_plans_do_not_follow_are_refused(changed, message) -> None:
+    with pytest.raises(ValueError, match=message):
+        OperationTables.model_validate({"control": {"rule": "predictive"} | changed})
+
+
+def test_groups_of_an_entry_of_rooms_are_planned_with_the_others() -> None:
+    entry = {"spaces": ["A"], "control": {"group": [{"windows": ["w"], "rule": "glare"}]}}
+    tables = OperationTables.model_validate({"control": {"rule": "predictive"}, "rooms": [entry]})
+    faults = [one.control_fault(3) for one in tables.variants]
+    assert faults[0] is None and faults[1] is not None
+    assert faults[1][0] == "control.group.0.rule" and "plans all groups" in faults[1][1]
