@@ -463,7 +463,6 @@ class ControlTable(ShadingRule):
         """The path of the key that the plans of all groups together cannot follow, and why."""
         if not any(leaf.rule == "predictive" for _, rule in self.rules for leaf in rule.leaves):
             return None
-        (_, first), *_ = self.rules
         for place, rule in self.rules:
             if rule.rule != "predictive":
                 return (
@@ -473,12 +472,6 @@ class ControlTable(ShadingRule):
             for key in ("open_delay_h", "hold_h"):
                 if getattr(rule, key):
                     return f"{place}.{key}", 'the rule "predictive" does not wait: leave it out'
-            for key in ("limit_dgp", "seat", "looks_deg"):
-                if getattr(rule, key) != getattr(first, key):
-                    return (
-                        f"{place}.{key}",
-                        '"predictive" has one for all groups: state it in control',
-                    )
         return None
 
     def rule_of(self, group: GroupTable | None) -> ShadingRule:

@@ -50,5 +50,5 @@ def stored_control(path: Path) -> ControlTable:
     ]
     control: dict[str, object] = {"group": tables}
     if groups[0].rule.get("rule") == "predictive":
-        control |= {k: v for k, v in groups[0].rule.items() if k in ControlTable.model_fields}
+        control |= {k: v for k, v in groups[0].rule.items() if k in ("rule", "predictive")}
     return validated(ControlTable, control, path)
