@@ -152,7 +152,8 @@ def test_plans_of_a_room_without_a_seat_do_not_take_that_of_another(tmp_path, wr
     first, second = (w.GlobalId for w in ifcopenshell.open(str(model)).by_type("IfcWindow")[:2])
     plan = {"rule": "predictive", "predictive": {}}
     groups = [
-        StoredGroup("A", (first,), plan | {"seat": [1.0, 1.0, 1.2]}), StoredGroup("B", (second,), plan)
+        StoredGroup("A", (first,), plan | {"seat": [1.0, 1.0, 1.2]}),
+        StoredGroup("B", (second,), plan),
     ]  # fmt: skip
     write_control(model, tmp_path / "plans.ifc", groups)
     control = taken(tmp_path / "plans.ifc", tmp_path).tables.control
