@@ -55,10 +55,10 @@ def control_groups(space: Space, control: ControlTable | None = None) -> Control
         rules.append(control.rule_of(table))
         places.append("control" if table is None else f"control.group.{key[1]}")
     for rule, place in zip(rules, places, strict=True):
-        for key in ("limit_dgp", "seat", "looks_deg") if rule.rule == "predictive" else ():
-            if getattr(rule, key) != getattr(rules[0], key):
+        for name in ("limit_dgp", "seat", "looks_deg") if rule.rule == "predictive" else ():
+            if getattr(rule, name) != getattr(rules[0], name):
                 message = '"predictive" has one for all groups of a room'
-                raise DataError(message, element=space.label, field=f"{place}.{key}")
+                raise DataError(message, element=space.label, field=f"{place}.{name}")
     leaves = [(leaf, p) for rule, p in zip(rules, places, strict=True) for leaf in rule.leaves]
     for leaf, place in leaves:
         if leaf.seat is not None and not in_room(space, np.array([leaf.seat]))[0]:
