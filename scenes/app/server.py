@@ -334,8 +334,9 @@ class AppServer:
         return None
 
     def _use_made(self, action: actions.Action) -> None:
-        for made in self._made.pop(action.out, ()):
+        for made in self._made.get(action.out, ()):
             self._project.use_made(made)
+        self._made.pop(action.out, None)
 
     async def _demo(self, _: Request) -> Any:
         """Copy the demo's office and weather into the project."""
