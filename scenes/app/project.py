@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import unicodedata
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -28,6 +27,7 @@ from bim.ifc.corrections import corrections_file, read_corrections
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import json_text, reason, write_text
 from scenes.input_files import read_weather
+from scenes.result_folder import remove_results
 from scenes.toml_file import read_table
 
 INPUTS, RESULTS, LOGS = "inputs", "results", "log"
@@ -132,7 +132,7 @@ def _lines(table: Mapping[str, Any], place: tuple[str, ...]) -> list[str]:
 
 
 def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json_text(name)
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _value(name)
 
 
 def _value(value: Any) -> str:
@@ -140,7 +140,9 @@ def _value(value: Any) -> str:
         return "[" + ", ".join(map(_value, value)) + "]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
-    if isinstance(value, str | bool | int | float):
+    if isinstance(value, float):
+        return repr(value)  # inf and nan too
+    if isinstance(value, str | bool | int):
         return json_text(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return str(value)  # a date
 
@@ -456,11 +458,8 @@ class Project:
         return [path.relative_to(self.folder).as_posix() for path in paths][:EXPORTED]
 
     def clear(self, name: str) -> None:
-        """Remove a folder of results that this program wrote."""
-        folder = self.folder / RESULTS / plain_name(name)
-        if not (folder / "cfs-results.json").is_file() or folder.is_symlink():
-            raise DataError("is no folder of results of this project", file=name)
-        shutil.rmtree(folder)
+        """Remove results that this program wrote; files of others in their folder stay."""
+        remove_results(self.folder / RESULTS / plain_name(name))
 
     def record(self, line: Mapping[str, Any]) -> None:
         """Append a line to the journal of commands."""
