@@ -124,11 +124,14 @@ def _property(model: ifcopenshell.file, name: str, value: Any) -> Entity:
 
 def _value(one: Entity, path: str | PathLike[str], group: Entity) -> Any:
     """The value of a property; JSON where it is a list or a table, or begins as one."""
-    value = one.NominalValue.wrappedValue
+    where: dict[str, Any] = {"file": path, "element": group.Name, "field": one.Name}
+    nominal = getattr(one, "NominalValue", None)
+    if nominal is None:
+        raise DataError("has no value", **where)
+    value = nominal.wrappedValue
     if not isinstance(value, str) or not value.startswith(AS_JSON):
         return value
     try:
         return json.loads(value)
     except ValueError as error:
-        where = {"file": path, "element": group.Name, "field": one.Name}
         raise DataError(f"is no list or table: {error}", **where) from None

@@ -97,6 +97,23 @@ def test_what_the_page_does_not_know_stays(project) -> None:
     assert "--furniture" in command and "sensor_spacing=0.7" in command
 
 
+def test_tables_of_the_user_and_further_climates_stay(project) -> None:
+    project.use_made(MadeSystem("moving", ("inputs/glazing.xml", "inputs/venetian_blind.xml")))
+    moving = project.folder / "inputs" / "controlled venetian_blind.toml"
+    moving.write_text(moving.read_text() + "\n[ventilation]\nopen_above_c = 24\n")
+    away = project.folder.parent / "controlled away.toml"
+    away.write_text(moving.read_text())
+    study = project.study()
+    study["system"].append({"name": "away", "operation": "../controlled away.toml"})
+    study["climate"].append({"name": "second", "weather": "second.epw"})
+    project.write_study(study)
+    project.change({"loads": {"heating_c": 20}})
+    assert "open_above_c = 24" in moving.read_text() and "heating_c" in moving.read_text()
+    assert "heating_c" not in away.read_text()
+    take(project, WEATHER)
+    assert [one["name"] for one in project.study()["climate"]][1:] == ["second"]
+
+
 def test_set_points_and_gains_are_an_operation_file(project) -> None:
     loads = {"heating_c": 20, "cooling_c": 26, "equipment_w_m2": 8}
     made = MadeSystem("moving", ("inputs/glazing.xml", "inputs/venetian_blind.xml"))

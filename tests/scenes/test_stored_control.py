@@ -147,6 +147,19 @@ def test_a_key_that_no_rule_has_is_refused(written, tmp_path) -> None:
         taken(out, tmp_path)
 
 
+def test_a_property_without_a_value_is_named(written, tmp_path) -> None:
+    model = written("[control]\nrule = 'always'\n")
+    window = ifcopenshell.open(str(model)).by_type("IfcWindow")[0].GlobalId
+    out = tmp_path / "other.ifc"
+    write_control(model, out, [StoredGroup("S", (window,), {"rule": "always"})])
+    file = ifcopenshell.open(str(out))
+    (rule,) = [p for p in file.by_type("IfcPropertySingleValue") if p.Name == "rule"]
+    rule.NominalValue = None
+    file.write(str(out))
+    with pytest.raises(DataError, match=r"other\.ifc: S: rule: has no value"):
+        taken(out, tmp_path)
+
+
 def test_plans_of_a_room_without_a_seat_do_not_take_that_of_another(tmp_path, written) -> None:
     model = written("[control]\nrule = 'always'\n")
     first, second = (w.GlobalId for w in ifcopenshell.open(str(model)).by_type("IfcWindow")[:2])
