@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import weakref
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -30,6 +31,7 @@ from mitsuba_cfs.files import (
 MARK, PROGRAM, FORMAT = "cfs-results.json", "mitsuba-cfs", 1
 RENAMED = {"ifc export": "export"}  # commands by their earlier names, which marks may have
 EXPLORER = "explore"  # folder of the explorer, inside that of the results
+CASES = "cases"  # folder of the finished cases of a study, inside that of its results
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,6 +274,35 @@ class ResultFolder:
 
     def _error(self, message: str) -> DataError:
         return DataError(message, file=self.folder, field=self._field)
+
+
+def remove_results(folder: Path) -> None:
+    """Remove the results in a folder with what they are resumed from; files of others stay.
+
+    Raises: `DataError` where there are none, where a command writes them, or where they cannot be
+        removed.
+    """
+    mark = None if folder.is_symlink() else FolderMark.read(folder)
+    if mark is None:
+        raise DataError("is no folder of results", file=folder)
+    place = Path(os.path.realpath(folder))
+    release = taken(place)
+    if release is None:
+        raise DataError("another run of cfs is writing there: wait for it", file=folder)
+    try:
+        _remove(place, mark.files)
+        for one in (place / CASES, place / EXPLORER):
+            if one.is_dir() and not one.is_symlink():
+                shutil.rmtree(one)
+        if any(one.name != MARK for one in place.iterdir()):
+            FolderMark(mark.command).write(place)  # so that the command may write there again
+            return
+        (place / MARK).unlink()
+        _remove_empty([place])
+    except OSError as error:
+        raise DataError(f"cannot be removed: {reason(error)}", file=folder) from error
+    finally:
+        release()
 
 
 def _inside(name: str) -> bool:

@@ -79,7 +79,7 @@ def reduced_zone(
         glass + frames + zone.bridges,
         max(opaque, 1e-6),
         mass,
-        mass**2 / squares,
+        mass**2 / squares if squares else float(areas.sum()),
         float(areas.sum()) + window_area,
         np.maximum(_outdoor_air(zone, hours) * AIR_HEAT, 1e-3),
         np.asarray(climate.outdoor_c, dtype=float),

@@ -24,6 +24,7 @@ from mitsuba_cfs.files import json_text
 
 KIND = "CFS shading control"  # ObjectType of the groups
 SET_NAME = "CFS shading control"
+AS_JSON = ("[", "{", '"')  # starts of the values that are stored as JSON
 DESCRIPTION = "Rule by which the windows of the group change their shading state"
 
 
@@ -114,7 +115,7 @@ def _property(model: ifcopenshell.file, name: str, value: Any) -> Entity:
         kind = "IfcInteger"
     elif isinstance(value, float):
         kind = "IfcReal"
-    elif not isinstance(value, str):
+    elif not isinstance(value, str) or value.startswith(AS_JSON):
         stored = json_text(value)
     return model.create_entity(
         "IfcPropertySingleValue", name, None, model.create_entity(kind, stored), None
@@ -122,12 +123,15 @@ def _property(model: ifcopenshell.file, name: str, value: Any) -> Entity:
 
 
 def _value(one: Entity, path: str | PathLike[str], group: Entity) -> Any:
-    """The value of a property; JSON where it is a list or a table."""
-    value = one.NominalValue.wrappedValue
-    if not isinstance(value, str) or value[:1] not in ("[", "{"):
+    """The value of a property; JSON where it is a list or a table, or begins as one."""
+    where: dict[str, Any] = {"file": path, "element": group.Name, "field": one.Name}
+    nominal = getattr(one, "NominalValue", None)
+    if nominal is None:
+        raise DataError("has no value", **where)
+    value = nominal.wrappedValue
+    if not isinstance(value, str) or not value.startswith(AS_JSON):
         return value
     try:
         return json.loads(value)
     except ValueError as error:
-        where = {"file": path, "element": group.Name, "field": one.Name}
         raise DataError(f"is no list or table: {error}", **where) from None

@@ -49,7 +49,7 @@ class SpectralFactor:
 
     def at(self, channels: Channels, theta: ArrayLike) -> Array:
         """r_c at angles of incidence [..] [rad]: [C, ..]."""
-        ratio = (channels.mean(self.transmittance) / self.visible[:, None]).T
+        ratio = _relative(channels.mean(self.transmittance), self.visible[:, None]).T
         angles = np.asarray(theta, dtype=float)
         return np.stack([np.interp(angles, ANGLES, row) for row in ratio])
 
@@ -63,5 +63,11 @@ class SpectralFactor:
             np.interp(theta, ANGLES, row).mean(axis=1)
             for row in channels.mean(self.transmittance).T
         ]
-        factors: Array = np.array(means) / visible
-        return factors
+        return _relative(np.array(means), visible)
+
+
+def _relative(means: Array, visible: Array) -> Array:
+    """Transmittances relative to the visible one; 1 where nothing visible passes."""
+    visible = np.broadcast_to(visible, means.shape)
+    relative: Array = np.divide(means, visible, out=np.ones_like(means), where=visible > 0)
+    return relative

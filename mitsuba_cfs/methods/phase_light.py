@@ -189,10 +189,7 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
     light = replace(light, matrices=with_sensors(light.matrices, progress=progress))
     light = with_reflected_sun(light)
     # states that are the mean of two others are added up after these
-    traced = tuple(
-        tuple(j for j in range(len(states)) if neighbours(states, j) is None)
-        for states in light.systems
-    )
+    traced = tuple(map(traced_states, light.systems))
     chosen = [
         [states[j] for j in numbers] for states, numbers in zip(light.systems, traced, strict=True)
     ]
@@ -210,15 +207,18 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
             ]
             for g, group in enumerate(coefficients)
         ]
-    whole = zip(light.systems, traced, sensors, strict=True)
-    return replace(light, sensors=tuple(_with_means(*of_group) for of_group in whole))
+    whole = zip(light.systems, sensors, strict=True)
+    return replace(light, sensors=tuple(with_means(*of_group) for of_group in whole))
 
 
-def _with_means(
-    states: States, traced: Sequence[int], sensors: Sequence[SensorLight]
-) -> tuple[SensorLight, ...]:
-    """The light of the sensors in all states of a group, from that of the `traced` ones."""
-    known = dict(zip(traced, sensors, strict=True))
+def traced_states(states: States) -> tuple[int, ...]:
+    """Numbers of the states of a window group that are not the mean of two others."""
+    return tuple(j for j in range(len(states)) if neighbours(states, j) is None)
+
+
+def with_means(states: States, sensors: Sequence[SensorLight]) -> tuple[SensorLight, ...]:
+    """The light of the sensors in all states of a group, from that of its `traced_states`."""
+    known = dict(zip(traced_states(states), sensors, strict=True))
     result = []
     for j, optics in enumerate(states):
         pair = neighbours(states, j)

@@ -38,6 +38,8 @@ from mitsuba_cfs.methods.phase_light import (
     SensorLight,
     illuminance_of_all,
     sensor_light,
+    traced_states,
+    with_means,
     with_sensor_light,
 )
 from mitsuba_cfs.methods.reflected_sun import replaced_through
@@ -144,20 +146,27 @@ class _Season:
         self._sun = self._sky.of_sun(channels)  # [L, C]
         lit = sensor_light(light)
         known: dict[int, _Angles] = {}
+        self._angles = [
+            [known.setdefault(id(f), _Angles(f, channels)) for f in of] for of in factors
+        ]
         self._groups = [
-            [
-                _GroupInState(light, one, g, known.setdefault(id(f), _Angles(f, channels)))
-                for one, f in zip(states, of, strict=True)
-            ]
-            for g, (states, of) in enumerate(zip(lit, factors, strict=True))
+            [_GroupInState(light, lit[g][j], g, self._angles[g][j]) for j in traced_states(states)]
+            for g, states in enumerate(light.systems)
         ]
 
     def in_channel(self, c: int) -> PhaseLight:
         """The light in a band, whose illuminance is irradiance in it [W/m2]."""
         light, sun = self._light, self._sun[:, c]
         sky = light.sky.in_channel(self._sky.diffuse(self._channels, c), sun)
-        sensors = tuple(tuple(one.in_channel(c, sun) for one in states) for states in self._groups)
-        systems = [[one.coefficients.optics for one in states] for states in sensors]
+        # a state between two others is the mean of them in each channel too
+        sensors = tuple(
+            with_means(states, [one.in_channel(c, sun) for one in traced])
+            for states, traced in zip(light.systems, self._groups, strict=True)
+        )
+        systems = [
+            [ChannelOptics(one, of.patches[c]) for one, of in zip(states, angles, strict=True)]
+            for states, angles in zip(light.systems, self._angles, strict=True)
+        ]
         reflected = light.reflected
         of_all = [optics for states in light.systems for optics in states]
         if reflected is not None and reflects_outdoors(light.matrices, of_all):

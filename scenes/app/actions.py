@@ -75,8 +75,7 @@ def computations(project: Project, wanted: Mapping[str, Any]) -> list[Action]:
         raise DataError("expected names of rule sets", field="standards")
     pages = ("--language", language) if language != "en" else ()
     found: list[Action] = []
-    for system in systems:
-        name = slug(system["name"])
+    for system, name in zip(systems, _folders(systems), strict=True):
         shared = _inputs(project, study)
         if wanted.get("report"):
             command = ["run", *shared, *_filled(project, study, system), *_options(study)]
@@ -97,6 +96,25 @@ def computations(project: Project, wanted: Mapping[str, Any]) -> list[Action]:
         out = f"{RESULTS}/comparison"
         found.append(Action("study", "", ("study", STUDY, *pages, "--out", out), out))
     return found
+
+
+def _folders(systems: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Names of the systems as those of folders, with a number where one is taken."""
+    found: list[str] = []
+    for system in systems:
+        name = first = slug(system["name"])
+        number = 2
+        while name in found:
+            name, number = f"{first}-{number}", number + 1
+        found.append(name)
+    return found
+
+
+def result_titles(study: Mapping[str, Any]) -> dict[str, str]:
+    """The systems of folders of results by the folders' names, as `computations` calls them."""
+    systems = study.get("system", [])
+    named = list(zip(systems, _folders(systems), strict=True))
+    return {f"{kind}-{name}": one["name"] for kind in ("report", "rules") for one, name in named}
 
 
 def export(project: Project, form: str) -> Action:

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import threading
 import time
+import traceback
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -18,7 +19,8 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
 from mitsuba_cfs.interpreter import own_paths, own_python
 from scenes.app.actions import Action
-from scenes.app.project import LOGS, Project
+from scenes.app.project import JOURNAL, LOGS, Project
+from scenes.user_errors import user_message
 
 KEPT = 400  # lines of a command that the page shows
 ENDED = 80  # of those of a command that has ended
@@ -158,27 +160,36 @@ class Jobs:
             self._run(job)
 
     def _run(self, job: Job) -> None:
-        log = self._project.folder / LOGS / f"{time.strftime('%Y%m%d-%H%M%S')}-{job.number}.txt"
+        """Run a command to its end; whatever happens, the next one can run."""
         try:
-            process = self._start(job.action)
-        except OSError as error:
+            code = self._ended(job)
+            if code == 0:
+                self.on_done(job.action)
+        except Exception as error:
+            code = 1
+            message = user_message(error)
+            if message is None:
+                traceback.print_exc()
             with self._changed:
-                job.lines.append(f"error: the command cannot be started: {reason(error)}")
-                self._end(job, 1)
-            return
+                job.lines.append(f"error: {message or error!r}")
         with self._changed:
-            self._process = process
-            if self._closed:
-                _interrupt(process)
-        with process, log.open("w", encoding="utf-8") as file:
+            self._process = None
+            self._end(job, code)
+
+    def _ended(self, job: Job) -> int:
+        """The exit code of a command, whose output is shown and logged."""
+        folder = self._project.folder / LOGS
+        folder.mkdir(exist_ok=True)
+        log = folder / f"{time.strftime('%Y%m%d-%H%M%S')}-{job.number}.txt"
+        with log.open("w", encoding="utf-8") as file, self._start(job.action) as process:
+            with self._changed:
+                self._process = process
+                if self._closed:
+                    _interrupt(process)
             file.write(f"$ {job.action.text}\n")
             for line in process.stdout or ():
                 self._take(job, line.rstrip("\n"), file)
-        if process.returncode == 0:
-            self.on_done(job.action)
-        with self._changed:
-            self._process = None
-            self._end(job, process.returncode)
+        return process.returncode
 
     def _start(self, action: Action) -> subprocess.Popen[str]:
         environment = own_paths() | {"CFS_PROGRESS": "json", "COLUMNS": "100", "NO_COLOR": "1"}
@@ -207,13 +218,15 @@ class Jobs:
         job.ended, job.code = time.time(), code
         job.state = DONE if code == 0 else STOPPED if stopped or code == INTERRUPTED else FAILED
         seconds = round(job.ended - job.started, 1)
-        self._project.record(
-            {
-                "command": ["cfs", *job.action.command], "kind": job.action.kind,
-                "title": job.action.title, "started": round(job.started), "seconds": seconds,
-                "state": job.state, "code": code,
-            }
-        )  # fmt: skip
+        line = {
+            "command": ["cfs", *job.action.command], "kind": job.action.kind,
+            "title": job.action.title, "started": round(job.started), "seconds": seconds,
+            "state": job.state, "code": code,
+        }  # fmt: skip
+        try:
+            self._project.record(line)
+        except OSError as error:
+            job.lines.append(f"{JOURNAL} cannot be written: {reason(error)}")
         self._note()
 
 

@@ -14,11 +14,12 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
+import threading
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -28,6 +29,7 @@ from bim.ifc.corrections import corrections_file, read_corrections
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import json_text, reason, write_text
 from scenes.input_files import read_weather
+from scenes.result_folder import remove_results
 from scenes.toml_file import read_table
 
 INPUTS, RESULTS, LOGS = "inputs", "results", "log"
@@ -132,7 +134,7 @@ def _lines(table: Mapping[str, Any], place: tuple[str, ...]) -> list[str]:
 
 
 def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json_text(name)
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _value(name)
 
 
 def _value(value: Any) -> str:
@@ -140,9 +142,22 @@ def _value(value: Any) -> str:
         return "[" + ", ".join(map(_value, value)) + "]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
-    if isinstance(value, str | bool | int | float):
+    if isinstance(value, float):
+        return repr(value)  # inf and nan too
+    if isinstance(value, str | bool | int):
         return json_text(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return str(value)  # a date
+
+
+def _alone(method: Callable[..., Any]) -> Callable[..., Any]:
+    """A method of a project that reads its files, changes them and writes them, one at a time."""
+
+    @wraps(method)
+    def locked(self: Project, *args: Any) -> Any:
+        with self.lock:
+            return method(self, *args)
+
+    return locked
 
 
 class Project:
@@ -151,6 +166,7 @@ class Project:
     def __init__(self, folder: Path) -> None:
         """Make the folder where there is none; `DataError` where it cannot be."""
         self.folder = folder.absolute()
+        self.lock = threading.RLock()  # requests and the thread of the commands change files
         try:
             for name in (INPUTS, RESULTS, LOGS):
                 (self.folder / name).mkdir(parents=True, exist_ok=True)
@@ -169,6 +185,7 @@ class Project:
                     found.append(ProjectFile(place, kind_of(path), path.stat().st_size))
         return found
 
+    @_alone
     def take(self, part: Path, name: str) -> ProjectFile:
         """Put an uploaded file into its place and into the study.
 
@@ -186,6 +203,9 @@ class Project:
         except DataError as error:
             named.unlink()
             raise DataError(error.message, file=name, field=error.field) from None
+        except BaseException:
+            named.unlink()
+            raise
         size = named.stat().st_size
         named.replace(target)
         file = ProjectFile(target.relative_to(self.folder).as_posix(), kind, size)
@@ -202,7 +222,8 @@ class Project:
                 both = all(path.lower().endswith(ifc) for path in (*files, file.path))
                 self._set_building(study, [*files, file.path] if both else [file.path])
         elif file.kind == "weather":
-            study["climate"] = [{"name": Path(file.path).stem, "weather": file.path}]
+            entry = {"name": Path(file.path).stem, "weather": file.path}
+            study["climate"] = [entry, *study.get("climate", [])[1:]]
         elif file.kind == "system":
             systems = study.setdefault("system", [])
             if all(one.get("bsdf") != file.path for one in systems):
@@ -214,6 +235,7 @@ class Project:
             around += [file.path] if file.path not in around else []
         self.write_study(study)
 
+    @_alone
     def remove(self, path: str) -> None:
         """Remove an input file, and its entries of the study.
 
@@ -276,6 +298,7 @@ class Project:
         """The building's files, relative to the project."""
         return self._building(self.study())
 
+    @_alone
     def change(self, wanted: Mapping[str, Any]) -> None:
         """Change rooms, systems, title, loads and uses as the page states them.
 
@@ -343,9 +366,9 @@ class Project:
             (self.folder / OPERATION).unlink(missing_ok=True)
             study.pop("operation", None)
         for one in study.get("system", []):
-            if Path(one.get("operation", "")).name.startswith(OPERATED):
-                path = self.folder / one["operation"]
-                kept = {k: v for k, v in read_table(path).items() if k in ("system", "control")}
+            path = self.folder / one.get("operation", "")
+            if path.parent == self.folder / INPUTS and path.name.startswith(OPERATED):
+                kept = {k: v for k, v in read_table(path).items() if k not in ("loads", "gains")}
                 write_text(path, WRITTEN + toml_text(kept | operation))
 
     def _change_uses(self, _study: dict[str, Any], value: Any) -> None:
@@ -408,6 +431,7 @@ class Project:
         path = self.folder / USES
         return dict(read_table(path).get("rooms", {})) if path.is_file() else {}
 
+    @_alone
     def use_made(self, made: MadeSystem) -> None:
         """Take a system as a variant; one of several files moves between them, by glare."""
         study = self.study()
@@ -456,11 +480,8 @@ class Project:
         return [path.relative_to(self.folder).as_posix() for path in paths][:EXPORTED]
 
     def clear(self, name: str) -> None:
-        """Remove a folder of results that this program wrote."""
-        folder = self.folder / RESULTS / plain_name(name)
-        if not (folder / "cfs-results.json").is_file() or folder.is_symlink():
-            raise DataError("is no folder of results of this project", file=name)
-        shutil.rmtree(folder)
+        """Remove results that this program wrote; files of others in their folder stay."""
+        remove_results(self.folder / RESULTS / plain_name(name))
 
     def record(self, line: Mapping[str, Any]) -> None:
         """Append a line to the journal of commands."""

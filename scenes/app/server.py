@@ -40,7 +40,6 @@ from scenes.app.project import (
     MadeSystem,
     Project,
     plain_name,
-    slug,
 )
 from scenes.app.variants import answers, variants
 from scenes.fenestration.library import Sheet, glazing_entry, library, shade_entry, sheets
@@ -241,9 +240,9 @@ class AppServer:
         )
         gains = operation.get("gains", {})
         systems = study.get("system", [])
-        results = self._project.results()
+        results, titles = self._project.results(), actions.result_titles(study)
         for result in results:
-            result["title"] = _result_title(result["name"], systems)
+            result["title"] = _result_title(result["name"], titles)
             pages = [result["pages"].get(name) for name in ("report", "dossier")]
             result["answers"] = [
                 text for page in pages if page for text in answers(self._project.folder / page)
@@ -334,8 +333,9 @@ class AppServer:
         return None
 
     def _use_made(self, action: actions.Action) -> None:
-        for made in self._made.pop(action.out, ()):
+        for made in self._made.get(action.out, ()):
             self._project.use_made(made)
+        self._made.pop(action.out, None)
 
     async def _demo(self, _: Request) -> Any:
         """Copy the demo's office and weather into the project."""
@@ -423,11 +423,10 @@ class AppServer:
         return None
 
 
-def _result_title(folder: str, systems: Sequence[Mapping[str, Any]]) -> str:
+def _result_title(folder: str, titles: Mapping[str, str]) -> str:
     """The system that a folder of results is of, as the page names it."""
     kind, _, rest = folder.partition("-")
-    names = {slug(one["name"]): one["name"] for one in systems}
-    return str(names.get(rest, rest.replace("-", " "))) if kind in ("report", "rules") else ""
+    return titles.get(folder, rest.replace("-", " ")) if kind in ("report", "rules") else ""
 
 
 def _sheet_facts(sheet: Sheet) -> dict[str, Any]:

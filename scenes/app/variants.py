@@ -25,7 +25,7 @@ def variants(project: Project, language: str = "en") -> dict[str, Any] | None:
     """Rooms by systems with their key figures; None before a comparison.
 
     Returns: `columns` with label, unit, digits, meaning and which way is better; `rows` with room,
-        system, error and values; `quick` and `stale`: whether study file or inputs are newer.
+        system, error and values; `quick`: whether it is a preview.
     """
     folder = project.folder / RESULTS / "comparison"
     table = folder / "results.csv"

@@ -183,8 +183,10 @@ def _columns(
             try:
                 values[name].append(float(row[name]))
             except (TypeError, ValueError):
+                values[name].append(np.nan)
+            if not np.isfinite(values[name][-1]):
                 message = f"{row[name]!r} is not a number"
-                raise DataError(message, file=path, element=f"line {number}", field=name) from None
+                raise DataError(message, file=path, element=f"line {number}", field=name)
     return {name: np.array(column) for name, column in values.items()}
 
 

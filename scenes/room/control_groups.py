@@ -32,7 +32,7 @@ def control_groups(space: Space, control: ControlTable | None = None) -> Control
     Entries of `group` come first, in their order, then the other windows: facades by their area,
     single windows by their position. The order of the windows in the file does not matter.
 
-    Raises: `DataError` for a seat outside the room.
+    Raises: `DataError` for a seat outside the room, or groups that plans cannot follow together.
     """
     control = control or ControlTable()
     facades = _facades(space)
@@ -54,6 +54,11 @@ def control_groups(space: Space, control: ControlTable | None = None) -> Control
         names.append(_name(windows, table, control.groups))
         rules.append(control.rule_of(table))
         places.append("control" if table is None else f"control.group.{key[1]}")
+    for rule, place in zip(rules, places, strict=True):
+        for name in ("limit_dgp", "seat", "looks_deg") if rule.rule == "predictive" else ():
+            if getattr(rule, name) != getattr(rules[0], name):
+                message = '"predictive" has one for all groups of a room'
+                raise DataError(message, element=space.label, field=f"{place}.{name}")
     leaves = [(leaf, p) for rule, p in zip(rules, places, strict=True) for leaf in rule.leaves]
     for leaf, place in leaves:
         if leaf.seat is not None and not in_room(space, np.array([leaf.seat]))[0]:

@@ -200,7 +200,7 @@ class ControlRun:
             tables = year.room.operation
             self._stepped = SteppedZone(
                 year.zone.zone, climate(year.room.weather),
-                year.combinations[:, year.room.control.number],
+                year.of_panes(year.combinations),
                 step_s=year.room.options.heat_step_s,
                 options=BalanceOptions(terrain="suburbs" if tables is None else tables.terrain),
             )  # fmt: skip

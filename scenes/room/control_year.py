@@ -8,7 +8,7 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods.glare import hourly_glare
@@ -100,6 +100,8 @@ class ControlYear:
             if states >= max(self.counts):
                 raise ValueError(f"state {states}: expected 0 to {max(self.counts) - 1}")
         else:
+            if not isinstance(states, Sequence | np.ndarray) or np.ndim(states) != 1:
+                raise ValueError(f"expected a state, one of each group, or names, got {states!r}")
             of_all = list(states)
             if len(of_all) != len(self.groups):
                 raise ValueError(f"{len(of_all)} states for {len(self.groups)} groups")
@@ -124,6 +126,15 @@ class ControlYear:
     def of_windows(self, states: Sequence[int]) -> StateArray:
         """States of the window groups [G] of those of the control groups [N]."""
         return np.asarray(states, dtype=np.int64)[self.room.windows.control]
+
+    def of_panes(self, states: ArrayLike) -> StateArray:
+        """States of the zone's windows [..., W] of those of the control groups [..., N].
+
+        A window with fewer states is in its last.
+        """
+        most = np.array([len(w.states) - 1 for w in self.zone.zone.windows], dtype=np.int64)
+        chosen = np.asarray(states, dtype=np.int64)[..., self.room.control.number]
+        return np.minimum(chosen, most)
 
     def sensors_lx(self, states: tuple[int, ...]) -> NDArray[np.float32]:
         """Illuminance of the work plane's sensors in the lit hours [S, L] [lx]."""

@@ -452,11 +452,27 @@ class ControlTable(ShadingRule):
 
     @model_validator(mode="after")
     def _predicts_all(self) -> ControlTable:
-        rules = [rule for _, rule in self.rules]
-        ahead = [rule for rule in rules if any(r.rule == "predictive" for r in rule.leaves)]
-        if ahead and any(rule.rule != "predictive" for rule in rules):
-            raise ValueError('rule: "predictive" plans all groups of a room together, and alone')
+        fault = self.plan_fault
+        if fault is not None:
+            place, message = fault
+            raise ValueError(f"{place.removeprefix('control.')}: {message}")
         return self
+
+    @property
+    def plan_fault(self) -> tuple[str, str] | None:
+        """The path of the key that the plans of all groups together cannot follow, and why."""
+        if not any(leaf.rule == "predictive" for _, rule in self.rules for leaf in rule.leaves):
+            return None
+        for place, rule in self.rules:
+            if rule.rule != "predictive":
+                return (
+                    f"{place}.rule",
+                    '"predictive" plans all groups of a room together, and alone',
+                )
+            for key in ("open_delay_h", "hold_h"):
+                if getattr(rule, key):
+                    return f"{place}.{key}", 'the rule "predictive" does not wait: leave it out'
+        return None
 
     def rule_of(self, group: GroupTable | None) -> ShadingRule:
         """The rule of an entry of `group`; None: of the windows that no entry names."""
@@ -587,6 +603,9 @@ class OperationTables(TomlTable):
 
     def control_fault(self, states: int) -> tuple[str, str] | None:
         """The path of the key that does not fit windows with `states` states, and the fault."""
+        planned = self.control.plan_fault  # an entry of `rooms` brings groups of its own
+        if planned is not None:
+            return planned
         tilted = any(one.tilt_deg is not None for one in self.system)
         for place, rule in self.control.rules:
             fault = rule.fault(states, self.schedules)

@@ -137,17 +137,13 @@ def predicted_hours(
     """The reduced zone of a room, and what acts on it in each combination of states, no glare."""
     room = year.room
     hours, zone = OperationHours(tables, room.weather), year.zone.zone
-    windows = year.combinations[:, room.control.number]
+    windows = year.of_panes(year.combinations)
     sun, daylight = [], []
     dimming = tables.gains.dimming
     areas = np.array([window.area for window in zone.windows])
-    for states in map(tuple, year.combinations.tolist()):
+    for states, chosen in zip(map(tuple, year.combinations.tolist()), windows, strict=True):
         solar, *_ = year.sun_by_states.of(year.of_windows(states).tolist())
-        chosen = np.array(states, dtype=np.int64)[room.control.number]
-        systems = [
-            window.states[min(j, len(window.states) - 1)]
-            for window, j in zip(zone.windows, chosen, strict=True)
-        ]
+        systems = [window.states[j] for window, j in zip(zone.windows, chosen, strict=True)]
         outer, middle, inner = np.array([one.inward_shares() for one in systems]).reshape(-1, 3).T
         absorbed = solar.absorbed_outer * outer + solar.absorbed_inner * inner
         if solar.absorbed_middle is not None:

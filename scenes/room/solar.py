@@ -247,7 +247,9 @@ class SunByStates:
         windows = self._room.windows
         for g, j in enumerate(state):
             pair = windows.neighbours(g, j)
-            if pair is not None:  # a tilt between two: the mean of the sun in these
+            if pair is not None and self._alike(
+                g, j, *pair[:2]
+            ):  # a tilt between two: the mean of the sun in these
                 low, high, share = pair
                 first, second = (self.of([*state[:g], k, *state[g + 1 :]]) for k in (low, high))
                 return _mean_sun(first, second, share)
@@ -255,6 +257,12 @@ class SunByStates:
         if key not in self._known:
             self._known[key] = self._balanced(state)
         return self._known[key]
+
+    def _alike(self, g: int, *states: int) -> bool:
+        """Whether some states of a window group have nodes for the same layers."""
+        of = self._zone.thermals[g]
+        shades = [of[min(j, len(of) - 1)].fenestration.shade for j in states]
+        return len({None if shade is None else shade.exterior for shade in shades}) == 1
 
     def _balanced(self, state: Sequence[int]) -> SunOfYear:
         heats = _in_states(self._zone.thermals, state)

@@ -168,7 +168,7 @@ def _factors(room: RoomInputs, light: RoomLight) -> tuple[list[list[SpectralFact
             if id(system) in known:
                 continue
             known[id(system)] = system.spectrum or SpectralFactor.neutral()
-            if system.spectrum is None:
+            if system.spectrum is None and system.between is None:
                 notes.append(
                     Note(
                         "{system}: its spectrum is not known; it transmits all wavelengths "

@@ -8,7 +8,7 @@ from bim.ifc.control import StoredGroup, read_control
 from bim.model import Building
 from mitsuba_cfs.errors import DataError
 from scenes.room.control_groups import control_groups
-from scenes.room.operation_tables import ControlTable, OperationTables, ShadingRule
+from scenes.room.operation_tables import ControlTable, OperationTables
 from scenes.toml_file import validated
 
 
@@ -45,10 +45,10 @@ def stored_control(path: Path) -> ControlTable:
         raise DataError(message, file=path)
     tables = [
         {"name": one.name, "windows": list(one.windows)}
-        | {key: value for key, value in one.rule.items() if key in ShadingRule.model_fields}
+        | {key: value for key, value in one.rule.items() if key != "predictive"}
         for one in groups
     ]
     control: dict[str, object] = {"group": tables}
     if groups[0].rule.get("rule") == "predictive":
-        control |= {k: v for k, v in groups[0].rule.items() if k in ControlTable.model_fields}
+        control |= {k: v for k, v in groups[0].rule.items() if k in ("rule", "predictive")}
     return validated(ControlTable, control, path)

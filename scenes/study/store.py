@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.files import json_text, opened_arrays, write_bytes, write_table, write_text
 from mitsuba_cfs.matrices.cache import UNREADABLE
 from mitsuba_cfs.progress import Progress, silent
-from scenes.result_folder import EXPLORER, ResultFolder
+from scenes.result_folder import CASES, EXPLORER, ResultFolder
 from scenes.study.plan import Case, requirements
 from scenes.user_errors import one_line, user_message
 from scenes.workers import Tasks
@@ -65,7 +65,7 @@ class Store:
 
     def open(self) -> None:
         """Make the folder, for cases to be kept in."""
-        self._results.checkpoints("cases")
+        self._results.checkpoints(CASES)
 
     def load(self, key: str) -> CaseResult | None:
         """The finished case of that key; None where there is none, or none that can be read."""
@@ -110,7 +110,7 @@ class Store:
         return self._results.checkpoints(EXPLORER)
 
     def _place(self, key: str) -> Path:
-        return self.folder / "cases" / f"{key}.npz"
+        return self.folder / CASES / f"{key}.npz"
 
 
 class Compute(Protocol):

@@ -30,6 +30,8 @@ from scenes.room.schedules import Hours
 from scenes.toml_file import OutdoorTable, ReadTable, TomlTable, read_options, read_table, validated
 
 OF_THE_GRID = ("method", "annual_glare")
+# Options of `cfs run` alone: a study has no figures of them
+OF_A_RUN = ("spectral", "channels")
 # Options that mean what a key of an operation file means
 OF_TABLES = {
     "occupied": Hours,
@@ -119,11 +121,11 @@ class AutoTable(_Table):
 
 
 def _options_table() -> type[BaseModel]:
-    """The options of a room without those that the study has keys for; no number is negative."""
+    """The options of a room without those that a study has keys for or no figures of."""
     kinds = named_types()
     columns: dict[str, Any] = {}
     for name, default in RoomOptions().named().items():
-        if name not in OF_THE_GRID:
+        if name not in (*OF_THE_GRID, *OF_A_RUN):
             kind = OF_TABLES.get(name, kinds[name])
             if name in CHOICES:
                 kind = Literal[CHOICES[name]]

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from mitsuba_cfs.errors import DataError
 from scenes.app import actions
 from scenes.app.jobs import Jobs
 from scenes.app.project import Project
@@ -94,3 +95,26 @@ def test_the_same_command_waits_once(project, jobs) -> None:
     jobs.add([check])
     jobs.add([check])
     assert len(jobs.facts()) == 2
+
+
+@pytest.mark.parametrize("fault", ["system", "log", "journal"])
+def test_a_fault_at_the_end_of_a_command_lets_the_next_one_run(project, jobs, fault) -> None:
+    def wrong(action) -> None:
+        raise DataError("is no TOML", file=project.folder / "study.toml")
+
+    check = actions.check(project)
+    if fault == "system":
+        jobs.on_done = wrong
+    elif fault == "log":
+        shutil.rmtree(project.folder / "log")
+    else:
+        (project.folder / "commands.jsonl").mkdir()
+    jobs.add([check])
+    until(lambda: not jobs.busy)
+    job = jobs.facts()[0]
+    assert job["state"] == ("failed" if fault == "system" else "done")
+    assert (fault != "system") or job["lines"][-1].startswith("error: ")
+    jobs.on_done = lambda action: None
+    jobs.again(1)
+    until(lambda: not jobs.busy)
+    assert jobs.facts()[1]["state"] == "done"

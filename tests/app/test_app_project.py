@@ -18,6 +18,7 @@ from scenes.comply.uses import read_uses
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
 from scenes.fenestration.library import library, sheets, write_library_system
+from scenes.result_folder import ResultFolder
 from scenes.room.operation import read_operation
 from scenes.study.files import check_files
 from scenes.study.study_file import read_study
@@ -45,6 +46,7 @@ def test_toml_comes_back_as_it_was() -> None:
         "options": {"a b": 1, "seed": 0},
         "room": [{"name": "r", "spaces": ["1", "2"]}, {"name": "s"}],
         "control": {"rule": "glare", "zone": [{"x": [[0, 1]]}]},
+        "rooms": {"\U0001f600\x7f": "office"}, "radius": float("inf"),
     }  # fmt: skip
     assert tomllib.loads(toml_text(table)) == table
 
@@ -93,6 +95,23 @@ def test_what_the_page_does_not_know_stays(project) -> None:
     assert study.room[0].furniture
     (command,) = [one.command for one in actions.computations(project, {"report": True})][:1]
     assert "--furniture" in command and "sensor_spacing=0.7" in command
+
+
+def test_tables_of_the_user_and_further_climates_stay(project) -> None:
+    project.use_made(MadeSystem("moving", ("inputs/glazing.xml", "inputs/venetian_blind.xml")))
+    moving = project.folder / "inputs" / "controlled venetian_blind.toml"
+    moving.write_text(moving.read_text() + "\n[ventilation]\nopen_above_c = 24\n")
+    away = project.folder.parent / "controlled away.toml"
+    away.write_text(moving.read_text())
+    study = project.study()
+    study["system"].append({"name": "away", "operation": "../controlled away.toml"})
+    study["climate"].append({"name": "second", "weather": "second.epw"})
+    project.write_study(study)
+    project.change({"loads": {"heating_c": 20}})
+    assert "open_above_c = 24" in moving.read_text() and "heating_c" in moving.read_text()
+    assert "heating_c" not in away.read_text()
+    take(project, WEATHER)
+    assert [one["name"] for one in project.study()["climate"]][1:] == ["second"]
 
 
 def test_set_points_and_gains_are_an_operation_file(project) -> None:
@@ -194,6 +213,36 @@ def test_what_is_missing_is_named(tmp_path) -> None:
 def test_slugs_are_names_of_folders() -> None:
     assert slug("Blind / 45°, é") == "blind-45-é"
     assert slug("../..") == "as-is"
+
+
+def test_variants_with_names_alike_have_folders_of_their_own(project) -> None:
+    bsdf = "inputs/glazing.xml"
+    names = ["Blind 45", "Blind 45°", "blind-45", "Blind 45 2"]
+    project.change({"systems": [{"name": name, "bsdf": bsdf} for name in names]})
+    found = actions.computations(project, {"report": True, "standards": ["en17037"]})
+    assert len({one.out for one in found}) == 8
+    titles = actions.result_titles(project.study())
+    assert [titles[Path(one.out).name] for one in found] == [one.title for one in found]
+
+
+def test_removed_results_leave_the_files_of_others(project) -> None:
+    folder = project.folder / "results" / "report-a"
+    with ResultFolder(folder, "run").replaced() as part:
+        (part / "report.html").write_text("x")
+        (part / "room").mkdir()
+        (part / "room" / "daylight.csv").write_text("x")
+    project.clear("report-a")
+    assert not folder.exists()
+    with ResultFolder(folder, "run").replaced() as part:
+        (part / "report.html").write_text("x")
+    (folder / "my notes.txt").write_text("keep")
+    project.clear("report-a")
+    assert {one.name for one in folder.iterdir()} == {"my notes.txt", "cfs-results.json"}
+    assert not project.results()
+    with ResultFolder(folder, "run").replaced() as part:  # the command may write there again
+        (part / "report.html").write_text("x")
+    with pytest.raises(DataError, match="no folder of results"):
+        project.clear("..")
 
 
 def test_the_library_has_the_glazings_of_the_options_and_a_sheet_for_each_pair() -> None:

@@ -210,3 +210,43 @@ def test_a_study_takes_functions_and_computes_them_anew(variant, tmp_path) -> No
 def test_a_function_needs_the_states_of_an_operation() -> None:
     with pytest.raises(ValueError, match="control: needs an operation"):
         cfs.simulate(TWO.room(TWO.spaces[0].name), str(VENETIAN_BLIND), str(WEATHER), control=max)
+
+
+@pytest.mark.parametrize("returned", [None, 1.0, "2"])
+def test_what_is_no_state_is_named_with_its_hour(inputs, returned) -> None:
+    with pytest.raises(ControlError, match="control at 01-01 00:30: expected a state, one of each"):
+        states_of(inputs(lambda hour: returned))
+
+
+@pytest.fixture
+def unequal(glass, milk, blind, weather, skies):
+    """A room whose windows move together, the second with two states of three."""
+
+    def of(function, **control) -> RoomInputs:
+        south, north = TWO.spaces[0].windows
+        tables = {"control": {"groups": "room", **control}, "loads": {"heating_c": 20.0}}
+        return room_inputs(
+            TWO, TWO.spaces[0], {south.guid: (glass, milk, blind), north.guid: (glass, milk)},
+            weather, FEW, operation=OperationTables.model_validate(tables), skies=skies,
+            controller=function,
+        )  # fmt: skip
+
+    return of
+
+
+def test_a_window_with_fewer_states_is_in_its_last_in_the_balance(unequal) -> None:
+    read = []
+
+    def own(hour: ControlHour) -> int:
+        if hour.index < 3:
+            read.append(hour.air_c)
+        return 2
+
+    assert states_of(unequal(own)).max() == 2
+    assert np.isfinite(read).all()
+
+
+def test_plans_are_made_of_windows_with_fewer_states(unequal) -> None:
+    room = unequal(None, rule="predictive", predictive={"horizon_h": 2, "glare": "Ev"})
+    states = states_of(room)
+    assert 0 <= states.min() and states.max() <= 2

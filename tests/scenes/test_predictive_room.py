@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.light import with_pictures
 from scenes.heat.study_file import StudyFile
+from scenes.room.control_groups import control_groups
 from scenes.room.control_hour import ControlHour, controlled_states
 from scenes.room.control_year import ControlYear
 from scenes.room.glare import rating_of
@@ -104,3 +106,21 @@ def test_plans_are_of_all_groups_and_need_light() -> None:
     study = {"weather": "a.epw", "building": "a.ifc", "control": {"rule": "predictive"}}
     with pytest.raises(ValueError, match="is of `cfs run`"):
         StudyFile.model_validate(study)
+
+
+def test_keys_that_plans_do_not_follow_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"hold_h: the rule .* does not wait"):
+        OperationTables.model_validate({"control": {"rule": "predictive", "hold_h": 2.0}})
+    (space,) = TWO.spaces
+    group = {"windows": [space.windows[1].guid], "limit_dgp": 0.3}
+    tables = {"control": {"rule": "predictive", "group": [group]}}
+    with pytest.raises(DataError, match=r"control\.limit_dgp: .* one for all groups of a room"):
+        control_groups(space, OperationTables.model_validate(tables).control)
+
+
+def test_groups_of_an_entry_of_rooms_are_planned_with_the_others() -> None:
+    entry = {"spaces": ["A"], "control": {"group": [{"windows": ["w"], "rule": "glare"}]}}
+    tables = OperationTables.model_validate({"control": {"rule": "predictive"}, "rooms": [entry]})
+    faults = [one.control_fault(3) for one in tables.variants]
+    assert faults[0] is None and faults[1] is not None
+    assert faults[1][0] == "control.group.0.rule" and "plans all groups" in faults[1][1]

@@ -7,7 +7,15 @@ from dataclasses import fields
 import pytest
 
 from mitsuba_cfs.methods.scene import Sampling
-from scenes.room.options import NAMES, Occupancy, Outputs, RoomOptions, SensorGrid, named_types
+from scenes.room.options import (
+    CHOICES,
+    NAMES,
+    Occupancy,
+    Outputs,
+    RoomOptions,
+    SensorGrid,
+    named_types,
+)
 
 # of `Sampling`, and no choice of a user: they follow from others, or from the machine
 FOLLOW = {("sampling", "picture_samples"), ("sampling", "outdoor_samples"), ("sampling", "memory")}
@@ -25,8 +33,9 @@ def test_a_choice_by_its_name_comes_back_by_it() -> None:
     full = RoomOptions()
     for name, value in full.named().items():
         if isinstance(value, int | float) and not isinstance(value, bool):
-            changed = full.changed(**{name: value + 1})
-            assert changed.named() == full.named() | {name: value + 1}
+            other = CHOICES[name][0] if name in CHOICES else value + 1
+            changed = full.changed(**{name: other})
+            assert changed.named() == full.named() | {name: other}
     assert RoomOptions.of(**full.named()) == full
     assert set(named_types()) == set(NAMES)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -24,12 +25,14 @@ from scenes.cli import cfs
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system
 from scenes.fenestration.thermal_file import read_spectrum
+from scenes.fenestration.tilts import tilt_states
 from scenes.input_files import read_weather
 from scenes.room.light import room_light
 from scenes.room.options import RoomOptions
 from scenes.room.room import inputs_of_room
-from scenes.room.spectral import room_spectral
+from scenes.room.spectral import _factors, room_spectral
 from scenes.room.windows import in_all_windows
+from tests.scenes.test_tilts import family
 
 FEW = {
     "method": "three-phase", "sensor_samples": 64, "patch_samples": 64, "sky_subdivision": 1,
@@ -125,3 +128,19 @@ def test_path_tracing_has_no_spectrum() -> None:
         RoomOptions.of(spectral=True, method="point-in-time")
     with pytest.raises(ValueError, match="channels: expected one of"):
         RoomOptions.of(channels=4)
+
+
+def test_a_spectrum_that_is_no_number_is_refused(tmp_path) -> None:
+    file = tmp_path / "shade.csv"
+    file.write_text("wavelength_nm,transmittance\n380,0.1\n500,nan\n780,0.2\n", "utf-8")
+    with pytest.raises(DataError, match=r"line 3.*transmittance: 'nan' is not a number"):
+        read_spectrum(file)
+
+
+def test_tilts_between_systems_are_not_noted_beside_these() -> None:
+    states = tilt_states(family(), 10.0)
+    room = SimpleNamespace(windows=SimpleNamespace(systems=[states]))
+    light = SimpleNamespace(light=SimpleNamespace(systems=[states]))
+    factors, notes = _factors(room, light)
+    assert len(factors[0]) == len(states) == 8
+    assert [note.split(":")[0] for note in notes] == ["milk 0", "milk 40", "milk 70"]

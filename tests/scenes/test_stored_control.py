@@ -128,3 +128,46 @@ def test_what_a_model_cannot_hold_or_lacks_is_refused(tmp_path, capsys) -> None:
     (tmp_path / "both.toml").write_text('control_of = "a.ifc"\n[control]\nrule = "always"\n')
     with pytest.raises(DataError, match=r"control_of: the file has"):
         read_operation(tmp_path / "both.toml")
+
+
+def test_a_name_may_begin_as_a_list_does(written, tmp_path) -> None:
+    model = written("[control]\nrule = 'always'\n")
+    window = ifcopenshell.open(str(model)).by_type("IfcWindow")[0].GlobalId
+    group = StoredGroup("[A] south", (window,), {"rule": "always"})
+    write_control(model, tmp_path / "named.ifc", [group])
+    assert read_control(tmp_path / "named.ifc") == (group,)
+
+
+def test_a_key_that_no_rule_has_is_refused(written, tmp_path) -> None:
+    model = written("[control]\nrule = 'always'\n")
+    window = ifcopenshell.open(str(model)).by_type("IfcWindow")[0].GlobalId
+    out = tmp_path / "other.ifc"
+    write_control(model, out, [StoredGroup("S", (window,), {"rule": "always", "close_over": 3})])
+    with pytest.raises(DataError, match=r"other\.ifc: .*close_over"):
+        taken(out, tmp_path)
+
+
+def test_a_property_without_a_value_is_named(written, tmp_path) -> None:
+    model = written("[control]\nrule = 'always'\n")
+    window = ifcopenshell.open(str(model)).by_type("IfcWindow")[0].GlobalId
+    out = tmp_path / "other.ifc"
+    write_control(model, out, [StoredGroup("S", (window,), {"rule": "always"})])
+    file = ifcopenshell.open(str(out))
+    (rule,) = [p for p in file.by_type("IfcPropertySingleValue") if p.Name == "rule"]
+    rule.NominalValue = None
+    file.write(str(out))
+    with pytest.raises(DataError, match=r"other\.ifc: S: rule: has no value"):
+        taken(out, tmp_path)
+
+
+def test_plans_of_a_room_without_a_seat_do_not_take_that_of_another(tmp_path, written) -> None:
+    model = written("[control]\nrule = 'always'\n")
+    first, second = (w.GlobalId for w in ifcopenshell.open(str(model)).by_type("IfcWindow")[:2])
+    plan = {"rule": "predictive", "predictive": {}}
+    groups = [
+        StoredGroup("A", (first,), plan | {"seat": [1.0, 1.0, 1.2]}),
+        StoredGroup("B", (second,), plan),
+    ]  # fmt: skip
+    write_control(model, tmp_path / "plans.ifc", groups)
+    control = taken(tmp_path / "plans.ifc", tmp_path).tables.control
+    assert [control.rule_of(one).seat for one in control.group] == [(1.0, 1.0, 1.2), None]

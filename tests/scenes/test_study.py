@@ -68,6 +68,9 @@ WRONG = {
     "negative option": (
         "", BOX + SYSTEM + CLIMATE + "[options]\nsensor_spacing = -1\n", "options.sensor_spacing:",
     ),
+    "option of a run": (
+        "", BOX + SYSTEM + CLIMATE + "[options]\nspectral = true\n", "options.spectral:",
+    ),
     "no time": (
         "", BOX + SYSTEM + CLIMATE + '[auto]\ntime_budget = "soon"\n',
         "auto.time_budget: expected a time such as",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -178,3 +179,29 @@ rule = "cut-off"
     assert bare.control_fault(3)[0] == "control.slat_tilts_deg"
     assert between_tilts(*operation.systems[1:3], 0.5).tilt_deg == 5
     assert isinstance(operation.file, Path)
+
+
+def test_the_sun_of_a_pane_stays_between_a_tilt_with_a_shade_node_and_one_without(
+    variant, weather, skies
+) -> None:
+    """The state between them has no node for the sun that the first one's pane absorbs."""
+    room = room_with(tilt_states(family(), 10.0), weather, skies)
+    surfaces, outdoors = zone_surfaces(room), seasonal_outdoors(room)
+    layered = []
+    for first, *others in surfaces.thermals:
+        half = 0.5 * first.absorptances.inner
+        nodes = replace(first.absorptances, inner=half, middle=half)
+        shade = replace(first.fenestration, shade=SimpleNamespace(exterior=False))
+        two = [
+            replace(
+                one,
+                absorptances=replace(one.absorptances, middle=0.0),
+                fenestration=replace(one.fenestration, shade=None),
+            )
+            for one in others
+        ]
+        layered.append([replace(first, absorptances=nodes, fenestration=shade), *two])
+    sun = SunByStates(room, outdoors, surfaces.room, surfaces.outer, thermals=layered)
+    assert sun.of([0, 4])[0].absorbed_middle[:, 0].max() > 1
+    assert not sun.of([1, 4])[0].absorbed_middle.any()
+    assert sun.of([1, 4])[0].absorbed_inner[:, 0].max() > 1

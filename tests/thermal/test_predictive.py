@@ -177,3 +177,15 @@ def test_the_reduced_model_has_the_loads_of_the_detailed_balance() -> None:
     assert year.cooling.sum() == pytest.approx(detailed.cooling.sum(), rel=0.05)
     both = detailed.heating - detailed.cooling, year.heating - year.cooling
     assert np.corrcoef(*both)[0, 1] > 0.98
+
+
+def test_a_zone_insulated_inside_has_a_model_without_mass() -> None:
+    foam, brick = Layer(0.1, 0.03, 30.0, 1400.0), Layer(0.2, 0.8, 1800.0, 900.0)
+    wall = OpaqueSurface("wall", 12.0, (brick, foam), np.array([0.0, -1.0, 0.0]))
+    zone = Zone("z", 60.0, (wall,), infiltration_ach=0.6, loads=IdealLoads(20.0, 26.0))
+    cold = climate(24, outdoor=np.zeros(24), sky=np.zeros(24))
+    one = reduced_zone(zone, cold, np.zeros((24, 1)), np.zeros((1, 0), dtype=np.int64))
+    none = np.zeros((24, 1))
+    acts = PredictedHours(none, none, np.zeros(24), None, np.zeros(24), none)
+    assert one.mass == 0.0
+    assert predicted_year(one, acts, ahead=2).heating.min() > 0

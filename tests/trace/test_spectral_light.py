@@ -8,7 +8,7 @@ import pytest
 from mitsuba_cfs.bsdf.angular import AngularTable, specular_matrices
 from mitsuba_cfs.bsdf.spectral_factor import ANGLES, SpectralFactor
 from mitsuba_cfs.methods.light import illuminance
-from mitsuba_cfs.methods.optics import BsdfOptics
+from mitsuba_cfs.methods.optics import BetweenOptics, BsdfOptics
 from mitsuba_cfs.methods.phase_light import phase_light
 from mitsuba_cfs.methods.spectral_light import channel_irradiance, sky_spectra
 from mitsuba_cfs.sky.annual import given_sky
@@ -104,3 +104,22 @@ def test_states_are_those_of_their_hours(corner) -> None:
     for j in (0, 1):
         alone = next(channel_irradiance(light, factors, CHANNELS, np.full_like(rows, j)))
         assert mixed[:, rows[0] == j] == pytest.approx(alone[:, rows[0] == j], rel=1e-5)
+
+
+def test_a_state_between_two_others_is_their_mean_in_each_channel(corner) -> None:
+    room, groups, shade, points = corner
+    matrices = traced(room, shade, groups, points, subdivision=1, window_parts=1)
+    blue, grey = tinted(), SpectralFactor.neutral()
+    low, high = optics(blue.visible), optics(np.full(len(ANGLES), 0.3))
+    mirrored = np.full(len(ANGLES), 0.1)
+    mean = AngularTable(ANGLES, 0.9 * (0.75 * blue.visible + 0.25 * 0.3), mirrored, mirrored)
+    between = BsdfOptics(specular_matrices(mean), None, mean, BetweenOptics(low, high, 0.25))
+    light = phase_light(matrices, [[low, between, high]] * len(groups), sky())
+    both = SpectralFactor(0.75 * blue.transmittance + 0.25 * 0.3)
+    factors = [[blue, both, grey]] * len(groups)
+    own, expected = [], []
+    for found, states in ((expected, (0, 2)), (own, (1,))):
+        for j in states:
+            rows = np.full((len(groups), 4), j)
+            found.append(np.stack(list(channel_irradiance(light, factors, CHANNELS, rows))))
+    assert own[0] == pytest.approx(0.75 * expected[0] + 0.25 * expected[1], rel=1e-5)

@@ -25,7 +25,7 @@ export function fill(element, ...children) {
 
 async function answered(answer) {
   if (answer.status === 403) throw new Error(gettext("The page has lost its access: open the address that cfs app printed."));
-  const value = await answer.json();
+  const value = await answer.json().catch(() => ({}));
   if (!answer.ok) throw new Error(value.error || gettext("The program has a fault; its terminal says more."));
   return value;
 }
