@@ -35,8 +35,9 @@ def source_hash(names: frozenset[str], root: Path = ROOT) -> str:
     for name in sorted(names):
         file = _file(name, root)
         content = _installed(name).encode() if file is None else file.read_bytes()
-        if file is not None and (data := file.with_suffix(".toml")).is_file():
-            content += data.read_bytes()  # the data of the module of that name
+        for suffix in (".toml", ".csv"):  # the data of the module of that name
+            if file is not None and (data := file.with_suffix(suffix)).is_file():
+                content += data.read_bytes()
         state.update(f"{name} {len(content)};".encode() + content)
     return state.hexdigest()
 

@@ -40,7 +40,7 @@ def sensitivities() -> FloatArray:
     import colour
     from scipy.interpolate import CubicSpline
 
-    path = Path(__file__).with_name("cie_s026.csv")
+    path = Path(__file__).with_suffix(".csv")
     table = np.loadtxt(path, delimiter=",", skiprows=1)
     opic = np.maximum(CubicSpline(table[:, 0], table[:, 1:])(NANOMETRES), 0.0)
     photopic = colour.SDS_LEFS["CIE 1924 Photopic Standard Observer"]

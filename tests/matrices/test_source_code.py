@@ -109,10 +109,13 @@ def test_reports_and_commands_do_not_count(copy, unchanged, modules, file):
     assert hash_after_a_change_of(copy, file, modules) == unchanged[modules]
 
 
+DATA = (".toml", ".csv")
+
+
 def test_what_computes_is_source_alone():
     """Of data files the hash sees those with the name of a module; texts compute nothing."""
     for package in ("mitsuba_cfs", "bim", "thermal"):
         files = {p for p in (ROOT / package).rglob("*") if p.is_file()}
         files.discard(ROOT / "bim" / "report" / "catalogue.toml")
-        files -= {p for p in files if p.suffix == ".toml" and p.with_suffix(".py") in files}
+        files -= {p for p in files if p.suffix in DATA and p.with_suffix(".py") in files}
         assert {p.suffix for p in files} <= {".py", ".pyi", ".typed", ".pyc", ".nbi", ".nbc"}

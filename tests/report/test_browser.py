@@ -48,7 +48,7 @@ def test_page_works_in_a_browser(page, tmp_path, width, flags) -> None:
 @pytest.mark.parametrize(
     ("planted", "instead", "key"),
     [
-        ('const data = JSON.parse(document.getElementById("viewer-data")', "x.y(", "faults"),
+        ('cfsViewer(JSON.parse(document.getElementById("viewer-data")', "x.y(", "faults"),
         (".x-ticks i {", ".x-ticks span { left: 0 !important; } .x-ticks i {", "overlaps"),
         ("max-width: 1180px; margin: 0 auto;", "min-width: 1500px;", "scroll"),
     ],

@@ -28,7 +28,7 @@ def test_what_is_asked_of_the_windows_irradiance_is_what_its_directions_give() -
     outdoors = SeasonalOutdoors([traced(rng)], np.zeros(L, dtype=np.int64))
     skies = SimpleNamespace(solar=rng.random((P, L)).astype(np.float32), lit=np.arange(L))
     absorbed = rng.random((G, K, F + G))
-    names = "outer", "inner", "air"
+    names = "outer", "inner", "middle"
     sides = [SimpleNamespace(**{name: rng.random(K) for name in names}) for _ in range(G)]
     heats = [
         SimpleNamespace(absorptances=side, back_reflectance=back)
@@ -42,7 +42,7 @@ def test_what_is_asked_of_the_windows_irradiance_is_what_its_directions_give() -
         np.einsum("gkf,gkl->fl", absorbed, entering),
         np.stack([side.outer @ i for side, i in zip(sides, incident, strict=True)]),
         np.stack([side.inner @ i for side, i in zip(sides, incident, strict=True)]),
-        np.stack([side.air @ i for side, i in zip(sides, incident, strict=True)]),
+        np.stack([side.middle @ i for side, i in zip(sides, incident, strict=True)]),
         np.stack([AREA @ incident.sum(axis=1), entering.sum(axis=(0, 1))]),
     )
     for shares, values in zip(absorbed_shares(heats, T, AREA, absorbed), expected, strict=True):

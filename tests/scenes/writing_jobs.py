@@ -135,6 +135,9 @@ JOBS = {
         lambda _, out: ["bsdf", "thermal", VENETIAN_BLIND, "--toml", out], "out.toml"
     ),
     "bsdf generate": Job(lambda _, out: [*GENERATE, out], "out.xml"),
+    "bsdf library": Job(
+        lambda _, out: ["bsdf", "library", "--glazing", "triple low-e", "--out", out], "out.xml"
+    ),
     "bsdf interpolate": Job(_goniophotometer, "out.xml"),
     "bsdf combine": Job(
         lambda _, out: ["bsdf", "combine", VENETIAN_BLIND, VENETIAN_BLIND, "--out", out], "out.xml"
