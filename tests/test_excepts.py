@@ -25,6 +25,7 @@ BROAD = {  # module and function: why
     "scenes/workers.py: _outcome": "sends the error to the parent process, which raises it",
     "scenes/workers.py: _collected": "an error of a task is its result, which the caller raises",
     "scenes/run/outputs.py: _faults": "writes the other files of a long run, then raises",
+    "scenes/app/jobs.py: _run": "prints the fault of one command; those that wait are run",
     "scenes/cli.py: run": "one line for a user's mistake; raises everything else again",
 }
 TABLES = {  # constructors of plain dataclasses take the keys of a file that the program has written

@@ -200,14 +200,12 @@ class Project:
                 check_building_file(named)
             elif kind == "weather":
                 read_weather(named)
+            size = named.stat().st_size
+            named.replace(target)
         except DataError as error:
-            named.unlink()
             raise DataError(error.message, file=name, field=error.field) from None
-        except BaseException:
-            named.unlink()
-            raise
-        size = named.stat().st_size
-        named.replace(target)
+        finally:
+            named.unlink(missing_ok=True)
         file = ProjectFile(target.relative_to(self.folder).as_posix(), kind, size)
         self._join(file)
         return file
