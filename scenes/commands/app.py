@@ -8,27 +8,14 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason
+from scenes.commands.served_page import port_fault, served_page_options
 
 
 @click.command()
 @click.argument(
     "project", type=click.Path(file_okay=False, path_type=Path), default=Path("cfs-project")
 )
-@click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=0,
-    help="Port on the loopback address; 0: any free port.",
-)
-@click.option(
-    "--language",
-    type=click.Choice(["en", "de", "fr"]),
-    default="en",
-    show_default=True,
-    help="Language of the page; also of the reports that it asks for.",
-)
-@click.option("--no-browser", is_flag=True, help="Print the address only.")
+@served_page_options("also of the reports that it asks for")
 def command(project: Path, port: int, language: str, no_browser: bool) -> None:
     """Open a project in a browser: files, rooms, systems, computation, results.
 
@@ -54,8 +41,7 @@ def command(project: Path, port: int, language: str, no_browser: bool) -> None:
         try:
             listening.bind((LOOPBACK, port))
         except OSError as error:
-            message = f"port {port} cannot be used: {reason(error)}"
-            raise DataError(message, field="--port") from None
+            raise port_fault(port, error) from None
         number = listening.getsockname()[1]
         jobs = Jobs(folder)
         served = AppServer(folder, jobs, language=language)

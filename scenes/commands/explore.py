@@ -11,6 +11,7 @@ import click
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason, scratch_folder
+from scenes.commands.served_page import port_fault, served_page_options
 
 RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 
@@ -22,20 +23,7 @@ RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
     type=click.Path(path_type=Path),
     help="Write one folder that opens as a file, and exit.",
 )
-@click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=0,
-    help="Port on the loopback address; 0: any free port.",
-)
-@click.option(
-    "--language",
-    type=click.Choice(["en", "de", "fr"]),
-    default="en",
-    show_default=True,
-    help="Language of the page; results of a run state none.",
-)
-@click.option("--no-browser", is_flag=True, help="Print the address only.")
+@served_page_options("results of a run state none")
 def command(
     results: Sequence[Path], out: Path | None, port: int, language: str, no_browser: bool
 ) -> None:
@@ -93,7 +81,7 @@ def _serve(folder: Path, port: int, *, open_it: bool) -> None:
     try:
         running = server(folder, port)
     except OSError as error:
-        raise DataError(f"port {port} cannot be used: {reason(error)}", field="--port") from None
+        raise port_fault(port, error) from None
     with running:
         address = f"http://127.0.0.1:{running.server_port}/"
         click.echo(f"{address} until Ctrl-C")

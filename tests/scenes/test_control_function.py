@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import scenes as cfs
-from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.light import eye_illuminance, illuminance
 from scenes.demo import VENETIAN_BLIND, WEATHER
@@ -22,19 +21,9 @@ from scenes.room.room import compute_room
 from scenes.room.shading import shading_states
 from scenes.room.solar import seasonal_outdoors
 from scenes.room.windows import in_all_windows
-from tests.scenes.small_box import HOURS, SMALL
+from tests.scenes.small_box import FEW, HOURS, TWO
 from thermal.control import cut_off_angle
 
-FEW = SMALL.changed(
-    sensor_samples=256, patch_samples=256, sun_points=16, picture_size=32, picture_samples=2,
-    picture_count=1, heat_step_s=3600.0,
-)  # fmt: skip
-OPENING = {"x": 0.5, "sill": 0.9, "width": 2.0, "height": 1.5}
-TWO = shoebox(
-    3.0, 4.0, 2.8,
-    windows=(WindowRectangle(**OPENING), WindowRectangle(**OPENING, side="back")),
-    reflectance={"wall": 0.3, "floor": 0.1, "ceiling": 0.4},
-)  # fmt: skip
 TILTS = [0.0, 30.0, 60.0]
 CUT_OFF = {"rule": "cut-off", "slat_tilts_deg": TILTS, "slat_width": 0.08, "slat_spacing": 0.08}
 WARM = {"rule": "operative temperature", "close_above_c": 24.0, "open_below_c": 23.0, "state": 2}

@@ -34,19 +34,9 @@ from scenes.room.shading import (
 from scenes.room.solar import seasonal_outdoors, solar_gains
 from scenes.room.windows import in_all_windows, room_windows
 from scenes.room.zone import RoomZone, balances, zone_surfaces
-from tests.scenes.small_box import HOURS, SMALL, clear
+from tests.scenes.small_box import FEW, HOURS, TWO, clear
 from thermal.control import TemperatureCondition
 
-FEW = SMALL.changed(
-    sensor_samples=256, patch_samples=256, sun_points=16, picture_size=32, picture_samples=2,
-    picture_count=1, heat_step_s=3600.0,
-)  # fmt: skip
-OPENING = {"x": 0.5, "sill": 0.9, "width": 2.0, "height": 1.5}
-TWO = shoebox(
-    3.0, 4.0, 2.8,
-    windows=(WindowRectangle(**OPENING), WindowRectangle(**OPENING, side="back")),
-    reflectance={"wall": 0.3, "floor": 0.1, "ceiling": 0.4},
-)  # fmt: skip
 BESIDE = shoebox(
     6.0, 4.0, 2.8,
     windows=(WindowRectangle(0.5, 0.9, 2.0, 1.5), WindowRectangle(3.5, 0.9, 2.0, 1.5)),
