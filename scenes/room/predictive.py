@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from mitsuba_cfs.progress import Progress, silent
 from scenes.room.control_year import ControlYear
 from scenes.room.operation import OperationHours
-from scenes.room.operation_tables import OperationTables, ShadingRule
+from scenes.room.operation_tables import OperationTables
 from scenes.room.shading import Seat
+from scenes.room.shading_rules import ShadingRule
 from scenes.room.zone import climate
 from thermal.predictive import (
     Forecast,

@@ -11,7 +11,7 @@ from tests.thermal.rooms import box, climate, sun
 from thermal.balance import BalanceOptions, simulate, simulate_zones
 from thermal.blackbox import Fenestration
 from thermal.control import (
-    TemperatureCondition,
+    RoomCondition,
     TemperatureControl,
     by_threshold,
     delayed,
@@ -25,7 +25,7 @@ from thermal.zone import Gains
 
 HOURS = 24 * 6
 OUTDOOR = 17.0 - 6.0 * np.cos((np.arange(HOURS) - 3.0) / 24 * 2 * np.pi)
-WARM, WARMER = TemperatureCondition(26.0, 24.5), TemperatureCondition(26.3, 26.3, operative=True)
+WARM, WARMER = RoomCondition(26.0, 24.5), RoomCondition(26.3, 26.3, "operative")
 SHUT = Fenestration("shut", 0.8, emissivity_in=0.3)
 
 
@@ -100,7 +100,7 @@ def test_control_without_an_alternative_for_each_case_is_refused():
     with pytest.raises(ThermalInputError, match="alternative"):
         TemperatureControl((WARM, WARMER), (day, shade), (Gains(), Gains()))
     with pytest.raises(ThermalInputError, match="opens at a greater"):
-        TemperatureCondition(20.0, 22.0)
+        RoomCondition(20.0, 22.0)
 
 
 WINDOWS = WindowAiring(0.02, 0.002, open_above_c=24.0, close_below_c=22.0)
