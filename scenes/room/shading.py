@@ -655,20 +655,44 @@ def _closure(
 
     Of each group its number among its states, or the view through that it takes away.
     """
-    windows = room.windows
-    of_groups = [np.flatnonzero(windows.control == c) for c in joint]
-    areas = np.array([sum(windows.groups[g].area for g in groups) for groups in of_groups])
-    each = []
-    by_view = any(leaf.prefer == "view" for leaf in leaves)
-    for n, groups in enumerate(of_groups):
-        count = group_states(room, int(joint[n]))
-        steps = np.arange(count) / max(count - 1, 1)
-        if by_view:
-            seen = np.array([sight_through(one).straight for one in windows.systems[groups[0]]])
-            steps = 1.0 - np.resize(seen, count) / max(seen.max(), 1e-9) + 1e-3 * steps
-        each.append(steps[combinations[:, n]])
-    closure: FloatArray = np.stack(each, axis=1) @ (areas / areas.sum())
-    return closure
+    if any(leaf.prefer == "view" for leaf in leaves):
+        return view_taken(room, joint, combinations) + 1e-3 * _mean_of_groups(
+            room, joint, combinations
+        )
+    return _mean_of_groups(room, joint, combinations)
+
+
+def view_taken(room: RoomInputs, groups: NDArray[np.int64], combinations: StateArray) -> FloatArray:
+    """Share of the view out that each combination of states of control groups takes away [M].
+
+    By the light of normal incidence that goes straight on, of that in the state with the most.
+    """
+    taken = []
+    for c in groups.tolist():
+        first = int(np.argmax(room.windows.control == c))
+        seen = np.array([sight_through(one).straight for one in room.windows.systems[first]])
+        taken.append(1.0 - seen / max(float(seen.max()), 1e-9))
+    return _mean_of_groups(room, groups, combinations, taken)
+
+
+def _mean_of_groups(
+    room: RoomInputs,
+    groups: NDArray[np.int64],
+    combinations: StateArray,
+    values: Sequence[FloatArray] = (),
+) -> FloatArray:
+    """Mean over control groups, weighted by glass area, in each combination of states [M].
+
+    Args: values: [N][J] in each state; by default 0 for the first to 1 for the last.
+    """
+    windows, each, areas = room.windows, [], []
+    for n, c in enumerate(groups.tolist()):
+        count = group_states(room, c)
+        of_states = values[n] if len(values) else np.arange(count) / max(count - 1, 1)
+        each.append(of_states[np.minimum(combinations[:, n], len(of_states) - 1)])
+        areas.append(sum(windows.groups[g].area for g in np.flatnonzero(windows.control == c)))
+    mean: FloatArray = np.stack(each, axis=1) @ (np.array(areas) / np.sum(areas))
+    return mean
 
 
 Excess = Callable[[StateArray, NDArray[np.int64], Progress], FloatArray]

@@ -101,7 +101,7 @@ def test_shading_by_temperature_follows_that_of_the_air_node(variant, weather, s
     one = _one([_shaded(rooms[0], warm, hot), _shaded(rooms[1], hot)], links)
     (result,) = balances([one], weather, 3600.0)
     air = result.air_c[:-1]
-    met = [by_threshold(air, c.above_c, c.below_c) for c in (warm, hot)]
+    met = [by_threshold(air, c.above, c.below) for c in (warm, hot)]
     np.testing.assert_array_equal(result.alternative[25:], (met[0] + 2 * met[1])[24:])
     assert 0 < met[1].sum() < met[0].sum()
     chosen = one.in_alternatives(result.alternative)

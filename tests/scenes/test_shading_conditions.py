@@ -199,6 +199,7 @@ def test_lm83_and_lightswitch_follow_the_direct_sun(inputs, weather) -> None:
         shading_states(three, room_light(three))
 
 
+@pytest.mark.slow
 def test_haldi_and_robinson_s_people_have_seeds(inputs) -> None:
     control = {"rule": "manual", "behaviour": "Haldi-Robinson"}
     room = inputs(control)
@@ -258,6 +259,7 @@ def test_keys_that_do_not_fit_a_rule_are_refused(rule, key) -> None:
     assert ShadingRule.model_validate(rule).fault(3, {})[0] == key
 
 
+@pytest.mark.slow
 def test_day_and_rule_by_loads(inputs) -> None:
     """A rule by the cooling of the step before is a condition of the room."""
     tables = OperationTables.model_validate(
@@ -278,3 +280,11 @@ def test_day_and_rule_by_loads(inputs) -> None:
     assert set(year.operation.shading.moves(room.weather.midpoints)["moved_by"]) == {
         "the room's temperature or load"
     }
+
+
+def test_the_page_lists_every_scenario() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "control.md").read_text("utf-8")
+    for name, scenario in scenarios().items():
+        points = ", ".join(f"{v:g}" for v in scenario.get("set_points", {}).values())
+        row = f"| `{name}` | {points} | {scenario['source']} | {scenario.get('missing', '')} |"
+        assert row in page, name

@@ -40,10 +40,24 @@ def shaded_room():
     return room, day, shade
 
 
+def test_shading_follows_the_load_of_the_step_before():
+    room, day, shade = shaded_room()
+    room = replace(room, loads=IdealLoads(cooling_c=24.0))
+    year = {"step_s": 3600.0, "options": BalanceOptions(warm_days=0, start_c=23.0)}
+    for quantity, limit in (("cooling", 300.0), ("heating", 0.0)):
+        condition = RoomCondition(limit, limit, quantity)
+        control = TemperatureControl((condition,), (day, shade), (Gains(), Gains()))
+        outdoor = climate(HOURS, outdoor=OUTDOOR)
+        result = simulate(room, outdoor, day, control=control, **year)
+        power = result.cooling if quantity == "cooling" else result.heating
+        assert np.array_equal(result.alternative[1:] > 0, power[:-1] > limit)
+        assert (result.alternative > 0).any() == (quantity == "cooling")
+
+
 SLOW = replace(WARM, open_delay_rows=2, hold_rows=7)
 
 
-@pytest.mark.parametrize("condition", [WARM, replace(WARM, operative=True), SLOW])
+@pytest.mark.parametrize("condition", [WARM, replace(WARM, quantity="operative"), SLOW])
 def test_shading_follows_the_temperature_at_the_end_of_the_step_before(condition):
     """With one step an hour the hourly means are the ends of the steps.
 
@@ -54,8 +68,8 @@ def test_shading_follows_the_temperature_at_the_end_of_the_step_before(condition
     control = TemperatureControl((condition,), (day, shade), (Gains(), lamps))
     year = {"step_s": 3600.0, "options": BalanceOptions(warm_days=0, start_c=23.0)}
     result = simulate(room, climate(HOURS, outdoor=OUTDOOR), day, control=control, **year)
-    temperature = result.operative_c if condition.operative else result.air_c
-    at_once = by_threshold(temperature[:-1], condition.above_c, condition.below_c)
+    temperature = result.operative_c if condition.quantity == "operative" else result.air_c
+    at_once = by_threshold(temperature[:-1], condition.above, condition.below)
     expected = held(delayed(at_once, condition.open_delay_rows), condition.hold_rows)
     assert 10 < expected.sum() < 110 and (condition is not SLOW or (expected != at_once).any())
     np.testing.assert_array_equal(result.alternative[1:], expected)
