@@ -27,7 +27,7 @@ NO_EVIDENCE = {
     },
     "control.md": {
         "| of `ControlHour` | what |", "| rule or key | closed | test |",
-        "| scenario | set points | source | not at hand, left out |",
+        "| scenario | set points | source | not available, left out |",
     },
     "comply.md": {
         "| in the folder of results | what |", "| option | what |",

@@ -207,7 +207,7 @@ def sun_depth(
 
     Each corner c of the glass casts a spot at c - s (c_z - plane)/s_z; the depth is the distance of
     the farthest one from the foot of the window, along the level direction into the room.  Walls
-    that stop it are not considered.  0 for a sun behind the window or below the horizon; infinite
+    that stop it are not considered.  0 for a sun behind the facade or below the horizon; infinite
     for a window that looks straight up, which has no foot.
 
     Args:

@@ -46,7 +46,7 @@ def lightswitch_2002(
         [W/m2]; present: [H] share of people; closed: the lowered state.
 
     Source: Reinhart 2004, Solar Energy 77(1), "Lightswitch-2002", section 2.3, from memory and from
-    its users' descriptions: the paper was not at hand.
+    its users' descriptions: the paper was not available.
     """
     sun, there = np.asarray(direct_sun, dtype=float), np.asarray(present, dtype=float) > 0
     first = arrivals(there, rows_of_day)
@@ -81,7 +81,7 @@ def haldi_robinson_2010(
 
     Source: Haldi and Robinson 2010, Journal of Building Performance Simulation 3(2) 135-153, by its
     constants in No-MASS (github.com/gitkw/No-MASS), whose b_out and b_L of complete moves are
-    exchanged there; the paper was not at hand.  Deviation: all blinds of a room read one sensor.
+    exchanged there; the paper was not available.  Deviation: all blinds of a room read one sensor.
     """
     random = np.random.default_rng(seed)
     there, outdoors = np.asarray(present, dtype=float) > 0, np.asarray(outdoors_lx, dtype=float)

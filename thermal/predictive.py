@@ -233,7 +233,7 @@ def _run(
     H, M = sun.shape
     step = (WARMEST_C - COLDEST_C) / (STEPS - 1)
     out, mass_c = np.zeros(6), constants[10]
-    kinds = M if move > 0.0 else 1  # combinations before that are told apart
+    kinds = M if move > 0.0 else 1  # combinations in the hour before that count
     kept = np.zeros((H + 1 if once else ahead + 1, kinds, STEPS))
     last_m = 0
     for hour in range(H):

@@ -61,7 +61,7 @@ FloatArray = NDArray[np.float64]
 StateArray = NDArray[np.int64]
 SUN_POINTS = 64  # on each window group, for its sunlit share
 DISC_RAYS = 4  # from each of them
-CLEAR = 0.01  # [m] of a sensor before the glass
+CLEAR = 0.01  # [m] of a sensor outside the glass
 MOST_COMBINATIONS = 1024  # of states of groups that avoid glare together
 # An eye: position [m] and azimuth of the line of sight [deg] from north by east, None of the view
 Seat = tuple[tuple[float, float, float] | None, float | None]
@@ -611,8 +611,8 @@ def _take_jointly(
 ) -> None:
     """Set the states [H, N] of control groups to the best combination for all rules of light.
 
-    The most open one without glare at every seat, and with no more daylight, than their rules
-    allow; for rules that leave a target of daylight the most closed one that does.  All other
+    The most open one whose glare at every seat, and whose daylight, are within their limits; for
+    rules that leave a target of daylight the most closed one that does.  All other
     groups are in their states.
     """
     counts = [group_states(room, c) for c in joint]

@@ -38,7 +38,7 @@ MOST_CONDITIONS = 4  # n of a room: the heat balance chooses from 2^n alternativ
 
 @cache
 def scenarios() -> dict[str, dict[str, Any]]:
-    """The named scenarios of control: rule, source, what of the source was not at hand."""
+    """The named scenarios of control: rule, source, what the source has and was not available."""
     return tomllib.loads(SCENARIOS.read_text("utf-8"))
 
 

@@ -139,13 +139,12 @@ def test_errors_of_a_forecast_do_not_depend_on_how_many_are_drawn_together() -> 
     assert few.warmer_k == pytest.approx(walks[1], rel=1e-5, abs=1e-6)
     year = noisy_forecast(8760, 8760, **errors)
     assert year.sun.shape == (1, 8760), "one plan of the year has one forecast"
-    zone, acts = zone_of(40), acting(40)
-    once = noisy_forecast(40, 40, **errors)
+    zone, acts = zone_of(40, mass=5e5), acting(40)
+    once = noisy_forecast(40, 40, sun_error=1.0, temperature_error_k=8.0, seed=4)
     plan = predicted_year(zone, acts, ahead=40, forecast=once)
-    assert (
-        plan.states.shape == (40,)
-        and (plan.states != predicted_year(zone, acts, ahead=40).states).any()
-    )
+    whole = Forecast(0, np.repeat(once.sun, 40, axis=0), np.repeat(once.warmer_k, 40, axis=0))
+    same = predicted_year(zone, acts, ahead=40, forecast=whole)
+    assert np.array_equal(plan.states, same.states) and plan.heating == pytest.approx(same.heating)
 
 
 def test_a_receding_plan_comes_near_and_a_penalty_goes_before_energy() -> None:

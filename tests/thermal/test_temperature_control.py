@@ -44,7 +44,7 @@ def test_shading_follows_the_load_of_the_step_before():
     room, day, shade = shaded_room()
     room = replace(room, loads=IdealLoads(cooling_c=24.0))
     year = {"step_s": 3600.0, "options": BalanceOptions(warm_days=0, start_c=23.0)}
-    for quantity, limit in (("cooling", 300.0), ("heating", 0.0)):
+    for quantity, limit in (("cooling", 50.0), ("heating", 0.0)):
         condition = RoomCondition(limit, limit, quantity)
         control = TemperatureControl((condition,), (day, shade), (Gains(), Gains()))
         outdoor = climate(HOURS, outdoor=OUTDOOR)
