@@ -34,6 +34,7 @@ rule = "irradiance"
 close_above = 100
 state = 1
 """
+AREA = 4.5  # of each window [m2]
 INDEX = "Surface Construction Index"
 INCIDENT = "Surface Outside Face Incident Solar Radiation Rate per Area"
 PASSED = "Surface Window Transmitted Solar Radiation Rate"
@@ -79,7 +80,9 @@ def compare(control: str = CONTROL, step_minutes: int = 60) -> pd.DataFrame:
         # the construction that most hours of a state have
         own = {j: float(pd.Series(index[states == j]).mode()[0]) for j in np.unique(states)}
         expected = np.array([own[j] for j in states])
-        share = {j: passed[states == j].sum() / max(sun[states == j].sum(), 1e-9) for j in own}
+        share = {
+            j: passed[states == j].sum() / max(AREA * sun[states == j].sum(), 1e-9) for j in own
+        }
         rows.append(
             {
                 "window": window,
