@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RegularGridInterpolator
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 
 FloatArray = NDArray[np.float64]
 TYPE_C = 1  # of LM-63: vertical angle from nadir, horizontal angle around the vertical
@@ -63,7 +64,7 @@ def read_photometry(path: Path) -> Photometry:
     try:
         text = path.read_text("latin-1")
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror}", file=path) from None
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
     kind = path.suffix.lower()
     if kind not in (".ies", ".ldt"):
         raise DataError("expected a luminaire as .ies or .ldt", file=path)
