@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bim.model import Space
 from bim.rays import RayMesh, ray_mesh
 from bim.to_tracer import furnished_surfaces
-from mitsuba_cfs.photometry import Photometry
+from mitsuba_cfs.metrics.photometry import Photometry
 
 FloatArray = NDArray[np.float64]
 PATHS = 512  # of each sensor

@@ -150,7 +150,6 @@ def _hour(
             constants[13],
             constants[14],
             constants[15],
-            constants[16],
         )
     responses(
         air, windows, constants[0], constants[1], constants[2], constants[3], outdoor_c, behind_c,

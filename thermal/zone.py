@@ -238,32 +238,34 @@ class Dimming:
         require_range(self.least_power, 0.0, 1.0, "lighting: least power")
 
     @property
-    def numbers(self) -> tuple[float, float, float, float, float, float]:
+    def numbers(self) -> tuple[float, float, float, float, float]:
         """The arguments of `lamp_share` after the daylight."""
         off = self.least_light if self.off else -1.0
         full = self.target_lx if self.full_lx is None else self.full_lx
-        return self.target_lx, self.least_light, self.least_power, off, self.sensor_factor, full
+        needed, read = self.target_lx / full, self.sensor_factor / full
+        return needed, read, self.least_light, self.least_power, off
 
 
 def lamp_share(
-    daylight: FloatArray, target: float, least_light: float, least_power: float, off: float,
-    factor: float, full: float,
+    daylight: FloatArray, needed: float, read: float, least_light: float, least_power: float,
+    off: float,
 ) -> FloatArray:  # fmt: skip
     """Share of the lamps' power by daylight [lx], of arrays, or compiled of numbers.
 
-    Args: off: share of light up to which the lamps are off; below 0: never; full: illuminance by
-        the lamps alone [lx].
+    Args:
+        needed: share of the lamps' light that is missing in the dark; read: less by each lux.
+        off: share of light up to which the lamps are off; below 0: never.
     """
-    missing = np.minimum(np.maximum((target - factor * daylight) / full, 0.0), 1.0)
+    missing = np.minimum(np.maximum(needed - read * daylight, 0.0), 1.0)
     above = np.maximum(missing - least_light, 0.0) / (1.0 - least_light)
     return (least_power + (1.0 - least_power) * above) * (missing > off)
 
 
 def dimmed_light(illuminance: ArrayLike, dimming: Dimming) -> FloatArray:
     """Share [H] of the lamps' light that they give: what is missing, at least their least light."""
-    target, least_light, _, off, factor, full = dimming.numbers
+    needed, read, least_light, _, off = dimming.numbers
     day = np.asarray(illuminance, dtype=float)
-    missing = np.minimum(np.maximum((target - factor * day) / full, 0.0), 1.0)
+    missing = np.minimum(np.maximum(needed - read * day, 0.0), 1.0)
     return np.maximum(missing, least_light) * (missing > off)
 
 

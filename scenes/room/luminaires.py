@@ -8,7 +8,7 @@ from bim.electric_light import Luminaire, lamp_light
 from bim.model import Space
 from bim.sensors import in_room, sensor_grid
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.photometry import Photometry, read_photometry
+from mitsuba_cfs.metrics.photometry import Photometry, read_photometry
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import SensorGrid
 

@@ -8,7 +8,7 @@ import pytest
 from bim.electric_light import Luminaire, lamp_light
 from bim.shoebox import shoebox
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.photometry import read_photometry
+from mitsuba_cfs.metrics.photometry import read_photometry
 
 GAMMA = np.arange(0.0, 91.0, 5.0)
 

@@ -9,7 +9,7 @@ from bim.electric_light import Luminaire, lamp_light
 from bim.sensors import sensor_grid
 from bim.shoebox import shoebox
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.photometry import read_photometry
+from mitsuba_cfs.metrics.photometry import read_photometry
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.demo import WEATHER
 from scenes.room.luminaires import with_luminaires

@@ -18,7 +18,7 @@ from bim.electric_light import Luminaire, lamp_light
 from bim.sensors import sensor_grid
 from bim.shoebox import shoebox
 from bim.to_tracer import furnished_surfaces
-from mitsuba_cfs.photometry import read_photometry
+from mitsuba_cfs.metrics.photometry import read_photometry
 from tests.metrics.test_photometry import GAMMA, ies
 from tests.radiance import run, sensors_text, write_surfaces
 
