@@ -2,7 +2,7 @@
 
 Only fields that are used are named; others are passed over, so that files of every version of
 honeybee-schema since 1.0 are read.  Materials, constructions and modifiers come as dictionaries:
-`bim.honeybee.energy` and `bim.honeybee.radiance` read those that something refers to.
+`bim.honeybee.energy` and `bim.honeybee.building` read those that something refers to.
 
 Source: honeybee-schema, "Model" (https://www.ladybug.tools/honeybee-schema/model.html).
 """

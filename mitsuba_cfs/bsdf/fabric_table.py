@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from mitsuba_cfs.bsdf.fabric import FabricBand
+from mitsuba_cfs.bsdf.screens import FabricBand
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
 

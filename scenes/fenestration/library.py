@@ -17,11 +17,11 @@ import numpy as np
 from pydantic import Field
 
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
-from mitsuba_cfs.bsdf.fabric import FabricBand, fabric_klems
 from mitsuba_cfs.bsdf.glazing import Pane, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.periodic import plastic
+from mitsuba_cfs.bsdf.screens import FabricBand, fabric_klems
 from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import json_text, write_text
