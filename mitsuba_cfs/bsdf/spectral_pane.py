@@ -2,11 +2,11 @@
 
 Files are Optics (IGDB) text, IGSDB products, optical data and glazing systems (JSON).
 
-Optical data are a list of `data`, each with `componentCharacteristics` and `dataPoints`; points have
-an incidence, an emergence and results.  Read are values near normal incidence (10 degrees or less):
-by wavelength, and the integrals `visible` and `infrared`.  Values of the non-prime surface are the
-front's, which often faces the exterior as the schema says, those of the prime surface the back's;
-points that name no surface, or `symmetric`, are both's.
+Optical data are a list of `data`, each with `componentCharacteristics` and `dataPoints`; a point
+has an incidence, an emergence and results.  Read are values near normal incidence (10 degrees or
+less): by wavelength, and the integrals `visible` and `infrared`.  Values of the non-prime surface
+are the front's, which often faces the exterior as the schema says, those of the prime surface the
+back's; points that name no surface, or `symmetric`, are both's.
 
 Source: github.com/building-envelope-data/api, schemas/opticalData.json 1.1.0 (the form of 1.0 is
 read too: `dataPoints` without `data`).
