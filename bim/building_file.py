@@ -205,7 +205,7 @@ def selected(elements: Iterable[Element], selector: str, file: str | Path = "") 
     """
     elements = list(elements)
     guids = {element.guid for element in elements}
-    found: set[str] = set()
+    names: set[str] = set()
     for group in re.split(r'\+(?=(?:[^"/]|"[^"]*"|/[^/]*/)*$)', selector):
         rest = FACET.sub("", group).strip(" ,")
         named = {text.strip() for text in rest.split(",") if text.strip()}
@@ -214,12 +214,12 @@ def selected(elements: Iterable[Element], selector: str, file: str | Path = "") 
             message = f"expected a GUID, or {', '.join(KEYS)} with = and a value, got {wrong}"
             raise DataError(message, file=file or None, field=selector)
         facets = [_facet(*match.groups(), selector, file) for match in FACET.finditer(group)]
-        found |= {
+        names |= {
             element.guid
             for element in elements
             if (not named or element.guid in named) and all(holds(element) for holds in facets)
         }
-    return frozenset(found)
+    return frozenset(names)
 
 
 def _facet(

@@ -391,8 +391,8 @@ class EnergyPlusTwin:
             outer = inner
         else:
             outer = inner
-        found = opaque_construction(self.model, layers, outer, inner, surface.name)
-        return found, outside, extra
+        construction = opaque_construction(self.model, layers, outer, inner, surface.name)
+        return construction, outside, extra
 
     def _surfaces_so_far(self) -> Mapping[str, object]:
         return self.model["BuildingSurface:Detailed"]
@@ -473,12 +473,12 @@ def _seen(facets: Sequence[Facet], points: Ring, normals: Ring) -> list[int]:
         return []
     mesh = ray_mesh(np.concatenate(pieces).reshape(-1, 3, 3))
     owner = np.repeat(np.arange(len(pieces)), [len(piece) // 3 for piece in pieces])
-    found: set[int] = set()
+    seen: set[int] = set()
     for point, normal in zip(points, normals, strict=True):
         rays = hemisphere(normal, RAYS)
         _, hit = mesh.first_hits(np.tile(point, (len(rays), 1)), rays)
-        found |= set(owner[hit[hit >= 0]].tolist())
-    return sorted(found)
+        seen |= set(owner[hit[hit >= 0]].tolist())
+    return sorted(seen)
 
 
 def _lookouts(rooms: Sequence[TwinRoom], outer: Sequence[OuterFaces]) -> tuple[Ring, Ring]:

@@ -100,18 +100,18 @@ class Constructions:
         if solar is None and absorbed is not None:
             solar = 1.0 - absorbed
         emissivity = self._share(one, "Emittance", "IntIR")
-        found = SurfaceFinish(construction, visible, solar, outer=outer)
-        return found if emissivity is None else replace(found, emissivity=emissivity)
+        finish = SurfaceFinish(construction, visible, solar, outer=outer)
+        return finish if emissivity is None else replace(finish, emissivity=emissivity)
 
     def _layers(self, one: ElementTree.Element) -> list[MaterialLayer]:
         """The layers of a construction, outermost first, as gbXML orders them."""
-        found = []
+        layers = []
         for reference in one.iterfind("LayerId"):
             layer = self._referred(one, "Layer", reference.get("layerIdRef"))
             for inner in layer.iterfind("MaterialId"):
                 material = self._referred(layer, "Material", inner.get("materialIdRef"))
-                found += self._layer(material)
-        return found
+                layers += self._layer(material)
+        return layers
 
     def _referred(
         self, owner: ElementTree.Element, kind: str, name: str | None
@@ -285,10 +285,10 @@ class UseReader:
         return None if not name else self._schedule(element, name)
 
     def _people(self, element: ElementTree.Element, space: Space) -> Iterator[tuple[str, Any]]:
-        found = element.find("PeopleNumber")
-        if found is None:
+        number = element.find("PeopleNumber")
+        if number is None:
             return
-        count, unit = self.document.number(found, least=0.0), found.get("unit", "NumberOfPeople")
+        count, unit = self.document.number(number, least=0.0), number.get("unit", "NumberOfPeople")
         if unit in PERSON_AREA:
             count = space.floor_area / (PERSON_AREA[unit] * count) if count else 0.0
         elif unit != "NumberOfPeople":
@@ -570,11 +570,11 @@ class _Reader:
         )  # fmt: skip
 
     def _location(self, field: str, most: float) -> float | None:
-        found = self.document.root.find(f"Campus/Location/{field}")
-        if found is None or not (found.text or "").strip():
+        element = self.document.root.find(f"Campus/Location/{field}")
+        if element is None or not (element.text or "").strip():
             return None
         return self.document.optional(
-            lambda: self.document.number(found, least=-most, most=most), self.issues
+            lambda: self.document.number(element, least=-most, most=most), self.issues
         )
 
     def _turn(self) -> NDArray[np.float64]:

@@ -73,7 +73,7 @@ class SensorReader:
 
         Raises: `DataError` that names the grid.
         """
-        found = []
+        grids = []
         for grid in _objects(self.radiance, "sensor_grids"):
             name = str(grid.get("display_name") or grid["identifier"])
             try:
@@ -85,20 +85,20 @@ class SensorReader:
             except (KeyError, TypeError, ValueError, OverflowError):
                 message = "expected sensors, each with pos and dir of three numbers"
                 raise DataError(message, file=self.file, element=name, field="sensors") from None
-            found.append(ModelGrid(name, self.scale * points, towards / lengths))
-        return tuple(found)
+            grids.append(ModelGrid(name, self.scale * points, towards / lengths))
+        return tuple(grids)
 
     def views(self) -> tuple[ModelView, ...]:
         """The views [m] that can be made; the others are named in the issues."""
-        found = []
+        views = []
         for view in _objects(self.radiance, "views"):
             name = str(view.get("display_name") or view["identifier"])
             made = view_of(view, self.scale)
             if made is None:
                 self.issues.append(Issue("view-unreadable", self.file.name, {"view": name}))
             else:
-                found.append(ModelView(name, made))
-        return tuple(found)
+                views.append(ModelView(name, made))
+        return tuple(views)
 
 
 def shade_issues(model: HoneybeeModel, file: Path) -> Iterator[Issue]:
@@ -489,25 +489,25 @@ class _Reader:
         """The optics of an aperture by state: BSDFs; of a dynamic group also its panes of glass."""
         held = _held(one)
         names = [modifier, *(s.get("modifier") for s in held[1:])]
-        found, missing = [], 0
+        states, missing = [], 0
         for number, name in enumerate(names):
             label = "" if number == 0 else str(name)
             state = self.light.state(name, label) if isinstance(name, str) else None
             if state is None and isinstance(name, str) and len(names) > 1:
                 state = self.light.pane_state(name, label, values)
             if state is not None:
-                found.append(_with_values(state, values, shaded=number > 0))
+                states.append(_with_values(state, values, shaded=number > 0))
             elif number:
                 missing += 1
         group = one.properties.radiance.get("dynamic_group_identifier")
-        if found and isinstance(group, str):
+        if states and isinstance(group, str):
             self.groups.setdefault(group, []).append(one.label)
         if missing:
             known = {"element": one.label, "count": missing}
             self.issues.append(Issue("states-not-optical", one.identifier, known))
         if any(state.get("shades") for state in held):
             self.issues.append(Issue("states-with-shades", one.identifier, {"element": one.label}))
-        return tuple(found) if found and found[0].name == "" else ()
+        return tuple(states) if states and states[0].name == "" else ()
 
     def _up(
         self, one: HoneybeeAperture, modifier: str | None, ring: np.ndarray

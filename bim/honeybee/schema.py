@@ -181,8 +181,8 @@ def read_model(path: Path) -> HoneybeeModel:
     """
     content = read_json(path)
     if content.get("type") != "Model":
-        found = content.get("type")
-        raise DataError(f"expected a honeybee Model, got {found!r:.60}", file=path, field="type")
+        kind = content.get("type")
+        raise DataError(f"expected a honeybee Model, got {kind!r:.60}", file=path, field="type")
     if isinstance(content.get("buildings"), list):
         message = "is a dragonfly model; write honeybee's HBJSON of it (Model.to_honeybee)"
         raise DataError(message, file=path)

@@ -98,17 +98,17 @@ def crown_elements(
     area = attenuation.max() * volume / (PROJECTED * most)
     counts = np.rint(most * attenuation / attenuation.max()).astype(int)
     leaves = _crown_leaves(mesh, most, area, zlib.crc32(guid.encode()))
-    found, steps = [], np.unique(np.append(counts, 0))
+    elements, steps = [], np.unique(np.append(counts, 0))
     for layer, (first, last) in enumerate(pairwise(steps)):
         months = tuple((np.flatnonzero(counts >= last) + 1).tolist())
-        found.append(
+        elements.append(
             Element(
                 f"{guid}-{layer}", crown.name, crown.ifc_class, leaves[first:last],
                 REFLECTANCE_VISIBLE, REFLECTANCE_SOLAR, layer=TREE_LAYER,
                 months=() if len(months) == 12 else months,
             )
         )  # fmt: skip
-    return found
+    return elements
 
 
 def _attenuations(mesh: RayMesh, name: str, transmittance: Sequence[float]) -> list[float]:
@@ -232,12 +232,12 @@ def _csv_rows(path: Path) -> list[tuple[str, str]]:
     start = next((i for i, row in enumerate(rows) if row[:2] == ["A", "H_hor"]), None)
     if start is None:
         raise DataError("expected columns A and H_hor (PVGIS printhorizon)", file=path)
-    found = []
+    table = []
     for row in rows[start + 1 :]:
         if len(row) < 2:
             break
-        found.append((row[0], row[1]))
-    return found
+        table.append((row[0], row[1]))
+    return table
 
 
 def horizon_wall(
@@ -399,12 +399,12 @@ def _list(text: str, path: Path) -> FloatArray:
 
 def _numbers(text: str, path: Path) -> FloatArray:
     try:
-        found = np.array(text.split(), dtype=float)
+        numbers = np.array(text.split(), dtype=float)
     except ValueError as error:
         raise DataError(f"expected numbers: {str(error)[:60]}", file=path) from None
-    if not are_coordinates(found):
+    if not are_coordinates(numbers):
         raise DataError("expected finite numbers", file=path)
-    return found
+    return numbers
 
 
 READ = (*SUFFIXES, ".city.json", *CITYGML, ".geojson", ".json", ".csv", ".toml", *GRIDS)
@@ -471,12 +471,12 @@ def with_surroundings(
     outdoors = unblinded([*building.elements, *free], building.spaces)
     leaves, told = _leaves(trees, building, centre, size)
     issues += [*more, *outdoors.issues, *told]
-    found = tuple(dict.fromkeys((*building.issues, *issues)))
+    all_issues = tuple(dict.fromkeys((*building.issues, *issues)))
     return replace(
         building,
         elements=(*outdoors.elements, *leaves),
-        issues=found,
-        account=building.account and replace(building.account, shut_in=shut_in_area(found)),
+        issues=all_issues,
+        account=building.account and replace(building.account, shut_in=shut_in_area(all_issues)),
     )
 
 
@@ -505,16 +505,16 @@ def _named_crowns(files: Sequence[Path]) -> dict[str, Foliage]:
     """What lists of trees say of objects of the other files, by their names."""
     lists = [file for file in files if file.suffix.lower() == ".toml"]
     bodies = [file for file in files if file not in lists and not _is_horizon(file)]
-    found: dict[str, Foliage] = {}
+    crowns: dict[str, Foliage] = {}
     for file in lists:
-        found |= dict(read_trees(file).crowns)
-    if found:
+        crowns |= dict(read_trees(file).crowns)
+    if crowns:
         known = {one.name for file in bodies for one in read_surroundings(file).objects}
-        missing = next((name for name in found if name not in known), None)
+        missing = next((name for name in crowns if name not in known), None)
         if missing is not None:
             message = f"{missing!r} is no object of the other files of surroundings"
             raise DataError(message, file=lists[0], field="object")
-    return found
+    return crowns
 
 
 def _leaves(
@@ -606,7 +606,7 @@ def _meshed(
     objects: Sequence[SurroundingObject], centre: NDArray[np.float64], file: Path
 ) -> tuple[list[SurroundingObject], list[Issue]]:
     """Grids as triangles, the further the coarser."""
-    found, issues = [], []
+    elements, issues = [], []
     for one in objects:
         if one.nodes is not None:
             triangles, worst = graded(one.nodes, centre, TERRAIN_DEG)
@@ -616,8 +616,8 @@ def _meshed(
             issues.append(Issue("terrain-simplified", file.name, values))
             if not len(triangles):
                 continue
-        found.append(one)
-    return found, issues
+        elements.append(one)
+    return elements, issues
 
 
 def _to_world(

@@ -327,13 +327,13 @@ def _daylight_together(
     alike: dict[str, list[int]] = {}
     for i, chosen in enumerate(options):
         alike.setdefault(repr(chosen), []).append(i)
-    found: dict[int, Estimate] = {}
+    estimates: dict[int, Estimate] = {}
     for some in alike.values():
         traced = daylight_of_rooms(
             [rooms[i] for i in some], outdoors, max_depth=depth, **options[some[0]], **common
         )
-        found |= dict(zip(some, traced, strict=True))
-    return [found[i] for i in range(len(rooms))]
+        estimates |= dict(zip(some, traced, strict=True))
+    return [estimates[i] for i in range(len(rooms))]
 
 
 def with_needs(

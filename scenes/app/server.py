@@ -416,13 +416,13 @@ class AppServer:
             actions.library_file(one.glazing, one.shade): _sheet_facts(one)
             for one in sheets().values()
         }
-        found = {}
+        by_name = {}
         for system in systems:
             file = system.get("bsdf") or system.get("operation", "")
             states = self._project.states(file) if "bsdf" not in system and file else [file]
             if states and states[-1] in known:
-                found[file] = known[states[-1]]
-        return found
+                by_name[file] = known[states[-1]]
+        return by_name
 
     # ---- changes
 

@@ -395,14 +395,14 @@ def _lines(result: GlareResult, request: Request) -> list[str]:
 
 def notices(result: GlareResult) -> list[str]:
     """Where an index is outside the range that it was made for."""
-    found = []
+    notes = []
     if result.Ev < 100:
-        found.append("the vertical illuminance is below 100 lx")
+        notes.append("the vertical illuminance is below 100 lx")
     if result.dgp <= 0.2:
-        found.append("a dark scene: DGP is at most 0.2 and might underestimate glare sources")
+        notes.append("a dark scene: DGP is at most 0.2 and might underestimate glare sources")
     if result.Ev < 380:
-        found.append("a dark scene: below 380 lx DGP might underestimate glare sources")
-    return found
+        notes.append("a dark scene: below 380 lx DGP might underestimate glare sources")
+    return notes
 
 
 def _write_cut(luminance, geometry: GlareView, cut: int, request: Request) -> None:

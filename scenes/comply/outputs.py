@@ -49,14 +49,14 @@ def answers(result: Compliance) -> tuple[tuple[str, str], ...]:
 
     Levels and titles are in the page's language.
     """
-    found = [
+    sentences = [
         (verdict, _sentence(result, verdict))
         for verdict in result.verdicts
         if verdict.rooms and verdict.criterion.over != "no building"
     ]
     return tuple(
         (f"{result.rules[one.rule].edition}, {gettext(one.criterion.title)}", text)
-        for one, text in found
+        for one, text in sentences
     )
 
 
@@ -143,10 +143,10 @@ def _view_plans(result: Compliance, room: CheckedRoom) -> Iterator[FloorPlan]:
 def _light_plans(result: Compliance, room: CheckedRoom) -> Iterator[FloorPlan]:
     """One plan of each quantity, on the grid of the first rule that asks for it."""
     for kind, needs in LIGHT_PLANS.items():
-        found = _asking(result, room, needs)
-        if found is None:
+        asking = _asking(result, room, needs)
+        if asking is None:
             continue
-        name, grid = found
+        name, grid = asking
         frame = plan_frame(room.space, grid.points)
         height = decimal(f"{grid.points[0, 2] - room.space.floor_level:.2f}")
         of_grid = gettext("Grid of {rule}, {height} m above the floor.", rule=name, height=height)
@@ -334,14 +334,14 @@ def dossier_rule(result: Compliance, name: str) -> DossierRule:
 
 def dossier_room(result: Compliance, room: CheckedRoom, number: int) -> DossierRoom:
     """Tables and drawings of a room."""
-    found = [tied_table(tables.room_table(result, room, name)) for name in result.rules]
+    room_tables = [tied_table(tables.room_table(result, room, name)) for name in result.rules]
     return DossierRoom(
         f"room-{number}",
         gettext("Room {room}", room=room.space.label),
         room_facts(room),
         plans(result, room),
         tuple(map(tied, tables.missed(room))),
-        tuple(table for table in found if table.rows),
+        tuple(table for table in room_tables if table.rows),
         sun_bars(result, room),
         tables.openings_table(room),
     )

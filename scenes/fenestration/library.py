@@ -138,11 +138,11 @@ def shade_entry(name: str) -> ShadeEntry:
 
 
 def _named(name: str, entries: Any, field: str) -> Any:
-    found = next((one for one in entries if one.name == name), None)
-    if found is None:
+    entry = next((one for one in entries if one.name == name), None)
+    if entry is None:
         known = ", ".join(repr(one.name) for one in entries)
         raise DataError(f"expected one of {known}, got {name!r}", field=field)
-    return found
+    return entry
 
 
 def write_library_system(

@@ -207,19 +207,19 @@ def energy_by_month(powers: pd.DataFrame, floor_area: float) -> pd.DataFrame:
 def energy_summary(powers: pd.DataFrame, floor_area: float) -> dict[str, float | str]:
     """Sums of the year, and the peaks with their hour."""
     hours = _step_h(powers)
-    found: dict[str, float | str] = {}
+    summary: dict[str, float | str] = {}
     for name in ("heat", "cold", "final heating", "primary"):
         key = name.replace(" ", "_")
-        found[f"{key}_kwh"] = float(powers[name].sum() * hours / 1e3)
-        found[f"{key}_kwh_m2"] = found[f"{key}_kwh"] / floor_area
+        summary[f"{key}_kwh"] = float(powers[name].sum() * hours / 1e3)
+        summary[f"{key}_kwh_m2"] = summary[f"{key}_kwh"] / floor_area
     electricity = [name for name in powers if name.startswith("electricity")]
-    found["electricity_kwh"] = float(powers[electricity].to_numpy().sum() * hours / 1e3)
-    found["electricity_kwh_m2"] = found["electricity_kwh"] / floor_area
+    summary["electricity_kwh"] = float(powers[electricity].to_numpy().sum() * hours / 1e3)
+    summary["electricity_kwh_m2"] = summary["electricity_kwh"] / floor_area
     for name in ("heat", "cold"):
         peak = powers[name].idxmax()
-        found[f"peak_{name}_w"] = float(powers[name].max())
-        found[f"peak_{name}_at"] = peak.strftime("%m-%d %H:%M") if powers[name].max() > 0 else ""
-    return found
+        summary[f"peak_{name}_w"] = float(powers[name].max())
+        summary[f"peak_{name}_at"] = peak.strftime("%m-%d %H:%M") if powers[name].max() > 0 else ""
+    return summary
 
 
 def _step_h(powers: pd.DataFrame) -> float:
@@ -295,7 +295,7 @@ def year_summary(
 ) -> tuple[dict[str, float], pd.DataFrame]:
     """Energy, peaks and comfort of the occupied hours [H], and their discomfort by month."""
     month = weather.midpoints.month.to_numpy()
-    found = {
+    summary = {
         "heating_kwh": result.heating.sum() * weather.step_h / 1e3,
         "cooling_kwh": result.cooling.sum() * weather.step_h / 1e3,
         "peak_heating_w": result.heating.max(),
@@ -310,12 +310,12 @@ def year_summary(
             result.operative_c, weather.dry_bulb_c, band, per_day=weather.per_day
         )
         counted = summarise(comfort, occupied, month)
-        found[f"comfortable_h {band}"] = counted.comfortable * weather.step_h
+        summary[f"comfortable_h {band}"] = counted.comfortable * weather.step_h
         months[f"{band} [h]"] = _in_hours(counted.discomfort_by_month, weather)
-        found[f"degree_hours_warm {band}"] = counted.degree_hours_warm * weather.step_h
-        found[f"degree_hours_cold {band}"] = counted.degree_hours_cold * weather.step_h
+        summary[f"degree_hours_warm {band}"] = counted.degree_hours_warm * weather.step_h
+        summary[f"degree_hours_cold {band}"] = counted.degree_hours_cold * weather.step_h
     table = pd.DataFrame(months, index=pd.RangeIndex(1, 13, name="month"))
-    return {key: float(value) for key, value in found.items()}, table
+    return {key: float(value) for key, value in summary.items()}, table
 
 
 @dataclass(frozen=True, slots=True)
@@ -513,15 +513,15 @@ def _balanced(
     results, moist, design, moved = [], [], [], []
     for number, (together, air) in enumerate(groups):
         place = {"terrain": study.terrain}
-        found = balances(together, weather, step_s, progress=progress, **air, **place)
-        results += found
-        for issues in step_issues(together, found, weather, step_s, **air, **place):
+        years = balances(together, weather, step_s, progress=progress, **air, **place)
+        results += years
+        for issues in step_issues(together, years, weather, step_s, **air, **place):
             notes += tuple(map(issue_note, issues))
         moved += [
             room.in_alternatives(result.alternative)
-            for room, result in zip(together, found, strict=True)
+            for room, result in zip(together, years, strict=True)
         ]
-        moist += room_humidity(together, found, weather, **air)
+        moist += room_humidity(together, years, weather, **air)
         if study.design is not None:
             cold = study.design.outdoor_c
             design.append(
@@ -564,7 +564,7 @@ def _transfers(
 
     Raises: `DataError` for a room that is not there, or not simulated.
     """
-    hours, found = OperationHours(study, weather), []
+    hours, transfers = OperationHours(study, weather), []
     for number, table in enumerate(study.transfer):
         place = f"transfer.{number}"
         ends = []
@@ -577,8 +577,8 @@ def _transfers(
         if ends[0] == ends[1]:
             message = "source and target are rooms of one air node"
             raise DataError(message, file=study.building, field=place)
-        found.append(AirTransfer(*ends, hours.value(table, "m3_h", place) / 3600.0))
-    return found
+        transfers.append(AirTransfer(*ends, hours.value(table, "m3_h", place) / 3600.0))
+    return transfers
 
 
 def _felt(

@@ -216,7 +216,7 @@ def outdoor_exchange(
 
     for incident and outgoing patches of the front; arguments as for `window_exchange`.
     """
-    found = window_exchange(
+    exchange = window_exchange(
         surfaces, [_turned(group) for group in groups], samples=samples, max_depth=max_depth,
         stopping=stopping, seed=seed, cache=cache, scenes=scenes,
     )  # fmt: skip
@@ -224,10 +224,10 @@ def outdoor_exchange(
     patch = KLEMS_FULL.index(theta, np.pi - phi)  # x of the turned windows is that of the others, -
     columns = (np.arange(len(groups))[:, None] * KLEMS_FULL.size + patch).ravel()
     return replace(
-        found,
-        values=found.values[:, patch][:, :, columns],
-        standard_error=found.standard_error[:, patch][:, :, columns],
-        covariance=found.sum_error[:, patch, None, None] ** 2,  # in one block: columns are moved
+        exchange,
+        values=exchange.values[:, patch][:, :, columns],
+        standard_error=exchange.standard_error[:, patch][:, :, columns],
+        covariance=exchange.sum_error[:, patch, None, None] ** 2,  # in one block: columns are moved
     )
 
 

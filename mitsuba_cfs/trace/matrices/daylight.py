@@ -63,11 +63,11 @@ def cell_daylight(
     Args: samples: paths of each cell and patch in each of 2 batches.
     """
     room = TracedRoom(surfaces, tuple(groups))
-    (found,) = cells_of_rooms(
+    (estimate,) = cells_of_rooms(
         [room], None, [cells], [samples], subdivision=subdivision, basis=basis,
         max_depth=max_depth, seed=seed, cache=cache, scenes=scenes,
     )  # fmt: skip
-    return found
+    return estimate
 
 
 def cells_of_rooms(
@@ -119,7 +119,7 @@ def cells_of_rooms(
     stored = (None if entry is None else entry.read(_stored) for entry in entries)
     values = [one for one in stored if one is not None]
     if len(values) < len(rooms):
-        found = of_rooms(
+        estimates = of_rooms(
             rooms,
             traced,
             [None] * len(rooms),
@@ -129,7 +129,7 @@ def cells_of_rooms(
             outdoors=True,
         )
         # their noise is a thousand times the rounding of seven digits, and nobody reads it
-        values = [one.values.astype(np.float32) for one in found]
+        values = [one.values.astype(np.float32) for one in estimates]
         for entry, one in zip(entries, values, strict=True):
             if entry is not None:
                 entry.write({"cells": one})
@@ -320,11 +320,11 @@ def daylight_matrix(
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
     """
     room = TracedRoom(surfaces, tuple(groups))
-    (found,) = daylight_of_rooms(
+    (estimate,) = daylight_of_rooms(
         [room], None, subdivision=subdivision, basis=basis, samples=samples, max_depth=max_depth,
         stopping=stopping, seed=seed, progress=progress, cache=cache, scenes=scenes,
     )  # fmt: skip
-    return found
+    return estimate
 
 
 def daylight_of_rooms(

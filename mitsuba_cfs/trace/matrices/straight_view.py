@@ -108,7 +108,7 @@ def escaped_view(
         _add_escapes(tracer, *box, sums, starts)
         return sums_of(sums, shape) / n
 
-    found = accumulate(
+    estimate = accumulate(
         batch,
         stopping=Stopping(batches=BATCHES),
         label="escape",
@@ -118,16 +118,16 @@ def escaped_view(
             by=__name__, stopping=Stopping(batches=BATCHES),
         ),
     )  # fmt: skip
-    return _escape(found, tracer.centre)
+    return _escape(estimate, tracer.centre)
 
 
-def _escape(found: Estimate, centre: NDArray[np.float64]) -> Escape:
+def _escape(estimate: Estimate, centre: NDArray[np.float64]) -> Escape:
     """Shares and points from the sums [S, 6, 4]."""
-    by_side = found.values[..., 0]
-    total = found.values.sum(axis=0)
+    by_side = estimate.values[..., 0]
+    total = estimate.values.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         place = total[:, 1:] / total[:, :1] + centre
-    error = np.sqrt((found.standard_error[..., 0] ** 2).sum(axis=1))
+    error = np.sqrt((estimate.standard_error[..., 0] ** 2).sum(axis=1))
     return Escape(by_side.sum(axis=1), error, by_side, place)
 
 
