@@ -41,7 +41,7 @@ def pixels_from_rgbe(rgbe: NDArray[np.uint8]) -> NDArray[np.float32]:
     return values
 
 
-def rgbe_from_pixels(pixels: NDArray) -> NDArray[np.uint8]:
+def rgbe_from_pixels(pixels: NDArray[Any]) -> NDArray[np.uint8]:
     """Four-byte pixels [..., 4] of values [..., 3], cut off so that reading back has no bias."""
     pixels = np.asarray(pixels, dtype=np.float64)
     largest = pixels.max(axis=-1)

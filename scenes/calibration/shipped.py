@@ -17,6 +17,7 @@ import time
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,8 @@ from scenes.calibration.costs import Calibration, calibration_file
 from scenes.cost.measure import Cost
 from scenes.cost.reference import reference_costs
 
-TRACED = {"methods": ["three-phase"], "metrics": ["sDGP"], "size": 48}  # V and D of one eye
+# V and D of one eye
+TRACED: dict[str, Any] = {"methods": ["three-phase"], "metrics": ["sDGP"], "size": 48}
 SIDE = 200  # [px]
 TRACINGS, RATINGS = 4, 100  # how often: the least counts, which other work disturbs least
 
