@@ -47,11 +47,10 @@ class SpectralFactor:
         visible: Array = self.transmittance @ weight / weight.sum()
         return visible
 
-    def at(self, channels: Channels, theta: ArrayLike) -> Array:
-        """r_c at angles of incidence [..] [rad]: [C, ..]."""
-        ratio = _relative(channels.mean(self.transmittance), self.visible[:, None]).T
-        angles = np.asarray(theta, dtype=float)
-        return np.stack([np.interp(angles, ANGLES, row) for row in ratio])
+    def of_angles(self, channels: Channels) -> Array:
+        """r_c at `ANGLES` [C, A]."""
+        ratio: Array = _relative(channels.mean(self.transmittance), self.visible[:, None]).T
+        return ratio
 
     def of_patches(self, channels: Channels) -> Array:
         """r_c of the patches of the full Klems basis [C, K], by their means of transmittance."""

@@ -21,5 +21,5 @@ def test_a_shade_of_any_scale_is_the_same_and_a_neutral_one_is_one() -> None:
 def test_a_shade_that_passes_nothing_gives_no_nan() -> None:
     opaque = SpectralFactor.of_panes((), np.zeros(len(NANOMETRES)))
     channels = channels_of(5)
-    assert np.isfinite(opaque.at(channels, 0.3)).all()
+    assert np.isfinite(opaque.of_angles(channels)).all()
     assert np.isfinite(opaque.of_patches(channels)).all()

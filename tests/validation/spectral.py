@@ -19,7 +19,7 @@ from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods.light import daylight
 from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
-from mitsuba_cfs.methods.spectral_light import channel_irradiance
+from mitsuba_cfs.methods.spectral_light import Detection, spectral_light
 from mitsuba_cfs.sky.annual import AnnualSky, given_sky
 from mitsuba_cfs.spectra.channels import channels_of
 from mitsuba_cfs.spectra.daylight import (
@@ -120,8 +120,9 @@ def ours(panes: Sequence[SpectralPane], kind: str) -> Light:
     sampling = Sampling(sensor_samples=1 << 16, patch_samples=1 << 14, sun_points=1 << 13)
     light = daylight(scene, [[system]], sky, sampling=sampling)
     factor = SpectralFactor.of_panes(panes)
-    bands = np.stack(list(channel_irradiance(light, [[factor]], channels)))[..., 0]
-    return Light.of(bands.T @ channels.detection.T)
+    wanted = [Detection(channels.detection)]
+    [received] = spectral_light(light, [[factor]], channels, wanted).received
+    return Light.of(received[..., 0].T)
 
 
 def radiances(panes: Sequence[SpectralPane], kind: str, bounces: int, divisions: int) -> Light:
