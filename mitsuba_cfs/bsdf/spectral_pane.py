@@ -332,6 +332,7 @@ class _Table:
 
 
 FloatArray = NDArray[np.float64]
+DIFFUSE_ANGLES = 64
 VISIBLE_NM = (400.0, 760.0)  # that a spectrum is to cover for visible values
 UNCOATED = ("neither", "none", "na", "n/a", "")
 
@@ -677,6 +678,13 @@ def spectral_transmittance(
     nm, whole = _whole(panes, angles)
     wanted = np.asarray(wavelength_nm, dtype=float)
     return np.stack([np.interp(wanted, nm, tau) for tau in whole.tau.T])
+
+
+def diffuse_reflectance(panes: Sequence[SpectralPane], wavelength_nm: ArrayLike) -> FloatArray:
+    """Reflectance [N] of panes in series for diffuse light from the room, by wavelength [N]."""
+    sine2 = (np.arange(DIFFUSE_ANGLES) + 0.5) / DIFFUSE_ANGLES  # equal shares of the light
+    nm, whole = _whole(panes, np.arcsin(np.sqrt(sine2)))
+    return np.interp(np.asarray(wavelength_nm, dtype=float), nm, whole.rho_back.mean(axis=1))
 
 
 @dataclass(frozen=True, slots=True)
