@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -12,11 +15,11 @@ from scenes.room.control_year import AT_A_TIME, ControlYear, StateArray, States,
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
 from scenes.room.predictive import predictive_states
-from scenes.room.shading import predicts, temperature_conditions
+from scenes.room.shading import Levels, predicts, room_conditions
 from scenes.room.solar import SeasonalOutdoors
 from scenes.room.zone import climate
 from thermal.balance import LONG_AGO, BalanceOptions, SteppedZone
-from thermal.control import TemperatureCondition
+from thermal.control import Condition, WaitingRule, number_of
 
 FloatArray = NDArray[np.float64]
 
@@ -158,24 +161,33 @@ class ControlError(CfsError, ValueError):
     """A control function that returns no states of the room's groups."""
 
 
-class MetCondition:
-    """Whether a condition of the room's temperature is met, hour by hour, as the balance has it."""
+class FollowedCondition:
+    """The level of a condition of the room's temperature, hour by hour, as the balance has it."""
 
-    def __init__(self, condition: TemperatureCondition) -> None:
-        """Not met, and since long ago."""
-        self._condition = condition
-        self._warm = self.met = False
-        self._cool_rows = self._same_rows = LONG_AGO
+    def __init__(self, condition: Condition) -> None:
+        """At level 0, and since long ago."""
+        self.condition, self.level, self._warm = condition, 0, False
+        self._since = [LONG_AGO] * condition.levels  # rows since each level or one above was asked
+        self._same_rows = LONG_AGO
 
-    def follow(self, felt_c: float) -> None:
-        """Go on by an hour, from the temperature at its beginning."""
-        of = self._condition
-        self._warm = felt_c > of.above_c or (self._warm and felt_c >= of.below_c)
-        self._cool_rows = 0 if self._warm else self._cool_rows + 1
+    def follow(self, felt: Callable[[], tuple[float, float]], levels: Levels, hour: int) -> None:
+        """Go on by an hour.
+
+        Args: felt: air and operative temperature [degC] at its beginning; levels: of the conditions
+            before this one.
+        """
+        of = self.condition
+        if isinstance(of, WaitingRule):
+            asked = int(of.asked[number_of([levels[one] for one in of.reads], of.reads), hour])
+        else:
+            felt_c = felt()[of.operative]
+            self._warm = felt_c > of.above_c or (self._warm and felt_c >= of.below_c)
+            asked = int(self._warm)
+        self._since = [0 if asked >= n else rows + 1 for n, rows in enumerate(self._since)]
         self._same_rows += 1
-        wanted = self._cool_rows <= of.open_delay_rows
-        if wanted != self.met and self._same_rows >= of.hold_rows:
-            self.met, self._same_rows = wanted, 0
+        wanted = max(n for n, rows in enumerate(self._since) if rows <= of.open_delay_rows)
+        if wanted != self.level and self._same_rows >= of.hold_rows:
+            self.level, self._same_rows = wanted, 0
 
 
 class ControlRun:
@@ -188,10 +200,10 @@ class ControlRun:
         self._stepped: SteppedZone | None = None
         self._temperatures: list[tuple[float, float]] = []  # air and operative, before each hour
         self._heat: dict[tuple[int, ...], ZoneHeat] = {}
-        self._conditions = temperature_conditions(year.by_file)
-        self._met = [MetCondition(one) for one in self._conditions]
+        conditions, self._read = room_conditions(year.by_file, year.light, year.outdoors)
+        self._conditions = [FollowedCondition(one) for one in conditions]
         self._followed = 0  # hours
-        self._by_rules: dict[tuple[bool, ...], StateArray] = {}
+        self._by_rules: dict[tuple[int, ...], StateArray] = {}
 
     def before(self, hour: int) -> tuple[float, float]:
         """Air and operative temperature at the end of the hour before [degC]."""
@@ -216,15 +228,17 @@ class ControlRun:
     def by_rules(self, hour: int) -> tuple[int, ...]:
         """The states of the control groups [N] by the rules of the operation file."""
         while self._conditions and self._followed <= hour:
-            air, operative = self.before(self._followed)
-            for one, met in zip(self._conditions, self._met, strict=True):
-                met.follow(operative if one.operative else air)
+            felt = partial(self.before, self._followed)
+            levels: dict[Condition, int] = {}
+            for one in self._conditions:
+                one.follow(felt, levels, self._followed)
+                levels[one.condition] = one.level
             self._followed += 1
-        key = tuple(met.met for met in self._met)
+        now = {one.condition: one.level for one in self._conditions}
+        key = tuple(now[one] for one in self._read)
         if key not in self._by_rules:
-            are_met = dict(zip(self._conditions, key, strict=True))
-            planned = predicts(self.year.by_file)
-            states = predictive_states(self.year) if planned else self.year.by_rules(are_met)
+            planned, levels = predicts(self.year.by_file), dict(zip(self._read, key, strict=True))
+            states = predictive_states(self.year) if planned else self.year.by_rules(levels)
             self._by_rules[key] = states
         return tuple(self._by_rules[key][hour].tolist())
 

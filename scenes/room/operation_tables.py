@@ -363,10 +363,6 @@ class ShadingRule(TomlTable):
 
     def fault(self, states: int, schedules: Mapping[str, ScheduleTable]) -> tuple[str, str] | None:
         """The key that does not fit windows with `states` states, and the fault."""
-        by_room = any(leaf.rule in ROOM_RULES for leaf in self.leaves)
-        if by_room and self.rule not in ROOM_RULES and (self.open_delay_h or self.hold_h):
-            key = "open_delay_h" if self.open_delay_h else "hold_h"
-            return key, "acts on the part by the room's temperature alone: state it there"
         if self.rule in ROOM_RULES and self.opens_below_c > self.closes_above_c:
             return "open_below_c", "lies above close_above_c"
         if self.rule in ("any", "all"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import product
 
 import numpy as np
@@ -28,13 +28,17 @@ from scenes.room.operation import OperationHours
 from scenes.room.operation_tables import MOST_CONDITIONS, ROOM_RULES, WEATHER_RULES, ShadingRule
 from scenes.room.solar import SeasonalOutdoors, window_irradiance
 from thermal.control import (
+    Condition,
     TemperatureCondition,
+    WaitingRule,
     always,
     by_cut_off,
     by_glare,
     by_threshold,
+    combinations_of,
     delayed,
     held,
+    levels_of,
 )
 
 FloatArray = NDArray[np.float64]
@@ -73,8 +77,8 @@ def predicts(room: RoomInputs) -> bool:
     return room.control.rules[0].rule == "predictive"
 
 
-Conditions = Mapping[TemperatureCondition, bool]
-NO_CONDITIONS: Conditions = {}
+Levels = Mapping[Condition, int]  # of conditions: 1 met, 0 not; of a rule that waits its own
+NO_CONDITIONS: Levels = {}
 
 
 def temperature_conditions(room: RoomInputs) -> tuple[TemperatureCondition, ...]:
@@ -94,6 +98,107 @@ def temperature_conditions(room: RoomInputs) -> tuple[TemperatureCondition, ...]
     return conditions
 
 
+def room_conditions(
+    room: RoomInputs, light: RoomLight | None, outdoors: SeasonalOutdoors | None
+) -> tuple[tuple[Condition, ...], tuple[Condition, ...]]:
+    """All conditions of a room's temperature, and those that the states of its windows follow from.
+
+    A rule that combines conditions and waits is one of them: its levels are its states, and what it
+    asks for is tabulated for those conditions that it reads itself.
+
+    Raises: `DataError` where more than 2^`MOST_CONDITIONS` combinations would be computed.
+    """
+    conditions: list[Condition] = list(temperature_conditions(room))
+    if not conditions:
+        return (), ()
+    rules, places = room.control.rules, room.control.places
+    signals, waiting = _Signals(room, outdoors, NO_CONDITIONS), dict[str, WaitingRule]()
+    by_glare, read = set(_against_glare(room)), dict[Condition, None]()
+    for c in sorted(range(len(rules)), key=by_glare.__contains__):
+        for rule, place in _waiting_parts(rules[c], places[c], room.weather.step_h):
+            reads = [
+                one
+                for inner, at in _parts(rule, place)
+                for one in _reads(inner, at, c, waiting, room.weather.step_h)
+            ]
+            if any(leaf.rule == "glare" for leaf in rule.leaves):
+                reads = [*read, *reads]  # it avoids glare beside the groups without this rule
+            one = _waiting_rule(room, light, c, (rule, place), dict.fromkeys(reads), signals)
+            waiting[one.name] = one
+            conditions.append(one)
+        read |= dict.fromkeys(_reads(rules[c], places[c], c, waiting, room.weather.step_h))
+    _bounded(room, read)
+    return tuple(conditions), tuple(read)
+
+
+def _bounded(room: RoomInputs, conditions: Iterable[Condition]) -> None:
+    count, most = combinations_of(tuple(conditions)), 2**MOST_CONDITIONS
+    if count > most:
+        message = f"its rules by the room's temperature have {count} combinations of states, at "
+        message += f"most {most} are computed: let fewer parts wait, or more windows move together"
+        raise DataError(message, element=room.space.label, field="control")
+
+
+def _waiting_rule(
+    room: RoomInputs,
+    light: RoomLight | None,
+    c: int,
+    at: tuple[ShadingRule, str],
+    reads: Iterable[Condition],
+    signals: _Signals,
+) -> WaitingRule:
+    """A rule of control group c, at a place of its file, as a condition that waits."""
+    (rule, place), read, asked = at, tuple(reads), []
+    _bounded(room, read)
+    for number in range(combinations_of(read)):
+        signals.met = dict(zip(read, levels_of(number, read), strict=True))
+        without_glare = None
+        if any(leaf.rule == "glare" for leaf in rule.leaves):
+            without_glare = _plain_states(room, light, signals, silent)[:, c]
+        asked.append(_rule_states(room, c, at, signals, without_glare, at_once=place))
+    states, levels = np.unique(np.stack(asked), return_inverse=True)
+    return WaitingRule(
+        _waiting_name(c, place), read, tuple(states.tolist()), levels.reshape(len(asked), -1),
+        *_waits(rule, room.weather.step_h),
+    )  # fmt: skip
+
+
+def _waiting_name(c: int, place: str) -> str:
+    return f"group {c}, {place}"
+
+
+def _parts(rule: ShadingRule, place: str) -> Iterator[tuple[ShadingRule, str]]:
+    """The parts of a rule with their places in the file."""
+    for n, inner in enumerate(rule.parts):
+        yield inner, f"{place}.parts.{n}"
+
+
+def _waiting_parts(
+    rule: ShadingRule, place: str, step_h: float
+) -> Iterator[tuple[ShadingRule, str]]:
+    """The combining rules in a rule that read the room's temperature and wait; inner ones first."""
+    if rule.rule not in ("any", "all"):
+        return
+    for inner, at in _parts(rule, place):
+        yield from _waiting_parts(inner, at, step_h)
+    if any(_waits(rule, step_h)) and any(leaf.rule in ROOM_RULES for leaf in rule.leaves):
+        yield rule, place
+
+
+def _reads(
+    rule: ShadingRule, place: str, c: int, waiting: Mapping[str, WaitingRule], step_h: float
+) -> Iterator[Condition]:
+    """The conditions that a rule's states follow from, without those within rules that wait."""
+    name = _waiting_name(c, place)
+    if name in waiting:
+        yield waiting[name]
+    elif rule.rule in ROOM_RULES:
+        yield condition_of(rule, step_h)
+    elif rule.rule in ("any", "all"):
+        for inner, at in _parts(rule, place):
+            yield from _reads(inner, at, c, waiting, step_h)
+
+
 def condition_of(rule: ShadingRule, step_h: float) -> TemperatureCondition:
     """The condition of a rule by the room's temperature, for weather in steps of so many hours."""
     operative, rows = rule.rule == "operative temperature", _waits(rule, step_h)
@@ -110,44 +215,69 @@ def shading_states(
     light: RoomLight | None = None,
     outdoors: SeasonalOutdoors | None = None,
     *,
-    met: Conditions = NO_CONDITIONS,
+    met: Levels = NO_CONDITIONS,
     progress: Progress = silent,
 ) -> StateArray:
     """The shading state of each window group in every hour [H, G].
 
     Args:
         light: for the signals "eye" and "dgp"; outdoors: for the signal "irradiance".
-        met: whether the room's temperature meets each of `temperature_conditions`.
+        met: the levels of the second part of `room_conditions`.
     """
     numbers, operation = room.windows.control, room.operation
-    states = np.zeros((room.skies.hours, len(room.control.names)), dtype=np.int64)
     if operation is None or not room.space.windows:
-        return states[:, numbers]
-    rules, signals = room.control.rules, _Signals(room, outdoors, met)
-    glare = np.array(
-        [c for c, rule in enumerate(rules) if any(leaf.rule == "glare" for leaf in rule.leaves)],
-        dtype=np.int64,
-    )
-    for c in range(len(rules)):
+        return np.zeros((room.skies.hours, len(room.control.names)), dtype=np.int64)[:, numbers]
+    signals = _Signals(room, outdoors, met)
+    states = _plain_states(room, light, signals, progress)
+    for c in _against_glare(room):
+        states[:, c] = _rule_states(room, c, _rule_of(room, c), signals, states[:, c])
+    return states[:, numbers]
+
+
+def _against_glare(room: RoomInputs) -> NDArray[np.int64]:
+    """The control groups with a rule against glare."""
+    rules = enumerate(room.control.rules)
+    groups = [c for c, rule in rules if any(leaf.rule == "glare" for leaf in rule.leaves)]
+    return np.array(groups, dtype=np.int64)
+
+
+def _rule_of(room: RoomInputs, c: int) -> tuple[ShadingRule, str]:
+    """The rule of a control group, and its place in the file."""
+    return room.control.rules[c], room.control.places[c]
+
+
+def _plain_states(
+    room: RoomInputs, light: RoomLight | None, signals: _Signals, progress: Progress
+) -> StateArray:
+    """The states of all control groups [H, N]; of those against glare by these rules alone."""
+    states = np.zeros((room.skies.hours, len(room.control.names)), dtype=np.int64)
+    glare = _against_glare(room)
+    for c in range(len(room.control.rules)):
         if c not in glare:
-            states[:, c] = _by_rule(room, c, signals, None)
+            states[:, c] = _rule_states(room, c, _rule_of(room, c), signals, None)
     if len(glare):
         if light is None:
             raise ValueError("the rule against glare needs the room's light")
         _avoid_glare(room, light, states, glare, progress)
-    for c in glare:
-        states[:, c] = _by_rule(room, c, signals, states[:, c])
-    return states[:, numbers]
+    return states
 
 
-def _by_rule(
-    room: RoomInputs, c: int, signals: _Signals, without_glare: StateArray | None
+def _rule_states(
+    room: RoomInputs,
+    c: int,
+    rule_at: tuple[ShadingRule, str],
+    signals: _Signals,
+    without_glare: StateArray | None,
+    *,
+    at_once: str = "",
 ) -> StateArray:
-    """The states of a control group by its rule [H].
+    """The states of a control group by a rule of it [H].
 
-    Args: without_glare: its states by its rules against glare [H].
+    Args: rule_at: with its place in the file; without_glare: its states by its rules against glare
+        [H]; at_once: the place of a rule that does not wait.
     """
     groups, operation = np.flatnonzero(room.windows.control == c), room.operation
+    by_name = {one.name: one for one in signals.met if isinstance(one, WaitingRule)}
 
     def plain(rule: ShadingRule, place: str) -> StateArray:
         if rule.rule == "glare" and without_glare is not None:
@@ -169,23 +299,26 @@ def _by_rule(
         return always(rule.state, room.skies.hours)
 
     def of(rule: ShadingRule, place: str) -> StateArray:
+        waiting = by_name.get(_waiting_name(c, place))
+        if waiting is not None:
+            return always(waiting.states[signals.met[waiting]], room.skies.hours)
         if rule.rule in ("any", "all"):
-            parts = [of(one, f"{place}.parts.{n}") for n, one in enumerate(rule.parts)]
+            parts = [of(*one) for one in _parts(rule, place)]
             states = np.max(parts, axis=0) if rule.rule == "any" else np.min(parts, axis=0)
         else:
             states = plain(rule, place)
+        if place == at_once:
+            return states
         wait, hold = _waits(rule, room.weather.step_h)
         return held(delayed(states, wait), hold)
 
-    return of(room.control.rules[c], room.control.places[c])
+    return of(*rule_at)
 
 
 class _Signals:
     """What rules read of the window groups, computed once."""
 
-    def __init__(
-        self, room: RoomInputs, outdoors: SeasonalOutdoors | None, met: Conditions
-    ) -> None:
+    def __init__(self, room: RoomInputs, outdoors: SeasonalOutdoors | None, met: Levels) -> None:
         self._room, self._outdoors, self.met = room, outdoors, met
         self._values: dict[tuple[str, str], FloatArray] = {}
 

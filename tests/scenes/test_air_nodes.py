@@ -92,7 +92,7 @@ def _shaded(room, *conditions):
         replace(room, solar=replace(room.solar, facade=room.solar.facade * 0.5 ** n.bit_count()))
         for n in range(2 ** len(conditions))
     ]
-    return replace(room, alternatives=RoomAlternatives(conditions, tuple(dimmed)))
+    return replace(room, alternatives=RoomAlternatives(conditions, conditions, tuple(dimmed)))
 
 
 def test_shading_by_temperature_follows_that_of_the_air_node(variant, weather, skies) -> None:
