@@ -162,7 +162,8 @@ def _conditions(
     limits = np.full((zones, most, 3), np.inf)
     waits = np.zeros((zones, most, 5), dtype=np.int64)
     waits[..., 4] = -1
-    reads, asked = np.zeros((zones, most, most), dtype=np.int64), []
+    reads = np.zeros((zones, most, most), dtype=np.int64)
+    asked: list[NDArray[np.int64]] = []
     for z, control in enumerate(controls):
         conditions = control.conditions if control else ()
         steps = strides(control.chosen_by) if control else ()
