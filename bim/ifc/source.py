@@ -66,8 +66,8 @@ class Source:
 
     @property
     def walls(self) -> list[Shape]:
-        """Building elements without the terrain: what rooms border on."""
-        return [shape for shape in self.elements if not shape.ifc_class.startswith("IfcSite")]
+        """Building elements without terrain and railings: what rooms border on."""
+        return [s for s in self.elements if not s.ifc_class.startswith(("IfcSite", "IfcRailing"))]
 
     @property
     def ground(self) -> float:
