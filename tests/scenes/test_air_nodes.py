@@ -119,5 +119,5 @@ def test_more_conditions_in_an_air_node_than_can_be_computed_are_refused(
 ) -> None:
     rooms, links = _rooms(weather, skies, equal=False)
     limits = [TemperatureCondition(float(t), float(t)) for t in range(22, 27)]
-    with pytest.raises(DataError, match="5 limits of the temperature of Dwelling; at most 4"):
+    with pytest.raises(DataError, match="temperature of Dwelling have 32 combinations of states; at most 16"):
         _one([_shaded(rooms[0], *limits[:3]), _shaded(rooms[1], *limits[3:])], links)
