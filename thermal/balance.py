@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermal import kernel, records
 from thermal.climate import Climate, Solar, to_steps
 from thermal.conduction import CELL
-from thermal.control import TemperatureControl, WaitingRule, strides
+from thermal.control import ROOM_QUANTITIES, TemperatureControl, WaitingRule, strides
 from thermal.convection import TERRAIN
 from thermal.emitters import HeatedSlab
 from thermal.errors import require, require_range
@@ -176,7 +176,7 @@ def _conditions(
                 places = [conditions.index(other) for other in one.reads]
                 reads[z, k, places] = strides(one.reads)
             else:
-                limits[z, k] = one.above_c, one.below_c, one.operative
+                limits[z, k] = one.above, one.below, ROOM_QUANTITIES.index(one.quantity)
     rows = max((len(one) for one in asked), default=0)
     table = np.zeros((len(asked), rows, stretch.size), dtype=np.int64)
     for number, levels in enumerate(asked):
@@ -565,6 +565,11 @@ class SteppedZone:
         """Mean of that and the mean radiant temperature [degC]."""
         shares = self._net.radiation.shares(0)[self._mix.of_hour[self._number]]
         return 0.5 * (self.air_c + float(shares @ self._state.inner[: len(shares)]))
+
+    @property
+    def load_w(self) -> float:
+        """Ideal load of the last step [W], heating positive."""
+        return float(self._state.load[0])
 
     def _drive(
         self, number: int, solar: Solar, gains: Gains, rows: int

@@ -132,10 +132,14 @@ def _take_alternative(
             stays, holds, levels, stride, rule = some.waits[z, k]
             since, asked, wanted = state.since[z, k], 0, 0
             if rule < 0:
-                above, below, operative = some.limits[z, k]
+                above, below, quantity = some.limits[z, k]
                 felt = state.air[z]
-                if operative > 0.0:
+                if quantity == 1.0:
                     felt = 0.5 * (felt + mean_radiant(net, state, some.mix[before, hour, z], z))
+                elif quantity == 2.0:
+                    felt = max(-state.load[z], 0.0)
+                elif quantity == 3.0:
+                    felt = max(state.load[z], 0.0)
                 state.warm[z, k] = felt > above or (state.warm[z, k] and felt >= below)
                 asked = 1 if state.warm[z, k] else 0
             else:

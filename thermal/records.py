@@ -51,7 +51,9 @@ class Alternatives(NamedTuple):
     conditions before it asks for.
     """
 
-    limits: NDArray[np.float64]  # [Z, K, 3] met above, until below [degC]; 1: operative, 0: air
+    # [Z, K, 3] met above, until below [degC, W]; number of the quantity in
+    # `control.ROOM_QUANTITIES`
+    limits: NDArray[np.float64]
     # [Z, K, 5] rows that a level stays after another was asked for, rows between two changes;
     # number of levels; what a level adds to an alternative's number; rule that asks, -1: limits
     waits: NDArray[np.int64]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -19,7 +18,7 @@ from scenes.room.shading import Levels, predicts, room_conditions
 from scenes.room.solar import SeasonalOutdoors
 from scenes.room.zone import climate
 from thermal.balance import LONG_AGO, BalanceOptions, SteppedZone
-from thermal.control import Condition, WaitingRule, number_of
+from thermal.control import ROOM_QUANTITIES, Condition, WaitingRule, number_of
 
 FloatArray = NDArray[np.float64]
 
@@ -170,18 +169,17 @@ class FollowedCondition:
         self._since = [LONG_AGO] * condition.levels  # rows since each level or one above was asked
         self._same_rows = LONG_AGO
 
-    def follow(self, felt: Callable[[], tuple[float, float]], levels: Levels, hour: int) -> None:
+    def follow(self, felt: Mapping[str, float], levels: Levels, hour: int) -> None:
         """Go on by an hour.
 
-        Args: felt: air and operative temperature [degC] at its beginning; levels: of the conditions
-            before this one.
+        Args: felt: the room's quantities at its beginning; levels: of the conditions before this.
         """
         of = self.condition
         if isinstance(of, WaitingRule):
             asked = int(of.asked[number_of([levels[one] for one in of.reads], of.reads), hour])
         else:
-            felt_c = felt()[of.operative]
-            self._warm = felt_c > of.above_c or (self._warm and felt_c >= of.below_c)
+            value = felt[of.quantity]
+            self._warm = value > of.above or (self._warm and value >= of.below)
             asked = int(self._warm)
         self._since = [0 if asked >= n else rows + 1 for n, rows in enumerate(self._since)]
         self._same_rows += 1
@@ -198,7 +196,7 @@ class ControlRun:
         self.year = year
         self.states: list[tuple[int, ...]] = []  # [N] of each hour so far
         self._stepped: SteppedZone | None = None
-        self._temperatures: list[tuple[float, float]] = []  # air and operative, before each hour
+        self._felt_before: list[tuple[float, float, float, float]] = []  # each hour
         self._heat: dict[tuple[int, ...], ZoneHeat] = {}
         conditions, self._read = room_conditions(year.by_file, year.light, year.outdoors)
         self._conditions = [FollowedCondition(one) for one in conditions]
@@ -207,6 +205,11 @@ class ControlRun:
 
     def before(self, hour: int) -> tuple[float, float]:
         """Air and operative temperature at the end of the hour before [degC]."""
+        air, operative, *_ = self._felt(hour)
+        return air, operative
+
+    def _felt(self, hour: int) -> tuple[float, float, float, float]:
+        """The `ROOM_QUANTITIES` at the end of the hour before."""
         year = self.year
         if self._stepped is None:
             tables = year.room.operation
@@ -218,17 +221,17 @@ class ControlRun:
             )  # fmt: skip
             heat = self._heat_of((0,) * len(year.counts))
             self._stepped.warm_up(0, heat.solar, heat.gains)
-            self._temperatures.append((self._stepped.air_c, self._stepped.operative_c))
-        for states in self.states[len(self._temperatures) - 1 : hour]:
+            self._felt_before.append(_felt_in(self._stepped))
+        for states in self.states[len(self._felt_before) - 1 : hour]:
             heat = self._heat_of(states)
             self._stepped.advance(year.number_of(states), heat.solar, heat.gains)
-            self._temperatures.append((self._stepped.air_c, self._stepped.operative_c))
-        return self._temperatures[hour]
+            self._felt_before.append(_felt_in(self._stepped))
+        return self._felt_before[hour]
 
     def by_rules(self, hour: int) -> tuple[int, ...]:
         """The states of the control groups [N] by the rules of the operation file."""
         while self._conditions and self._followed <= hour:
-            felt = partial(self.before, self._followed)
+            felt = dict(zip(ROOM_QUANTITIES, self._felt(self._followed), strict=True))
             levels: dict[Condition, int] = {}
             for one in self._conditions:
                 one.follow(felt, levels, self._followed)
@@ -246,6 +249,11 @@ class ControlRun:
         if states not in self._heat:
             self._heat[states] = self.year.heat(states)
         return self._heat[states]
+
+
+def _felt_in(zone: SteppedZone) -> tuple[float, float, float, float]:
+    load = zone.load_w
+    return zone.air_c, zone.operative_c, max(-load, 0.0), max(load, 0.0)
 
 
 def controlled_states(

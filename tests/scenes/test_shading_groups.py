@@ -36,7 +36,7 @@ from scenes.room.solar import seasonal_outdoors, solar_gains
 from scenes.room.windows import in_all_windows, room_windows
 from scenes.room.zone import RoomZone, balances, zone_surfaces
 from tests.scenes.small_box import FEW, HOURS, TWO, clear
-from thermal.control import TemperatureCondition
+from thermal.control import RoomCondition
 
 BESIDE = shoebox(
     6.0, 4.0, 2.8,
@@ -322,7 +322,7 @@ def test_rules_by_room_temperature_are_computed_both_ways(inputs) -> None:
     )
     room = inputs({"rule": "all", "parts": [sun, slow, slow]})
     (condition,) = temperature_conditions(room)
-    assert condition == TemperatureCondition(22.0, 21.0, True, 2, 3)
+    assert condition == RoomCondition(22.0, 21.0, "operative", 2, 3)
     outdoors, by_sun = seasonal_outdoors(room), by_group(inputs(sun))["S"]
     cold, warm = (
         shading_states(room, None, outdoors, met={condition: met})[:, 0] for met in (False, True)
@@ -357,6 +357,7 @@ def test_rules_that_combine_room_temperatures_wait(inputs) -> None:
 @pytest.mark.parametrize(
     ("control", "key"),
     [
+        ({"rule": "any", "hold_h": 1.0, "parts": [WARM, {"rule": "glare"}]}, "control.hold_h"),
         (WARM | {"open_below_c": 23.0}, "control.open_below_c"),
         ({"rule": "any", "parts": [WARM, WARM | {"open_below_c": 23.0}]},
          "control.parts.1.open_below_c"),
