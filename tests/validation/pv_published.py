@@ -118,7 +118,7 @@ def main() -> dict[str, pd.DataFrame]:
             mine = found.module == number
             row[module.guid] = found.plain[mine][:, columns].mean(axis=0).sum()
             if module.guid == "back":
-                row["back behind glass"] = found.effective[mine][:, columns].mean(axis=0).sum()
+                row["back, glazed"] = found.effective[mine][:, columns].mean(axis=0).sum()
                 up = module.points[:, 2]
                 order = np.array_split(np.argsort(up), 6)
                 rest = found.effective[mine][:, columns].sum(axis=1)
