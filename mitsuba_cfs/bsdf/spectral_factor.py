@@ -10,7 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, spectral_transmittance
+from mitsuba_cfs.bsdf.spectral_pane import (
+    SpectralPane,
+    diffuse_reflectance,
+    spectral_transmittance,
+)
 from mitsuba_cfs.spectra.channels import Channels
 from mitsuba_cfs.spectra.detectors import NANOMETRES, illuminant, sensitivities
 
@@ -29,10 +33,19 @@ class SpectralFactor:
     transmittance: Array  # [A, N] at `ANGLES` and `NANOMETRES`, of any scale
 
     @staticmethod
-    def of_panes(panes: Sequence[SpectralPane], shade: ArrayLike = 1.0) -> SpectralFactor:
-        """That of panes in series; shade: of a shade besides [N], at all angles, of any scale."""
+    def of_panes(
+        panes: Sequence[SpectralPane], shade: ArrayLike = 1.0, reflectance: ArrayLike = 0.0
+    ) -> SpectralFactor:
+        """That of panes in series.
+
+        Args:
+            shade: transmittance [N] of a shade besides, at all angles, of any scale.
+            reflectance: of the side of a diffusing shade indoors that faces the panes [N]: light
+                goes to and fro between it and the panes.
+        """
         tau = spectral_transmittance(panes, NANOMETRES, ANGLES) if panes else np.ones((1, 1))
-        whole = tau * np.asarray(shade, dtype=float)
+        back = diffuse_reflectance(panes, NANOMETRES) if panes else 0.0
+        whole = tau * np.asarray(shade, dtype=float) / (1 - np.asarray(reflectance) * back)
         return SpectralFactor(np.broadcast_to(whole, (len(ANGLES), len(NANOMETRES))))
 
     @staticmethod
@@ -47,11 +60,10 @@ class SpectralFactor:
         visible: Array = self.transmittance @ weight / weight.sum()
         return visible
 
-    def at(self, channels: Channels, theta: ArrayLike) -> Array:
-        """r_c at angles of incidence [..] [rad]: [C, ..]."""
-        ratio = _relative(channels.mean(self.transmittance), self.visible[:, None]).T
-        angles = np.asarray(theta, dtype=float)
-        return np.stack([np.interp(angles, ANGLES, row) for row in ratio])
+    def of_angles(self, channels: Channels) -> Array:
+        """r_c at `ANGLES` [C, A]."""
+        ratio: Array = _relative(channels.mean(self.transmittance), self.visible[:, None]).T
+        return ratio
 
     def of_patches(self, channels: Channels) -> Array:
         """r_c of the patches of the full Klems basis [C, K], by their means of transmittance."""

@@ -376,24 +376,46 @@ def _without_direct_sun(
 
     Few sensors before many hours, and the groups as one.
     """
-    sensors, sky = sensor_light(light), sky_in(light, hours)
-    chosen = [sensors[g][j] for g, j in enumerate(kind)]
-    reflected = reflected_shares(light.matrices, light.optics(kind))
-    whole, outwards = _total([one.coefficients.whole for one in chosen]), reflected.outwards
-    if reflected.coefficients is not None:
-        whole = whole + reflected.coefficients
+    sky = sky_in(light, hours)
     # in the sky's single precision: the noise of the sums is ten thousand times its rounding
-    values = (whole[some].astype(sky.dtype) @ sky).astype(float)
+    values = (sky_coefficients(light, kind, some).astype(sky.dtype) @ sky).astype(float)
+    return np.asarray(values + in_place_of_sun(light, kind, hours, some))
+
+
+def sky_coefficients(light: PhaseLight, kind: Sequence[int], some: slice = ALL_SENSORS) -> Array:
+    """Daylight coefficients [s, P] of the sensors, the eye last, with each group in a state [G]."""
+    sensors = sensor_light(light)
+    whole = _total([sensors[g][j].coefficients.whole for g, j in enumerate(kind)])
+    reflected = reflected_shares(light.matrices, light.optics(kind)).coefficients
+    return whole[some] if reflected is None else whole[some] + reflected[some]
+
+
+def in_place_of_sun(
+    light: PhaseLight, kind: Sequence[int], hours: NDArray[np.int64], some: slice = ALL_SENSORS
+) -> Array | float:
+    """What the five-phase method takes in place of the sun's patches, but for the direct sun.
+
+    Illuminance less that of the patches [s, h]; 0 with the three-phase method.
+    """
     if not light.matrices.five_phase:
-        return values
+        return 0.0
+    sensors = sensor_light(light)
+    chosen = [sensors[g][j] for g, j in enumerate(kind)]
     by_sun = _total([one.coefficients.by_sun for one in chosen])[some]
-    values -= phases.times_sky(by_sun, _sun_in(light, hours))
+    values = -phases.times_sky(by_sun, sun_in(light, hours))
     for one in chosen:
         if one.added is not None:
             values += one.added[some] if all_hours(light, hours) else one.added[some][:, hours]
+    outwards = reflected_shares(light.matrices, light.optics(kind)).outwards
     if outwards is not None and light.reflected is not None:
         values += replaced_before(light.reflected, outwards[some], hours)
     return values
+
+
+def direct_sun_of_all(light: PhaseLight, kind: Sequence[int], hours: NDArray[np.int64]) -> Array:
+    """Illuminance [S, h] directly from the sun, with each group in a state [G]; five phases."""
+    sensors = sensor_light(light)
+    return _total([sensors[g][j].sun for g, j in enumerate(kind)])[:, hours]
 
 
 def _direct_sun(
@@ -518,7 +540,7 @@ def _in_states(values: Sequence[Array | None], row: NDArray[np.int64]) -> Array:
     return chosen
 
 
-def _sun_in(light: PhaseLight, hours: NDArray[np.int64]) -> phases.Sky:
+def sun_in(light: PhaseLight, hours: NDArray[np.int64]) -> phases.Sky:
     """The sun alone in some of the sky's hours, as products take it."""
     sun = light.sky.lit_sun
     if all_hours(light, hours):

@@ -1,4 +1,4 @@
-"""The light of a scene by channel, from the matrices and the traced sun of its photopic light.
+"""What detectors receive of a scene's light, from the matrices and the sun of its photopic light.
 
 In a channel c the transmission of a system is that of the visible band times a factor of the angle
 of incidence (rank one: spectrum of the panes, times angles of the visible band),
@@ -9,6 +9,14 @@ so that nothing is traced again where the surfaces reflect all channels equally:
 are those of the visible band, and what was traced through a group is scaled by its factor at the
 angle that it came from.
 
+All of this is linear in r_c and in the spectrum of the sky.  The factors of all channels are sums
+of a few modes m, r_c = sum a_cm r_m, and skies are sums of the three components k of CIE daylight.
+A detector that weighs the channels by w_c receives
+
+    E = sum_k (sum_cm w_c a_cm S_kc V T_m D) s_k + sum_cm w_c a_cm (E_m of the sun) sun_c
+
+which are three products with the sky for any number of channels.
+
     sensors by patches       r_c at the patch of incidence
     straight view            r_c at the patch of the sky; of what the outdoors reflects, the mean
                              of the patches of incidence that the sensor sees it through
@@ -17,13 +25,13 @@ angle that it came from.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
+from mitsuba_cfs.bsdf.spectral_factor import ANGLES, SpectralFactor
 from mitsuba_cfs.methods.coefficients import (
     GroupCoefficients,
     direct_daylight,
@@ -32,22 +40,35 @@ from mitsuba_cfs.methods.coefficients import (
     without_straight,
 )
 from mitsuba_cfs.methods.light import SeasonalLight, seasons_of
-from mitsuba_cfs.methods.optics import SystemOptics
+from mitsuba_cfs.methods.optics import SystemOptics, combinations
 from mitsuba_cfs.methods.phase_light import (
     PhaseLight,
     SensorLight,
-    illuminance_of_all,
+    all_hours,
+    direct_sun_of_all,
+    in_place_of_sun,
     sensor_light,
+    sky_coefficients,
+    states_of,
+    sun_in,
     traced_states,
     with_means,
     with_sensor_light,
 )
 from mitsuba_cfs.methods.reflected_sun import replaced_through
-from mitsuba_cfs.methods.window_reflection import reflects_outdoors
+from mitsuba_cfs.phases import times_sky
+from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.spectra.channels import Channels
-from mitsuba_cfs.spectra.daylight import WATER_CM, SpectralSky, spectral_sky
+from mitsuba_cfs.spectra.daylight import (
+    COMPONENTS,
+    WATER_CM,
+    SpectralSky,
+    daylight_components,
+    spectral_sky,
+)
+from mitsuba_cfs.spectra.detectors import NANOMETRES
 from mitsuba_cfs.surfaces import WindowGroup
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.paths.scene import PathOptics
@@ -56,11 +77,11 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class ChannelOptics:
-    """A system's optics in a channel: those of the visible band, transmission times a factor."""
+class ModeOptics:
+    """A system's optics in a mode: those of the visible band, transmission times a factor."""
 
     visible: SystemOptics
-    factor: Array  # [K] r_c of the patches of incidence
+    factor: Array  # [K] r_m of the patches of incidence
 
     @property
     def transmission(self) -> Array:
@@ -89,17 +110,37 @@ class ChannelOptics:
 
 
 Factors = Sequence[Sequence[SpectralFactor]]  # of each window group in each of its states [G][J]
+MODE_ERROR = 1e-5  # largest part of the factors that modes leave out
 
 
-def channel_irradiance(
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """What is wanted of the light of some sensors."""
+
+    weights: Array  # [D, C] what detectors receive of a unit of power in each band
+    sensors: slice = field(default_factory=lambda: slice(None))  # of the scene's, the eye last
+    total: bool = False  # the sum over the hours alone
+
+
+@dataclass(frozen=True, slots=True)
+class SpectralLight:
+    """What detectors receive."""
+
+    received: tuple[NDArray[np.float32], ...]  # of each `Detection` [D, s, L], or [D, s] of totals
+    outdoors: Array  # [N] the hours' sum of the irradiance of a horizontal plane [W/(m2 nm)]
+
+
+def spectral_light(
     light: PhaseLight | SeasonalLight,
     factors: Factors,
     channels: Channels,
+    wanted: Sequence[Detection],
     state: NDArray[np.int64] | None = None,
     *,
     water_cm: ArrayLike = WATER_CM,
-) -> Iterator[NDArray[np.float32]]:
-    """Irradiance of the sensors, the eye last, in each band in turn [S + 1, L] [W/m2].
+    progress: Progress = silent,
+) -> SpectralLight:
+    """What detectors receive of the light of the sensors.
 
     Args:
         factors: of the systems of the light [G][J].
@@ -108,22 +149,30 @@ def channel_irradiance(
 
     Raises: `ValueError` for path tracing, which has no matrices.
     """
-    parts = []
-    for one, hours in seasons_of(light):
-        if not isinstance(one, PhaseLight):
+    hours_of_all, sensors = len(light.sky.lit), len(light.scene.sensors()[0])
+    received = []
+    for one in wanted:
+        shape = (len(one.weights), len(range(sensors)[one.sensors]), hours_of_all)
+        received.append(np.zeros(shape[:2] if one.total else shape, dtype=np.float32))
+    outdoors = np.zeros(len(NANOMETRES))
+    parts = seasons_of(light)
+    for i, (phase, hours) in enumerate(parts):
+        if not isinstance(phase, PhaseLight):
             raise ValueError("path tracing has no matrices: expected the light of a phase method")
-        water = np.broadcast_to(np.asarray(water_cm, dtype=float), (len(light.sky.lit),))[hours]
-        rows = None if state is None else state[:, hours]
-        parts.append((hours, rows, _Season(with_sensor_light(one), factors, channels, water)))
-    for c in range(channels.count):
-        whole: NDArray[np.float32] | None = None
-        for hours, rows, season in parts:
-            values = illuminance_of_all(season.in_channel(c), rows).astype(np.float32)
-            if whole is None:
-                whole = np.zeros((len(values), len(light.sky.lit)), dtype=np.float32)
-            whole[:, hours] = values
-        assert whole is not None  # a year has a season
-        yield whole
+        water = np.broadcast_to(np.asarray(water_cm, dtype=float), (hours_of_all,))[hours]
+        season = _Season(with_sensor_light(phase), factors, channels, water)
+        outdoors += season.sky.horizontal.sum(axis=0)
+        rows = states_of(phase, None if state is None else state[:, hours])
+        for kind, some in combinations(rows):
+            modes = season.modes_in(kind, some)
+            for one, whole in zip(wanted, received, strict=True):
+                values = modes.received(one)
+                if one.total:
+                    whole += values.sum(axis=-1)
+                else:
+                    whole[..., hours[some]] = values
+        progress("spectral", (i + 1) / len(parts))
+    return SpectralLight(tuple(received), outdoors)
 
 
 def sky_spectra(sky: AnnualSky, water_cm: ArrayLike = WATER_CM) -> SpectralSky:
@@ -136,61 +185,138 @@ def sky_spectra(sky: AnnualSky, water_cm: ArrayLike = WATER_CM) -> SpectralSky:
 
 
 class _Season:
-    """What the channels of a light share."""
+    """The light of the hours of one season, in the modes of its systems' factors."""
 
     def __init__(
         self, light: PhaseLight, factors: Factors, channels: Channels, water_cm: Array
     ) -> None:
-        self._light, self._channels = light, channels
-        self._sky = sky_spectra(light.sky, water_cm)
-        self._sun = self._sky.of_sun(channels)  # [L, C]
+        self._light, self.sky = light, sky_spectra(light.sky, water_cm)
+        # power of sun and ground in each band per lumen and of the sky's components
+        self._sun, self._ground = channels.power(self.sky.sun), channels.power(self.sky.ground)
+        self._components = channels.power(daylight_components())  # [k, C]
         lit = sensor_light(light)
-        known: dict[int, _Angles] = {}
-        self._angles = [
-            [known.setdefault(id(f), _Angles(f, channels)) for f in of] for of in factors
-        ]
-        self._groups = [
+        distinct = {id(factor): factor for of in factors for factor in of}
+        self._shares, angles = _modes(list(distinct.values()), channels)  # [C, M]
+        known = dict(zip(distinct, angles, strict=True))
+        self._angles = [[known[id(factor)] for factor in of] for of in factors]
+        groups = [
             [_GroupInState(light, lit[g][j], g, self._angles[g][j]) for j in traced_states(states)]
             for g, states in enumerate(light.systems)
         ]
+        self._modes = [self._in_mode(groups, m) for m in range(self._shares.shape[1])]
 
-    def in_channel(self, c: int) -> PhaseLight:
-        """The light in a band, whose illuminance is irradiance in it [W/m2]."""
-        light, sun = self._light, self._sun[:, c]
-        sky = light.sky.in_channel(self._sky.diffuse(self._channels, c), sun)
-        # a state between two others is the mean of them in each channel too
+    def _in_mode(self, groups: Sequence[Sequence[_GroupInState]], m: int) -> PhaseLight:
+        """The light in a mode, under the photopic sun."""
+        light = self._light
+        # a state between two others is the mean of them in each mode too
         sensors = tuple(
-            with_means(states, [one.in_channel(c, sun) for one in traced])
-            for states, traced in zip(light.systems, self._groups, strict=True)
+            with_means(states, [one.in_mode(m) for one in traced])
+            for states, traced in zip(light.systems, groups, strict=True)
         )
         systems = [
-            [ChannelOptics(one, of.patches[c]) for one, of in zip(states, angles, strict=True)]
+            [ModeOptics(one, of.patches[m]) for one, of in zip(states, angles, strict=True)]
             for states, angles in zip(light.systems, self._angles, strict=True)
         ]
-        reflected = light.reflected
-        of_all = [optics for states in light.systems for optics in states]
-        if reflected is not None and reflects_outdoors(light.matrices, of_all):
-            factor = sun[reflected.shining].astype(np.float32)
-            before = tuple(values * factor for values in reflected.before)
-            reflected = replace(reflected, sky=sky, before=before)
-        return replace(light, sky=sky, systems=systems, sensors=sensors, reflected=reflected)
+        return replace(light, systems=systems, sensors=sensors)
+
+    def modes_in(self, kind: Sequence[int], hours: NDArray[np.int64]) -> _Modes:
+        """The light in all modes in some hours, with each group in a state [G]."""
+        sky, coefficients, by_sun, direct = self.sky, [], [], []
+        for light in self._modes:
+            whole = sky_coefficients(light, kind)
+            coefficients.append(whole.astype(np.float32))
+            by_sun.append(
+                times_sky(whole, sun_in(light, hours)) + in_place_of_sun(light, kind, hours)
+            )
+            if light.matrices.five_phase:
+                direct.append(direct_sun_of_all(light, kind, hours))
+        amount = sky.amount
+        return _Modes(
+            np.array(coefficients), np.array(by_sun), np.array(direct) if direct else None,
+            amount if all_hours(self._light, hours) else amount[..., hours],
+            sky.ground_luminance[hours], self._shares, self._components, self._sun[hours],
+            self._ground[hours],
+        )  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True)
+class _Modes:
+    """The light of the sensors in modes M in some hours h, under the sky's components k."""
+
+    coefficients: NDArray[np.float32]  # [M, S, P] of the sky
+    by_sun: Array  # [M, S, h] of the sun, but for what comes straight from it
+    direct: Array | None  # [M, S, h] straight from the sun; None with the three-phase method
+    amount: NDArray[np.float32]  # [k, P, h]
+    ground_luminance: Array  # [h]
+    shares: Array  # [C, M]
+    components: Array  # [k, C]
+    sun: Array  # [h, C]
+    ground: Array  # [h, C]
+
+    def received(self, one: Detection) -> Array:
+        """What detectors receive [D, s, h]."""
+        weights = one.weights[:, :, None] * self.shares  # [D, C, M]
+        of_sun = np.tensordot(weights, self.sun, (1, 1))  # [D, M, h]
+        values = self._of_sky(weights, one.sensors)
+        ground = np.tensordot(weights, self.ground, (1, 1)) * self.ground_luminance
+        values += np.einsum("ms,dmh->dsh", self.coefficients[:, one.sensors, 0], ground)
+        values += np.einsum("msh,dmh->dsh", self.by_sun[:, one.sensors], of_sun, optimize=True)
+        if self.direct is None:
+            return values
+        np.maximum(values, 0.0, out=values)
+        values += np.einsum("msh,dmh->dsh", self.direct[:, one.sensors], of_sun, optimize=True)
+        return values
+
+    def _of_sky(self, weights: Array, sensors: slice) -> Array:
+        """Of the sky without its sun [D, s, h]: products of modes, or of detectors if fewer."""
+        coefficients = self.coefficients[:, sensors]
+        D, M, s = len(weights), len(coefficients), coefficients.shape[1]
+        values = np.zeros((D, s * self.amount.shape[-1]))
+        for k in range(COMPONENTS):
+            mixed = np.tensordot(weights, self.components[k], (1, 0)).astype(np.float32)  # [D, M]
+            if D < M:
+                rows = np.tensordot(mixed, coefficients, 1).reshape(D * s, -1)
+                values += (rows @ self.amount[k]).reshape(values.shape)
+            else:
+                lit = coefficients.reshape(M * s, -1) @ self.amount[k]
+                values += mixed @ lit.reshape(M, -1)
+        return values.reshape(D, s, -1)
+
+
+def _modes(factors: Sequence[SpectralFactor], channels: Channels) -> tuple[Array, list[_Angles]]:
+    """Modes of the factors of systems: their shares in the channels [C, M], and the systems'."""
+    patches = [factor.of_patches(channels) for factor in factors]
+    angles = [factor.of_angles(channels) for factor in factors]
+    whole = np.concatenate([*patches, *angles], axis=1)
+    left, size, right = np.linalg.svd(whole, full_matrices=False)
+    count = 1
+    while count < len(size):
+        rest = whole - (left[:, :count] * size[:count]) @ right[:count]
+        if np.abs(rest).max() <= MODE_ERROR * np.abs(whole).max():
+            break
+        count += 1
+    widths = np.cumsum([one.shape[1] for one in (*patches, *angles)])[:-1]
+    split = np.split(right[:count], widths, axis=1)
+    pairs = zip(split[: len(factors)], split[len(factors) :], strict=True)
+    return left[:, :count] * size[:count], [_Angles(*pair) for pair in pairs]
+
+
+@dataclass(frozen=True, slots=True)
 class _Angles:
-    """Factors of a system in all channels."""
+    """Factors of a system in all modes."""
 
-    def __init__(self, factor: SpectralFactor, channels: Channels) -> None:
-        self._factor, self._channels = factor, channels
-        self.patches = factor.of_patches(channels)  # [C, K]
+    patches: Array  # [M, K] of the patches of incidence
+    angles: Array  # [M, A] at `ANGLES`
 
     def towards(self, group: WindowGroup, directions: Array) -> NDArray[np.float32]:
-        """Factors of light from directions [n, 3] on a window group [C, n]."""
+        """Factors of light from directions [n, 3] on a window group [M, n]."""
         theta = np.arccos(np.clip(directions @ group.frame[2], 0.0, 1.0))
-        return self._factor.at(self._channels, theta).astype(np.float32)
+        rows = [np.interp(theta, ANGLES, row) for row in self.angles]
+        return np.array(rows, dtype=np.float32)
 
 
 class _GroupInState:
-    """The light of the sensors through a group in a state, as channels scale it."""
+    """The light of the sensors through a group in a state, as modes scale it."""
 
     def __init__(self, light: PhaseLight, one: SensorLight, g: int, angles: _Angles) -> None:
         matrices, coefficients = light.matrices, one.coefficients
@@ -212,12 +338,12 @@ class _GroupInState:
                 self._straight_outdoors -= replaced_through(light.reflected, parts, self._rest)
         group = matrices.scene.groups[g]
         sky = ReinhartSky(matrices.sampling.subdivision).directions
-        self._to_sky = angles.towards(group, sky)  # [C, P]
-        self._to_sun = angles.towards(group, light.sky.direction)  # [C, L]
+        self._to_sky = angles.towards(group, sky)  # [M, P]
+        self._to_sun = angles.towards(group, light.sky.direction)  # [M, L]
 
-    def in_channel(self, c: int, sun: Array) -> SensorLight:
-        """The light in a band; sun: power of the beam in it per lumen [L]."""
-        one, patches = self._one, self._angles.patches[c]
+    def in_mode(self, m: int) -> SensorLight:
+        """The light in a mode."""
+        one, patches = self._one, self._angles.patches[m]
         coefficients = one.coefficients
         whole = sum(
             (rest * patches) @ daylight
@@ -230,19 +356,18 @@ class _GroupInState:
         if straight is not None:
             # what comes off the outdoors meets the window from anywhere
             direct = straight.values.values if straight.direct is None else straight.direct
-            scaled = direct * self._to_sky[c]
+            scaled = direct * self._to_sky[m]
             whole = whole + scaled + (straight.values.values - direct) * (self._seen @ patches)
             if by_sun is not None and straight.direct is not None:
                 by_sun = by_sun + scaled
-        beam = self._to_sun[c] * sun
-        added = one.added
+        beam, added = self._to_sun[m], one.added
         if added is not None and one.beam_in_room is not None:
             added = one.beam_in_room * beam
-            added += self._straight_outdoors * (self._seen @ patches) * sun
+            added += self._straight_outdoors * (self._seen @ patches)
             if self._reflected is not None:
                 shares = [rest * patches for rest in self._rest]
-                added += sun * replaced_through(self._reflected, self._parts, shares)
-        optics = ChannelOptics(coefficients.optics, patches)
+                added += replaced_through(self._reflected, self._parts, shares)
+        optics = ModeOptics(coefficients.optics, patches)
         return SensorLight(
             replace(coefficients, optics=optics, whole=whole, by_sun=by_sun),
             added,

@@ -245,24 +245,6 @@ class AnnualSky:
             solar=None if self.solar is None else self.solar[:, hours],
         )
 
-    def in_channel(self, diffuse: NDArray[np.floating], beam: ArrayLike) -> AnnualSky:
-        """The same hours in a band of wavelengths, in its power instead of light.
-
-        Args:
-            diffuse: [P, L] radiance without the sun [W/(m2 sr)].
-            beam: [L] power of the sun in the band per lumen [W/lm].
-        """
-        factor = np.asarray(beam, dtype=np.float32)
-        sun = self.sun_alone() * factor
-        lit = self.lit_sun
-        scaled = lit * factor if isinstance(lit, np.ndarray) else lit.multiply(factor[:, None])
-        sky = replace(
-            self, whole=diffuse + sun, illuminance=self.illuminance * np.asarray(beam), sun=sun,
-            solar=None,
-        )  # fmt: skip
-        sky._lit_sun.append(scaled if isinstance(scaled, np.ndarray) else csr_array(scaled))
-        return sky
-
     def whole_year(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values [..., L] as values [..., H] of all hours of the year, the others 0."""
         full = np.zeros((*values.shape[:-1], self.hours), dtype=values.dtype)

@@ -14,7 +14,6 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.spectra.channels import Channels
 from mitsuba_cfs.spectra.detectors import NANOMETRES, detected
 
 FloatArray = NDArray[np.float64]
@@ -23,10 +22,11 @@ LEAST_K, MOST_K = 4000.0, 25000.0  # that CIE's daylight is defined for
 # Of the standard spectra of ASTM G173-03
 WATER_CM, OZONE_CM, AEROSOL_500NM, PRESSURE_PA = 1.42, 0.34, 0.084, 101325.0
 LOWEST_SUN = 0.05  # sine of the altitude below which its colour stays as there (87 degrees zenith)
+TABLE_STEPS = 1 << 14  # of mired, in which the components are tabulated: steps of 0.013
 COMPONENTS = 3  # S_0, S_1, S_2 of CIE daylight
 
 
-def sky_temperature(luminance: ArrayLike, clear: ArrayLike) -> FloatArray:
+def sky_temperature(luminance: ArrayLike, clear: ArrayLike) -> NDArray[np.floating]:
     """Correlated colour temperature of sky of a luminance [cd/m2] [K]; clear: 0 overcast to 1.
 
     Between clear and overcast, reciprocal temperatures are mixed (our choice).
@@ -34,11 +34,10 @@ def sky_temperature(luminance: ArrayLike, clear: ArrayLike) -> FloatArray:
     Source: Chain, Dumortier, Fontoynont 1999, Solar Energy 65, 285-295, as quoted by
     frudawski.de/specsky.
     """
-    mired = -132.1 + 59.77 * np.log10(np.maximum(np.asarray(luminance, dtype=float), 1.0))
-    clear = np.asarray(clear, dtype=float)
-    mixed = clear * np.clip(mired, 1e6 / MOST_K, 1e6 / LEAST_K) + (1 - clear) * 1e6 / OVERCAST_K
-    temperature: FloatArray = 1e6 / mixed
-    return temperature
+    mired = -132.1 + 59.77 * np.log10(np.maximum(luminance, 1.0))
+    mired = np.clip(mired, 1e6 / MOST_K, 1e6 / LEAST_K)
+    share = np.asarray(clear)
+    return np.asarray(1e6 / (share * (mired - 1e6 / OVERCAST_K) + 1e6 / OVERCAST_K))
 
 
 def daylight_shares(temperature: ArrayLike) -> FloatArray:
@@ -114,24 +113,10 @@ class SpectralSky:
     ground_luminance: FloatArray  # [L] [cd/m2]
     sun: FloatArray  # [L, N] spectrum of the beam per lumen [W/(lm nm)]
 
-    def diffuse(self, channels: Channels, c: int) -> NDArray[np.float32]:
-        """Radiance [P, L] of sky and ground in a band [W/(m2 sr)]."""
-        parts = channels.power(daylight_components())[:, c].astype(np.float32)
-        radiance: NDArray[np.float32] = parts[0] * self.amount[0]
-        for part, amount in zip(parts[1:], self.amount[1:], strict=True):
-            radiance += part * amount
-        ground = channels.power(self.ground)[:, c] * self.ground_luminance
-        radiance[0] = ground
-        return radiance
-
-    def of_sun(self, channels: Channels) -> FloatArray:
-        """Power of the beam in each band per lumen [L, C] [W/lm]."""
-        return channels.power(self.sun)
-
 
 def spectral_sky(
     luminance: NDArray[np.floating],
-    weights: FloatArray,
+    weights: NDArray[np.floating],
     beam: FloatArray,
     height: FloatArray,
     water_cm: ArrayLike = WATER_CM,
@@ -144,22 +129,24 @@ def spectral_sky(
         beam: [L] normal illuminance of the sun [lx]; height: [L] sine of its altitude.
     """
     horizontal = beam * np.maximum(height, 0.0)
-    sky = np.asarray(weights, dtype=np.float32) @ luminance
+    weights = np.asarray(weights, dtype=np.float32)  # as the luminances of the year
+    sky = weights @ luminance
     share = horizontal / np.maximum(horizontal + sky, 1e-9)
     per_lumen = detected(daylight_components())[:, 0].astype(np.float32)
     # shares depend on one number: a table is much faster than the patches of all hours
-    steps = np.linspace(1e6 / MOST_K, 1e6 / LEAST_K, 4096)
-    table = daylight_shares(1e6 / steps).astype(np.float32)
-    table /= per_lumen @ table
-    mired = 1e6 / sky_temperature(luminance, share)
+    steps = np.linspace(1e6 / MOST_K, 1e6 / LEAST_K, TABLE_STEPS)
+    table = daylight_shares(1e6 / steps)
+    table = (table / (per_lumen @ table)).astype(np.float32)
+    number = 1e6 / sky_temperature(luminance, share.astype(np.float32)) - steps[0]
+    number *= (TABLE_STEPS - 1) / (steps[-1] - steps[0])
+    nearest = np.rint(number).astype(np.int32)
     amount = np.empty((COMPONENTS, *luminance.shape), dtype=np.float32)
     for own, values in zip(amount, table, strict=True):
-        own[:] = np.interp(mired, steps, values)
-        own *= luminance
+        np.multiply(values[nearest], luminance, out=own)
     amount[:, 0] = 0.0
     sun = sun_spectra(height, water_cm)
     sun /= detected(sun)[:, :1]
-    diffuse = np.einsum("kpl,p->lk", amount, weights) @ daylight_components()
+    diffuse = np.stack([weights @ one for one in amount], axis=-1) @ daylight_components()
     whole = diffuse + horizontal[:, None] * sun
     lumens = detected(whole)[:, :1]
     ground = np.divide(whole, lumens, out=sun.copy(), where=lumens > 0)

@@ -37,6 +37,7 @@ from mitsuba_cfs.bsdf.glazing import Glazing, Pane
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
 from mitsuba_cfs.bsdf.spectral_pane import (
+    VISIBLE_NM,
     SpectralPane,
     read_glazing_layers,
     read_pane_file,
@@ -66,6 +67,7 @@ from thermal.gvalue import TYPICAL_SYSTEMS
 ANGULAR_COLUMNS = ("theta_deg", "transmittance")
 ANGULAR_OPTIONAL = ("reflectance_front", "reflectance_back")
 SPECTRUM_COLUMNS = ("wavelength_nm", "transmittance")
+SPECTRUM_OPTIONAL = ("reflectance",)  # of the side of a shade that faces the panes
 Film = Annotated[Positive, plausible.RESISTANCE]  # [m2 K/W]
 PATCHES = KLEMS_FULL.size
 ByPatch = Annotated[tuple[float, ...], Field(min_length=PATCHES, max_length=PATCHES)]
@@ -418,24 +420,35 @@ class SpectralTable(TomlTable):
         """Transmittance by wavelength and angle; `DataError` for a file that cannot be read."""
         # no transmittance depends on the thickness, which some files do not state
         panes = [read_spectral_pane(pane, thickness=0.004) for pane in self.panes]
-        if self.shade is None:
-            return SpectralFactor.of_panes(panes)
-        nm, tau = read_spectrum(self.shade)
-        return SpectralFactor.of_panes(panes, np.interp(NANOMETRES, nm, tau))
+        low, high = VISIBLE_NM
+        for file, pane in zip(self.panes, panes, strict=True):
+            nm = pane.wavelength_nm
+            if nm[0] > low or nm[-1] < high:
+                message = f"its spectrum is of {nm[0]:g} to {nm[-1]:g} nm, expected {low:g} to "
+                raise DataError(f"{message}{high:g}", file=file, field="spectral_data")
+        shade = (1.0, 0.0) if self.shade is None else read_spectrum(self.shade)
+        return SpectralFactor.of_panes(panes, *shade)
 
 
 def read_spectrum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Wavelengths [N] [nm] and transmittance [N] of a CSV file of `SPECTRUM_COLUMNS`.
+    """Transmittance and reflectance at `NANOMETRES` of a CSV file of `SPECTRUM_COLUMNS`.
+
+    The reflectance is 0 where the file has none.
 
     Raises: `DataError` for a file that cannot be read or does not span 380 to 780 nm.
     """
-    (nm, tau) = _columns(path, SPECTRUM_COLUMNS).values()
+    columns = _columns(path, SPECTRUM_COLUMNS, SPECTRUM_OPTIONAL)
+    nm, tau = columns["wavelength_nm"], columns["transmittance"]
+    rho = columns.get("reflectance", np.zeros_like(nm))
     if len(nm) < 2 or np.any(np.diff(nm) <= 0) or tau.min() < 0 or not tau.any():
         message = "expected rising wavelengths and a transmittance that is not 0"
         raise DataError(message, file=path)
     if nm[0] > NANOMETRES[0] or nm[-1] < NANOMETRES[-1]:
         raise DataError("expected wavelengths from 380 to 780 nm", file=path)
-    return nm, tau
+    if rho.min() < 0 or (rho.any() and (tau + rho).max() > 1):
+        message = "with a reflectance, expected shares of 1 that are 1 at most together"
+        raise DataError(message, file=path)
+    return np.interp(NANOMETRES, nm, tau), np.interp(NANOMETRES, nm, rho)
 
 
 class WindowHeatTable(ClosureTable):

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
 from mitsuba_cfs.methods.optics import SystemOptics
-from mitsuba_cfs.methods.spectral_light import channel_irradiance, sky_spectra
+from mitsuba_cfs.methods.spectral_light import Detection, SpectralLight, spectral_light
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, silent
-from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.spectra.channels import Channels, channels_of
 from mitsuba_cfs.spectra.daylight import WATER_CM, water_vapour_cm
@@ -47,36 +46,35 @@ def room_spectral(
     """
     channels = channels_of(room.options.outputs.channels)
     factors, notes = _factors(room, light)
-    eyes = 1 + len(EYE_TURNS)
-    hours = len(room.skies.lit)
-    # of the work plane photopic [lx] and melanopic [W/m2]; of the eyes in every band
-    plane = np.zeros((2, sensors, hours), dtype=np.float32)
-    bands = np.zeros((channels.count, eyes, hours), dtype=np.float32)
-    count = channels.count
     water = _water(room.weather)[room.skies.lit]
-    rows = light.states(state)
-    irradiance = channel_irradiance(light.light, factors, channels, rows, water_cm=water)
-    for c, values in enumerate(irradiance):
-        plane += channels.detection[[0, MELANOPIC], c, None, None] * values[:sensors]
-        bands[c] = values[-eyes:]
-        progress("spectral", (c + 1) / count)
-    return spectral_year(room, channels, plane, bands, notes)
+    melanopic, photopic = channels.detection[[MELANOPIC]], channels.detection[[0]]
+    wanted = (
+        Detection(melanopic, slice(sensors)),
+        Detection(photopic, slice(sensors), total=True),
+        Detection(np.eye(channels.count), slice(-1 - len(EYE_TURNS), None)),
+    )
+    spectral = spectral_light(
+        light.light, factors, channels, wanted, light.states(state), water_cm=water,
+        progress=progress,
+    )  # fmt: skip
+    return spectral_year(room, channels, spectral, notes)
 
 
 def spectral_year(
     room: RoomInputs,
     channels: Channels,
-    plane: NDArray[np.float32],
-    bands: NDArray[np.float32],
+    light: SpectralLight,
     notes: Sequence[str],
 ) -> SpectralYear:
-    """The results of a year from its irradiances.
+    """The results of a year from its light.
 
     Args:
-        plane: photopic [lx] and melanopic [W/m2] of the work plane's sensors [2, S, L].
-        bands: of the eyes in each band [C, E, L] [W/m2], the view's own direction last.
+        light: melanopic [W/m2] of the work plane's sensors [1, S, L], their photopic total
+            [1, S] [lx], irradiance of the eyes in each band [C, E, L] [W/m2], the view's own
+            direction last.
     """
     skies, occupied = room.skies, room.occupied
+    plane, photopic, bands = light.received
     received = np.einsum("dc,cel->edl", channels.detection, bands)  # [E, 9, L]
     own = received[-1]
     illuminance = skies.whole_year(own[0])
@@ -94,27 +92,30 @@ def spectral_year(
         table[column] = whole
     for turn, values in zip(EYE_TURNS, melanopic, strict=False):
         table[f"melanopic_edi_{turn}_lx"] = values
-    edi = skies.whole_year(equivalent_daylight(plane[1])).T.astype(np.float32)
+    edi = skies.whole_year(equivalent_daylight(plane[0]).astype(np.float32)).T
     return SpectralYear(
         channels.edges_nm,
         table.rename_axis("time"),
         edi,
-        _sensors(plane, edi, occupied),
+        _sensors(photopic[0], edi, occupied),
         np.moveaxis(skies.whole_year(bands[:, -1]), 0, 1).astype(np.float32),
-        _summary(channels, table, bands[:, -1], skies, room.weather, occupied),
+        _summary(channels, table, bands[:, -1], light.outdoors, room.weather.step_h, occupied),
         tuple(notes),
     )
 
 
 def _sensors(
-    plane: NDArray[np.float32], edi: NDArray[np.float32], occupied: NDArray[np.bool_]
+    photopic: NDArray[np.float32], edi: NDArray[np.float32], occupied: NDArray[np.bool_]
 ) -> pd.DataFrame:
-    """Mean melanopic EDI [lx], DER and share of occupied hours at 250 lx or more, by sensor."""
-    photopic, melanopic = plane.sum(axis=2, dtype=float)
+    """Mean melanopic EDI [lx], DER and share of occupied hours at 250 lx or more, by sensor.
+
+    Args: photopic: sum over the hours [S] [lx].
+    """
+    melanopic = edi.sum(axis=0, dtype=float)
     return pd.DataFrame(
         {
             "melanopic_edi_mean_lx": edi.mean(axis=0, dtype=float),
-            "melanopic_der": _ratio(equivalent_daylight(melanopic), photopic),
+            "melanopic_der": _ratio(melanopic, photopic),
             "melanopic_250_percent": _share(edi >= MELANOPIC_BY_DAY, occupied),
         }
     ).rename_axis("sensor")
@@ -124,8 +125,8 @@ def _summary(
     channels: Channels,
     table: pd.DataFrame,
     bands: NDArray[np.float32],
-    skies: AnnualSky,
-    weather: Weather,
+    outdoors: NDArray[np.float64],
+    step_h: float,
     occupied: NDArray[np.bool_],
 ) -> dict[str, float]:
     """Figures of the year at the eye; colour is that of the sum of its light."""
@@ -133,7 +134,7 @@ def _summary(
     enough = edi >= MELANOPIC_BY_DAY
     figures = {
         "melanopic_250_percent": float(_share(enough[:, None], occupied)[0]),
-        "melanopic_250_h": float(np.count_nonzero(enough) * weather.step_h),
+        "melanopic_250_h": float(np.count_nonzero(enough) * step_h),
         "melanopic_edi_median_lx": float(np.median(edi[occupied])) if occupied.any() else 0.0,
         "melanopic_der": float(_ratio(edi.sum(), lit.sum())),
     }
@@ -145,18 +146,11 @@ def _summary(
             "cct_k": float(temperature), "duv": float(distance),
             "colour_rendering_index": index, "colour_fidelity_index": fidelity,
         }  # fmt: skip
-    outdoors = outdoor_light(skies, weather)
+    horizontal = detected(outdoors)
     figures["outdoor_melanopic_der"] = float(
-        _ratio(equivalent_daylight(outdoors[MELANOPIC]), outdoors[0])
+        _ratio(equivalent_daylight(horizontal[MELANOPIC]), horizontal[0])
     )
     return figures
-
-
-def outdoor_light(skies: AnnualSky, weather: Weather) -> NDArray[np.float64]:
-    """What `DETECTORS` receive of the year's daylight on an open horizontal plane [9]."""
-    spectra = sky_spectra(skies, _water(weather)[skies.lit])
-    whole: NDArray[np.float64] = detected(spectra.horizontal).sum(axis=0)
-    return whole
 
 
 def _factors(room: RoomInputs, light: RoomLight) -> tuple[list[list[SpectralFactor]], list[str]]:
@@ -199,7 +193,7 @@ def _share(enough: NDArray[np.bool_], occupied: NDArray[np.bool_]) -> NDArray[np
     return share
 
 
-def _ratio(a: NDArray[np.float64] | float, b: NDArray[np.float64] | float) -> NDArray[np.float64]:
+def _ratio(a: NDArray[np.floating] | float, b: NDArray[np.floating] | float) -> NDArray[np.float64]:
     """a / b, NaN where b is 0."""
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     ratio: NDArray[np.float64] = np.divide(a, b, out=np.full(a.shape, np.nan), where=b > 0)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
+from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, diffuse_reflectance
 from mitsuba_cfs.spectra.channels import channels_of
 from mitsuba_cfs.spectra.detectors import NANOMETRES
 
@@ -21,5 +23,16 @@ def test_a_shade_of_any_scale_is_the_same_and_a_neutral_one_is_one() -> None:
 def test_a_shade_that_passes_nothing_gives_no_nan() -> None:
     opaque = SpectralFactor.of_panes((), np.zeros(len(NANOMETRES)))
     channels = channels_of(5)
-    assert np.isfinite(opaque.at(channels, 0.3)).all()
+    assert np.isfinite(opaque.of_angles(channels)).all()
     assert np.isfinite(opaque.of_patches(channels)).all()
+
+
+def test_light_between_a_coloured_shade_and_glass_has_its_colour() -> None:
+    tau, rho = np.full(2, 0.8), np.full(2, 0.1)
+    pane = SpectralPane("grey", np.array([300.0, 2500.0]), tau, rho, rho, 0.004)
+    shade = np.where(NANOMETRES < 550, 0.05, 0.4)
+    back = diffuse_reflectance([pane], NANOMETRES)
+    assert back == pytest.approx(back[0]) and 0.1 < back[0] < 0.2  # grazing light is reflected more
+    without = SpectralFactor.of_panes([pane], shade).transmittance
+    own = SpectralFactor.of_panes([pane], shade, shade).transmittance
+    assert own / without == pytest.approx(np.broadcast_to(1 / (1 - shade * back), own.shape))

@@ -24,7 +24,7 @@ from mitsuba_cfs.spectra.detectors import (
 from scenes.cli import cfs
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system
-from scenes.fenestration.thermal_file import read_spectrum
+from scenes.fenestration.thermal_file import SpectralTable, read_spectrum
 from scenes.fenestration.tilts import tilt_states
 from scenes.input_files import read_weather
 from scenes.room.light import room_light
@@ -144,3 +144,11 @@ def test_tilts_between_systems_are_not_noted_beside_these() -> None:
     factors, notes = _factors(room, light)
     assert len(factors[0]) == len(states) == 8
     assert [note.split(":")[0] for note in notes] == ["milk 0", "milk 40", "milk 70"]
+
+
+def test_panes_without_visible_data_are_refused(tmp_path) -> None:
+    pane = tmp_path / "sun.txt"
+    rows = "".join(f"{nm} 0.8 0.1 0.1\n" for nm in (800.0, 1500.0, 2500.0))
+    pane.write_text("{ Units, Wavelength Units } Nanometers\n{ Thickness } 4\n" + rows, "utf-8")
+    with pytest.raises(DataError, match=r"of 800 to 2500 nm, expected 400 to 760"):
+        SpectralTable(panes=(pane,)).factor()

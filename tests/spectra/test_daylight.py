@@ -49,9 +49,11 @@ def test_photopic_sky_is_the_luminance_of_its_patches() -> None:
     luminance = np.array([[300.0, 800.0], [5000.0, 0.0], [9000.0, 200.0]], dtype=np.float32)
     weights, beam, height = np.array([0.0, 1.5, 1.6]), np.array([8e4, 0.0]), np.array([0.5, 0.1])
     sky, channels = spectral_sky(luminance, weights, beam, height), channels_of(81)
-    light = sum(channels.detection[0, c] * sky.diffuse(channels, c) for c in range(channels.count))
+    per_lumen = detected(daylight_components())[:, 0]
+    light = np.einsum("k,kpl->pl", per_lumen, sky.amount)
+    light[0] = detected(sky.ground)[:, 0] * sky.ground_luminance
     assert light == pytest.approx(luminance, rel=2e-4, abs=1e-3)
-    assert sky.of_sun(channels) @ channels.detection[0] == pytest.approx(1.0, rel=2e-4)
+    assert channels.power(sky.sun) @ channels.detection[0] == pytest.approx(1.0, rel=2e-4)
     # the ground has the colour of the whole: between the sun's and the sky's
     of = [colour_temperature(detected(s)[..., -3:])[0] for s in (sky.sun[0], sky.ground[0])]
     assert of[0] < of[1] < 6514

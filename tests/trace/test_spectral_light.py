@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,9 +12,10 @@ from mitsuba_cfs.bsdf.spectral_factor import ANGLES, SpectralFactor
 from mitsuba_cfs.methods.light import illuminance
 from mitsuba_cfs.methods.optics import BetweenOptics, BsdfOptics
 from mitsuba_cfs.methods.phase_light import phase_light
-from mitsuba_cfs.methods.spectral_light import channel_irradiance, sky_spectra
+from mitsuba_cfs.methods.spectral_light import Detection, sky_spectra, spectral_light
 from mitsuba_cfs.sky.annual import given_sky
 from mitsuba_cfs.spectra.channels import channels_of
+from mitsuba_cfs.spectra.daylight import daylight_components
 from mitsuba_cfs.spectra.detectors import NANOMETRES
 from mitsuba_cfs.surfaces import Surfaces
 from tests.trace.phase_rooms import traced
@@ -48,11 +51,30 @@ def sky(height_deg: float = 35.0):
     return given_sky(towards, beam, diffuse, 1, day_of_year=80)
 
 
+def channel_irradiance(light, factors, channels, rows=None) -> np.ndarray:
+    """Irradiance of the sensors in each band [C, S, L]."""
+    wanted = [Detection(np.eye(channels.count))]
+    [found] = spectral_light(light, factors, channels, wanted, rows).received
+    return found
+
+
+def in_channel(whole, spectra, c: int):
+    """The skies in a band of `CHANNELS`, in its power instead of light."""
+    parts = CHANNELS.power(daylight_components())[:, c]
+    diffuse = np.einsum("k,kpl->pl", parts, spectra.amount)
+    diffuse[0] = CHANNELS.power(spectra.ground)[:, c] * spectra.ground_luminance
+    beam = CHANNELS.power(spectra.sun)[:, c]
+    sun = whole.sun_alone() * beam
+    return replace(
+        whole, whole=diffuse + sun, illuminance=whole.illuminance * beam, sun=sun, solar=None
+    )
+
+
 def traced_by_channel(matrices, factor, whole) -> np.ndarray:
     """Irradiance [C, S, L] with the optics of each channel traced, no factor of the visible's."""
     spectra, found = sky_spectra(whole), []
     for c in range(CHANNELS.count):
-        own = whole.in_channel(spectra.diffuse(CHANNELS, c), spectra.of_sun(CHANNELS)[:, c])
+        own = in_channel(whole, spectra, c)
         system = optics(CHANNELS.mean(factor.transmittance)[:, c])
         groups = len(matrices.scene.groups)
         found.append(illuminance(phase_light(matrices, [[system]] * groups, own)))
@@ -76,7 +98,7 @@ def test_light_is_that_traced_for_each_channel(corner, open_site: bool, most: fl
     matrices = traced(room, exterior, groups, points, subdivision=1, window_parts=1)
     factor, whole = tinted(), sky()
     visible = phase_light(matrices, [[optics(factor.visible)]] * len(groups), whole)
-    own = np.stack(list(channel_irradiance(visible, [[factor]] * len(groups), CHANNELS)))
+    own = channel_irradiance(visible, [[factor]] * len(groups), CHANNELS)
     true = traced_by_channel(matrices, factor, whole)
     assert own[:, : len(points)] == pytest.approx(true, rel=most)
 
@@ -87,7 +109,7 @@ def test_neutral_glass_gives_the_photopic_light(corner) -> None:
     factor, channels = SpectralFactor.neutral(), channels_of(81)
     light = phase_light(matrices, [[optics(np.full(len(ANGLES), 0.7))]] * len(groups), sky())
     bands = channel_irradiance(light, [[factor]] * len(groups), channels)
-    lux = sum(channels.detection[0, c] * one for c, one in enumerate(bands))
+    lux = np.tensordot(channels.detection[0], bands, 1)
     # 2e-4: light beyond 380 to 780 nm and the cells of 5 nm
     assert lux[: len(points)] == pytest.approx(illuminance(light), rel=2e-4)
 
@@ -100,9 +122,9 @@ def test_states_are_those_of_their_hours(corner) -> None:
     light = phase_light(matrices, [states] * len(groups), sky())
     factors = [[blue, grey]] * len(groups)
     rows = np.tile([0, 1, 0, 1], (len(groups), 1))
-    mixed = next(channel_irradiance(light, factors, CHANNELS, rows))
+    mixed = channel_irradiance(light, factors, CHANNELS, rows)[0]
     for j in (0, 1):
-        alone = next(channel_irradiance(light, factors, CHANNELS, np.full_like(rows, j)))
+        alone = channel_irradiance(light, factors, CHANNELS, np.full_like(rows, j))[0]
         assert mixed[:, rows[0] == j] == pytest.approx(alone[:, rows[0] == j], rel=1e-5)
 
 
@@ -121,5 +143,23 @@ def test_a_state_between_two_others_is_their_mean_in_each_channel(corner) -> Non
     for found, states in ((expected, (0, 2)), (own, (1,))):
         for j in states:
             rows = np.full((len(groups), 4), j)
-            found.append(np.stack(list(channel_irradiance(light, factors, CHANNELS, rows))))
+            found.append(channel_irradiance(light, factors, CHANNELS, rows))
     assert own[0] == pytest.approx(0.75 * expected[0] + 0.25 * expected[1], rel=1e-5)
+
+
+def test_a_total_is_the_sum_over_the_hours_and_a_detector_that_of_its_bands(corner) -> None:
+    room, groups, shade, points = corner
+    matrices = traced(room, shade, groups, points, subdivision=1, window_parts=1)
+    blue, grey = tinted(), SpectralFactor.neutral()
+    states = [optics(blue.visible), optics(np.full(len(ANGLES), 0.3))]
+    light = phase_light(matrices, [states] * len(groups), sky())
+    factors, rows = [[blue, grey]] * len(groups), np.tile([0, 1, 0, 1], (len(groups), 1))
+    melanopic = CHANNELS.detection[[5]]
+    wanted = [
+        Detection(melanopic, slice(2)),
+        Detection(melanopic, slice(2), total=True),
+        Detection(np.eye(CHANNELS.count), slice(2)),
+    ]
+    one, total, bands = spectral_light(light, factors, CHANNELS, wanted, rows).received
+    assert one == pytest.approx(np.tensordot(melanopic, bands, 1), rel=1e-5)
+    assert total == pytest.approx(one.sum(axis=-1), rel=1e-5)

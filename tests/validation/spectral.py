@@ -8,18 +8,26 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from bim.shoebox import shoebox
 from bim.to_tracer import interior_surfaces, window_groups
 from mitsuba_cfs.bsdf.angular import spectral_tables, specular_matrices
+from mitsuba_cfs.bsdf.en410 import solar_value
+from mitsuba_cfs.bsdf.glazing import BRONZE_SHAPE, CLEAR_ABOVE, CLEAR_SHAPE
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
-from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, read_spectral_pane
+from mitsuba_cfs.bsdf.spectral_pane import (
+    SpectralPane,
+    read_spectral_pane,
+    spectral_transmittance,
+)
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods.light import daylight
 from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
-from mitsuba_cfs.methods.spectral_light import channel_irradiance
+from mitsuba_cfs.methods.spectral_light import Detection, spectral_light
 from mitsuba_cfs.sky.annual import AnnualSky, given_sky
 from mitsuba_cfs.spectra.channels import channels_of
 from mitsuba_cfs.spectra.daylight import (
@@ -33,14 +41,20 @@ from mitsuba_cfs.spectra.detectors import (
     colour_temperature,
     detected,
     equivalent_daylight,
+    illuminant,
+    sensitivities,
 )
 from mitsuba_cfs.surfaces import Surfaces
 from tests.radiance import polygon, run, write_surfaces
 
-PANES = {  # of the IGSDB, in ../shared/data: file and number of panes in series
-    "clear": ("CLEAR_3.DAT", 1),
-    "green float": ("913.json", 1),
-    "three panes of green float": ("913.json", 3),
+FABRIC = np.interp(NANOMETRES, [380, 500, 540, 780], [0.05, 0.05, 0.4, 0.4])  # amber
+WINDOWS = {  # panes of the IGSDB in ../shared/data, from outside to inside, and a fabric indoors
+    "clear": (("CLEAR_3.DAT",), None),
+    "green float": (("913.json",), None),
+    "three panes of green float": (("913.json",) * 3, None),
+    "electrochromic, clear": (("frads_igsdb_product_7406.json", "CLEAR_3.DAT"), None),
+    "blue, coated, and clear": (("nfrc_9962.json", "CLEAR_3.DAT"), None),
+    "clear, amber fabric": (("CLEAR_3.DAT",), FABRIC),
 }
 SKY_AND_GROUND = (
     "skyfunc glow sky_glow 0 0 4 1 1 1 0 sky_glow source sky 0 0 4 0 0 1 180 "
@@ -51,6 +65,14 @@ BANDS = 20  # of the peer, 380 to 780 nm; its build has at most 24
 POINTS = np.array([[2.0, 3.0, 0.8], [2.0, 3.0, 1.2], [2.0, 3.0, 1.2]])
 NORMALS = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 NAMES = ("desk", "eye towards the window", "eye along the window")
+
+
+@dataclass(frozen=True)
+class Window:
+    """What fills the window."""
+
+    panes: list[SpectralPane]
+    fabric: NDArray[np.float64] | None  # transmittance and reflectance [N], diffuse; None: none
 
 
 @dataclass(frozen=True)
@@ -70,18 +92,20 @@ class Light:
 
 def main(
     *, data: Path = Path("../shared/data/bsdf/products_spectral"), bounces: int = 8,
-    divisions: int = 20000,
+    divisions: int = 20000, only: str = "",
 ) -> str:  # fmt: skip
-    """The table of docs/evidence_daylight.md."""
+    """The table of docs/evidence_daylight.md; only: of one of `WINDOWS`."""
     rows = [
         "| panes | sky | point | EDI [lx] | Radiance | difference % | DER | difference % | CCT, "
         "difference [K] |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    for name, (file, count) in PANES.items():
-        panes = [read_spectral_pane(data / file)] * count
+    for name, (files, fabric) in WINDOWS.items():
+        if only not in ("", name):
+            continue
+        window = Window([read_spectral_pane(data / file) for file in files], fabric)
         for sky in ("overcast", "sun"):
-            own, peer = ours(panes, sky), radiances(panes, sky, bounces, divisions)
+            own, peer = ours(window, sky), radiances(window, sky, bounces, divisions)
             for s, point in enumerate(NAMES):
                 edi, ratio = own.edi[s], own.ratio[s]
                 rows.append(
@@ -112,29 +136,38 @@ def hour(kind: str) -> AnnualSky:
     return sky if kind == "overcast" else replace(sky, whole=sky.sun_alone())
 
 
-def ours(panes: Sequence[SpectralPane], kind: str) -> Light:
-    """The project's own, from the photopic light of the panes' visible band."""
+def ours(window: Window, kind: str) -> Light:
+    """The project's own, from the photopic light of the window's visible band."""
     scene, sky, channels = room_scene(), hour(kind), channels_of(20)
-    table = spectral_tables(panes)["Visible"]
+    table = spectral_tables(window.panes)["Visible"]
     system = BsdfOptics(specular_matrices(table), angular=table)
+    factor = SpectralFactor.of_panes(window.panes)
+    if window.fabric is not None:
+        weight = illuminant("D65") * sensitivities()[0]
+        share = float(window.fabric @ weight / weight.sum())
+        block = np.full((KLEMS_FULL.size,) * 2, share / np.pi)
+        sheet = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, block, block, block, block)
+        system = BsdfOptics(combine_layers([specular_matrices(table), sheet]).bsdf)
+        factor = SpectralFactor.of_panes(window.panes, window.fabric, window.fabric)
     sampling = Sampling(sensor_samples=1 << 16, patch_samples=1 << 14, sun_points=1 << 13)
     light = daylight(scene, [[system]], sky, sampling=sampling)
-    factor = SpectralFactor.of_panes(panes)
-    bands = np.stack(list(channel_irradiance(light, [[factor]], channels)))[..., 0]
-    return Light.of(bands.T @ channels.detection.T)
+    wanted = [Detection(channels.detection)]
+    [received] = spectral_light(light, [[factor]], channels, wanted).received
+    return Light.of(received[..., 0].T)
 
 
-def radiances(panes: Sequence[SpectralPane], kind: str, bounces: int, divisions: int) -> Light:
-    """Radiance's: spectra as its own primitives, each pane a `glass`."""
+def radiances(window: Window, kind: str, bounces: int, divisions: int) -> Light:
+    """Radiance's: spectra as its own primitives, each pane a `glass`, the fabric a `trans`."""
     scene = room_scene()
     with TemporaryDirectory() as name:
         folder = Path(name)
         write_surfaces(scene.interior, folder / "room.rad")
-        (folder / "glass.rad").write_text(_glass(scene, panes), "utf-8")
+        (folder / "pane.cal").write_text(PANE_CAL, "utf-8")
+        (folder / "glass.rad").write_text(_glass(scene, window), "utf-8")
         azimuth = AZIMUTH - 180.0  # gendaylit's: west of south
         beam, diffuse = (0.0, 200.0) if kind == "overcast" else (800.0, 50.0)
         made = run(f"gendaylit -ang {ALTITUDE} {azimuth} -W {beam} {diffuse}", folder).decode()
-        (folder / "sky.rad").write_text(_sky(made, kind), "utf-8")
+        (folder / "sky.rad").write_text(_sky(made, kind, window.panes), "utf-8")
         run("oconv sky.rad room.rad glass.rad > scene.oct", folder)
         lines = "".join(
             " ".join(f"{v:g}" for v in (*p, *n)) + "\n"
@@ -154,6 +187,13 @@ def radiances(panes: Sequence[SpectralPane], kind: str, bounces: int, divisions:
     return Light.of(power @ channels_of(BANDS).detection.T * 179.0 / flat)
 
 
+def transmissivity(tau: ArrayLike) -> NDArray[np.float64]:
+    """Radiance's transmissivity of a pane's transmittance at normal incidence, n = 1.52."""
+    tau = np.asarray(tau, dtype=float)
+    root = np.sqrt(0.8402528435 + 0.0072522239 * tau**2)
+    return np.asarray((root - 0.9166530661) / 0.0036261119 / tau)
+
+
 def _spectrum(name: str, values: NDArray[np.float64]) -> str:
     """A primitive `spectrum` of values [N]."""
     text = " ".join(f"{v:.6g}" for v in values)
@@ -165,10 +205,17 @@ def _unit(spectrum: NDArray[np.float64]) -> NDArray[np.float64]:
     return spectrum * detected(np.ones(len(NANOMETRES)))[0] / detected(spectrum)[0]
 
 
-def _sky(made: str, kind: str) -> str:
-    """The sky of `gendaylit`, coloured; the overcast sky, or the sun alone."""
+def _sky(made: str, kind: str, panes: Sequence[SpectralPane]) -> str:
+    """The sky of `gendaylit`, coloured; the overcast sky, or the sun alone.
+
+    Shadow rays of Radiance do not go to and fro between panes: the sun's spectrum has that share.
+    """
     overcast = _unit(daylight_shares(OVERCAST_K) @ daylight_components())
-    sun = _unit(sun_spectra(np.sin(np.radians(ALTITUDE)))[0])
+    cosine = np.cos(np.radians(ALTITUDE)) * np.cos(np.radians(AZIMUTH - 180.0))
+    alone = [spectral_transmittance([pane], NANOMETRES, np.arccos(cosine))[0] for pane in panes]
+    together = spectral_transmittance(panes, NANOMETRES, np.arccos(cosine))[0]
+    share = together / np.maximum(np.prod(alone, axis=0), 1e-9)
+    sun = _unit(sun_spectra(np.sin(np.radians(ALTITUDE)))[0]) * share
     lines = [line for line in made.splitlines() if not line.startswith("#")]
     text = "\n".join(lines)
     start = text.index("void brightfunc skyfunc")
@@ -178,18 +225,55 @@ def _sky(made: str, kind: str) -> str:
     return _spectrum("beam", sun) + text[:start].replace("void light", "beam light")
 
 
-def _glass(scene: DaylightScene, panes: Sequence[SpectralPane]) -> str:
-    """Panes as `glass`, a centimetre apart, the inner one in the window's plane."""
-    parts = []
-    for i, pane in enumerate(reversed(panes)):
-        tau = np.interp(NANOMETRES, pane.wavelength_nm, pane.transmittance)
-        # Radiance's transmissivity of a transmittance at normal incidence, n = 1.52
-        passed = (np.sqrt(0.8402528435 + 0.0072522239 * tau**2) - 0.9166530661) / 0.0036261119 / tau
-        parts.append(_spectrum(f"tint{i}", passed))
-        parts.append(f"tint{i} glass pane{i}\n0\n0\n3 1 1 1\n")
+# Radiance multiplies the spectrum of a `glass` into its transmittance whatever the angle: only the
+# three colours of the material itself get the longer way of oblique light.  This function has it: T
+# of a pane of transmissivity tn by wavelength over that of the material's own transmissivity.
+# A coated pane has t(theta) of WINDOW 4's polynomials, as ours.
+PANE_CAL = """{ arguments: wavelengths from and to, own transmissivity, coefficients in cos(theta),
+table every 5 nm of tn, or of the coated pane's transmittance }
+n : 1.52;
+c = abs(Rdot);
+c2 = sqrt(1 - (1 - c*c)/(n*n));
+sq(x) = x*x;
+re = sq((c - n*c2)/(c + n*c2));
+rm = sq((1/c - n/c2)/(1/c + n/c2));
+T(r, t) = (1-r)*(1-r)*t/(1 - r*r*t*t);
+both(tn) = .5*(T(re, tn^(1/c2)) + T(rm, tn^(1/c2)));
+between(f, a, b) = (1-f)*a + f*b;
+at(x) = between(x - floor(x), arg(9 + floor(x)), arg(10 + floor(x)));
+pane(nm) = both(at((nm - 380)/5)) / both(arg(3));
+shape = arg(4) + c*(arg(5) + c*(arg(6) + c*(arg(7) + c*arg(8))));
+coated(nm) = at((nm - 380)/5) * if(shape, shape, 0) / both(arg(3));
+"""
+
+
+def _glass(scene: DaylightScene, window: Window) -> str:
+    """Panes as `glass`, a centimetre apart; what is innermost is in the window's plane."""
+    parts, innermost = [], 0
+    if window.fabric is not None:
+        innermost = 1
+        parts.append(_spectrum("dye", 2 * window.fabric))
+        parts.append("dye trans layer0\n0\n0\n7 1 1 1 0 0 0.5 0\n")
+    for i, pane in enumerate(reversed(window.panes), start=innermost):
+        every = np.arange(380.0, 786.0, 5.0)
+        table = np.interp(every, pane.wavelength_nm, pane.transmittance)
+        own = transmissivity(SpectralFactor.of_panes([pane]).visible[0])
+        shape = np.zeros(5)
+        if pane.coated:
+            clear = solar_value(pane.wavelength_nm, pane.transmittance) > CLEAR_ABOVE
+            shape = np.array(CLEAR_SHAPE[0] if clear else BRONZE_SHAPE[0])
+        else:
+            table = transmissivity(table)
+        values = " ".join(f"{v:.6g}" for v in (own, *shape, *table))
+        function = "coated" if pane.coated else "pane"
+        parts.append(
+            f"void specfunc tint{i}\n2 {function} pane.cal\n0\n{8 + len(every)} 380 780 {values}\n"
+            f"tint{i} glass layer{i}\n0\n0\n3 {own:.6g} {own:.6g} {own:.6g}\n"
+        )
+    for i in range(innermost + len(window.panes)):
         for group in scene.groups:
-            for window in group.windows:
-                for k, triangle in enumerate(window.triangles):
+            for each in group.windows:
+                for k, triangle in enumerate(each.triangles):
                     moved = triangle + 0.01 * i * group.frame[2]
-                    parts.append(polygon(f"pane{i}", f"glass{i}_{k}", moved))
+                    parts.append(polygon(f"layer{i}", f"sheet{i}_{k}", moved))
     return "\n".join(parts)

@@ -1,0 +1,61 @@
+"""Colour of daylight outdoors: the models of sky and sun against measurements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pvlib
+
+from mitsuba_cfs.methods.spectral_light import sky_spectra
+from mitsuba_cfs.sky.annual import AnnualSky, given_sky
+from mitsuba_cfs.spectra.detectors import colour_temperature, detected
+
+SINGAPORE = pvlib.location.Location(1.34, 103.96, "Asia/Singapore", 15.0)
+WATER_CM = 5.0  # of the atmosphere there, the year's mean
+LOWEST_DEG = 5.0  # altitude of the sun below which measurements are left out
+
+
+def main(measured: Path) -> str:
+    """The table of docs/spectral.md.
+
+    Args: measured: metadata.csv of github.com/prijibalakrishnan/equatorialskies.
+    """
+    table = pd.read_csv(measured).dropna(subset=["GlobalIrrad"])
+    moments = pd.to_datetime(table["MonthYear"] + " " + table["Time"], format="%d%b%y %H:%M")
+    times = pd.DatetimeIndex(moments).tz_localize("Asia/Singapore")
+    position = SINGAPORE.get_solarposition(times)
+    high = position["elevation"].to_numpy() >= LOWEST_DEG
+    table, times, position = table[high], times[high], position[high]
+    split = pvlib.irradiance.erbs(table["GlobalIrrad"].to_numpy(), position["zenith"], times)
+    sky = _sky(position, split, times)
+    own = detected(sky_spectra(sky, WATER_CM).horizontal)
+    kelvin, true = colour_temperature(own[:, -3:])[0], table["CCT"].to_numpy(dtype=float)
+    lines = [
+        "| sky | measurements | CCT measured, median [K] | model | difference, mean [1/MK] | rms |",
+        "|---|---|---|---|---|---|",
+    ]
+    kinds = {"clear": ["CS"], "intermediate": ["IS"], "overcast": ["OS"]}
+    known = [kind for names in kinds.values() for kind in names]
+    kinds["morning and evening"] = sorted(set(table["SkyType"]) - set(known))
+    for label, names in kinds.items():
+        some = table["SkyType"].isin(names).to_numpy()
+        mired = 1e6 / kelvin[some] - 1e6 / true[some]
+        lines.append(
+            f"| {label} | {np.count_nonzero(some)} | {np.median(true[some]):.0f} | "
+            f"{np.median(kelvin[some]):.0f} | {mired.mean():+.1f} | "
+            f"{np.sqrt(np.mean(mired**2)):.1f} |"
+        )
+    return "\n".join(lines)
+
+
+def _sky(position: pd.DataFrame, split: pd.DataFrame, times: pd.DatetimeIndex) -> AnnualSky:
+    azimuth, height = (np.radians(position[name]) for name in ("azimuth", "elevation"))
+    towards = np.stack(
+        [np.sin(azimuth) * np.cos(height), np.cos(azimuth) * np.cos(height), np.sin(height)], axis=1
+    )
+    return given_sky(
+        towards, np.asarray(split["dni"]), np.asarray(split["dhi"]), 1,
+        day_of_year=times.dayofyear.to_numpy(), dew_point_c=24.0,
+    )  # fmt: skip
