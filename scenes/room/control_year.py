@@ -33,9 +33,9 @@ from scenes.room.shading import (
     seat_view,
     shading_states,
     slat_tilts_deg,
-    window_beam,
 )
 from scenes.room.solar import SeasonalOutdoors, SunByStates, window_irradiance
+from scenes.room.window_sensors import window_beam
 from scenes.room.zone import (
     RoomZone,
     ZoneSurfaces,

@@ -9,7 +9,6 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.to_tracer import exterior_surfaces
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.evaluation import GlareOptions
 from mitsuba_cfs.images.view import View, fisheye
@@ -25,9 +24,6 @@ from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.metrics.lm83 import blinds_operated
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.sun import is_up, sun_directions
-from mitsuba_cfs.surfaces import Surfaces, even_numbers, points_on_triangles
-from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
-from mitsuba_cfs.trace.sun.shade import sunlit_shares
 from scenes.fenestration.sight import sight_through
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.room.glare import rating_of
@@ -43,6 +39,7 @@ from scenes.room.shading_rules import (
     ShadingRule,
 )
 from scenes.room.solar import SeasonalOutdoors, window_irradiance
+from scenes.room.window_sensors import facade_illuminance, roof_irradiance, window_beam
 from thermal.control import (
     Condition,
     RoomCondition,
@@ -63,9 +60,6 @@ from thermal.occupants import arrivals, haldi_robinson_2010, lightswitch_2002
 
 FloatArray = NDArray[np.float64]
 StateArray = NDArray[np.int64]
-SUN_POINTS = 64  # on each window group, for its sunlit share
-DISC_RAYS = 4  # from each of them
-CLEAR = 0.01  # [m] of a sensor outside the glass
 MOST_COMBINATIONS = 1024  # of states of groups that avoid glare together
 # An eye: position [m] and azimuth of the line of sight [deg] from north by east, None of the view
 Seat = tuple[tuple[float, float, float] | None, float | None]
@@ -500,78 +494,6 @@ def group_states(room: RoomInputs, c: int) -> int:
     """Number of states of a control group: of its window group with the most."""
     windows = room.windows
     return max(len(windows.systems[g]) for g in np.flatnonzero(windows.control == c))
-
-
-def window_beam(room: RoomInputs, *, shaded: bool) -> FloatArray:
-    """The sun's direct irradiance of each window group in every hour [H, G] [W/m2].
-
-    Args: shaded: by the surroundings; else as if there were none.
-    """
-    sun, groups = sun_directions(room.weather), room.windows.groups
-    normals = np.stack([group.frame[2] for group in groups])
-    # an hour of sunset has a beam in the weather, although the sun has set in its middle
-    direct = np.where(is_up(sun), room.weather.direct_normal, 0.0)
-    beam: FloatArray = direct[:, None] * np.maximum(sun @ normals.T, 0.0)
-    if not shaded:
-        return beam
-    points = np.concatenate(
-        [
-            points_on_triangles(
-                np.concatenate([w.triangles for w in group.windows]), even_numbers(SUN_POINTS)
-            )[0]
-            for group in groups
-        ]
-    )
-    facing = np.repeat(normals, SUN_POINTS, axis=0)
-    for number, season in enumerate(room.seasons):
-        exterior = exterior_surfaces(season.building, room.space, "solar")
-        hours = np.flatnonzero((beam > 0).any(axis=1) & (room.season_of_year == number))
-        if len(hours) and len(exterior.triangles):
-            lit = sunlit_shares(
-                exterior, points, facing, sun[hours], samples=DISC_RAYS,
-                seed=room.options.sampling.seed,
-            )  # fmt: skip
-            beam[hours] *= lit.reshape(len(groups), SUN_POINTS, -1).mean(axis=1).T
-    return beam
-
-
-def roof_irradiance(room: RoomInputs, *, horizontal: bool = False) -> FloatArray:
-    """Irradiance of the window groups, or of a level sensor, without surroundings [H, G] [W/m2]."""
-    matrix = _sensor_matrix(room, Surfaces.none(), horizontal=horizontal)
-    lit: FloatArray = (matrix @ np.asarray(room.skies.solar)).astype(float)
-    return room.skies.whole_year(lit).T
-
-
-def facade_illuminance(room: RoomInputs, sensor: str) -> FloatArray:
-    """Illuminance in the middle of the glass of the window groups [H, G] [lx].
-
-    Args: sensor: "window", "roof" without surroundings, or "horizontal" on the roof.
-    """
-    sky, season = np.asarray(room.skies.whole), room.season_of_year[room.skies.lit]
-    lit = np.zeros((len(room.windows.groups), sky.shape[1]))
-    for number, one in enumerate(room.seasons):
-        around = Surfaces.none()
-        if sensor == "window":
-            around = exterior_surfaces(one.building, room.space, "visible")
-        hours = season == number
-        matrix = _sensor_matrix(room, around, horizontal=sensor == "horizontal")
-        lit[:, hours] = matrix @ sky[:, hours]
-    return room.skies.whole_year(lit).T
-
-
-def _sensor_matrix(room: RoomInputs, around: Surfaces, *, horizontal: bool) -> FloatArray:
-    """Irradiance of sensors in the middle of the window groups per radiance of a patch [G, P]."""
-    sampling, groups = room.options.sampling, room.windows.groups
-    centres = [np.mean([w.triangles.mean(axis=(0, 1)) for w in g.windows], axis=0) for g in groups]
-    normals = np.stack([g.frame[2] for g in groups])
-    points = np.stack(centres) + CLEAR * normals
-    if horizontal:  # one sensor for all
-        points, normals = points[:1], np.array([[0.0, 0.0, 1.0]])
-    values: FloatArray = sky_irradiance_matrix(
-        around, points, normals,
-        subdivision=sampling.subdivision, seed=sampling.seed, cache=room.cache,
-    ).values  # fmt: skip
-    return np.tile(values, (len(groups), 1)) if horizontal else values
 
 
 def _by_sun_depth(

@@ -30,9 +30,9 @@ from scenes.room.shading import (
     room_conditions,
     shading_states,
     temperature_conditions,
-    window_beam,
 )
 from scenes.room.solar import seasonal_outdoors, solar_gains
+from scenes.room.window_sensors import window_beam
 from scenes.room.windows import in_all_windows, room_windows
 from scenes.room.zone import RoomZone, balances, zone_surfaces
 from tests.scenes.small_box import FEW, HOURS, TWO, clear
