@@ -93,6 +93,27 @@ class BsdfOptics:
         """Pickle the data without the forms that have been made."""
         return BsdfOptics, (self._coarse, self._fine, self._angular, self.between)
 
+    def tinted(self, theta: ArrayLike, factor: ArrayLike) -> BsdfOptics:
+        """The same with its transmission times factors [A] at angles of incidence [A] [rad].
+
+        A tensor tree without a table by angle stays as it is.
+        """
+        if isinstance(self._fine, KlemsBsdf):
+            bsdf = _tinted_klems(self._fine, theta, factor)
+        elif self._angular is not None:
+            bsdf = _tinted_klems(self._coarse, theta, factor)
+        else:
+            return self
+        angular = self._angular
+        if angular is not None:
+            passed = angular.transmittance * np.interp(angular.theta, theta, factor)
+            most = np.ones_like(passed)
+            for reflected in (angular.reflectance_front, angular.reflectance_back):
+                if reflected is not None:
+                    most = np.minimum(most, 1 - reflected)
+            angular = replace(angular, transmittance=np.clip(passed, 0, most))
+        return BsdfOptics(bsdf, None, angular)
+
     @cached_property
     def transmission(self) -> NDArray[np.float64]:
         """See `SystemOptics`."""
@@ -135,6 +156,18 @@ class BsdfOptics:
             return mirror
         block = block * full.basis_in.projected_solid_angles()
         return block if mirror is None else block + mirror
+
+
+def _tinted_klems(bsdf: KlemsBsdf, theta: ArrayLike, factor: ArrayLike) -> KlemsBsdf:
+    """Klems matrices with their transmission times factors by the angle outdoors."""
+    changed = {}
+    if bsdf.transmission_front is not None:
+        outside = np.interp(bsdf.basis_in.centres()[0], theta, factor)
+        changed["transmission_front"] = bsdf.transmission_front * outside
+    if bsdf.transmission_back is not None:
+        outside = np.interp(bsdf.basis_out.centres()[0], theta, factor)
+        changed["transmission_back"] = bsdf.transmission_back * outside[:, None]
+    return replace(bsdf, **changed)
 
 
 class AngularOptics:
