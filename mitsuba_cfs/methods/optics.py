@@ -93,7 +93,7 @@ class BsdfOptics:
         """Pickle the data without the forms that have been made."""
         return BsdfOptics, (self._coarse, self._fine, self._angular, self.between)
 
-    def tinted(self, theta: ArrayLike, factor: ArrayLike) -> BsdfOptics:
+    def tinted(self, theta: NDArray[np.float64], factor: NDArray[np.float64]) -> BsdfOptics:
         """The same with its transmission times factors [A] at angles of incidence [A] [rad].
 
         A tensor tree without a table by angle stays as it is.
@@ -158,16 +158,16 @@ class BsdfOptics:
         return block if mirror is None else block + mirror
 
 
-def _tinted_klems(bsdf: KlemsBsdf, theta: ArrayLike, factor: ArrayLike) -> KlemsBsdf:
+def _tinted_klems(
+    bsdf: KlemsBsdf, theta: NDArray[np.float64], factor: NDArray[np.float64]
+) -> KlemsBsdf:
     """Klems matrices with their transmission times factors by the angle outdoors."""
-    changed = {}
-    if bsdf.transmission_front is not None:
-        outside = np.interp(bsdf.basis_in.centres()[0], theta, factor)
-        changed["transmission_front"] = bsdf.transmission_front * outside
-    if bsdf.transmission_back is not None:
-        outside = np.interp(bsdf.basis_out.centres()[0], theta, factor)
-        changed["transmission_back"] = bsdf.transmission_back * outside[:, None]
-    return replace(bsdf, **changed)
+    front, back = bsdf.transmission_front, bsdf.transmission_back
+    if front is not None:
+        front = front * np.interp(bsdf.basis_in.centres()[0], theta, factor)
+    if back is not None:
+        back = back * np.interp(bsdf.basis_out.centres()[0], theta, factor)[:, None]
+    return replace(bsdf, transmission_front=front, transmission_back=back)
 
 
 class AngularOptics:
