@@ -113,40 +113,40 @@ class Account:
         return tuple(Note("{title}: {text}", title=title, text=text) for title, text in self.facts)
 
     def _stops(self) -> list[Note]:
-        found = []
+        notes = []
         if self.cut_off:
-            found.append(
+            notes.append(
                 Note("THE FILE IS CUT OFF at its end: an unknown part of the building is lost")
             )
         if not self.rooms:
-            found.append(Note("no rooms"))
+            notes.append(Note("no rooms"))
         elif self.share_used < HALF:
-            found.append(
+            notes.append(
                 Note(
                     "only {percent:.0f} % of the exterior glass is used",
                     percent=100 * self.share_used,
                 )
             )
-        return found
+        return notes
 
     def _cautions(self) -> list[Note]:
-        found = []
+        notes = []
         if self.rooms and HALF <= self.share_used < WHOLE:
-            found.append(
+            notes.append(
                 Note("{percent:.0f} % of the exterior glass is used", percent=100 * self.share_used)
             )
         if not self.glass_out:
-            found.append(Note("no exterior glass"))
+            notes.append(Note("no exterior glass"))
         if self.glass_assumed > MUCH_ASSUMED * self.glass_used:
-            found.append(Note("{area:.1f} m2 of glass assumed", area=self.glass_assumed))
+            notes.append(Note("{area:.1f} m2 of glass assumed", area=self.glass_assumed))
         losses = (
             Note("{area:.1f} m2 transparent but no glass", area=self.phantom),
             Note("{area:.1f} m2 of openings without a window closed", area=self.closed),
             Note("{area:.1f} m2 of glass without sky or ground in view", area=self.shut_in),
         )
-        found += [note for note in losses if note.values["area"] > NOTABLE * self.glass_out]
+        notes += [note for note in losses if note.values["area"] > NOTABLE * self.glass_out]
         if self.from_geometry:
-            found.append(Note("rooms found from geometry"))
+            notes.append(Note("rooms found from geometry"))
         elif self.rooms < self.spaces:
             lost = self.spaces - self.rooms
             note = Note(
@@ -155,15 +155,15 @@ class Account:
                 count=lost,
                 all=self.spaces,
             )
-            found.append(note)
+            notes.append(note)
         if self.overlapping:
-            found.append(Note("pairs of overlapping spaces: {count}", count=len(self.overlapping)))
+            notes.append(Note("pairs of overlapping spaces: {count}", count=len(self.overlapping)))
         if self.inner_only:
             names = _listed(self.inner_only)
-            found.append(Note("only inner glass, to other rooms: {names}", names=names))
+            notes.append(Note("only inner glass, to other rooms: {names}", names=names))
         if self.leaking:
-            found.append(Note("rooms with open edges: {count}", count=len(self.leaking)))
-        return found
+            notes.append(Note("rooms with open edges: {count}", count=len(self.leaking)))
+        return notes
 
     def _rooms_line(self) -> Note:
         if not self.rooms and not self.spaces:

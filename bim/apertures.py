@@ -158,10 +158,10 @@ def _lies_around(one: Aperture, other: Aperture) -> bool:
         return False
     if abs(one.plane.to_plane(other.plane.origin)[2]) > ONE_WINDOW:
         return False
-    theirs = shapely.transform(
+    outline = shapely.transform(
         other.glass, lambda p: one.plane.to_plane(other.plane.to_world(p))[:, :2]
     )
-    return theirs.intersection(one.glass).area > MOSTLY * one.glass.area
+    return outline.intersection(one.glass).area > MOSTLY * one.glass.area
 
 
 def _looking(filling: Filling, source: NDArray[np.float64]) -> NDArray[np.float64] | None:

@@ -23,7 +23,7 @@ Key = tuple[str, str]  # GUID of a room, name of its face
 def panes_between(spaces: Iterable[Space], space: Space) -> dict[str, list[tuple[Face, Face]]]:
     """Panes of a room and the same as the room beyond has them, by the GUID of that room."""
     rooms = {other.guid: other for other in spaces}
-    found: dict[str, list[tuple[Face, Face]]] = {}
+    pairs: dict[str, list[tuple[Face, Face]]] = {}
     for face in space.faces:
         other = rooms.get(face.neighbour or "")
         if face.pane is None or other is None or other.guid == space.guid:
@@ -39,8 +39,8 @@ def panes_between(spaces: Iterable[Space], space: Space) -> dict[str, list[tuple
                 and away > -THINNEST
                 and _beside(face, back) < 0.5 * np.sqrt(face.area)
             ):
-                found.setdefault(other.guid, []).append((face, back))
-    return found
+                pairs.setdefault(other.guid, []).append((face, back))
+    return pairs
 
 
 def rooms_through_panes(building: Building, space: Space, among: Collection[str]) -> list[Space]:

@@ -85,14 +85,14 @@ def _unique(rooms: Sequence[DrawnRoom], path: Path) -> list[DrawnRoom]:
         number = count[opening.guid]
         return opening if number == 1 else replace(opening, guid=f"{opening.guid} ({number})")
 
-    found = []
+    unique = []
     for room in rooms:
         if room.guid in names:
             raise DataError("two rooms have this identifier", file=path, element=room.guid)
         names.add(room.guid)
         faces = [replace(face, openings=tuple(map(own, face.openings))) for face in room.faces]
-        found.append(replace(room, faces=tuple(faces)))
-    return found
+        unique.append(replace(room, faces=tuple(faces)))
+    return unique
 
 
 def _joined(rooms: Sequence[DrawnRoom], text: str, path: Path) -> list[DrawnRoom]:
@@ -165,14 +165,14 @@ def _furnished(
     if not count or not wanted:
         left = Issue("furniture-left-out", "furniture", {"count": count})
         return list(spaces), [left] if count else []
-    found = [replace(s, furniture=tuple(model.furniture.get(s.guid, ()))) for s in spaces]
-    return found, [Issue("furniture-included", "furniture", {"count": count})]
+    furnished = [replace(s, furniture=tuple(model.furniture.get(s.guid, ()))) for s in spaces]
+    return furnished, [Issue("furniture-included", "furniture", {"count": count})]
 
 
 def _inner_glass(spaces: Sequence[Space]) -> list[Issue]:
     """Glass between two rooms; that which the room beyond does not have is opaque."""
     rooms = {space.guid: space for space in spaces}
-    found: dict[tuple[str, str], Issue] = {}
+    issues: dict[tuple[str, str], Issue] = {}
     for space in spaces:
         pairs = panes_between(spaces, space)
         both = {face.name for own in pairs.values() for face, _ in own}
@@ -184,27 +184,29 @@ def _inner_glass(spaces: Sequence[Space]) -> list[Issue]:
             values = {"element": face.pane.name, "rooms": names}
             code = "glass-between-rooms" if face.name in both else "glass-on-one-side"
             where = face.pane.guid
-            found.setdefault((code, where), Issue(code, where, values, Effect("window")))
-    return list(found.values())
+            issues.setdefault((code, where), Issue(code, where, values, Effect("window")))
+    return list(issues.values())
 
 
 def _envelope(rooms: Sequence[DrawnRoom], spaces: Sequence[Space]) -> list[Element]:
     """The building's own skin as it shades and reflects outdoors: exterior faces and glass."""
     drawn = {face.guid: face for room in rooms for face in room.faces}
     finishes = {one.guid: one.finish for face in drawn.values() for one in (face, *face.openings)}
-    found = []
+    elements = []
     for space in spaces:
         for face in space.faces:
             if face.adjacency == "outside":
                 outer = finishes[face.element].outer
                 value = FACADE_REFLECTANCE if outer is None else outer
                 name, kind = face.name, "IfcDoor" if face.kind == "door" else "IfcWall"
-                found.append(Element(face.element or "", name, kind, face.triangles, value, value))
-        found += [
+                elements.append(
+                    Element(face.element or "", name, kind, face.triangles, value, value)
+                )
+        elements += [
             Element(w.guid, w.name, "IfcWindow", w.triangles, GLASS_REFLECTANCE, GLASS_REFLECTANCE)
             for w in space.windows
         ]
-    return found
+    return elements
 
 
 def _glazed(room: DrawnRoom) -> list[tuple[DrawnFace, DrawnOpening]]:

@@ -105,9 +105,9 @@ def first_rooms_enclosed(
     for number, (more, gap) in enumerate(attempts):
         if not may_enclose([*elements, *more], gap):
             continue
-        found = rooms_enclosed_by([*elements, *more], gap, tell)
-        if found.rooms:
-            return number, found
+        enclosed = rooms_enclosed_by([*elements, *more], gap, tell)
+        if enclosed.rooms:
+            return number, enclosed
     return -1, Enclosed(())
 
 

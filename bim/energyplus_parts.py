@@ -91,9 +91,9 @@ def opaque_construction(
     for known, other in model["Construction"].items():
         if other == entry:
             return known
-    found = f"C{len(model['Construction'])}"
-    model["Construction"][found] = entry
-    return found
+    key = f"C{len(model['Construction'])}"
+    model["Construction"][key] = entry
+    return key
 
 
 def at_most_layers(layers: Sequence[MaterialLayer]) -> tuple[MaterialLayer, ...]:

@@ -49,14 +49,14 @@ class WindowOptics:
 
     def simplified(self, *, panes: bool) -> tuple[str, ...]:
         """Its properties that the EnergyPlus model does not have; panes: see `complex_state`."""
-        found = []
+        reasons = []
         one = self.fenestration
         known = panes and self.panes is not None
         if not known and one.layer_resistance.kind != "constant":
-            found.append("its layers' resistance, which varies, is that of its U")
+            reasons.append("its layers' resistance, which varies, is that of its U")
         if one.shade is not None or one.extra_inner or one.extra_outer:
-            found.append("what a shade gives to the air behind it counts in its U alone")
-        return tuple(f"{one.name}: {what}" for what in found)
+            reasons.append("what a shade gives to the air behind it counts in its U alone")
+        return tuple(f"{one.name}: {what}" for what in reasons)
 
 
 def complex_state(model: Model, name: str, optics: WindowOptics, *, panes: bool) -> None:

@@ -41,11 +41,11 @@ def mitsuba_bsdf(reflectance: float, gloss: Gloss | None) -> ElementTree.Element
 def _plastic(reflectance: float, gloss: Gloss) -> ElementTree.Element:
     """A diffuse body below a coat; of its reflectance what passes the coat is seen."""
     root = np.sqrt(gloss.at_normal)
-    found = _of_roughness("plastic", gloss)
-    _number(found, "float", "int_ior", float((1 + root) / (1 - root)))
-    _number(found, "float", "ext_ior", 1.0)
-    _number(found, "spectrum", "diffuse_reflectance", reflectance / (1.0 - gloss.at_normal))
-    return found
+    bsdf = _of_roughness("plastic", gloss)
+    _number(bsdf, "float", "int_ior", float((1 + root) / (1 - root)))
+    _number(bsdf, "float", "ext_ior", 1.0)
+    _number(bsdf, "spectrum", "diffuse_reflectance", reflectance / (1.0 - gloss.at_normal))
+    return bsdf
 
 
 def gltf_factors(reflectance: float, gloss: Gloss | None) -> tuple[float, float]:
@@ -65,19 +65,19 @@ def gltf_factors(reflectance: float, gloss: Gloss | None) -> tuple[float, float]
 
 
 def _diffuse(reflectance: float) -> ElementTree.Element:
-    found = ElementTree.Element("bsdf", type="diffuse")
-    _number(found, "spectrum", "reflectance", reflectance)
-    return found
+    bsdf = ElementTree.Element("bsdf", type="diffuse")
+    _number(bsdf, "spectrum", "reflectance", reflectance)
+    return bsdf
 
 
 def _of_roughness(kind: str, gloss: Gloss) -> ElementTree.Element:
     """A smooth or rough one of Mitsuba's kinds."""
     if gloss.roughness < SMOOTHEST:
         return ElementTree.Element("bsdf", type=kind)
-    found = ElementTree.Element("bsdf", type=f"rough{kind}")
-    ElementTree.SubElement(found, "string", name="distribution", value="beckmann")
-    _number(found, "float", "alpha", gloss.roughness)
-    return found
+    bsdf = ElementTree.Element("bsdf", type=f"rough{kind}")
+    ElementTree.SubElement(bsdf, "string", name="distribution", value="beckmann")
+    _number(bsdf, "float", "alpha", gloss.roughness)
+    return bsdf
 
 
 def _number(parent: ElementTree.Element, kind: str, name: str, value: float) -> None:

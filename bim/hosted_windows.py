@@ -57,11 +57,11 @@ def hosted_polygons(space: Space) -> list[HostedPolygon]:
             pane = _moved(glass, plane, host_plane)
             parts[at] = face, host_plane, _largest(shapely.union(polygon, pane, grid_size=1e-6))
             panes[at].append((window, pane))
-    found = [
+    polygons = [
         HostedPolygon(face, plane, polygon, tuple((w, _within(pane, polygon)) for w, pane in own))
         for (face, plane, polygon), own in zip(parts, panes, strict=True)
     ]
-    return [*found, *extra]
+    return [*polygons, *extra]
 
 
 def _within(pane: shapely.Polygon, polygon: shapely.Polygon) -> shapely.Polygon:

@@ -43,8 +43,8 @@ def room_boundaries(
 ) -> list[RoomBoundary | RoomError]:
     """The boundary of each room with its attachments; the error where there is none."""
     items = [(one.guid, one.name, packed(one.manifold), list(own)) for one, own in rooms]
-    found = each_apart(_boundary, items, limit_s=LIMIT_S)
-    return [RoomError(str(one)) if isinstance(one, ProcessEnded) else one for one in found]
+    boundaries = each_apart(_boundary, items, limit_s=LIMIT_S)
+    return [RoomError(str(one)) if isinstance(one, ProcessEnded) else one for one in boundaries]
 
 
 def gaps_between(
@@ -83,10 +83,10 @@ def united(solids: Sequence[PackedSolid], outlines: Sequence[Outline]) -> Packed
 
     Raises: `RoomError` where their union ends its process.
     """
-    (found,) = each_apart(_united, [(list(solids), list(outlines))], limit_s=LIMIT_S)
-    if isinstance(found, ProcessEnded):
-        raise RoomError(str(found))
-    return found
+    (solid,) = each_apart(_united, [(list(solids), list(outlines))], limit_s=LIMIT_S)
+    if isinstance(solid, ProcessEnded):
+        raise RoomError(str(solid))
+    return solid
 
 
 def opened(bodies: Sequence[tuple[Body, Sequence[Outline]]]) -> list[Body | ProcessEnded | None]:
@@ -94,8 +94,8 @@ def opened(bodies: Sequence[tuple[Body, Sequence[Outline]]]) -> list[Body | Proc
     return each_apart(_opened, [(one, list(holes)) for one, holes in bodies], limit_s=LIMIT_S)
 
 
-def _solid_here(found: Packed | ProcessEnded | None) -> Solid | ProcessEnded | None:
-    return Solid(unpacked(found[0]), found[1]) if isinstance(found, tuple) else found
+def _solid_here(packed: Packed | ProcessEnded | None) -> Solid | ProcessEnded | None:
+    return Solid(unpacked(packed[0]), packed[1]) if isinstance(packed, tuple) else packed
 
 
 def _solid(body: Body) -> Packed | None:

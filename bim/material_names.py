@@ -161,13 +161,13 @@ def _kind_named(name: str) -> Kind:
 def _matches(words: tuple[str, ...]) -> list[Kind]:
     """The rows that a name has stems of, in the order of the table."""
     free = [True] * len(words)
-    found: set[int] = set()
+    matches: set[int] = set()
     hits = sorted(_hits(words), key=lambda hit: (-hit[0], hit[1]))
     for _, row, start, stop in hits:
         if all(free[start:stop]):
             free[start:stop] = [False] * (stop - start)
-            found.add(row)
-    return [table()[row] for row in sorted(found)]
+            matches.add(row)
+    return [table()[row] for row in sorted(matches)]
 
 
 def _hits(words: tuple[str, ...]) -> Iterator[tuple[int, int, int, int]]:

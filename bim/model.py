@@ -51,8 +51,8 @@ def crs_name(text: str) -> str:
     zone = re.search(r"ETRS89_UTM(3[123])(?!\d)", text, re.IGNORECASE)
     if zone:
         return f"EPSG:258{zone[1]}"
-    found = re.search(r"EPSG\D+(?:[\d.]+[:/]+)?(\d{4,6})\b", text, re.IGNORECASE)
-    return f"EPSG:{found[1]}" if found else text.strip()
+    match = re.search(r"EPSG\D+(?:[\d.]+[:/]+)?(\d{4,6})\b", text, re.IGNORECASE)
+    return f"EPSG:{match[1]}" if match else text.strip()
 
 
 def local_metres(

@@ -97,22 +97,22 @@ def item_named(items: Sequence[T], wanted: str, kind: str) -> T:
     Raises: `UnknownName` where there is none, `AmbiguousName` where there are several; their texts
         list the nearest.
     """
-    found = [item for item in items if item.guid == wanted]
-    found = found or [i for i in items if wanted in (i.name, i.long_name, i.label)]
+    matches = [item for item in items if item.guid == wanted]
+    matches = matches or [i for i in items if wanted in (i.name, i.long_name, i.label)]
     key = _key(wanted)
-    found = found or [
+    matches = matches or [
         item for item in items if key and key in map(_key, (item.name, item.long_name, item.label))
     ]
-    found = found or [item for item in items if key and key in map(_key, _names_of_parts(item))]
-    if not found:
+    matches = matches or [item for item in items if key and key in map(_key, _names_of_parts(item))]
+    if not matches:
         there = listed(wanted, (item.label for item in items))
         raise UnknownName(f"no {kind} {wanted!r}; there are: {there}")
-    if len(found) > 1:
-        labels = [item.label for item in found]
+    if len(matches) > 1:
+        labels = [item.label for item in matches]
         same = len(set(labels)) < len(labels)
-        shown = (f"{item.label} ({item.guid})" if same else item.label for item in found)
-        raise AmbiguousName(f"{len(found)} {kind}s are named {wanted!r}: {listed(wanted, shown)}")
-    return found[0]
+        shown = (f"{item.label} ({item.guid})" if same else item.label for item in matches)
+        raise AmbiguousName(f"{len(matches)} {kind}s are named {wanted!r}: {listed(wanted, shown)}")
+    return matches[0]
 
 
 def has_words(text: str, words: str) -> bool:
@@ -156,8 +156,8 @@ def numbered(names: Iterable[str]) -> list[str]:
     numbers: dict[str, Iterator[int]] = defaultdict(lambda: count(2))
     result: dict[str, None] = {}
     for name in names:
-        found = name
-        while found in result or (found != name and found in given):
-            found = f"{name} {next(numbers[name])}"
-        result[found] = None
+        unique = name
+        while unique in result or (unique != name and unique in given):
+            unique = f"{name} {next(numbers[name])}"
+        result[unique] = None
     return list(result)

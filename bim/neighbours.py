@@ -95,7 +95,7 @@ def _opposite(
     facet: Facet, rooms: Sequence[RoomSolid]
 ) -> list[tuple[float, str, shapely.Geometry]]:
     """Distance, room and outline in the facet's plane of the faces opposite, nearest first."""
-    found = []
+    faces = []
     for room in rooms:
         for other in room.facets:
             if other.plane.normal @ facet.plane.normal > OPPOSITE:
@@ -110,8 +110,8 @@ def _opposite(
             )
             region = shapely.make_valid(region).intersection(facet.polygon)
             if polygons_of(region):
-                found.append((distance, room.guid, shapely.union_all(polygons_of(region))))
-    return sorted(found, key=lambda item: item[0])
+                faces.append((distance, room.guid, shapely.union_all(polygons_of(region))))
+    return sorted(faces, key=lambda item: item[0])
 
 
 def sample_points(facet: Facet) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -165,10 +165,10 @@ def what_lies_beyond(piece: Piece, around: Surroundings, own: int) -> Beyond:
     return Beyond(spans, _most(met, areas))
 
 
-def _most(found: Mapping[int, T], areas: NDArray[np.float64]) -> T:
+def _most(by_index: Mapping[int, T], areas: NDArray[np.float64]) -> T:
     """What most of the area says, by number of its sample; where two are even, the first."""
     shares: dict[T, float] = {}
-    for i, what in found.items():
+    for i, what in by_index.items():
         shares[what] = shares.get(what, 0.0) + round(float(areas[i]), 9)
     return max(shares, key=lambda what: shares[what])
 
@@ -229,7 +229,7 @@ def _at_the_face(
     up to its top: all of that belongs to the wall.  Objects deeper in the room do not, but
     for its part beyond the face.
     """
-    found: list[Span] = []
+    spans: list[Span] = []
     for span in bodies.along(point - back * normal, normal, back + 2 * DEEPEST_WALL):
         span = span.moved(back)
         if span.stop <= -TOUCHING or span.start >= limit - TOUCHING:
@@ -238,8 +238,8 @@ def _at_the_face(
             if span.stop <= TOUCHING:
                 continue
             span = span.since(-INSIDE)
-        found.append(span if span.stop - span.start < DEEPEST_WALL else span.endless())
-    return sorted(found, key=lambda span: (span.start, span.stop))
+        spans.append(span if span.stop - span.start < DEEPEST_WALL else span.endless())
+    return sorted(spans, key=lambda span: (span.start, span.stop))
 
 
 def _without_fittings(walks: Sequence[Walk]) -> list[Walk]:

@@ -140,11 +140,11 @@ def before_windows(elements: Sequence[Element], windows: Sequence[Window]) -> ND
     """
     planes = {tuple(np.round([*w.normal, w.normal @ w.centre], 3)): w for w in windows}
     rest = np.concatenate([NOTHING, *(element.triangles for element in elements)])
-    found = [NOTHING]
+    obstructions = [NOTHING]
     for window in planes.values():
-        found.append(beyond(rest, window.normal, window.centre))
+        obstructions.append(beyond(rest, window.normal, window.centre))
         rest = beyond(rest, -window.normal, window.centre)
-    return np.concatenate(found)
+    return np.concatenate(obstructions)
 
 
 def beyond(
@@ -200,13 +200,13 @@ def _faces_in_view(
     normals = vectors / np.maximum(areas, 1e-300)[:, None]
     along = np.abs(normals @ normals[np.argmax(areas)]) > FACE
     plane, own = (centres * facing).sum(axis=1), (triangles.mean(axis=1) * normals).sum(axis=1)
-    found = np.zeros(len(triangles), dtype=bool)
+    in_view = np.zeros(len(triangles), dtype=bool)
     for start in range(0, len(centres), WINDOWS_AT_ONCE):
         some = slice(start, start + WINDOWS_AT_ONCE)
         before = (triangles @ facing[some].T).max(axis=1) - plane[some] > BEFORE_GLASS
         towards = normals @ centres[some].T > own[:, None]
-        found |= along & (before & towards).any(axis=1)
-    return found
+        in_view |= along & (before & towards).any(axis=1)
+    return in_view
 
 
 class _Near:
@@ -233,23 +233,23 @@ class _Near:
         Args: own: GUIDs of the windows of its room.
         """
         origins, directions = _rays(window, GRAZING)
-        mine = np.isin(self._guids, list(own))
+        is_own = np.isin(self._guids, list(own))
         cover, nearest = np.full(len(origins), -1), np.full(len(origins), np.inf)
         for part in self._parts:
-            distance, index = _first_of_others(*part, mine, origins, directions, NEAR)
+            distance, index = _first_of_others(*part, is_own, origins, directions, NEAR)
             met = (distance * (directions @ window.normal) < AT_ONCE) & (distance < nearest)
             cover[met], nearest[met] = index[met], distance[met]
         if np.mean(cover >= 0) < COVERED:
             return set()
-        found, counts = np.unique(cover[cover >= 0], return_counts=True)
-        return {int(i) for i, n in zip(found, counts, strict=True) if n > 0.2 * len(cover)}
+        covering, counts = np.unique(cover[cover >= 0], return_counts=True)
+        return {int(i) for i, n in zip(covering, counts, strict=True) if n > 0.2 * len(cover)}
 
     def open_share(self, window: Window, own: set[str]) -> float:
         """Cosine-weighted share of the half space outside a window that is free."""
         origins, directions = _rays(window, 0.0)
-        mine, free = np.isin(self._guids, list(own)), np.ones(len(origins), dtype=bool)
+        is_own, free = np.isin(self._guids, list(own)), np.ones(len(origins), dtype=bool)
         for part in self._parts:
-            distance, _ = _first_of_others(*part, mine, origins, directions, np.inf)
+            distance, _ = _first_of_others(*part, is_own, origins, directions, np.inf)
             free &= np.isinf(distance)
         return float(np.average(free, weights=directions @ window.normal))
 
@@ -266,25 +266,25 @@ def _rays(window: Window, flattest: float) -> tuple[NDArray[np.float64], NDArray
 def _first_of_others(
     mesh,
     owner: NDArray[np.int64],
-    mine: NDArray[np.bool_],
+    is_own: NDArray[np.bool_],
     origins: NDArray[np.float64],
     directions: NDArray[np.float64],
     reach: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Distance to, and number of, what each ray meets first that is not mine; else inf and -1."""
-    found, index = np.full(len(origins), np.inf), np.full(len(origins), -1)
+    nearest, index = np.full(len(origins), np.inf), np.full(len(origins), -1)
     travelled, rays = np.zeros(len(origins)), np.arange(len(origins))
     for _ in range(8):  # through the window's own panes and frame
         start = origins[rays] + travelled[rays, None] * directions[rays]
         distance, hit = mesh.first_hits(start, directions[rays], reach)
         rays, distance, hit = rays[hit >= 0], distance[hit >= 0], owner[hit[hit >= 0]]
         travelled[rays] += distance + 1e-5
-        others = ~mine[hit]
-        found[rays[others]], index[rays[others]] = travelled[rays[others]], hit[others]
+        others = ~is_own[hit]
+        nearest[rays[others]], index[rays[others]] = travelled[rays[others]], hit[others]
         rays = rays[~others & (travelled[rays] < reach)]
         if not len(rays):
             break
-    return found, index
+    return nearest, index
 
 
 def _opened(
@@ -302,12 +302,12 @@ def _opened(
 
 def _holes(windows: Sequence[Window]) -> list[Outline]:
     """What is cut out before windows."""
-    found = []
+    holes = []
     for window in windows:
         plane = plane_through(window.triangles[0, 0], window.normal)
         panes = merged_polygons(plane.to_plane(window.triangles)[..., :2])
-        found += [(pane, plane, -CUT_DEPTH, CUT_DEPTH) for pane in panes]
-    return found
+        holes += [(pane, plane, -CUT_DEPTH, CUT_DEPTH) for pane in panes]
+    return holes
 
 
 def lifted_sites(

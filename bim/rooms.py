@@ -100,7 +100,7 @@ def attachments_of(aperture: Aperture, rooms: Sequence[RoomSolid]) -> list[Attac
     near &= np.all(highs >= outline.min(axis=0) - REACH, axis=1)
     rooms = [rooms[i] for i in np.flatnonzero(near)]
     sides = [_one_side(side, rooms) for side in (aperture, aperture.turned)]
-    found: list[Attachment] = []
+    attachments: list[Attachment] = []
     for here, there in (sides, sides[::-1]):
         for attachment in here:
             rest = attachment.region
@@ -108,27 +108,27 @@ def attachments_of(aperture: Aperture, rooms: Sequence[RoomSolid]) -> list[Attac
                 back = shapely.transform(other.region, lambda p: p * [-1.0, 1.0])
                 shared = rest.intersection(back)
                 rest = rest.difference(back)
-                found.append(replace(attachment, region=shared, neighbour=other.room))
-            found.append(replace(attachment, region=rest))
+                attachments.append(replace(attachment, region=shared, neighbour=other.room))
+            attachments.append(replace(attachment, region=rest))
     smallest = SMALLEST_SHARE * aperture.opening.area
-    cleaned = [replace(a, region=shapely.union_all(polygons_of(a.region))) for a in found]
+    cleaned = [replace(a, region=shapely.union_all(polygons_of(a.region))) for a in attachments]
     return [a for a in cleaned if a.region.area > smallest]
 
 
 def _one_side(aperture: Aperture, rooms: Sequence[RoomSolid]) -> list[Attachment]:
     """Attachments of the rooms behind an aperture whose normal points away from them."""
-    found: list[tuple[float, float, str, shapely.Geometry]] = []
+    pieces: list[tuple[float, float, str, shapely.Geometry]] = []
     for room in rooms:
         for facet in room.facets:
             if facet.plane.normal @ aperture.plane.normal < FACING:
                 continue
             seen = _seen_from(aperture, facet)
             if seen is not None:
-                found.append((*seen[:2], room.guid, seen[2]))
-    found.sort(key=lambda item: abs(item[1]))
+                pieces.append((*seen[:2], room.guid, seen[2]))
+    pieces.sort(key=lambda item: abs(item[1]))
     covered = shapely.Polygon()
     regions: dict[str, tuple[list[shapely.Geometry], list[float], list[float]]] = {}
-    for deepest, nearest, guid, region in found:
+    for deepest, nearest, guid, region in pieces:
         new = region.difference(covered)
         if new.area < 1e-4:
             continue

@@ -224,23 +224,23 @@ def _size_and_normal(window: Window) -> tuple[float, ...]:
 
 def in_room(space: Space, points: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which of points [S, 3] lie in the air of a room [S]."""
-    found = np.zeros(len(points), dtype=bool)
+    inside = np.zeros(len(points), dtype=bool)
     heights = np.round(points[:, 2], 3)
     for z in np.unique(heights):
         own = heights == z
         section = horizontal_section(space.shell, float(z))
-        found[own] = shapely.contains_xy(section, points[own, 0], points[own, 1])
-    return found
+        inside[own] = shapely.contains_xy(section, points[own, 0], points[own, 1])
+    return inside
 
 
 def model_grids(building: Building, space: Space) -> list[ModelGrid]:
     """The sensors of the building's file that lie in a room, by grid."""
-    found = []
+    grids = []
     for grid in building.grids:
         own = in_room(space, grid.points)
         if own.any():
-            found.append(ModelGrid(grid.name, grid.points[own], grid.directions[own]))
-    return found
+            grids.append(ModelGrid(grid.name, grid.points[own], grid.directions[own]))
+    return grids
 
 
 def model_views(building: Building, space: Space) -> list[ModelView]:
@@ -296,15 +296,15 @@ def surface_sensors(
     if outdoors and isinstance(surface, Face):
         depth = surface.construction.thickness
     plane: Plane = plane_through(surface.triangles[0, 0], surface.normal)
-    found = []
+    grids = []
     for polygon in merged_polygons(plane.to_plane(surface.triangles)[..., :2]):
         oriented = shapely.orient_polygons(polygon)
         rings = [
             plane.to_world(np.asarray(ring.coords)[:-1])
             for ring in (oriented.exterior, *oriented.interiors)
         ]
-        found.append(polygon_sensors(rings[0], spacing, rings[1:])[0])
-    points = np.concatenate(found)
+        grids.append(polygon_sensors(rings[0], spacing, rings[1:])[0])
+    points = np.concatenate(grids)
     direction = surface.normal if outdoors else -surface.normal
     points = points + (OFF_THE_SURFACE + depth) * direction
     return points, np.tile(direction, (len(points), 1))

@@ -26,14 +26,14 @@ def template_rooms(spaces: Sequence[Space]) -> list[tuple[Space, ...]]:
     groups: list[list[Space]] = []
     features: list[NDArray[np.float64]] = []
     for space in spaces:
-        mine = room_features(space)
-        for group, theirs in zip(groups, features, strict=True):
-            if _same(mine, theirs) and _same_constructions(space, group[0]):
+        features_here = room_features(space)
+        for group, template in zip(groups, features, strict=True):
+            if _same(features_here, template) and _same_constructions(space, group[0]):
                 group.append(space)
                 break
         else:
             groups.append([space])
-            features.append(mine)
+            features.append(features_here)
     return [tuple(group) for group in groups]
 
 
@@ -101,7 +101,7 @@ def _same_constructions(a: Space, b: Space) -> bool:
             table[key] = table.get(key, 0.0) + face.area
         return table
 
-    mine, theirs = areas(a), areas(b)
-    return mine.keys() == theirs.keys() and all(
-        abs(mine[key] - theirs[key]) <= ALIKE * max(1.0, mine[key]) for key in mine
+    areas_a, areas_b = areas(a), areas(b)
+    return areas_a.keys() == areas_b.keys() and all(
+        abs(areas_a[key] - areas_b[key]) <= ALIKE * max(1.0, areas_a[key]) for key in areas_a
     )

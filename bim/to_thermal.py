@@ -132,11 +132,11 @@ def coupled_rooms(
             area = 0.5 * (one.area + other.area)
             surfaces[a][i] = replace(one, area=area, outside=names[b], partner=other.name)
             surfaces[b][j] = replace(other, area=area, outside=names[a], partner=one.name)
-    found = [
+    coupled = [
         replace(room, zone=replace(room.zone, name=name, surfaces=tuple(own)))
         for room, name, own in zip(rooms, names, surfaces, strict=True)
     ]
-    return found, tuple(notes)
+    return coupled, tuple(notes)
 
 
 def shared_constructions(spaces: Sequence[Space]) -> list[Space]:

@@ -80,7 +80,7 @@ from .sky.epw import read_epw as read_epw
 from .sky.matrix import sky_matrix as sky_matrix
 from .sky.patches import ReinhartSky as ReinhartSky
 from .sky.sun import sun_directions as sun_directions
-from .sky.wea import read_wea as read_wea
+from .sky.epw import read_wea as read_wea
 from .sky.weather import Weather as Weather
 from .surfaces import (
     Surfaces as Surfaces,

@@ -15,11 +15,11 @@ from mitsuba_cfs.bsdf import klems
 from mitsuba_cfs.bsdf.blinds import venetian_blind, vertical_louvre
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.evaluate import klems_of
-from mitsuba_cfs.bsdf.fabric import fabric_klems
 from mitsuba_cfs.bsdf.fabric_table import FabricShade, named_fabric, read_fabric_table
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial, plastic
 from mitsuba_cfs.bsdf.screens import (
+    fabric_klems,
     perforated_screen,
     pleated_shade,
     prism_panel,

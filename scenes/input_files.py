@@ -23,9 +23,8 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, silent, summed
-from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.epw import is_wea, read_epw, read_wea
 from mitsuba_cfs.sky.matrix import DEFAULT_DEW_POINT_C
-from mitsuba_cfs.sky.wea import is_wea, read_wea
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
 from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system

@@ -208,10 +208,10 @@ def write_check_picture(path: Path, result: GlareResult, *, title: str = "") -> 
     axes.set_axis_off()
     axes.set_title(title or f"DGP {rounded(result.dgp, 3)}", **TITLE)
     outline = [withStroke(linewidth=2.5, foreground="white")]
-    found, height = result.sources, result.geometry.view.height
-    largest = np.argsort(-(found.luminance**2) * found.solid_angle / result.position**2)[:12]
+    sources, height = result.sources, result.geometry.view.height
+    largest = np.argsort(-(sources.luminance**2) * sources.solid_angle / result.position**2)[:12]
     for i in largest:
-        x, y = found.x[i], height - 1 - found.y[i]
+        x, y = sources.x[i], height - 1 - sources.y[i]
         axes.text(x, y, str(i + 1), ha="center", va="center", fontsize=8, path_effects=outline)
     _list_sources(figure, result, largest)
     _save(figure, path)
@@ -219,13 +219,13 @@ def write_check_picture(path: Path, result: GlareResult, *, title: str = "") -> 
 
 def _list_sources(figure: Figure, result: GlareResult, largest: NDArray[Any]) -> None:
     """The sources beside the picture, the most glaring first."""
-    found, colours = result.sources, source_colours(result.count)
+    sources, colours = result.sources, source_colours(result.count)
     counted = ngettext("{count} glare source", "{count} glare sources", result.count)
     figure.text(0.81, 0.92, f"E_v {rounded(result.Ev, 0)} lx\n{counted}", fontsize=8, va="top")
     for line, i in enumerate(largest):
         y = 0.83 - 0.062 * line
         figure.text(0.81, y, "■", color=colours[i], fontsize=9)
-        luminance, size = rounded(found.luminance[i], 0), significant(found.solid_angle[i])
+        luminance, size = rounded(sources.luminance[i], 0), significant(sources.solid_angle[i])
         text = f"{i + 1}  {luminance} cd/m²\n    {size} sr"
         figure.text(0.835, y, text, fontsize=6.5, va="center")
     if result.count > len(largest):

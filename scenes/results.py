@@ -162,6 +162,10 @@ class ShadingYear:
     rules: tuple[str, ...]  # [N] of the control
     states: NDArray[np.int64]  # [H, N]
     number: NDArray[np.int64]  # [W] group of each window of the room
+    # [H, N] number of the reason of each move, -1 without; None: of a function or a plan
+    moved_by: NDArray[np.int64] | None = None
+    reasons: tuple[str, ...] = ()
+    views: tuple[NDArray[np.bool_], ...] = ()  # [N][J] whether one sees through in each state
 
     @property
     def columns(self) -> dict[str, NDArray[np.int64]]:
@@ -178,7 +182,10 @@ class ShadingYear:
         return self.states[:, self.number]
 
     def figures(self, occupied: NDArray[np.bool_], per_day: int) -> pd.DataFrame:
-        """By group: its rule, moves a day, and hours by state while the room is occupied [%].
+        """By group: its rule, moves a day, hours with a view out, and hours by state.
+
+        Shares of the hours in which the room is occupied [%]; a view: at least half of the light
+        of normal incidence that passes goes straight on.
 
         Args: occupied: [H]; per_day: hours, or steps, of a day.
         """
@@ -188,11 +195,24 @@ class ShadingYear:
             "group": self.groups,
             "rule": self.rules,
             "moves_per_day": moved.sum(axis=0) * per_day / max(len(self.states), 1),
+            "most_moves_of_a_day": self.moves_of_days(per_day).max(axis=0, initial=0),
         }
+        if self.views:
+            table["view_h"] = [
+                np.count_nonzero(view[np.minimum(used[:, c], len(view) - 1)]) * 24.0 / per_day
+                for c, view in enumerate(self.views)
+            ]
         for state in range(int(self.states.max(initial=0)) + 1):
             share = (used == state).sum(axis=0) / max(len(used), 1)
             table[f"state_{state}_percent"] = 100.0 * share
         return pd.DataFrame(table)
+
+    def moves_of_days(self, per_day: int) -> NDArray[np.int64]:
+        """Moves of each group in each day [D, N]."""
+        moved = np.concatenate([np.zeros_like(self.states[:1]), np.diff(self.states, axis=0)]) != 0
+        starts = np.arange(0, len(moved), per_day)
+        counts: NDArray[np.int64] = np.add.reduceat(moved.astype(np.int64), starts, axis=0)
+        return counts
 
     def moves(self, times: pd.DatetimeIndex) -> pd.DataFrame:
         """One row for each move: time, group, rule, state before and after."""
@@ -202,10 +222,27 @@ class ShadingYear:
                 "time": times[rows + 1],
                 "group": [self.groups[c] for c in columns],
                 "rule": [self.rules[c] for c in columns],
+                "moved_by": [
+                    self._reason(h + 1, c)
+                    for h, c in zip(rows.tolist(), columns.tolist(), strict=True)
+                ],
                 "from_state": self.states[rows, columns],
                 "to_state": self.states[rows + 1, columns],
             }
         )
+
+    def _reason(self, hour: int, group: int) -> str:
+        """The condition that moved a group in an hour."""
+        number = -1 if self.moved_by is None else int(self.moved_by[hour, group])
+        return self.rules[group] if number < 0 else self.reasons[number]
+
+    def moves_by_reason(self) -> dict[str, NDArray[np.int64]]:
+        """Moves of a year by each condition [N], the most frequent first."""
+        counts: dict[str, NDArray[np.int64]] = {}
+        for hour, group in np.argwhere(np.diff(self.states, axis=0)).tolist():
+            none = np.zeros(len(self.groups), dtype=np.int64)
+            counts.setdefault(self._reason(hour + 1, group), none)[group] += 1
+        return dict(sorted(counts.items(), key=lambda item: -int(item[1].sum())))
 
 
 @dataclass(frozen=True, slots=True)

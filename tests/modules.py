@@ -3,7 +3,7 @@
     python -m tests.modules
 
 prints the measures of docs/architecture.md: modules, lines, single importers, lines of imports and
-the longest chain of imports.
+the longest chain of imports, lines without code, and exceptions from the format.
 """
 
 from __future__ import annotations
@@ -50,9 +50,10 @@ def measures() -> dict[str, int]:
     """Size of the product and of its imports."""
     sources = {dotted(file_name(path)): path.read_text(encoding="utf-8") for path in MODULES}
     imported: dict[str, set[str]] = {}
-    statements = 0
+    statements = docstrings = 0
     for name, source in sources.items():
         tree = ast.parse(source)
+        docstrings += sum(map(_docstring_lines, ast.walk(tree)))
         either = {t if t in sources else t.rpartition(".")[0] for t, _ in imports(tree)}
         imported[name] = either & set(sources) - {name}
         nodes = (n for n in ast.walk(tree) if isinstance(n, ast.Import | ast.ImportFrom))
@@ -65,15 +66,26 @@ def measures() -> dict[str, int]:
     for name in TopologicalSorter(imported).static_order():
         depth[name] = 1 + max((depth[other] for other in imported[name]), default=0)
     packages = {dotted(file_name(path)) for path in MODULES if path.name == "__init__.py"}
+    lines = [line.strip() for source in sources.values() for line in source.splitlines()]
     return {
         "modules": len(sources),
-        "lines": sum(len(source.splitlines()) for source in sources.values()),
+        "lines": len(lines),
+        "lines that are empty": lines.count(""),
+        "lines of docstrings": docstrings,
+        "lines with `# fmt: skip`": sum("# fmt: skip" in line for line in lines),
         "modules with a single importer": sum(
             len(of) == 1 for name, of in importers.items() if name not in packages
         ),
         "lines of imports": statements,
         "modules in the longest chain of imports": max(depth.values()),
     }
+
+
+def _docstring_lines(node: ast.AST) -> int:
+    kinds = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+    if not isinstance(node, kinds) or ast.get_docstring(node) is None:
+        return 0
+    return node.body[0].end_lineno - node.body[0].lineno + 1
 
 
 if __name__ == "__main__":

@@ -25,7 +25,10 @@ NO_EVIDENCE = {
     "thermal.md": {
         "| to | read |", "| closure | absorptances from | layer resistance | film resistances |",
     },
-    "control.md": {"| of `ControlHour` | what |"},
+    "control.md": {
+        "| of `ControlHour` | what |", "| rule or key | closed | test |",
+        "| scenario | set points | source | not available, left out |",
+    },
     "comply.md": {
         "| in the folder of results | what |", "| option | what |",
         "| rule | quantity | set-up | weather that it asks for |",

@@ -16,7 +16,7 @@ from tests.modules import MODULES, file_name
 PLAIN = {  # json.dumps that write no results
     "mitsuba_cfs/files.py",  # `json_text` itself
     "scenes/study/store.py",  # a case's own file, which it reads again
-    "bim/stored_building.py",  # an entry of the cache, which may hold NaN
+    "bim/building_file.py",  # an entry of the cache, which may hold NaN
     "bim/ifc/corrections_draft.py", "bim/ifc/correct.py",  # values of TOML
     "scenes/room/operation.py",  # likewise
     "scenes/commands/self_test.py", "scenes/cost/reference.py", "scenes/calibration/shipped.py",

@@ -20,8 +20,7 @@ from bim.building_file import read_building_file
 from bim.fenestration import read_g_table
 from bim.ifc.corrections import read_corrections
 from bim.radiance.cell import read_radiance_layer
-from bim.surroundings.placement import read_surroundings
-from bim.surroundings.terrain import read_horizon
+from bim.surroundings.placement import read_horizon, read_surroundings
 from mitsuba_cfs.bsdf.fabric_table import read_fabric_table
 from mitsuba_cfs.bsdf.klems import KLEMS_QUARTER, KlemsBsdf
 from mitsuba_cfs.bsdf.measured_file import read_measurement
@@ -34,9 +33,8 @@ from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.images.hdr import read_hdr, write_hdr
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.matrices.mtx_io import read_matrix, write_matrix
-from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.epw import read_epw, read_wea
 from mitsuba_cfs.sky.measured import read_measured
-from mitsuba_cfs.sky.wea import read_wea
 from scenes.comply.uses import read_uses
 from scenes.demo import WEATHER
 from scenes.explore.case_files import case_files, read_case

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermal import kernel, records
 from thermal.climate import Climate, Solar, to_steps
 from thermal.conduction import CELL
-from thermal.control import TemperatureControl
+from thermal.control import ROOM_QUANTITIES, TemperatureControl
 from thermal.convection import TERRAIN
 from thermal.emitters import HeatedSlab
 from thermal.errors import require, require_range
@@ -153,7 +153,8 @@ def _condition_limits(controls: Sequence[TemperatureControl | None]) -> FloatArr
     for z, control in enumerate(controls):
         for k, one in enumerate(control.conditions if control else ()):
             waits = one.open_delay_rows, one.hold_rows
-            limits[z, k] = one.above_c, one.below_c, one.operative, *waits
+            quantity = ROOM_QUANTITIES.index(one.quantity)
+            limits[z, k] = one.above, one.below, quantity, *waits
     return limits
 
 
@@ -538,6 +539,11 @@ class SteppedZone:
         """Mean of that and the mean radiant temperature [degC]."""
         shares = self._net.radiation.shares(0)[self._mix.of_hour[self._number]]
         return 0.5 * (self.air_c + float(shares @ self._state.inner[: len(shares)]))
+
+    @property
+    def load_w(self) -> float:
+        """Ideal load of the last step [W], heating positive."""
+        return float(self._state.load[0])
 
     def _drive(
         self, number: int, solar: Solar, gains: Gains, rows: int

@@ -77,21 +77,26 @@ def by_glare(
     return chosen
 
 
+# what a room's condition reads: temperatures [degC], power that cools or heats it [W]
+ROOM_QUANTITIES = ("air", "operative", "cooling", "heating")
+
+
 @dataclass(frozen=True, slots=True)
-class TemperatureCondition:
-    """Met once a room's temperature at the end of the step before is above a limit.
+class RoomCondition:
+    """Met once a room's temperature or load at the end of the step before is above a limit.
 
     Until it is below the other.
     """
 
-    above_c: float
-    below_c: float
-    operative: bool = False  # else of the air
-    open_delay_rows: int = 0  # hours that it stays met after the temperature has left it: `delayed`
+    above: float  # [degC] or [W]
+    below: float
+    quantity: str = "air"  # of ROOM_QUANTITIES
+    open_delay_rows: int = 0  # hours that it stays met after the quantity has left it: `delayed`
     hold_rows: int = 0  # least number of hours between two changes: `held`
 
     def __post_init__(self) -> None:
-        fits = self.below_c <= self.above_c
+        require(self.quantity in ROOM_QUANTITIES, "shading control", f"no {self.quantity!r}")
+        fits = self.below <= self.above
         require(fits, "shading control", "opens at a greater value than it closes at")
 
 
@@ -103,7 +108,7 @@ class TemperatureControl:
     condition k is met.
     """
 
-    conditions: tuple[TemperatureCondition, ...]
+    conditions: tuple[RoomCondition, ...]
     suns: tuple[Solar, ...]
     gains: tuple[Gains, ...]
 
@@ -168,6 +173,59 @@ def held(states: StateArray, rows: int) -> StateArray:
         if states[row] != result[row] and row - moved >= rows:
             result[row], moved = states[row], row
     return result
+
+
+def latched(states: StateArray, ends: ArrayLike) -> StateArray:
+    """States [H] that close at any time, but open in some hours only.
+
+    Args: ends: [H] hours in which a more open state may be taken.
+    """
+    result, free = states.copy(), np.asarray(ends, dtype=bool)
+    for row in range(1, len(states)):
+        if not free[row]:
+            result[row] = max(result[row], result[row - 1])
+    return result
+
+
+def with_few_moves(states: StateArray, most: int, rows_of_day: int) -> StateArray:
+    """States [H] that change at most so often in each day; after that they stay until its end."""
+    result, moves = states.copy(), 0
+    for row in range(1, len(states)):
+        if row % rows_of_day == 0:
+            moves = 0
+        if moves >= most:
+            result[row] = result[row - 1]
+        elif states[row] != result[row - 1]:
+            moves += 1
+    return result
+
+
+def sun_depth(
+    sun: ArrayLike, outwards: ArrayLike, corners: ArrayLike, plane: float
+) -> NDArray[np.float64]:
+    """Distance from a window's foot to which the sun reaches on a level plane [H] [m].
+
+    Each corner c of the glass casts a spot at c - s (c_z - plane)/s_z; the depth is the distance of
+    the farthest one from the foot of the window, along the level direction into the room.  Walls
+    that stop it are not considered.  0 for a sun behind the facade or below the horizon; infinite
+    for a window that looks straight up, which has no foot.
+
+    Args:
+        sun: [H, 3] directions to it; outwards: [3] the window's normal; corners: [N, 3] [m].
+        plane: height of the plane [m].
+    """
+    s, normal = np.asarray(sun, dtype=float), np.asarray(outwards, dtype=float)
+    points = np.asarray(corners, dtype=float)
+    level = np.hypot(normal[0], normal[1])
+    shines = (s @ normal > 0) & (s[:, 2] > 0)
+    if level < 1e-6:
+        return np.where(shines, np.inf, 0.0)
+    inwards = -np.array([normal[0], normal[1], 0.0]) / level
+    foot = (points @ inwards).min()
+    above = np.maximum(points[:, 2] - plane, 0.0)
+    slope = np.where(shines, -(s @ inwards) / np.where(shines, s[:, 2], 1.0), 0.0)
+    reached = points @ inwards - foot + slope[:, None] * above
+    return np.where(shines, np.maximum(reached.max(axis=1), 0.0), 0.0)
 
 
 def switched(suns: Sequence[Solar], chosen: ArrayLike, states: ArrayLike | None = None) -> Solar:

@@ -129,10 +129,14 @@ def _take_alternative(
         for k in range(some.limits.shape[1]):
             before += state.met[z, k] << k
         for k in range(some.limits.shape[1]):
-            above, below, operative, stays, holds = some.limits[z, k]
+            above, below, quantity, stays, holds = some.limits[z, k]
             felt = state.air[z]
-            if operative > 0.0:
+            if quantity == 1.0:
                 felt = 0.5 * (felt + mean_radiant(net, state, some.mix[before, hour, z], z))
+            elif quantity == 2.0:
+                felt = max(-state.load[z], 0.0)
+            elif quantity == 3.0:
+                felt = max(state.load[z], 0.0)
             since = state.since[z, k]
             state.warm[z, k] = felt > above or (state.warm[z, k] and felt >= below)
             since[0] = 0 if state.warm[z, k] else since[0] + 1

@@ -5,6 +5,9 @@ hour a combination of window states costs its lamps, heating and cooling, and a 
 
     V_t(T) = min over m of  [ w_l lamps + w_h heating + w_c cooling + penalty ](t, m, T) + V_t+1(T')
 
+With a cost of moves c the combination m before is part of the programme's state, and V_t(T, m) the
+least over m' of the above for m' plus c for each group whose state differs: found group by group.
+
 The horizon recedes: of each plan only its first hour is carried out.  A horizon of the whole year
 is one plan with perfect foresight.
 
@@ -23,6 +26,7 @@ from thermal.reduced import ReducedZone, responses
 from thermal.zone import Dimming, lamp_share
 
 FloatArray = NDArray[np.float64]
+AT_A_TIME = 256  # forecasts whose errors are drawn together
 COLDEST_C, WARMEST_C, STEPS = 5.0, 45.0, 41  # grid of the mass
 
 
@@ -36,6 +40,8 @@ class PredictedHours:
     dimming: Dimming | None  # by the daylight; None: they are not dimmed
     internal: FloatArray  # [H] other heat indoors [W]
     penalty: FloatArray  # [H, M] [Wh] of glare, or of a preference
+    counts: tuple[int, ...] = ()  # [N] states of the groups, whose product is M; the last is fast
+    move_wh: float = 0.0  # cost of the move of a group [Wh]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +49,9 @@ class Forecast:
     """How the hours ahead are known, besides the present one."""
 
     shift: int = 0  # hours: what acted so long ago is expected again; 0: what will come
-    sun: FloatArray | None = None  # [H, N] factor of sun and daylight, N hours ahead; None: 1
-    warmer_k: FloatArray | None = None  # [H, N] added to the outdoor temperature; None: 0
+    # [H, N] factor of sun and daylight, N hours ahead; None: 1; one row for one plan of the year
+    sun: NDArray[np.floating] | None = None
+    warmer_k: NDArray[np.floating] | None = None  # [H, N] added to the outdoor temperature
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +76,16 @@ def noisy_forecast(
             outdoor temperature [K].
     """
     random = np.random.default_rng(seed)
-    walks = random.standard_normal((2, hours, ahead)).cumsum(axis=2) / np.sqrt(24.0)
-    walks -= walks[:, :, :1]  # the present hour is measured
-    sun = np.maximum(1.0 + sun_error * walks[0], 0.0)
-    return Forecast(0, sun, temperature_error_k * walks[1])
+    made = 1 if ahead >= hours else hours  # forecasts: a plan of the whole year is made once
+    walks = np.zeros((2, made, ahead), dtype=np.float32)
+    for quantity in range(2):
+        for start in range(0, made, AT_A_TIME):
+            some = slice(start, min(start + AT_A_TIME, made))
+            steps = random.standard_normal((some.stop - start, ahead)).cumsum(axis=1)
+            walks[quantity, some] = (steps - steps[:, :1]) / np.sqrt(24.0)  # the first is measured
+    walks[0] = np.maximum(1.0 + sun_error * walks[0], 0.0)
+    walks[1] *= temperature_error_k
+    return Forecast(0, *walks)
 
 
 def predicted_year(
@@ -94,7 +107,8 @@ def predicted_year(
     count = len(hours.lamps)
     forecast = forecast or Forecast()
     once = ahead >= count
-    none = np.zeros((1, 1))
+    none = np.zeros((1, 1), dtype=np.float32)
+    counts = hours.counts if hours.move_wh > 0 else ()
     result = np.zeros((count, 4))
     _run(
         np.array([zone.opaque, zone.mass, zone.mass_area, zone.area, zone.heating_limit,
@@ -103,8 +117,9 @@ def predicted_year(
         zone.windows, zone.air, zone.outdoor_c, zone.behind_c, zone.heating_c, zone.cooling_c,
         hours.sun, hours.daylight, hours.lamps, hours.internal, hours.penalty,
         count if once else max(ahead, 1), once, forecast.shift,
-        none + 1.0 if forecast.sun is None else forecast.sun,
+        none + 1 if forecast.sun is None else forecast.sun,
         none if forecast.warmer_k is None else forecast.warmer_k,
+        np.array(counts or (1,), dtype=np.int64), hours.move_wh if counts else 0.0,
         result,
     )  # fmt: skip
     return PredictedYear(result[:, 0].astype(np.int64), *result[:, 1:].T)
@@ -163,6 +178,35 @@ def _value(values: NDArray[np.float64], mass_c: float) -> float:
 
 
 @compiled()
+def _moved(values: NDArray[np.float64], counts: NDArray[np.int64], move: float) -> None:
+    """Write the least value after moves into values [M, K]: of each group in its turn."""
+    M, K = values.shape
+    stride = M
+    for count in counts:
+        stride //= count
+        for first in range(M):
+            if (first // stride) % count != 0:
+                continue
+            for k in range(K):
+                least = np.inf
+                for j in range(count):
+                    least = min(least, values[first + j * stride, k])
+                for j in range(count):
+                    here = first + j * stride
+                    values[here, k] = min(values[here, k], least + move)
+
+
+@compiled()
+def _groups_apart(a: int, b: int, counts: NDArray[np.int64]) -> int:
+    """Number of groups whose states differ in two combinations."""
+    apart, stride = 0, 1
+    for n in range(len(counts) - 1, -1, -1):
+        apart += (a // stride) % counts[n] != (b // stride) % counts[n]
+        stride *= counts[n]
+    return apart
+
+
+@compiled()
 def _run(
     constants: NDArray[np.float64],
     windows: NDArray[np.float64],
@@ -179,15 +223,19 @@ def _run(
     ahead: int,
     once: bool,
     shift: int,
-    factor: NDArray[np.float64],
-    warmer: NDArray[np.float64],
+    factor: NDArray[np.float32],
+    warmer: NDArray[np.float32],
+    counts: NDArray[np.int64],
+    move: float,
     result: NDArray[np.float64],
 ) -> None:
     """Carry out the plans of the year: state, heating, cooling and lamps into result [H, 4]."""
     H, M = sun.shape
     step = (WARMEST_C - COLDEST_C) / (STEPS - 1)
     out, mass_c = np.zeros(6), constants[10]
-    kept = np.zeros((H + 1 if once else ahead + 1, STEPS))
+    kinds = M if move > 0.0 else 1  # combinations in the hour before that count
+    kept = np.zeros((H + 1 if once else ahead + 1, kinds, STEPS))
+    last_m = 0
     for hour in range(H):
         if not once or hour == 0:
             last = H - 1 if once else ahead - 1
@@ -195,8 +243,9 @@ def _run(
             for t in range(last, 0, -1):
                 at = (hour + t) % H
                 known = (at - shift) % H
-                scale = factor[hour, t] if factor.shape[0] > 1 else 1.0
-                more = warmer[hour, t] if warmer.shape[0] > 1 else 0.0
+                row = min(hour, factor.shape[0] - 1)
+                scale = factor[row, t] if factor.shape[1] > 1 else 1.0
+                more = warmer[row, t] if warmer.shape[1] > 1 else 0.0
                 kept[t] = np.inf
                 for m in range(M):
                     lit = _hour(
@@ -212,16 +261,20 @@ def _run(
                         out,
                     )
                     base = constants[9] * lit + penalty[at if shift == 0 else known, m]
+                    kind = m if kinds > 1 else 0
                     for k in range(STEPS):
                         temperature = COLDEST_C + k * step
                         power = _power(temperature, out, low[at], high[at], constants)
                         cost = constants[7] * power if power > 0 else -constants[8] * power
                         after = out[3] + out[4] * temperature + out[5] * power
-                        cost += base + _value(kept[t + 1], after)
-                        if cost < kept[t, k]:
-                            kept[t, k] = cost
+                        cost += base + _value(kept[t + 1, kind], after)
+                        if cost < kept[t, kind, k]:
+                            kept[t, kind, k] = cost
+                if kinds > 1:
+                    _moved(kept[t], counts, move)
         best, best_after = np.inf, mass_c
         ahead_values = kept[hour + 1] if once else kept[1]
+        best_m = 0
         for m in range(M):
             lit = _hour(
                 constants,
@@ -238,10 +291,13 @@ def _run(
             power = _power(mass_c, out, low[hour], high[hour], constants)
             cost = constants[7] * power if power > 0 else -constants[8] * power
             after = out[3] + out[4] * mass_c + out[5] * power
-            cost += constants[9] * lit + penalty[hour, m] + _value(ahead_values, after)
+            kind = m if kinds > 1 else 0
+            cost += constants[9] * lit + penalty[hour, m] + _value(ahead_values[kind], after)
+            if kinds > 1:
+                cost += move * _groups_apart(last_m, m, counts)
             if cost < best:
-                best, best_after = cost, after
+                best, best_after, best_m = cost, after, m
                 result[hour, 0] = m
                 result[hour, 1], result[hour, 2] = max(power, 0.0), max(-power, 0.0)
                 result[hour, 3] = lit
-        mass_c = best_after
+        mass_c, last_m = best_after, best_m

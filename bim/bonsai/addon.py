@@ -69,7 +69,7 @@ def room_values(results: str, quantity: str) -> dict[str, float]:
     wanted, folder = QUANTITIES[quantity], Path(results)
     try:
         places = json.loads((folder / "run.json").read_text(encoding="utf-8"))["folders"]
-        found = {}
+        by_room = {}
         for guid, place in places.items():
             if Path(place).is_absolute() or ".." in Path(place).parts:
                 raise ValueError(f"{place[:60]!r} is no name of a room's folder")
@@ -77,12 +77,12 @@ def room_values(results: str, quantity: str) -> dict[str, float]:
                 cells = [row[wanted.column] for row in csv.DictReader(file)]
             values = [float(cell) for cell in cells if cell]
             if values:
-                found[guid] = max(values)
+                by_room[guid] = max(values)
     except (
         OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, csv.Error,
     ) as error:  # fmt: skip
         raise ValueError(f"cfs: {folder} holds no results of cfs run ({error})") from None
-    return found
+    return by_room
 
 
 def colour(value: float, low: float, high: float) -> Colour:
@@ -129,15 +129,15 @@ def paint(objects: Iterable[tuple[Any, Colour]]) -> int:
 
 def room_objects(ifc: Any, colours: Mapping[str, Colour]) -> list[tuple[Any, Colour]]:
     """Blender's object of each room with its colour; ifc: `bonsai.tool.Ifc`."""
-    found = []
+    objects = []
     for guid, shade in colours.items():
         try:
             one = ifc.get_object(ifc.get().by_guid(guid))
         except RuntimeError:  # no such GUID: another file is open
             continue
         if one is not None:
-            found.append((one, shade))
-    return found
+            objects.append((one, shade))
+    return objects
 
 
 def add_on_classes(bpy: Any) -> Sequence[type]:

@@ -94,10 +94,10 @@ class Document:
 
         Args: known: of `by_id`.
         """
-        found = known[kind].get(name or "")
-        if found is None:
+        element = known[kind].get(name or "")
+        if element is None:
             raise self.fault(f"no {kind} {name!r:.60}", owner)
-        return found
+        return element
 
     def number(
         self, element: ElementTree.Element, *, least: float = -math.inf, most: float = math.inf
@@ -119,24 +119,24 @@ class Document:
 
     def quantity(self, owner: ElementTree.Element, name: str) -> float | None:
         """A quantity [SI] of an element by the unit that it states; None where it has none."""
-        found = owner.find(name)
-        if found is None:
+        element = owner.find(name)
+        if element is None:
             return None
         units = SI[name]
-        unit = found.get("unit")
+        unit = element.get("unit")
         if unit is None:  # of lengths the file's own unit, of the others the SI unit
             unit = self._length_unit if units is METRES else next(iter(units))
         if unit not in units:
             raise self.fault(f"unit {unit[:40]!r}, expected of {', '.join(units)}", owner, name)
         try:
-            return units[unit] * self.number(found, least=0.0)
+            return units[unit] * self.number(element, least=0.0)
         except DataError as error:
             raise self.fault(error.message, owner, name) from None
 
     def size(self, owner: ElementTree.Element, name: str) -> float | None:
         """Area [m2] or Volume [m3] of an element by the file's unit; None where it has none."""
-        found = owner.find(name)
-        if found is None or not (found.text or "").strip():
+        element = owner.find(name)
+        if element is None or not (element.text or "").strip():
             return None
         field, units = SIZES[name]
         unit = self.root.get(field, "SquareMeters" if name == "Area" else "CubicMeters")
@@ -144,7 +144,7 @@ class Document:
             message = f"{unit[:40]!r}, expected of {', '.join(units)}"
             raise self.fault(message, self.root, field)
         try:
-            return units[unit] * self.number(found, least=0.0)
+            return units[unit] * self.number(element, least=0.0)
         except DataError as error:
             raise self.fault(error.message, owner, name) from None
 

@@ -2,23 +2,30 @@
 
 Light is by the modifiers of honeybee-radiance, heat by the constructions of honeybee-energy, as
 honeybee's own recipes take them; where one of the two is missing, the other stands for it.
+
+A surface's modifier is its own, else its room's modifier set's, else the model's global set's.
+
+Source: honeybee-schema, "Modifier", "ModifierSet", "SensorGrid", "View".
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import base64
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bim.defaults import FACADE_REFLECTANCE
 from bim.drawn_building import DrawnModel, drawn_building
 from bim.fenestration import PlainGlass, ShadingState
+from bim.held_sensors import ModelGrid, ModelView
 from bim.honeybee.energy import EnergyLibrary, OpaqueValues
-from bim.honeybee.library import OUTDOORS, PARTS
-from bim.honeybee.radiance import ModifierLibrary
+from bim.honeybee.library import OUTDOORS, PARTS, NamedObjects
 from bim.honeybee.schema import (
     Condition,
     HoneybeeAperture,
@@ -30,7 +37,6 @@ from bim.honeybee.schema import (
     ShadeMesh,
     read_model,
 )
-from bim.honeybee.sensors import SensorReader, shade_issues
 from bim.honeybee.use import UseLibrary
 from bim.model import Building, Element
 from bim.planes import newell_normal
@@ -42,11 +48,252 @@ from bim.polygon_rooms import (
     SurfaceFinish,
     triangles_of_rings,
 )
+from bim.radiance.materials import RadianceMaterial, material_of
+from bim.radiance.primitives import VOID, Primitive
+from bim.radiance.xform import read_xform
 from bim.report.issue import Issue
+from mitsuba_cfs.bsdf.angular import glass_table, specular_matrices
+from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import scratch_folder
+from mitsuba_cfs.images.view import KINDS, View
+
+
+class SensorReader:
+    """The grids and views of a model; what cannot be one is in the issues."""
+
+    def __init__(self, model: HoneybeeModel, file: Path) -> None:
+        self.radiance, self.scale, self.file = model.properties.radiance, model.scale, file
+        self.issues: list[Issue] = []
+
+    def grids(self) -> tuple[ModelGrid, ...]:
+        """The sensor grids [m].
+
+        Raises: `DataError` that names the grid.
+        """
+        grids = []
+        for grid in _objects(self.radiance, "sensor_grids"):
+            name = str(grid.get("display_name") or grid["identifier"])
+            try:
+                rows = [(one["pos"], one["dir"]) for one in grid["sensors"]]
+                points, towards = np.array(rows, dtype=float).reshape(-1, 2, 3).transpose(1, 0, 2)
+                lengths = np.linalg.norm(towards, axis=1, keepdims=True)
+                if not (np.isfinite(points).all() and (lengths > 0).all() and len(points)):
+                    raise ValueError(name)
+            except (KeyError, TypeError, ValueError, OverflowError):
+                message = "expected sensors, each with pos and dir of three numbers"
+                raise DataError(message, file=self.file, element=name, field="sensors") from None
+            grids.append(ModelGrid(name, self.scale * points, towards / lengths))
+        return tuple(grids)
+
+    def views(self) -> tuple[ModelView, ...]:
+        """The views [m] that can be made; the others are named in the issues."""
+        views = []
+        for view in _objects(self.radiance, "views"):
+            name = str(view.get("display_name") or view["identifier"])
+            made = view_of(view, self.scale)
+            if made is None:
+                self.issues.append(Issue("view-unreadable", self.file.name, {"view": name}))
+            else:
+                views.append(ModelView(name, made))
+        return tuple(views)
+
+
+def shade_issues(model: HoneybeeModel, file: Path) -> Iterator[Issue]:
+    """Issues that name shades with states, and shades that let light through by a schedule."""
+    shades = [s for s in _shades(model) if s.properties.radiance.get("states")]
+    if shades:
+        values = {"count": len(shades), "shades": tuple(s.label for s in shades)}
+        yield Issue("shades-with-states", file.name, values)
+    seasonal = [s for s in _shades(model) if s.properties.energy.get("transmittance_schedule")]
+    if seasonal:
+        values = {"count": len(seasonal), "shades": tuple(s.label for s in seasonal)}
+        yield Issue("shades-by-schedule", file.name, values)
+
+
+def view_of(view: Mapping[str, Any], scale: float) -> View | None:
+    """A honeybee view [m]; None where one of its fields cannot be one.
+
+    Args: scale: metres in the model's unit of length.
+    """
+    sizes = [60.0 if view.get(field) is None else view[field] for field in ("h_size", "v_size")]
+    up = view.get("up_vector") or (0.0, 0.0, 1.0)
+    try:
+        position, direction, up = (
+            tuple(np.array(one, dtype=float).reshape(3).tolist())
+            for one in (view.get("position"), view.get("direction"), up)
+        )
+        width, height = map(float, sizes)
+        kind = KINDS[view.get("view_type") or "v"]
+    except (KeyError, TypeError, ValueError, OverflowError):
+        return None
+    place = tuple(scale * x for x in position)
+    try:
+        return View(kind, place, direction, up, width, height)
+    except ValueError:  # no direction, impossible angles
+        return None
+
+
+def _objects(properties: Mapping[str, Any], field: str) -> list[Mapping[str, Any]]:
+    """The objects with an identifier that an extension lists."""
+    listed = properties.get(field)
+    listed = listed if isinstance(listed, list) else []
+    return [one for one in listed if isinstance(one, dict) and one.get("identifier")]
+
+
+def _shades(model: HoneybeeModel) -> Iterator[Shade | ShadeMesh]:
+    yield from model.orphaned_shades or ()
+    yield from model.shade_meshes or ()
+    for room in model.rooms or ():
+        yield from room.outdoor_shades or ()
+        for face in room.faces:
+            yield from face.outdoor_shades or ()
+            for opening in (*(face.apertures or ()), *(face.doors or ())):
+                yield from opening.outdoor_shades or ()
+
+
+COLOURS = ("r", "g", "b")
+UP = (0.01, 0.01, 1.0)  # up vector of a BSDF where the file states none: honeybee-schema's default
+OPAQUE_FIELDS = {
+    "plastic": ("specularity", "roughness"),
+    "metal": ("specularity", "roughness"),
+    "trans": ("specularity", "roughness", "transmitted_diff", "transmitted_spec"),
+    "mirror": (),
+}
+
+
+class ModifierLibrary:
+    """Modifiers and modifier sets of a file, read when something refers to them."""
+
+    def __init__(self, radiance: Mapping[str, Any], file: Path) -> None:
+        self.file = file
+        self.objects = NamedObjects(radiance, ("modifiers",), "modifier", file)
+        self._materials: dict[str, RadianceMaterial] = {}
+        self._states: dict[str, ShadingState] = {}
+
+    def material(self, name: str) -> RadianceMaterial | None:
+        """The Radiance material of a modifier; None where the file has none of that name."""
+        if name not in self._materials:
+            modifier = self.objects.find("modifiers", name)
+            if modifier is None:
+                return None
+            self._materials[name] = self._material(modifier)
+        return self._materials[name]
+
+    def _material(self, modifier: Mapping[str, Any]) -> RadianceMaterial:
+        kind = _kind(modifier)
+        numbers: list[float] = []
+        under = modifier.get("modifier")
+        if under is not None and under != VOID and _kind(under) != VOID:
+            known = {"modifier": modifier["identifier"], "type": _kind(under) or "?"}
+            self.objects.issues.append(Issue("modifier-of-modifier", self.file.name, known))
+        if kind in OPAQUE_FIELDS:
+            numbers = [self.objects.number(modifier, f"{c}_reflectance", 0.0) for c in COLOURS]
+            numbers += [self.objects.number(modifier, field, 0.0) for field in OPAQUE_FIELDS[kind]]
+        elif kind == "glass":
+            numbers = [self.objects.number(modifier, f"{c}_transmissivity", 0.0) for c in COLOURS]
+            index = modifier.get("refraction_index")
+            numbers += (
+                [] if index is None else [self.objects.number(modifier, "refraction_index", 1.52)]
+            )
+        elif kind == "BSDF":
+            return RadianceMaterial(modifier["identifier"], "BSDF", bsdf=modifier["identifier"])
+        name = modifier["identifier"]
+        try:
+            return material_of(Primitive(VOID, kind, name, (), tuple(numbers), self.file, 0))
+        except DataError as error:  # which names a line; there is none
+            raise DataError(error.message, file=self.file, element=name) from None
+
+    def state(self, name: str, label: str = "") -> ShadingState | None:
+        """The BSDF of a modifier as a shading state; None where it is none."""
+        modifier = self.objects.find("modifiers", name) or {}
+        if _kind(modifier) != "BSDF":
+            return None
+        if name not in self._states:
+            self._states[name] = self._bsdf(modifier)
+        held = self._states[name]
+        return ShadingState(name=label, bands=held.bands, angular=held.angular)
+
+    def up_vector(self, name: str) -> NDArray[np.float64] | None:
+        """The up vector [3] of a modifier's BSDF, as Radiance takes it; None where it is none.
+
+        Raises: `DataError` for one that is no vector, or that a function file gives.
+        """
+        modifier = self.objects.find("modifiers", name) or {}
+        if _kind(modifier) != "BSDF":
+            return None
+        stated = modifier.get("up_orientation")
+        try:
+            up = np.array(UP if stated is None else stated, dtype=float)
+        except (TypeError, ValueError):
+            up = np.zeros(0)
+        if up.shape != (3,) or not 0 < np.linalg.norm(up) < np.inf:
+            message = f"expected a vector of three numbers, got {stated!r:.60}"
+            raise self.objects.fault(message, modifier, "up_orientation")
+        if modifier.get("function_file") not in (None, "", "."):
+            message = "function files of a BSDF are not read: state its up_orientation in numbers"
+            raise self.objects.fault(message, modifier, "function_file")
+        transform = modifier.get("transform")
+        if transform:
+            try:
+                up = read_xform(("xform", *str(transform).split())).copies[0][:3, :3] @ up
+            except ValueError as error:
+                raise self.objects.fault(str(error), modifier, "transform") from None
+        return up / np.linalg.norm(up)
+
+    def pane_state(self, name: str, label: str, values: GlazingValues) -> ShadingState | None:
+        """A modifier of glass as a shading state; None where it is none.
+
+        Its sun is the construction's, as much more or less as its light (a tint of one colour).
+        """
+        material = self.material(name)
+        if material is None or material.kind != "glass":
+            return None
+        table = glass_table([(material.transmissivity, material.index)])
+        bands = {"Visible": specular_matrices(table)}
+        if values.solar is not None and values.visible:
+            tau, rho = float(table.transmittance[0]), float(table.reflectance_front[0])
+            through = min(tau * values.solar / values.visible, 1.0 - rho)
+            sun = Glazing(name, through, rho, rho, values.panes or 2)
+            bands["Solar"] = specular_klems(sun, KLEMS_FULL)
+        return ShadingState(name=label, bands=bands, angular=table)
+
+    def _bsdf(self, modifier: Mapping[str, Any]) -> ShadingState:
+        name, data = modifier["identifier"], modifier.get("bsdf_data")
+        if not isinstance(data, str):
+            raise DataError("expected the text of a BSDF XML", file=self.file, element=name,
+                            field="bsdf_data")  # fmt: skip
+        with scratch_folder() as folder:
+            path = folder / "bsdf.xml"
+            path.write_bytes(_decoded(data))
+            try:
+                bands = read_bsdf_xml(path).bands
+            except DataError as error:
+                raise DataError(error.message, file=self.file, element=name, field="bsdf_data")\
+                    from None  # fmt: skip
+        return ShadingState(bands=dict(bands))
+
+
+def _kind(modifier: Any) -> str:
+    """Radiance's name of a modifier's type, which files write with either first letter."""
+    kind = str(modifier.get("type", "") if isinstance(modifier, Mapping) else modifier)
+    return kind if kind.upper() == kind else kind[:1].lower() + kind[1:]
+
+
+def _decoded(data: str) -> bytes:
+    """The XML of a modifier: as text, or in base 64 as some writers keep it."""
+    if data.lstrip().startswith("<"):
+        return data.encode("utf-8")
+    try:
+        return base64.b64decode(data, validate=True)
+    except ValueError:
+        return data.encode("utf-8")
+
 
 ADJACENCY = {"Outdoors": "outside", "Ground": "ground", "Surface": "space"}
-KINDS = {"Wall": "wall", "Floor": "floor"}  # the others by their slope
+FACE_KINDS = {"Wall": "wall", "Floor": "floor"}  # the others by their slope
 SAME_UP = 1e-3  # difference of unit up vectors that are taken as one
 PARALLEL = 1e-3  # sine of the angle between up vector and normal
 
@@ -140,7 +387,7 @@ class _Reader:
         name = None
         if face.face_type != "AirBoundary":
             name = self.energy.objects.name(own.energy, of_room.energy, part, field)
-        kind = KINDS.get(face.face_type, "")
+        kind = FACE_KINDS.get(face.face_type, "")
         return DrawnFace(
             face.identifier, face.label, kind, face.geometry.rings(self.scale), adjacency,
             neighbour, self._finish(face, room, name, part), tuple(openings),
@@ -242,25 +489,25 @@ class _Reader:
         """The optics of an aperture by state: BSDFs; of a dynamic group also its panes of glass."""
         held = _held(one)
         names = [modifier, *(s.get("modifier") for s in held[1:])]
-        found, missing = [], 0
+        states, missing = [], 0
         for number, name in enumerate(names):
             label = "" if number == 0 else str(name)
             state = self.light.state(name, label) if isinstance(name, str) else None
             if state is None and isinstance(name, str) and len(names) > 1:
                 state = self.light.pane_state(name, label, values)
             if state is not None:
-                found.append(_with_values(state, values, shaded=number > 0))
+                states.append(_with_values(state, values, shaded=number > 0))
             elif number:
                 missing += 1
         group = one.properties.radiance.get("dynamic_group_identifier")
-        if found and isinstance(group, str):
+        if states and isinstance(group, str):
             self.groups.setdefault(group, []).append(one.label)
         if missing:
             known = {"element": one.label, "count": missing}
             self.issues.append(Issue("states-not-optical", one.identifier, known))
         if any(state.get("shades") for state in held):
             self.issues.append(Issue("states-with-shades", one.identifier, {"element": one.label}))
-        return tuple(found) if found and found[0].name == "" else ()
+        return tuple(states) if states and states[0].name == "" else ()
 
     def _up(
         self, one: HoneybeeAperture, modifier: str | None, ring: np.ndarray

@@ -93,7 +93,7 @@ class EnergyLibrary:
         own = construction.get("materials") or construction.get("layers") or []
         if not isinstance(own, list):
             raise self.objects.fault("expected a list of materials", construction, "materials")
-        found = []
+        layers = []
         for one in own:
             material = one if isinstance(one, dict) else self.objects.find("materials", str(one))
             if material is None:
@@ -102,8 +102,8 @@ class EnergyLibrary:
                 raise self.objects.fault(
                     "expected materials with an identifier", construction, "materials"
                 )
-            found.append(material)
-        return found
+            layers.append(material)
+        return layers
 
     def _layer(self, material: Mapping[str, Any]) -> MaterialLayer:
         name, kind = str(material["identifier"]), material.get("type")
@@ -193,22 +193,22 @@ class EnergyLibrary:
 
     def _without_shade(self, layers: Sequence[dict]) -> list[dict]:
         """The layers of a glazing without shades; the gaps on both sides of one are one gap."""
-        found: list[dict] = []
+        unshaded: list[dict] = []
         behind_shade = False
         for one in layers:
             kind = str(one.get("type", ""))
-            after_gap = bool(found) and str(found[-1].get("type", "")) in GAPS
+            after_gap = bool(unshaded) and str(unshaded[-1].get("type", "")) in GAPS
             if kind.endswith(BLINDS):
                 behind_shade = True
                 continue
             if behind_shade and kind in GAPS and after_gap:
-                widths = [self._width(gap) for gap in (found[-1], one)]
-                found[-1] = found[-1] | {"thickness": sum(widths)}
-            elif not (behind_shade and kind in GAPS and not found):
-                found.append(one)
+                widths = [self._width(gap) for gap in (unshaded[-1], one)]
+                unshaded[-1] = unshaded[-1] | {"thickness": sum(widths)}
+            elif not (behind_shade and kind in GAPS and not unshaded):
+                unshaded.append(one)
             behind_shade = False
-        ends_in_gap = bool(found) and str(found[-1].get("type", "")) in GAPS
-        return found[:-1] if behind_shade and ends_in_gap else found
+        ends_in_gap = bool(unshaded) and str(unshaded[-1].get("type", "")) in GAPS
+        return unshaded[:-1] if behind_shade and ends_in_gap else unshaded
 
     def _layered(
         self, name: str, panes: Sequence[dict], gaps: Sequence[dict], height: float

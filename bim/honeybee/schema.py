@@ -2,7 +2,7 @@
 
 Only fields that are used are named; others are passed over, so that files of every version of
 honeybee-schema since 1.0 are read.  Materials, constructions and modifiers come as dictionaries:
-`bim.honeybee.energy` and `bim.honeybee.radiance` read those that something refers to.
+`bim.honeybee.energy` and `bim.honeybee.building` read those that something refers to.
 
 Source: honeybee-schema, "Model" (https://www.ladybug.tools/honeybee-schema/model.html).
 """
@@ -181,8 +181,8 @@ def read_model(path: Path) -> HoneybeeModel:
     """
     content = read_json(path)
     if content.get("type") != "Model":
-        found = content.get("type")
-        raise DataError(f"expected a honeybee Model, got {found!r:.60}", file=path, field="type")
+        kind = content.get("type")
+        raise DataError(f"expected a honeybee Model, got {kind!r:.60}", file=path, field="type")
     if isinstance(content.get("buildings"), list):
         message = "is a dragonfly model; write honeybee's HBJSON of it (Model.to_honeybee)"
         raise DataError(message, file=path)

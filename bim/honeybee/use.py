@@ -157,12 +157,12 @@ def _fixed(held: Mapping[str, Any]) -> NDArray[np.float64]:
     order = [day for day in range(DAYS) if leap or day != LAST_OF_FEBRUARY]
     first = order.index(day_of_year(*start[:2]))
     placeholder = _numbers(held.get("placeholder_value") or 0.0, 0)
-    found = np.full((DAYS, CLOCK), float(placeholder))
+    hourly = np.full((DAYS, CLOCK), float(placeholder))
     for number, day in enumerate(hours[: len(order)]):
-        found[order[(first + number) % len(order)]] = day
+        hourly[order[(first + number) % len(order)]] = day
     if not leap:
-        found[LAST_OF_FEBRUARY] = found[LAST_OF_FEBRUARY - 1]
-    return np.repeat(found[:, None, :], len(KINDS), axis=1)
+        hourly[LAST_OF_FEBRUARY] = hourly[LAST_OF_FEBRUARY - 1]
+    return np.repeat(hourly[:, None, :], len(KINDS), axis=1)
 
 
 LOADS = ("people", "lighting", "electric_equipment", "gas_equipment", "infiltration",
@@ -209,10 +209,10 @@ class UseLibrary:
         name = room.properties.energy.get("program_type")
         if isinstance(name, dict):
             return name
-        found = self.objects.find("program_types", str(name)) if name else None
-        if name and found is None:
+        program = self.objects.find("program_types", str(name)) if name else None
+        if name and program is None:
             self._report(room, "program-missing", program=str(name))
-        return found or {}
+        return program or {}
 
     def hvac(self, room: HoneybeeRoom) -> Mapping[str, Any] | None:
         """The system of a room; None where it has none."""
@@ -240,10 +240,10 @@ class _Parts:
 
     def use(self) -> StatedUse:
         """All of them as a use; a load that neither room nor program has is none."""
-        found: dict[str, Any] = {}
+        parts: dict[str, Any] = {}
         for part in (self._people, self._lamps, self._equipment, self._air, self._loads):
-            found |= dict(part())
-        return StatedUse(**found, radiant_share=self._radiant())
+            parts |= dict(part())
+        return StatedUse(**parts, radiant_share=self._radiant())
 
     def _of(self, kind: str) -> Mapping[str, Any]:
         return self.loads.get(kind, {})
@@ -285,7 +285,7 @@ class _Parts:
 
     def _equipment(self) -> Iterator[tuple[str, Any]]:
         kinds = [k for k in ("electric_equipment", "gas_equipment") if self._of(k)]
-        found: YearSchedule | None = None
+        schedule: YearSchedule | None = None
         for kind in kinds:
             one = self._of(kind)
             away = sum(
@@ -295,8 +295,11 @@ class _Parts:
                 self.report("gain-lost", load=Phrase(kind), percent=100 * away)
             power = self.number(one, "watts_per_area", 0.0) * self.space.floor_area
             part = self._share(kind).times(power * max(1.0 - away, 0.0))
-            found = part if found is None else found.plus(part)
-        yield "equipment_w", ScheduledValue(0.0) if found is None else ScheduledValue(1.0, found)
+            schedule = part if schedule is None else schedule.plus(part)
+        yield (
+            "equipment_w",
+            ScheduledValue(0.0) if schedule is None else ScheduledValue(1.0, schedule),
+        )
 
     def _air(self) -> Iterator[tuple[str, Any]]:
         leaks, fan, space = self._of("infiltration"), self._of("ventilation"), self.space

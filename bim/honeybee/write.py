@@ -80,12 +80,12 @@ class _Names:
     def of(self, name: str) -> str:
         """The name in letters that honeybee takes, with a number where it is taken."""
         base = identifier(name)[:80]
-        found, number = base, 1
-        while found in self._taken:
+        unique, number = base, 1
+        while unique in self._taken:
             number += 1
-            found = f"{base}_{number}"
-        self._taken.add(found)
-        return found
+            unique = f"{base}_{number}"
+        self._taken.add(unique)
+        return unique
 
 
 class _Library:

@@ -1,4 +1,8 @@
-"""Scene files of Radiance as triangles by material: `read_radiance`."""
+"""Scene files of Radiance as triangles by material: `read_radiance`.
+
+Circles become polygons of the same area.  Source of the arguments: "The RADIANCE 5.1 Synthetic
+Imaging System", 3.1; of the generators `genbox` and `genprism`: their manual pages.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +14,11 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+import shapely
+import trimesh
 from numpy.typing import NDArray
 
-from bim.radiance import shapes
-from bim.radiance.generators import GENERATORS, Polygon
+from bim.planes import newell_normal, plane_through, triangulated
 from bim.radiance.materials import (
     MATERIALS,
     MIXTURE,
@@ -23,11 +28,165 @@ from bim.radiance.materials import (
     mixed_material,
 )
 from bim.radiance.patterns import COMPUTED_PATTERNS, EVEN, pattern_values
-from bim.radiance.primitives import VOID, Command, Definition, Primitive, read_statements
+from bim.radiance.primitives import (
+    VOID,
+    Command,
+    Definition,
+    Primitive,
+    count_of,
+    number_of,
+    read_statements,
+)
 from bim.radiance.xform import Xform, read_xform
 from bim.report.issue import Issue, area_words
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.surfaces import triangle_areas
+
+CIRCLE_SIDES = 32  # of a circle
+LARGEST = 1e10  # of a coordinate, in units of the file
+SUBDIVISIONS = 2  # of an icosahedron: 320 triangles
+
+INWARD = {"bubble": "sphere", "tube": "cylinder", "cup": "cone"}
+ARGUMENTS = {"sphere": 4, "cylinder": 7, "cone": 8, "ring": 8}
+KINDS = ("polygon", *ARGUMENTS, *INWARD)
+
+
+def triangles_of(primitive: Primitive) -> NDArray[np.float64]:
+    """Triangles [T, 3, 3] of an object, counter-clockwise seen from its front; [0, 3, 3] if flat.
+
+    Raises: `DataError` naming file and line for wrong arguments.
+    """
+    kind = INWARD.get(primitive.kind, primitive.kind)
+    numbers = np.asarray(primitive.numbers)
+    if not np.abs(numbers).max(initial=0.0) <= LARGEST:
+        raise primitive.fault(f"a coordinate or size is above {LARGEST:g}")
+    if kind == "polygon":
+        if len(numbers) < 9 or len(numbers) % 3:
+            raise primitive.fault(
+                f"expected three numbers of each corner, got {len(numbers)} numbers"
+            )
+        return polygon_triangles(numbers.reshape(-1, 3))
+    if len(numbers) != ARGUMENTS[kind]:
+        raise primitive.fault(f"expected {ARGUMENTS[kind]} numbers, got {len(numbers)}")
+    if (numbers[6:] < 0).any() or (kind == "sphere" and numbers[3] <= 0):
+        raise primitive.fault("a radius is negative")
+    triangles = sphere(numbers[:3], numbers[3]) if kind == "sphere" else strip(kind, numbers)
+    return triangles[:, ::-1] if primitive.kind in INWARD else triangles
+
+
+def polygon_triangles(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A plane polygon [n, 3] as triangles, concave or with holes on seams."""
+    area = newell_normal(corners)
+    if not np.linalg.norm(area) > 0:
+        return np.empty((0, 3, 3))
+    plane = plane_through(corners[0], area)
+    whole = shapely.make_valid(shapely.Polygon(plane.to_plane(corners)[:, :2]))
+    parts = [part for part in shapely.get_parts(whole) if part.geom_type == "Polygon"]
+    flat = np.concatenate([np.empty((0, 3, 2)), *map(triangulated, parts)])
+    return plane.to_world(flat.reshape(-1, 2)).reshape(-1, 3, 3)
+
+
+def sphere(centre: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+    """A sphere's triangles, of its area."""
+    mesh = trimesh.creation.icosphere(subdivisions=SUBDIVISIONS)
+    return mesh.triangles * (radius * np.sqrt(4 * np.pi / mesh.area)) + centre
+
+
+def strip(kind: str, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The strip between two circles; the front is outside, of a ring where its normal points."""
+    if kind == "ring":
+        start = end = numbers[:3]
+        axis, radii = numbers[3:6], numbers[6:8][::-1]
+    else:
+        start, end = numbers[:3], numbers[3:6]
+        axis, radii = end - start, (numbers[6], numbers[7] if kind == "cone" else numbers[6])
+    if not np.linalg.norm(axis) > 0:
+        return np.empty((0, 3, 3))
+    u, v, _ = plane_through(start, axis).axes
+    angles = np.linspace(0.0, 2 * np.pi, CIRCLE_SIDES + 1)
+    size = np.sqrt((2 * np.pi / CIRCLE_SIDES) / np.sin(2 * np.pi / CIRCLE_SIDES))
+    round_ = size * (np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * v)
+    low, high = start + radii[0] * round_, end + radii[1] * round_
+    first = np.stack([low[:-1], low[1:], high[1:]], axis=1)
+    second = np.stack([low[:-1], high[1:], high[:-1]], axis=1)
+    both = np.concatenate([first, second])
+    areas = np.linalg.norm(np.cross(both[:, 1] - both[:, 0], both[:, 2] - both[:, 0]), axis=1)
+    return both[areas > 0]
+
+
+Polygon = tuple[str, NDArray[np.float64]]  # name, corners [n, 3]
+
+# corners of a unit box's sides, counter-clockwise seen from outside
+SIDES = {
+    "x0": ((0, 0, 0), (0, 0, 1), (0, 1, 1), (0, 1, 0)),
+    "x1": ((1, 0, 0), (1, 1, 0), (1, 1, 1), (1, 0, 1)),
+    "y0": ((0, 0, 0), (1, 0, 0), (1, 0, 1), (0, 0, 1)),
+    "y1": ((0, 1, 0), (0, 1, 1), (1, 1, 1), (1, 1, 0)),
+    "z0": ((0, 0, 0), (0, 1, 0), (1, 1, 0), (1, 0, 0)),
+    "z1": ((0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)),
+}
+
+
+def genbox(words: tuple[str, ...]) -> tuple[str, list[Polygon]]:
+    """Material and sides of `genbox material name x y z [-i]`.
+
+    Raises: `ValueError` for rounded or bevelled boxes, or wrong numbers.
+    """
+    if len(words) < 6:
+        raise ValueError("takes a material, a name and three sizes")
+    material, name, *rest = words[1:]
+    size = _numbers(rest[:3])
+    if set(rest[3:]) - {"-i"}:
+        raise ValueError(f"option {next(w for w in rest[3:] if w != '-i')} is not read")
+    turn = -1 if "-i" in rest[3:] else 1
+    return material, [
+        (f"{name}.{side}", np.array(corners, float)[::turn] * size)
+        for side, corners in SIDES.items()
+    ]
+
+
+def genprism(words: tuple[str, ...]) -> tuple[str, list[Polygon]]:
+    """Material and sides of `genprism material name N x1 y1 .. xN yN [-l x y z] [-c] [-e]`.
+
+    Raises: `ValueError` for rounded prisms, outlines from files, or wrong numbers.
+    """
+    if len(words) < 4:
+        raise ValueError("takes a material, a name, the number of corners and their x and y")
+    material, name, count = words[1], words[2], count_of(words[3])
+    outline = _numbers(words[4 : 4 + 2 * count])
+    if count < 3 or len(outline) < 2 * count:
+        raise ValueError(f"expected the x and y of {words[3]} corners, at least three")
+    ring = np.column_stack([outline.reshape(-1, 2), np.zeros(count)])
+    along, is_open, has_ends, rest = (
+        np.array([0.0, 0.0, 1.0]),
+        False,
+        True,
+        list(words[4 + 2 * count :]),
+    )
+    while rest:
+        option = rest.pop(0)
+        if option == "-l":
+            along, rest = _numbers(rest[:3]), rest[3:]
+            if len(along) < 3:
+                raise ValueError("-l takes three numbers")
+        elif option in ("-c", "-e"):
+            is_open, has_ends = is_open or option == "-c", has_ends and option != "-e"
+        else:
+            raise ValueError(f"option {option} is not read")
+    sides = [
+        (f"{name}.{i + 1}", np.array([ring[i], ring[i] + along, ring[j] + along, ring[j]]))
+        for i, j in ((i, (i + 1) % count) for i in range(count - is_open))
+    ]
+    ends = [(f"{name}.b", ring), (f"{name}.t", (ring + along)[::-1])] if has_ends else []
+    return material, ends + sides
+
+
+GENERATORS = {"genbox": genbox, "genprism": genprism}
+
+
+def _numbers(words: tuple[str, ...] | list[str]) -> NDArray[np.float64]:
+    return np.array([number_of(word) for word in words])
+
 
 DEEPEST = 32  # files that call each other
 MOST_OBJECTS = 5_000_000
@@ -178,7 +337,7 @@ class _Reader:
 
     def _take(self, primitive: Primitive, outer: tuple[Xform, ...]) -> None:
         kind = primitive.kind
-        if kind in shapes.KINDS:
+        if kind in KINDS:
             self._add(primitive, outer)
         elif kind in ("alias", MIXTURE) or kind in MATERIALS or kind in PATTERNS:
             self.defined[primitive.name] = Definition(primitive, _places(outer)[0])
@@ -190,7 +349,7 @@ class _Reader:
 
     def _add(self, primitive: Primitive, outer: tuple[Xform, ...]) -> None:
         modifier = next((x.modifier for x in outer if x.modifier is not None), primitive.modifier)
-        triangles = shapes.triangles_of(primitive)
+        triangles = triangles_of(primitive)
         if not len(triangles):
             self._leave_out("surfaces-without-area", primitive)
             return

@@ -187,9 +187,9 @@ def read_footprints(path: Path) -> SurroundingsFile:
     without, crs = 0, _crs(content)
     for number, feature in enumerate(features):
         element = f"feature {number}"
-        found = _block(feature, element, path) or _tree(feature, crs, element, path)
-        without += not found
-        objects += found
+        footprints = _block(feature, element, path) or _tree(feature, crs, element, path)
+        without += not footprints
+        objects += footprints
     if not objects:
         message = f"no polygon states a height ({', '.join(HEIGHTS[:3])}, or {LEVELS[0]})"
         raise DataError(message, file=path, field="properties")
@@ -317,11 +317,11 @@ def triangles_of_surfaces(
     surfaces: Iterable[Sequence[NDArray[np.float64]]],
 ) -> NDArray[np.float64]:
     """Triangles [T, 3, 3] of polygons, each of an outline [N, 3] and its holes."""
-    found = [np.empty((0, 3, 3))]
+    triangles = [np.empty((0, 3, 3))]
     for rings in surfaces:
         if rings and min(map(len, rings)) >= 3:
-            found.append(triangles_of_rings(rings))
-    return np.concatenate(found)
+            triangles.append(triangles_of_rings(rings))
+    return np.concatenate(triangles)
 
 
 SUFFIXES = (".gml", ".xml", ".citygml")
@@ -418,16 +418,16 @@ def _geometries(feature: Element) -> Iterator[tuple[int, int, list[Element]]]:
     """Level of detail, rank among `KINDS` and elements of each geometry of an object."""
     hulls: dict[int, list[Element]] = {}
     for owner in feature:
-        if found := NAMED.fullmatch(owner.tag):
-            yield int(found[1]), KINDS.index(found[2]), [owner]
+        if match := NAMED.fullmatch(owner.tag):
+            yield int(match[1]), KINDS.index(match[2]), [owner]
         elif owner.tag == "tin":
             level = (feature.findtext("lod") or "").strip()
             yield int(level) if level in ("0", "1", "2", "3", "4") else 0, 0, [owner]
         for surface in owner:
             if BOUNDARY.fullmatch(surface.tag) and not NAMED.fullmatch(owner.tag):
                 for one in surface:
-                    if found := NAMED.fullmatch(one.tag):
-                        hulls.setdefault(int(found[1]), []).append(one)
+                    if match := NAMED.fullmatch(one.tag):
+                        hulls.setdefault(int(match[1]), []).append(one)
     for level, owners in hulls.items():
         yield level, KINDS.index("Surface"), owners
 
@@ -439,7 +439,7 @@ def _finest(
 
     Where none is complete, of the one with most surfaces.
     """
-    found: list[tuple[list[Rings], int]] = []
+    complete: list[tuple[list[Rings], int]] = []
     for _, _, owners in sorted(geometries, key=lambda one: (-one[0], one[1])):
         seen: set[int] = set()
         missing: list[str] = []
@@ -450,8 +450,8 @@ def _finest(
         ]
         if surfaces and not missing:
             return surfaces, 0
-        found.append((surfaces, len(missing)))
-    return max(found, key=lambda one: len(one[0]))
+        complete.append((surfaces, len(missing)))
+    return max(complete, key=lambda one: len(one[0]))
 
 
 def _polygons(
@@ -519,8 +519,8 @@ def read_cityjson(path: Path) -> SurroundingsFile:
     """
     content = read_object(path)
     if content.get("type") != "CityJSON":
-        found = content.get("type")
-        raise DataError(f"expected CityJSON, got {found!r:.60}", file=path, field="type")
+        kind = content.get("type")
+        raise DataError(f"expected CityJSON, got {kind!r:.60}", file=path, field="type")
     vertices = _vertices(content, path)
     things = content.get("CityObjects")
     if not isinstance(things, dict):
@@ -573,9 +573,9 @@ def _geometry(thing: Any, name: str, path: Path) -> dict[str, Any] | None:
         raise DataError("expected a list", file=path, element=name[:60], field="geometry")
     if not all(isinstance(one.get("type"), str | None) for one in listed):
         raise DataError("expected a text", file=path, element=name[:60], field="geometry.type")
-    found = [(_level(one), one) for one in listed if one.get("type") in DEPTH]
-    found = [(level, one) for level, one in found if level < FINEST]
-    return max(found, key=lambda pair: pair[0])[1] if found else None
+    geometries = [(_level(one), one) for one in listed if one.get("type") in DEPTH]
+    geometries = [(level, one) for level, one in geometries if level < FINEST]
+    return max(geometries, key=lambda pair: pair[0])[1] if geometries else None
 
 
 def _level(geometry: dict[str, Any]) -> float:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from mitsuba_cfs.bsdf.fabric import FabricBand
+from mitsuba_cfs.bsdf.screens import FabricBand
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
 
@@ -108,8 +108,8 @@ def read_fabric_table(path: str | PathLike[str]) -> tuple[list[FabricShade], tup
         "without a unit, in percent as some values are above 1": percents,
         "without a unit, shares of 1 as no value is above it": shares,
     }
-    said = tuple(f"{what}: {', '.join(titles)}" for what, titles in notes.items() if titles)
-    return [_shade(row) for row in rows], said
+    summary = tuple(f"{what}: {', '.join(titles)}" for what, titles in notes.items() if titles)
+    return [_shade(row) for row in rows], summary
 
 
 def named_fabric(shades: Sequence[FabricShade], name: str | None, path: Path) -> FabricShade:

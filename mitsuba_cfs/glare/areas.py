@@ -106,15 +106,15 @@ def split_by_zone(
     order = np.argsort(np.where(outside, pairs - np.iinfo(np.int64).max // 2, first))
     number = np.empty(len(pairs), dtype=np.int64)
     number[order] = np.arange(len(pairs))
-    mine = number[np.searchsorted(pairs, pair)]
+    numbers = number[np.searchsorted(pairs, pair)]
     labels = np.zeros(flat.size, dtype=np.int32)
-    labels[lit] = mine + 1
+    labels[lit] = numbers + 1
     omega, light = geometry.solid_angle.ravel()[lit], luminance.ravel()[lit]
     x, y = np.divmod(lit, luminance.shape[1])
     at_eye = light * geometry.projected.ravel()[lit]
 
     def total(weights: NDArray[np.float64]) -> NDArray[Any]:
-        return np.bincount(mine, weights, minlength=len(pairs))
+        return np.bincount(numbers, weights, minlength=len(pairs))
 
     flux = total(omega * light)
     cut = Sources(

@@ -41,16 +41,16 @@ def detailed_lines(result: GlareResult) -> list[str]:
 
 def source_lines(result: GlareResult) -> list[str]:
     """One line for each source."""
-    found, height = result.sources, result.geometry.view.height
+    sources, height = result.sources, result.geometry.view.height
     contrasts, shares = _contributions(result)
-    veils = indices.cie_veiling_luminance(found.illuminance, result.sigma)
+    veils = indices.cie_veiling_luminance(sources.illuminance, result.sigma)
     lines = []
     for i in range(result.count):
-        place = (found.pixels[i], found.x[i], height - found.y[i], found.luminance[i])
+        place = (sources.pixels[i], sources.x[i], height - sources.y[i], sources.luminance[i])
         sigma = np.degrees(result.sigma[i])
-        after = (*result.direction[i], found.illuminance[i], veils[i], sigma)
+        after = (*result.direction[i], sources.illuminance[i], veils[i], sigma)
         lines.append(
-            f"{i + 1} {_six(place)} {found.solid_angle[i]:.10f} "
+            f"{i + 1} {_six(place)} {sources.solid_angle[i]:.10f} "
             f"{_six((result.position[i], *_of_picture(result), sigma, *after))} "
             f"{result.zones[i]} {_six((contrasts[i], shares[i]))} "
         )
@@ -74,11 +74,11 @@ def _no_source(result: GlareResult) -> str:
 
 def detailed_figures(result: GlareResult) -> dict[str, float]:
     """All figures of the last line of -d, by evalglare's names."""
-    found, geometry = result.sources, result.geometry
-    L, w, P = found.luminance, found.solid_angle, result.position
+    sources, geometry = result.sources, result.geometry
+    L, w, P = sources.luminance, sources.solid_angle, result.position
     indirect = (result.Ev - result.Ev_direct) / np.pi
     weighted, medians = _weighted_by_position(result)
-    veils = indices.cie_veiling_luminance(found.illuminance, result.sigma)
+    veils = indices.cie_veiling_luminance(sources.illuminance, result.sigma)
     return {
         "dgp": result.dgp,
         "av_lum": result.mean_luminance,
@@ -130,10 +130,10 @@ def _weighted_by_position(result: GlareResult) -> tuple[list[float], list[float]
 
 def _contributions(result: GlareResult) -> tuple[np.ndarray, np.ndarray]:
     """Each source's own DGP contrast term, over that of all [n], and over DGP [n]."""
-    found, Ev = result.sources, result.Ev
+    sources, Ev = result.sources, result.Ev
     if not result.count:
         return np.zeros(0), np.zeros(0)
-    each = found.luminance**2 * found.solid_angle / result.position**2
+    each = sources.luminance**2 * sources.solid_angle / result.position**2
     alone = 0.092 * np.log10(1 + each / Ev**1.87)
     together = 0.092 * np.log10(1 + result.contrast / Ev**1.87)
     return alone / together, alone / indices.daylight_glare_probability(Ev, result.contrast)

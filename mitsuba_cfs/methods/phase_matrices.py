@@ -33,11 +33,20 @@ from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, joined
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.kernels.rooms import TracedRoom
 from mitsuba_cfs.trace.kernels.scene import SceneCache
-from mitsuba_cfs.trace.matrices.adjacent import AdjacentRoomLight, GlassToRoom, adjacent_daylight
-from mitsuba_cfs.trace.matrices.cell_daylight import BATCHES as CELL_BATCHES
-from mitsuba_cfs.trace.matrices.cell_daylight import cell_daylight, cells_of_rooms
-from mitsuba_cfs.trace.matrices.daylight import daylight_matrix, daylight_of_rooms
-from mitsuba_cfs.trace.matrices.exchange import outdoor_exchange, window_exchange
+from mitsuba_cfs.trace.matrices.adjacent import (
+    AdjacentRoomLight,
+    GlassToRoom,
+    adjacent_daylight,
+    outdoor_exchange,
+    window_exchange,
+)
+from mitsuba_cfs.trace.matrices.daylight import BATCHES as CELL_BATCHES
+from mitsuba_cfs.trace.matrices.daylight import (
+    cell_daylight,
+    cells_of_rooms,
+    daylight_matrix,
+    daylight_of_rooms,
+)
 from mitsuba_cfs.trace.matrices.view import view_matrix, views_of_rooms
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown, adjacent_picture
 from mitsuba_cfs.trace.pictures.annual import ViewMatrices, ViewNoise, view_matrices
@@ -318,13 +327,13 @@ def _daylight_together(
     alike: dict[str, list[int]] = {}
     for i, chosen in enumerate(options):
         alike.setdefault(repr(chosen), []).append(i)
-    found: dict[int, Estimate] = {}
+    estimates: dict[int, Estimate] = {}
     for some in alike.values():
         traced = daylight_of_rooms(
             [rooms[i] for i in some], outdoors, max_depth=depth, **options[some[0]], **common
         )
-        found |= dict(zip(some, traced, strict=True))
-    return [found[i] for i in range(len(rooms))]
+        estimates |= dict(zip(some, traced, strict=True))
+    return [estimates[i] for i in range(len(rooms))]
 
 
 def with_needs(

@@ -484,9 +484,9 @@ class EpwColumns:
         if np.isnan(result).any():
             start = int(np.argmax(np.isnan(result)))
             length = int(np.argmin(np.append(missing[start:], False)))
-            found = self.rows[start][EPW_FIELDS[field][0]]
+            text = self.rows[start][EPW_FIELDS[field][0]]
             most = f"between others up to {LONGEST_GAP_H} hours are filled"
-            message = f"missing (the file has {found}; {length / steps:g} hours; {most})"
+            message = f"missing (the file has {text}; {length / steps:g} hours; {most})"
             raise self.error(field, start, message)
         self.gaps[field] = np.flatnonzero(missing)
         return result

@@ -74,7 +74,7 @@ def computations(project: Project, wanted: Mapping[str, Any]) -> list[Action]:
     if not isinstance(standards, list) or not all(isinstance(one, str) for one in standards):
         raise DataError("expected names of rule sets", field="standards")
     pages = ("--language", language) if language != "en" else ()
-    found: list[Action] = []
+    actions: list[Action] = []
     for system, name in zip(systems, _folders(systems), strict=True):
         shared = _inputs(project, study)
         if wanted.get("report"):
@@ -82,32 +82,32 @@ def computations(project: Project, wanted: Mapping[str, Any]) -> list[Action]:
             command += ["--annual-glare"] if wanted.get("annual_glare") else []
             command += ["--explore"] if wanted.get("explore") else []
             out = f"{RESULTS}/report-{name}"
-            found.append(Action("run", system["name"], (*command, *pages, "--out", out), out))
+            actions.append(Action("run", system["name"], (*command, *pages, "--out", out), out))
         if standards:
             command = ["comply", *shared, *_states(project, system), *_options(study)]
             command += [part for one in standards for part in ("--standard", one)]
             command += ["--annual-glare"] if wanted.get("annual_glare") else []
             command += ["--uses", USES] if (project.folder / USES).is_file() else []
             out = f"{RESULTS}/rules-{name}"
-            found.append(Action("comply", system["name"], (*command, *pages, "--out", out), out))
+            actions.append(Action("comply", system["name"], (*command, *pages, "--out", out), out))
     if wanted.get("compare"):
         _weather(study)
         _files(project)
         out = f"{RESULTS}/comparison"
-        found.append(Action("study", "", ("study", STUDY, *pages, "--out", out), out))
-    return found
+        actions.append(Action("study", "", ("study", STUDY, *pages, "--out", out), out))
+    return actions
 
 
 def _folders(systems: Sequence[Mapping[str, Any]]) -> list[str]:
     """Names of the systems as those of folders, with a number where one is taken."""
-    found: list[str] = []
+    folders: list[str] = []
     for system in systems:
         name = first = slug(system["name"])
         number = 2
-        while name in found:
+        while name in folders:
             name, number = f"{first}-{number}", number + 1
-        found.append(name)
-    return found
+        folders.append(name)
+    return folders
 
 
 def result_titles(study: Mapping[str, Any]) -> dict[str, str]:

@@ -177,13 +177,13 @@ class Project:
 
     def files(self) -> list[ProjectFile]:
         """The input files, those of unknown kinds left out."""
-        found = []
+        files = []
         for path in sorted((self.folder / INPUTS).rglob("*")):
             if path.is_file() and not path.is_symlink() and not path.name.startswith("."):
                 with suppress(DataError):
                     place = path.relative_to(self.folder).as_posix()
-                    found.append(ProjectFile(place, kind_of(path), path.stat().st_size))
-        return found
+                    files.append(ProjectFile(place, kind_of(path), path.stat().st_size))
+        return files
 
     @_alone
     def take(self, part: Path, name: str) -> ProjectFile:
@@ -457,7 +457,7 @@ class Project:
 
     def results(self) -> list[dict[str, Any]]:
         """Folders of results with the pages and tables in them."""
-        found = []
+        results = []
         for folder in sorted((self.folder / RESULTS).iterdir()):
             if not folder.is_dir() or folder.is_symlink():
                 continue
@@ -468,8 +468,8 @@ class Project:
             }
             if pages:
                 time = max((self.folder / page).stat().st_mtime for page in pages.values())
-                found.append({"name": folder.name, "pages": pages, "time": time})
-        return found
+                results.append({"name": folder.name, "pages": pages, "time": time})
+        return results
 
     def exported(self) -> list[str]:
         """Files for other programs, relative to the project; of folders the files in them."""

@@ -9,6 +9,7 @@ a path with a secret of its own, sandboxed: a script in them has no access to th
 from __future__ import annotations
 
 import asyncio
+import csv
 import hmac
 import json
 import mimetypes
@@ -18,6 +19,8 @@ import shutil
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import asdict, dataclass, field
+from functools import lru_cache
+from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +34,6 @@ from mitsuba_cfs.errors import CfsError
 from mitsuba_cfs.files import json_text
 from scenes.app import actions
 from scenes.app.jobs import Jobs
-from scenes.app.page import PAGE_FILES, page_html
 from scenes.app.project import (
     GAINS,
     INPUTS,
@@ -41,10 +43,122 @@ from scenes.app.project import (
     Project,
     plain_name,
 )
-from scenes.app.variants import answers, variants
+from scenes.explore.folder import script_words
 from scenes.fenestration.library import Sheet, glazing_entry, library, shade_entry, sheets
 from scenes.language.catalogue import gettext, in_language
+from scenes.report.names import quantity
+from scenes.report.page import FILES, environment
+from scenes.report.page_files import page_files
 from scenes.user_errors import user_message
+
+# Columns of `results.csv`; + where more is better, - where less is
+FIGURES = {
+    "sda300_50": "+", "ase1000_250": "-", "udi_300_3000": "+", "glare_intolerable_h": "-",
+    "operative_max_c": "-", "heating_kwh": "-", "cooling_kwh": "-",
+    "lighting_kwh": "-",
+}  # fmt: skip
+
+
+def variants(project: Project, language: str = "en") -> dict[str, Any] | None:
+    """Rooms by systems with their key figures; None before a comparison.
+
+    Returns: `columns` with label, unit, digits, meaning and which way is better; `rows` with room,
+        system, error and values; `quick`: whether it is a preview.
+    """
+    folder = project.folder / RESULTS / "comparison"
+    table = folder / "results.csv"
+    if not table.is_file():
+        return None
+    with table.open(encoding="utf-8", newline="") as file:
+        cases = list(csv.DictReader(file))
+    shown = [key for key in FIGURES if any(case.get(key) for case in cases)]
+    with in_language(language):
+        named = [quantity(key) for key in shown]
+    record = json.loads((folder / "study.json").read_text(encoding="utf-8"))
+    return {
+        "columns": [
+            {
+                "key": key, "label": q.label, "unit": q.unit, "digits": q.digits,
+                "meaning": q.meaning, "better": FIGURES[key],
+            }
+            for key, q in zip(shown, named, strict=True)
+        ],
+        "rows": [
+            {
+                "room": case["space"], "system": case["system"], "error": case.get("error", ""),
+                "values": [_number(case.get(key, "")) for key in shown],
+            }
+            for case in cases
+        ],
+        "quick": bool(record.get("quick")),
+    }  # fmt: skip
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+class _Answers(HTMLParser):
+    """Collects the paragraphs of class "answer", with which a page of results begins."""
+
+    def __init__(self) -> None:
+        super().__init__(convert_charrefs=True)
+        self.found: list[str] = []
+        self._within = False
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Begin a paragraph."""
+        if tag == "p" and ("class", "answer") in attrs:
+            self._within = True
+            self.found.append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        """End it."""
+        self._within = self._within and tag != "p"
+
+    def handle_data(self, data: str) -> None:
+        """Add its text."""
+        if self._within:
+            self.found[-1] += data
+
+
+HEAD = 400_000  # characters of a page in which its answers are
+MOST_ANSWERS = 40
+
+
+def answers(page: Path) -> tuple[str, ...]:
+    """The sentences that a report or dossier begins with."""
+    status = page.stat()
+    return _answers(page, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=200)
+def _answers(page: Path, _time: int, _size: int) -> tuple[str, ...]:
+    reader = _Answers()
+    with page.open(encoding="utf-8", errors="replace") as file:
+        reader.feed(file.read(HEAD))
+    texts = (" ".join(text.split()) for text in reader.found[:MOST_ANSWERS])
+    return tuple(text for text in texts if text)
+
+
+INDEX = "index.html"
+SCRIPTS = "scenes/app/templates/"  # where the messages of scripts are from
+OWN = page_files("scenes.app")
+SHARED = {name: FILES[name] for name in ("style.css", "viewer.js")}
+SHARED |= {"words.js": page_files("scenes.explore")["words.js"]}
+PAGE_FILES = {name: text for name, text in OWN.items() if name != INDEX} | SHARED
+
+
+def page_html(project: str, language: str, files: str) -> str:
+    """The page of a project; `files`: the path that its results are served under."""
+    with in_language(language):
+        words = script_words(SCRIPTS)
+        template = environment(OWN).get_template(INDEX)
+        return template.render(project=project, language=language, words=words, files=files)
+
 
 LOOPBACK = "127.0.0.1"
 SELF_ONLY = (
@@ -302,13 +416,13 @@ class AppServer:
             actions.library_file(one.glazing, one.shade): _sheet_facts(one)
             for one in sheets().values()
         }
-        found = {}
+        by_name = {}
         for system in systems:
             file = system.get("bsdf") or system.get("operation", "")
             states = self._project.states(file) if "bsdf" not in system and file else [file]
             if states and states[-1] in known:
-                found[file] = known[states[-1]]
-        return found
+                by_name[file] = known[states[-1]]
+        return by_name
 
     # ---- changes
 

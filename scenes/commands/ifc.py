@@ -202,8 +202,7 @@ def templates(out: Path) -> None:
     models for it.
     """
     folder = ResultFolder(out, "ifc templates")
-    from bim.ifc.property_definition import write_psd
-    from bim.ifc.property_templates import write_ids, write_templates
+    from bim.ifc.property_templates import write_ids, write_psd, write_templates
 
     with folder.replaced() as place:
         write_templates(place / "fenestration_templates.ifc")
@@ -248,7 +247,7 @@ def query(building: Path, selector: str) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    from bim.ifc.query import query as chosen_elements
+    from bim.ifc.targets import query as chosen_elements
 
     elements = chosen_elements(building, selector)
     table = Table()

@@ -210,8 +210,8 @@ def run_to_folder(
         progress("results", 1.0)
     head.notes(note for note in result.notes if note != quick_run.NOTE)
     if result.issues:
-        found = ngettext("{count} problem", "{count} problems", len(result.issues))
-        click.echo(f"{found} in the model: {out / 'problems.csv'}")
+        problems = ngettext("{count} problem", "{count} problems", len(result.issues))
+        click.echo(f"{problems} in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
     if options.explore:
         click.echo(f"explorer: {out / EXPLORER / 'index.html'}")

@@ -183,7 +183,7 @@ def positions(weather: Path, out: Path, sun_model: str) -> None:
 def wea(weather: Path, out: Path) -> None:
     """Write the irradiances of WEATHER (EPW) as a Radiance WEA file OUT."""
     check_file(out, field="OUT", inputs=[weather])
-    from mitsuba_cfs.sky.wea import write_wea
+    from mitsuba_cfs.sky.epw import write_wea
 
     hours = read_weather(weather)
     write_wea(hours, out)
@@ -238,8 +238,8 @@ def measured(
     direct normal is (global - diffuse)/sin(altitude).
     """
     check_file(out, field="OUT", inputs=[table])
+    from mitsuba_cfs.sky.epw import write_wea
     from mitsuba_cfs.sky.measured import read_measured
-    from mitsuba_cfs.sky.wea import write_wea
 
     hours = read_measured(
         table,
@@ -300,8 +300,7 @@ def sun_steps(weather: Weather, sun_model: str) -> np.ndarray:
 
 def read_weather(path: Path) -> Weather:
     """An EPW or a WEA file, by its first word."""
-    from mitsuba_cfs.sky.epw import read_epw
-    from mitsuba_cfs.sky.wea import is_wea, read_wea
+    from mitsuba_cfs.sky.epw import is_wea, read_epw, read_wea
 
     weather = read_wea(path, whole_year=False) if is_wea(path) else read_epw(path)
     _tell(weather)

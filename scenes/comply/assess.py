@@ -130,7 +130,7 @@ def assess_building(
         areas: floor area of each [m2].
         dwellings: name of each room's dwelling, "" where it is in none; None: in none.
     """
-    found = []
+    rooms = []
     for rows in zip(*verdicts, strict=True):
         used = [(v, area) for v, area in zip(rows, areas, strict=True) if v.applies]
         homes = dwellings or [""] * len(rows)
@@ -140,10 +140,10 @@ def assess_building(
             value = level_value(level, number, used, named)
             values.append(value)
             met.append(_level_met(level, value))
-        found.append(
+        rooms.append(
             BuildingVerdict(rows[0].rule, rows[0].criterion, len(used), tuple(values), tuple(met))
         )
-    return found
+    return rooms
 
 
 def level_value(

@@ -34,7 +34,7 @@ from scenes.comply.blinds import DEFAULT_NAME, open_and_closed
 from scenes.comply.dwellings import dwelling_words, judged, uses_of_rooms
 from scenes.comply.files import ComplyFiles, read_files
 from scenes.comply.findings import Findings, GridLight, RoomHeat, SeatGlare, calendar_of
-from scenes.comply.glass import sight_through, windows_without_view
+from scenes.comply.glass import windows_without_view
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outdoors import OutdoorMesh, outdoors_of
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLights
@@ -44,6 +44,7 @@ from scenes.comply.tables import USE_WORDS
 from scenes.comply.uses import RoomUse
 from scenes.comply.view_out import ViewOut, view_out
 from scenes.fenestration.ratings import system_ratings
+from scenes.fenestration.sight import sight_through
 from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.head import Head, unused_notes

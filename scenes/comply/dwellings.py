@@ -41,7 +41,7 @@ def uses_of_rooms(
         from bim.ifc.room_uses import read_room_uses  # reads IFC: only where there is a file
 
         texts = read_room_uses(building.file, *linked)
-    found = {}
+    uses = {}
     homes = dwellings_of(building)
     for space in spaces:
         use = known.of(space, texts.get(space.guid, ()))
@@ -55,8 +55,8 @@ def uses_of_rooms(
             use = replace(use, key="living", source=source, assumed=True)
         if use.key == UNKNOWN and not space.windows:
             use = replace(use, occupied=False, source=Note("no window and no use, not occupied"))
-        found[space.guid] = use
-    return found
+        uses[space.guid] = use
+    return uses
 
 
 def dwellings_of(building: Building) -> dict[str, str]:

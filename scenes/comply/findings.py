@@ -50,12 +50,12 @@ class Calendar:
 
     def clear_hours(self, clock: int) -> NDArray[np.int64]:
         """Time steps whose interval begins or ends at a clock hour of the clear days."""
-        found = []
+        hours = []
         for day in self.clear_days:
             moment = day + pd.Timedelta(hours=clock)
             near = np.abs((self.times - moment) / pd.Timedelta(hours=1)) <= self.step_h / 2 + 1e-6
-            found.append(np.flatnonzero(near))
-        return np.concatenate(found)
+            hours.append(np.flatnonzero(near))
+        return np.concatenate(hours)
 
 
 @dataclass(frozen=True, slots=True)

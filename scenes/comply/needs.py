@@ -345,10 +345,10 @@ class ComfortShare(HeatNeed):
         if room.heat is None:
             return None
         heat, per_day = room.heat, round(24 / room.step_h)
-        found = comfort_by_outdoors(heat.operative_c, heat.outdoor_c, self.band, per_day=per_day)
-        counted = self.counted(room, heat) & found.applicable
-        heated = (found.excess < 0) & (found.outdoor_mean_c < self.cold_from_c)
-        kept = found.comfortable | heated
+        comfort = comfort_by_outdoors(heat.operative_c, heat.outdoor_c, self.band, per_day=per_day)
+        counted = self.counted(room, heat) & comfort.applicable
+        heated = (comfort.excess < 0) & (comfort.outdoor_mean_c < self.cold_from_c)
+        kept = comfort.comfortable | heated
         return float(np.mean(kept[counted])) if counted.any() else None
 
 

@@ -34,8 +34,8 @@ class SunDay:
         """Directions [N, 3] at minutes of the day; within a minute the sun goes straight on."""
         before = np.clip(np.floor(minutes).astype(int), 0, len(self.directions) - 2)
         share = (minutes - before)[:, None]
-        found = (1 - share) * self.directions[before] + share * self.directions[before + 1]
-        return found / np.linalg.norm(found, axis=1, keepdims=True)
+        direction = (1 - share) * self.directions[before] + share * self.directions[before + 1]
+        return direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ def sun_exposure(space: Space, outdoors: OutdoorMesh, day: SunDay) -> SunExposur
     Source: EN 17037:2018+A1:2021, 5.3 and annex D.
     """
     room, own = opaque_room(space), outdoors.windows_of(space)
-    found = []
+    openings = []
     for opening in openings_of(space):
         point = reference_point(opening, space.floor_level)
 
@@ -104,8 +104,8 @@ def sun_exposure(space: Space, outdoors: OutdoorMesh, day: SunDay) -> SunExposur
 
         window = opening.window
         times = tuple(true_intervals(sees, 0.0, float(len(day.directions) - 1)))
-        found.append(SunlitOpening(window.name or window.guid, window.guid, point, times))
-    return SunExposure(tuple(found), tuple(united([one.times for one in found])))
+        openings.append(SunlitOpening(window.name or window.guid, window.guid, point, times))
+    return SunExposure(tuple(openings), tuple(united([one.times for one in openings])))
 
 
 def reference_point(opening: Opening, floor: float) -> FloatArray:

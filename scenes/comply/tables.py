@@ -156,12 +156,12 @@ def room_table(result: Compliance, room: CheckedRoom, rule: str) -> Table:
 
 def _quantities(verdict: RoomVerdict) -> dict[str, tuple[str, list[str]]]:
     """The quantities of a criterion in words: value, and limit by level."""
-    found: dict[str, tuple[str, list[str]]] = {}
+    quantities: dict[str, tuple[str, list[str]]] = {}
     for level, values in zip(verdict.criterion.level, verdict.values, strict=True):
         for need, value in zip(level.needs, values, strict=True):
-            _, limits = found.setdefault(need.words, (shown(need, value), []))
+            _, limits = quantities.setdefault(need.words, (shown(need, value), []))
             limits.append(f"{gettext(level.name)} {limit_of(need)}")
-    return found
+    return quantities
 
 
 def missed(room: CheckedRoom) -> Iterator[str]:

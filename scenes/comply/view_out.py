@@ -64,7 +64,7 @@ class Sight:
         one = self.opening
         x = np.linspace(-0.5, 0.5, LAYER_AZIMUTHS) * (one.width - 2 * EDGE)
         z = np.linspace(one.sill + EDGE, one.head - EDGE, LAYER_HEIGHTS)
-        found = np.zeros((len(eyes), len(LAYERS)), dtype=bool)
+        seen = np.zeros((len(eyes), len(LAYERS)), dtype=bool)
         before = np.flatnonzero((one.centre - eyes) @ one.normal > EDGE)
         # the eye's own height too: the horizon is seen there or not at all
         level = np.clip(eyes[before, 2], z[0], z[-1])
@@ -73,8 +73,8 @@ class Sight:
         targets = one.at(np.tile(x, heights.size), np.repeat(heights.ravel(), len(x)))
         kinds = self._kinds(eyes[eye], targets - eyes[eye])
         for k in range(len(LAYERS)):
-            found[eye[kinds == k], k] = True
-        return found
+            seen[eye[kinds == k], k] = True
+        return seen
 
     def _kinds(self, origins: FloatArray, towards: FloatArray) -> NDArray[np.int64]:
         """Which of LAYERS each ray [R] meets; -1: none."""
@@ -88,12 +88,12 @@ class Sight:
         gone = element < 0
         far = ~gone & (distance * (rays @ self._flat) >= LEAST_DISTANCE)
         ground = (gone & (altitude < 0)) | (far & self.outdoors.terrain[element])
-        found = np.where(gone & (altitude > 0), LAYERS.index("sky"), -1)
-        found[far] = LAYERS.index("landscape")
-        found[ground] = LAYERS.index("ground")
+        layer = np.where(gone & (altitude > 0), LAYERS.index("sky"), -1)
+        layer[far] = LAYERS.index("landscape")
+        layer[ground] = LAYERS.index("ground")
         horizon = (ground | (gone & (altitude <= 0))) & (altitude >= -HORIZON_DEG)
-        found[horizon] = LAYERS.index("landscape")
-        kinds[free] = found
+        layer[horizon] = LAYERS.index("landscape")
+        kinds[free] = layer
         return kinds
 
     @property
@@ -221,9 +221,9 @@ def view_out(
     for opening in openings:
         sight = Sight(opening, room, outdoors, own)
         seen.append(sight.intervals(points))
-        found = sight.layers(points)
-        better = _rank(found) > _rank(layers)
-        layers[better] = found[better]
+        layers_seen = sight.layers(points)
+        better = _rank(layers_seen) > _rank(layers)
+        layers[better] = layers_seen[better]
     table = np.concatenate(seen)
     parts = [table[table[:, 0] == i, 1:] for i in range(len(points))]
     return ViewOut(

@@ -17,11 +17,11 @@ import numpy as np
 from pydantic import Field
 
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
-from mitsuba_cfs.bsdf.fabric import FabricBand, fabric_klems
 from mitsuba_cfs.bsdf.glazing import Pane, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.periodic import plastic
+from mitsuba_cfs.bsdf.screens import FabricBand, fabric_klems
 from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import json_text, write_text
@@ -138,11 +138,11 @@ def shade_entry(name: str) -> ShadeEntry:
 
 
 def _named(name: str, entries: Any, field: str) -> Any:
-    found = next((one for one in entries if one.name == name), None)
-    if found is None:
+    entry = next((one for one in entries if one.name == name), None)
+    if entry is None:
         known = ", ".join(repr(one.name) for one in entries)
         raise DataError(f"expected one of {known}, got {name!r}", field=field)
-    return found
+    return entry
 
 
 def write_library_system(

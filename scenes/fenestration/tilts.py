@@ -92,6 +92,11 @@ def mean_bsdf(low: KlemsBsdf, high: KlemsBsdf, share: float) -> KlemsBsdf:
         if name in others
     }
     changed: dict[str, Any] = dict(blocks)
+    passed = low.see_through, high.see_through
+    if passed[0] is not None and passed[1] is not None:
+        changed["see_through"] = (1 - share) * passed[0] + share * passed[1]
+    else:
+        changed["see_through"] = None  # by the data of the mean
     return replace(low, **changed)
 
 

@@ -17,7 +17,7 @@ from bim.model import Space
 from bim.to_thermal import ThermalRoom
 from mitsuba_cfs.errors import DataError
 from scenes.results import ShadingYear
-from scenes.room.operation_tables import MOST_CONDITIONS
+from scenes.room.shading_rules import MOST_CONDITIONS
 from scenes.room.zone import RoomAlternatives, RoomServices, RoomZone
 from thermal.climate import Solar
 from thermal.network import framed
@@ -249,11 +249,20 @@ def _shading(rooms: Sequence[RoomZone]) -> ShadingYear:
         return rooms[0].shading
     labels = [room.space.label for room in rooms if len(room.zone.windows)]
     before = np.cumsum([0, *(len(year.groups) for year in years)])
+    reasons = tuple(dict.fromkeys(reason for year in years for reason in year.reasons))
+    moved_by = []
+    for year in years:
+        numbers = np.array([*map(reasons.index, year.reasons), -1], dtype=np.int64)
+        of_none = np.full_like(year.states, -1)
+        moved_by.append(of_none if year.moved_by is None else numbers[year.moved_by])
     return ShadingYear(
         tuple(f"{label} {g}" for label, y in zip(labels, years, strict=True) for g in y.groups),
         tuple(rule for year in years for rule in year.rules),
         np.concatenate([year.states for year in years], axis=1),
         np.concatenate([year.number + n for year, n in zip(years, before, strict=False)]),
+        np.concatenate(moved_by, axis=1),
+        reasons,
+        tuple(view for year in years for view in year.views),
     )
 
 

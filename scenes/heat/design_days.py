@@ -117,8 +117,8 @@ def _hot_days(rooms: Sequence[RoomZone], weather: Weather, rows: int) -> list[in
     warm = weather.dry_bulb_c[: rows * days].reshape(days, rows).mean(axis=1)
     sun = sum(room.solar.inside.sum(axis=1) for room in rooms)[: rows * days]
     sunny = sun.reshape(days, rows).sum(axis=1)
-    found = [*np.argsort(-warm)[:CANDIDATES], *np.argsort(-sunny)[:CANDIDATES]]
-    return sorted({int(day) for day in found})
+    candidates = [*np.argsort(-warm)[:CANDIDATES], *np.argsort(-sunny)[:CANDIDATES]]
+    return sorted({int(day) for day in candidates})
 
 
 def _unlimited(zone: Zone) -> Zone:

@@ -10,17 +10,21 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Building
+from bim.model import Building, Space
 from bim.names import listed
 from bim.report.issue import issue_note
-from bim.to_thermal import shared_constructions
+from bim.sensors import view_point
+from bim.to_thermal import ThermalRoom, shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.matrices.cache import MatrixCache, cached_or_computed
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, item, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.surfaces import Surfaces
+from mitsuba_cfs.trace.kernels.estimate import cache_entry
+from mitsuba_cfs.trace.matrices.view_factors import person_view_factors, view_factors
 from scenes.fenestration.systems import States
 from scenes.fenestration.thermal_system import with_likely_layers
 from scenes.head import Head
@@ -28,17 +32,9 @@ from scenes.heat.air_nodes import with_air_nodes
 from scenes.heat.box import building_or_box
 from scenes.heat.design_days import design_loads
 from scenes.heat.files import HeatFiles, read_files
-from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
-from scenes.heat.tables import (
-    comfort_summary,
-    energy_by_month,
-    energy_summary,
-    hourly_table,
-    room_powers,
-    year_summary,
-)
 from scenes.inputs import Inputs, every_state, inputs_of
+from scenes.results import ShadingYear
 from scenes.room.heat import felt_by, room_humidity, step_issues
 from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.leaks import leak_issues
@@ -51,12 +47,275 @@ from scenes.room.operation import (
     unstated_note,
     with_stated_uses,
 )
+from scenes.room.operation_tables import PlantTable
 from scenes.room.room import operated_zone
 from scenes.room.zone import RoomZone, balances, coupled, inner_sun_note
 from thermal.balance import ZoneResult
+from thermal.comfort import (
+    ADAPTIVE_BANDS,
+    comfort_by_outdoors,
+    degree_hours,
+    mean_radiant_temperature,
+    operative_temperature,
+    room_centre_mrt,
+    summarise,
+)
 from thermal.moisture import Humidity
+from thermal.performance import performance
 from thermal.ventilation import AirTransfer
 from thermal.zone import Zone
+
+MOST_LOST = 0.05  # of the rays of a surface that may leave a room that is not quite closed
+
+
+@dataclass(frozen=True, slots=True)
+class RadiantRoom:
+    """View factors of a room, N: the zone's surfaces, then its windows."""
+
+    among: FloatArray  # [N, N] between the inside faces
+    person: FloatArray  # [N] from somebody seated in the middle, facing the biggest window
+
+
+def radiant_room(
+    space: Space,
+    room: ThermalRoom,
+    *,
+    samples: int = 16384,
+    seed: int = 0,
+    cache: MatrixCache | None = None,
+) -> RadiantRoom | None:
+    """Traced view factors of a room, or None where its surfaces do not close it.
+
+    Args: cache: of traced view factors.
+    """
+    among, person = _view_factors(enclosure(space, room), *view_point(space), samples, seed, cache)
+    if min(among.sum(axis=1).min(), person.sum()) < 1.0 - MOST_LOST:
+        return None
+    return RadiantRoom(among / among.sum(axis=1, keepdims=True), person / person.sum())
+
+
+def _view_factors(
+    parts: Surfaces,
+    place: FloatArray,
+    facing: FloatArray,
+    samples: int,
+    seed: int,
+    cache: MatrixCache | None,
+) -> tuple[FloatArray, FloatArray]:
+    """View factors [N, N] among the parts and [N] from a person, traced or kept as one matrix."""
+    inputs = (parts, place, facing, samples, seed)
+    label, by = "view factors", view_factors.__module__
+    entry = cache_entry(cache, label, *inputs, by=by, stopping=None)
+
+    def traced() -> FloatArray:
+        among = view_factors(parts, samples=samples, seed=seed)
+        person = person_view_factors(parts, place, facing, samples=samples, seed=seed)
+        return np.vstack([among, person])
+
+    rows = cached_or_computed(entry, traced)
+    return rows[:-1], rows[-1]
+
+
+def enclosure(space: Space, room: ThermalRoom) -> Surfaces:
+    """The triangles round a room's air, numbered by the zone's surfaces and then its windows."""
+    parts = [*space.faces, *space.windows]
+    windows = len(room.zone.surfaces) + np.arange(len(space.windows))
+    number = np.concatenate([room.surface_of_face, windows])
+    counts = [len(part.triangles) for part in parts]
+    triangles = np.concatenate([part.triangles for part in parts])
+    return Surfaces(triangles, np.zeros(len(triangles)), np.repeat(number, counts))
+
+
+def felt(
+    result: ZoneResult, radiant: RadiantRoom | None, rule: str, floor: int, air_speed: float
+) -> ZoneResult:
+    """The result with the mean radiant and operative temperatures of a rule.
+
+    Args:
+        rule: "view factors" (ISO 7726), "room centre" (the dissertation's mean of all surfaces and
+            the floor) or "area" (weighted by area and emissivity).
+        floor: the surface that is the floor.
+        air_speed: [m/s] sets the weight of the air.
+    """
+    faces = np.concatenate([result.surface_in_c, result.window_inner_c], axis=1)
+    if rule == "room centre":
+        mrt = room_centre_mrt(faces, result.surface_in_c[:, floor])
+    elif rule == "view factors" and radiant is not None:
+        mrt = mean_radiant_temperature(faces, radiant.person)
+    else:
+        mrt = result.mrt_c
+    operative = operative_temperature(result.air_c, mrt, air_speed)
+    return replace(result, mrt_c=mrt, operative_c=operative)
+
+
+DEMAND = ("heating", "cooling", "supply air heating", "slab heating", "slab cooling",
+          "humidification", "dehumidification")  # fmt: skip
+MONTHS = pd.RangeIndex(1, 13, name="month")
+
+
+def room_powers(
+    room: RoomZone, result: ZoneResult, humidity: Humidity, weather: Weather, plant: PlantTable
+) -> pd.DataFrame:
+    """Demand, final and primary power of every hour [H] [W].
+
+    "heat" and "cold" are what the plant gives: to the air and surfaces, by the slab, to the supply
+    air, and for moisture.
+    """
+    outdoor = weather.dry_bulb_c
+    demand = dict(
+        zip(
+            DEMAND,
+            (
+                result.heating,
+                result.cooling,
+                result.coil,
+                np.maximum(result.slab, 0.0),
+                np.maximum(-result.slab, 0.0),
+                humidity.humidify,
+                humidity.dehumidify,
+            ),
+            strict=True,
+        )
+    )
+    heat = sum(
+        demand[k] for k in ("heating", "supply air heating", "slab heating", "humidification")
+    )
+    cold = sum(demand[k] for k in ("cooling", "slab cooling", "dehumidification"))
+    heating_final = heat / performance(plant.heating_cop, outdoor)
+    electricity = {
+        "electricity cooling": cold / performance(plant.cooling_cop, outdoor),
+        "electricity fans": room.services.fan_w_m3_s * result.fan_air,
+        "electricity lamps": room.lamps,
+        "electricity equipment": room.services.equipment,
+    }
+    primary = plant.heating_factor * heating_final
+    primary = primary + plant.electricity_factor * sum(electricity.values())
+    columns = demand | {"heat": heat, "cold": cold, "final heating": heating_final}
+    columns |= electricity | {"primary": primary}
+    return pd.DataFrame(columns, index=weather.midpoints).rename_axis("time")
+
+
+def energy_by_month(powers: pd.DataFrame, floor_area: float) -> pd.DataFrame:
+    """Energy by month [kWh], and of the floor [kWh/m2]."""
+    hours = _step_h(powers)
+    table = powers.groupby(powers.index.month).sum().mul(hours / 1e3).reindex(MONTHS, fill_value=0)
+    table.index.name = "month"
+    per_area = (table / floor_area).add_suffix(" [kWh/m2]")
+    return table.add_suffix(" [kWh]").join(per_area)
+
+
+def energy_summary(powers: pd.DataFrame, floor_area: float) -> dict[str, float | str]:
+    """Sums of the year, and the peaks with their hour."""
+    hours = _step_h(powers)
+    summary: dict[str, float | str] = {}
+    for name in ("heat", "cold", "final heating", "primary"):
+        key = name.replace(" ", "_")
+        summary[f"{key}_kwh"] = float(powers[name].sum() * hours / 1e3)
+        summary[f"{key}_kwh_m2"] = summary[f"{key}_kwh"] / floor_area
+    electricity = [name for name in powers if name.startswith("electricity")]
+    summary["electricity_kwh"] = float(powers[electricity].to_numpy().sum() * hours / 1e3)
+    summary["electricity_kwh_m2"] = summary["electricity_kwh"] / floor_area
+    for name in ("heat", "cold"):
+        peak = powers[name].idxmax()
+        summary[f"peak_{name}_w"] = float(powers[name].max())
+        summary[f"peak_{name}_at"] = peak.strftime("%m-%d %H:%M") if powers[name].max() > 0 else ""
+    return summary
+
+
+def _step_h(powers: pd.DataFrame) -> float:
+    """Length of the table's steps [h]."""
+    return float((powers.index[1] - powers.index[0]) / pd.Timedelta(hours=1))
+
+
+FloatArray = NDArray[np.float64]
+PMV_CATEGORIES = {"I": 0.2, "II": 0.5, "III": 0.7, "IV": 1.0}  # EN 16798-1:2019, table B.1
+WARM = 26.0  # [degC] operative, above which overheating is counted, ISO 17772, DIN 4108-2
+
+
+def hourly_table(
+    result: ZoneResult,
+    shading: ShadingYear,
+    daylight: FloatArray | None,
+    weather: Weather,
+    felt: dict[str, FloatArray],
+) -> pd.DataFrame:
+    """Temperatures, votes, loads, shading states and heat flows by hour; felt: `felt_by`."""
+    table = {
+        "outdoor_c": weather.dry_bulb_c,
+        "air_c": result.air_c,
+        "mrt_c": result.mrt_c,
+        "operative_c": result.operative_c,
+        **felt,
+        "heating_w": result.heating,
+        "cooling_w": result.cooling,
+        **shading.columns,
+    }
+    if daylight is not None:
+        table["daylight_lx"] = daylight
+    for i in range(result.window_inner_c.shape[1]):
+        table[f"window_{i + 1}_inside_c"] = result.window_inner_c[:, i]
+        table[f"window_{i + 1}_outside_c"] = result.window_outer_c[:, i]
+    for name, flow in result.heat_flow.items():
+        table[f"{name.replace(' ', '_')}_w"] = flow
+    return pd.DataFrame(table, index=weather.midpoints).rename_axis("time")
+
+
+def _in_hours(counts: NDArray[np.int64], weather: Weather) -> NDArray[Any]:
+    """Counts of time steps as hours; whole ones stay whole."""
+    return counts if weather.step_h == 1.0 else counts * weather.step_h
+
+
+def comfort_summary(
+    result: ZoneResult, pmv: FloatArray, weather: Weather, occupied: NDArray[np.bool_]
+) -> dict[str, float]:
+    """Occupied hours by categories of EN 16798-1, and warmth above 26 degC.
+
+    The adaptive categories I to III are `year_summary`'s bands; IV holds what is beyond them where
+    the running mean lies in the standard's range. A category of the votes holds the hours of those
+    before it.
+    """
+    operative_c, step_h = result.operative_c, weather.step_h
+    band = comfort_by_outdoors(
+        operative_c, weather.dry_bulb_c, "EN 16798-1 III", per_day=weather.per_day
+    )
+    beyond = band.applicable & ~band.comfortable
+    steps = {"adaptive_IV_h": np.count_nonzero(beyond & occupied)}
+    for name, limit in PMV_CATEGORIES.items():
+        steps[f"pmv_{name}_h"] = np.count_nonzero((np.abs(pmv) < limit) & occupied)
+    steps["above_26_h"] = np.count_nonzero((operative_c > WARM) & occupied)
+    return {key: float(count) * step_h for key, count in steps.items()} | {
+        "above_26_kh": degree_hours(operative_c[occupied], WARM, step_h=step_h),
+        "above_26_kh_all_hours": degree_hours(operative_c, WARM, step_h=step_h),
+        "pmv_mean": float(pmv[occupied].mean() if occupied.any() else pmv.mean()),
+    }
+
+
+def year_summary(
+    result: ZoneResult, weather: Weather, occupied: NDArray[np.bool_]
+) -> tuple[dict[str, float], pd.DataFrame]:
+    """Energy, peaks and comfort of the occupied hours [H], and their discomfort by month."""
+    month = weather.midpoints.month.to_numpy()
+    summary = {
+        "heating_kwh": result.heating.sum() * weather.step_h / 1e3,
+        "cooling_kwh": result.cooling.sum() * weather.step_h / 1e3,
+        "peak_heating_w": result.heating.max(),
+        "peak_cooling_w": result.cooling.max(),
+        "operative_min_c": result.operative_c.min(),
+        "operative_max_c": result.operative_c.max(),
+        "occupied_h": np.count_nonzero(occupied) * weather.step_h,
+    }
+    months = {}
+    for band in ADAPTIVE_BANDS:
+        comfort = comfort_by_outdoors(
+            result.operative_c, weather.dry_bulb_c, band, per_day=weather.per_day
+        )
+        counted = summarise(comfort, occupied, month)
+        summary[f"comfortable_h {band}"] = counted.comfortable * weather.step_h
+        months[f"{band} [h]"] = _in_hours(counted.discomfort_by_month, weather)
+        summary[f"degree_hours_warm {band}"] = counted.degree_hours_warm * weather.step_h
+        summary[f"degree_hours_cold {band}"] = counted.degree_hours_cold * weather.step_h
+    table = pd.DataFrame(months, index=pd.RangeIndex(1, 13, name="month"))
+    return {key: float(value) for key, value in summary.items()}, table
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,15 +513,15 @@ def _balanced(
     results, moist, design, moved = [], [], [], []
     for number, (together, air) in enumerate(groups):
         place = {"terrain": study.terrain}
-        found = balances(together, weather, step_s, progress=progress, **air, **place)
-        results += found
-        for issues in step_issues(together, found, weather, step_s, **air, **place):
+        years = balances(together, weather, step_s, progress=progress, **air, **place)
+        results += years
+        for issues in step_issues(together, years, weather, step_s, **air, **place):
             notes += tuple(map(issue_note, issues))
         moved += [
             room.in_alternatives(result.alternative)
-            for room, result in zip(together, found, strict=True)
+            for room, result in zip(together, years, strict=True)
         ]
-        moist += room_humidity(together, found, weather, **air)
+        moist += room_humidity(together, years, weather, **air)
         if study.design is not None:
             cold = study.design.outdoor_c
             design.append(
@@ -305,7 +564,7 @@ def _transfers(
 
     Raises: `DataError` for a room that is not there, or not simulated.
     """
-    hours, found = OperationHours(study, weather), []
+    hours, transfers = OperationHours(study, weather), []
     for number, table in enumerate(study.transfer):
         place = f"transfer.{number}"
         ends = []
@@ -318,8 +577,8 @@ def _transfers(
         if ends[0] == ends[1]:
             message = "source and target are rooms of one air node"
             raise DataError(message, file=study.building, field=place)
-        found.append(AirTransfer(*ends, hours.value(table, "m3_h", place) / 3600.0))
-    return found
+        transfers.append(AirTransfer(*ends, hours.value(table, "m3_h", place) / 3600.0))
+    return transfers
 
 
 def _felt(

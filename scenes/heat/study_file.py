@@ -206,15 +206,15 @@ def read_study(path: Path, *, quick: bool = False) -> StudyFile:
         for s in study.system
     )
     around = tuple(_there(here, name, path) for name in study.surroundings)
-    found = {"weather": _there(here, study.weather, path), "system": systems}
-    found["surroundings"] = around
+    files = {"weather": _there(here, study.weather, path), "system": systems}
+    files["surroundings"] = around
     if quick:
         given = study.trace.model_fields_set
-        found["trace"] = study.trace.model_copy(update=picks(HEAT, given))
+        files["trace"] = study.trace.model_copy(update=picks(HEAT, given))
     if study.building is not None:
-        found["building"] = _there(here, study.building, path)
-        check_building_file(found["building"])
-    return study.model_copy(update=found)
+        files["building"] = _there(here, study.building, path)
+        check_building_file(files["building"])
+    return study.model_copy(update=files)
 
 
 def _there(folder: Path, name: Path, study: Path) -> Path:

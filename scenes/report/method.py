@@ -113,7 +113,7 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
             **errors,
         )
     )
-    found = [
+    sentences = [
         (gettext("Light"), " ".join(gettext(sentence) for sentence in LIGHT[result.method])),
         (gettext("Error bars"), bars + _glare_error(result)),
     ]
@@ -124,12 +124,12 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
         )
         if _moved(result):
             sun += " " + gettext("It is for the most open shading state.")
-        found.append((gettext("Direct sun"), sun))
+        sentences.append((gettext("Direct sun"), sun))
     sources = _sources(result)
     if sources:
-        found.append((gettext("Fenestration"), sources))
-    found.append((gettext("Glare"), _glare(result)))
-    found.append((gettext("Heat"), _heat(result)))
+        sentences.append((gettext("Fenestration"), sources))
+    sentences.append((gettext("Glare"), _glare(result)))
+    sentences.append((gettext("Heat"), _heat(result)))
     twins = [room.space.label for room in rooms if room.template]
     if twins:
         names = ", ".join(twins)
@@ -146,8 +146,8 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
                 rooms=names,
             )
         )
-        found.append((gettext("Equal rooms"), text))
-    return found
+        sentences.append((gettext("Equal rooms"), text))
+    return sentences
 
 
 def _glare_error(result: RunResult) -> str:

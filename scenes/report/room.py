@@ -27,7 +27,7 @@ from scenes.report.headline import Card, cards, occupied
 from scenes.report.names import quantity
 from scenes.report.tables import monthly_gains
 from scenes.report.thermal_figures import month_chart
-from scenes.results import RoomYear, RunResult, method_figures, method_notes
+from scenes.results import RoomYear, RunResult, ShadingYear, method_figures, method_notes
 
 STATE_COLOURS = ("#f0e7c8", "#c9b458", "#8f9d3d", "#4f7f4f", "#2c5f66", "#23395b")
 LOADS = {"heating_w": "part0", "cooling_w": "part1", "lighting_w": "part2"}
@@ -42,10 +42,29 @@ RULES = {
     "operative temperature": N_("closed above an operative temperature of the room"),
     "wind": N_("open in strong wind"),
     "rain": N_("open in rain"),
+    "illuminance": N_("by illuminance on the windows"),
+    "work plane": N_("most open state that limits daylight on the work plane"),
+    "daylight": N_("most closed state that leaves enough daylight"),
+    "sun depth": N_("closed against sun that reaches deep into the room"),
+    "day": N_("closed by day"),
+    "night": N_("closed by night"),
+    "occupied": N_("closed while the room is used"),
+    "unoccupied": N_("closed while nobody is there"),
+    "cooling": N_("closed while the room is cooled"),
+    "heating": N_("closed while the room is heated"),
+    "manual": N_("by people"),
     "any": N_("several rules, the most closed state"),
     "all": N_("several rules, the most open state"),
     "function": N_("by a function in Python"),
     "predictive": N_("by plans of the hours ahead (predictive control)"),
+}
+# reasons of moves besides rules
+WAITS = {
+    "open_delay_h": N_("end of the delay of openings"),
+    "hold_h": N_("end of the least time between moves"),
+    "until": N_("event before which it may not open"),
+    "most_moves": N_("most moves of a day"),
+    "the room's temperature or load": N_("the room's temperature or load"),
 }
 
 
@@ -75,15 +94,28 @@ def state_carpets(result: RunResult, room: RoomYear) -> tuple[Chart, ...]:
                 legend,
                 title=f"{title}: {group}" if several else title,
                 explanation=gettext(
-                    "Control: {rule}. {moves} moves a day; open in {open} % of the occupied hours. "
-                    "Hours with the sun up; optical and thermal properties change together.",
+                    "Control: {rule}. {moves} moves a day; open in {open} % of the occupied hours, "
+                    "view out in {view} h of them. Hours with the sun up; optical and thermal "
+                    "properties change together.",
                     rule=gettext(RULES[rule]) if rule in RULES else rule,
                     moves=rounded(float(figures["moves_per_day"][number]), 1),
                     open=percent(float(figures["state_0_percent"][number])),
-                ),
+                    view=rounded(float(figures["view_h"][number]), 0),
+                )
+                + _reasons(shading, number),
             )
         )
     return tuple(charts)
+
+
+def _reasons(shading: ShadingYear, number: int) -> str:
+    """A sentence on the conditions that moved a group; empty where there is one at most."""
+    words = RULES | WAITS
+    counts = {key: int(of[number]) for key, of in shading.moves_by_reason().items() if of[number]}
+    if len(counts) < 2:
+        return ""
+    named = (f"{gettext(words[key])} ({count})" for key, count in counts.items())
+    return " " + gettext("Moves of the year by what caused them: {list}.", list="; ".join(named))
 
 
 def loads_chart(room: RoomYear) -> Chart | None:

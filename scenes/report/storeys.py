@@ -87,13 +87,13 @@ def room_metrics(result: RunResult) -> tuple[RoomMetric, ...]:
         ),
         (_temperatures(result), 1, False, _peak),
     )
-    found = []
+    metrics = []
     for scale, digits, better, value in asked:
         values = [value(room) for room in result.spaces]
         if any(one is not None for one in values):
             known = tuple(float("nan") if one is None else float(one) for one in values)
-            found.append(RoomMetric(scale, digits, better, known))
-    return tuple(found)
+            metrics.append(RoomMetric(scale, digits, better, known))
+    return tuple(metrics)
 
 
 def storey_plans(result: RunResult) -> tuple[StoreyPlan, ...]:

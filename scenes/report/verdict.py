@@ -285,9 +285,9 @@ def _shading(result: RunResult) -> str:
         return gettext("The shading does not move: all results are for one state.")
     drawn = [_drawn(room) for room in moved]
     cost = [None if r.explored is None else _autonomies(r, r.explored) for r in moved]
-    found = list(zip(moved, drawn, cost, strict=True))
+    rows = list(zip(moved, drawn, cost, strict=True))
     if len(moved) > MOST_NAMES:
-        found.sort(key=lambda one: -one[1])
+        rows.sort(key=lambda one: -one[1])
         parts = [
             gettext(
                 "{rooms}: the shading is in use in {least} to {most} % of the occupied daylight "
@@ -295,13 +295,13 @@ def _shading(result: RunResult) -> str:
                 rooms=rooms_counted(len(moved)),
                 least=percent(min(drawn)),
                 most=percent(max(drawn)),
-                room=found[0][0].space.label,
+                room=rows[0][0].space.label,
             )
         ]
-        found = found[:1]  # what it costs where it is drawn most
+        rows = rows[:1]  # what it costs where it is drawn most
     else:
         parts = []
-    parts += [_shading_of(*one) for one in found if not parts or one[2] is not None]
+    parts += [_shading_of(*one) for one in rows if not parts or one[2] is not None]
     if not any(r.explored for r in moved):
         parts.append(gettext("Use --explore to compute its effect on daylight."))
     return " ".join(parts)

@@ -13,7 +13,7 @@ from bim.names import numbered
 from bim.sensors import in_room
 from bim.to_tracer import orientation_groups, orientation_name
 from mitsuba_cfs.errors import DataError
-from scenes.room.operation_tables import ControlTable, GroupTable, ShadingRule
+from scenes.room.shading_rules import ControlTable, GroupTable, ShadingRule
 
 
 @dataclass(frozen=True, slots=True)

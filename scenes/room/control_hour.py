@@ -16,7 +16,7 @@ from scenes.room.shading import predicts, temperature_conditions
 from scenes.room.solar import SeasonalOutdoors
 from scenes.room.zone import climate
 from thermal.balance import LONG_AGO, BalanceOptions, SteppedZone
-from thermal.control import TemperatureCondition
+from thermal.control import ROOM_QUANTITIES, RoomCondition
 
 FloatArray = NDArray[np.float64]
 
@@ -161,16 +161,16 @@ class ControlError(CfsError, ValueError):
 class MetCondition:
     """Whether a condition of the room's temperature is met, hour by hour, as the balance has it."""
 
-    def __init__(self, condition: TemperatureCondition) -> None:
+    def __init__(self, condition: RoomCondition) -> None:
         """Not met, and since long ago."""
         self._condition = condition
         self._warm = self.met = False
         self._cool_rows = self._same_rows = LONG_AGO
 
-    def follow(self, felt_c: float) -> None:
-        """Go on by an hour, from the temperature at its beginning."""
+    def follow(self, felt: float) -> None:
+        """Go on by an hour, from its quantity at the beginning."""
         of = self._condition
-        self._warm = felt_c > of.above_c or (self._warm and felt_c >= of.below_c)
+        self._warm = felt > of.above or (self._warm and felt >= of.below)
         self._cool_rows = 0 if self._warm else self._cool_rows + 1
         self._same_rows += 1
         wanted = self._cool_rows <= of.open_delay_rows
@@ -186,7 +186,7 @@ class ControlRun:
         self.year = year
         self.states: list[tuple[int, ...]] = []  # [N] of each hour so far
         self._stepped: SteppedZone | None = None
-        self._temperatures: list[tuple[float, float]] = []  # air and operative, before each hour
+        self._felt_before: list[tuple[float, float, float, float]] = []  # each hour
         self._heat: dict[tuple[int, ...], ZoneHeat] = {}
         self._conditions = temperature_conditions(year.by_file)
         self._met = [MetCondition(one) for one in self._conditions]
@@ -195,6 +195,11 @@ class ControlRun:
 
     def before(self, hour: int) -> tuple[float, float]:
         """Air and operative temperature at the end of the hour before [degC]."""
+        air, operative, *_ = self._felt(hour)
+        return air, operative
+
+    def _felt(self, hour: int) -> tuple[float, float, float, float]:
+        """The `ROOM_QUANTITIES` at the end of the hour before."""
         year = self.year
         if self._stepped is None:
             tables = year.room.operation
@@ -206,19 +211,19 @@ class ControlRun:
             )  # fmt: skip
             heat = self._heat_of((0,) * len(year.counts))
             self._stepped.warm_up(0, heat.solar, heat.gains)
-            self._temperatures.append((self._stepped.air_c, self._stepped.operative_c))
-        for states in self.states[len(self._temperatures) - 1 : hour]:
+            self._felt_before.append(_felt_in(self._stepped))
+        for states in self.states[len(self._felt_before) - 1 : hour]:
             heat = self._heat_of(states)
             self._stepped.advance(year.number_of(states), heat.solar, heat.gains)
-            self._temperatures.append((self._stepped.air_c, self._stepped.operative_c))
-        return self._temperatures[hour]
+            self._felt_before.append(_felt_in(self._stepped))
+        return self._felt_before[hour]
 
     def by_rules(self, hour: int) -> tuple[int, ...]:
         """The states of the control groups [N] by the rules of the operation file."""
         while self._conditions and self._followed <= hour:
-            air, operative = self.before(self._followed)
+            felt = dict(zip(ROOM_QUANTITIES, self._felt(self._followed), strict=True))
             for one, met in zip(self._conditions, self._met, strict=True):
-                met.follow(operative if one.operative else air)
+                met.follow(felt[one.quantity])
             self._followed += 1
         key = tuple(met.met for met in self._met)
         if key not in self._by_rules:
@@ -232,6 +237,11 @@ class ControlRun:
         if states not in self._heat:
             self._heat[states] = self.year.heat(states)
         return self._heat[states]
+
+
+def _felt_in(zone: SteppedZone) -> tuple[float, float, float, float]:
+    load = zone.load_w
+    return zone.air_c, zone.operative_c, max(-load, 0.0), max(load, 0.0)
 
 
 def controlled_states(

@@ -45,7 +45,7 @@ from scenes.room.zone import (
     zone_surfaces,
 )
 from thermal.climate import Solar
-from thermal.control import TemperatureCondition, profile_angle
+from thermal.control import RoomCondition, profile_angle
 from thermal.zone import Gains
 
 FloatArray = NDArray[np.float64]
@@ -272,7 +272,7 @@ class ControlYear:
         """The room as its operation file controls it."""
         return replace(self.room, controller=None)
 
-    def by_rules(self, met: Mapping[TemperatureCondition, bool]) -> StateArray:
+    def by_rules(self, met: Mapping[RoomCondition, bool]) -> StateArray:
         """States of the control groups by the rules of the operation file [H, N]."""
         states = shading_states(self.by_file, self.light, self.outdoors, met=met)
         return self.by_file.shading(states).states

@@ -124,12 +124,21 @@ def operated_year(room: RoomZone, result: ZoneResult, weather: Weather) -> Opera
         "heating_kwh": result.heating.sum() * weather.step_h / 1e3,
         "cooling_kwh": result.cooling.sum() * weather.step_h / 1e3,
         "lighting_kwh": room.lamps.sum() * weather.step_h / 1e3,
-        "leni_kwh_m2": room.lamps.sum() * weather.step_h / 1e3 / room.space.floor_area,
+        **_leni(room, weather),
         "peak_heating_w": result.heating.max(),
         "peak_cooling_w": result.cooling.max(),
     }
     summary = {key: float(value) for key, value in summary.items()}
     return OperationResult(room.states, hours, summary, room.shading)
+
+
+def _leni(room: RoomZone, weather: Weather) -> dict[str, float]:
+    """LENI of EN 15193-1 by a name; empty for weather that is no whole year."""
+    hours = len(room.lamps) * weather.step_h
+    if round(hours) not in (8760, 8784):
+        return {}
+    energy = room.lamps.sum() * weather.step_h / 1e3
+    return {"leni_kwh_m2": float(energy / room.space.floor_area)}
 
 
 def thermal_result(

@@ -18,6 +18,7 @@ from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration.sight import sight_through
 from scenes.fenestration.systems import States
 from scenes.results import ShadingYear
 from scenes.room.control_groups import ControlGroups, control_groups
@@ -97,13 +98,25 @@ class RoomInputs:
             return OperationHours(self.operation, self.weather).present > 0
         return working_hours(self.weather, *self.options.occupancy.hours)
 
-    def shading(self, state: NDArray[np.int64]) -> ShadingYear:
-        """The year of the control groups, from the states of the window groups [H, G]."""
+    def shading(
+        self,
+        state: NDArray[np.int64],
+        moved_by: NDArray[np.int64] | None = None,
+        reasons: tuple[str, ...] = (),
+    ) -> ShadingYear:
+        """The year of the control groups, from the states of the window groups [H, G].
+
+        Args: moved_by, reasons: as of `ShadingYear`.
+        """
         firsts = [int(np.argmax(self.windows.control == c)) for c in range(len(self.control.names))]
         rules = tuple(rule.rule for rule in self.control.rules)
         if self.controller is not None:
             rules = (FUNCTION,) * len(rules)
-        return ShadingYear(self.control.names, rules, state[:, firsts], self.control.number)
+        seen = [[sight_through(one).is_view for one in self.windows.systems[g]] for g in firsts]
+        return ShadingYear(
+            self.control.names, rules, state[:, firsts], self.control.number, moved_by, reasons,
+            tuple(map(np.array, seen)),
+        )  # fmt: skip
 
 
 def room_inputs(

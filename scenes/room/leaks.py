@@ -14,7 +14,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.matrices.escape import SIDES, Escape, escaped_view
+from mitsuba_cfs.trace.matrices.straight_view import SIDES, Escape, escaped_view
 
 SPACING, WORK_PLANE = 1.0, 0.8  # of the sensors [m]
 EYE_PIXELS = 64  # of the eye's view; only its position and direction count

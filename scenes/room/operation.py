@@ -19,6 +19,7 @@ from bim.use import ScheduledValue, StatedUse, YearSchedule
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.notes import Note
+from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import FenestrationSystem, read_system, system_of_panes
 from scenes.fenestration.thermal_file import StateTable
@@ -26,14 +27,13 @@ from scenes.fenestration.thermal_system import checked_system
 from scenes.fenestration.tilts import tilt_states
 from scenes.room.operation_tables import (
     PARTS,
-    WEATHER_RULES,
     OperationTables,
     RoomsTable,
-    ShadingRule,
     operated_tables,
 )
 from scenes.room.options import RoomOptions
 from scenes.room.schedules import WEEK, ScheduleTable, scheduled_fields
+from scenes.room.shading_rules import WEATHER_RULES, ShadingRule
 from scenes.toml_file import TomlTable, read_table, validated
 from thermal.control import by_schedule, by_threshold
 from thermal.emitters import HeatedSlab, IdealLoads
@@ -229,6 +229,11 @@ class OperationHours:
             return closed - by_threshold(wind, rule.open_above_m_s, closed=closed)
         if rule.rule == "rain":
             return np.where(self.rain(f"{place}.rule"), 0, closed)
+        if rule.rule in ("day", "night"):
+            up = is_up(sun_directions(self.weather))
+            return np.where(up == (rule.rule == "day"), closed, 0)
+        if rule.rule in ("occupied", "unoccupied"):
+            return np.where((self.present > 0) == (rule.rule == "occupied"), closed, 0)
         if not isinstance(rule.schedule, str):
             return by_schedule(rule.schedule, len(self.weather.times))
         values = self.value(rule, "schedule", place)

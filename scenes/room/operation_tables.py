@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -10,23 +10,21 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from bim.model import Building, Space
-from bim.to_tracer import COMPASS
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather, in_city
 from scenes import plausible
 from scenes.fenestration.thermal_file import StateTable
 from scenes.room.schedules import (
-    CLOCK,
     CalendarTable,
     Hours,
     OrSchedule,
     ScheduleTable,
     clock_or_name,
     scheduled_fields,
-    states_or_name,
     tables_within,
     unknown_name,
 )
+from scenes.room.shading_rules import ControlTable
 from scenes.toml_file import Positive, Share, TomlTable
 from thermal.ground import SHIELDS, SOILS
 from thermal.ventilation import BLAST, DOE2, DOOR_DISCHARGE, Leakage, aim2, sherman_grimsrud
@@ -318,175 +316,6 @@ class EnvelopeTable(TomlTable):
     outside_roughness: Literal[tuple(ROUGHNESS)] = "medium rough"  # DOE-2, for the outside film
     frame_u: Annotated[Positive, plausible.FRAME_U] | None = None  # with films 0.13 and 0.04
     frame_psi: Annotated[float, plausible.PSI] = 0.0  # along the edges of the glass [W/(m K)]
-
-
-WEATHER_RULES = ("outdoor temperature", "wind", "rain")  # that need nothing computed
-ROOM_RULES = ("air temperature", "operative temperature")  # that the heat balance decides
-MOST_CONDITIONS = 4  # n of a room: the heat balance chooses from 2^n alternatives
-
-
-class ShadingRule(TomlTable):
-    """The rule by which a group of windows changes its state.
-
-    States are numbered from 0 in the order of the file.
-    """
-
-    rule: Literal[
-        "always", "schedule", "irradiance", "glare", "cut-off", "outdoor temperature", "wind",
-        "rain", "air temperature", "operative temperature", "any", "all", "predictive",
-    ] = "always"  # fmt: skip
-    parts: tuple[ShadingRule, ...] = ()  # of "any", the most closed state, and "all", the most open
-    open_delay_h: Annotated[float, plausible.HOURS] = 0.0  # opens after more light for so long [h]
-    hold_h: Annotated[float, plausible.HOURS] = 0.0  # least time between two moves [h]
-    # "always"; the closed one of "irradiance", "wind", "rain" and the temperatures
-    state: Annotated[int, Field(ge=0)] = 0
-    # "schedule": 24 states, or the name of a schedule of states
-    schedule: Annotated[tuple[int, ...] | str, OrSchedule(plausible.STATE, states_or_name)] = ()
-    close_above: Annotated[Positive, plausible.SUN] = 200.0  # "irradiance" on the windows [W/m2]
-    open_below: Annotated[float, plausible.SUN] | None = None
-    # temperatures: "outdoor temperature", and those of the room at the end of the step before
-    close_above_c: Annotated[float, plausible.OUTDOOR] | None = None  # 20 outdoors, 24 in the room
-    open_below_c: Annotated[float, plausible.OUTDOOR] | None = None
-    open_above_m_s: Annotated[Positive, plausible.WIND] = 10.0  # "wind": closed in less wind
-    # "irradiance" and "cut-off": sun and sky that reach the windows, or those of a weather station
-    # on the roof, without surroundings
-    sensor: Literal["window", "roof"] = "window"
-    limit_lx: Annotated[Positive, plausible.EYE] = (
-        3473.0  # "glare": vertical illuminance of the eye; sDGP 0.40
-    )
-    limit_dgp: Share | None = None  # "glare": DGP of every hour's picture in place of Ev
-    seat: tuple[float, float, float] | None = None  # "glare": the eye [m]; default: the room's view
-    looks_deg: float | None = None  # "glare": azimuth of the line of sight from north by east
-    slat_tilts_deg: tuple[float, ...] = ()  # "cut-off": of each state; default: of its system
-    slat_width: Annotated[Positive, plausible.SLAT] = 0.08  # [m]
-    slat_spacing: Annotated[Positive, plausible.SLAT] = 0.072  # [m]
-
-    def fault(self, states: int, schedules: Mapping[str, ScheduleTable]) -> tuple[str, str] | None:
-        """The key that does not fit windows with `states` states, and the fault."""
-        by_room = any(leaf.rule in ROOM_RULES for leaf in self.leaves)
-        if by_room and self.rule not in ROOM_RULES and (self.open_delay_h or self.hold_h):
-            key = "open_delay_h" if self.open_delay_h else "hold_h"
-            return key, "acts on the part by the room's temperature alone: state it there"
-        if self.rule in ROOM_RULES and self.opens_below_c > self.closes_above_c:
-            return "open_below_c", "lies above close_above_c"
-        if self.rule in ("any", "all"):
-            if not self.parts:
-                return "parts", f'the rule "{self.rule}" needs tables of rules'
-            for number, one in enumerate(self.parts):
-                fault = one.fault(states, schedules)
-                if fault is not None:
-                    return f"parts.{number}.{fault[0]}", fault[1]
-            return None
-        used = self.schedule if self.rule == "schedule" else (self.state,)
-        if self.rule == "schedule" and isinstance(self.schedule, str):
-            wrong = sorted(set(schedules[self.schedule].stated) - set(range(states)))
-            if wrong:
-                message = f"has state {wrong[0]:g}: the windows have {states}, from 0"
-                return "schedule", f"{self.schedule!r} {message}"
-            return None
-        if self.rule == "schedule" and len(self.schedule) != CLOCK:
-            return "schedule", f"expected {CLOCK} states, got {len(self.schedule)}"
-        if any(not 0 <= state < states for state in used):
-            return "state", f"a state outside 0 to {states - 1}: the windows have {states}"
-        if self.rule == "cut-off" and self.slat_tilts_deg and len(self.slat_tilts_deg) != states:
-            return "slat_tilts_deg", f"expected one for each of {states} states"
-        return None
-
-    @property
-    def closes_above_c(self) -> float:
-        """`close_above_c` or its default."""
-        default = 24.0 if self.rule in ROOM_RULES else 20.0
-        return default if self.close_above_c is None else self.close_above_c
-
-    @property
-    def opens_below_c(self) -> float:
-        """`open_below_c` or its default."""
-        return self.closes_above_c if self.open_below_c is None else self.open_below_c
-
-    @property
-    def leaves(self) -> tuple[ShadingRule, ...]:
-        """The rule itself, or the rules that it combines."""
-        if self.rule not in ("any", "all"):
-            return (self,)
-        return tuple(leaf for one in self.parts for leaf in one.leaves)
-
-
-class PredictiveTable(TomlTable):
-    """Control that looks ahead, of all groups of a room together."""
-
-    horizon_h: Annotated[int, Field(ge=1, le=8784)] = 24  # planned; a year: one plan
-    # how the hours ahead are known: as yesterday's, as what comes with an error, or as what comes
-    forecast: Literal["yesterday", "error", "perfect"] = "yesterday"
-    sun_error: Share = 0.25  # of "error", relative standard deviation 24 h ahead
-    temperature_error_k: Annotated[float, Field(ge=0, le=10)] = 1.5  # likewise [K]
-    seed: Annotated[int, Field(ge=0)] = 0  # of the errors
-    # what counts as glare: DGP of the pictures of each combination, or 6.2e-5 Ev + 0.184
-    glare: Literal["DGP", "Ev"] = "DGP"
-    heating_weight: Annotated[float, Field(ge=0, le=100)] = 1.0  # of 1 kWh of heat
-    cooling_weight: Annotated[float, Field(ge=0, le=100)] = 1.0
-    lighting_weight: Annotated[float, Field(ge=0, le=100)] = 1.0
-
-
-class GroupTable(ShadingRule):
-    """Windows that move together by a rule; keys that it lacks are those of `control`."""
-
-    name: str = ""  # in results; default: its first window or facade
-    windows: tuple[str, ...] = ()  # names or GUIDs
-    facades: tuple[Literal[(*COMPASS, "roof")], ...] = ()
-
-    @model_validator(mode="after")
-    def _names_some(self) -> GroupTable:
-        if not self.windows and not self.facades:
-            raise ValueError("name `windows` or `facades`")
-        return self
-
-
-class ControlTable(ShadingRule):
-    """Control of the shading states: which windows move together, and by which rule."""
-
-    # windows that no entry of `group` names move together by facade (orientation), one by one, or
-    # all of a room
-    groups: Literal["facade", "window", "room"] = "facade"
-    group: tuple[GroupTable, ...] = ()  # the first entry that names a window applies to it
-    predictive: PredictiveTable = PredictiveTable()  # of the rule "predictive"
-
-    @model_validator(mode="after")
-    def _predicts_all(self) -> ControlTable:
-        fault = self.plan_fault
-        if fault is not None:
-            place, message = fault
-            raise ValueError(f"{place.removeprefix('control.')}: {message}")
-        return self
-
-    @property
-    def plan_fault(self) -> tuple[str, str] | None:
-        """The path of the key that the plans of all groups together cannot follow, and why."""
-        if not any(leaf.rule == "predictive" for _, rule in self.rules for leaf in rule.leaves):
-            return None
-        for place, rule in self.rules:
-            if rule.rule != "predictive":
-                return (
-                    f"{place}.rule",
-                    '"predictive" plans all groups of a room together, and alone',
-                )
-            for key in ("open_delay_h", "hold_h"):
-                if getattr(rule, key):
-                    return f"{place}.{key}", 'the rule "predictive" does not wait: leave it out'
-        return None
-
-    def rule_of(self, group: GroupTable | None) -> ShadingRule:
-        """The rule of an entry of `group`; None: of the windows that no entry names."""
-        stated = {key: getattr(self, key) for key in ShadingRule.model_fields}
-        if group is not None:
-            keys = group.model_fields_set & ShadingRule.model_fields.keys()
-            stated |= {key: getattr(group, key) for key in keys}
-        return ShadingRule.model_construct(**stated)
-
-    @property
-    def rules(self) -> tuple[tuple[str, ShadingRule], ...]:
-        """Every rule, with the path of its table."""
-        others = ((f"control.group.{n}", self.rule_of(one)) for n, one in enumerate(self.group))
-        return ("control", self.rule_of(None)), *others
 
 
 class GainsTable(TomlTable):

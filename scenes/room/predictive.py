@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from mitsuba_cfs.progress import Progress, silent
 from scenes.room.control_year import ControlYear
 from scenes.room.operation import OperationHours
-from scenes.room.operation_tables import OperationTables, ShadingRule
-from scenes.room.shading import Seat
+from scenes.room.operation_tables import OperationTables
+from scenes.room.shading import Seat, view_taken
+from scenes.room.shading_rules import ShadingRule
 from scenes.room.zone import climate
 from thermal.predictive import (
     Forecast,
@@ -69,6 +70,8 @@ class Planner:
         self._combinations = combinations
         self.zone, self._hours = predicted_hours(year, tables)
         count = year.room.skies.hours
+        groups = np.arange(len(year.counts))
+        self._hidden = view_taken(year.room, groups, year.combinations)  # [M]
         self.used = np.flatnonzero((year.present > 0) & (year.lit_hours >= 0))
         eye = np.stack(
             [year.room.skies.whole_year(year.eye_lx(one, self._seat)) for one in combinations], 1
@@ -96,11 +99,12 @@ class Planner:
         penalty[self.used] = PENALTY * np.maximum(self.glare[self.used] - self._limit, 0.0)
         if of_rated:
             penalty[self.used] += np.where(self.rated[self.used], 0.0, 2 * PENALTY)
+        penalty[self.used] += table.view_wh * self._hidden
         most = np.maximum(np.array(self._year.counts) - 1, 1)
         penalty += CLOSED * (self._year.combinations / most).mean(axis=1)
         hours = PredictedHours(
             self._hours.sun, self._hours.daylight, self._hours.lamps, self._hours.dimming,
-            self._hours.internal, penalty,
+            self._hours.internal, penalty, self._year.counts, table.move_wh,
         )  # fmt: skip
         weights = table.heating_weight, table.cooling_weight, table.lighting_weight
         return predicted_year(

@@ -64,7 +64,7 @@ from scenes.room.picture_hours import wanted_hours
 from scenes.room.shading import (
     control_signals,
     predicts,
-    shading_states,
+    ruled_year,
     temperature_conditions,
 )
 from scenes.room.solar import SeasonalOutdoors, seasonal_outdoors
@@ -193,7 +193,7 @@ def lit_room(
     with times.stage("daylight"):
         needs = light_needs(room, annual_glare=options.outputs.annual_glare)
         light = room_light(room, needs=needs, progress=progress)
-        conditions = temperature_conditions(room)
+        conditions, ruled = temperature_conditions(room), None
         has_function = room.controller is not None and bool(space.windows)
         controlled = has_function or predicts(room)
         if conditions or controlled or "irradiance" in control_signals(room):
@@ -205,7 +205,8 @@ def lit_room(
         elif controlled and outdoors is not None:
             state = controlled_states(room, light, outdoors, progress=progress)
         else:
-            state = shading_states(room, light, outdoors, progress=progress)
+            ruled = ruled_year(room, light, outdoors, progress=progress)
+            state = ruled.states[:, room.windows.control]
         daylight = room_daylight(room, light, state, progress=progress)
     with times.stage("leaks"):
         leaks = leak_issues(space, light.scene, seed=options.sampling.seed, cache=cache)
@@ -239,7 +240,7 @@ def lit_room(
         surfaces = surfaces or zone_surfaces(room)
         if outdoors is None:
             outdoors = seasonal_outdoors(room, light, progress=progress)
-        zone = room_zone(room, surfaces, outdoors, state, daylight, progress=progress)
+        zone = room_zone(room, surfaces, outdoors, state, daylight, ruled=ruled, progress=progress)
         if choice is not None:
             zone = replace(zone, alternatives=choice.alternatives)
     return DaylitRoom(
@@ -308,10 +309,13 @@ def controlled_zone(
     conditions, rooms = temperature_conditions(room), []
     for number in range(2 ** len(conditions)):
         met = {one: bool(number >> k & 1) for k, one in enumerate(conditions)}
-        state, daylight = shading_states(room, light, outdoors, met=met, progress=progress), None
+        ruled, daylight = ruled_year(room, light, outdoors, met=met, progress=progress), None
+        state = ruled.states[:, room.windows.control]
         if light is not None and reads_work_plane(room):
             daylight = room_daylight(room, light, state, progress=progress)
-        rooms.append(room_zone(room, surfaces, outdoors, state, daylight, progress=progress))
+        rooms.append(
+            room_zone(room, surfaces, outdoors, state, daylight, ruled=ruled, progress=progress)
+        )
     if not conditions:
         return rooms[0]
     return replace(rooms[0], alternatives=RoomAlternatives(conditions, tuple(rooms)))

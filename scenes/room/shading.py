@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -13,34 +14,54 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.evaluation import GlareOptions
 from mitsuba_cfs.images.view import View, fisheye
 from mitsuba_cfs.methods.glare import hourly_glare
-from mitsuba_cfs.methods.light import SeasonalLight, eye_illuminance, with_view
+from mitsuba_cfs.methods.light import (
+    SeasonalLight,
+    direct_sun_by_group,
+    eye_illuminance,
+    illuminance,
+    with_view,
+)
 from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.metrics.lm83 import blinds_operated
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.surfaces import Surfaces, even_numbers, points_on_triangles
 from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
 from mitsuba_cfs.trace.sun.shade import sunlit_shares
+from scenes.fenestration.sight import sight_through
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.room.glare import rating_of
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
 from scenes.room.operation import OperationHours
-from scenes.room.operation_tables import MOST_CONDITIONS, ROOM_RULES, WEATHER_RULES, ShadingRule
+from scenes.room.shading_rules import (
+    JOINT_RULES,
+    LOAD_RULES,
+    MOST_CONDITIONS,
+    ROOM_RULES,
+    WEATHER_RULES,
+    ShadingRule,
+)
 from scenes.room.solar import SeasonalOutdoors, window_irradiance
 from thermal.control import (
-    TemperatureCondition,
+    RoomCondition,
     always,
     by_cut_off,
     by_glare,
     by_threshold,
     delayed,
     held,
+    latched,
+    sun_depth,
+    with_few_moves,
 )
+from thermal.occupants import arrivals, haldi_robinson_2010, lightswitch_2002
 
 FloatArray = NDArray[np.float64]
 StateArray = NDArray[np.int64]
 SUN_POINTS = 64  # on each window group, for its sunlit share
 DISC_RAYS = 4  # from each of them
+CLEAR = 0.01  # [m] of a sensor outside the glass
 MOST_COMBINATIONS = 1024  # of states of groups that avoid glare together
 # An eye: position [m] and azimuth of the line of sight [deg] from north by east, None of the view
 Seat = tuple[tuple[float, float, float] | None, float | None]
@@ -49,7 +70,8 @@ Seat = tuple[tuple[float, float, float] | None, float | None]
 def control_signals(room: RoomInputs) -> frozenset[str]:
     """The computed quantities that the rules of a room's windows read.
 
-    "irradiance" of the windows, "sun" on them, "eye": illuminance at an eye, "dgp" of every hour.
+    "irradiance" of the windows, "sun" on them, "eye": illuminance at an eye, "dgp" of every hour,
+    "plane": daylight of the work plane, "direct": direct sun on it.
     """
     if room.operation is None or room.controller is not None:
         return frozenset()
@@ -61,9 +83,13 @@ def signal_of(rule: ShadingRule) -> str:
     """The computed quantity that a rule reads; "": none but the weather."""
     if rule.rule == "glare":
         return "eye" if rule.limit_dgp is None else "dgp"
-    if rule.sensor == "roof":
+    if rule.rule == "manual":
+        return "plane" if rule.behaviour == "Haldi-Robinson" else "direct"
+    if rule.rule in JOINT_RULES:
+        return "plane"
+    if rule.sensor != "window":
         return ""
-    return {"irradiance": "irradiance", "cut-off": "sun"}.get(rule.rule, "")
+    return {"irradiance": "irradiance", "cut-off": "sun", "sun depth": "sun"}.get(rule.rule, "")
 
 
 def predicts(room: RoomInputs) -> bool:
@@ -73,11 +99,11 @@ def predicts(room: RoomInputs) -> bool:
     return room.control.rules[0].rule == "predictive"
 
 
-Conditions = Mapping[TemperatureCondition, bool]
+Conditions = Mapping[RoomCondition, bool]
 NO_CONDITIONS: Conditions = {}
 
 
-def temperature_conditions(room: RoomInputs) -> tuple[TemperatureCondition, ...]:
+def temperature_conditions(room: RoomInputs) -> tuple[RoomCondition, ...]:
     """The distinct conditions of a room's temperature that its rules read.
 
     Raises: `DataError` for more than `MOST_CONDITIONS`.
@@ -94,15 +120,26 @@ def temperature_conditions(room: RoomInputs) -> tuple[TemperatureCondition, ...]
     return conditions
 
 
-def condition_of(rule: ShadingRule, step_h: float) -> TemperatureCondition:
+def condition_of(rule: ShadingRule, step_h: float) -> RoomCondition:
     """The condition of a rule by the room's temperature, for weather in steps of so many hours."""
-    operative, rows = rule.rule == "operative temperature", _waits(rule, step_h)
-    return TemperatureCondition(rule.closes_above_c, rule.opens_below_c, operative, *rows)
+    rows, quantity = _waits(rule, step_h), ROOM_RULES[rule.rule]
+    if rule.rule in LOAD_RULES:
+        return RoomCondition(rule.close_above_w, rule.close_above_w, quantity, *rows)
+    return RoomCondition(rule.closes_above_c, rule.opens_below_c, quantity, *rows)
 
 
 def _waits(rule: ShadingRule, step_h: float) -> tuple[int, int]:
     """Steps of the weather that a rule waits before it opens, and between two moves."""
     return round(rule.open_delay_h / step_h), round(rule.hold_h / step_h)
+
+
+@dataclass(frozen=True, slots=True)
+class RuledYear:
+    """The states of the control groups in every hour by their rules, and what moved them."""
+
+    states: StateArray  # [H, N]
+    moved_by: StateArray  # [H, N] number of the reason of each move; -1: none
+    reasons: tuple[str, ...]
 
 
 def shading_states(
@@ -113,71 +150,175 @@ def shading_states(
     met: Conditions = NO_CONDITIONS,
     progress: Progress = silent,
 ) -> StateArray:
-    """The shading state of each window group in every hour [H, G].
+    """The shading state of each window group in every hour [H, G]; see `ruled_year`."""
+    ruled = ruled_year(room, light, outdoors, met=met, progress=progress)
+    return ruled.states[:, room.windows.control]
+
+
+def ruled_year(
+    room: RoomInputs,
+    light: RoomLight | None = None,
+    outdoors: SeasonalOutdoors | None = None,
+    *,
+    met: Conditions = NO_CONDITIONS,
+    progress: Progress = silent,
+) -> RuledYear:
+    """The states of a room's control groups by their rules.
 
     Args:
-        light: for the signals "eye" and "dgp"; outdoors: for the signal "irradiance".
-        met: whether the room's temperature meets each of `temperature_conditions`.
+        light: for the signals "eye", "dgp", "plane" and "direct"; outdoors: for "irradiance".
+        met: whether the room's temperature and loads meet each of `temperature_conditions`.
     """
-    numbers, operation = room.windows.control, room.operation
+    operation, rules = room.operation, room.control.rules
     states = np.zeros((room.skies.hours, len(room.control.names)), dtype=np.int64)
     if operation is None or not room.space.windows:
-        return states[:, numbers]
-    rules, signals = room.control.rules, _Signals(room, outdoors, met)
-    glare = np.array(
-        [c for c, rule in enumerate(rules) if any(leaf.rule == "glare" for leaf in rule.leaves)],
-        dtype=np.int64,
-    )
+        return RuledYear(states, np.full_like(states, -1), ())
+    signals, moved_by = _Signals(room, outdoors, met), np.full_like(states, -1)
+    reasons = tuple(dict.fromkeys(one for rule in rules for one in _reasons(rule)))
+
+    def reading(kinds: Sequence[str]) -> NDArray[np.int64]:
+        found = [c for c, r in enumerate(rules) if any(leaf.rule in kinds for leaf in r.leaves)]
+        return np.array(found, dtype=np.int64)
+
+    def rule_of(c: int, known: Mapping[str, StateArray]) -> None:
+        states[:, c], moved_by[:, c] = _by_rule(room, c, signals, known, reasons)
+
+    joint, manual = reading(JOINT_RULES), reading(("manual",))
+    if light is None and len(joint) + len(manual):
+        raise ValueError("rules against glare, by daylight or by people need the room's light")
+    by_people: dict[int, StateArray] = {}
     for c in range(len(rules)):
-        if c not in glare:
-            states[:, c] = _by_rule(room, c, signals, None)
-    if len(glare):
-        if light is None:
-            raise ValueError("the rule against glare needs the room's light")
-        _avoid_glare(room, light, states, glare, progress)
-    for c in glare:
-        states[:, c] = _by_rule(room, c, signals, states[:, c])
-    return states[:, numbers]
+        if c not in joint and c not in manual:
+            rule_of(c, {})
+    if light is not None and len(manual):
+        by_people = _by_people(room, light, states, manual)
+        for c in set(manual.tolist()) - set(joint.tolist()):
+            rule_of(c, {"manual": by_people[c]})
+    if light is not None and len(joint):
+        _take_jointly(room, light, states, joint, progress)
+        for c in joint.tolist():
+            known = {kind: states[:, c].copy() for kind in JOINT_RULES}
+            rule_of(c, known | ({"manual": by_people[c]} if c in by_people else {}))
+    return RuledYear(states, moved_by, reasons)
+
+
+def _reasons(rule: ShadingRule) -> Iterator[str]:
+    """What may move windows by a rule: its conditions, and the keys that make them wait."""
+    if rule.rule in ("any", "all"):
+        for one in rule.parts:
+            yield from _reasons(one)
+    else:
+        yield rule.rule
+    yield from (key for key in WAITS if getattr(rule, key))
+
+
+WAITS = ("open_delay_h", "hold_h", "until", "most_moves")
 
 
 def _by_rule(
-    room: RoomInputs, c: int, signals: _Signals, without_glare: StateArray | None
-) -> StateArray:
-    """The states of a control group by its rule [H].
+    room: RoomInputs,
+    c: int,
+    signals: _Signals,
+    known: Mapping[str, StateArray],
+    reasons: Sequence[str],
+) -> tuple[StateArray, StateArray]:
+    """The states of a control group by its rule [H], and the number of the reason of each move [H].
 
-    Args: without_glare: its states by its rules against glare [H].
+    Args: known: its states [H] by the kinds of rules of which several groups take theirs together.
     """
     groups, operation = np.flatnonzero(room.windows.control == c), room.operation
+    hours = room.skies.hours
 
     def plain(rule: ShadingRule, place: str) -> StateArray:
-        if rule.rule == "glare" and without_glare is not None:
-            return without_glare
+        if rule.rule in known:
+            return known[rule.rule]
         closed = rule.state or group_states(room, c) - 1
         if rule.rule in ("schedule", *WEATHER_RULES) and operation is not None:
-            hours = OperationHours(operation, room.weather)
-            return hours.states(rule, place, room.windows.states, closed)
+            of_hours = OperationHours(operation, room.weather)
+            return of_hours.states(rule, place, room.windows.states, closed)
         if rule.rule in ROOM_RULES:
             met = signals.met[condition_of(rule, room.weather.step_h)]
-            return always(closed if met else 0, room.skies.hours)
+            return always(closed if met else 0, hours)
         if rule.rule == "irradiance":
             brightest = signals.irradiance(rule.sensor)[:, groups].max(axis=1)
             return by_threshold(brightest, rule.close_above, rule.open_below, closed=closed)
+        if rule.rule == "illuminance":
+            brightest = signals.illuminance(rule.sensor)[:, groups].max(axis=1)
+            lower = rule.opens_below_lx
+            return by_threshold(brightest, rule.closes_above_lx, lower, closed=closed)
         if rule.rule == "predictive":
             raise ValueError("plans are made of the room's light: predictive_states")
         if rule.rule == "cut-off":
             return _by_cut_off(room, rule, groups, signals.beam(rule.sensor))
-        return always(rule.state, room.skies.hours)
+        if rule.rule == "sun depth":
+            return _by_sun_depth(room, rule, groups, signals.beam(rule.sensor)) * closed
+        return always(rule.state, hours)
 
-    def of(rule: ShadingRule, place: str) -> StateArray:
+    def of(rule: ShadingRule, place: str) -> tuple[StateArray, StateArray]:
         if rule.rule in ("any", "all"):
             parts = [of(one, f"{place}.parts.{n}") for n, one in enumerate(rule.parts)]
-            states = np.max(parts, axis=0) if rule.rule == "any" else np.min(parts, axis=0)
+            states, by = _combined(rule.rule == "any", parts)
         else:
             states = plain(rule, place)
+            if rule.inverse:
+                states = np.where(states > 0, 0, rule.state or group_states(room, c) - 1)
+            by = np.where(_moves(states), reasons.index(rule.rule), -1)
         wait, hold = _waits(rule, room.weather.step_h)
-        return held(delayed(states, wait), hold)
+        few = rule.most_moves or 1
+        changes: dict[str, Callable[[StateArray], StateArray]] = {
+            "open_delay_h": lambda one: delayed(one, wait),
+            "hold_h": lambda one: held(one, hold),
+            "until": lambda one: latched(one, _ends(room, rule.until)),
+            "most_moves": lambda one: with_few_moves(one, few, rows_of_day(room)),
+        }
+        for key in WAITS:
+            if getattr(rule, key):
+                waited = changes[key](states)
+                same = _moves(states) & (waited == states)
+                by = np.where(_moves(waited), np.where(same, by, reasons.index(key)), -1)
+                states = waited
+        return states, by
 
     return of(room.control.rules[c], room.control.places[c])
+
+
+def _moves(states: StateArray) -> NDArray[np.bool_]:
+    """Hours [H] whose state is not that of the hour before."""
+    return np.concatenate([[False], states[1:] != states[:-1]])
+
+
+def _combined(
+    closed: bool, parts: Sequence[tuple[StateArray, StateArray]]
+) -> tuple[StateArray, StateArray]:
+    """The most closed, or most open, states of parts [H], and the reason of each move [H].
+
+    The part that has the extreme after a move towards it, or before one away from it, moves then.
+    """
+    states, by = np.stack([one for one, _ in parts]), np.stack([one for _, one in parts])
+    extreme = states.max(axis=0) if closed else states.min(axis=0)
+    number = states.argmax(axis=0) if closed else states.argmin(axis=0)
+    change = np.concatenate([[0], np.diff(extreme)])
+    before = np.concatenate([number[:1], number[:-1]])
+    towards = change > 0 if closed else change < 0
+    chosen = by[np.where(towards, number, before), np.arange(by.shape[1])]
+    return extreme, np.where(change != 0, chosen, -1)
+
+
+def rows_of_day(room: RoomInputs) -> int:
+    """Steps of the weather in a day."""
+    return round(24 / room.weather.step_h)
+
+
+def _ends(room: RoomInputs, until: str) -> NDArray[np.bool_]:
+    """Hours [H] in which windows may open that a rule has closed until some event."""
+    if until == "sunset":
+        return ~is_up(sun_directions(room.weather))
+    if until == "midnight":
+        return np.arange(room.skies.hours) % rows_of_day(room) == 0
+    if until == "sunrise":
+        up = is_up(sun_directions(room.weather))
+        return np.concatenate([up[:1], up[1:] & ~up[:-1]])
+    return arrivals(room.occupied, rows_of_day(room))
 
 
 class _Signals:
@@ -204,9 +345,13 @@ class _Signals:
             self._values[key] = compute(key[1])
         return self._values[key]
 
+    def illuminance(self, sensor: str) -> FloatArray:
+        """Illuminance of a sensor in the middle of the glass [H, G] [lx]."""
+        return self._once(("illuminance", sensor), lambda at: facade_illuminance(self._room, at))
+
     def _irradiance(self, sensor: str) -> FloatArray:
-        if sensor == "roof":
-            return roof_irradiance(self._room)
+        if sensor != "window":
+            return roof_irradiance(self._room, horizontal=sensor == "horizontal")
         if self._outdoors is None:
             raise ValueError("the rule by irradiance needs the room's outdoors")
         return window_irradiance(self._outdoors, self._room.skies)
@@ -281,54 +426,273 @@ def window_beam(room: RoomInputs, *, shaded: bool) -> FloatArray:
     return beam
 
 
-def roof_irradiance(room: RoomInputs) -> FloatArray:
-    """Irradiance of the window groups without surroundings [H, G] [W/m2]."""
-    sampling, groups = room.options.sampling, room.windows.groups
-    centres = [np.mean([w.triangles.mean(axis=(0, 1)) for w in g.windows], axis=0) for g in groups]
-    matrix = sky_irradiance_matrix(
-        Surfaces.none(), np.stack(centres), np.stack([g.frame[2] for g in groups]),
-        subdivision=sampling.subdivision, seed=sampling.seed, cache=room.cache,
-    ).values  # fmt: skip
+def roof_irradiance(room: RoomInputs, *, horizontal: bool = False) -> FloatArray:
+    """Irradiance of the window groups, or of a level sensor, without surroundings [H, G] [W/m2]."""
+    matrix = _sensor_matrix(room, Surfaces.none(), horizontal=horizontal)
     lit: FloatArray = (matrix @ np.asarray(room.skies.solar)).astype(float)
     return room.skies.whole_year(lit).T
 
 
-def _avoid_glare(
+def facade_illuminance(room: RoomInputs, sensor: str) -> FloatArray:
+    """Illuminance in the middle of the glass of the window groups [H, G] [lx].
+
+    Args: sensor: "window", "roof" without surroundings, or "horizontal" on the roof.
+    """
+    sky, season = np.asarray(room.skies.whole), room.season_of_year[room.skies.lit]
+    lit = np.zeros((len(room.windows.groups), sky.shape[1]))
+    for number, one in enumerate(room.seasons):
+        around = Surfaces.none()
+        if sensor == "window":
+            around = exterior_surfaces(one.building, room.space, "visible")
+        hours = season == number
+        matrix = _sensor_matrix(room, around, horizontal=sensor == "horizontal")
+        lit[:, hours] = matrix @ sky[:, hours]
+    return room.skies.whole_year(lit).T
+
+
+def _sensor_matrix(room: RoomInputs, around: Surfaces, *, horizontal: bool) -> FloatArray:
+    """Irradiance of sensors in the middle of the window groups per radiance of a patch [G, P]."""
+    sampling, groups = room.options.sampling, room.windows.groups
+    centres = [np.mean([w.triangles.mean(axis=(0, 1)) for w in g.windows], axis=0) for g in groups]
+    normals = np.stack([g.frame[2] for g in groups])
+    points = np.stack(centres) + CLEAR * normals
+    if horizontal:  # one sensor for all
+        points, normals = points[:1], np.array([[0.0, 0.0, 1.0]])
+    values: FloatArray = sky_irradiance_matrix(
+        around, points, normals,
+        subdivision=sampling.subdivision, seed=sampling.seed, cache=room.cache,
+    ).values  # fmt: skip
+    return np.tile(values, (len(groups), 1)) if horizontal else values
+
+
+def _by_sun_depth(
+    room: RoomInputs, rule: ShadingRule, groups: NDArray[np.int64], beam: FloatArray
+) -> StateArray:
+    """1 where the sun reaches deeper into the room than a rule allows [H], else 0."""
+    sun = sun_directions(room.weather)
+    floor = min(face.triangles[..., 2].min() for face in room.space.faces)
+    result = np.zeros(len(sun), dtype=np.int64)
+    for g in groups:
+        group = room.windows.groups[g]
+        corners = np.concatenate([w.triangles.reshape(-1, 3) for w in group.windows])
+        depth = sun_depth(sun, group.frame[2], corners, floor + rule.plane_height_m)
+        result |= (depth > rule.deepest_m) & (beam[:, g] > rule.beam_above)
+    return result
+
+
+def _by_people(
+    room: RoomInputs, light: RoomLight, states: StateArray, manual: NDArray[np.int64]
+) -> dict[int, StateArray]:
+    """The states [H] of control groups that people move, by the number of the group.
+
+    Groups with the same rule are moved by the same people.
+
+    Args: states: [H, N] of the groups without such a rule; the others are open.
+    """
+    found: dict[int, StateArray] = {}
+    rules: dict[tuple[object, ...], list[int]] = {}
+    for c in manual.tolist():
+        leaf = next(one for one in room.control.rules[c].leaves if one.rule == "manual")
+        rules.setdefault((leaf.behaviour, leaf.seed, leaf.at), []).append(c)
+    for members in rules.values():
+        leaf = next(one for one in room.control.rules[members[0]].leaves if one.rule == "manual")
+        if leaf.behaviour == "Haldi-Robinson":
+            found |= _by_habit(room, light, states, members, leaf)
+        else:
+            found |= _by_direct_sun(room, light, members, leaf)
+    return found
+
+
+def _by_direct_sun(
+    room: RoomInputs, light: RoomLight, members: list[int], rule: ShadingRule
+) -> dict[int, StateArray]:
+    """States [H] of control groups by LM-83's rule, or of Lightswitch-2002's active user."""
+    through = direct_sun_by_group(light.light)
+    if through is None:
+        message = f"{rule.behaviour} reads the direct sun, which the three-phase method lacks"
+        raise DataError(message, element=room.space.label, field="control.behaviour")
+    control, plane = room.windows.control, _plane_sensors(room, light)
+    direct = np.stack([np.sum([through[g][plane] for g in np.flatnonzero(control == c)], axis=0)
+                       for c in members])  # [n, S, L]  # fmt: skip
+    if rule.behaviour == "LM-83":
+        lit = blinds_operated(list(direct.transpose(0, 2, 1))).astype(np.int64)
+        closed = [room.skies.whole_year(one).astype(np.int64) for one in lit]
+        return {c: one * _closed(room, c) for c, one in zip(members, closed, strict=True)}
+    place = light.scene.eye.position if rule.at is None else rule.at
+    nearest = int(np.argmin(np.linalg.norm(light.scene.points[plane] - np.array(place), axis=1)))
+    sky, normal = room.skies, room.weather.direct_normal[room.skies.lit]
+    watts = np.where(sky.illuminance > 0, normal / np.maximum(sky.illuminance, 1e-9), 0.0)
+    present, rows = _present(room), rows_of_day(room)
+    return {
+        c: lightswitch_2002(
+            sky.whole_year(of_group[nearest] * watts), present, rows, closed=_closed(room, c)
+        )
+        for c, of_group in zip(members, direct, strict=True)
+    }
+
+
+def _by_habit(
+    room: RoomInputs, light: RoomLight, states: StateArray, members: list[int], rule: ShadingRule
+) -> dict[int, StateArray]:
+    """States [H] of control groups of which Haldi and Robinson's people lower a share.
+
+    Light of the groups is added: that of each is known in each of its states.
+    """
+    counts = [group_states(room, c) for c in members]
+
+    def indoors(of_groups: StateArray) -> FloatArray:
+        rows = light.states(of_groups[:, room.windows.control])
+        return room.skies.whole_year(_plane_lx(room, light, rows, rule.at))
+
+    base, more = indoors(states), []
+    for c, count in zip(members, counts, strict=True):
+        of_states = []
+        for state in range(count):
+            other = states.copy()
+            other[:, c] = state
+            of_states.append(indoors(other) - base)
+        more.append(np.stack(of_states))  # [J, H]
+
+    def lux(hour: int, shares: FloatArray) -> float:
+        parts = (
+            np.interp((1.0 - share) * (len(of) - 1), np.arange(len(of)), of[:, hour])
+            for share, of in zip(shares, more, strict=True)
+        )
+        return float(base[hour] + sum(parts))
+
+    level = facade_illuminance(room, "horizontal")[:, 0]
+    shares = haldi_robinson_2010(
+        lux, level, _present(room), blinds=len(members), seed=rule.seed,
+        substeps=max(round(12 * room.weather.step_h), 1),
+    )  # fmt: skip
+    return {
+        c: np.rint((1.0 - shares[:, n]) * (counts[n] - 1)).astype(np.int64)
+        for n, c in enumerate(members)
+    }
+
+
+def _closed(room: RoomInputs, c: int) -> int:
+    """The last state of a control group, or that which its rule by people names."""
+    leaf = next(one for one in room.control.rules[c].leaves if one.rule == "manual")
+    return leaf.state or group_states(room, c) - 1
+
+
+def _present(room: RoomInputs) -> FloatArray:
+    """Share of the people that is present [H]."""
+    if room.operation is None:
+        return room.occupied.astype(float)
+    return OperationHours(room.operation, room.weather).present
+
+
+def _plane_sensors(room: RoomInputs, light: RoomLight) -> slice:
+    return slice(0, len(light.scene.points) - room.other_sensors)
+
+
+def _plane_lx(
+    room: RoomInputs, light: RoomLight, rows: StateArray, at: tuple[float, float, float] | None
+) -> FloatArray:
+    """Daylight of the work plane in the lit hours [L] [lx]: the mean, or at the nearest sensor.
+
+    Args: rows: [G, L] states of the window groups.
+    """
+    plane = _plane_sensors(room, light)
+    values: FloatArray = illuminance(light.light, rows)[plane].astype(float)
+    if at is None:
+        return values.mean(axis=0)
+    return values[np.argmin(np.linalg.norm(light.scene.points[plane] - np.array(at), axis=1))]
+
+
+def _take_jointly(
     room: RoomInputs,
     light: RoomLight,
     states: StateArray,
-    glare: NDArray[np.int64],
+    joint: NDArray[np.int64],
     progress: Progress,
 ) -> None:
-    """Set the states [H, N] of control groups to the most open combination without glare.
+    """Set the states [H, N] of control groups to the best combination for all rules of light.
 
-    At every seat that their rules name, with all other groups in their states.
+    The most open one whose glare at every seat, and whose daylight, are within their limits; for
+    rules that leave a target of daylight the most closed one that does.  All other
+    groups are in their states.
     """
-    counts = [group_states(room, c) for c in glare]
+    counts = [group_states(room, c) for c in joint]
     combinations = np.array(list(product(*map(range, counts))), dtype=np.int64)
     if len(combinations) > MOST_COMBINATIONS:
-        message = f"{len(glare)} groups have {len(combinations)} combinations of states, at most "
+        message = f"{len(joint)} groups have {len(combinations)} combinations of states, at most "
         message += f"{MOST_COMBINATIONS} are rated: let more windows move together"
         raise DataError(message, element=room.space.label, field="control.groups")
-    windows, lit = room.windows, room.skies.lit
-    areas = np.array(
-        [sum(windows.groups[g].area for g in np.flatnonzero(windows.control == c)) for c in glare]
-    )
-    closure = combinations / np.maximum(np.array(counts) - 1, 1) @ (areas / areas.sum())
-    leaves = [leaf for c in glare for leaf in room.control.rules[c].leaves if leaf.rule == "glare"]
-    limits = _limits(room, light, leaves)
+    lit = room.skies.lit
+    leaves = [leaf for c in joint for leaf in room.control.rules[c].leaves]
+    closure = _closure(room, joint, combinations, leaves)
+    targets = [leaf for leaf in leaves if leaf.rule == "daylight"]
+    limits = _limits(room, light, [leaf for leaf in leaves if leaf.rule in JOINT_RULES])
+    if targets and len(targets) < len([leaf for leaf in leaves if leaf.rule in JOINT_RULES]):
+        message = 'the rule "daylight" closes as far as it can, others open: not in one room'
+        raise DataError(message, element=room.space.label, field="control.rule")
+    if targets:  # the most closed first, the most open where none leaves the target
+        combinations, closure = combinations[::-1], -closure[::-1]
 
     def excess(number: int, hours: NDArray[np.int64]) -> FloatArray:
         chosen = states.copy()
-        chosen[:, glare] = combinations[number]
-        rows = light.states(chosen[:, windows.control])
+        chosen[:, joint] = combinations[number]
+        rows = light.states(chosen[:, room.windows.control])
         steps = part(
             progress, number / len(combinations), (number + 1) / len(combinations), "glare control"
         )
         return np.max([limit(rows, hours, steps) for limit in limits], axis=0)
 
     chosen = by_glare(closure, excess, len(lit))
-    states[np.ix_(lit, glare)] = combinations[chosen]
+    states[np.ix_(lit, joint)] = combinations[chosen]
+
+
+def _closure(
+    room: RoomInputs,
+    joint: NDArray[np.int64],
+    combinations: StateArray,
+    leaves: Sequence[ShadingRule],
+) -> FloatArray:
+    """How closed each combination of states is [M], 0 to 1: the mean, weighted by glass area.
+
+    Of each group its number among its states, or the view through that it takes away.
+    """
+    if any(leaf.prefer == "view" for leaf in leaves):
+        return view_taken(room, joint, combinations) + 1e-3 * _mean_of_groups(
+            room, joint, combinations
+        )
+    return _mean_of_groups(room, joint, combinations)
+
+
+def view_taken(room: RoomInputs, groups: NDArray[np.int64], combinations: StateArray) -> FloatArray:
+    """Share of the view out that each combination of states of control groups takes away [M].
+
+    By the light of normal incidence that goes straight on, of that in the state with the most.
+    """
+    taken = []
+    for c in groups.tolist():
+        first = int(np.argmax(room.windows.control == c))
+        seen = np.array([sight_through(one).straight for one in room.windows.systems[first]])
+        taken.append(1.0 - seen / max(float(seen.max()), 1e-9))
+    return _mean_of_groups(room, groups, combinations, taken)
+
+
+def _mean_of_groups(
+    room: RoomInputs,
+    groups: NDArray[np.int64],
+    combinations: StateArray,
+    values: Sequence[FloatArray] = (),
+) -> FloatArray:
+    """Mean over control groups, weighted by glass area, in each combination of states [M].
+
+    Args: values: [N][J] in each state; by default 0 for the first to 1 for the last.
+    """
+    windows, each, areas = room.windows, [], []
+    for n, c in enumerate(groups.tolist()):
+        count = group_states(room, c)
+        of_states = values[n] if len(values) else np.arange(count) / max(count - 1, 1)
+        each.append(of_states[np.minimum(combinations[:, n], len(of_states) - 1)])
+        areas.append(sum(windows.groups[g].area for g in np.flatnonzero(windows.control == c)))
+    mean: FloatArray = np.stack(each, axis=1) @ (np.array(areas) / np.sum(areas))
+    return mean
 
 
 Excess = Callable[[StateArray, NDArray[np.int64], Progress], FloatArray]
@@ -339,6 +703,10 @@ def _limits(room: RoomInputs, light: RoomLight, rules: list[ShadingRule]) -> lis
     lights: dict[object, PhaseLight | SeasonalLight] = {}
     limits: dict[object, Excess] = {}
     for rule in rules:
+        if rule.rule in ("work plane", "daylight"):
+            level = rule.closes_above_lx if rule.rule == "work plane" else rule.target_lx
+            limits[rule.rule, rule.at, level] = _excess_daylight(room, light, rule, level)
+            continue
         seat = rule.seat, rule.looks_deg
         if seat not in lights:
             view = None if seat == (None, None) else seat_view(room, seat, light.scene.eye)
@@ -350,6 +718,17 @@ def _limits(room: RoomInputs, light: RoomLight, rules: list[ShadingRule]) -> lis
             else _excess_dgp(lights[seat], limit, rating_of(room.options.outputs))
         )
     return list(limits.values())
+
+
+def _excess_daylight(room: RoomInputs, light: RoomLight, rule: ShadingRule, level: float) -> Excess:
+    """Daylight of the work plane above a level, or below it where it is a target."""
+    sign = 1.0 if rule.rule == "work plane" else -1.0
+
+    def excess(rows: StateArray, hours: NDArray[np.int64], progress: Progress) -> FloatArray:
+        values = _plane_lx(room, light, rows, rule.at)[hours].astype(np.float32)
+        return sign * (values.astype(float) - level) / level
+
+    return excess
 
 
 def _excess_illuminance(light: PhaseLight | SeasonalLight, limit: float) -> Excess:

@@ -32,7 +32,7 @@ from mitsuba_cfs.sky.matrix import series_matrix, sky_series
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.kernels.scene import SceneCache
-from mitsuba_cfs.trace.matrices.absorption import absorption_matrix
+from mitsuba_cfs.trace.matrices.adjacent import absorption_matrix
 from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
 from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
 from scenes.room.inputs import RoomInputs

@@ -8,7 +8,8 @@ from bim.ifc.control import StoredGroup, read_control
 from bim.model import Building
 from mitsuba_cfs.errors import DataError
 from scenes.room.control_groups import control_groups
-from scenes.room.operation_tables import ControlTable, OperationTables
+from scenes.room.operation_tables import OperationTables
+from scenes.room.shading_rules import ControlTable
 from scenes.toml_file import validated
 
 

@@ -36,11 +36,13 @@ from scenes.room.inputs import RoomInputs
 from scenes.room.operation import OperationHours
 from scenes.room.operation_tables import GroundTable, NeighbourTable, OperationTables
 from scenes.room.options import Occupancy
+from scenes.room.shading import RuledYear
+from scenes.room.shading_rules import JOINT_RULES
 from scenes.room.solar import SeasonalOutdoors, SunBeyond, solar_gains, sun_by_hour
 from scenes.room.windows import RoomWindows
 from thermal.balance import BalanceOptions, ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
-from thermal.control import TemperatureCondition, TemperatureControl
+from thermal.control import RoomCondition, TemperatureControl
 from thermal.errors import ThermalInputError
 from thermal.ground import (
     SOILS,
@@ -308,12 +310,14 @@ class RoomZone:
             chosen([room.zone.gains.radiant for room in rooms]),
         )
         states = chosen([room.shading.states for room in rooms])
+        reasons = (*rooms[0].shading.reasons, BY_ROOM)
+        moved_by = _moved_by([room.shading for room in rooms], number, states)
         return replace(
             self,
             room=replace(self.room, zone=replace(self.zone, gains=gains)),
             solar=sun_by_hour([room.solar for room in rooms], number),
             gains={key: chosen([room.gains[key] for room in rooms]) for key in self.gains},
-            shading=replace(self.shading, states=states),
+            shading=replace(self.shading, states=states, moved_by=moved_by, reasons=reasons),
             lamps=chosen([room.lamps for room in rooms]),
             daylight=chosen(planes) if planes else None,
             sun_beyond={
@@ -339,11 +343,29 @@ class RoomZone:
         return replace(self, room=replace(self.room, zone=replace(self.zone, view_factors=among)))
 
 
+BY_ROOM = "the room's temperature or load"  # the reason of a move that the balance decides
+
+
+def _moved_by(
+    years: Sequence[ShadingYear], number: NDArray[np.int64], states: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """The number of the reason of each move [H, N] where the balance chose among years.
+
+    Args: number: [H] of the chosen one; states: [H, N] as chosen.
+    """
+    every = [np.full_like(states, -1) if y.moved_by is None else y.moved_by for y in years]
+    chosen: NDArray[np.int64] = np.stack(every)[number, np.arange(len(number))]
+    same = np.concatenate([[True], number[1:] == number[:-1]])[:, None]
+    chosen = np.where(same & (chosen >= 0), chosen, len(years[0].reasons))
+    moved = np.concatenate([np.zeros_like(states[:1]), np.diff(states, axis=0)]) != 0
+    return np.where(moved, chosen, -1)
+
+
 @dataclass(frozen=True, slots=True)
 class RoomAlternatives:
     """A room by which conditions its temperature meets: see `thermal.control`."""
 
-    conditions: tuple[TemperatureCondition, ...]
+    conditions: tuple[RoomCondition, ...]
     rooms: tuple[RoomZone, ...]
 
 
@@ -496,7 +518,8 @@ def reads_work_plane(room: RoomInputs) -> bool:
         return False
     dimmed = tables.gains.dimming is not None
     leaves = (leaf for rule in room.control.rules for leaf in rule.leaves)
-    return any(leaf.rule == "glare" for leaf in leaves) or dimmed
+    by_light = any(leaf.rule in (*JOINT_RULES, "manual") for leaf in leaves)
+    return by_light or dimmed
 
 
 def room_zone(
@@ -506,11 +529,14 @@ def room_zone(
     state: NDArray[np.int64],
     daylight: DaylightResult | None = None,
     *,
+    ruled: RuledYear | None = None,
     progress: Progress = silent,
 ) -> RoomZone:
     """The zone of a room in the shading states of every hour [H, G].
 
-    Args: daylight: dims the lamps; needed where `reads_work_plane`.
+    Args:
+        daylight: dims the lamps; needed where `reads_work_plane`.
+        ruled: the rules' year, where the states are by rules: says what moved the windows.
     """
     progress("heat", 0.0)
     zone, lamps = surfaces.room, np.zeros(room.skies.hours)
@@ -537,12 +563,15 @@ def room_zone(
         seed=room.options.sampling.seed,
         cache=room.cache,
     )
+    shading = room.shading(state)
+    if ruled is not None:
+        shading = room.shading(state, ruled.moved_by, ruled.reasons)
     solar, gains, beyond = solar_gains(
         room, outdoors, surfaces.room, surfaces.outer, state,
         thermals=surfaces.thermals, progress=progress,
     )  # fmt: skip
     return RoomZone(
-        room.space, zone, solar, gains, room.shading(state), lamps, room.occupied, plane, services,
+        room.space, zone, solar, gains, shading, lamps, room.occupied, plane, services,
         fenestration=tuple(fenestration_table(room.windows, surfaces.thermals)),
         states=tuple(system.name for system in max(room.windows.systems, key=len, default=())),
         operation=room.operation, sun_beyond=beyond,

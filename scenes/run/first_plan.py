@@ -46,7 +46,7 @@ from scenes.run.together import traced_together
 # a hundredth of a full run's paths; fewer where the run has fewer
 PATHS = {"sensor_samples": 256, "patch_samples": 128}
 SPACING = 1.0  # of the sensors, at least [m]
-READ = {"eye"}  # what a rule of shading may read; others leave the first state
+READ = {"eye", "plane"}  # what a rule of shading may read; others leave the first state
 GLARE = LIMITS[1]  # above it glare disturbs, EN 17037's medium level
 SET = 24  # rooms that are traced together: each has its surroundings in memory
 FROM = 6  # rooms; fewer are computed nearly as soon

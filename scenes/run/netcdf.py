@@ -54,8 +54,8 @@ def year_dataset(result: RunResult) -> Dataset:
 
     rooms = result.spaces
     names = folder_names([room.space for room in rooms])
-    found = _hours(rooms) | _sensors(rooms, names) | _surfaces(rooms, names)
-    found |= _pictures(result, names) | _years(rooms)
+    variables = _hours(rooms) | _sensors(rooms, names) | _surfaces(rooms, names)
+    variables |= _pictures(result, names) | _years(rooms)
     coordinates = {
         "time": ("time", result.times, {"long_name": "middle of the hour, local standard time"}),
         "room": ("room", names, {"long_name": "folder of the room"}),
@@ -75,8 +75,8 @@ def year_dataset(result: RunResult) -> Dataset:
         "site": str(manifest["site"]),
     }
     owners = ("sensor_room", "surface_name", "surface_room", "picture_time", "picture_room")
-    places = [name for name in (*PLACES, *owners) if name in found]
-    return xr.Dataset(found, coordinates, about).set_coords(places)
+    places = [name for name in (*PLACES, *owners) if name in variables]
+    return xr.Dataset(variables, coordinates, about).set_coords(places)
 
 
 def write_netcdf(result: RunResult, path: str | PathLike[str]) -> None:

@@ -127,14 +127,14 @@ def run_study(
         store = Store(Path(store), inputs=study.files)
     store.open()
     cases = {case.key: case for case in plan.cases}
-    found = {key: result for key in cases if (result := store.load(key)) is not None}
-    reused, total = len(found), len(cases)
+    finished = {key: result for key in cases if (result := store.load(key)) is not None}
+    reused, total = len(finished), len(cases)
 
     def under_way(stage: str = "", fraction: float = 0.0) -> None:
-        progress(Stage(stage, "case", min(len(found) + 1, total), total), fraction)
+        progress(Stage(stage, "case", min(len(finished) + 1, total), total), fraction)
 
     under_way()
-    left = [case for key, case in cases.items() if key not in found]
+    left = [case for key, case in cases.items() if key not in finished]
     results_of_left = computed(
         left, compute, processes=processes, scheduler=scheduler, progress=under_way
     )
@@ -142,11 +142,11 @@ def run_study(
         for result in results_of_left:
             if not result.error and cases[result.key].control is None:
                 store.save(result)
-            found[result.key] = result
+            finished[result.key] = result
             under_way()
             if on_case is not None:
-                on_case(cases[result.key], result, len(found), total)
-    results = tuple(found[case.key] for case in plan.cases)
+                on_case(cases[result.key], result, len(finished), total)
+    results = tuple(finished[case.key] for case in plan.cases)
     seconds = round(time.monotonic() - start, 3)
     return StudyResult(study.title, plan, results, reused, seconds, study.quick, head=head)
 
@@ -168,10 +168,10 @@ def with_explorers(
         processes, scheduler, progress: as of `run_study`.
         on_case: called with each case that is ready.
     """
-    found: dict[str, ExploredCase] = {}
+    by_case: dict[str, ExploredCase] = {}
 
     def under_way(stage: str = "", fraction: float = 0.0) -> None:
-        number, total = min(len(found) + 1, len(chosen)), len(chosen)
+        number, total = min(len(by_case) + 1, len(chosen)), len(chosen)
         progress(Stage(stage, "explorer", number, total), fraction)
 
     under_way()
@@ -184,11 +184,11 @@ def with_explorers(
     )
     with closing(made):
         for case, explored in made:
-            found[explored.key] = explored
+            by_case[explored.key] = explored
             under_way()
             if on_case is not None:
                 on_case(case, explored)
-    every = {number: found[explorer_key(case)] for number, case in chosen.items()}
+    every = {number: by_case[explorer_key(case)] for number, case in chosen.items()}
     return replace(result, explored={n: one for n, one in every.items() if not one.error})
 
 

@@ -36,8 +36,8 @@ def write_study_ifc(study: StudyResult, out: Path) -> tuple[Issue, ...]:
             for case, result in cases:
                 _, space = study.plan.rooms[case.scene]
                 values |= _values(space, case, result)
-            found = write_results(source, values, part, set_name=f"{SET_NAME}: {name}")
-            issues |= dict.fromkeys(found)
+            written = write_results(source, values, part, set_name=f"{SET_NAME}: {name}")
+            issues |= dict.fromkeys(written)
             source = part
     return tuple(issues)
 
@@ -46,12 +46,12 @@ def _by_variant(
     done: Sequence[tuple[Case, CaseResult]],
 ) -> dict[str, list[tuple[Case, CaseResult]]]:
     """The cases of all rooms by what they are besides the room."""
-    found: dict[str, list[tuple[Case, CaseResult]]] = {}
+    variants: dict[str, list[tuple[Case, CaseResult]]] = {}
     for case, result in done:
         angle = f"{case.orientation_deg:g} deg"
         name = ", ".join((case.system, case.climate, angle, case.options.method))
-        found.setdefault(name, []).append((case, result))
-    return found
+        variants.setdefault(name, []).append((case, result))
+    return variants
 
 
 def _values(space: Space, case: Case, result: CaseResult) -> dict[str, dict[str, Any]]:

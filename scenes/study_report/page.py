@@ -104,8 +104,8 @@ def _extremes(
     study: StudyResult, value: Callable[[CaseResult], float]
 ) -> tuple[tuple[str, float], tuple[str, float]]:
     """Name and value of the case with least and of that with most."""
-    found = [(case_label(study, case), value(result)) for _, case, result in finished(study)]
-    return min(found, key=lambda one: one[1]), max(found, key=lambda one: one[1])
+    values = [(case_label(study, case), value(result)) for _, case, result in finished(study)]
+    return min(values, key=lambda one: one[1]), max(values, key=lambda one: one[1])
 
 
 def _daylight(study: StudyResult) -> str:
@@ -402,7 +402,7 @@ def _layers(study: StudyResult, scenes: list[str]) -> tuple[ColourLayer, ...]:
         if not result.error:
             key = (case.system, case.climate, case.orientation_deg, case.options.method)
             groups.setdefault(key, {})[case.scene] = case, result
-    found = []
+    layers = []
     for members in groups.values():
         if set(members) != set(scenes):
             continue
@@ -411,8 +411,8 @@ def _layers(study: StudyResult, scenes: list[str]) -> tuple[ColourLayer, ...]:
             q = quantity(column)
             values = np.concatenate([members[s][1].arrays[f"sensor/{column}"] for s in scenes])
             scale = ColourScale(0.0, 100.0, f"{q.label}: {label}", "%")
-            found.append(ColourLayer(column, scale, colour_bytes(scale, values), 0))
-    return tuple(found[:MOST_LAYERS])
+            layers.append(ColourLayer(column, scale, colour_bytes(scale, values), 0))
+    return tuple(layers[:MOST_LAYERS])
 
 
 TICKS = 4

@@ -18,7 +18,7 @@ from bim.ifc.building import read_ifc
 from bim.ifc.correct import correct
 from bim.ifc.corrections import Corrections, Paint, read_corrections
 from bim.ifc.corrections_draft import corrections_draft
-from bim.ifc.query import query
+from bim.ifc.targets import query
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
 from scenes.commands.ifc import command

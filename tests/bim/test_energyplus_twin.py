@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bim.energyplus_operation import FILE
-from bim.energyplus_twin import EnergyPlusTwin, TwinAir, TwinRoom
+from bim.energyplus_twin import FILE, EnergyPlusTwin, TwinAir, TwinRoom
 from bim.energyplus_windows import AIR, TYPICAL, WindowOptics, complex_state
 from bim.model import Building
 from bim.shoebox import WindowRectangle, shoebox

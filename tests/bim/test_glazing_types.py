@@ -14,7 +14,7 @@ import pytest
 from bim.building_file import held_states, read_building_file
 from bim.model import Building, Window
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
-from mitsuba_cfs.bsdf.fabric import FabricBand, fabric_klems
+from mitsuba_cfs.bsdf.screens import FabricBand, fabric_klems
 from mitsuba_cfs.bsdf.xml import bsdf_xml
 from mitsuba_cfs.errors import DataError
 from tests.bim.honeybee_models import two_rooms, write

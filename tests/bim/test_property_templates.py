@@ -15,8 +15,7 @@ import pytest
 from bim.fenestration import ShadingState
 from bim.ifc.fenestration_read import THERMAL
 from bim.ifc.fenestration_write import BLOCKS, attach_state
-from bim.ifc.property_definition import write_psd
-from bim.ifc.property_templates import IDS, KINDS, XS, write_ids, write_templates
+from bim.ifc.property_templates import IDS, KINDS, XS, write_ids, write_psd, write_templates
 from mitsuba_cfs.bsdf.klems import KLEMS_HALF, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
 from thermal.closure import Closure

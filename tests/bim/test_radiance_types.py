@@ -12,7 +12,7 @@ from bim.building_file import read_building_file
 from bim.model import Building
 from bim.report.issue import area_words
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
-from mitsuba_cfs.bsdf.fabric import FabricBand, fabric_klems
+from mitsuba_cfs.bsdf.screens import FabricBand, fabric_klems
 from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.surfaces import triangle_areas
@@ -229,6 +229,6 @@ def test_a_mixture_of_itself_is_refused(tmp_path):
 
 def test_the_table_has_all_types_that_are_known():
     from bim.radiance.materials import MATERIALS, MIXTURE, PATTERNS
-    from bim.radiance.shapes import KINDS
+    from bim.radiance.scene import KINDS
 
     assert {*MATERIALS, *PATTERNS, *KINDS, MIXTURE} <= {kind for kind, _, _ in rows()}

@@ -10,8 +10,7 @@ import pytest
 
 from bim.building_file import read_building_file
 from bim.gbxml import document
-from bim.gbxml.building import read_gbxml
-from bim.gbxml.constructions import Constructions
+from bim.gbxml.building import Constructions, read_gbxml
 from bim.gbxml.document import read_document
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError

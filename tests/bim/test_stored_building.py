@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 import bim.building_file
-from bim.building_file import ReadOptions, read_building_file
+from bim.building_file import READER, ReadOptions, _NotStored, _restored, read_building_file, stored
 from bim.shoebox import shoebox
-from bim.stored_building import READER, _NotStored, _restored, stored
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.processes import ProcessEnded, each_apart
 from mitsuba_cfs.source_code import import_closure
@@ -116,7 +115,7 @@ def test_a_building_that_lacks_what_a_process_did_not_finish_is_not_stored(
 
 
 def test_the_sources_that_read_and_store_are_in_the_key() -> None:
-    assert {"bim.ifc.building", "bim.stored_building"} <= import_closure((READER,))
+    assert {"bim.ifc.building", "bim.building_file"} <= import_closure((READER,))
 
 
 def test_a_damaged_file_of_the_cache_is_read_from_its_source(office, cache, reads) -> None:

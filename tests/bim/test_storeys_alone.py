@@ -10,7 +10,7 @@ from bim.building_file import ReadOptions, named_spaces, read_building_file
 from bim.ifc.building import read_ifc
 from bim.ifc.damage import Damage
 from bim.ifc.project import storey_of
-from bim.ifc.storeys import keep_storeys
+from bim.ifc.source import keep_storeys
 from mitsuba_cfs.errors import DataError
 from tests.benchmarks.tower import tower
 

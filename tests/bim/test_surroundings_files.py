@@ -13,8 +13,12 @@ from bim.ifc.building import read_ifc
 from bim.model import Georeference, crs_name, local_metres
 from bim.shell import enclosed_volume
 from bim.shoebox import WindowRectangle, shoebox
-from bim.surroundings.placement import read_surroundings, with_surroundings
-from bim.surroundings.terrain import horizon_wall, read_horizon
+from bim.surroundings.placement import (
+    horizon_wall,
+    read_horizon,
+    read_surroundings,
+    with_surroundings,
+)
 from mitsuba_cfs.errors import DataError
 from tests.bim.bim_fuzz import mutations, refusals
 from tests.bim.small_ifc import box_room

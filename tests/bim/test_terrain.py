@@ -10,8 +10,7 @@ import pytest
 from bim.model import Georeference
 from bim.rays import ray_mesh
 from bim.shoebox import WindowRectangle, shoebox
-from bim.surroundings.placement import read_surroundings, with_surroundings
-from bim.surroundings.terrain import graded
+from bim.surroundings.placement import graded, read_surroundings, with_surroundings
 from mitsuba_cfs.errors import DataError
 from tests.bim.bim_fuzz import mutations
 

@@ -14,8 +14,7 @@ from bim.rays import ray_mesh
 from bim.report.issue import issue_text
 from bim.shoebox import WindowRectangle, shoebox
 from bim.surroundings.city_models import BARE, LEAFED, monthly_transmittance, tree_of
-from bim.surroundings.crowns import crown_elements
-from bim.surroundings.placement import read_surroundings, with_surroundings
+from bim.surroundings.placement import crown_elements, read_surroundings, with_surroundings
 from mitsuba_cfs.errors import DataError
 from tests.issues import of_code
 

@@ -11,7 +11,7 @@ import pytest
 
 from bim.rays import ray_mesh
 from bim.surroundings.city_models import tree_of
-from bim.surroundings.crowns import _attenuations, crown_elements
+from bim.surroundings.placement import _attenuations, crown_elements
 from bim.to_tracer import element_surfaces
 from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix

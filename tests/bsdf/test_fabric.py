@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 from mitsuba_cfs.bsdf.evaluate import through_peak
-from mitsuba_cfs.bsdf.fabric import FabricBand, fabric_klems, fabric_transmittances
 from mitsuba_cfs.bsdf.fabric_table import read_fabric_table
+from mitsuba_cfs.bsdf.screens import FabricBand, fabric_klems, fabric_transmittances
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from scenes.commands.bsdf import command

@@ -16,13 +16,12 @@ from click.testing import CliRunner
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
 from scenes.commands.comply import command
-from scenes.comply.answer import answers
 from scenes.comply.comply import check_rooms
 from scenes.comply.files import ComplyFiles, least_altitude, read_files
 from scenes.comply.findings import SeatGlare
 from scenes.comply.options import ComplyOptions
-from scenes.comply.outputs import write_compliance, write_into_ifc
-from scenes.comply.page import (
+from scenes.comply.outputs import (
+    answers,
     dossier_html,
     glare_words,
     plans,
@@ -30,6 +29,8 @@ from scenes.comply.page import (
     summary,
     sun_bars,
     tied,
+    write_compliance,
+    write_into_ifc,
 )
 from scenes.comply.results import GridSummary, RoomLights
 from scenes.comply.rules import read_rule

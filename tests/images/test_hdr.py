@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.images import rgbe
+from mitsuba_cfs.images import hdr
 from mitsuba_cfs.images.hdr import Picture, luminance, read_hdr, write_hdr
 from mitsuba_cfs.images.view import fisheye, parse_view
 
@@ -67,15 +67,15 @@ def test_run_length_code_gives_the_bytes_back(width):
     pixels[3, ::3] = 1
     pixels[:, :, 0] |= 128  # as every normal pixel's largest mantissa; (1, 1, 1, n) means a repeat
     again = np.zeros_like(pixels)
-    data = np.frombuffer(rgbe.encode_scanlines(pixels), dtype=np.uint8)
-    assert rgbe.decode_scanlines(data, again) == 4
+    data = np.frombuffer(hdr.encode_scanlines(pixels), dtype=np.uint8)
+    assert hdr.decode_scanlines(data, again) == 4
     assert np.array_equal(again, pixels)
 
 
 def test_old_run_length_code():
     data = np.array([9, 8, 7, 130, 1, 1, 1, 2, 3, 3, 3, 140], dtype=np.uint8)
     line = np.zeros((1, 4, 4), dtype=np.uint8)
-    assert rgbe.decode_scanlines(data, line) == 1
+    assert hdr.decode_scanlines(data, line) == 1
     assert line[0].tolist() == [[9, 8, 7, 130]] * 3 + [[3, 3, 3, 140]]
 
 
@@ -89,7 +89,7 @@ def test_every_orientation_is_set_upright_as_pvalue_does(resolution, tmp_path):
     path = tmp_path / "a.hdr"
     first, second = (int(word) for word in resolution.split()[1::2])
     stored = picture_pixels(first, second)
-    body = rgbe.encode_scanlines(rgbe.rgbe_from_pixels(stored))
+    body = hdr.encode_scanlines(hdr.rgbe_from_pixels(stored))
     header = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{resolution}\n"
     path.write_bytes(header.encode() + body)
     lines = np.array([line.split() for line in run("pvalue", "-h", "-H", path).splitlines()], float)

@@ -16,7 +16,7 @@ from mitsuba_cfs.notes import Note
 from scenes.comply.comply import check_rooms
 from scenes.comply.files import ComplyFiles
 from scenes.comply.options import ComplyOptions
-from scenes.comply.page import dossier_html
+from scenes.comply.outputs import dossier_html
 from scenes.comply.rules import read_rule, rule_names
 from scenes.comply.tables import limit_of
 from scenes.comply.uses import read_uses

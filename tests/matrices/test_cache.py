@@ -197,7 +197,7 @@ def test_the_sun_and_what_is_absorbed_come_from_the_cache(variant, cache, monkey
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL
     from mitsuba_cfs.trace.kernels import scattering
     from mitsuba_cfs.trace.kernels.estimate import Stopping
-    from mitsuba_cfs.trace.matrices import absorption
+    from mitsuba_cfs.trace.matrices import adjacent
     from mitsuba_cfs.trace.sun import direct
 
     room, groups = rooms.test_room()
@@ -209,14 +209,14 @@ def test_the_sun_and_what_is_absorbed_come_from_the_cache(variant, cache, monkey
             room, rooms.NOTHING, groups, [way], [[1.8, 1, 0.8]], [[0, 0, 1]], suns=[[0, -1, 0.6]],
             window_points=16, stopping=few, cache=cache,
         )  # fmt: skip
-        absorbed = absorption.absorption_matrix(
+        absorbed = adjacent.absorption_matrix(
             room, groups, window_reflectance=[reflectance], samples=16, stopping=few, cache=cache
         )
         return sun.values, absorbed.values
 
     first = both(0.5, 0.1)
     with monkeypatch.context() as patch:
-        for module in (direct, absorption):
+        for module in (direct, adjacent):
             patch.setattr(module, "TracedScene", _must_not_trace(module.TracedScene))
         assert all(np.array_equal(*pair) for pair in zip(first, both(0.5, 0.1), strict=True))
     other = both(0.6, 0.2)

@@ -124,7 +124,10 @@ def operation_result(times, beam, daylight) -> OperationResult:
     summary = {f"{n}_kwh": float(hours[f"{n}_w"].sum() / 1e3) for n in ("heating", "cooling")}
     summary |= {"lighting_kwh": float(lamps.sum() / 1e3), "peak_heating_w": 900.0}
     states = hours["shading_state"].to_numpy()[:, None]
-    shading = ShadingYear(("S",), ("irradiance",), states, np.zeros(1, dtype=np.int64))
+    shading = ShadingYear(
+        ("S",), ("irradiance",), states, np.zeros(1, dtype=np.int64),
+        views=(np.array([True, False]),),
+    )  # fmt: skip
     return OperationResult(("open", "slats 40°", "closed <70°>"), hours, summary, shading)
 
 

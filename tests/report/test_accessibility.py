@@ -14,7 +14,7 @@ import pytest
 from bim.shoebox import shoebox
 from scenes.comply.comply import check_rooms
 from scenes.comply.options import ComplyOptions
-from scenes.comply.page import dossier_html
+from scenes.comply.outputs import dossier_html
 from scenes.demo import WEATHER
 from scenes.explore.folder import write_explorer
 from scenes.page_options import PageOptions

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from bim.report.issue import Issue
-from scenes.report.orientation import INNER, OUTER, orientation
-from scenes.report.page import report_html
+from scenes.report.page import INNER, OUTER, orientation, report_html
 from tests.report.synthetic import run_result
 
 

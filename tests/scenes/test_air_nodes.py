@@ -11,7 +11,7 @@ from mitsuba_cfs.errors import DataError
 from scenes.heat.air_nodes import with_air_nodes
 from scenes.room.zone import RoomAlternatives, balances, coupled
 from tests.scenes.test_coupled_heat import lit, two_boxes
-from thermal.control import TemperatureCondition, by_threshold
+from thermal.control import RoomCondition, by_threshold
 
 TABLES = {"loads": {"heating_c": 22.0, "cooling_c": 25.0}, "gains": {"equipment_w_m2": 5.0},
           "air": {"infiltration_ach": 0.3}}  # fmt: skip
@@ -97,11 +97,11 @@ def _shaded(room, *conditions):
 
 def test_shading_by_temperature_follows_that_of_the_air_node(variant, weather, skies) -> None:
     rooms, links = _rooms(weather, skies, equal=False)
-    warm, hot = TemperatureCondition(23.0, 22.5), TemperatureCondition(24.0, 23.0)
+    warm, hot = RoomCondition(23.0, 22.5), RoomCondition(24.0, 23.0)
     one = _one([_shaded(rooms[0], warm, hot), _shaded(rooms[1], hot)], links)
     (result,) = balances([one], weather, 3600.0)
     air = result.air_c[:-1]
-    met = [by_threshold(air, c.above_c, c.below_c) for c in (warm, hot)]
+    met = [by_threshold(air, c.above, c.below) for c in (warm, hot)]
     np.testing.assert_array_equal(result.alternative[25:], (met[0] + 2 * met[1])[24:])
     assert 0 < met[1].sum() < met[0].sum()
     chosen = one.in_alternatives(result.alternative)
@@ -118,6 +118,6 @@ def test_more_conditions_in_an_air_node_than_can_be_computed_are_refused(
     variant, weather, skies
 ) -> None:
     rooms, links = _rooms(weather, skies, equal=False)
-    limits = [TemperatureCondition(float(t), float(t)) for t in range(22, 27)]
+    limits = [RoomCondition(float(t), float(t)) for t in range(22, 27)]
     with pytest.raises(DataError, match="5 limits of the temperature of Dwelling; at most 4"):
         _one([_shaded(rooms[0], *limits[:3]), _shaded(rooms[1], *limits[3:])], links)

@@ -11,8 +11,7 @@ import pytest
 
 from mitsuba_cfs.errors import DataError
 from scenes.calibration.costs import HEAT, Calibration, Workload, calibration_file
-from scenes.calibration.shipped import scaled_costs, shipped_costs
-from scenes.calibration.speed import Speed, measured_speed
+from scenes.calibration.shipped import Speed, measured_speed, scaled_costs, shipped_costs
 from scenes.cost.measure import Cost
 from scenes.study.automatic import Demand, choose
 
@@ -173,10 +172,10 @@ def test_the_machines_speed_is_measured(variant):
 
 
 def test_the_machine_is_tested_once_in_a_process(monkeypatch):
-    from scenes.calibration import shipped, speed
+    from scenes.calibration import shipped
 
     tested = iter([Speed(0.2, 0.002)])
-    monkeypatch.setattr(speed, "measured_speed", lambda: next(tested))
+    monkeypatch.setattr(shipped, "measured_speed", lambda: next(tested))
     shipped._speed_here.cache_clear()
     assert scaled_costs() == scaled_costs()
     shipped._speed_here.cache_clear()

@@ -13,7 +13,7 @@ from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
 from scenes.demo import WEATHER
 from scenes.heat.design_days import design_loads
-from scenes.heat.tables import energy_by_month, energy_summary, room_powers
+from scenes.heat.study import energy_by_month, energy_summary, room_powers
 from scenes.room.heat import felt_by, outdoor_humidity, room_humidity
 from scenes.room.operation_tables import ComfortTable, PlantTable
 from scenes.room.zone import RoomServices, RoomZone

@@ -9,8 +9,7 @@ import pytest
 
 from mitsuba_cfs.images.hdr import read_hdr
 from mitsuba_cfs.images.view import fitted, parse_view
-from mitsuba_cfs.sky.epw import read_epw
-from mitsuba_cfs.sky.wea import write_wea
+from mitsuba_cfs.sky.epw import read_epw, write_wea
 from scenes import cli
 from scenes.demo import WEATHER
 from tests.conftest import REPOSITORY

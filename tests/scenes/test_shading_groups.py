@@ -35,7 +35,7 @@ from scenes.room.solar import seasonal_outdoors, solar_gains
 from scenes.room.windows import in_all_windows, room_windows
 from scenes.room.zone import RoomZone, balances, zone_surfaces
 from tests.scenes.small_box import FEW, HOURS, TWO, clear
-from thermal.control import TemperatureCondition
+from thermal.control import RoomCondition
 
 BESIDE = shoebox(
     6.0, 4.0, 2.8,
@@ -321,7 +321,7 @@ def test_rules_by_room_temperature_are_computed_both_ways(inputs) -> None:
     )
     room = inputs({"rule": "all", "parts": [sun, slow, slow]})
     (condition,) = temperature_conditions(room)
-    assert condition == TemperatureCondition(22.0, 21.0, True, 2, 3)
+    assert condition == RoomCondition(22.0, 21.0, "operative", 2, 3)
     outdoors, by_sun = seasonal_outdoors(room), by_group(inputs(sun))["S"]
     cold, warm = (
         shading_states(room, None, outdoors, met={condition: met})[:, 0] for met in (False, True)

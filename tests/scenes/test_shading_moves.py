@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -25,4 +27,14 @@ def test_moves_and_hours_by_state() -> None:
     moves = year.moves(times)
     assert moves["time"].dt.hour.tolist() == [9, 15, 6, 9, 15]
     assert moves["group"].tolist() == ["S", "S", "N", "S", "S"]
-    assert moves.iloc[2].tolist()[2:] == ["function", 0, 2]
+    assert moves.iloc[2].tolist()[2:] == ["function", "function", 0, 2]
+    assert table["most_moves_of_a_day"].tolist() == [2, 1]
+    assert year.moves_of_days(24).tolist() == [[2, 0], [2, 1]]
+    seen = replace(year, views=(np.array([True, False]), np.array([True, False, True])))
+    assert seen.figures(occupied, 24)["view_h"].tolist() == [8.0, 20.0]
+    by = np.full_like(states, -1)
+    by[[9, 15, 33, 39], 0] = [0, 1, 0, 1]
+    caused = replace(year, moved_by=by, reasons=("irradiance", "hold_h"))
+    assert caused.moves(times)["moved_by"].tolist()[:3] == ["irradiance", "hold_h", "function"]
+    counts = {key: of.tolist() for key, of in caused.moves_by_reason().items()}
+    assert counts == {"irradiance": [2, 0], "hold_h": [2, 0], "function": [0, 1]}

@@ -12,8 +12,7 @@ import pytest
 from bim.model import Building, seasons
 from bim.rays import ray_mesh
 from bim.surroundings.city_models import read_trees
-from bim.surroundings.crowns import _attenuations
-from bim.surroundings.placement import with_surroundings
+from bim.surroundings.placement import _attenuations, with_surroundings
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods.light import direct_sun
 from scenes import cli

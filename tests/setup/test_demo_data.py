@@ -16,7 +16,7 @@ import pytest
 
 from scenes import demo
 from scenes.demo import make_office
-from scenes.demo.office_materials import LAYERS, REFLECTANCES, u_value
+from scenes.demo.make_office import LAYERS, REFLECTANCES, u_value
 
 
 @pytest.fixture(scope="module")

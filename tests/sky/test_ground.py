@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.sky.annual import annual_sky, given_sky
-from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.epw import read_epw, read_wea, write_wea
 from mitsuba_cfs.sky.matrix import (
     gendaylit_ground,
     reflected_ground,
@@ -18,7 +18,6 @@ from mitsuba_cfs.sky.matrix import (
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.perez import relative_luminance
 from mitsuba_cfs.sky.sun import direction
-from mitsuba_cfs.sky.wea import read_wea, write_wea
 
 NEW_YEAR = 1  # the day whose distance to the sun `gendaylit -ang` takes
 # overcast, three between, clear, low and high suns: altitude [degrees], direct, diffuse [W/m2]

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from weather_files import epw_rows, write_epw
 
-from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.epw import read_epw, read_wea, write_wea
 from mitsuba_cfs.sky.matrix import sky_matrix, sky_series, sun_matrix, sun_up
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-from mitsuba_cfs.sky.wea import read_wea, write_wea
 from mitsuba_cfs.sky.weather import Weather
 
 EFFICACY = 179.0  # [lm/W] of Radiance

@@ -12,7 +12,7 @@ from weather_files import epw_rows, write_epw
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.mtx_io import read_header, read_matrix
-from mitsuba_cfs.sky.wea import read_wea
+from mitsuba_cfs.sky.epw import read_wea
 from scenes.commands.sky import command
 
 

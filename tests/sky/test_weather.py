@@ -7,8 +7,7 @@ import pytest
 from weather_files import epw_rows, write_epw
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.sky.epw import read_epw, spikes
-from mitsuba_cfs.sky.wea import read_wea, write_wea
+from mitsuba_cfs.sky.epw import read_epw, read_wea, spikes, write_wea
 from mitsuba_cfs.sky.weather import relative_humidity
 from mitsuba_cfs.sky.weather_table import EpwColumns, epw_ground, epw_location, year_of
 

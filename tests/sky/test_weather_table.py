@@ -11,9 +11,8 @@ import pytest
 from weather_files import epw_rows, write_epw
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.epw import read_epw, read_wea, write_wea
 from mitsuba_cfs.sky.measured import read_measured
-from mitsuba_cfs.sky.wea import read_wea, write_wea
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.sky.weather_table import noon_offset, whole_days
 

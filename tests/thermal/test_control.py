@@ -19,8 +19,11 @@ from thermal.control import (
     cut_off_angle,
     delayed,
     held,
+    latched,
     profile_angle,
+    sun_depth,
     switched,
+    with_few_moves,
 )
 from thermal.errors import ThermalInputError
 from thermal.zone import WindowElement, Zone
@@ -123,3 +126,27 @@ def test_unknown_states_are_refused():
         switched([light], np.ones(24, dtype=int))
     with pytest.raises(ThermalInputError, match="24 states"):
         by_schedule([0, 1], 24)
+
+
+def test_closed_until_an_event_and_few_moves_a_day():
+    states = np.array([0, 1, 0, 2, 1, 0, 0, 1])
+    ends = np.arange(8) == 5
+    assert latched(states, ends).tolist() == [0, 1, 1, 2, 2, 0, 0, 1]
+    assert with_few_moves(states, 2, 4).tolist() == [0, 1, 0, 0, 1, 0, 0, 0]
+    assert np.array_equal(with_few_moves(states, 8, 4), states)
+
+
+def test_depth_of_the_sun_behind_a_window():
+    """A window to the south with its head 2 m above the plane: 2 m / tan(profile angle)."""
+    corners = [(x, 0.0, z) for x in (0.0, 1.0) for z in (1.0, 2.5)]
+    angle = np.radians([30.0, 60.0])
+    south = np.stack([0 * angle, -np.cos(angle), np.sin(angle)], axis=1)
+    depth = sun_depth(south, [0.0, -1.0, 0.0], corners, 0.5)
+    assert depth == pytest.approx(2.0 / np.tan(angle))
+    turned = [0.4, -0.6, 0.5]
+    assert sun_depth([turned], [0.0, -1.0, 0.0], corners, 0.5) == pytest.approx(2.0 * 0.6 / 0.5)
+    assert sun_depth([[0.0, 0.6, 0.8], [0.0, -0.6, -0.8]], [0, -1, 0], corners, 0.5).max() == 0
+    leant = [(0.0, 0.0, 1.0), (0.0, 1.0, 2.0)]  # a roof window: its head is a metre inside
+    found = sun_depth([[0.0, -0.6, 0.8]], [0.0, -np.sqrt(0.5), np.sqrt(0.5)], leant, 0.0)
+    assert found == pytest.approx(1.0 + 2.0 * 0.6 / 0.8)
+    assert np.isinf(sun_depth([[0.0, -0.6, 0.8]], [0, 0, 1], leant, 0.0)[0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -100,6 +101,50 @@ def test_a_plan_is_the_cheapest_of_all_sequences(mass, seed) -> None:
     assert plan.heating.sum() + plan.cooling.sum() + plan.lamps.sum() == pytest.approx(chosen)
     assert chosen <= 1.001 * min(every.values())  # the grid is a kelvin wide
     assert chosen < 0.98 * np.median(list(every.values()))
+
+
+@pytest.mark.parametrize("move_wh", [60.0, 500.0])
+def test_a_plan_with_moves_that_cost_is_the_cheapest_of_all_sequences(move_wh) -> None:
+    """Two groups of two states: each that moves in an hour costs; before the first all are open."""
+    random, hours = np.random.default_rng(5), 5
+    zone = zone_of(hours, windows=np.array([15.0, 13.5, 13.5, 12.0]))
+    many = {key: random.uniform(0, top, (hours, 4)) for key, top in
+            (("sun", 2500.0), ("daylight", 800.0))}  # fmt: skip
+    acts = acting(
+        hours, **many, penalty=np.zeros((hours, 4)), counts=(2, 2), move_wh=move_wh
+    )  # fmt: skip
+    plan = predicted_year(zone, acts, ahead=hours, start_c=21.0)
+    assert (
+        plan.states != predicted_year(zone, replace(acts, move_wh=0.0), ahead=hours).states
+    ).any()
+
+    def whole(states) -> float:
+        groups = np.array([[0, 0], *((s // 2, s % 2) for s in states)])
+        return cost_of(zone, acts, states, 21.0) + move_wh * np.count_nonzero(
+            np.diff(groups, axis=0)
+        )
+
+    least = min(map(whole, product(range(4), repeat=hours)))
+    assert whole(plan.states.tolist()) <= 1.001 * least
+    again = predicted_year(zone, replace(acts, penalty=acts.penalty + 1.0), ahead=3, start_c=21.0)
+    assert np.count_nonzero(np.diff(again.states)) <= hours
+
+
+def test_errors_of_a_forecast_do_not_depend_on_how_many_are_drawn_together() -> None:
+    errors = {"sun_error": 0.3, "temperature_error_k": 1.0, "seed": 4}
+    few = noisy_forecast(700, 30, **errors)
+    walks = np.random.default_rng(4).standard_normal((2, 700, 30)).cumsum(axis=2) / np.sqrt(24.0)
+    walks -= walks[:, :, :1]
+    assert few.sun == pytest.approx(np.maximum(1 + 0.3 * walks[0], 0), rel=1e-5, abs=1e-6)
+    assert few.warmer_k == pytest.approx(walks[1], rel=1e-5, abs=1e-6)
+    year = noisy_forecast(8760, 8760, **errors)
+    assert year.sun.shape == (1, 8760), "one plan of the year has one forecast"
+    zone, acts = zone_of(40, mass=5e5), acting(40)
+    once = noisy_forecast(40, 40, sun_error=1.0, temperature_error_k=8.0, seed=4)
+    plan = predicted_year(zone, acts, ahead=40, forecast=once)
+    whole = Forecast(0, np.repeat(once.sun, 40, axis=0), np.repeat(once.warmer_k, 40, axis=0))
+    same = predicted_year(zone, acts, ahead=40, forecast=whole)
+    assert np.array_equal(plan.states, same.states) and plan.heating == pytest.approx(same.heating)
 
 
 def test_a_receding_plan_comes_near_and_a_penalty_goes_before_energy() -> None:

@@ -26,7 +26,7 @@ def room():
 
 
 def test_view_factors_of_a_room_with_a_window(variant, room):
-    from scenes.heat.radiant import radiant_room
+    from scenes.heat.study import radiant_room
 
     space, zoned = room
     zone = zoned.zone
@@ -56,7 +56,7 @@ def test_view_factors_are_found_again_while_the_room_is_as_it_was(
     variant, room, tmp_path, monkeypatch
 ):
     from mitsuba_cfs.matrices.cache import MatrixCache
-    from scenes.heat import radiant as module
+    from scenes.heat import study as module
 
     cache = MatrixCache(tmp_path)
 
@@ -93,7 +93,7 @@ def _counted(function, name, calls):
 
 
 def test_felt_temperatures_follow_their_rules_and_energy_closes(variant, room):
-    from scenes.heat.radiant import RadiantRoom, felt, radiant_room
+    from scenes.heat.study import RadiantRoom, felt, radiant_room
 
     space, zoned = room
     radiant = radiant_room(space, zoned, samples=4096)
@@ -119,7 +119,7 @@ def test_felt_temperatures_follow_their_rules_and_energy_closes(variant, room):
 
 
 def test_open_room_falls_back(variant, room):
-    from scenes.heat.radiant import radiant_room
+    from scenes.heat.study import radiant_room
 
     space, zoned = room
     keep = [i for i, f in enumerate(space.faces) if f.kind != "ceiling"]

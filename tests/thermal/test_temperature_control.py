@@ -11,7 +11,7 @@ from tests.thermal.rooms import box, climate, sun
 from thermal.balance import BalanceOptions, simulate, simulate_zones
 from thermal.blackbox import Fenestration
 from thermal.control import (
-    TemperatureCondition,
+    RoomCondition,
     TemperatureControl,
     by_threshold,
     delayed,
@@ -25,7 +25,7 @@ from thermal.zone import Gains
 
 HOURS = 24 * 6
 OUTDOOR = 17.0 - 6.0 * np.cos((np.arange(HOURS) - 3.0) / 24 * 2 * np.pi)
-WARM, WARMER = TemperatureCondition(26.0, 24.5), TemperatureCondition(26.3, 26.3, operative=True)
+WARM, WARMER = RoomCondition(26.0, 24.5), RoomCondition(26.3, 26.3, "operative")
 SHUT = Fenestration("shut", 0.8, emissivity_in=0.3)
 
 
@@ -40,10 +40,24 @@ def shaded_room():
     return room, day, shade
 
 
+def test_shading_follows_the_load_of_the_step_before():
+    room, day, shade = shaded_room()
+    room = replace(room, loads=IdealLoads(cooling_c=24.0))
+    year = {"step_s": 3600.0, "options": BalanceOptions(warm_days=0, start_c=23.0)}
+    for quantity, limit in (("cooling", 50.0), ("heating", 0.0)):
+        condition = RoomCondition(limit, limit, quantity)
+        control = TemperatureControl((condition,), (day, shade), (Gains(), Gains()))
+        outdoor = climate(HOURS, outdoor=OUTDOOR)
+        result = simulate(room, outdoor, day, control=control, **year)
+        power = result.cooling if quantity == "cooling" else result.heating
+        assert np.array_equal(result.alternative[1:] > 0, power[:-1] > limit)
+        assert (result.alternative > 0).any() == (quantity == "cooling")
+
+
 SLOW = replace(WARM, open_delay_rows=2, hold_rows=7)
 
 
-@pytest.mark.parametrize("condition", [WARM, replace(WARM, operative=True), SLOW])
+@pytest.mark.parametrize("condition", [WARM, replace(WARM, quantity="operative"), SLOW])
 def test_shading_follows_the_temperature_at_the_end_of_the_step_before(condition):
     """With one step an hour the hourly means are the ends of the steps.
 
@@ -54,8 +68,8 @@ def test_shading_follows_the_temperature_at_the_end_of_the_step_before(condition
     control = TemperatureControl((condition,), (day, shade), (Gains(), lamps))
     year = {"step_s": 3600.0, "options": BalanceOptions(warm_days=0, start_c=23.0)}
     result = simulate(room, climate(HOURS, outdoor=OUTDOOR), day, control=control, **year)
-    temperature = result.operative_c if condition.operative else result.air_c
-    at_once = by_threshold(temperature[:-1], condition.above_c, condition.below_c)
+    temperature = result.operative_c if condition.quantity == "operative" else result.air_c
+    at_once = by_threshold(temperature[:-1], condition.above, condition.below)
     expected = held(delayed(at_once, condition.open_delay_rows), condition.hold_rows)
     assert 10 < expected.sum() < 110 and (condition is not SLOW or (expected != at_once).any())
     np.testing.assert_array_equal(result.alternative[1:], expected)
@@ -100,7 +114,7 @@ def test_control_without_an_alternative_for_each_case_is_refused():
     with pytest.raises(ThermalInputError, match="alternative"):
         TemperatureControl((WARM, WARMER), (day, shade), (Gains(), Gains()))
     with pytest.raises(ThermalInputError, match="opens at a greater"):
-        TemperatureCondition(20.0, 22.0)
+        RoomCondition(20.0, 22.0)
 
 
 WINDOWS = WindowAiring(0.02, 0.002, open_above_c=24.0, close_below_c=22.0)

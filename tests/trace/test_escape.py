@@ -8,7 +8,7 @@ import pytest
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import Stopping
-from mitsuba_cfs.trace.matrices.escape import SIDES, escaped_view
+from mitsuba_cfs.trace.matrices.straight_view import SIDES, escaped_view
 from mitsuba_cfs.trace.matrices.view import view_matrix
 from tests.trace.rooms import DEPTH, HEIGHT, WIDTH, test_room
 

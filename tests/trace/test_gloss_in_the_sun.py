@@ -187,7 +187,7 @@ def test_the_sun_on_a_smooth_mirror_is_counted_by_its_image_alone():
 def test_a_mirror_floor_absorbs_what_it_does_not_mirror():
     """In a black room: the floor keeps 0.6 of what meets it first, the others 0.4."""
     from mitsuba_cfs.trace.kernels.estimate import Stopping
-    from mitsuba_cfs.trace.matrices.absorption import absorption_matrix
+    from mitsuba_cfs.trace.matrices.adjacent import absorption_matrix
 
     black, floor = black_room(mirror(0.4))
     _, groups = rooms.test_room()

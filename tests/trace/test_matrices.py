@@ -120,7 +120,7 @@ def test_clear_opening_three_phase_is_the_two_phase_matrix():
 
 
 def test_absorbed_shares_sum_to_one_and_follow_the_reflectances():
-    from mitsuba_cfs.trace.matrices.absorption import absorption_matrix
+    from mitsuba_cfs.trace.matrices.adjacent import absorption_matrix
 
     room, groups = rooms.test_room()
     values = absorption_matrix(room, groups, samples=2048).values[0]
@@ -274,7 +274,7 @@ def test_panes_before_a_screen_do_not_take_its_light():
 
 
 def test_cells_of_a_screen_have_its_light():
-    from mitsuba_cfs.trace.matrices.cell_daylight import cell_daylight
+    from mitsuba_cfs.trace.matrices.daylight import cell_daylight
     from mitsuba_cfs.window_parts import window_cells
 
     alone, both = panes_before_a_screen()

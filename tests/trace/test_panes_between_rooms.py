@@ -9,7 +9,7 @@ from bim.fenestration import pane_transmissivity
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.gloss import STEPS, pane, pane_shares
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
-from mitsuba_cfs.trace.matrices.absorption import absorption_matrix
+from mitsuba_cfs.trace.matrices.adjacent import absorption_matrix
 
 TAU, INDEX = 0.8, 1.52
 FLOOR, CEILING, WEST, EAST, FRONT, BACK = range(6)

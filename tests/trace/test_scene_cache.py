@@ -24,12 +24,11 @@ def town(side: int = 40, spread: float = 12.0):
 
 def apart(monkeypatch, *given, **chosen):
     """The scene in a structure of its own, all in one mesh."""
-    from mitsuba_cfs.trace.kernels import mesh
-    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.kernels import scene
 
     with monkeypatch.context() as patch:
-        patch.setattr(mesh, "FROM", 10**9)
-        return TracedScene(*given, **chosen)
+        patch.setattr(scene, "FROM", 10**9)
+        return scene.TracedScene(*given, **chosen)
 
 
 def met(scene, rays: int = 50_000, *, half: bool = False):
@@ -58,8 +57,7 @@ def met(scene, rays: int = 50_000, *, half: bool = False):
 @pytest.mark.parametrize("half", [False, True])
 @pytest.mark.parametrize("blocks", [False, True])
 def test_rays_meet_what_they_meet_in_one_mesh(monkeypatch, blocks, half):
-    from mitsuba_cfs.trace.kernels.mesh import SharedScene
-    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.scene import SharedScene, TracedScene
 
     given = town(), rooms.test_room()[1]
     shared = TracedScene(*given, windows_block=blocks)
@@ -90,7 +88,7 @@ def test_scenes_of_equal_triangles_share_one_structure():
 
 
 def test_what_reaches_far_or_is_small_is_built_about_each_scenes_own_middle():
-    from mitsuba_cfs.trace.kernels.mesh import SolidMesh
+    from mitsuba_cfs.trace.kernels.scene import SolidMesh
 
     assert SolidMesh(town().triangles).is_shared
     assert not SolidMesh(town(spread=300.0).triangles).is_shared
@@ -98,7 +96,7 @@ def test_what_reaches_far_or_is_small_is_built_about_each_scenes_own_middle():
 
 
 def test_matrix_does_not_know_whether_the_structure_is_shared(monkeypatch):
-    from mitsuba_cfs.trace.kernels import mesh
+    from mitsuba_cfs.trace.kernels import scene
     from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 
     def traced():
@@ -106,7 +104,7 @@ def test_matrix_does_not_know_whether_the_structure_is_shared(monkeypatch):
         return daylight_matrix(town(), rooms.test_room()[1], **few).values
 
     shared = traced()
-    monkeypatch.setattr(mesh, "FROM", 10**9)
+    monkeypatch.setattr(scene, "FROM", 10**9)
     alone = traced()
     # of 9,280 paths some ten meet another tile at an edge, and each carries 1/64 of its row at most
     assert np.abs(shared - alone).sum() < 2e-3 * alone.sum()

@@ -59,8 +59,8 @@ def the_rest(interior: Surfaces, groups: list[WindowGroup], exterior: Surfaces, 
     from mitsuba_cfs.trace.kernels.estimate import Stopping
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
     from mitsuba_cfs.trace.kernels.scene import TracedScene
-    from mitsuba_cfs.trace.matrices.absorption import absorption_matrix
-    from mitsuba_cfs.trace.matrices.escape import escaped_view
+    from mitsuba_cfs.trace.matrices.adjacent import absorption_matrix
+    from mitsuba_cfs.trace.matrices.straight_view import escaped_view
     from mitsuba_cfs.trace.pictures.annual import view_matrices
     from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
     from mitsuba_cfs.trace.sun.reflected import window_shares

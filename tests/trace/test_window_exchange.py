@@ -53,7 +53,7 @@ def small(name: str, centre, normal) -> WindowGroup:
 
 def test_windows_that_face_each_other_see_what_leaves_towards_them() -> None:
     """The patches are those that a file names them by: aside, and one window above the other."""
-    from mitsuba_cfs.trace.matrices.exchange import outdoor_exchange
+    from mitsuba_cfs.trace.matrices.adjacent import outdoor_exchange
 
     far = rooms.surfaces([(rooms.quad((0, 9, 9), (1, 9, 9), (1, 9, 8), (0, 9, 8)), 0.0)])
     places = np.array([[0.0, 0.0, 1.0], [1.0, -0.8, 1.6]])
@@ -75,7 +75,7 @@ def test_windows_that_face_each_other_see_what_leaves_towards_them() -> None:
 
 
 def test_all_that_leaves_into_a_white_box_comes_back() -> None:
-    from mitsuba_cfs.trace.matrices.exchange import outdoor_exchange
+    from mitsuba_cfs.trace.matrices.adjacent import outdoor_exchange
 
     box = rooms.surfaces(
         [

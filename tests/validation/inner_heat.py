@@ -24,7 +24,7 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.demo import WEATHER
 from scenes.fenestration.thermal_file import StateTable
 from scenes.heat.air_nodes import with_air_nodes
-from scenes.heat.radiant import radiant_room
+from scenes.heat.study import radiant_room
 from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.operation import read_state
 from scenes.room.operation_tables import OperationTables

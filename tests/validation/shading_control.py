@@ -10,6 +10,7 @@ a fin.  EnergyPlus runs here and now with a `WindowShadingControl` for each wind
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,14 @@ from thermal.control import by_cut_off
 
 WINDOWS = {"S": "WINDOW", "N": "NORTH"}  # EnergyPlus' names of ours
 LIMITS = (100.0, 200.0, 400.0)  # [W/m2]
+# named scenarios that need no daylighting of EnergyPlus, with their set points
+SCENARIOS: dict[str, dict[str, float]] = {
+    "OnIfHighHorizontalSolar": {"setpoint": 300.0},
+    "OnIfHighOutdoorAirTemperature": {"setpoint": 20.0},
+    "OnIfHighOutdoorAirTempAndHighSolarOnWindow": {"setpoint": 20.0, "setpoint_2": 100.0},
+    "OnIfHighOutdoorAirTempAndHighHorizontalSolar": {"setpoint": 20.0, "setpoint_2": 300.0},
+    "OnNightIfLowOutdoorTempAndOffDay": {"setpoint": 10.0},
+}
 TILTS = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)  # [deg]
 WIDTH, SPACING = 0.08, 0.072  # of the slats [m]
 FIN = 1.5  # depth of overhang and fin [m]
@@ -187,7 +196,19 @@ def compare() -> pd.DataFrame:
             rows.append(_row("cut-off", shaded, name, ours[name].to_numpy(), slats))
             same_sun = cut_off_under(theirs, name)
             rows.append(_row("cut-off, EnergyPlus' sun", shaded, name, same_sun, slats))
-    return pd.DataFrame(rows)
+    return pd.DataFrame([*rows, *_scenarios()])
+
+
+def _scenarios() -> Iterator[dict[str, Any]]:
+    """The states by named scenarios in the open."""
+    for kind, points in SCENARIOS.items():
+        model = energyplus_model({"shading_control_type": kind, **points}, shaded=False)
+        theirs = run_energyplus(model, WEATHER, outputs=OUTPUTS)
+        keys = "\n".join(f"{key} = {value}" for key, value in points.items())
+        ours = our_states(f'scenario = "EnergyPlus {kind}"\n{keys}', 2, shaded=False)
+        for name in WINDOWS:
+            on = theirs[f"{name} on"].to_numpy().round().astype(int)
+            yield _row(kind, False, name, ours[name].to_numpy(), on)
 
 
 def with_reflections(model: Model) -> Model:

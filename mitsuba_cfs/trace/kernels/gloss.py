@@ -194,11 +194,11 @@ def _planes(
     up = up * np.where(side < 0, -1.0, 1.0)[:, None]
     steps = np.round(up / (2 * SAME_PLANE)).astype(np.int64)
     keys = np.column_stack([steps, kind[glossy]])
-    found, number = np.unique(keys, axis=0, return_inverse=True)
+    planes, number = np.unique(keys, axis=0, return_inverse=True)
     number = number.reshape(-1)
     area = triangle_areas(surfaces.triangles[glossy])
-    mean = np.stack([np.bincount(number, up[:, i] * area, len(found)) for i in range(3)], axis=1)
+    mean = np.stack([np.bincount(number, up[:, i] * area, len(planes)) for i in range(3)], axis=1)
     mean /= np.linalg.norm(mean, axis=1, keepdims=True)
     plane = np.full(len(kind), NO_PLANE)
     plane[glossy] = number
-    return np.column_stack([mean, found[:, 3]]), plane
+    return np.column_stack([mean, planes[:, 3]]), plane

@@ -54,7 +54,7 @@ class PatchLight:
         """
         one, two, hour = value > 0, other_value > 0, mi.UInt32(0)
         while (one | two) & (hour < self._count):
-            found = value * dr.gather(mi.Float, self._table, patch * self._count + hour, one)
-            found += other_value * dr.gather(mi.Float, self._table, other * self._count + hour, two)
-            dr.scatter_add(sums, mi.Float64(found), entry + hour)
+            light = value * dr.gather(mi.Float, self._table, patch * self._count + hour, one)
+            light += other_value * dr.gather(mi.Float, self._table, other * self._count + hour, two)
+            dr.scatter_add(sums, mi.Float64(light), entry + hour)
             hour += 1

@@ -87,9 +87,9 @@ def neighbours(tiles: Tiles, key: NDArray[np.int64], step: int) -> sparse.csr_ar
     row, column, weight = [], [], []
     for y in (-1, 0, 1):
         for x in (-1, 0, 1):
-            place, found = _find(key, key + step * (y * down + x))
-            row.append(np.flatnonzero(found))
-            column.append(place[found])
+            place, is_known = _find(key, key + step * (y * down + x))
+            row.append(np.flatnonzero(is_known))
+            column.append(place[is_known])
             weight.append(np.full(len(row[-1]), float((2 - abs(x)) * (2 - abs(y)))))
     entries = np.concatenate(weight), (np.concatenate(row), np.concatenate(column))
     return sparse.csr_array(entries, shape=(len(key), len(key)))
@@ -185,8 +185,8 @@ class SharedLight:
         for j in (0, 1):
             for i in (0, 1):
                 across, along = (left + i).astype(np.int64), (top + j).astype(np.int64)
-                place, found = _find(self._key, self.tiles.key(across, along, face))
-                weight = found * np.abs((1 - i - x + left) * (1 - j - y + top))
+                place, is_known = _find(self._key, self.tiles.key(across, along, face))
+                weight = is_known * np.abs((1 - i - x + left) * (1 - j - y + top))
                 value += weight * mean[place]
                 share += weight
         return value / np.maximum(share, 1e-300)
@@ -284,8 +284,8 @@ class PictureRows:
         if self.tiles.size == 1:
             return sparse.csr_array(sparse.eye_array(len(self.keys), dtype=np.float32))
         total = np.bincount(self.row, share, minlength=len(self.keys))
-        found = smoothing(self.tiles, self.keys, np.maximum(total, least), close)
-        return found.astype(np.float32)
+        matrix = smoothing(self.tiles, self.keys, np.maximum(total, least), close)
+        return matrix.astype(np.float32)
 
 
 def pixel_hits(

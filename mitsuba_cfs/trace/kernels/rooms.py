@@ -163,7 +163,7 @@ def of_rooms(
         outdoors: rather than indoors.
         layers: of the batches: matrices of each room that one pass gives, of all rooms each.
     """
-    found: dict[int, Estimate] = {}
+    estimates: dict[int, Estimate] = {}
     sizes, count = [math.prod(shape) for shape in shapes], len(rooms)
     for some in batches_of_rooms(rooms, [layers * size for size in sizes], outdoors=outdoors):
         those = [layer * count + i for layer in range(layers) for i in some]
@@ -174,8 +174,8 @@ def of_rooms(
             progress=progress, entry=_joined_entry([entries[i] for i in those], of_each),
         )  # fmt: skip
         for i, shape, first, size in zip(those, of_each, np.cumsum(rows) - rows, rows, strict=True):
-            found[i] = together.part(np.s_[first : first + size]).shaped(shape)
-    return [found[number] for number in range(layers * count)]
+            estimates[i] = together.part(np.s_[first : first + size]).shaped(shape)
+    return [estimates[number] for number in range(layers * count)]
 
 
 def _at_first_use(

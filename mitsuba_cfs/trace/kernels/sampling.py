@@ -114,14 +114,14 @@ def vectors(table: ArrayLike, kind: type | None = None) -> Any:
     return (mi.Vector3f if kind is None else kind)(*map(column, np.asarray(table).T))
 
 
-def tables(*found: Any) -> list[NDArray[Any]]:
+def tables(*arrays: Any) -> list[NDArray[Any]]:
     """Results of a kernel from one launch: vectors as tables [n, 3], the others as [n]."""
-    dr.eval(*found)
+    dr.eval(*arrays)
     return [
         np.stack(np.broadcast_arrays(*(axis.numpy() for axis in one)), axis=1)
         if dr.depth_v(one) > 1
         else one.numpy()
-        for one in found
+        for one in arrays
     ]
 
 

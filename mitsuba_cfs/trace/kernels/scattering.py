@@ -49,14 +49,14 @@ def sun_scattering(bsdf: Bsdf, angular: AngularTable | None = None) -> Scatterin
     Args: angular: transmittance of a specular system's beam, in place of the data's patches.
     """
     if isinstance(bsdf, TensorTreeBsdf):
-        found: Scattering = TreeScattering(bsdf)
+        scattering: Scattering = TreeScattering(bsdf)
     else:
         share = bsdf.see_through if angular is None else 1.0
         peak = through_peak(bsdf.filled().transmission_front, bsdf.basis_in, share)
         exponent = None if angular is not None else specular_exponent(peak, bsdf.basis_in)
         beams = bsdf.basis_in, peak.scattered, peak.transmittance, exponent
-        found = KlemsScattering(*beams)
-    return found if angular is None else SpecularScattering(found, angular)
+        scattering = KlemsScattering(*beams)
+    return scattering if angular is None else SpecularScattering(scattering, angular)
 
 
 class AngularBeam:

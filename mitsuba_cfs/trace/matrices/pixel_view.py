@@ -169,8 +169,8 @@ def _shares(
     patches: NDArray[np.int32], weight: NDArray[np.floating], columns: int
 ) -> sparse.csr_array:
     """Share of each patch in each pixel [n, columns], from the patches of its rays [samples, n]."""
-    _, pixel = found = np.nonzero(patches != NO_PATCH)
-    entries = weight[pixel], (pixel, patches[found])
+    _, pixel = indices = np.nonzero(patches != NO_PATCH)
+    entries = weight[pixel], (pixel, patches[indices])
     shares = sparse.coo_array(entries, shape=(len(weight), columns))
     return sparse.csr_array(shares).astype(np.float32)
 

@@ -102,13 +102,13 @@ class _Sensors:
 
     def blocks(self, samples: int) -> list[_Block]:
         """The sensors that share hits."""
-        found = []
+        blocks = []
         for room, (count, first) in enumerate(zip(self.counts, self.firsts, strict=True)):
             parts = np.array_split(np.arange(first, first + count), -(-count // MOST_SENSORS))
             for number, part in enumerate(parts):
                 hits, paths = shares(len(part), samples)
-                found.append(_Block(room, number, int(part[0]), len(part), hits, paths))
-        return found
+                blocks.append(_Block(room, number, int(part[0]), len(part), hits, paths))
+        return blocks
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +188,7 @@ def indirect_rows(
         first_point=first_point, max_depth=max_depth, key_of=key_of,
     )  # fmt: skip
     rows, weight = rows.numpy(), weight.numpy()
-    found, ends = [], np.cumsum(points)
+    estimates, ends = [], np.cumsum(points)
     for i, block in enumerate(blocks):
         shape = block.sensors, block.points
         some = slice(pairs.firsts[i], pairs.firsts[i] + math.prod(shape))
@@ -199,8 +199,8 @@ def indirect_rows(
         if left is not None:
             seen = seen * left[some].reshape(shape)
         of_block = rows[entries[i] : entries[i + 1]].reshape(block.points, -1)
-        found.append((seen * share) @ of_block)
-    return found
+        estimates.append((seen * share) @ of_block)
+    return estimates
 
 
 def _add_paths(
@@ -473,11 +473,11 @@ def view_matrix(
     balance heuristic of Veach, Guibas 1995.
     """
     room = TracedRoom(surfaces, tuple(groups), *sensors_of(points, directions))
-    ((found, _),) = views_of_rooms(
+    ((estimate, _),) = views_of_rooms(
         [room], basis=basis, samples=samples, max_depth=max_depth, stopping=stopping, seed=seed,
         progress=progress, cache=cache, scenes=scenes,
     )  # fmt: skip
-    return found
+    return estimate
 
 
 def views_of_rooms(
@@ -515,7 +515,7 @@ def views_of_rooms(
         placed, tracer = scenes.together([rooms[i] for i in some])
         return _batches(_Sensors.of(tracer, bins, placed), n, depths, seed)
 
-    found = of_rooms(
+    estimates = of_rooms(
         rooms,
         traced,
         entries,
@@ -526,7 +526,7 @@ def views_of_rooms(
         layers=len(depths),
     )
     count = len(rooms)
-    return list(zip(found[:count], found[count:] or [None] * count, strict=True))
+    return list(zip(estimates[:count], estimates[count:] or [None] * count, strict=True))
 
 
 def _batches(

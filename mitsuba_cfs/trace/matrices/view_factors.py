@@ -134,9 +134,9 @@ def _hits(surfaces: Surfaces, origins: FloatArray, directions: FloatArray) -> ND
     towards = vectors(directions)
     start = vectors(origins - centre, mi.Point3f) + towards * tracer.epsilon
     hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(start, towards), coherent=False)
-    found = hit.is_valid()
-    part = dr.gather(mi.UInt32, tracer.surface, hit.prim_index, found)
-    return dr.select(found, mi.Int32(part), -1).numpy().astype(np.int64)
+    is_hit = hit.is_valid()
+    part = dr.gather(mi.UInt32, tracer.surface, hit.prim_index, is_hit)
+    return dr.select(is_hit, mi.Int32(part), -1).numpy().astype(np.int64)
 
 
 def _shares(hits: NDArray[np.int64], parts: int) -> FloatArray:

@@ -121,17 +121,17 @@ def window_parts(
     mirror, away = mi.Vector3f(direction), mi.Vector3f(direction)
     scattered = scattered_at(room, group, direction, towards, glazed)
     for g, system in enumerate(room.systems):
-        mine = glazed & (group == g)
+        of_group = glazed & (group == g)
         local = room.inside.to_group(g, direction)
-        straight = dr.select(mine, system.straight(local), straight)
-        mirrored = dr.select(mine, system.mirrored(local), mirrored)
+        straight = dr.select(of_group, system.straight(local), straight)
+        mirrored = dr.select(of_group, system.mirrored(local), mirrored)
         back = room.inside.to_world(g, local * mi.Vector3f(1, 1, -1))
-        mirror = dr.select(mine, back, mirror)
+        mirror = dr.select(of_group, back, mirror)
         if system.bsdf is not None:
             si, context = _interaction(room, g, direction), mi.BSDFContext()
-            sample, weight = system.bsdf.sample(context, si, choice, u, mine)
-            rest = dr.select(mine, weight[0], rest)
-            away = dr.select(mine, room.inside.to_world(g, sample.wo), away)
+            sample, weight = system.bsdf.sample(context, si, choice, u, of_group)
+            rest = dr.select(of_group, weight[0], rest)
+            away = dr.select(of_group, room.inside.to_world(g, sample.wo), away)
     return scattered, straight, mirrored, mirror, rest, away
 
 
@@ -165,15 +165,15 @@ def window_sun(
     glazed: mi.Bool,
 ) -> mi.Float:
     """Radiance of the sun in smooth mirrors outdoors that windows scatter."""
-    found = mi.Float(0)
+    light = mi.Float(0)
     if all(system.bsdf is None for system in room.systems) or room.outside.gloss is None:
-        return found
+        return light
     outward = room.inside.outward(group, glazed) / room.inside.epsilon
     vertex = Vertex(place, outward, glazed)
     for image in sun_images(room, sky, vertex, generator, glazed, rough=False):
         seen = glazed & (image.strength > 0)
-        found += scattered_at(room, group, direction, image.towards, seen) * image.strength
-    return found
+        light += scattered_at(room, group, direction, image.towards, seen) * image.strength
+    return light
 
 
 def _at_window(

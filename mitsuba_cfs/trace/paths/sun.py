@@ -261,9 +261,9 @@ def surface_sun(
     active: mi.Bool,
 ) -> mi.Float:
     """Radiance of the sun that a surface reflects back along a path."""
-    found = rho * dr.inv_pi * sun_at(room, sky, vertex, u, active)
+    light = rho * dr.inv_pi * sun_at(room, sky, vertex, u, active)
     if not room.glossy:
-        return found
+        return light
     sun = on_disc(sky, u)
     share = diffuse_share(room, vertex, triangle, sun, active)
     lobe = _by_side(
@@ -276,7 +276,7 @@ def surface_sun(
         ),
     )
     bright = active & ((lobe > 0) | (rho > 0))
-    found = (rho * dr.inv_pi * share + lobe) * sun_at(room, sky, vertex, u, bright)
+    light = (rho * dr.inv_pi * share + lobe) * sun_at(room, sky, vertex, u, bright)
     for image in sun_images(room, sky, vertex, generator, active):
         share = diffuse_share(room, vertex, triangle, image.towards, active)
         lobe = _by_side(
@@ -288,8 +288,8 @@ def surface_sun(
             ),
         )
         cosine = dr.maximum(dr.dot(vertex.normal, image.towards), 0.0)
-        found += (rho * dr.inv_pi * share + lobe) * cosine * image.strength
-    return found
+        light += (rho * dr.inv_pi * share + lobe) * cosine * image.strength
+    return light
 
 
 def diffuse_share(
@@ -324,13 +324,13 @@ def leave_by_gloss(
     glossy, towards, weight = mi.Bool(False), mi.Vector3f(direction), mi.Float(rho)
     for tracer, here in ((room.inside, ~vertex.outdoors), (room.outside, vertex.outdoors)):
         if tracer.gloss is not None:
-            mine = active & here
+            leaves = active & here
             one, way, factor = tracer.gloss.leave(
-                triangle, vertex.normal, direction, rho, generator, mine
+                triangle, vertex.normal, direction, rho, generator, leaves
             )
             glossy |= one
             towards = dr.select(one, way, towards)
-            weight = dr.select(mine, factor, weight)
+            weight = dr.select(leaves, factor, weight)
     return glossy, towards, weight
 
 
@@ -359,9 +359,9 @@ def _by_side(
     value: Callable[[TracedGloss, mi.Bool], mi.Float],
 ) -> mi.Float:
     """A value of the gloss on each lane's side of the windows, 0 where there is none."""
-    found = mi.Float(0)
+    light = mi.Float(0)
     for tracer, here in ((room.inside, ~outdoors), (room.outside, outdoors)):
         if tracer.gloss is not None:
-            mine = active & here
-            found = dr.select(mine, value(tracer.gloss, mine), found)
-    return found
+            on_side = active & here
+            light = dr.select(on_side, value(tracer.gloss, on_side), light)
+    return light

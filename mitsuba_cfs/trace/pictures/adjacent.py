@@ -67,10 +67,10 @@ class RoomShown:
     def add_to(self, values: NDArray[np.float32], sky: NDArray[np.floating]) -> None:
         """Add the luminance [cd/m2] under skies [P, h] to values [h, n]."""
         sky = np.asarray(sky, dtype=np.float32)
-        found = self.seen @ (self.scattered @ sky)
-        found += self.faces @ (self.irradiance @ (self.luminance @ sky))
-        found += self.sky @ sky + self.outdoor_faces @ (self.reflected @ sky)
-        values += found.T
+        luminance = self.seen @ (self.scattered @ sky)
+        luminance += self.faces @ (self.irradiance @ (self.luminance @ sky))
+        luminance += self.sky @ sky + self.outdoor_faces @ (self.reflected @ sky)
+        values += luminance.T
 
 
 def adjacent_picture(
@@ -121,10 +121,10 @@ def _all_behind(behind: Sequence[GlassToRoom]) -> list[tuple[int, GlassToRoom]]:
 
     -1: the eye's room.
     """
-    found = [(-1, one) for one in behind]
-    for i, (_, one) in enumerate(found):  # grows as it is read
-        found += [(i, onward) for onward in one.room.onward]
-    return found
+    rooms = [(-1, one) for one in behind]
+    for i, (_, one) in enumerate(rooms):  # grows as it is read
+        rooms += [(i, onward) for onward in one.room.onward]
+    return rooms
 
 
 def _into_room(tracer: TracedScene, behind: GlassToRoom, lanes: PixelRays) -> PixelRays:
@@ -139,14 +139,14 @@ def _into_room(tracer: TracedScene, behind: GlassToRoom, lanes: PixelRays) -> Pi
 
 def _panes(beams: NDArray[np.float64]) -> list[KlemsScattering]:
     """Straight beams through window groups, by their patches [G, K]."""
-    dark, found = np.zeros((KLEMS_FULL.size, KLEMS_FULL.size)), {}
+    dark, panes = np.zeros((KLEMS_FULL.size, KLEMS_FULL.size)), {}
     for beam in beams:
-        if beam.tobytes() not in found:
+        if beam.tobytes() not in panes:
             # an even beam (an open doorway) has no specular fall: an exponent of 0
             fall = specular_exponent(ThroughPeak(beam, dark), KLEMS_FULL)
             exponent = 0.0 if fall is None and np.ptp(beam) == 0 else fall
-            found[beam.tobytes()] = KlemsScattering(KLEMS_FULL, dark, beam, exponent)
-    return [found[beam.tobytes()] for beam in beams]
+            panes[beam.tobytes()] = KlemsScattering(KLEMS_FULL, dark, beam, exponent)
+    return [panes[beam.tobytes()] for beam in beams]
 
 
 class _MetInRoom:
@@ -179,14 +179,14 @@ class _MetInRoom:
             origin, way = vectors(lanes.origin.T, mi.Point3f), vectors(lanes.way.T)
             ray = mi.Ray3f(origin, way)
             hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False)
-            found = hit.is_valid()
-            window = tracer.leaves(hit, way, found)
+            is_hit = hit.is_valid()
+            window = tracer.leaves(hit, way, is_hit)
             group = dr.gather(mi.Int32, tracer.group, hit.prim_index, window)
             patch = self.bins.index(tracer.to_local(group, way, window))
             cosine = dr.abs(dr.dot(dr.gather(mi.Vector3f, tracer.normal, hit.prim_index), way))
-            rho = tracer.diffuse(hit.prim_index, cosine, found)
+            rho = tracer.diffuse(hit.prim_index, cosine, is_hit)
             places, *of_hits = hit_points(
-                tracer, origin, way, hit, found, found, window, group, patch, rho, hit.prim_index
+                tracer, origin, way, hit, is_hit, is_hit, window, group, patch, rho, hit.prim_index
             )
             self._sort(lanes, places, of_hits, block, start)
             lanes = mirrored(tracer, lanes, hit, bounce)
@@ -248,17 +248,17 @@ class _MetInRoom:
         order = np.argsort(tile, kind="stable")
         order = np.repeat(order, again[tile[order]])
         ends = np.searchsorted(tile[order], np.arange(len(size) + 1))
-        found = np.empty((len(size), self._columns), dtype=np.float32)
+        irradiance = np.empty((len(size), self._columns), dtype=np.float32)
         step = max(16, BLOCK_BYTES // (8 * self._columns))
         for start in range(0, len(size), step):
             end = min(start + step, len(size))
-            mine = order[ends[start] : ends[end]]
+            part = order[ends[start] : ends[end]]
             matrix = empty_sums((end - start) * self._columns)
             path = np.arange(ends[start], ends[end])
-            self._add_paths(matrix, path, tile[mine] - start, places.some(mine), max_depth, seed)
+            self._add_paths(matrix, path, tile[part] - start, places.some(part), max_depth, seed)
             values = sums_of(matrix, (end - start, self._columns))
-            found[start:end] = values / np.diff(ends[start : end + 1])[:, None]
-        return found
+            irradiance[start:end] = values / np.diff(ends[start : end + 1])[:, None]
+        return irradiance
 
     def _add_paths(
         self, matrix: mi.Float64, path: NDArray[np.int64], row: NDArray[np.int64],

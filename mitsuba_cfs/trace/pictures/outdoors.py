@@ -170,13 +170,13 @@ def through_windows(
     inside: TracedScene, scattering: Sequence[Scattering], lanes: PixelRays
 ) -> PixelRays:
     """Rays of a block that pass a window straight, at the window."""
-    found = []
+    luminances = []
     for bounce in range(MOST_MIRRORS + 1):
         if not len(lanes.row):
             break
         passed, lanes = _passed(inside, scattering, lanes, bounce)
-        found.append(passed)
-    return PixelRays.joined(found)
+        luminances.append(passed)
+    return PixelRays.joined(luminances)
 
 
 def _passed(
@@ -207,11 +207,11 @@ def _sky_and_hits(
     """Sky in the rays by row [count, P]; hits of the others; rays reflected by gloss."""
     origin, way = vectors(lanes.origin.T, mi.Point3f), vectors(lanes.way.T)
     hit, origin = outside.met_outdoors(origin, way, mi.Bool(True))
-    found = hit.is_valid()
-    face = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, found)
-    rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(face, way)), found)
+    is_hit = hit.is_valid()
+    face = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, is_hit)
+    rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(face, way)), is_hit)
     places, met, rho, patch, prim = hit_points(
-        outside, origin, way, hit, found, found, rho, sky.index(way), hit.prim_index
+        outside, origin, way, hit, is_hit, is_hit, rho, sky.index(way), hit.prim_index
     )
     patch = patch.astype(np.int64)
     entries = lanes.weight[~met].astype(np.float32), (lanes.row[~met], patch[~met])
@@ -260,10 +260,10 @@ def _reflected(
     blocks = [sparse.csr_array((0, sky.size), dtype=np.float32)]
     for start in range(0, count, size):
         end = min(start + size, count)
-        mine = order[ends[start] : ends[end]]
-        tile, places = shown.tile[mine] - start, shown.places.some(mine)
+        part = order[ends[start] : ends[end]]
+        tile, places = shown.tile[part] - start, shown.places.some(part)
         matrix = empty_sums((end - start) * sky.size)
-        generator = path_generator(column(mine, mi.UInt32), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
+        generator = path_generator(column(part, mi.UInt32), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
         u = mi.Point2f(generator.next_float32(), generator.next_float32())
         away = mi.warp.square_to_cosine_hemisphere(u)
         starts = PathStarts(
@@ -287,5 +287,5 @@ def _beams(scattering: Sequence[Scattering], basis: KlemsBasis) -> NDArray[np.fl
     lane = dr.arange(mi.UInt32, bins.size * PATCH_POINTS)
     patch = lane // PATCH_POINTS
     local = bins.sample(patch, lattice_2d(lane - patch * PATCH_POINTS, patch, 0))
-    found = [system.through(local) + dr.zeros(mi.Float, dr.width(lane)) for system in scattering]
-    return np.stack([f.numpy().reshape(-1, PATCH_POINTS).mean(axis=1) for f in found])
+    beams = [system.through(local) + dr.zeros(mi.Float, dr.width(lane)) for system in scattering]
+    return np.stack([f.numpy().reshape(-1, PATCH_POINTS).mean(axis=1) for f in beams])

@@ -202,9 +202,9 @@ class _Light:
         """Pixels, faces and the faces' weights in the pixels' means."""
         ray = np.flatnonzero(self.weight > 0)
         key = (self.face[ray] << 32) + pixels[ray // samples]
-        found, place = np.unique(key, return_inverse=True)
-        weight = np.bincount(place, self.weight[ray], minlength=len(found)) / samples
-        return found & 0xFFFFFFFF, found >> 32, weight
+        lit, place = np.unique(key, return_inverse=True)
+        weight = np.bincount(place, self.weight[ray], minlength=len(lit)) / samples
+        return lit & 0xFFFFFFFF, lit >> 32, weight
 
     def by_tile(
         self, pixels: NDArray, samples: int, tiles: Tiles
@@ -212,9 +212,9 @@ class _Light:
         """Numbers of faces in tiles, and the sum and number of their paths."""
         ray = np.flatnonzero(self.weight > 0)
         key = tiles.of_pixels(pixels[ray // samples], self.face[ray])
-        found, place = np.unique(key, return_inverse=True)
-        total = np.bincount(place, self.value[ray], minlength=len(found))
-        return found, total, np.bincount(place, minlength=len(found)).astype(float)
+        keys, place = np.unique(key, return_inverse=True)
+        total = np.bincount(place, self.value[ray], minlength=len(keys))
+        return keys, total, np.bincount(place, minlength=len(keys)).astype(float)
 
 
 class _Kernel:

@@ -110,7 +110,7 @@ class SunDiscs:
         Args: keys: of the batches [B].
         """
         count = dr.width(keys)
-        found = [np.tile(part, (count, 1)) for part in self._whole]
+        parts = [np.tile(part, (count, 1)) for part in self._whole]
         step = max(LANES // EDGE_RAYS // count, 1)
         for start in range(0, len(self._crossed), step):
             crossed = self._crossed[start : start + step]
@@ -125,10 +125,10 @@ class SunDiscs:
             way = disc_direction(centre, _spiral(lane - row * EDGE_RAYS, EDGE_RAYS, stream))
             passed = self._rays(sensor, way)[0]
             dr.eval(passed)
-            for part, values in zip(found, passed, strict=True):
+            for part, values in zip(parts, passed, strict=True):
                 rays = values.numpy().reshape(count, -1, EDGE_RAYS)
                 part[:, crossed] = rays.mean(axis=2)
-        return found
+        return parts
 
     def _pair(self, number: mi.UInt32) -> tuple[mi.UInt32, mi.UInt32]:
         """Sensor and sun of each pair number."""
@@ -289,17 +289,17 @@ def direct_sun_matrix(
     def launched(first: int, count: int) -> NDArray[np.float64]:
         """Batches from number `first` on [B, G, S, Q]."""
         keys = column([batch_key(seed, first + i)[0] for i in range(count)], mi.UInt32)
-        found = [np.zeros((count, len(points) * len(suns)), dtype=np.float32) for _ in groups]
+        matrices = [np.zeros((count, len(points) * len(suns)), dtype=np.float32) for _ in groups]
         for around, straight in zip(ways, discs(), strict=True):
-            found = [a + b for a, b in zip(found, straight.light(keys), strict=True)]
+            matrices = [a + b for a, b in zip(matrices, straight.light(keys), strict=True)]
             for g, system in enumerate(scattering):
                 if system is None:
                     continue
                 shared = _window_points(around, g, window_points, keys)
                 rest = _scattered(inside, g, system, shared, around.towards, len(points))
-                found[g] = found[g] + rest.numpy().reshape(count, -1)
-        values = np.stack(found, axis=1).astype(float) * SUN_SOLID_ANGLE
-        return values.reshape(count, len(found), len(points), len(suns))
+                matrices[g] = matrices[g] + rest.numpy().reshape(count, -1)
+        values = np.stack(matrices, axis=1).astype(float) * SUN_SOLID_ANGLE
+        return values.reshape(count, len(matrices), len(points), len(suns))
 
     def batch(number: int) -> NDArray[np.float64]:
         if number not in ready:

@@ -146,12 +146,12 @@ def _next(
     u = mi.Point2f(generator.next_float32(), generator.next_float32())
     way = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
     hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(point, way), coherent=False)
-    found, luck = hit.is_valid(), generator.next_float32()
-    rho = tracer.whole(hit.prim_index, way, found)
-    own = tracer.without_mirrors(hit.prim_index, way, found)
-    others = found, rho, own, luck
-    after, found, rho, own, luck = hit_points(tracer, point, way, hit, found, *others)
-    kept = found & (rho > 0)
+    is_hit, luck = hit.is_valid(), generator.next_float32()
+    rho = tracer.whole(hit.prim_index, way, is_hit)
+    own = tracer.without_mirrors(hit.prim_index, way, is_hit)
+    others = is_hit, rho, own, luck
+    after, is_hit, rho, own, luck = hit_points(tracer, point, way, hit, is_hit, *others)
+    kept = is_hit & (rho > 0)
     return kept, after.some(kept), np.stack([rho, own])[:, kept], luck[kept]
 
 
@@ -286,9 +286,9 @@ class SunGrid:
         x, y = (place - low).T
         second = low + np.where((y > x)[:, None], [0, 1], [1, 0])
         key = np.stack([low, second, low + 1], axis=1) @ np.array([KEY, 1])
-        found, corner = np.unique(key, return_inverse=True)
-        along = (found + KEY // 2) // KEY
-        flat = np.stack([along, found - along * KEY], axis=1) * STEP
+        keys, corner = np.unique(key, return_inverse=True)
+        along = (keys + KEY // 2) // KEY
+        flat = np.stack([along, keys - along * KEY], axis=1) * STEP
         square = np.minimum((flat**2).sum(axis=1), 4.0)
         nodes = np.column_stack([flat * np.sqrt(1 - square / 4)[:, None], 1 - square / 2])
         nodes /= np.linalg.norm(nodes, axis=1)[:, None]
@@ -325,15 +325,15 @@ class SunGrid:
         first = dr.gather(mi.UInt32, column(self.first, mi.UInt32), hour)
         checked = (dr.gather(mi.UInt32, number, place) + first) % each == 0
         own = level | ((cosine > 0) & (differ | checked))
-        found = dr.select((cosine > 0) & ~level, cosine * share, 0.0)
+        light = dr.select((cosine > 0) & ~level, cosine * share, 0.0)
         times = dr.select(differ | level, mi.Float(1), mi.Float(each))
-        dr.eval(found, own, times)
+        dr.eval(light, own, times)
         pair = dr.compress(own)
         if dr.width(pair):
-            before, more = (dr.gather(mi.Float, of, pair) for of in (found, times))
+            before, more = (dr.gather(mi.Float, of, pair) for of in (light, times))
             exact = sunlight_of_pairs(way, places, suns, pair, number)
-            dr.scatter(found, before + more * (exact - before), pair)
-        return found
+            dr.scatter(light, before + more * (exact - before), pair)
+        return light
 
 
 def sunlight_of_many(

@@ -72,11 +72,11 @@ def mirrored(
     none = np.empty(0, dtype=np.int64)
     if tracer.gloss is None or bounce >= MOST_MIRRORS or not len(lanes.row):
         return lanes.some(none)
-    way, found = vectors(lanes.way.T), hit.is_valid()
-    position, face, _ = tracer.surface_at(hit, vectors(lanes.origin.T, mi.Point3f), way, found)
+    way, is_hit = vectors(lanes.way.T), hit.is_valid()
+    position, face, _ = tracer.surface_at(hit, vectors(lanes.origin.T, mi.Point3f), way, is_hit)
     lane = dr.arange(mi.UInt32, len(lanes.row))
     glossy, towards, weight = tracer.gloss.leave(
-        hit.prim_index, face, way, mi.Float(0), path_generator(lane, mi.UInt32(bounce)), found
+        hit.prim_index, face, way, mi.Float(0), path_generator(lane, mi.UInt32(bounce)), is_hit
     )
     kept = np.flatnonzero((glossy & (weight > 0)).numpy())
     return PixelRays(
@@ -151,8 +151,8 @@ class RoughSun:
         step = max(1, LANES // len(self._weight))
         for start in range(0, len(lit), step):
             hours = lit[start : start + step]
-            found = self._faces.lobes(self._outside, suns[hours]) * self._weight[:, None]
-            for hour, light in zip(hours, found.T, strict=True):
+            luminance = self._faces.lobes(self._outside, suns[hours]) * self._weight[:, None]
+            for hour, light in zip(hours, luminance.T, strict=True):
                 np.add.at(values[hour], self._faces.pixel, light * illuminance[hour])
 
 
@@ -212,19 +212,19 @@ class OutdoorSun:
         if not self._places.size:
             return
         lit = np.flatnonzero((illuminance > 0) & (suns[:, 2] > 0))
-        found, irradiance = np.zeros((len(self._shown), len(suns)), dtype=np.float32), sky.copy()
+        radiance, irradiance = np.zeros((len(self._shown), len(suns)), dtype=np.float32), sky.copy()
         step = max(1, LANES // (self._places.size + self._reflecting.size))
         for start in range(0, len(lit), step):
             hours = lit[start : start + step]
             strength = illuminance[hours].astype(np.float32)
             light = sunlight(self._outside, self._places, suns[hours])
             self._resample_edges(light, suns[hours])
-            found[:, hours] = self._pixels @ (light * strength)
+            radiance[:, hours] = self._pixels @ (light * strength)
             if self._reflecting.size:
                 light = sunlight(self._outside, self._reflecting, suns[hours]) * strength
                 irradiance[:, hours] += self._gather @ light
-        found += self._tiles @ irradiance
-        for hour, luminance in zip(values, found.T, strict=True):
+        radiance += self._tiles @ irradiance
+        for hour, luminance in zip(values, radiance.T, strict=True):
             hour[self._shown] += luminance
 
     def _resample_edges(self, light: NDArray[np.float32], suns: NDArray[np.float64]) -> None:

@@ -100,10 +100,10 @@ def beam_light(
     bins = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     shape = 2 * len(rows.keys), bins[1].size + len(groups) * basis.size
     look = _Look(inside, outside, scattering, bins, view, of_pixel)
-    found, seen, carrying = look.rows(rows, np.arange(len(rows.pixels)), shape, seed)
+    light, seen, carrying = look.rows(rows, np.arange(len(rows.pixels)), shape, seed)
     # a slit of sky beside or below obstructions may carry most of a row's light, and a
     # sliver of a face has the rays of one pixel
-    lit = np.diff(found.indptr).reshape(-1, 2).any(axis=1)
+    lit = np.diff(light.indptr).reshape(-1, 2).any(axis=1)
     # each half by the rays of the other: chosen by its own, it would keep those that met more light
     carrying = 2 * carrying.reshape(-1, 2)[:, ::-1]
     sliver = np.bincount(rows.row, minlength=len(rows.keys)) * of_pixel < samples / 2
@@ -111,10 +111,10 @@ def beam_light(
     again = np.flatnonzero(few[rows.half])
     look = _Look(inside, outside, scattering, bins, view, MORE * of_pixel)
     more, seen[again], _ = look.rows(rows, again, shape, seed)
-    found, least = sparse.diags_array((~few).astype(np.float32)) @ found + more, 0.5 / of_pixel
+    light, least = sparse.diags_array((~few).astype(np.float32)) @ light + more, 0.5 / of_pixel
     # rays enough and no smoothing: beside a window and below an overhang's edge a tile may have
     # half the light of the next
-    mean, noise = (sparse.csr_array(a @ found) for a in rows.of_halves(seen, least))
+    mean, noise = (sparse.csr_array(a @ light) for a in rows.of_halves(seen, least))
     split = bins[1].size
     return BeamLight(
         transmittance, mean[:, :split], mean[:, split:], noise[:, :split], noise[:, split:]
@@ -241,6 +241,6 @@ class _Look:
         """Transmittance of the beam of each lane's group; 0 for groups left out."""
         chosen, found = dr.gather(mi.Int32, self._way, group, active), mi.Float(0)
         for i, way in enumerate(self._ways):
-            mine = active & (chosen == i)
-            found = dr.select(mine, way.through(local), found)
+            through = active & (chosen == i)
+            found = dr.select(through, way.through(local), found)
         return found

@@ -89,17 +89,17 @@ def edge_pixels(
     number_at = np.full((view.height + 2) * across, -1)
     at = (row + 1) * across + column + 1
     number_at[at] = np.arange(len(pixels))
-    found, crossed = [], np.zeros(len(pixels), dtype=bool)
+    edges, crossed = [], np.zeros(len(pixels), dtype=bool)
     for shown in lit:
         number = np.flatnonzero(shown)  # of two that are unlike, one is lit: few are
         for step in (1, -1, across, -across):
             other = number_at[at[number] + step]
             unlike = (other >= 0) & ~shown[other]
             crossed[number[unlike]] = crossed[other[unlike]] = True
-        found.append(np.flatnonzero(crossed))
-        crossed[found[-1]] = False
-    hour = np.repeat(np.arange(len(lit)), [len(numbers) for numbers in found])
-    return hour, np.concatenate([np.empty(0, dtype=np.int64), *found])
+        edges.append(np.flatnonzero(crossed))
+        crossed[edges[-1]] = False
+    hour = np.repeat(np.arange(len(lit)), [len(numbers) for numbers in edges])
+    return hour, np.concatenate([np.empty(0, dtype=np.int64), *edges])
 
 
 def pixel_samples(view: View, pixels: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -300,9 +300,9 @@ def _rough(
 ) -> RoughFaces:
     """Hits on faces with rough gloss."""
     alpha = outside.gloss.roughness(column(triangle, mi.UInt32), column(met, mi.Bool)).numpy()
-    found = np.flatnonzero(alpha > 0)
-    some, faces = lanes.some(found), triangle[found].astype(np.int64)
-    return RoughFaces(some.row, some.weight, faces, some.way, places.some(found))
+    rough = np.flatnonzero(alpha > 0)
+    some, faces = lanes.some(rough), triangle[rough].astype(np.int64)
+    return RoughFaces(some.row, some.weight, faces, some.way, places.some(rough))
 
 
 def _few(rough: RoughFaces) -> RoughFaces:
@@ -340,9 +340,9 @@ def _runs(
         np.searchsorted(run, np.arange(len(of_run))),
         np.searchsorted(run, np.arange(len(of_run)), side="right") - 1,
     )
-    found = np.empty_like(run)
-    found[order] = run
-    return found, order[drawn]
+    runs = np.empty_like(run)
+    runs[order] = run
+    return runs, order[drawn]
 
 
 def _numbered(values: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -100,8 +100,8 @@ class RoomCells:
             below = dr.gather(mi.UInt64, self._table, middle, active) < key
             low = dr.select(below, dr.minimum(middle + 1, high), low)
             high = dr.select(below, high, middle)
-        found = active & (dr.gather(mi.UInt64, self._table, low, active) == key)
-        return dr.select(found, mi.Int32(low), -1)
+        is_known = active & (dr.gather(mi.UInt64, self._table, low, active) == key)
+        return dr.select(is_known, mi.Int32(low), -1)
 
     def numbers(self, places: SurfacePoints) -> NDArray[np.int32]:
         """The cell of each place [m], -1 where there is none."""
@@ -141,9 +141,9 @@ def _surface_cells(inside: TracedScene) -> CellPoints:
     cube = np.floor(place).astype(np.int64) & 0xFFFF
     keys = ((cube[:, 0] << 37) | (cube[:, 1] << 21) | (cube[:, 2] << 5)) + side
     order = np.argsort(keys, kind="stable")
-    found, first = np.unique(keys[order], return_index=True)
+    unique, first = np.unique(keys[order], return_index=True)
     count = np.diff(np.append(first, len(order)))
-    cells = RoomCells(edge, low, 0, found, count * (area / AREA_POINTS))
+    cells = RoomCells(edge, low, 0, unique, count * (area / AREA_POINTS))
     return CellPoints(cells, points.some(order), first, count)
 
 
@@ -177,9 +177,9 @@ class Beam:
         self, cells: RoomCells, suns: NDArray[np.float64], columns: NDArray[np.int64]
     ) -> sparse.csr_array:
         """Some columns [n] of the flux."""
-        found = sparse.csr_array((cells.size, len(columns)))
+        flux = sparse.csr_array((cells.size, len(columns)))
         if not cells.size:
-            return found
+            return flux
         for by in specular_sun_paths(self.scenes[1]):
             before = by.apparent(suns) @ self.scenes[0].groups[self.group].frame[2] > -SPREAD
             some = np.flatnonzero(before[columns % len(suns)])
@@ -189,14 +189,14 @@ class Beam:
             lit = value > 0
             crossed = lit.any(axis=1) & ~lit.all(axis=1)
             value[crossed] = 0
-            found = found + self._landed(cells, value, position, to_sun, some, len(columns))
+            flux = flux + self._landed(cells, value, position, to_sun, some, len(columns))
             some = some[crossed]
             step = max(RAYS // self.points, 1)
             for start in range(0, len(some), step):
                 part = some[start : start + step]
                 rays = self._entering(by, suns, columns[part], self.points)
-                found = found + self._landed(cells, *rays, part, len(columns))
-        return found
+                flux = flux + self._landed(cells, *rays, part, len(columns))
+        return flux
 
     def _entering(
         self, by: SpecularPath, suns: NDArray[np.float64], columns: NDArray[np.int64], points: int

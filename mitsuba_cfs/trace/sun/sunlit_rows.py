@@ -86,8 +86,8 @@ class SunlitShares:
 
     def far_rows(self, irradiance: NDArray[np.float32] | sparse.csr_array) -> NDArray[np.float32]:
         """Luminance [m, h] of rows by the cells with irradiances [c, h]."""
-        found = self.share @ irradiance
-        return self.smooth @ (found.toarray() if sparse.issparse(found) else found)
+        luminance = self.share @ irradiance
+        return self.smooth @ (luminance.toarray() if sparse.issparse(luminance) else luminance)
 
     def of_rows(self, rows: sparse.csr_array, smooth: sparse.csr_array) -> SunlitShares:
         """The shares of other rows [k], by `rows` [k, m] of these, with their smoothing."""
@@ -244,14 +244,14 @@ class _Look:
     ) -> tuple[sparse.csr_array, NDArray[np.int64]]:
         """Share of the cells in the rows, except near ones; the rows close to another surface."""
         shown, row = self._shown(part, samples), part.row
-        found = reflecting_points(self._tracer, shown.places, self._seed * 1_000_003 + key)
-        weight = found.weight * shown.value[found.path]
-        path, met = found.path[: found.first], found.places.some(np.arange(found.first))
+        points = reflecting_points(self._tracer, shown.places, self._seed * 1_000_003 + key)
+        weight = points.weight * shown.value[points.path]
+        path, met = points.path[: points.first], points.places.some(np.arange(points.first))
         far = shown.far_share(path, met)
-        weight[: found.first] *= far
-        rows = row[shown.ray[found.path]]
-        share = _cell_shares(self._cells, rows, weight, found.places, shape)
-        return share, np.unique(rows[: found.first][far < 1])
+        weight[: points.first] *= far
+        rows = row[shown.ray[points.path]]
+        share = _cell_shares(self._cells, rows, weight, points.places, shape)
+        return share, np.unique(rows[: points.first][far < 1])
 
     def near(self, part: _Pixels, samples: int) -> _Hits:
         """Hits of pixels' rays on near surfaces, stratified over the pixels of a row."""
@@ -262,36 +262,36 @@ class _Look:
         stream = streams(part.row, self._seed)
         value = dr.gather(mi.Float, column(part.weight / (np.pi * samples)), pixel)
         # ----- What the ray shows, and what is near to that -----
-        eye, way, hit, found = pixel_hits(tracer, self._view, part.pixel, samples)
-        start, normal, _ = tracer.surface_at(hit, eye, way, found)
-        value *= dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found)
+        eye, way, hit, is_hit = pixel_hits(tracer, self._view, part.pixel, samples)
+        start, normal, _ = tracer.surface_at(hit, eye, way, is_hit)
+        value *= dr.gather(mi.Float, tracer.reflectance, hit.prim_index, is_hit)
         reach = dr.maximum(hit.t * opaque(self._near), 1e-6)
-        found &= value > 0
+        is_hit &= value > 0
         u = lattice_2d(sample, dr.gather(mi.UInt32, stream, pixel), 0)
         way = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
         ray = mi.Ray3f(start, way)
-        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=found)
-        found &= hit.is_valid()
-        point, face, _ = tracer.surface_at(hit, start, way, found)
-        value *= dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found)
+        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=is_hit)
+        is_hit &= hit.is_valid()
+        point, face, _ = tracer.surface_at(hit, start, way, is_hit)
+        value *= dr.gather(mi.Float, tracer.reflectance, hit.prim_index, is_hit)
         distance = dr.norm(point - start)
         value *= 1 - dr.clip(2 * distance / reach - 1, 0.0, 1.0)
         finer = dr.log2(opaque(self._edge / FINENESS) / dr.maximum(distance, 1e-6))
         halvings = dr.clip(dr.ceil(finer), 0.0, HALVINGS)
         # ----- Those that count, a third or less of all -----
         met = [value, pixel, halvings, *point, *face]
-        dr.eval(met, found)
-        some = dr.compress(found & (value > 0))
+        dr.eval(met, is_hit)
+        some = dr.compress(is_hit & (value > 0))
         weight, pixel, halvings, *axes = tables(*(dr.gather(type(a), a, some) for a in met))
         places = SurfacePoints(np.stack(axes[:3], axis=1), np.stack(axes[3:], axis=1))
         return _Hits(part.row[pixel], weight, places, halvings.astype(np.int8))
 
     def _shown(self, part: _Pixels, samples: int) -> _Shown:
         tracer = self._tracer
-        eye, way, hit, found = pixel_hits(tracer, self._view, part.pixel, samples)
-        rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found)
-        places, found, rho, far = hit_points(tracer, eye, way, hit, found, found, rho, hit.t)
-        kept = np.flatnonzero(found & (rho > 0))
+        eye, way, hit, is_hit = pixel_hits(tracer, self._view, part.pixel, samples)
+        rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, is_hit)
+        places, is_hit, rho, far = hit_points(tracer, eye, way, hit, is_hit, is_hit, rho, hit.t)
+        kept = np.flatnonzero(is_hit & (rho > 0))
         reach = np.maximum(self._near * far[kept], 1e-6)
         value = rho[kept] * part.weight[kept // samples] / (np.pi * samples)
         return _Shown(kept // samples, value, places.some(kept), reach)
@@ -341,7 +341,7 @@ def window_sunlit_shares(tracer: TracedScene, *, samples: int, seed: int = 0) ->
     """
     bins, cells = DirectionBins(KLEMS_FULL), _far_cells(tracer)
     shape = len(tracer.groups) * bins.size, cells.size
-    found = [sparse.csr_array(shape, dtype=np.float32)]
+    shares = [sparse.csr_array(shape, dtype=np.float32)]
 
     def follow(_: mi.Float64, paths: WindowPaths) -> None:
         inward = paths.inward(tracer)
@@ -352,14 +352,14 @@ def window_sunlit_shares(tracer: TracedScene, *, samples: int, seed: int = 0) ->
         places, met, rho, of = hit_points(tracer, start, inward, hit, met, met, rho, of)
         kept = np.flatnonzero(met & (rho > 0))
         value, row, first = rho[kept] / (np.pi * samples), of[kept].astype(int), places.some(kept)
-        later = reflecting_points(tracer, first, seed * 1_000_003 + len(found) - 1)
+        later = reflecting_points(tracer, first, seed * 1_000_003 + len(shares) - 1)
         rows = np.concatenate([row, row[later.path]])
         weight = np.concatenate([value, value[later.path] * later.weight])
         both = SurfacePoints.joined([first, later.places])
-        found.append(_cell_shares(cells, rows, weight, both, shape))
+        shares.append(_cell_shares(cells, rows, weight, both, shape))
 
     window_batches(tracer, bins, 1, samples, seed, follow)(0)
-    return _with_pieces(cells, sum(found[1:], found[0]), _Hits.joined([]), 1.0, seed)
+    return _with_pieces(cells, sum(shares[1:], shares[0]), _Hits.joined([]), 1.0, seed)
 
 
 def _far_cells(tracer: TracedScene) -> RoomCells:
@@ -458,8 +458,8 @@ def _beside(cubes: NDArray[np.int64]) -> sparse.csr_array:
     for others in (holders, *(cubes + step[:, None] for step in np.eye(7, dtype=np.int64)[:3])):
         wanted = _keys(others, cubes)
         place = np.minimum(np.searchsorted(keys, wanted), count - 1)
-        found = np.flatnonzero(keys[place] == wanted)
-        pairs.append(np.stack([found, place[found]]))
+        positions = np.flatnonzero(keys[place] == wanted)
+        pairs.append(np.stack([positions, place[positions]]))
     one, other = np.concatenate(pairs, axis=1)
     both = np.concatenate([one, other]), np.concatenate([other, one])
     ones = np.ones(len(both[0]), dtype=np.uint8)
