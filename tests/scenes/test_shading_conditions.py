@@ -19,13 +19,12 @@ from scenes.room.operation_tables import OperationTables
 from scenes.room.room import lit_room
 from scenes.room.shading import (
     control_signals,
-    facade_illuminance,
     ruled_year,
     shading_states,
-    window_beam,
 )
 from scenes.room.shading_rules import ShadingRule, scenarios
 from scenes.room.solar import seasonal_outdoors
+from scenes.room.window_sensors import facade_illuminance, window_beam
 from scenes.room.windows import in_all_windows
 from scenes.toml_file import validated
 from tests.scenes.small_box import FEW, TWO
