@@ -68,12 +68,31 @@ def read_photometry(path: Path) -> Photometry:
     kind = path.suffix.lower()
     if kind not in (".ies", ".ldt"):
         raise DataError("expected a luminaire as .ies or .ldt", file=path)
+    return _lm63(text, path) if kind == ".ies" else _eulumdat(text, path)
+
+
+def _number(text: str, path: Path) -> float:
+    """A finite number.
+
+    Raises: `DataError`.
+    """
     try:
-        return _lm63(text, path) if kind == ".ies" else _eulumdat(text, path)
-    except (ValueError, IndexError) as error:
-        if isinstance(error, DataError):
-            raise
-        raise DataError(f"is no complete photometry: {error}", file=path) from None
+        value = float(text.replace(",", "."))
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise DataError(f"{text[:40]!r} is no number", file=path)
+    return value
+
+
+def _count(value: float, what: str, path: Path) -> int:
+    """A number of `what`, from 1 to 10,000.
+
+    Raises: `DataError`.
+    """
+    if not 1 <= value <= 10_000 or value != int(value):
+        raise DataError(f"{value:g} {what}: expected a whole number from 1", file=path)
+    return int(value)
 
 
 def _lm63(text: str, path: Path) -> Photometry:
@@ -86,16 +105,21 @@ def _lm63(text: str, path: Path) -> Photometry:
         (line.partition("]")[2].strip() for line in lines[:row] if line.startswith("[LUMINAIRE]")),
         path.stem,
     )
-    numbers = [float(word) for line in lines[row + 1 :] for word in line.replace(",", " ").split()]
+    words = [word for line in lines[row + 1 :] for word in line.replace(",", " ").split()]
+    numbers = [_number(word, path) for word in words]
     tilt = lines[row].strip()[5:].strip().upper()
-    if tilt == "INCLUDE":
-        pairs = int(numbers[1])
-        numbers = numbers[2 + 2 * pairs :]
+    if tilt == "INCLUDE" and len(numbers) > 1:
+        numbers = numbers[2 + 2 * _count(numbers[1], "angles of tilt", path) :]
     elif tilt != "NONE":
         raise DataError(f"TILT={tilt}: factors of another file are not read", file=path)
-    multiplier, vertical, horizontal, kind = numbers[2], *map(int, numbers[3:6])
-    if kind != TYPE_C:
-        raise DataError(f"photometry of type {'?CBA'[kind]}: only type C is read", file=path)
+    if len(numbers) < 13:
+        raise DataError("ends before its angles", file=path)
+    multiplier = numbers[2]
+    vertical = _count(numbers[3], "vertical angles", path)
+    horizontal = _count(numbers[4], "horizontal angles", path)
+    if numbers[5] != TYPE_C:
+        kind = {2: "type B", 3: "type A"}.get(int(numbers[5]), "an unknown type")
+        raise DataError(f"photometry of {kind}: only type C is read", file=path)
     factor, watts = multiplier * numbers[10] * numbers[11], numbers[12]
     angles = numbers[13:]
     gamma = np.array(angles[:vertical])
@@ -135,17 +159,19 @@ def _ring(c: FloatArray, candela: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _eulumdat(text: str, path: Path) -> Photometry:
     """EULUMDAT: candela per 1000 lm of the lamps, times these."""
-    lines = [line.strip().replace(",", ".") for line in text.splitlines()]
+    lines = [line.strip() for line in text.splitlines()]
 
     def number(row: int) -> float:
-        return float(lines[row])
+        if row >= len(lines):
+            raise DataError(f"ends before line {row + 1}", file=path)
+        return _number(lines[row], path)
 
-    symmetry, planes, step, angles = (number(row) for row in (2, 3, 4, 5))
-    if int(symmetry) not in SYMMETRIES:
+    symmetry, step, sets = number(2), number(4), number(25)
+    if symmetry not in SYMMETRIES:
         raise DataError(f"symmetry {symmetry:g}: expected 0 to 4", file=path)
-    planes, angles, sets = int(planes), int(angles), int(number(25))
+    planes, angles = _count(number(3), "planes", path), _count(number(5), "angles", path)
     if sets != 1:
-        raise DataError(f"{sets} sets of lamps: one is read", file=path)
+        raise DataError(f"{sets:g} sets of lamps: one is read", file=path)
     lumens, watts = abs(number(HEAD_LINES + 2)), number(HEAD_LINES + 5)
     first = HEAD_LINES + 6 + AFTER_LAMPS
     c = np.array([number(first + n) for n in range(planes)])

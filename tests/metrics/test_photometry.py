@@ -137,7 +137,12 @@ def test_a_cube_of_even_reflectance_keeps_its_flux(tmp_path) -> None:
         ("a.ies", ies([0.0], GAMMA, [np.ones(18)]), "expected 19 intensities"),
         ("a.ies", ies([0.0, 30.0], GAMMA, np.ones((2, 19))), "no symmetry"),
         ("a.ies", ies([0.0], GAMMA, [np.ones(19)]).replace("NONE", "lamp.til"), "not read"),
-        ("a.ldt", "maker\n1\n", "no complete photometry"),
+        ("a.ies", ies([0.0], GAMMA, [np.full(19, np.nan)]), "'nan' is no number"),
+        ("a.ies", ies([0.0], GAMMA, [np.ones(19)], kind=7), "unknown type"),
+        ("a.ies", "TILT=NONE\n1 1 1 19 -2 1\n", "ends before its angles"),
+        ("a.ies", ies([], GAMMA, [np.ones(19)]), "0 horizontal angles"),
+        ("a.ldt", "maker\n1\n", "ends before line 3"),
+        ("a.ldt", ldt(0, 8, GAMMA, np.ones(19)), "ends before line"),
         (
             "a.ldt",
             ldt(1, 8, GAMMA, np.ones(19)).replace("\n0\n1\n1\nLED", "\n0\n2\n1\nLED"),
