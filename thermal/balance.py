@@ -147,14 +147,14 @@ def _driven(
 
 
 def _condition_limits(controls: Sequence[TemperatureControl | None]) -> FloatArray:
-    """Limits of the conditions of all zones [Z, K, 5]; those that a zone lacks are never met."""
+    """Limits of the conditions of all zones [Z, K, 6]; those that a zone lacks are never met."""
     most = max((len(c.conditions) for c in controls if c is not None), default=0)
-    limits = np.full((len(controls), most, 5), np.inf)
+    limits = np.full((len(controls), most, 6), np.inf)
     for z, control in enumerate(controls):
         for k, one in enumerate(control.conditions if control else ()):
             waits = one.open_delay_rows, one.hold_rows
             quantity = ROOM_QUANTITIES.index(one.quantity)
-            limits[z, k] = one.above, one.below, quantity, *waits
+            limits[z, k] = one.above, one.below, quantity, *waits, one.opens
     return limits
 
 

@@ -85,14 +85,16 @@ ROOM_QUANTITIES = ("air", "operative", "cooling", "heating")
 class RoomCondition:
     """Met once a room's temperature or load at the end of the step before is above a limit.
 
-    Until it is below the other.
+    Until it is below the other.  Windows close while it is met, or open where it `opens`.
     """
 
     above: float  # [degC] or [W]
     below: float
     quantity: str = "air"  # of ROOM_QUANTITIES
-    open_delay_rows: int = 0  # hours that it stays met after the quantity has left it: `delayed`
+    # hours that windows stay closed after the quantity asks them to open: `delayed`
+    open_delay_rows: int = 0
     hold_rows: int = 0  # least number of hours between two changes: `held`
+    opens: bool = False  # whether windows open while it is met: the delay is one of being met
 
     def __post_init__(self) -> None:
         require(self.quantity in ROOM_QUANTITIES, "shading control", f"no {self.quantity!r}")

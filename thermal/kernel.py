@@ -129,7 +129,7 @@ def _take_alternative(
         for k in range(some.limits.shape[1]):
             before += state.met[z, k] << k
         for k in range(some.limits.shape[1]):
-            above, below, quantity, stays, holds = some.limits[z, k]
+            above, below, quantity, stays, holds, opens = some.limits[z, k]
             felt = state.air[z]
             if quantity == 1.0:
                 felt = 0.5 * (felt + mean_radiant(net, state, some.mix[before, hour, z], z))
@@ -139,9 +139,11 @@ def _take_alternative(
                 felt = max(state.load[z], 0.0)
             since = state.since[z, k]
             state.warm[z, k] = felt > above or (state.warm[z, k] and felt >= below)
-            since[0] = 0 if state.warm[z, k] else since[0] + 1
+            closes = state.warm[z, k] != (opens > 0.0)
+            since[0] = 0 if closes else since[0] + 1
             since[1] += 1
-            if (since[0] <= stays) != state.met[z, k] and since[1] >= holds:
+            wanted = (since[0] <= stays) != (opens > 0.0)
+            if wanted != state.met[z, k] and since[1] >= holds:
                 state.met[z, k], since[1] = not state.met[z, k], 0
             now += state.met[z, k] << k
         taken[z] = now

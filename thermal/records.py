@@ -50,8 +50,9 @@ class Alternatives(NamedTuple):
     Bit k of an alternative's number is set where condition K of the zone's temperature is met.
     """
 
-    # [Z, K, 5] met above, until below [degC, W]; number of the quantity in
-    # `control.ROOM_QUANTITIES`; rows that it stays met after that, rows between two changes
+    # [Z, K, 6] met above, until below [degC, W]; number of the quantity in
+    # `control.ROOM_QUANTITIES`; rows that windows stay closed after that, rows between two changes;
+    # whether windows open while it is met
     limits: NDArray[np.float64]
     inner: NDArray[np.float64]  # [A, R, N]
     outer: NDArray[np.float64]  # [A, R, N]

@@ -165,15 +165,15 @@ class MetCondition:
         """Not met, and since long ago."""
         self._condition = condition
         self._warm = self.met = False
-        self._cool_rows = self._same_rows = LONG_AGO
+        self._open_rows = self._same_rows = LONG_AGO
 
     def follow(self, felt: float) -> None:
         """Go on by an hour, from its quantity at the beginning."""
         of = self._condition
         self._warm = felt > of.above or (self._warm and felt >= of.below)
-        self._cool_rows = 0 if self._warm else self._cool_rows + 1
+        self._open_rows = 0 if self._warm != of.opens else self._open_rows + 1
         self._same_rows += 1
-        wanted = self._cool_rows <= of.open_delay_rows
+        wanted = (self._open_rows <= of.open_delay_rows) != of.opens
         if wanted != self.met and self._same_rows >= of.hold_rows:
             self.met, self._same_rows = wanted, 0
 

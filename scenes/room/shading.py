@@ -39,6 +39,7 @@ from scenes.room.shading_rules import (
     LOAD_RULES,
     MOST_CONDITIONS,
     ROOM_RULES,
+    WAITS,
     WEATHER_RULES,
     ShadingRule,
 )
@@ -106,11 +107,18 @@ NO_CONDITIONS: Conditions = {}
 def temperature_conditions(room: RoomInputs) -> tuple[RoomCondition, ...]:
     """The distinct conditions of a room's temperature that its rules read.
 
-    Raises: `DataError` for more than `MOST_CONDITIONS`.
+    Raises: `DataError` for more than `MOST_CONDITIONS`, or a rule by a load that the room has not.
     """
     if room.operation is None or room.controller is not None or not room.space.windows:
         return ()
-    leaves = (leaf for rule in room.control.rules for leaf in rule.leaves)
+    leaves = [leaf for rule in room.control.rules for leaf in rule.leaves]
+    for kind in LOAD_RULES:
+        needed = f"{kind}_c"
+        if any(leaf.rule == kind for leaf in leaves) and (
+            getattr(room.operation.loads, needed) is None
+        ):
+            message = f'the rule "{kind}" needs a set point: the room has no ideal {kind}'
+            raise DataError(message, element=room.space.label, field=f"loads.{needed}")
     step_h = room.weather.step_h
     by_room = (condition_of(leaf, step_h) for leaf in leaves if leaf.rule in ROOM_RULES)
     conditions = tuple(dict.fromkeys(by_room))
@@ -123,9 +131,10 @@ def temperature_conditions(room: RoomInputs) -> tuple[RoomCondition, ...]:
 def condition_of(rule: ShadingRule, step_h: float) -> RoomCondition:
     """The condition of a rule by the room's temperature, for weather in steps of so many hours."""
     rows, quantity = _waits(rule, step_h), ROOM_RULES[rule.rule]
+    opens = rule.inverse and rows[0] > 0
     if rule.rule in LOAD_RULES:
-        return RoomCondition(rule.close_above_w, rule.close_above_w, quantity, *rows)
-    return RoomCondition(rule.closes_above_c, rule.opens_below_c, quantity, *rows)
+        return RoomCondition(rule.close_above_w, rule.close_above_w, quantity, *rows, opens)
+    return RoomCondition(rule.closes_above_c, rule.opens_below_c, quantity, *rows, opens)
 
 
 def _waits(rule: ShadingRule, step_h: float) -> tuple[int, int]:
@@ -210,9 +219,6 @@ def _reasons(rule: ShadingRule) -> Iterator[str]:
     else:
         yield rule.rule
     yield from (key for key in WAITS if getattr(rule, key))
-
-
-WAITS = ("open_delay_h", "hold_h", "until", "most_moves")
 
 
 def _by_rule(

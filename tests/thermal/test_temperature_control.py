@@ -80,6 +80,20 @@ def test_shading_follows_the_temperature_at_the_end_of_the_step_before(condition
     assert np.abs(result.residual).max() < 1e-6
 
 
+def test_a_delay_of_an_inverse_rule_delays_opening_alone():
+    """Closed while the room is cold: it closes at once, and opens after two warm steps more."""
+    room, day, shade = shaded_room()
+    control = TemperatureControl(
+        (RoomCondition(24.0, 24.0, open_delay_rows=2, opens=True),), (shade, day), (Gains(),) * 2
+    )
+    year = {"step_s": 3600.0, "options": BalanceOptions(warm_days=0, start_c=20.0)}
+    result = simulate(room, climate(HOURS, outdoor=OUTDOOR), day, control=control, **year)
+    cold = 1 - by_threshold(result.air_c[:-1], 24.0)
+    closed = 1 - result.alternative[1:]
+    np.testing.assert_array_equal(closed[2:], delayed(cold, 2)[2:])
+    assert 10 < closed.sum() and np.count_nonzero(closed != cold) >= 6
+
+
 def test_conditions_are_met_each_by_itself_and_each_zone_has_its_temperature():
     room, day, shade = shaded_room()
     other = replace(room, name="cold", loads=IdealLoads(cooling_c=23.0))
