@@ -62,10 +62,10 @@ def control_groups(space: Space, control: ControlTable | None = None) -> Control
                 raise DataError(message, element=space.label, field=f"{place}.{name}")
     leaves = [(leaf, p) for rule, p in zip(rules, places, strict=True) for leaf in rule.leaves]
     for leaf, place in leaves:
-        for key in ("seat", "at"):
-            point = getattr(leaf, key)
+        for field, point in (("seat", leaf.seat), ("at", leaf.at)):
             if point is not None and not in_room(space, np.array([point]))[0]:
-                raise DataError("is outside the room", element=space.label, field=f"{place}.{key}")
+                where = f"{place}.{field}"
+                raise DataError("is outside the room", element=space.label, field=where)
     return ControlGroups(tuple(numbered(names)), tuple(rules), tuple(places), number)
 
 
