@@ -92,7 +92,7 @@ def room_picture(
     if options.colour:
         steps = part(progress, end, 1.0, "colour")
         radiance = coloured_picture(
-            luminance, viewed.bands, viewed.optics, sky, 0, sampling=sampling, progress=steps
+            luminance, viewed.bands, viewed.tinted, sky, 0, sampling=sampling, progress=steps
         )
     middle = weather.midpoints[hour]
     notes = (*viewed.leaks(), *([] if rated is None else _as_lobe(light, viewed)))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from bim.model import COLOURS, Building, Season, Space, in_month, seasons
 from bim.to_tracer import band_scenes
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.methods.optics import BsdfOptics
+from mitsuba_cfs.methods.optics import BsdfOptics, SystemOptics
 from mitsuba_cfs.methods.scene import DaylightScene
 from scenes.fenestration.peaks import as_lobes
 from scenes.inputs import Inputs
@@ -28,6 +28,9 @@ class ViewedRoom:
     seasons: tuple[Season, ...]  # surroundings outdoors by months
     scenes: tuple[DaylightScene, ...]  # of each season
     bands: tuple[DaylightScene, ...] = ()  # the first scene by red, green and blue
+    tinted: tuple[
+        Sequence[Sequence[SystemOptics]], ...
+    ] = ()  # the optics by red, green and blue [3][G][1]
 
     @property
     def scene(self) -> DaylightScene:
@@ -68,4 +71,6 @@ def viewed_room(
     )
     changed = as_lobes(windows.systems)
     lobes = None if changed is None else replace(windows, systems=changed).optics()
-    return ViewedRoom(room, windows.optics(), lobes, times, (visible, *others), tuple(bands))
+    optics = windows.optics()
+    tinted = tuple(windows.optics_by_colour(optics)) if colour else ()
+    return ViewedRoom(room, optics, lobes, times, (visible, *others), tuple(bands), tinted)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermal import kernel, records
 from thermal.climate import Climate, Solar, to_steps
 from thermal.conduction import CELL
-from thermal.control import ROOM_QUANTITIES, TemperatureControl
+from thermal.control import ROOM_QUANTITIES, TemperatureControl, WaitingRule, strides
 from thermal.convection import TERRAIN
 from thermal.emitters import HeatedSlab
 from thermal.errors import require, require_range
@@ -74,7 +74,8 @@ def drive_of(
     rows, hours, steps = len(solar[0].inside), climate.hours, stretch.steps
     fits = rows in (hours, hours * steps)
     require(fits, "solar", f"expected {hours} or {hours * steps} rows, got {rows}")
-    limits, of_hour = _condition_limits(controls), [m.of_hour.reshape(-1, hours) for m in mixes]
+    of_hour = [m.of_hour.reshape(-1, hours) for m in mixes]
+    count = max((len(c.suns) for c in controls if c), default=1)
     every = [
         _driven(
             zones,
@@ -84,10 +85,10 @@ def drive_of(
             stretch,
             np.stack([stretch.of(mix[a % len(mix)]) for mix in of_hour], axis=1),
         )
-        for a in range(2 ** limits.shape[1])
+        for a in range(count)
     ]  # fmt: skip
     first = every[0]
-    some = {k: np.stack([one[k] for one in every]) for k in first} if limits.shape[1] else {
+    some = {k: np.stack([one[k] for one in every]) for k in first} if count > 1 else {
         k: values[None, :0] for k, values in first.items()
     }  # fmt: skip
     fans = [zone.supply or SupplyAir(0.0) for zone in zones]
@@ -95,7 +96,7 @@ def drive_of(
     beside = [one for zone in zones for one in zone.beside]
     drive = records.Drive(
         **first,
-        alternatives=records.Alternatives(limits, **some),
+        alternatives=records.Alternatives(**_conditions(controls, stretch), **some),
         beyond=_beyond(zones, climate, stretch),
         leaks=_flows([z.infiltration_ach for z in zones], zones, stretch, "infiltration"),
         airflow=_flows([z.other_air_ach for z in zones], zones, stretch, "outdoor air"),
@@ -146,16 +147,41 @@ def _driven(
     }
 
 
-def _condition_limits(controls: Sequence[TemperatureControl | None]) -> FloatArray:
-    """Limits of the conditions of all zones [Z, K, 6]; those that a zone lacks are never met."""
-    most = max((len(c.conditions) for c in controls if c is not None), default=0)
-    limits = np.full((len(controls), most, 6), np.inf)
+def _shape(controls: Sequence[TemperatureControl | None]) -> tuple[int, int, int]:
+    """Number of zones, of the conditions of one at most, and of the levels of one of these."""
+    every = [c.conditions for c in controls if c is not None]
+    levels = [one.levels for conditions in every for one in conditions]
+    return len(controls), max(map(len, every), default=0), max(levels, default=0)
+
+
+def _conditions(
+    controls: Sequence[TemperatureControl | None], stretch: Stretch
+) -> dict[str, NDArray[Any]]:
+    """The conditions of all zones, as `Alternatives` has them; those that a zone lacks stay 0."""
+    zones, most, _ = _shape(controls)
+    limits = np.full((zones, most, 3), np.inf)
+    waits = np.zeros((zones, most, 5), dtype=np.int64)
+    waits[..., 4] = -1
+    reads = np.zeros((zones, most, most), dtype=np.int64)
+    asked: list[NDArray[np.int64]] = []
     for z, control in enumerate(controls):
-        for k, one in enumerate(control.conditions if control else ()):
-            waits = one.open_delay_rows, one.hold_rows
-            quantity = ROOM_QUANTITIES.index(one.quantity)
-            limits[z, k] = one.above, one.below, quantity, *waits, one.opens
-    return limits
+        conditions = control.conditions if control else ()
+        steps = strides(control.chosen_by) if control else ()
+        adds = dict(zip(control.chosen_by if control else (), steps, strict=True))
+        for k, one in enumerate(conditions):
+            waits[z, k, :4] = one.open_delay_rows, one.hold_rows, one.levels, adds.get(one, 0)
+            if isinstance(one, WaitingRule):
+                waits[z, k, 4] = len(asked)
+                asked.append(stretch.of(one.asked.T).T)
+                places = [conditions.index(other) for other in one.reads]
+                reads[z, k, places] = strides(one.reads)
+            else:
+                limits[z, k] = one.above, one.below, ROOM_QUANTITIES.index(one.quantity)
+    rows = max((len(one) for one in asked), default=0)
+    table = np.zeros((len(asked), rows, stretch.size), dtype=np.int64)
+    for number, levels in enumerate(asked):
+        table[number, : len(levels)] = levels
+    return {"limits": limits, "waits": waits, "reads": reads, "asked": table}
 
 
 def _zone_sun(
@@ -452,7 +478,7 @@ def simulate_zones(
     )  # fmt: skip
     method = _method(options, steps, step_s)
     outdoors = _weather(climate, steps)
-    state = _start(net, _condition_limits(controls).shape[:2], options.start_c)
+    state = _start(net, _shape(controls), options.start_c)
     work, years, days = _work(net, state), [], 0
     first_day = min(round(24 * HOUR / row_s), climate.hours)
     for stretch in stretches(climate.hours, steps, max(STRETCH, first_day)):
@@ -499,7 +525,7 @@ class SteppedZone:
         self._options = BalanceOptions() if options is None else options
         self._zone, self._climate = zone, climate
         self._steps, self._row_s = _steps_per_row(step_s, row_s), row_s
-        self._mix, no_conditions = window_mix(zone, states, len(states)), (1, 0)
+        self._mix, no_conditions = window_mix(zone, states, len(states)), (1, 0, 0)
         self._net = network(
             [zone], [self._mix], step_s=step_s, terrain=self._options.terrain,
             cell=self._options.cell, link=_links(None, 1),
@@ -623,7 +649,7 @@ def _weather(climate: Climate, steps: int) -> records.OutdoorConditions:
     )
 
 
-def _start(net: Network, conditions: tuple[int, int], start_c: float) -> records.State:
+def _start(net: Network, conditions: tuple[int, int, int], start_c: float) -> records.State:
     n, zones = net.faces.area.size, conditions[0]
     return records.State(
         inner=np.full(n, start_c),
@@ -633,9 +659,9 @@ def _start(net: Network, conditions: tuple[int, int], start_c: float) -> records
         air=np.full(zones, start_c),
         load=np.zeros(zones),
         opened=np.zeros(zones, dtype=np.bool_),
-        met=np.zeros(conditions, dtype=np.bool_),
-        warm=np.zeros(conditions, dtype=np.bool_),
-        since=np.full((*conditions, 2), LONG_AGO),
+        met=np.zeros(conditions[:2], dtype=np.int64),
+        warm=np.zeros(conditions[:2], dtype=np.bool_),
+        since=np.full(conditions, LONG_AGO),
     )
 
 

@@ -85,38 +85,102 @@ ROOM_QUANTITIES = ("air", "operative", "cooling", "heating")
 class RoomCondition:
     """Met once a room's temperature or load at the end of the step before is above a limit.
 
-    Until it is below the other.  Windows close while it is met, or open where it `opens`.
+    Until it is below the other.
     """
 
     above: float  # [degC] or [W]
     below: float
     quantity: str = "air"  # of ROOM_QUANTITIES
-    # hours that windows stay closed after the quantity asks them to open: `delayed`
-    open_delay_rows: int = 0
+    open_delay_rows: int = 0  # hours that it stays met after the quantity has left it: `delayed`
     hold_rows: int = 0  # least number of hours between two changes: `held`
-    opens: bool = False  # whether windows open while it is met: the delay is one of being met
 
     def __post_init__(self) -> None:
         require(self.quantity in ROOM_QUANTITIES, "shading control", f"no {self.quantity!r}")
         fits = self.below <= self.above
         require(fits, "shading control", "opens at a greater value than it closes at")
 
+    @property
+    def levels(self) -> int:
+        """Number of its levels: not met, met."""
+        return 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WaitingRule:
+    """A rule that combines conditions, and waits before its state changes.
+
+    Its level is the number of its state among those that it has in the year, from the most open.
+    """
+
+    name: str
+    reads: tuple[Condition, ...]
+    states: tuple[int, ...]  # of the windows, by level
+    asked: StateArray  # [A, H] level by `number_of` the levels of `reads`, as if it did not wait
+    open_delay_rows: int = 0  # as of `RoomCondition`
+    hold_rows: int = 0
+
+    def __post_init__(self) -> None:
+        fits = len(self.asked) == combinations_of(self.reads)
+        require(fits, "shading control", "expected states for all levels of what a rule reads")
+
+    @property
+    def levels(self) -> int:
+        """Number of its levels."""
+        return len(self.states)
+
+
+Condition = RoomCondition | WaitingRule
+
+
+def combinations_of(conditions: Sequence[Condition]) -> int:
+    """Number of combinations of the levels of conditions."""
+    return int(np.prod([one.levels for one in conditions], dtype=np.int64))
+
+
+def number_of(levels: Sequence[int], conditions: Sequence[Condition]) -> int:
+    """The number of a combination of levels; the first condition's level changes first."""
+    return int(np.dot(levels, strides(conditions))) if conditions else 0
+
+
+def strides(conditions: Sequence[Condition]) -> StateArray:
+    """What a level of each condition [K] adds to the number of a combination."""
+    counts = [1, *(one.levels for one in conditions)][: len(conditions)]
+    return np.cumprod(counts, dtype=np.int64)
+
+
+def levels_of(number: int, conditions: Sequence[Condition]) -> tuple[int, ...]:
+    """The level of each condition in the combination of a number."""
+    steps = strides(conditions)
+    return tuple(
+        number // int(step) % one.levels for one, step in zip(conditions, steps, strict=True)
+    )
+
 
 @dataclass(frozen=True, slots=True)
 class TemperatureControl:
-    """Sun and gains of a zone by which of K conditions its temperature meets in each hour.
+    """Sun and gains of a zone by the levels of conditions of its temperature in each hour.
 
-    The heat balance chooses: of the 2^K alternatives that whose number has bit k set where
-    condition k is met.
+    The heat balance chooses, from an alternative for each combination of the levels of `read`.
     """
 
-    conditions: tuple[RoomCondition, ...]
+    conditions: tuple[Condition, ...]  # those that a rule reads before it
     suns: tuple[Solar, ...]
     gains: tuple[Gains, ...]
+    read: tuple[Condition, ...] | None = None  # None: all conditions
 
     def __post_init__(self) -> None:
-        fits = len(self.suns) == len(self.gains) == 2 ** len(self.conditions) > 1
+        count = combinations_of(self.chosen_by)
+        fits = len(self.suns) == len(self.gains) == count > 1
         require(fits, "shading control", "expected an alternative for all conditions met or not")
+        for k, one in enumerate(self.conditions):
+            if isinstance(one, WaitingRule):
+                fits = all(read in self.conditions[:k] for read in one.reads)
+                require(fits, "shading control", "a rule reads a condition that comes after it")
+
+    @property
+    def chosen_by(self) -> tuple[Condition, ...]:
+        """The conditions whose levels number the alternatives."""
+        return self.conditions if self.read is None else self.read
 
 
 def profile_angle(sun_local: ArrayLike) -> NDArray[np.float64]:

@@ -127,25 +127,34 @@ def _take_alternative(
     for z in range(some.limits.shape[0]):
         before, now = 0, 0
         for k in range(some.limits.shape[1]):
-            before += state.met[z, k] << k
+            before += some.waits[z, k, 3] * state.met[z, k]
         for k in range(some.limits.shape[1]):
-            above, below, quantity, stays, holds, opens = some.limits[z, k]
-            felt = state.air[z]
-            if quantity == 1.0:
-                felt = 0.5 * (felt + mean_radiant(net, state, some.mix[before, hour, z], z))
-            elif quantity == 2.0:
-                felt = max(-state.load[z], 0.0)
-            elif quantity == 3.0:
-                felt = max(state.load[z], 0.0)
-            since = state.since[z, k]
-            state.warm[z, k] = felt > above or (state.warm[z, k] and felt >= below)
-            closes = state.warm[z, k] != (opens > 0.0)
-            since[0] = 0 if closes else since[0] + 1
-            since[1] += 1
-            wanted = (since[0] <= stays) != (opens > 0.0)
-            if wanted != state.met[z, k] and since[1] >= holds:
-                state.met[z, k], since[1] = not state.met[z, k], 0
-            now += state.met[z, k] << k
+            stays, holds, levels, stride, rule = some.waits[z, k]
+            since, asked, wanted = state.since[z, k], 0, 0
+            if rule < 0:
+                above, below, quantity = some.limits[z, k]
+                felt = state.air[z]
+                if quantity == 1.0:
+                    felt = 0.5 * (felt + mean_radiant(net, state, some.mix[before, hour, z], z))
+                elif quantity == 2.0:
+                    felt = max(-state.load[z], 0.0)
+                elif quantity == 3.0:
+                    felt = max(state.load[z], 0.0)
+                state.warm[z, k] = felt > above or (state.warm[z, k] and felt >= below)
+                asked = 1 if state.warm[z, k] else 0
+            else:
+                row = 0
+                for j in range(k):
+                    row += some.reads[z, k, j] * state.met[z, j]
+                asked = some.asked[rule, row, hour]
+            for level in range(1, levels):
+                since[level] = 0 if asked >= level else since[level] + 1
+                if since[level] <= stays:
+                    wanted = level
+            since[0] += 1
+            if wanted != state.met[z, k] and since[0] >= holds:
+                state.met[z, k], since[0] = wanted, 0
+            now += stride * state.met[z, k]
         taken[z] = now
         drive.mix[hour, z] = some.mix[now, hour, z]
         drive.convective[hour, z] = some.convective[now, hour, z]

@@ -141,7 +141,7 @@ def air_paths(zones: Sequence[Zone], transfers: Sequence[AirTransfer], terrain: 
         leak=np.array(
             [(*x.factors, x.stack, x.stack_exponent, x.wind, x.wind_exponent) for x in leaks]
         ),
-        wind=np.array([local_wind_factor(_height(zone), terrain) for zone in zones]),
+        wind=np.array([local_wind_factor(mean_height(zone), terrain) for zone in zones]),
         airing=np.array([(x.wind, x.stack, float(x.both), x.flow) for x in airings]),
         opens=np.array(
             [(x.open_above_c, x.close_below_c, x.least_difference, x.greatest_wind,
@@ -195,7 +195,7 @@ def emitters(
     )
 
 
-def _height(zone: Zone) -> float:
+def mean_height(zone: Zone) -> float:
     """Mean height [m] of what faces outdoors, weighted by area."""
     out = [s for s in zone.surfaces if s.outside == "outdoor"] + list(zone.windows)
     if not out:

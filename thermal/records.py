@@ -47,13 +47,18 @@ class OutdoorConditions(NamedTuple):
 class Alternatives(NamedTuple):
     """What `Drive` has of zones in each of A alternatives, from which every hour takes one.
 
-    Bit k of an alternative's number is set where condition K of the zone's temperature is met.
+    A condition K has a level: 1 where the zone's temperature meets it, or that which a rule of
+    conditions before it asks for.
     """
 
-    # [Z, K, 6] met above, until below [degC, W]; number of the quantity in
-    # `control.ROOM_QUANTITIES`; rows that windows stay closed after that, rows between two changes;
-    # whether windows open while it is met
+    # [Z, K, 3] met above, until below [degC, W]; number of the quantity in
+    # `control.ROOM_QUANTITIES`
     limits: NDArray[np.float64]
+    # [Z, K, 5] rows that a level stays after another was asked for, rows between two changes;
+    # number of levels; what a level adds to an alternative's number; rule that asks, -1: limits
+    waits: NDArray[np.int64]
+    reads: NDArray[np.int64]  # [Z, K, K] what a level of a condition adds to the rows of `asked`
+    asked: NDArray[np.int64]  # [Q, B, H] levels by rule
     inner: NDArray[np.float64]  # [A, R, N]
     outer: NDArray[np.float64]  # [A, R, N]
     middle: NDArray[np.float64]  # [A, R, N]
@@ -99,9 +104,9 @@ class State(NamedTuple):
     air: NDArray[np.float64]  # [Z]
     load: NDArray[np.float64]  # [Z] ideal load of the step [W], heating positive
     opened: NDArray[np.bool_]  # [Z] whether the windows are open
-    met: NDArray[np.bool_]  # [Z, K] conditions of `Alternatives`
-    warm: NDArray[np.bool_]  # [Z, K] what they would be without waiting
-    since: NDArray[np.int64]  # [Z, K, 2] rows since that was true, since they changed
+    met: NDArray[np.int64]  # [Z, K] levels of the conditions of `Alternatives`
+    warm: NDArray[np.bool_]  # [Z, K] whether the temperature meets them, without waiting
+    since: NDArray[np.int64]  # [Z, K, L] rows since a change, then since level 1, 2 ... was asked
 
 
 class Workspace(NamedTuple):

@@ -4,8 +4,9 @@ It is derived from a zone's surfaces, windows and air, nothing is fitted, and se
 a controller that looks ahead: the temperature of the air and the loads of an hour are linear in the
 temperature of the mass.  Deviations from the standard: the mass follows from the layers of the zone
 (a tenth of a metre from inside, at most half of a construction, up to its insulation), the area of
-the inside is that of the zone's faces, and walls meet the temperature behind them: that of air with
-the sun that they absorb, of the ground, of a neighbour.
+the inside is that of the zone's faces, walls meet the temperature behind them: that of air with
+the sun that they absorb, of the ground, of a neighbour; leaks have the wind of the hour and the
+difference between outdoors and the nearer set point (20 and 26 degC without).
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.compiled import compiled
 from thermal.climate import Climate
+from thermal.convection import local_wind_factor
+from thermal.network import mean_height
 from thermal.zone import OpaqueSurface, Zone
 
 FloatArray = NDArray[np.float64]
@@ -26,6 +29,7 @@ FILMS = 0.13, 0.04  # [m2 K/W] inside and outside, EN ISO 6946
 DEEPEST = 0.1  # [m] of a construction that counts as mass, EN ISO 13786 annex A
 INSULATION = 0.06  # [W/(m K)] conductivity up to which a layer insulates
 AIR_HEAT = 1200.0  # [J/(m3 K)]
+ROOM_C = 20.0, 26.0  # air of rooms without set points, for their leaks
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,13 +51,19 @@ class ReducedZone:
 
 
 def reduced_zone(
-    zone: Zone, climate: Climate, facade: FloatArray, states: NDArray[np.int64]
+    zone: Zone,
+    climate: Climate,
+    facade: FloatArray,
+    states: NDArray[np.int64],
+    *,
+    terrain: str = "suburbs",
 ) -> ReducedZone:
     """The reduced model of a zone.
 
     Args:
         facade: [H, F] irradiance on the outside of its surfaces [W/m2].
         states: [M, W] combinations of the states of its windows.
+        terrain: around the building, for the wind at its leaks.
 
     Opened windows, slabs with pipes and air of neighbours are left out.
     """
@@ -81,7 +91,7 @@ def reduced_zone(
         mass,
         mass**2 / squares if squares else float(areas.sum()),
         float(areas.sum()) + window_area,
-        np.maximum(_outdoor_air(zone, hours) * AIR_HEAT, 1e-3),
+        np.maximum(_outdoor_air(zone, climate, terrain) * AIR_HEAT, 1e-3),
         np.asarray(climate.outdoor_c, dtype=float),
         behind / opaque if opaque else np.asarray(climate.outdoor_c, dtype=float),
         _by_hour(loads.heating_c, hours),
@@ -121,12 +131,28 @@ def _behind(surface: OpaqueSurface, climate: Climate, facade: FloatArray) -> Flo
     return climate.outdoor_c + surface.absorptance_out * FILMS[1] * facade
 
 
-def _outdoor_air(zone: Zone, hours: int) -> FloatArray:
+def _outdoor_air(zone: Zone, climate: Climate, terrain: str) -> FloatArray:
     """Outdoor air [H] [m3/s], that of a fan less its heat recovery."""
-    changes = _by_hour(zone.infiltration_ach, hours) + _by_hour(zone.other_air_ach, hours)
+    hours, leaks = climate.hours, zone.leakage
+    changes = _by_hour(zone.other_air_ach, hours)
     if zone.supply is not None:
         changes = changes + _by_hour(zone.supply.ach, hours) * (1.0 - zone.supply.recovery)
-    return changes * zone.volume / 3600.0
+    heating, cooling = (_by_hour(v, hours) for v in (zone.loads.heating_c, zone.loads.cooling_c))
+    outdoor = np.asarray(climate.outdoor_c, dtype=float)
+    lower, upper = (
+        np.where(np.isfinite(limit), limit, otherwise)
+        for limit, otherwise in zip((heating, cooling), ROOM_C, strict=True)
+    )
+    gap = np.abs(np.clip(outdoor, lower, np.maximum(lower, upper)) - outdoor)
+    wind = climate.wind_speed * local_wind_factor(mean_height(zone), terrain)
+    a, b, c, d = leaks.factors
+    changes = changes + _by_hour(zone.infiltration_ach, hours) * (
+        a + b * gap + c * wind + d * wind**2
+    )
+    by_test = np.hypot(
+        leaks.stack * gap**leaks.stack_exponent, leaks.wind * wind**leaks.wind_exponent
+    )
+    return changes * zone.volume / 3600.0 + by_test
 
 
 def _by_hour(values: FloatArray | float, hours: int) -> FloatArray:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.bsdf.colour import relative_rgb
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.spectral_pane import (
     SpectralPane,
@@ -64,6 +65,12 @@ class SpectralFactor:
         """r_c at `ANGLES` [C, A]."""
         ratio: Array = _relative(channels.mean(self.transmittance), self.visible[:, None]).T
         return ratio
+
+    def rgb(self) -> Array:
+        """Linear sRGB [A, 3] of D65 through it at `ANGLES`, over its luminance; none negative."""
+        observer = illuminant("D65")[:, None] * sensitivities()[-3:].T  # [N, 3]
+        x, y, z = (self.transmittance @ (observer / observer.sum(axis=0))).T
+        return relative_rgb(x, y, z)
 
     def of_patches(self, channels: Channels) -> Array:
         """r_c of the patches of the full Klems basis [C, K], by their means of transmittance."""

@@ -84,11 +84,24 @@ def _rgb(x: ArrayLike, z: ArrayLike) -> NDArray[np.float64]:
     return relative_rgb(x, np.ones_like(x), z)
 
 
-def has_colour(bands: Sequence[DaylightScene], sky: AnnualSky, hour: int) -> bool:
+def has_colour(
+    bands: Sequence[DaylightScene],
+    systems: Sequence[Sequence[States]],
+    sky: AnnualSky,
+    hour: int,
+) -> bool:
     """Whether a picture of the scenes by red, green and blue in one of the hours L is not grey.
 
-    It is grey where all surfaces reflect the bands equally and the hour's daylight is neutral.
+    It is grey where all surfaces reflect the bands equally, the windows transmit them equally, and
+    the hour's daylight is neutral.
+
+    Args: systems: by red, green and blue [3][G][J].
     """
+    red = [optics for states in systems[0] for optics in states]
+    for tinted in systems[1:]:
+        of_band = (optics for states in tinted for optics in states)
+        if any(one is not other for one, other in zip(red, of_band, strict=True)):
+            return True
     first, *others = bands
     for other in others:
         for one, two in ((first.interior, other.interior), (first.exterior, other.exterior)):
@@ -104,7 +117,7 @@ def has_colour(bands: Sequence[DaylightScene], sky: AnnualSky, hour: int) -> boo
 def coloured_picture(
     luminance: NDArray[np.float32],
     bands: Sequence[DaylightScene],
-    systems: Sequence[States],
+    systems: Sequence[Sequence[States]],
     sky: AnnualSky,
     hour: int,
     *,
@@ -119,7 +132,7 @@ def coloured_picture(
 
     Args:
         bands: the scene with its view by red, green and blue.
-        systems: of each window group its states [G][J], the same in all bands.
+        systems: of each window group its states, by red, green and blue [3][G][J].
         state: of each window group [G]; the first by default.
     """
     shade = daylight_colour(sky, hour)
@@ -127,8 +140,9 @@ def coloured_picture(
     disc = float(sky.illuminance[hour]) / SUN_SOLID_ANGLE
     skies = [Sky(patches * shade.patches[:, c], towards, disc * shade.sun[c]) for c in range(3)]
     rgb = colour_picture(
-        [path_tracing_room(band, systems, state) for band in bands], skies, bands[0].eye,
-        samples=max(sampling.picture_samples // FEWER, 1), seed=sampling.seed, progress=progress,
+        [path_tracing_room(*own, state) for own in zip(bands, systems, strict=True)], skies,
+        bands[0].eye, samples=max(sampling.picture_samples // FEWER, 1), seed=sampling.seed,
+        progress=progress,
     )  # fmt: skip
     return with_luminance(smoothed_colour(rgb, luminance), luminance)
 

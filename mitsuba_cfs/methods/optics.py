@@ -93,6 +93,27 @@ class BsdfOptics:
         """Pickle the data without the forms that have been made."""
         return BsdfOptics, (self._coarse, self._fine, self._angular, self.between)
 
+    def tinted(self, theta: NDArray[np.float64], factor: NDArray[np.float64]) -> BsdfOptics:
+        """The same with its transmission times factors [A] at angles of incidence [A] [rad].
+
+        A tensor tree without a table by angle stays as it is.
+        """
+        if isinstance(self._fine, KlemsBsdf):
+            bsdf = _tinted_klems(self._fine, theta, factor)
+        elif self._angular is not None:
+            bsdf = _tinted_klems(self._coarse, theta, factor)
+        else:
+            return self
+        angular = self._angular
+        if angular is not None:
+            passed = angular.transmittance * np.interp(angular.theta, theta, factor)
+            most = np.ones_like(passed)
+            for reflected in (angular.reflectance_front, angular.reflectance_back):
+                if reflected is not None:
+                    most = np.minimum(most, 1 - reflected)
+            angular = replace(angular, transmittance=np.clip(passed, 0, most))
+        return BsdfOptics(bsdf, None, angular)
+
     @cached_property
     def transmission(self) -> NDArray[np.float64]:
         """See `SystemOptics`."""
@@ -135,6 +156,18 @@ class BsdfOptics:
             return mirror
         block = block * full.basis_in.projected_solid_angles()
         return block if mirror is None else block + mirror
+
+
+def _tinted_klems(
+    bsdf: KlemsBsdf, theta: NDArray[np.float64], factor: NDArray[np.float64]
+) -> KlemsBsdf:
+    """Klems matrices with their transmission times factors by the angle outdoors."""
+    front, back = bsdf.transmission_front, bsdf.transmission_back
+    if front is not None:
+        front = front * np.interp(bsdf.basis_in.centres()[0], theta, factor)
+    if back is not None:
+        back = back * np.interp(bsdf.basis_out.centres()[0], theta, factor)[:, None]
+    return replace(bsdf, transmission_front=front, transmission_back=back)
 
 
 class AngularOptics:

@@ -85,7 +85,7 @@ def _five_nanometres() -> tuple[float, ...]:
 
 # By their number.  3 and 9: Lark 2 (Inanici, Brennan, Clark 2015, "Spectral daylighting
 # simulations", Building Simulation 2015, 1245-1252); 20: Radiance's spectral samples; 81: every
-# 5 nm; 5: see `tests.validation.spectral_channels`
+# 5 nm; 5: least error of the alpha-opic quantities of the daylight in tests/spectra/test_channels
 CHANNEL_SETS = {
     3: (380.0, 498.0, 586.0, 780.0),
     5: (380.0, 400.0, 470.0, 540.0, 620.0, 780.0),

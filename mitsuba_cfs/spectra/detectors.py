@@ -34,15 +34,13 @@ D65_EFFICACY = {
 def sensitivities() -> FloatArray:
     """Sensitivities [9, N] of `DETECTORS`: V(lambda), the five action spectra, CIE 1931 observer.
 
-    Source: CIE S 026:2018, table 2 (CIE data set 10.25039/CIE.DS.vqqhzp5a), here every 5 nm with
-    cubic splines between; V(lambda) and the observer are those of colour-science.
+    Source: CIE S 026:2018, table 2 (CIE data set 10.25039/CIE.DS.vqqhzp5a); V(lambda) and the
+    observer are those of colour-science.
     """
     import colour
-    from scipy.interpolate import CubicSpline
 
-    path = Path(__file__).with_suffix(".csv")
-    table = np.loadtxt(path, delimiter=",", skiprows=1)
-    opic = np.maximum(CubicSpline(table[:, 0], table[:, 1:])(NANOMETRES), 0.0)
+    path = Path(__file__).with_suffix(".csv")  # every nanometre of `NANOMETRES`
+    opic = np.loadtxt(path, delimiter=",", skiprows=1)[:, 1:]
     photopic = colour.SDS_LEFS["CIE 1924 Photopic Standard Observer"]
     observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
     v = np.interp(NANOMETRES, photopic.wavelengths, photopic.values)

@@ -150,4 +150,6 @@ def write_facade(path: Path) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("file", type=Path, nargs="?", default=Path("facade.ifc"))
-    write_facade(parser.parse_args().file)
+    target = parser.parse_args().file
+    write_facade(target)
+    print(f"{target}, and the study of its modules: {target.with_name(STUDY)}")

@@ -15,9 +15,9 @@ and 80 degrees from north, clockwise. The site is that of the demo's weather fil
 
 from __future__ import annotations
 
+import argparse
 import functools
 import operator
-import sys
 import uuid
 from dataclasses import dataclass
 from pathlib import Path
@@ -592,8 +592,12 @@ def _fix_identity(model: ifcopenshell.file) -> None:
 
 def main() -> None:
     """Write the model to the file named, by default the one that is shipped."""
-    target = sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parent / "office.ifc"
+    parser = argparse.ArgumentParser(description="Write the demo's building, a two-room office.")
+    shipped = Path(__file__).with_name("office.ifc")
+    parser.add_argument("file", type=Path, nargs="?", default=shipped)
+    target = parser.parse_args().file
     office().write(str(target))
+    print(f"{target}: two rooms")
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from scenes.results import ShadingYear
 from scenes.room.shading_rules import MOST_CONDITIONS
 from scenes.room.zone import RoomAlternatives, RoomServices, RoomZone
 from thermal.climate import Solar
+from thermal.control import combinations_of, levels_of, number_of
 from thermal.network import framed
 from thermal.ventilation import WindowAiring
 from thermal.zone import Gains, Zone
@@ -86,33 +87,38 @@ def _renamed(room: RoomZone) -> RoomZone:
 
 
 def _in_alternatives(name: str, rooms: Sequence[RoomZone]) -> RoomZone:
-    """The rooms as one, in an alternative for all conditions of their shading met or not.
+    """The rooms as one, in an alternative for all levels of the conditions of their shading.
 
     The conditions are of the temperature of the air node, the operative one of all its faces.
 
-    Raises: `DataError` for more than `MOST_CONDITIONS`.
+    Raises: `DataError` for more than 2^`MOST_CONDITIONS` alternatives.
     """
-    of_rooms = [room.alternatives.conditions if room.alternatives else () for room in rooms]
-    conditions = tuple(dict.fromkeys(one for each in of_rooms for one in each))
-    if len(conditions) > MOST_CONDITIONS:
-        message = f"{len(conditions)} limits of the temperature of {name}; at most "
-        raise DataError(f"{message}{MOST_CONDITIONS}", element=name, field="control")
+    choices = [room.alternatives for room in rooms if room.alternatives is not None]
+    conditions = tuple(dict.fromkeys(one for each in choices for one in each.conditions))
+    read = tuple(dict.fromkeys(one for each in choices for one in each.read))
+    if combinations_of(read) > 2**MOST_CONDITIONS:
+        message = (
+            f"the rules by the temperature of {name} have {combinations_of(read)} combinations"
+        )
+        message = f"{message} of states; at most {2**MOST_CONDITIONS} are computed"
+        raise DataError(message, element=name, field="control")
 
     def those(number: int) -> Iterator[RoomZone]:
-        for room, read in zip(rooms, of_rooms, strict=True):
+        levels = dict(zip(read, levels_of(number, read), strict=True))
+        for room in rooms:
             if room.alternatives is None:
                 yield room
                 continue
-            bits = (number >> conditions.index(one) & 1 for one in read)
-            one = room.alternatives.rooms[sum(bit << k for k, bit in enumerate(bits))]
+            of_room = room.alternatives.read
+            one = room.alternatives.rooms[number_of([levels[k] for k in of_room], of_room)]
             zone = replace(room.zone, gains=one.zone.gains)  # with the names of the air node
             yield replace(one, room=replace(room.room, zone=zone))
 
     whole = _merged(name, rooms)
-    if not conditions:
+    if not choices:
         return whole
-    every = tuple(_merged(name, list(those(n))) for n in range(2 ** len(conditions)))
-    return replace(whole, alternatives=RoomAlternatives(conditions, every))
+    every = tuple(_merged(name, list(those(n))) for n in range(combinations_of(read)))
+    return replace(whole, alternatives=RoomAlternatives(conditions, read, every))
 
 
 def _merged(name: str, rooms: Sequence[RoomZone]) -> RoomZone:

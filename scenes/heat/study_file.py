@@ -188,7 +188,7 @@ class StudyFile(OperationTables, ReadTable, OutdoorTable):
         for one in self.variants:
             fault = one.control_fault(max(Counter(s.windows for s in self.system).values()))
             if fault is not None:
-                raise ValueError("control.{}: {}".format(*fault))
+                raise ValueError("{}: {}".format(*fault))
         return self
 
 

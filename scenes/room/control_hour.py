@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -12,11 +14,11 @@ from scenes.room.control_year import AT_A_TIME, ControlYear, StateArray, States,
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
 from scenes.room.predictive import predictive_states
-from scenes.room.shading import predicts, temperature_conditions
+from scenes.room.shading import Levels, predicts, room_conditions
 from scenes.room.solar import SeasonalOutdoors
 from scenes.room.zone import climate
 from thermal.balance import LONG_AGO, BalanceOptions, SteppedZone
-from thermal.control import ROOM_QUANTITIES, RoomCondition
+from thermal.control import ROOM_QUANTITIES, Condition, WaitingRule, number_of
 
 FloatArray = NDArray[np.float64]
 
@@ -158,24 +160,32 @@ class ControlError(CfsError, ValueError):
     """A control function that returns no states of the room's groups."""
 
 
-class MetCondition:
-    """Whether a condition of the room's temperature is met, hour by hour, as the balance has it."""
+class FollowedCondition:
+    """The level of a condition of the room's temperature, hour by hour, as the balance has it."""
 
-    def __init__(self, condition: RoomCondition) -> None:
-        """Not met, and since long ago."""
-        self._condition = condition
-        self._warm = self.met = False
-        self._open_rows = self._same_rows = LONG_AGO
+    def __init__(self, condition: Condition) -> None:
+        """At level 0, and since long ago."""
+        self.condition, self.level, self._warm = condition, 0, False
+        self._since = [LONG_AGO] * condition.levels  # rows since each level or one above was asked
+        self._same_rows = LONG_AGO
 
-    def follow(self, felt: float) -> None:
-        """Go on by an hour, from its quantity at the beginning."""
-        of = self._condition
-        self._warm = felt > of.above or (self._warm and felt >= of.below)
-        self._open_rows = 0 if self._warm != of.opens else self._open_rows + 1
+    def follow(self, felt: Mapping[str, float], levels: Levels, hour: int) -> None:
+        """Go on by an hour.
+
+        Args: felt: the room's quantities at its beginning; levels: of the conditions before this.
+        """
+        of = self.condition
+        if isinstance(of, WaitingRule):
+            asked = int(of.asked[number_of([levels[one] for one in of.reads], of.reads), hour])
+        else:
+            value = felt[of.quantity]
+            self._warm = value > of.above or (self._warm and value >= of.below)
+            asked = int(self._warm)
+        self._since = [0 if asked >= n else rows + 1 for n, rows in enumerate(self._since)]
         self._same_rows += 1
-        wanted = (self._open_rows <= of.open_delay_rows) != of.opens
-        if wanted != self.met and self._same_rows >= of.hold_rows:
-            self.met, self._same_rows = wanted, 0
+        wanted = max(n for n, rows in enumerate(self._since) if rows <= of.open_delay_rows)
+        if wanted != self.level and self._same_rows >= of.hold_rows:
+            self.level, self._same_rows = wanted, 0
 
 
 class ControlRun:
@@ -188,10 +198,10 @@ class ControlRun:
         self._stepped: SteppedZone | None = None
         self._felt_before: list[tuple[float, float, float, float]] = []  # each hour
         self._heat: dict[tuple[int, ...], ZoneHeat] = {}
-        self._conditions = temperature_conditions(year.by_file)
-        self._met = [MetCondition(one) for one in self._conditions]
+        conditions, self._read = room_conditions(year.by_file, year.light, year.outdoors)
+        self._conditions = [FollowedCondition(one) for one in conditions]
         self._followed = 0  # hours
-        self._by_rules: dict[tuple[bool, ...], StateArray] = {}
+        self._by_rules: dict[tuple[int, ...], StateArray] = {}
 
     def before(self, hour: int) -> tuple[float, float]:
         """Air and operative temperature at the end of the hour before [degC]."""
@@ -222,14 +232,16 @@ class ControlRun:
         """The states of the control groups [N] by the rules of the operation file."""
         while self._conditions and self._followed <= hour:
             felt = dict(zip(ROOM_QUANTITIES, self._felt(self._followed), strict=True))
-            for one, met in zip(self._conditions, self._met, strict=True):
-                met.follow(felt[one.quantity])
+            levels: dict[Condition, int] = {}
+            for one in self._conditions:
+                one.follow(felt, levels, self._followed)
+                levels[one.condition] = one.level
             self._followed += 1
-        key = tuple(met.met for met in self._met)
+        now = {one.condition: one.level for one in self._conditions}
+        key = tuple(now[one] for one in self._read)
         if key not in self._by_rules:
-            are_met = dict(zip(self._conditions, key, strict=True))
-            planned = predicts(self.year.by_file)
-            states = predictive_states(self.year) if planned else self.year.by_rules(are_met)
+            planned, levels = predicts(self.year.by_file), dict(zip(self._read, key, strict=True))
+            states = predictive_states(self.year) if planned else self.year.by_rules(levels)
             self._by_rules[key] = states
         return tuple(self._by_rules[key][hour].tolist())
 

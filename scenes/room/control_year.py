@@ -27,14 +27,15 @@ from scenes.room.light import RoomLight
 from scenes.room.operation import OperationHours
 from scenes.room.shading import (
     MOST_COMBINATIONS,
+    Levels,
     Seat,
     group_states,
     seat_view,
     shading_states,
     slat_tilts_deg,
-    window_beam,
 )
 from scenes.room.solar import SeasonalOutdoors, SunByStates, window_irradiance
+from scenes.room.window_sensors import window_beam
 from scenes.room.zone import (
     RoomZone,
     ZoneSurfaces,
@@ -45,7 +46,7 @@ from scenes.room.zone import (
     zone_surfaces,
 )
 from thermal.climate import Solar
-from thermal.control import RoomCondition, profile_angle
+from thermal.control import profile_angle
 from thermal.zone import Gains
 
 FloatArray = NDArray[np.float64]
@@ -272,7 +273,7 @@ class ControlYear:
         """The room as its operation file controls it."""
         return replace(self.room, controller=None)
 
-    def by_rules(self, met: Mapping[RoomCondition, bool]) -> StateArray:
+    def by_rules(self, met: Levels) -> StateArray:
         """States of the control groups by the rules of the operation file [H, N]."""
         states = shading_states(self.by_file, self.light, self.outdoors, met=met)
         return self.by_file.shading(states).states

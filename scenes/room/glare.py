@@ -250,7 +250,8 @@ def coloured(
     sky = annual_sky(room.weather, sampling.subdivision, hours=[hour], **room.options.sky)
     result = with_colour(
         glare, band_scenes(building, room.space, groups, glare.view),
-        light.light.systems[: len(groups)], sky, state=state[hour].tolist(), sampling=sampling,
+        room.windows.optics_by_colour(light.light.systems[: len(groups)]), sky,
+        state=state[hour].tolist(), sampling=sampling,
         progress=part(progress, 0.0, 1.0, "colour"),
     )  # fmt: skip
     progress("colour", 1.0)
@@ -260,7 +261,7 @@ def coloured(
 def with_colour(
     glare: GlareResults,
     bands: Sequence[DaylightScene],
-    systems: Sequence[States],
+    systems: Sequence[Sequence[States]],
     sky: AnnualSky,
     *,
     state: Sequence[int],
@@ -273,11 +274,12 @@ def with_colour(
 
     Args:
         bands: the room's scene with its view by red, green and blue.
+        systems: of its windows by red, green and blue [3][G][J].
         sky: of the picture's hour alone.
         state: [G] of the window groups in that hour.
     """
     shown = brightest_picture(glare)
-    if not bands[0].groups or not has_colour(bands, sky, 0):
+    if not bands[0].groups or not has_colour(bands, systems, sky, 0):
         return glare
     rgb = coloured_picture(
         shown.luminance, bands, systems, sky, 0,

@@ -48,7 +48,7 @@ class Outputs:
     picture_size: int = 600  # pixels of a side of the fisheye picture
     annual_glare: bool = False  # rate every lit hour, not only the pictures
     spectral: bool = False  # alpha-opic quantities and colour of the light
-    channels: int = 20  # bands of wavelength for that, a key of CHANNEL_SETS
+    channels: int = 81  # bands of wavelength for that, a key of CHANNEL_SETS
     glare_sources: str = "evalglare"  # one of GLARE_SOURCES
     glare_sun: str = "source"  # its disc: a source of its own, or part of its pixels
 

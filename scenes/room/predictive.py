@@ -163,7 +163,9 @@ def predicted_hours(
         daylight.append(
             np.zeros(room.skies.hours) if dimming is None else year.work_plane_lx(states)
         )
-    reduced = reduced_zone(zone, climate(room.weather), solar.facade, windows)
+    reduced = reduced_zone(
+        zone, climate(room.weather), solar.facade, windows, terrain=tables.terrain
+    )
     area = room.space.floor_area
     lamps, other = hours.lamps(area), hours.heat(area) + tables.gains.lighting_standby_w_m2 * area
     return reduced, PredictedHours(

@@ -64,6 +64,7 @@ from scenes.room.picture_hours import wanted_hours
 from scenes.room.shading import (
     control_signals,
     predicts,
+    room_conditions,
     ruled_year,
     temperature_conditions,
 )
@@ -78,6 +79,7 @@ from scenes.room.zone import (
     room_zone,
     zone_surfaces,
 )
+from thermal.control import combinations_of, levels_of
 
 
 class RoomChoices(TypedDict, total=False):
@@ -303,12 +305,12 @@ def controlled_zone(
 ) -> RoomZone:
     """The zone of a room by its rules of shading.
 
-    Where these read the room's temperature: with an alternative for each combination of conditions
-    that are met, from which the heat balance chooses in every hour.
+    Where these read the room's temperature: with an alternative for each combination of its
+    conditions' levels, from which the heat balance chooses in every hour.
     """
-    conditions, rooms = temperature_conditions(room), []
-    for number in range(2 ** len(conditions)):
-        met = {one: bool(number >> k & 1) for k, one in enumerate(conditions)}
+    (conditions, read), rooms = room_conditions(room, light, outdoors), []
+    for number in range(combinations_of(read)):
+        met = dict(zip(read, levels_of(number, read), strict=True))
         ruled, daylight = ruled_year(room, light, outdoors, met=met, progress=progress), None
         state = ruled.states[:, room.windows.control]
         if light is not None and reads_work_plane(room):
@@ -316,9 +318,9 @@ def controlled_zone(
         rooms.append(
             room_zone(room, surfaces, outdoors, state, daylight, ruled=ruled, progress=progress)
         )
-    if not conditions:
+    if len(rooms) == 1:
         return rooms[0]
-    return replace(rooms[0], alternatives=RoomAlternatives(conditions, tuple(rooms)))
+    return replace(rooms[0], alternatives=RoomAlternatives(conditions, read, tuple(rooms)))
 
 
 def _states_by_balance(room: RoomInputs, zone: RoomZone) -> NDArray[np.int64]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.to_tracer import exterior_surfaces
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.evaluation import GlareOptions
 from mitsuba_cfs.images.view import View, fisheye
@@ -25,9 +24,6 @@ from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.metrics.lm83 import blinds_operated
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.sun import is_up, sun_directions
-from mitsuba_cfs.surfaces import Surfaces, even_numbers, points_on_triangles
-from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
-from mitsuba_cfs.trace.sun.shade import sunlit_shares
 from scenes.fenestration.sight import sight_through
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.room.glare import rating_of
@@ -44,15 +40,20 @@ from scenes.room.shading_rules import (
     ShadingRule,
 )
 from scenes.room.solar import SeasonalOutdoors, window_irradiance
+from scenes.room.window_sensors import facade_illuminance, roof_irradiance, window_beam
 from thermal.control import (
+    Condition,
     RoomCondition,
+    WaitingRule,
     always,
     by_cut_off,
     by_glare,
     by_threshold,
+    combinations_of,
     delayed,
     held,
     latched,
+    levels_of,
     sun_depth,
     with_few_moves,
 )
@@ -60,9 +61,6 @@ from thermal.occupants import arrivals, haldi_robinson_2010, lightswitch_2002
 
 FloatArray = NDArray[np.float64]
 StateArray = NDArray[np.int64]
-SUN_POINTS = 64  # on each window group, for its sunlit share
-DISC_RAYS = 4  # from each of them
-CLEAR = 0.01  # [m] of a sensor outside the glass
 MOST_COMBINATIONS = 1024  # of states of groups that avoid glare together
 # An eye: position [m] and azimuth of the line of sight [deg] from north by east, None of the view
 Seat = tuple[tuple[float, float, float] | None, float | None]
@@ -100,8 +98,8 @@ def predicts(room: RoomInputs) -> bool:
     return room.control.rules[0].rule == "predictive"
 
 
-Conditions = Mapping[RoomCondition, bool]
-NO_CONDITIONS: Conditions = {}
+Levels = Mapping[Condition, int]  # of conditions: 1 met, 0 not; of a rule that waits its own
+NO_CONDITIONS: Levels = {}
 
 
 def temperature_conditions(room: RoomInputs) -> tuple[RoomCondition, ...]:
@@ -128,13 +126,109 @@ def temperature_conditions(room: RoomInputs) -> tuple[RoomCondition, ...]:
     return conditions
 
 
+def room_conditions(
+    room: RoomInputs, light: RoomLight | None, outdoors: SeasonalOutdoors | None
+) -> tuple[tuple[Condition, ...], tuple[Condition, ...]]:
+    """All conditions of a room's temperature, and those that the states of its windows follow from.
+
+    A rule that combines conditions and waits is one of them: its levels are its states, and what it
+    asks for is tabulated for those conditions that it reads itself.
+
+    Raises: `DataError` where more than 2^`MOST_CONDITIONS` combinations would be computed.
+    """
+    conditions: list[Condition] = list(temperature_conditions(room))
+    if not conditions:
+        return (), ()
+    rules, places = room.control.rules, room.control.places
+    signals, waiting = _Signals(room, outdoors, NO_CONDITIONS), dict[str, WaitingRule]()
+    step_h, read = room.weather.step_h, dict[Condition, None]()
+    for c in range(len(rules)):
+        for rule, place in _waiting_parts(rules[c], places[c], step_h):
+            reads = dict.fromkeys(
+                one
+                for inner, at in list(_parts(rule, place)) or [(rule, place)]
+                for one in _reads(inner, at, c, waiting, step_h)
+            )
+            one = _waiting_rule(room, c, (rule, place), tuple(reads), signals)
+            waiting[one.name] = one
+            conditions.append(one)
+        read |= dict.fromkeys(_reads(rules[c], places[c], c, waiting, step_h))
+    _bounded(room, read)
+    return tuple(conditions), tuple(read)
+
+
+def _bounded(room: RoomInputs, conditions: Iterable[Condition]) -> None:
+    count, most = combinations_of(tuple(conditions)), 2**MOST_CONDITIONS
+    if count > most:
+        message = f"its rules by the room's temperature have {count} combinations of states, at "
+        message += f"most {most} are computed: let fewer parts wait, or more windows move together"
+        raise DataError(message, element=room.space.label, field="control")
+
+
+def _waiting_rule(
+    room: RoomInputs,
+    c: int,
+    at: tuple[ShadingRule, str],
+    read: tuple[Condition, ...],
+    signals: _Signals,
+) -> WaitingRule:
+    """A rule of control group c, at a place of its file, as a condition that waits."""
+    (rule, place), asked, reasons = at, [], tuple(dict.fromkeys(_reasons(at[0])))
+    _bounded(room, read)
+    for number in range(combinations_of(read)):
+        signals.met = dict(zip(read, levels_of(number, read), strict=True))
+        asked.append(_by_rule(room, c, signals, {}, reasons, at=at, at_once=place)[0])
+    states, levels = np.unique(np.stack(asked), return_inverse=True)
+    return WaitingRule(
+        _waiting_name(c, place), read, tuple(states.tolist()), levels.reshape(len(asked), -1),
+        *_waits(rule, room.weather.step_h),
+    )  # fmt: skip
+
+
+def _waiting_name(c: int, place: str) -> str:
+    return f"group {c}, {place}"
+
+
+def _parts(rule: ShadingRule, place: str) -> Iterator[tuple[ShadingRule, str]]:
+    """The parts of a rule with their places in the file."""
+    for n, inner in enumerate(rule.parts):
+        yield inner, f"{place}.parts.{n}"
+
+
+def _waiting_parts(
+    rule: ShadingRule, place: str, step_h: float
+) -> Iterator[tuple[ShadingRule, str]]:
+    """The rules that combine or turn conditions of the room, and wait; inner ones first."""
+    if rule.rule not in ("any", "all") and not rule.inverse:
+        return
+    for inner, at in _parts(rule, place):
+        yield from _waiting_parts(inner, at, step_h)
+    if any(_waits(rule, step_h)) and any(leaf.rule in ROOM_RULES for leaf in rule.leaves):
+        yield rule, place
+
+
+def _reads(
+    rule: ShadingRule, place: str, c: int, waiting: Mapping[str, WaitingRule], step_h: float
+) -> Iterator[Condition]:
+    """The conditions that a rule's states follow from, without those within rules that wait."""
+    name = _waiting_name(c, place)
+    if name in waiting:
+        yield waiting[name]
+    elif rule.rule in ROOM_RULES:
+        yield condition_of(rule, step_h)
+    elif rule.rule in ("any", "all"):
+        for inner, at in _parts(rule, place):
+            yield from _reads(inner, at, c, waiting, step_h)
+
+
 def condition_of(rule: ShadingRule, step_h: float) -> RoomCondition:
     """The condition of a rule by the room's temperature, for weather in steps of so many hours."""
     rows, quantity = _waits(rule, step_h), ROOM_RULES[rule.rule]
-    opens = rule.inverse and rows[0] > 0
+    if rule.inverse:
+        rows = 0, 0  # windows open where it is met: the rule waits, see `_waiting_parts`
     if rule.rule in LOAD_RULES:
-        return RoomCondition(rule.close_above_w, rule.close_above_w, quantity, *rows, opens)
-    return RoomCondition(rule.closes_above_c, rule.opens_below_c, quantity, *rows, opens)
+        return RoomCondition(rule.close_above_w, rule.close_above_w, quantity, *rows)
+    return RoomCondition(rule.closes_above_c, rule.opens_below_c, quantity, *rows)
 
 
 def _waits(rule: ShadingRule, step_h: float) -> tuple[int, int]:
@@ -156,7 +250,7 @@ def shading_states(
     light: RoomLight | None = None,
     outdoors: SeasonalOutdoors | None = None,
     *,
-    met: Conditions = NO_CONDITIONS,
+    met: Levels = NO_CONDITIONS,
     progress: Progress = silent,
 ) -> StateArray:
     """The shading state of each window group in every hour [H, G]; see `ruled_year`."""
@@ -169,14 +263,14 @@ def ruled_year(
     light: RoomLight | None = None,
     outdoors: SeasonalOutdoors | None = None,
     *,
-    met: Conditions = NO_CONDITIONS,
+    met: Levels = NO_CONDITIONS,
     progress: Progress = silent,
 ) -> RuledYear:
     """The states of a room's control groups by their rules.
 
     Args:
         light: for the signals "eye", "dgp", "plane" and "direct"; outdoors: for "irradiance".
-        met: whether the room's temperature and loads meet each of `temperature_conditions`.
+        met: the levels of the second part of `room_conditions`.
     """
     operation, rules = room.operation, room.control.rules
     states = np.zeros((room.skies.hours, len(room.control.names)), dtype=np.int64)
@@ -227,11 +321,17 @@ def _by_rule(
     signals: _Signals,
     known: Mapping[str, StateArray],
     reasons: Sequence[str],
+    *,
+    at: tuple[ShadingRule, str] | None = None,
+    at_once: str = "",
 ) -> tuple[StateArray, StateArray]:
     """The states of a control group by its rule [H], and the number of the reason of each move [H].
 
-    Args: known: its states [H] by the kinds of rules of which several groups take theirs together.
+    Args: known: its states [H] by the kinds of rules of which several groups take theirs together;
+        at: a rule in it with its place in the file; at_once: the place of a rule that does not
+        wait.
     """
+    by_name = {one.name: one for one in signals.met if isinstance(one, WaitingRule)}
     groups, operation = np.flatnonzero(room.windows.control == c), room.operation
     hours = room.skies.hours
 
@@ -261,14 +361,20 @@ def _by_rule(
         return always(rule.state, hours)
 
     def of(rule: ShadingRule, place: str) -> tuple[StateArray, StateArray]:
+        waiting = by_name.get(_waiting_name(c, place))
+        if waiting is not None:
+            states = always(waiting.states[signals.met[waiting]], hours)
+            return states, np.full(hours, -1)
         if rule.rule in ("any", "all"):
-            parts = [of(one, f"{place}.parts.{n}") for n, one in enumerate(rule.parts)]
+            parts = [of(*one) for one in _parts(rule, place)]
             states, by = _combined(rule.rule == "any", parts)
         else:
             states = plain(rule, place)
             if rule.inverse:
                 states = np.where(states > 0, 0, rule.state or group_states(room, c) - 1)
             by = np.where(_moves(states), reasons.index(rule.rule), -1)
+        if place == at_once:
+            return states, by
         wait, hold = _waits(rule, room.weather.step_h)
         few = rule.most_moves or 1
         changes: dict[str, Callable[[StateArray], StateArray]] = {
@@ -285,7 +391,7 @@ def _by_rule(
                 states = waited
         return states, by
 
-    return of(room.control.rules[c], room.control.places[c])
+    return of(*(at or (room.control.rules[c], room.control.places[c])))
 
 
 def _moves(states: StateArray) -> NDArray[np.bool_]:
@@ -330,9 +436,7 @@ def _ends(room: RoomInputs, until: str) -> NDArray[np.bool_]:
 class _Signals:
     """What rules read of the window groups, computed once."""
 
-    def __init__(
-        self, room: RoomInputs, outdoors: SeasonalOutdoors | None, met: Conditions
-    ) -> None:
+    def __init__(self, room: RoomInputs, outdoors: SeasonalOutdoors | None, met: Levels) -> None:
         self._room, self._outdoors, self.met = room, outdoors, met
         self._values: dict[tuple[str, str], FloatArray] = {}
 
@@ -397,78 +501,6 @@ def group_states(room: RoomInputs, c: int) -> int:
     """Number of states of a control group: of its window group with the most."""
     windows = room.windows
     return max(len(windows.systems[g]) for g in np.flatnonzero(windows.control == c))
-
-
-def window_beam(room: RoomInputs, *, shaded: bool) -> FloatArray:
-    """The sun's direct irradiance of each window group in every hour [H, G] [W/m2].
-
-    Args: shaded: by the surroundings; else as if there were none.
-    """
-    sun, groups = sun_directions(room.weather), room.windows.groups
-    normals = np.stack([group.frame[2] for group in groups])
-    # an hour of sunset has a beam in the weather, although the sun has set in its middle
-    direct = np.where(is_up(sun), room.weather.direct_normal, 0.0)
-    beam: FloatArray = direct[:, None] * np.maximum(sun @ normals.T, 0.0)
-    if not shaded:
-        return beam
-    points = np.concatenate(
-        [
-            points_on_triangles(
-                np.concatenate([w.triangles for w in group.windows]), even_numbers(SUN_POINTS)
-            )[0]
-            for group in groups
-        ]
-    )
-    facing = np.repeat(normals, SUN_POINTS, axis=0)
-    for number, season in enumerate(room.seasons):
-        exterior = exterior_surfaces(season.building, room.space, "solar")
-        hours = np.flatnonzero((beam > 0).any(axis=1) & (room.season_of_year == number))
-        if len(hours) and len(exterior.triangles):
-            lit = sunlit_shares(
-                exterior, points, facing, sun[hours], samples=DISC_RAYS,
-                seed=room.options.sampling.seed,
-            )  # fmt: skip
-            beam[hours] *= lit.reshape(len(groups), SUN_POINTS, -1).mean(axis=1).T
-    return beam
-
-
-def roof_irradiance(room: RoomInputs, *, horizontal: bool = False) -> FloatArray:
-    """Irradiance of the window groups, or of a level sensor, without surroundings [H, G] [W/m2]."""
-    matrix = _sensor_matrix(room, Surfaces.none(), horizontal=horizontal)
-    lit: FloatArray = (matrix @ np.asarray(room.skies.solar)).astype(float)
-    return room.skies.whole_year(lit).T
-
-
-def facade_illuminance(room: RoomInputs, sensor: str) -> FloatArray:
-    """Illuminance in the middle of the glass of the window groups [H, G] [lx].
-
-    Args: sensor: "window", "roof" without surroundings, or "horizontal" on the roof.
-    """
-    sky, season = np.asarray(room.skies.whole), room.season_of_year[room.skies.lit]
-    lit = np.zeros((len(room.windows.groups), sky.shape[1]))
-    for number, one in enumerate(room.seasons):
-        around = Surfaces.none()
-        if sensor == "window":
-            around = exterior_surfaces(one.building, room.space, "visible")
-        hours = season == number
-        matrix = _sensor_matrix(room, around, horizontal=sensor == "horizontal")
-        lit[:, hours] = matrix @ sky[:, hours]
-    return room.skies.whole_year(lit).T
-
-
-def _sensor_matrix(room: RoomInputs, around: Surfaces, *, horizontal: bool) -> FloatArray:
-    """Irradiance of sensors in the middle of the window groups per radiance of a patch [G, P]."""
-    sampling, groups = room.options.sampling, room.windows.groups
-    centres = [np.mean([w.triangles.mean(axis=(0, 1)) for w in g.windows], axis=0) for g in groups]
-    normals = np.stack([g.frame[2] for g in groups])
-    points = np.stack(centres) + CLEAR * normals
-    if horizontal:  # one sensor for all
-        points, normals = points[:1], np.array([[0.0, 0.0, 1.0]])
-    values: FloatArray = sky_irradiance_matrix(
-        around, points, normals,
-        subdivision=sampling.subdivision, seed=sampling.seed, cache=room.cache,
-    ).values  # fmt: skip
-    return np.tile(values, (len(groups), 1)) if horizontal else values
 
 
 def _by_sun_depth(

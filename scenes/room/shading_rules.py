@@ -169,9 +169,11 @@ class ShadingRule(TomlTable):
     def fault(self, states: int, schedules: Mapping[str, ScheduleTable]) -> tuple[str, str] | None:
         """The key that does not fit windows with `states` states, and the fault."""
         by_room = any(leaf.rule in ROOM_RULES for leaf in self.leaves)
-        if by_room and self.rule not in ROOM_RULES and (self.open_delay_h or self.hold_h):
+        together = any(leaf.rule in (*JOINT_RULES, "manual") for leaf in self.leaves)
+        if by_room and together and (self.open_delay_h or self.hold_h):
             key = "open_delay_h" if self.open_delay_h else "hold_h"
-            return key, "acts on the part by the room's temperature alone: state it there"
+            message = "does not act on the room's temperature and on glare, daylight or people"
+            return key, f"{message} together: state it in the parts"
         if by_room and (self.until or self.most_moves):
             key = "until" if self.until else "most_moves"
             return key, "does not go with the room's temperature or loads"

@@ -19,7 +19,10 @@ from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.room.control_groups import ControlGroups, control_groups
 
 if TYPE_CHECKING:
-    from mitsuba_cfs.methods.optics import BsdfOptics
+    from mitsuba_cfs.methods.optics import BsdfOptics, SystemOptics
+
+
+COLOUR_BANDS = 3  # red, green, blue
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +56,30 @@ class RoomWindows:
             return known[id(system)]
 
         return [[of(system) for system in states] for states in self.systems]
+
+    def optics_by_colour(
+        self, optics: Sequence[Sequence[SystemOptics]]
+    ) -> list[list[list[SystemOptics]]]:
+        """Optics of each group's systems by red, green and blue [3][G][J].
+
+        Light of D65 through a system has the colour of its spectrum; neutral where this is not
+        known.
+
+        Args: optics: of the visible band [G][J].
+        """
+        from mitsuba_cfs.bsdf.spectral_factor import ANGLES
+        from mitsuba_cfs.methods.optics import BsdfOptics
+
+        known: dict[int, list[SystemOptics]] = {}
+        for states, of in zip(self.systems, optics, strict=True):
+            for system, one in zip(states, of, strict=True):
+                if id(one) in known:
+                    continue
+                known[id(one)] = [one] * COLOUR_BANDS
+                if system.spectrum is not None and isinstance(one, BsdfOptics):
+                    tints = system.spectrum.rgb().T
+                    known[id(one)] = [one.tinted(ANGLES, tint) for tint in tints]
+        return [[[known[id(one)][c] for one in of] for of in optics] for c in range(COLOUR_BANDS)]
 
     def neighbours(self, g: int, state: int) -> tuple[int, int, float] | None:
         """Numbers of two states of a group that a state is the mean of, and the second's share."""

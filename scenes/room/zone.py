@@ -42,7 +42,7 @@ from scenes.room.solar import SeasonalOutdoors, SunBeyond, solar_gains, sun_by_h
 from scenes.room.windows import RoomWindows
 from thermal.balance import BalanceOptions, ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
-from thermal.control import RoomCondition, TemperatureControl
+from thermal.control import Condition, TemperatureControl
 from thermal.errors import ThermalInputError
 from thermal.ground import (
     SOILS,
@@ -290,7 +290,8 @@ class RoomZone:
         rooms = self.alternatives.rooms
         suns = tuple(per_window(room.solar, room.zone) for room in rooms)
         gains = tuple(room.zone.gains for room in rooms)
-        return TemperatureControl(self.alternatives.conditions, suns, gains)
+        choices = self.alternatives
+        return TemperatureControl(choices.conditions, suns, gains, choices.read)
 
     def in_alternatives(self, number: NDArray[np.int64]) -> RoomZone:
         """The room with that alternative of every hour [H] which the heat balance chose."""
@@ -363,9 +364,10 @@ def _moved_by(
 
 @dataclass(frozen=True, slots=True)
 class RoomAlternatives:
-    """A room by which conditions its temperature meets: see `thermal.control`."""
+    """A room by the levels of conditions of its temperature: see `thermal.control`."""
 
-    conditions: tuple[RoomCondition, ...]
+    conditions: tuple[Condition, ...]
+    read: tuple[Condition, ...]  # whose levels number the rooms
     rooms: tuple[RoomZone, ...]
 
 

@@ -244,6 +244,8 @@ def room_figures(room: RoomYear) -> tuple[dict[str, float | str], dict[str, NDAr
     figures |= {k: float(v) for k, v in window.items() if not isinstance(v, str)}
     if room.operation is not None:
         figures |= {k: float(v) for k, v in room.operation.summary.items()}
+    if room.spectral is not None:
+        figures |= room.spectral.summary
     figures |= {f"{stage}_s": seconds for stage, seconds in room.seconds.items()}
     times = heat.temperatures.index.to_numpy().astype("datetime64[s]")
     arrays: dict[str, NDArray[Any]] = {

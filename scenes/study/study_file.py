@@ -29,9 +29,8 @@ from scenes.room.options import CHOICES, RoomOptions, named_types
 from scenes.room.schedules import Hours
 from scenes.toml_file import OutdoorTable, ReadTable, TomlTable, read_options, read_table, validated
 
+SPECTRAL_METHODS = ("three-phase", "five-phase")
 OF_THE_GRID = ("method", "annual_glare")
-# Options of `cfs run` alone: a study has no figures of them
-OF_A_RUN = ("spectral", "channels")
 # Options that mean what a key of an operation file means
 OF_TABLES = {
     "occupied": Hours,
@@ -121,11 +120,11 @@ class AutoTable(_Table):
 
 
 def _options_table() -> type[BaseModel]:
-    """The options of a room without those that a study has keys for or no figures of."""
+    """The options of a room without those that a study has keys for."""
     kinds = named_types()
     columns: dict[str, Any] = {}
     for name, default in RoomOptions().named().items():
-        if name not in (*OF_THE_GRID, *OF_A_RUN):
+        if name not in OF_THE_GRID:
             kind = OF_TABLES.get(name, kinds[name])
             if name in CHOICES:
                 kind = Literal[CHOICES[name]]
@@ -165,6 +164,8 @@ class Study(_Table, OutdoorTable):
         turned = [angle % 360.0 for angle in self.orientations_deg]
         _unique("orientations_deg", turned)
         _unique("methods", self.methods)
+        if self.options.spectral and not set(self.methods) <= set(SPECTRAL_METHODS):
+            raise ValueError(f"options.spectral: needs methods of {', '.join(SPECTRAL_METHODS)}")
         return self
 
     def inputs(

@@ -544,6 +544,8 @@ CANDIDATES = (
            lambda result, _: _comfort(result)),
     _Candidate(N_("Energy"), N_("heating, cooling and light per floor area"), "kWh/m²", 0, False,
            _energy),
+    _Candidate(N_("Melanopic light"), N_("occupied hours with 250 lx melanopic EDI"), "%", 0, True,
+           lambda result, _: _figure(result, "melanopic_250_percent")),
     _Candidate(N_("View"), N_("direct visible transmittance"), "%", 0, True,
            lambda result, _: _figure(result, "straight_view_percent")),
 )  # fmt: skip

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
+from mitsuba_cfs.bsdf.angular import AngularTable, specular_matrices
+from mitsuba_cfs.bsdf.colour import RGB_TO_XYZ
+from mitsuba_cfs.bsdf.spectral_factor import ANGLES, SpectralFactor
 from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, diffuse_reflectance
+from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.spectra.channels import channels_of
 from mitsuba_cfs.spectra.detectors import NANOMETRES
 
@@ -36,3 +41,16 @@ def test_light_between_a_coloured_shade_and_glass_has_its_colour() -> None:
     without = SpectralFactor.of_panes([pane], shade).transmittance
     own = SpectralFactor.of_panes([pane], shade, shade).transmittance
     assert own / without == pytest.approx(np.broadcast_to(1 / (1 - shade * back), own.shape))
+
+
+def test_colour_of_glass_as_seen() -> None:
+    assert SpectralFactor.neutral().rgb() == pytest.approx(np.ones((len(ANGLES), 3)), abs=2e-3)
+    red = np.where(NANOMETRES > 600, 0.5, 0.1)
+    own = SpectralFactor.of_panes((), red).rgb()[0]
+    assert own[0] > 1.5 > 1 > own[1] and own @ RGB_TO_XYZ[1] == pytest.approx(1.0)
+    # by the same path as light: a tinted system passes the tint times the visible band
+    table = AngularTable(ANGLES, np.full(len(ANGLES), 0.2))
+    system = BsdfOptics(specular_matrices(replace(table, reflectance_front=np.zeros(len(ANGLES)),
+        reflectance_back=np.zeros(len(ANGLES)))), angular=table)  # fmt: skip
+    passed = system.tinted(ANGLES, np.full(len(ANGLES), own[0])).transmission
+    assert np.diag(passed) == pytest.approx(own[0] * np.diag(system.transmission), rel=1e-3)

@@ -92,7 +92,7 @@ def _shaded(room, *conditions):
         replace(room, solar=replace(room.solar, facade=room.solar.facade * 0.5 ** n.bit_count()))
         for n in range(2 ** len(conditions))
     ]
-    return replace(room, alternatives=RoomAlternatives(conditions, tuple(dimmed)))
+    return replace(room, alternatives=RoomAlternatives(conditions, conditions, tuple(dimmed)))
 
 
 def test_shading_by_temperature_follows_that_of_the_air_node(variant, weather, skies) -> None:
@@ -119,5 +119,6 @@ def test_more_conditions_in_an_air_node_than_can_be_computed_are_refused(
 ) -> None:
     rooms, links = _rooms(weather, skies, equal=False)
     limits = [RoomCondition(float(t), float(t)) for t in range(22, 27)]
-    with pytest.raises(DataError, match="5 limits of the temperature of Dwelling; at most 4"):
+    message = "Dwelling have 32 combinations of states; at most 16"
+    with pytest.raises(DataError, match=message):
         _one([_shaded(rooms[0], *limits[:3]), _shaded(rooms[1], *limits[3:])], links)

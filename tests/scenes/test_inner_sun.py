@@ -51,7 +51,8 @@ def test_what_the_pane_lets_through_is_absorbed_behind_it(variant, zones) -> Non
     assert before - after == pytest.approx(at_pane + passed, rel=0.03)
     (note,) = inner_sun_note([front, rear], 1.0)
     assert "kWh in the year" in note
-    by_temperature = RoomAlternatives((RoomCondition(23.0, 22.5),), (front, front))
+    warm = (RoomCondition(23.0, 22.5),)
+    by_temperature = RoomAlternatives(warm, warm, (front, front))
     _, more = inner_sun_note([replace(front, alternatives=by_temperature), rear], 1.0)
     assert more.startswith(note.split("rooms: ")[1].split(" kWh")[0])  # all of it
     assert more.endswith(f"the temperature of {front.space.label} moves it.")

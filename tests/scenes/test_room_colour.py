@@ -48,9 +48,9 @@ def coloured(room: Space, weather, states, hour: int = 4116, state: int = 0) -> 
     windows = room_windows(room, in_all_windows(room, *states))
     building = replace(BOX, spaces=(room,))
     return with_colour(
-        pictures(), band_scenes(building, room, windows.groups, VIEW), windows.optics(),
-        annual_sky(weather, 1, hours=[hour]), state=[state] * len(windows.groups),
-        sampling=SMALL.sampling, progress=lambda *_: None,
+        pictures(), band_scenes(building, room, windows.groups, VIEW),
+        windows.optics_by_colour(windows.optics()), annual_sky(weather, 1, hours=[hour]),
+        state=[state] * len(windows.groups), sampling=SMALL.sampling, progress=lambda *_: None,
     )  # fmt: skip
 
 

@@ -75,11 +75,13 @@ def test_three_commands_give_the_same_numbers(variant, tmp_path, method) -> None
         f'methods = ["{method}"]\nglare = "none"\noperation = "{operation}"\n'
         f'[[room]]\nbuilding = "{OFFICE}"\nspaces = ["A"]\n'
         f'[[system]]\nbsdf = "{VENETIAN_BLIND}"\n[[climate]]\nweather = "{WEATHER}"\n'
-        f"[options]\n{TRACE}\n"
+        f"[options]\n{TRACE}\nspectral = true\nchannels = 3\n"
     )
     options = JobOptions(
         OFFICE, WEATHER, VENETIAN_BLIND, ("A",), operation=operation,
-        room=RoomOptions.of(method=method, picture_hours=("06-21 12",), **SAMPLING),
+        room=RoomOptions.of(
+            method=method, picture_hours=("06-21 12",), spectral=True, channels=3, **SAMPLING
+        ),
     )  # fmt: skip
     (room,) = run_job(options).spaces
     (year,), _ = run_study(read_study(thermal), silent)
@@ -97,6 +99,9 @@ def test_three_commands_give_the_same_numbers(variant, tmp_path, method) -> None
     for name in ("heating_kwh", "cooling_kwh", "peak_heating_w", "peak_cooling_w"):
         assert row.figures[name] == ran.summary[name] == year.summary[name], name
     assert row.figures["lighting_kwh"] == ran.summary["lighting_kwh"]
+    assert room.spectral is not None and room.spectral.summary["melanopic_250_percent"] > 0
+    for name, value in room.spectral.summary.items():
+        assert row.figures[name] == value, name
     np.testing.assert_array_equal(row.arrays["mean_illuminance"], light.illuminance.mean(axis=0))
     for name in ("air_c", "operative_c"):
         kept = heat[name].to_numpy(np.float32)

@@ -13,7 +13,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods.light import direct_sun_by_group, illuminance
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from scenes.room.control_groups import control_groups
-from scenes.room.control_hour import MetCondition
+from scenes.room.control_hour import FollowedCondition
 from scenes.room.heat import heat_alone
 from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.light import room_light
@@ -23,14 +23,14 @@ from scenes.room.predictive import predictive_states
 from scenes.room.room import lit_room
 from scenes.room.shading import (
     control_signals,
-    facade_illuminance,
+    room_conditions,
     ruled_year,
     shading_states,
     temperature_conditions,
-    window_beam,
 )
 from scenes.room.shading_rules import ShadingRule, scenarios
 from scenes.room.solar import seasonal_outdoors
+from scenes.room.window_sensors import facade_illuminance, window_beam
 from scenes.room.windows import in_all_windows
 from scenes.toml_file import validated
 from tests.scenes.small_box import FEW, TWO
@@ -268,24 +268,22 @@ def test_a_scenario_of_a_group_is_itself(inputs) -> None:
 
 
 def test_delays_of_inverse_rules_by_the_room_delay_opening(inputs) -> None:
+    """Closed while the room is cold: it closes at once, and opens two hours late."""
     rule = {"rule": "air temperature", "inverse": True, "open_delay_h": 2.0}
-    (condition,) = temperature_conditions(inputs(rule))
-    assert condition == RoomCondition(24.0, 24.0, "air", 2, 0, opens=True)
-    both = [{"rule": "air temperature"}, {"rule": "air temperature", "inverse": True}]
-    assert len(temperature_conditions(inputs({"rule": "any", "parts": both}))) == 1
-
-
-@pytest.mark.parametrize("opens", [False, True])
-def test_functions_follow_a_condition_as_the_balance_does(opens) -> None:
-    """The delay is one of opening, whichever way the condition acts."""
-    felt = 24.0 + 2.0 * np.sin(np.arange(200) / 3.0)
-    met, found = MetCondition(RoomCondition(24.0, 23.0, "air", 2, 0, opens)), []
-    for value in felt:
-        met.follow(float(value))
-        found.append(met.met != opens)
-    warm = by_threshold(felt, 24.0, 23.0)
-    expected = delayed(1 - warm if opens else warm, 2)
-    assert np.array_equal(found, expected > 0) and 0 < expected.sum() < 200
+    room = inputs(rule | {"groups": "room"})
+    (condition, waits), read = room_conditions(room, None, None)
+    assert read == (waits,) and condition == RoomCondition(24.0, 24.0)
+    assert (waits.open_delay_rows, waits.states) == (2, (0, 2))
+    followed = [FollowedCondition(condition), FollowedCondition(waits)]
+    felt, found = 24.0 + 2.0 * np.sin(np.arange(200) / 3.0), []
+    for hour, value in enumerate(felt.tolist()):
+        levels = {}
+        for one in followed:
+            one.follow({"air": value}, levels, hour)
+            levels[one.condition] = one.level
+        found.append(shading_states(room, met={waits: levels[waits]})[hour, 0])
+    expected = delayed(2 - by_threshold(felt, 24.0, closed=2), 2)
+    assert np.array_equal(found, expected) and 0 < np.count_nonzero(expected) < 200
 
 
 def test_plans_of_other_steps_than_hours_are_refused(inputs) -> None:

@@ -27,11 +27,12 @@ from scenes.room.operation_tables import OperationTables
 from scenes.room.room import compute_room, explored_combinations, operated_zone
 from scenes.room.shading import (
     control_signals,
+    room_conditions,
     shading_states,
     temperature_conditions,
-    window_beam,
 )
 from scenes.room.solar import seasonal_outdoors, solar_gains
+from scenes.room.window_sensors import window_beam
 from scenes.room.windows import in_all_windows, room_windows
 from scenes.room.zone import RoomZone, balances, zone_surfaces
 from tests.scenes.small_box import FEW, HOURS, TWO, clear
@@ -329,11 +330,34 @@ def test_rules_by_room_temperature_are_computed_both_ways(inputs) -> None:
     assert not cold.any() and np.array_equal(warm, by_sun)
 
 
+def test_rules_that_combine_room_temperatures_wait(inputs) -> None:
+    """Each is a condition of its own, inner ones before the rules that read them."""
+    sun, fresh = {"rule": "irradiance", "close_above": 150.0}, {"rule": "outdoor temperature"}
+    cool = {"rule": "air temperature", "close_above_c": 20.0}
+    inner = {"rule": "all", "hold_h": 3, "parts": [sun, WARM]}
+    room = inputs({"rule": "any", "open_delay_h": 2, "parts": [inner, {
+        "rule": "all", "parts": [fresh, cool]}]})  # fmt: skip
+    outdoors = seasonal_outdoors(room)
+    conditions, read = room_conditions(room, None, outdoors)
+    warm, cold, held_one, outer, *others = conditions
+    by_sun, by_air = (by_group(inputs(one))["S"] > 0 for one in (sun, fresh))
+    assert by_sun.any() and by_air.any() and not by_sun.all()
+    assert (held_one.reads, outer.reads) == ((warm,), (held_one, cold))
+    assert (held_one.hold_rows, outer.open_delay_rows, outer.hold_rows) == (3, 2, 0)
+    assert held_one.states == outer.states == (0, 2)
+    assert not held_one.asked[0].any() and np.array_equal(held_one.asked[1], by_sun)
+    expected = [np.zeros_like(by_sun), np.ones_like(by_sun), by_air, np.ones_like(by_sun)]
+    np.testing.assert_array_equal(outer.asked, expected)
+    assert outer in read and warm not in read and len(read) == len(others) // 2 + 1
+    for level in (0, 1):
+        levels = dict.fromkeys(read, level)
+        assert (shading_states(room, None, outdoors, met=levels) == 2 * level).all()
+
+
 @pytest.mark.parametrize(
     ("control", "key"),
     [
-        ({"rule": "all", "hold_h": 2.0, "parts": [WARM]}, "control.hold_h"),
-        ({"rule": "any", "open_delay_h": 1.0, "parts": [WARM]}, "control.open_delay_h"),
+        ({"rule": "any", "hold_h": 1.0, "parts": [WARM, {"rule": "glare"}]}, "control.hold_h"),
         (WARM | {"open_below_c": 23.0}, "control.open_below_c"),
         ({"rule": "any", "parts": [WARM, WARM | {"open_below_c": 23.0}]},
          "control.parts.1.open_below_c"),

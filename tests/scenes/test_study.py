@@ -68,8 +68,9 @@ WRONG = {
     "negative option": (
         "", BOX + SYSTEM + CLIMATE + "[options]\nsensor_spacing = -1\n", "options.sensor_spacing:",
     ),
-    "option of a run": (
-        "", BOX + SYSTEM + CLIMATE + "[options]\nspectral = true\n", "options.spectral:",
+    "by wavelength with paths": (
+        'methods = ["point-in-time"]\n', BOX + SYSTEM + CLIMATE + "[options]\nspectral = true\n",
+        "options.spectral: needs methods of three-phase, five-phase",
     ),
     "no time": (
         "", BOX + SYSTEM + CLIMATE + '[auto]\ntime_budget = "soon"\n',

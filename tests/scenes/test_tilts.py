@@ -22,8 +22,9 @@ from scenes.room.inputs import room_inputs
 from scenes.room.light import room_light
 from scenes.room.operation import check_systems, read_operation
 from scenes.room.operation_tables import OperationTables
-from scenes.room.shading import shading_states, window_beam
+from scenes.room.shading import shading_states
 from scenes.room.solar import SunByStates, seasonal_outdoors
+from scenes.room.window_sensors import window_beam
 from scenes.room.windows import in_all_windows
 from scenes.room.zone import zone_surfaces
 from tests.scenes.test_control_function import FEW, TWO

@@ -15,6 +15,7 @@ from thermal.climate import Climate
 from thermal.emitters import IdealLoads
 from thermal.predictive import Forecast, PredictedHours, noisy_forecast, predicted_year
 from thermal.reduced import MASS_FILM, SURFACE_FILM, ReducedZone, reduced_zone, responses
+from thermal.ventilation import Leakage
 from thermal.zone import Dimming, Gains, Layer, OpaqueSurface, Zone, dimmed_share
 
 DIMMING = Dimming(500.0, 0.2, 0.3, off=True, sensor_factor=0.9)
@@ -198,6 +199,24 @@ def test_the_reduced_model_of_a_zone() -> None:
     assert reduced.air[0] == pytest.approx(60 * 0.6 / 3600 * 1200)
     assert reduced.windows.tolist() == [2.0]
     assert reduced.behind_c[12] == pytest.approx(0.6 * 0.04 * 500)
+
+
+def test_the_reduced_model_has_leaks_by_wind_and_temperature() -> None:
+    """At 3 m in the country, outdoors 10 degC, wind 5 m/s: (270/10)^.14 (3/270)^.14 of it there."""
+    wall = OpaqueSurface("w", 12.0, (Layer(0.2, 2.0, 2400.0, 1000.0),), np.array([0.0, -1.0, 0.0]),
+                         height=3.0)  # fmt: skip
+    cold, air = replace(climate(1, outdoor=np.full(1, 10.0)), wind_speed=np.full(1, 5.0)), 60 / 3600
+    test = Leakage(stack=0.01, wind=0.02)
+    for leakage, ach, expected in (
+        (Leakage((0.6, 0.03, 0.1, 0.01)), 0.5,
+         0.5 * air * (0.6 + 0.3 + 0.1 * 4.22442 + 0.01 * 4.22442**2)),
+        (test, 0.0, np.hypot(0.01 * 10**0.5, 0.02 * 4.22442)),
+    ):  # fmt: skip
+        zone = Zone("z", 60.0, (wall,), infiltration_ach=ach, leakage=leakage,
+                    loads=IdealLoads(20.0, 26.0))  # fmt: skip
+        none = np.zeros((1, 1)), np.zeros((1, 0), dtype=np.int64)
+        reduced = reduced_zone(zone, cold, *none, terrain="country")
+        assert reduced.air[0] == pytest.approx(1200.0 * expected, rel=1e-4)
 
 
 def test_the_reduced_model_has_the_loads_of_the_detailed_balance() -> None:

@@ -13,6 +13,7 @@ from thermal.blackbox import Fenestration
 from thermal.control import (
     RoomCondition,
     TemperatureControl,
+    WaitingRule,
     by_threshold,
     delayed,
     held,
@@ -80,18 +81,27 @@ def test_shading_follows_the_temperature_at_the_end_of_the_step_before(condition
     assert np.abs(result.residual).max() < 1e-6
 
 
-def test_a_delay_of_an_inverse_rule_delays_opening_alone():
-    """Closed while the room is cold: it closes at once, and opens after two warm steps more."""
+def test_a_rule_of_two_conditions_waits_before_it_opens_and_between_moves():
+    """Three states, by two conditions; the waits are those of `delayed` and `held`."""
     room, day, shade = shaded_room()
-    control = TemperatureControl(
-        (RoomCondition(24.0, 24.0, open_delay_rows=2, opens=True),), (shade, day), (Gains(),) * 2
-    )
-    year = {"step_s": 3600.0, "options": BalanceOptions(warm_days=0, start_c=20.0)}
-    result = simulate(room, climate(HOURS, outdoor=OUTDOOR + 10.0), day, control=control, **year)
-    cold = 1 - by_threshold(result.air_c[:-1], 24.0)
-    closed = 1 - result.alternative[1:]
-    np.testing.assert_array_equal(closed[2:], delayed(cold, 2)[2:])
-    assert 10 < closed.sum() < HOURS - 10 and np.count_nonzero(closed != cold) >= 6
+    half = replace(sun(HOURS, room, strength=0.6), state=np.ones((HOURS, 1), np.int64))
+    none, late = np.zeros(HOURS, np.int64), np.arange(HOURS) % 24 % 9 > 1
+    asked = np.stack([none, np.where(late, 1, 0), np.full(HOURS, 1), np.where(late, 2, 1)])
+    rule = WaitingRule("both", (WARM, WARMER), (0, 1, 2), asked, open_delay_rows=2, hold_rows=4)
+    conditions, gains = (WARM, WARMER, rule), (Gains(),) * 3
+    control = TemperatureControl(conditions, (day, half, shade), gains, read=(rule,))
+    year = {"step_s": 3600.0, "options": BalanceOptions(warm_days=0, start_c=23.0)}
+    result = simulate(room, climate(HOURS, outdoor=OUTDOOR), day, control=control, **year)
+    warm = by_threshold(result.air_c[:-1], WARM.above, WARM.below)
+    warmer = by_threshold(result.operative_c[:-1], WARMER.above, WARMER.below)
+    at_once = asked[warm + 2 * warmer, np.arange(1, HOURS)]
+    expected = held(delayed(at_once, 2), 4)
+    assert set(expected) == {0, 1, 2}  # each shows, and so do both waits
+    assert (delayed(at_once, 2) != at_once).any() and (expected != delayed(at_once, 2)).any()
+    np.testing.assert_array_equal(result.alternative[1:], expected)
+    assert np.abs(result.residual).max() < 1e-6
+    with pytest.raises(ThermalInputError, match="comes after"):
+        replace(control, conditions=(rule, WARM, WARMER))
 
 
 def test_conditions_are_met_each_by_itself_and_each_zone_has_its_temperature():

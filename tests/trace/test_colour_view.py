@@ -99,7 +99,7 @@ def test_walls_colour_a_room_under_a_grey_sky() -> None:
             found.append(scene)
         systems = [[MatrixOptics(paths=glass(0.7))]]
         lit = path_picture(PathLight(found[1], systems, sky, sampling), 0)
-        return lit, coloured_picture(lit, found, systems, sky, 0, sampling=sampling)
+        return lit, coloured_picture(lit, found, [systems] * 3, sky, 0, sampling=sampling)
 
     lit, grey = pictured(1.0, 1.0)
     assert luminance(grey) == pytest.approx(lit, rel=1e-4)

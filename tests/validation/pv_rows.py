@@ -55,7 +55,7 @@ def sheet(guid: str, corners: FloatArray, reflectance: float = 0.0) -> Element:
     return Element(guid, guid, "IfcPlate", triangles, reflectance, reflectance)
 
 
-def rows(tilt_deg: float, pitch: float, height: float) -> list[Element]:
+def rows(tilt_deg: float, pitch: float, height: float, albedo: float = ALBEDO) -> list[Element]:
     """Rows that face south, and the ground; the judged front and back are "front" and "back"."""
     tilt = np.radians(tilt_deg)
     up = np.array([0.0, np.cos(tilt), np.sin(tilt)])
@@ -77,7 +77,7 @@ def rows(tilt_deg: float, pitch: float, height: float) -> list[Element]:
                 elements.append(sheet(name, ring if side > 0 else ring[::-1]))
     far = 3.0 * LENGTH
     ground = np.array([[-far, -far, 0], [far, -far, 0], [far, far, 0], [-far, far, 0]])
-    return [*elements, sheet("ground", ground, ALBEDO)]
+    return [*elements, sheet("ground", ground, albedo)]
 
 
 def ours(case: tuple[float, float, float], weather: Weather) -> dict[str, FloatArray]:

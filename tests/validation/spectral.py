@@ -26,6 +26,7 @@ from mitsuba_cfs.bsdf.spectral_pane import (
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods.light import daylight
 from mitsuba_cfs.methods.optics import BsdfOptics
+from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.methods.spectral_light import Detection, spectral_light
 from mitsuba_cfs.sky.annual import AnnualSky, given_sky
@@ -73,6 +74,12 @@ class Window:
 
     panes: list[SpectralPane]
     fabric: NDArray[np.float64] | None  # transmittance and reflectance [N], diffuse; None: none
+
+    @property
+    def factor(self) -> SpectralFactor:
+        """Its spectrum by angle."""
+        shade = () if self.fabric is None else (self.fabric, self.fabric)
+        return SpectralFactor.of_panes(self.panes, *shade)
 
 
 @dataclass(frozen=True)
@@ -128,32 +135,41 @@ def room_scene() -> DaylightScene:
 
 
 def hour(kind: str) -> AnnualSky:
-    """An overcast sky, or the sun alone."""
+    """An overcast sky, a clear one, or its sun alone."""
     height, azimuth = np.radians([ALTITUDE, AZIMUTH])
     towards = [np.sin(azimuth) * np.cos(height), np.cos(azimuth) * np.cos(height), np.sin(height)]
     beam, diffuse = (0.0, 200.0) if kind == "overcast" else (800.0, 50.0)
     sky = given_sky([towards], [beam], [diffuse], 4, day_of_year=1, ground="gendaylit")
-    return sky if kind == "overcast" else replace(sky, whole=sky.sun_alone())
+    return replace(sky, whole=sky.sun_alone()) if kind == "sun" else sky
 
 
 def ours(window: Window, kind: str) -> Light:
     """The project's own, from the photopic light of the window's visible band."""
-    scene, sky, channels = room_scene(), hour(kind), channels_of(20)
+    return received(photopic_light(window, hour(kind)), window, BANDS)
+
+
+def received(light: PhaseLight, window: Window, bands: int) -> Light:
+    """The light of the points by so many bands."""
+    channels = channels_of(bands)
+    wanted = [Detection(channels.detection)]
+    [values] = spectral_light(light, [[window.factor]], channels, wanted).received
+    return Light.of(values[..., 0].T)
+
+
+def photopic_light(window: Window, sky: AnnualSky) -> PhaseLight:
+    """The photopic light of the points in an hour."""
     table = spectral_tables(window.panes)["Visible"]
     system = BsdfOptics(specular_matrices(table), angular=table)
-    factor = SpectralFactor.of_panes(window.panes)
     if window.fabric is not None:
         weight = illuminant("D65") * sensitivities()[0]
         share = float(window.fabric @ weight / weight.sum())
         block = np.full((KLEMS_FULL.size,) * 2, share / np.pi)
         sheet = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, block, block, block, block)
         system = BsdfOptics(combine_layers([specular_matrices(table), sheet]).bsdf)
-        factor = SpectralFactor.of_panes(window.panes, window.fabric, window.fabric)
     sampling = Sampling(sensor_samples=1 << 16, patch_samples=1 << 14, sun_points=1 << 13)
-    light = daylight(scene, [[system]], sky, sampling=sampling)
-    wanted = [Detection(channels.detection)]
-    [received] = spectral_light(light, [[factor]], channels, wanted).received
-    return Light.of(received[..., 0].T)
+    light = daylight(room_scene(), [[system]], sky, sampling=sampling)
+    assert isinstance(light, PhaseLight)
+    return light
 
 
 def radiances(window: Window, kind: str, bounces: int, divisions: int) -> Light:

@@ -3,6 +3,7 @@
     python -m tests.validation time_steps FOLDER --epw CITY.epw
 
 Writes a study file for each control and step into FOLDER and computes it as `cfs thermal` does.
+The control with rain runs by `--controls` alone, with a file that states rain.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Annotated
 
 import pandas as pd
 
@@ -72,6 +74,21 @@ rule = "all"
 parts = [{{ rule = "irradiance", close_above = 100 }},
          {{ rule = "{}", close_above_c = 23.5, open_below_c = 22.5 }}]
 """
+COMBINED = """
+[control]
+rule = "any"
+open_delay_h = 2
+hold_h = 3
+[[control.parts]]
+rule = "outdoor temperature"
+close_above_c = 28
+[[control.parts]]
+rule = "all"
+hold_h = 2
+parts = [{ rule = "irradiance", close_above = 100 },
+         { rule = "operative temperature", close_above_c = 24.5, open_below_c = 23.5 }]
+"""
+RAIN = "windows by night, shut in rain"
 CONTROLS = {
     "none": AIR,
     "set points": AIR + LOADS,
@@ -88,6 +105,10 @@ CONTROLS = {
     + SHADED.format("operative temperature")
     .replace("23.5", "25.0")
     .replace("22.5", "24.9, open_delay_h = 2, hold_h = 3"),
+    "combined shading that waits": AIR + LOADS + TINTED + COMBINED,
+    RAIN: AIR
+    + WINDOWS
+    + 'when = "always"\nnight_share = 0.02\nclosed_in_rain = true\n[loads]\nheating_c = 20\n',
     "shading and windows": AIR + WINDOWS + HEATED + TINTED + SHADED.format("operative temperature"),
     "air by night": f"{AIR}night_ach = 3\nnight = [22, 6]\n{LOADS}",
     "heat recovery": FAN + LOADS,
@@ -106,11 +127,20 @@ FIGURES = {"heating": "kWh", "cooling": "kWh", "peak heating": "W", "peak coolin
            "above 26 degC": "K h"}  # fmt: skip
 
 
-def main(folder: Path, *, epw: Path, minutes: Sequence[int] = (20, 10, 5)) -> pd.DataFrame:
+def main(
+    folder: Path,
+    *,
+    epw: Path,
+    minutes: Sequence[int] = (20, 10, 5),
+    controls: Annotated[Sequence[str], tuple(CONTROLS)] = tuple(
+        one for one in CONTROLS if one != RAIN
+    ),
+) -> pd.DataFrame:
     """Figures at the second step, and their change from step to step [%]."""
     folder.mkdir(parents=True, exist_ok=True)
     rows = []
-    for control, tables in CONTROLS.items():
+    for control in controls:
+        tables = CONTROLS[control]
         years = []
         for step in minutes:
             study = folder / f"{control} {step}.toml"
