@@ -32,6 +32,7 @@ class SpectralFactor:
     """
 
     transmittance: Array  # [A, N] at `ANGLES` and `NANOMETRES`, of any scale
+    whole: bool = True  # of all its layers; otherwise the rest passes all wavelengths equally
 
     @staticmethod
     def of_panes(

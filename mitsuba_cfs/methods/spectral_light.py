@@ -110,7 +110,7 @@ class ModeOptics:
 
 
 Factors = Sequence[Sequence[SpectralFactor]]  # of each window group in each of its states [G][J]
-MODE_ERROR = 1e-5  # largest part of the factors that modes leave out
+MODE_ERROR = 1e-5  # largest part of a factor that modes leave out; visible light's is 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,7 +292,7 @@ def _modes(factors: Sequence[SpectralFactor], channels: Channels) -> tuple[Array
     count = 1
     while count < len(size):
         rest = whole - (left[:, :count] * size[:count]) @ right[:count]
-        if np.abs(rest).max() <= MODE_ERROR * np.abs(whole).max():
+        if np.abs(rest).max() <= MODE_ERROR:
             break
         count += 1
     widths = np.cumsum([one.shape[1] for one in (*patches, *angles)])[:-1]

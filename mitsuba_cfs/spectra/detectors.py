@@ -17,6 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 NANOMETRES = np.arange(380.0, 781.0)
 EFFICACY = 683.002  # K_m [lm/W], CIE S 026
+FARTHEST_DUV = 0.05  # from the Planckian locus that a colour temperature is stated (CIE 015:2018)
+LEAST_K, MOST_K = 1667.0, 99_999.0  # within the isotherms that Robertson's method knows
 ALPHA_OPIC = ("s_cone", "m_cone", "l_cone", "rod", "melanopic")
 # rows of `sensitivities`
 DETECTORS = ("photopic", *ALPHA_OPIC, "x", "y", "z")
@@ -90,7 +92,9 @@ def daylight_efficacy_ratio(spectrum: ArrayLike, name: str = "melanopic") -> Flo
 def colour_temperature(xyz: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Correlated colour temperature [..] [K] and Duv [..] of tristimulus values [.., 3].
 
-    NaN where there is no light.
+    NaN where there is no light.  The temperature is NaN where the colour is farther than
+    `FARTHEST_DUV` from the Planckian locus, both are NaN where it is not between `LEAST_K` and
+    `MOST_K`: neither has a meaning there.
 
     Source: Robertson 1968, J. Opt. Soc. Am. 58, 1528-1535; Duv: ANSI C78.377, positive above the
     Planckian locus (by colour-science).
@@ -106,16 +110,23 @@ def colour_temperature(xyz: ArrayLike) -> tuple[FloatArray, FloatArray]:
     result = np.full((2, *y.shape), np.nan)
     if lit.any():
         result[:, lit] = np.asarray(uv_to_CCT_Robertson1968(uv)).T
+    beyond = lit & ~((result[0] >= LEAST_K) & (result[0] <= MOST_K))
+    result[:, beyond] = np.nan
+    result[0, np.abs(np.nan_to_num(result[1])) > FARTHEST_DUV] = np.nan
     return result[0], result[1]
 
 
 def colour_rendering(spectrum: ArrayLike) -> tuple[float, float]:
     """General colour rendering index R_a and colour fidelity index R_f of a spectrum [N].
 
+    NaN for light without a colour temperature, whose reference light they need.
+
     Source: CIE 13.3-1995; CIE 224:2017 (R_f of ANSI/IES TM-30-20), by colour-science.
     """
     import colour
 
+    if np.isnan(colour_temperature(detected(spectrum)[-3:])[0]):
+        return np.nan, np.nan
     shape = colour.SpectralShape(360, 830, 1)  # of its observers; no light beyond 380 to 780
     whole = np.pad(np.asarray(spectrum, dtype=float), (20, 50))
     power = colour.SpectralDistribution(whole, shape)

@@ -67,6 +67,7 @@ from thermal.gvalue import TYPICAL_SYSTEMS
 ANGULAR_COLUMNS = ("theta_deg", "transmittance")
 ANGULAR_OPTIONAL = ("reflectance_front", "reflectance_back")
 SPECTRUM_COLUMNS = ("wavelength_nm", "transmittance")
+WIDEST_GAP_NM = 50.0  # between visible data of a pane, which files have every 5 to 20 nm
 SPECTRUM_OPTIONAL = ("reflectance",)  # of the side of a shade that faces the panes
 Film = Annotated[Positive, plausible.RESISTANCE]  # [m2 K/W]
 PATCHES = KLEMS_FULL.size
@@ -420,14 +421,23 @@ class SpectralTable(TomlTable):
         """Transmittance by wavelength and angle; `DataError` for a file that cannot be read."""
         # no transmittance depends on the thickness, which some files do not state
         panes = [read_spectral_pane(pane, thickness=0.004) for pane in self.panes]
-        low, high = VISIBLE_NM
         for file, pane in zip(self.panes, panes, strict=True):
-            nm = pane.wavelength_nm
-            if nm[0] > low or nm[-1] < high:
-                message = f"its spectrum is of {nm[0]:g} to {nm[-1]:g} nm, expected {low:g} to "
-                raise DataError(f"{message}{high:g}", file=file, field="spectral_data")
+            check_visible(pane, file)
         shade = (1.0, 0.0) if self.shade is None else read_spectrum(self.shade)
         return SpectralFactor.of_panes(panes, *shade)
+
+
+def check_visible(pane: SpectralPane, file: Path) -> None:
+    """Raise `DataError` for a pane whose data do not tell its visible spectrum."""
+    nm, (low, high) = pane.wavelength_nm, VISIBLE_NM
+    if nm[0] > low or nm[-1] < high:
+        message = f"its spectrum is of {nm[0]:g} to {nm[-1]:g} nm, expected {low:g} to {high:g}"
+        raise DataError(message, file=file, field="spectral_data")
+    widest = int(np.argmax(np.where((nm[1:] > low) & (nm[:-1] < high), np.diff(nm), 0.0)))
+    if nm[widest + 1] - nm[widest] > WIDEST_GAP_NM:
+        message = f"its spectrum has nothing between {nm[widest]:g} and {nm[widest + 1]:g} nm, "
+        message += f"expected steps of {WIDEST_GAP_NM:g} nm at most"
+        raise DataError(message, file=file, field="spectral_data")
 
 
 def read_spectrum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -484,8 +494,13 @@ class WindowHeatTable(ClosureTable):
         """Spectrum that the table states, else that of the panes of its layers; None: not known."""
         if self.spectral is not None:
             return self.spectral.factor()
-        panes = [layer.spectral() for layer in self.layers if layer.pane is not None]
-        return SpectralFactor.of_panes(panes) if panes else None
+        files = [layer for layer in self.layers if layer.pane is not None]
+        panes = [layer.spectral() for layer in files]
+        for layer, pane in zip(files, panes, strict=True):
+            check_visible(pane, layer.pane)
+        if not panes:
+            return None
+        return replace(SpectralFactor.of_panes(panes), whole=len(panes) == len(self.layers))
 
     def g_by_patch(self) -> NDArray[np.float64] | None:
         """g [K] of the Klems full patches where it is stated by patch or by angle."""

@@ -55,7 +55,7 @@ def melanopic_against_glare(room: RoomYear, year: SpectralYear, dgp: NDArray[np.
     shown = used & np.isfinite(dgp) & (edi >= LOWEST_LX)
     top = max(0.6, float(np.ceil(20 * dgp[shown].max(initial=0.0)) / 20))
     high = max(HIGHEST_LX, float(10 ** np.ceil(np.log10(edi[shown].max(initial=1.0)))))
-    state, names = _states(room)
+    (state, names), step = _states(room), tables.step_hours(year.eye.index)
     x = (np.log(edi[shown]) - np.log(LOWEST_LX)) / (np.log(high) - np.log(LOWEST_LX))
     y = (np.clip(dgp[shown], LEAST_DGP, top) - LEAST_DGP) / (top - LEAST_DGP)
     calm = np.nan_to_num(dgp) <= GLARE_LIMIT
@@ -72,7 +72,7 @@ def melanopic_against_glare(room: RoomYear, year: SpectralYear, dgp: NDArray[np.
     at = 100 * (np.log(ticks) - x_range[0]) / (x_range[1] - x_range[0])
     colours = [DOTS[i % len(DOTS)] for i in range(len(names))]
     legend = tuple(
-        (colour, f"{name}: {rounded(float(np.count_nonzero(state[shown] == i)), 0)} h")
+        (colour, f"{name}: {rounded(step * np.count_nonzero(state[shown] == i), 0)} h")
         for i, (colour, name) in enumerate(zip(colours, names, strict=True))
     )
     return Chart(

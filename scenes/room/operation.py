@@ -424,12 +424,16 @@ def read_state(table: StateTable, path: Path | None, *, by: str = "") -> Fenestr
     if table.layers:  # their U and g come before those of the BSDF's thermal file
         system = replace(system, u_value=table.u_value, g_value=table.g_value, g_by_patch=None)
     by_patch = table.g_by_patch()
+    spectrum = table.spectrum()
+    if table.spectral is None and (spectrum is None or not spectrum.whole):
+        # that beside the BSDF's file knows its shade too
+        spectrum = system.spectrum or spectrum
     return replace(
         system,
         closure=table.closure() or system.closure,
         g_by_patch=system.g_by_patch if by_patch is None else by_patch,
         shading_position=table.shading_position or system.shading_position,
-        spectrum=table.spectrum() or system.spectrum,
+        spectrum=spectrum,
     )
 
 

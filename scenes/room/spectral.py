@@ -162,6 +162,15 @@ def _factors(room: RoomInputs, light: RoomLight) -> tuple[list[list[SpectralFact
             if id(system) in known:
                 continue
             known[id(system)] = system.spectrum or SpectralFactor.neutral()
+            if not known[id(system)].whole and system.between is None:
+                notes.append(
+                    Note(
+                        "{system}: its spectrum is that of the panes among its layers that are "
+                        "files; its other layers transmit all wavelengths equally. State "
+                        "[spectral] panes and shade.",
+                        system=system.name,
+                    )
+                )
             if system.spectrum is None and system.between is None:
                 notes.append(
                     Note(

@@ -23,11 +23,13 @@ from mitsuba_cfs.spectra.detectors import (
 )
 from scenes.cli import cfs
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.fenestration.systems import read_system
-from scenes.fenestration.thermal_file import SpectralTable, read_spectrum
+from scenes.fenestration.systems import FenestrationSystem, read_system
+from scenes.fenestration.thermal_file import SpectralTable, StateTable, read_spectrum
 from scenes.fenestration.tilts import tilt_states
 from scenes.input_files import read_weather
+from scenes.report.spectral_figures import melanopic_against_glare
 from scenes.room.light import room_light
+from scenes.room.operation import read_state
 from scenes.room.options import RoomOptions
 from scenes.room.room import inputs_of_room
 from scenes.room.spectral import _factors, room_spectral
@@ -152,3 +154,55 @@ def test_panes_without_visible_data_are_refused(tmp_path) -> None:
     pane.write_text("{ Units, Wavelength Units } Nanometers\n{ Thickness } 4\n" + rows, "utf-8")
     with pytest.raises(DataError, match=r"of 800 to 2500 nm, expected 400 to 760"):
         SpectralTable(panes=(pane,)).factor()
+
+
+def pane_file(path: Path, wavelengths: tuple[float, ...]) -> Path:
+    """A pane in Optics' format that passes more light of longer wavelengths."""
+    head = "{ Units, Wavelength Units } Nanometers\n{ Thickness } 4\n"
+    rows = "".join(f"{nm:g} {min(0.2 + nm / 5000, 0.8):g} 0.1 0.1\n" for nm in wavelengths)
+    path.write_text(head + rows, "utf-8")
+    return path
+
+
+EVERY_20 = tuple(float(nm) for nm in range(300, 2501, 20))
+
+
+def test_panes_with_a_gap_in_the_visible_are_refused(tmp_path) -> None:
+    gap = pane_file(tmp_path / "gap.txt", (300.0, *EVERY_20[40:]))
+    with pytest.raises(DataError, match=r"nothing between 300 and 1100 nm"):
+        SpectralTable(panes=(gap,)).factor()
+    layers = [{"pane": gap, "solar": (0.5, 0.1, 0.1)}]
+    with pytest.raises(DataError, match=r"nothing between 300 and 1100 nm"):
+        StateTable(bsdf=VENETIAN_BLIND, layers=layers).spectrum()
+
+
+def state_of(path: Path, *layers: dict[str, object]) -> FenestrationSystem:
+    return read_state(StateTable(bsdf=path, layers=layers), path)
+
+
+def test_layers_without_a_spectrum_are_named_and_a_stated_spectrum_goes_before(
+    blind, tmp_path
+) -> None:
+    pane = {"pane": pane_file(tmp_path / "pane.txt", EVERY_20), "thickness": 0.004}
+    plain = {"thickness": 0.004, "solar": (0.8, 0.07, 0.07)}
+    gap = {"gap": {"width": 0.016}}
+    partial = state_of(VENETIAN_BLIND, pane | gap, plain)
+    whole = state_of(VENETIAN_BLIND, pane | gap, pane)
+    # the amber fabric beside the blind's file is not lost by layers that do not know it
+    beside = state_of(blind, pane | gap, plain)
+    assert beside.spectrum is not None and beside.spectrum.of_angles(channels_of(3))[0, 0] == 0
+    for states, count in (((partial,), 1), ((whole, beside), 0)):
+        room = SimpleNamespace(windows=SimpleNamespace(systems=[states]))
+        light = SimpleNamespace(light=SimpleNamespace(systems=[states]))
+        notes = _factors(room, light)[1]
+        assert len(notes) == count
+        assert all("other layers transmit all wavelengths equally" in note for note in notes)
+
+
+def test_hours_of_states_are_hours_in_weather_of_half_hours() -> None:
+    times = pd.date_range("2025-06-01 08:15", periods=10, freq="30min")
+    eye = pd.DataFrame({"melanopic_edi_lx": 300.0}, index=times)
+    heat = SimpleNamespace(comfort=eye, temperatures=eye)
+    room = SimpleNamespace(heat=heat, operation=None)
+    chart = melanopic_against_glare(room, SimpleNamespace(eye=eye), np.full(10, 0.2))
+    assert chart.classes[0][1].endswith(": 5 h")

@@ -90,3 +90,16 @@ def test_colour_rendering() -> None:
 def test_unknown_illuminant() -> None:
     with pytest.raises(ValueError, match="illuminant 'D66'"):
         illuminant("D66")
+
+
+def test_light_far_from_the_planckian_locus_has_no_colour_temperature() -> None:
+    def band(low: float, high: float) -> np.ndarray:
+        return illuminant("D65") * ((low <= NANOMETRES) & (high >= NANOMETRES))
+
+    # green: on an isotherm, Duv 0.15; violet and deep red: beyond the isotherms (were 100000 and
+    # 1667 K)
+    spectra = np.array([illuminant("A"), band(500, 560), band(380, 480), band(650, 780)])
+    kelvin, distance = colour_temperature(detected(spectra)[:, -3:])
+    assert kelvin[0] == pytest.approx(2856, abs=1) and np.isnan(kelvin[1:]).all()
+    assert distance[1] == pytest.approx(0.152, abs=1e-3) and np.isnan(distance[2:]).all()
+    assert np.isnan(colour_rendering(spectra[2])).all()  # was -68 and 0
