@@ -32,7 +32,8 @@ def control_groups(space: Space, control: ControlTable | None = None) -> Control
     Entries of `group` come first, in their order, then the other windows: facades by their area,
     single windows by their position. The order of the windows in the file does not matter.
 
-    Raises: `DataError` for a seat outside the room, or groups that plans cannot follow together.
+    Raises: `DataError` for a seat or sensor outside the room, or groups that plans cannot follow
+        together.
     """
     control = control or ControlTable()
     facades = _facades(space)
@@ -61,8 +62,10 @@ def control_groups(space: Space, control: ControlTable | None = None) -> Control
                 raise DataError(message, element=space.label, field=f"{place}.{name}")
     leaves = [(leaf, p) for rule, p in zip(rules, places, strict=True) for leaf in rule.leaves]
     for leaf, place in leaves:
-        if leaf.seat is not None and not in_room(space, np.array([leaf.seat]))[0]:
-            raise DataError("is outside the room", element=space.label, field=f"{place}.seat")
+        for field, point in (("seat", leaf.seat), ("at", leaf.at)):
+            if point is not None and not in_room(space, np.array([point]))[0]:
+                where = f"{place}.{field}"
+                raise DataError("is outside the room", element=space.label, field=where)
     return ControlGroups(tuple(numbered(names)), tuple(rules), tuple(places), number)
 
 

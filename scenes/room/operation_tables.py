@@ -481,6 +481,8 @@ class OperationTables(TomlTable):
         for part in PARTS:
             stated = getattr(rooms, part)
             update = {key: getattr(stated, key) for key in stated.model_fields_set}
+            if part == "control":
+                update = self.control.changed_by(rooms.control) | update
             parts[part] = getattr(self, part).model_copy(update=update)
         return self.model_copy(update=parts)
 

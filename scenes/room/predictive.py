@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, silent
 from scenes.room.control_year import ControlYear
 from scenes.room.operation import OperationHours
@@ -44,10 +45,16 @@ def predictive_states(year: ControlYear, *, progress: Progress = silent) -> NDAr
     Plans are repeated until the glare of nearly all that they choose in occupied hours has been
     rated, first those of single hours, which cost a fraction of a day's; the last one chooses
     among what has been rated.
+
+    Raises: `DataError` for weather in other steps than hours.
     """
     tables, (rule, *_) = year.room.operation, year.room.control.rules
     if tables is None:
         raise ValueError("predictive control needs the tables of an operation")
+    if year.room.weather.step_h != 1.0:
+        message = "plans are of hours: the weather has steps of "
+        message += f"{60 * year.room.weather.step_h:g} minutes"
+        raise DataError(message, element=year.room.space.label, field="control.rule")
     planner = Planner(year, tables, rule)
     for ahead in (1, tables.control.predictive.horizon_h):
         for number in range(ROUNDS):

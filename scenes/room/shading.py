@@ -35,6 +35,7 @@ from scenes.room.shading_rules import (
     LOAD_RULES,
     MOST_CONDITIONS,
     ROOM_RULES,
+    WAITS,
     WEATHER_RULES,
     ShadingRule,
 )
@@ -104,11 +105,18 @@ NO_CONDITIONS: Levels = {}
 def temperature_conditions(room: RoomInputs) -> tuple[RoomCondition, ...]:
     """The distinct conditions of a room's temperature that its rules read.
 
-    Raises: `DataError` for more than `MOST_CONDITIONS`.
+    Raises: `DataError` for more than `MOST_CONDITIONS`, or a rule by a load that the room has not.
     """
     if room.operation is None or room.controller is not None or not room.space.windows:
         return ()
-    leaves = (leaf for rule in room.control.rules for leaf in rule.leaves)
+    leaves = [leaf for rule in room.control.rules for leaf in rule.leaves]
+    for kind in LOAD_RULES:
+        needed = f"{kind}_c"
+        if any(leaf.rule == kind for leaf in leaves) and (
+            getattr(room.operation.loads, needed) is None
+        ):
+            message = f'the rule "{kind}" needs a set point: the room has no ideal {kind}'
+            raise DataError(message, element=room.space.label, field=f"loads.{needed}")
     step_h = room.weather.step_h
     by_room = (condition_of(leaf, step_h) for leaf in leaves if leaf.rule in ROOM_RULES)
     conditions = tuple(dict.fromkeys(by_room))
@@ -138,7 +146,7 @@ def room_conditions(
         for rule, place in _waiting_parts(rules[c], places[c], step_h):
             reads = dict.fromkeys(
                 one
-                for inner, at in _parts(rule, place)
+                for inner, at in list(_parts(rule, place)) or [(rule, place)]
                 for one in _reads(inner, at, c, waiting, step_h)
             )
             one = _waiting_rule(room, c, (rule, place), tuple(reads), signals)
@@ -190,8 +198,8 @@ def _parts(rule: ShadingRule, place: str) -> Iterator[tuple[ShadingRule, str]]:
 def _waiting_parts(
     rule: ShadingRule, place: str, step_h: float
 ) -> Iterator[tuple[ShadingRule, str]]:
-    """The combining rules in a rule that read the room's temperature and wait; inner ones first."""
-    if rule.rule not in ("any", "all"):
+    """The rules that combine or turn conditions of the room, and wait; inner ones first."""
+    if rule.rule not in ("any", "all") and not rule.inverse:
         return
     for inner, at in _parts(rule, place):
         yield from _waiting_parts(inner, at, step_h)
@@ -216,6 +224,8 @@ def _reads(
 def condition_of(rule: ShadingRule, step_h: float) -> RoomCondition:
     """The condition of a rule by the room's temperature, for weather in steps of so many hours."""
     rows, quantity = _waits(rule, step_h), ROOM_RULES[rule.rule]
+    if rule.inverse:
+        rows = 0, 0  # windows open where it is met: the rule waits, see `_waiting_parts`
     if rule.rule in LOAD_RULES:
         return RoomCondition(rule.close_above_w, rule.close_above_w, quantity, *rows)
     return RoomCondition(rule.closes_above_c, rule.opens_below_c, quantity, *rows)
@@ -303,9 +313,6 @@ def _reasons(rule: ShadingRule) -> Iterator[str]:
     else:
         yield rule.rule
     yield from (key for key in WAITS if getattr(rule, key))
-
-
-WAITS = ("open_delay_h", "hold_h", "until", "most_moves")
 
 
 def _by_rule(

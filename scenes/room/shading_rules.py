@@ -33,6 +33,8 @@ LOAD_RULES = ("cooling", "heating")
 JOINT_RULES = ("glare", "work plane", "daylight")
 # conditions that are met or not
 INVERTIBLE = (*WEATHER_RULES, *ROOM_RULES, "irradiance", "illuminance", "sun depth")
+OF_SCENARIO = ("scenario", "setpoint", "setpoint_2")
+WAITS = ("open_delay_h", "hold_h", "until", "most_moves")  # keys that make a rule wait
 MOST_CONDITIONS = 4  # n of a room: the heat balance chooses from 2^n alternatives
 
 
@@ -64,6 +66,14 @@ def scenario_rule(name: str, stated: Mapping[str, Any]) -> dict[str, Any]:
 
     rule: dict[str, Any] = filled(scenario["rule"])
     return rule
+
+
+def stated_keys(rule: ShadingRule) -> dict[str, Any]:
+    """The keys that a table of a rule needs to be read as the rule: also those of its scenario."""
+    own = scenarios()[rule.scenario]["rule"].keys() if rule.scenario else set()
+    stated = rule.model_dump(mode="json", exclude_defaults=True)
+    stated |= rule.model_dump(mode="json", include={"rule", *own})
+    return stated | ({"parts": [stated_keys(one) for one in rule.parts]} if rule.parts else {})
 
 
 class ShadingRule(TomlTable):
@@ -146,7 +156,15 @@ class ShadingRule(TomlTable):
             near = get_close_matches(str(name), scenarios(), n=1)
             more = f"; did you mean {near[0]!r}?" if near else ""
             raise ValueError(f"scenario: there is no {name!r}{more}")
-        return scenario_rule(name, table) | table
+        whole = scenario_rule(name, table) | table
+        own = {*OF_SCENARIO, "parts", *WAITS}
+        stray = [key for key in table if key in ShadingRule.model_fields and key not in own]
+        if whole["rule"] in ("any", "all") and "rule" not in table and stray:
+            raise ValueError(
+                f"{stray[0]}: the scenario {name!r} combines rules with keys of their own: state "
+                "its `parts`"
+            )
+        return whole
 
     def fault(self, states: int, schedules: Mapping[str, ScheduleTable]) -> tuple[str, str] | None:
         """The key that does not fit windows with `states` states, and the fault."""
@@ -170,6 +188,11 @@ class ShadingRule(TomlTable):
         if self.rule in ("any", "all"):
             if not self.parts:
                 return "parts", f'the rule "{self.rule}" needs tables of rules'
+            if len({leaf for leaf in self.leaves if leaf.rule == "manual"}) > 1:
+                return "parts", 'a group is moved by people of one kind: several rules "manual"'
+            if self._parts_several_limits:
+                message = 'rules of light ("glare", "work plane", "daylight") of a group act'
+                return "parts", f'{message} together: as parts of one "any"'
             for number, one in enumerate(self.parts):
                 fault = one.fault(states, schedules)
                 if fault is not None:
@@ -191,6 +214,23 @@ class ShadingRule(TomlTable):
         if self.rule == "cut-off" and self.slat_tilts_deg and len(self.slat_tilts_deg) != states:
             return "slat_tilts_deg", f"expected one for each of {states} states"
         return None
+
+    @property
+    def _parts_several_limits(self) -> bool:
+        """Whether parts have different rules of light that the rule does not take together."""
+        of_light = [one for one in self.parts if one._limits_of_light]
+        if len({limit for one in of_light for limit in one._limits_of_light}) < 2:
+            return False
+        together = all(one.rule == "any" or not one.parts for one in of_light)
+        return len(of_light) > 1 and not (self.rule == "any" and together)
+
+    @property
+    def _limits_of_light(self) -> set[str]:
+        """The distinct rules of light that it has."""
+        keys = {"rule", "at", "close_above_lx", "target_lx", "limit_lx", "limit_dgp", "seat",
+                "looks_deg"}  # fmt: skip
+        joint = (leaf for leaf in self.leaves if leaf.rule in JOINT_RULES)
+        return {leaf.model_dump_json(include=keys) for leaf in joint}
 
     @property
     def closes_above_c(self) -> float:
@@ -283,7 +323,7 @@ class ControlTable(ShadingRule):
                     f"{place}.rule",
                     '"predictive" plans all groups of a room together, and alone',
                 )
-            for key in ("open_delay_h", "hold_h", "until", "most_moves"):
+            for key in WAITS:
                 if getattr(rule, key):
                     return f"{place}.{key}", 'the rule "predictive" does not wait: leave it out'
         return None
@@ -292,11 +332,23 @@ class ControlTable(ShadingRule):
         """The rule of an entry of `group`; None: of the windows that no entry names."""
         stated = {key: getattr(self, key) for key in ShadingRule.model_fields}
         if group is not None:
-            keys = group.model_fields_set & ShadingRule.model_fields.keys()
-            if "rule" in keys and "scenario" not in keys:
-                stated["scenario"] = ""
-            stated |= {key: getattr(group, key) for key in keys}
+            stated |= self.changed_by(group)
         return ShadingRule.model_construct(**stated)
+
+    def changed_by(self, table: ShadingRule) -> dict[str, Any]:
+        """Keys of the rule that differ where `table` holds, of some windows or rooms.
+
+        A scenario is what its source says, whatever holds elsewhere; a rule takes nothing from
+        another scenario.
+        """
+        fields = ShadingRule.model_fields
+        keys, left_out = table.model_fields_set & fields.keys(), set[str]()
+        if "scenario" in keys:
+            left_out = set(fields)
+        elif "rule" in keys and self.scenario:
+            left_out = {*OF_SCENARIO, *scenarios()[self.scenario]["rule"]}
+        changed = {key: fields[key].get_default() for key in left_out}
+        return changed | {key: getattr(table, key) for key in keys}
 
     @property
     def rules(self) -> tuple[tuple[str, ShadingRule], ...]:

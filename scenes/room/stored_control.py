@@ -9,7 +9,7 @@ from bim.model import Building
 from mitsuba_cfs.errors import DataError
 from scenes.room.control_groups import control_groups
 from scenes.room.operation_tables import OperationTables
-from scenes.room.shading_rules import ControlTable
+from scenes.room.shading_rules import ControlTable, stated_keys
 from scenes.toml_file import validated
 
 
@@ -28,7 +28,7 @@ def stored_groups(building: Building, tables: OperationTables, file: Path) -> li
                     message = f"{leaf.schedule!r}: an IFC file holds 24 states, no named schedule"
                     raise DataError(message, file=file, field=f"{control.places[c]}.schedule")
             windows = [w.guid for w, n in zip(space.windows, control.number, strict=True) if n == c]
-            stated = rule.model_dump(mode="json", exclude_defaults=True) | {"rule": rule.rule}
+            stated = stated_keys(rule)
             if rule.rule == "predictive":
                 stated["predictive"] = of_room.control.predictive.model_dump(mode="json")
             groups.append(StoredGroup(name, tuple(windows), stated, space.label))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,16 +13,20 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods.light import direct_sun_by_group, illuminance
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from scenes.room.control_groups import control_groups
+from scenes.room.control_hour import FollowedCondition
 from scenes.room.heat import heat_alone
 from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.light import room_light
 from scenes.room.operation import Operation
 from scenes.room.operation_tables import OperationTables
+from scenes.room.predictive import predictive_states
 from scenes.room.room import lit_room
 from scenes.room.shading import (
     control_signals,
+    room_conditions,
     ruled_year,
     shading_states,
+    temperature_conditions,
 )
 from scenes.room.shading_rules import ShadingRule, scenarios
 from scenes.room.solar import seasonal_outdoors
@@ -28,6 +34,7 @@ from scenes.room.window_sensors import facade_illuminance, window_beam
 from scenes.room.windows import in_all_windows
 from scenes.toml_file import validated
 from tests.scenes.small_box import FEW, TWO
+from thermal.control import RoomCondition, by_threshold, delayed
 
 SUN = {"rule": "irradiance", "close_above": 150.0, "sensor": "roof"}
 
@@ -232,9 +239,78 @@ def test_every_scenario_is_a_rule_with_a_source(inputs) -> None:
     assert (south.rule, south.close_above, south.scenario) == ("irradiance", 300.0, "EN ISO 13790")
 
 
+def test_a_scenario_of_a_group_is_itself(inputs) -> None:
+    """Neither keys of [control] nor of its scenario change a group's own scenario or rule."""
+    control = {
+        "scenario": "EnergyPlus OnIfHighHorizontalSolar", "setpoint": 600.0, "most_moves": 1,
+        "state": 1,
+        "group": [
+            {"facades": ["S"], "scenario": "EnergyPlus AlwaysOff"},
+            {"facades": ["N"], "rule": "irradiance"},
+        ],
+    }  # fmt: skip
+    table = OperationTables.model_validate({"control": control}).control
+    (_, whole), (_, south), (_, north) = table.rules
+    assert (whole.sensor, whole.close_above, whole.setpoint) == ("horizontal", 600.0, 600.0)
+    alone = ShadingRule.model_validate({"scenario": "EnergyPlus AlwaysOff"})
+    assert south.model_dump() == alone.model_dump()
+    assert (north.sensor, north.close_above, north.setpoint) == ("window", 200.0, None)
+    assert (north.most_moves, north.state) == (1, 1), "keys beside the scenario"
+    rooms = [
+        {"spaces": ["A"], "control": {"scenario": "EnergyPlus AlwaysOff"}},
+        {"spaces": ["B"], "control": {"rule": "irradiance"}},
+    ]
+    del control["group"]
+    tables = OperationTables.model_validate({"control": control, "rooms": rooms})
+    first, second = (tables.with_rooms(one).control.rule_of(None) for one in tables.rooms)
+    assert first.model_dump() == alone.model_dump()
+    assert second.model_dump() == north.model_dump()
+
+
+def test_delays_of_inverse_rules_by_the_room_delay_opening(inputs) -> None:
+    """Closed while the room is cold: it closes at once, and opens two hours late."""
+    rule = {"rule": "air temperature", "inverse": True, "open_delay_h": 2.0}
+    room = inputs(rule | {"groups": "room"})
+    (condition, waits), read = room_conditions(room, None, None)
+    assert read == (waits,) and condition == RoomCondition(24.0, 24.0)
+    assert (waits.open_delay_rows, waits.states) == (2, (0, 2))
+    followed = [FollowedCondition(condition), FollowedCondition(waits)]
+    felt, found = 24.0 + 2.0 * np.sin(np.arange(200) / 3.0), []
+    for hour, value in enumerate(felt.tolist()):
+        levels = {}
+        for one in followed:
+            one.follow({"air": value}, levels, hour)
+            levels[one.condition] = one.level
+        found.append(shading_states(room, met={waits: levels[waits]})[hour, 0])
+    expected = delayed(2 - by_threshold(felt, 24.0, closed=2), 2)
+    assert np.array_equal(found, expected) and 0 < np.count_nonzero(expected) < 200
+
+
+def test_plans_of_other_steps_than_hours_are_refused(inputs) -> None:
+    room = inputs({"rule": "predictive"})
+    half = replace(room, weather=replace(room.weather, step_h=0.5))
+    with pytest.raises(DataError, match="steps of 30 minutes"):
+        predictive_states(SimpleNamespace(room=half))
+
+
+@pytest.mark.parametrize("rule", ["cooling", "heating"])
+def test_rules_by_loads_need_a_set_point(inputs, rule) -> None:
+    other = {"cooling": {"heating_c": 20.0}, "heating": {"cooling_c": 26.0}}[rule]
+    room = inputs({"rule": rule}, loads=other)
+    with pytest.raises(DataError, match=f"loads.{rule}_c"):
+        temperature_conditions(room)
+
+
+def test_a_place_outside_the_room_is_refused(inputs) -> None:
+    with pytest.raises(DataError, match="outside the room"):
+        inputs({"rule": "work plane", "at": [100.0, 0.0, 1.0]})
+
+
 @pytest.mark.parametrize(
     ("control", "words"),
     [
+        ({"scenario": "EnergyPlus AlwaysOn", "state": 1}, "state: .*combines"),
+        ({"scenario": "Lightswitch-2002 passive", "sensor": "roof"}, "sensor: .*combines"),
         ({"scenario": "LM 83"}, "did you mean 'LM-83'"),
         ({"scenario": "LM-83", "setpoint": 3.0}, "no such set point"),
         ({"setpoint": 3.0}, "belongs to a `scenario`"),
@@ -252,6 +328,21 @@ def test_an_unknown_scenario_or_set_point_is_refused(control, words, tmp_path) -
         ({"rule": "glare", "inverse": True}, "inverse"),
         ({"rule": "illuminance", "open_below_lx": 30000.0}, "open_below_lx"),
         ({"rule": "cooling", "until": "sunset"}, "until"),
+        (
+            {"rule": "any", "parts": [{"rule": "manual"}, {"rule": "manual", "seed": 1}]},
+            "parts",
+        ),
+        ({"rule": "all", "parts": [{"rule": "glare"}, {"rule": "work plane"}]}, "parts"),
+        (
+            {
+                "rule": "any",
+                "parts": [
+                    {"rule": "all", "parts": [{"rule": "glare"}, {"rule": "occupied"}]},
+                    {"rule": "all", "parts": [{"rule": "work plane"}, {"rule": "unoccupied"}]},
+                ],
+            },
+            "parts",
+        ),
     ],
 )
 def test_keys_that_do_not_fit_a_rule_are_refused(rule, key) -> None:

@@ -56,7 +56,25 @@ def taken(model: Path, folder: Path):
     return read_operation(file)
 
 
-@pytest.mark.parametrize("rules", [RULES.replace("seat = [2.0, 2.0, 1.2]\n", ""), PLANS])
+# keys beside a scenario that replace its own by the defaults of rules
+SCENARIO = """
+[control]
+scenario = "EN ISO 13790"
+close_above = 200.0
+[[control.group]]
+facades = ["S"]
+rule = "any"
+[[control.group.parts]]
+scenario = "EnergyPlus OnIfHighZoneCooling"
+close_above_w = 0.0
+[[control.group]]
+facades = ["N"]
+scenario = "EnergyPlus OnNightIfLowOutdoorTempAndOffDay"
+setpoint = 12
+"""
+
+
+@pytest.mark.parametrize("rules", [RULES.replace("seat = [2.0, 2.0, 1.2]\n", ""), PLANS, SCENARIO])
 def test_rules_come_back_from_the_model_as_they_were(written, tmp_path, rules) -> None:
     out = written(rules)
     operation = taken(out, tmp_path)
