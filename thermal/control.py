@@ -46,7 +46,7 @@ def by_threshold(
     state = np.zeros(len(e), dtype=np.int64)
     shut = False
     for hour, value in enumerate(e):
-        shut = value > close_above or (shut and value >= lower)
+        shut = value > close_above or (shut and lower <= value and lower < close_above)
         state[hour] = closed if shut else 0
     return state
 

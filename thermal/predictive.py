@@ -144,7 +144,12 @@ def _hour(
     """Write the `responses` of a combination into out [6]; returns the power of its lamps."""
     if constants[6] > 0:
         lamps *= _lamp_share(
-            daylight, constants[11], constants[12], constants[13], constants[14], constants[15]
+            daylight,
+            constants[11],
+            constants[12],
+            constants[13],
+            constants[14],
+            constants[15],
         )
     responses(
         air, windows, constants[0], constants[1], constants[2], constants[3], outdoor_c, behind_c,

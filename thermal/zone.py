@@ -227,10 +227,13 @@ class Dimming:
     least_power: float = 0.0  # share of their power that gives it
     off: bool = False  # less light than that is none
     sensor_factor: float = 1.0  # what the sensor reads, over the mean daylight of the work plane
+    full_lx: float | None = None  # of the work plane by the lamps alone; None: the target
 
     def __post_init__(self) -> None:
         valid = self.target_lx > 0
         require(valid, "lighting", f"target illuminance must be positive, got {self.target_lx} lx")
+        full = self.full_lx is None or self.full_lx > 0
+        require(full, "lighting", f"light of the lamps must be positive, got {self.full_lx} lx")
         require_range(self.least_light, 0.0, 0.99, "lighting: least light")
         require_range(self.least_power, 0.0, 1.0, "lighting: least power")
 
@@ -238,20 +241,32 @@ class Dimming:
     def numbers(self) -> tuple[float, float, float, float, float]:
         """The arguments of `lamp_share` after the daylight."""
         off = self.least_light if self.off else -1.0
-        return self.target_lx, self.least_light, self.least_power, off, self.sensor_factor
+        full = self.target_lx if self.full_lx is None else self.full_lx
+        needed, read = self.target_lx / full, self.sensor_factor / full
+        return needed, read, self.least_light, self.least_power, off
 
 
 def lamp_share(
-    daylight: FloatArray, target: float, least_light: float, least_power: float, off: float,
-    factor: float,
+    daylight: FloatArray, needed: float, read: float, least_light: float, least_power: float,
+    off: float,
 ) -> FloatArray:  # fmt: skip
     """Share of the lamps' power by daylight [lx], of arrays, or compiled of numbers.
 
-    Args: off: share of light up to which the lamps are off; below 0: never.
+    Args:
+        needed: share of the lamps' light that is missing in the dark; read: less by each lux.
+        off: share of light up to which the lamps are off; below 0: never.
     """
-    missing = np.minimum(np.maximum(1.0 - factor * daylight / target, 0.0), 1.0)
+    missing = np.minimum(np.maximum(needed - read * daylight, 0.0), 1.0)
     above = np.maximum(missing - least_light, 0.0) / (1.0 - least_light)
     return (least_power + (1.0 - least_power) * above) * (missing > off)
+
+
+def dimmed_light(illuminance: ArrayLike, dimming: Dimming) -> FloatArray:
+    """Share [H] of the lamps' light that they give: what is missing, at least their least light."""
+    needed, read, least_light, _, off = dimming.numbers
+    day = np.asarray(illuminance, dtype=float)
+    missing = np.minimum(np.maximum(needed - read * day, 0.0), 1.0)
+    return np.maximum(missing, least_light) * (missing > off)
 
 
 def dimmed_share(illuminance: ArrayLike, dimming: Dimming) -> FloatArray:

@@ -120,6 +120,10 @@ def operated_year(room: RoomZone, result: ZoneResult, weather: Weather) -> Opera
         },
         index=weather.midpoints,
     ).rename_axis("time")
+    if room.lamp_lx is not None:
+        hours["lamps_lx"] = room.lamp_lx
+        if room.daylight is not None:
+            hours["task_lx"] = room.lamp_lx + room.daylight
     summary = {
         "heating_kwh": result.heating.sum() * weather.step_h / 1e3,
         "cooling_kwh": result.cooling.sum() * weather.step_h / 1e3,

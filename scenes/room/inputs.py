@@ -22,6 +22,7 @@ from scenes.fenestration.sight import sight_through
 from scenes.fenestration.systems import States
 from scenes.results import ShadingYear
 from scenes.room.control_groups import ControlGroups, control_groups
+from scenes.room.luminaires import with_luminaires
 from scenes.room.operation import FUNCTION, Controller, OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
@@ -152,6 +153,9 @@ def room_inputs(
     if skies is None:
         skies = skies_for(weather, options.sampling, cache, **options.sky)
     tables = None if operation is None else operation.of_room(building, space)
+    if tables is not None:
+        grid = (tuple(grids) or (options.grid,))[0]
+        tables = with_luminaires(tables, space, grid, seed=options.sampling.seed)
     control = control_groups(space, None if tables is None else tables.control)
     return RoomInputs(
         building,

@@ -27,6 +27,7 @@ from scenes.fenestration.thermal_system import checked_system
 from scenes.fenestration.tilts import tilt_states
 from scenes.room.operation_tables import (
     PARTS,
+    GainsTable,
     OperationTables,
     RoomsTable,
     operated_tables,
@@ -322,7 +323,8 @@ class Operation:
         states = [table.placed(self.file.parent) for table in self.tables.system]
         panes = [layer.pane for table in states if table.bsdf is None for layer in table.layers]
         named = [None if table.bsdf is None else self.file.parent / table.bsdf for table in states]
-        files = (*named, *panes, *tables, self.tables.control_of)
+        lamps = (one.file for v in self.tables.variants for one in v.gains.luminaire)
+        files = (*named, *panes, *tables, self.tables.control_of, *lamps)
         return tuple(path for path in files if path is not None)
 
     def outdoors(self, weather: Weather) -> Weather:
@@ -403,7 +405,26 @@ def schedules_there(tables: Tables, path: Path) -> Tables:
             field = f"schedules.{name}.csv"
             raise DataError(f"no such file: {schedule.csv}", file=path, field=field)
         schedules[name] = schedule.model_copy(update={"csv": csv})
-    return tables.model_copy(update={"schedules": schedules})
+    update = {"schedules": schedules, "gains": _placed(tables.gains, path)}
+    rooms = tuple(
+        one.model_copy(update={"gains": _placed(one.gains, path)}) for one in tables.rooms
+    )
+    return tables.model_copy(update=update | {"rooms": rooms})
+
+
+def _placed(gains: GainsTable, path: Path) -> GainsTable:
+    """Gains with absolute paths of the luminaires' files.
+
+    Raises: `DataError` for a file that does not exist.
+    """
+    placed = []
+    for number, one in enumerate(gains.luminaire):
+        file = (path.parent / one.file).absolute()
+        if not file.is_file():
+            field = f"gains.luminaire.{number}.file"
+            raise DataError(f"no such file: {one.file}", file=path, field=field)
+        placed.append(one.model_copy(update={"file": file}))
+    return gains.model_copy(update={"luminaire": tuple(placed)}) if placed else gains
 
 
 def read_state(table: StateTable, path: Path | None, *, by: str = "") -> FenestrationSystem:

@@ -318,6 +318,23 @@ class EnvelopeTable(TomlTable):
     frame_psi: Annotated[float, plausible.PSI] = 0.0  # along the edges of the glass [W/(m K)]
 
 
+class LuminaireTable(TomlTable):
+    """A luminaire of a room by its photometry, or several in a row."""
+
+    file: Path  # .ies (IES LM-63) or .ldt (EULUMDAT)
+    position: tuple[float, float, float]  # [m]
+    turned_deg: float = 0.0  # of C0 from +x, anticlockwise
+    number: Annotated[int, Field(ge=1, le=1000)] = 1
+    step: tuple[float, float, float] = (0.0, 0.0, 0.0)  # from one to the next [m]
+    watts: Annotated[Positive, plausible.POWER] | None = None  # where the file states none
+
+    @model_validator(mode="after")
+    def _steps(self) -> LuminaireTable:
+        if self.number > 1 and not any(self.step):
+            raise ValueError("step: several luminaires need a distance")
+        return self
+
+
 class GainsTable(TomlTable):
     """Internal gains during the occupied hours."""
 
@@ -337,10 +354,21 @@ class GainsTable(TomlTable):
     lighting_off: bool = False  # lamps are off where less light than that is needed
     # what the sensor reads over the mean daylight of the work plane: its error, or its place
     lighting_sensor_factor: Annotated[float, Field(ge=0.1, le=10)] = 1.0
+    # of the work plane by the lamps alone; default: the target
+    lighting_full_lx: Annotated[Positive, plausible.TARGET] | None = None
+    luminaire: tuple[LuminaireTable, ...] = ()  # in place of lighting_w_m2 and lighting_full_lx
     lighting_standby_w_m2: Annotated[float, plausible.LAMPS] = 0.0  # at all hours, EN 15193-1's W_P
     radiant_share: Share = 0.5
     # clock hours of every day, or a schedule of the share of people; multiplies the constants above
     occupied: Annotated[tuple[int, int] | str, OrSchedule(plausible.SHARE, clock_or_name)] = (8, 18)
+
+    @model_validator(mode="after")
+    def _states_lamps_once(self) -> GainsTable:
+        if self.luminaire:
+            for key in ("lighting_w_m2", "lighting_full_lx"):
+                if key in self.model_fields_set:
+                    raise ValueError(f"{key}: follows from the luminaires")
+        return self
 
     @property
     def dimming(self) -> Dimming | None:
@@ -353,6 +381,7 @@ class GainsTable(TomlTable):
             self.lighting_least_power,
             self.lighting_off,
             self.lighting_sensor_factor,
+            self.lighting_full_lx,
         )
 
 

@@ -57,7 +57,7 @@ from thermal.ground import (
 )
 from thermal.kernel import advance
 from thermal.ventilation import AirTransfer
-from thermal.zone import Gains, Layer, OpaqueSurface, Zone, dimmed_share, split_gains
+from thermal.zone import Gains, Layer, OpaqueSurface, Zone, dimmed_light, dimmed_share, split_gains
 
 DOWNWARDS = -0.7  # z of a floor's normal
 
@@ -281,6 +281,8 @@ class RoomZone:
     operation: OperationTables | None = None
     sun_beyond: SunBeyond = field(default_factory=dict)  # of its windows, in rooms beyond glass
     alternatives: RoomAlternatives | None = None  # of shading by the room's temperature
+    # [H] light of the lamps on the work plane [lx]; None where it is not known
+    lamp_lx: FloatArray | None = None
 
     @property
     def control(self) -> TemperatureControl | None:
@@ -305,6 +307,7 @@ class RoomZone:
             result: NDArray[Any] = np.stack(whole)[number, hours]
             return result
 
+        lit = [room.lamp_lx for room in rooms if room.lamp_lx is not None]
         planes = [room.daylight for room in rooms if room.daylight is not None]
         gains = Gains(
             chosen([room.zone.gains.convective for room in rooms]),
@@ -320,6 +323,7 @@ class RoomZone:
             gains={key: chosen([room.gains[key] for room in rooms]) for key in self.gains},
             shading=replace(self.shading, states=states, moved_by=moved_by, reasons=reasons),
             lamps=chosen([room.lamps for room in rooms]),
+            lamp_lx=chosen(lit) if lit else None,
             daylight=chosen(planes) if planes else None,
             sun_beyond={
                 place: chosen([room.sun_beyond[place] for room in rooms])
@@ -541,9 +545,10 @@ def room_zone(
         ruled: the rules' year, where the states are by rules: says what moved the windows.
     """
     progress("heat", 0.0)
-    zone, lamps = surfaces.room, np.zeros(room.skies.hours)
+    zone, lamps, lit = surfaces.room, np.zeros(room.skies.hours), None
     plane = work_plane(room, daylight)
     if room.operation is not None:
+        lit = lamp_lux(room.operation, room.weather, plane)
         area = room.space.floor_area
         operated_zone, lamps = operated(zone.zone, room.operation, area, room.weather, plane)
         zone = enveloped(
@@ -574,6 +579,7 @@ def room_zone(
     )  # fmt: skip
     return RoomZone(
         room.space, zone, solar, gains, shading, lamps, room.occupied, plane, services,
+        lamp_lx=lit,
         fenestration=tuple(fenestration_table(room.windows, surfaces.thermals)),
         states=tuple(system.name for system in max(room.windows.systems, key=len, default=())),
         operation=room.operation, sun_beyond=beyond,
@@ -680,6 +686,20 @@ def services_of(tables: OperationTables, floor_area: float, weather: Weather) ->
         0.0 if low is None else low / 100.0,
         1.0 if high is None else high / 100.0,
     )
+
+
+def lamp_lux(
+    tables: OperationTables, weather: Weather, daylight: FloatArray | None
+) -> FloatArray | None:
+    """Light of the lamps on the work plane [H] [lx]; None where nothing says how much it is."""
+    gains = tables.gains
+    if gains.lighting_full_lx is None:
+        return None
+    used = OperationHours(tables, weather).lamps(1.0) > 0
+    dimming = gains.dimming
+    if daylight is None or dimming is None:
+        return used * gains.lighting_full_lx
+    return used * gains.lighting_full_lx * dimmed_light(daylight, dimming)
 
 
 def operated(

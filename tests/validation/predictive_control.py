@@ -1,6 +1,6 @@
 """Predictive control of two facades beside perfect foresight, AFC's glare term and fixed rules.
 
-    python -m tests.validation predictive_control --weather CITY.epw [--other OTHER.epw]
+    python -m tests.validation predictive_control CITY.epw [--other OTHER.epw]
 
 An office with equal windows to the south and to the west, each with an exterior blind raised or at
 seven tilts, of which three are interpolated.  Energy is that of the detailed heat balance; glare is
