@@ -21,13 +21,10 @@ from mkdocs.structure.pages import Page
 REPOSITORY = Path(__file__).parent.parent
 PACKAGES = ("scenes", "bim", "mitsuba_cfs", "thermal")
 NOT_PUBLIC = ("scenes/commands",)  # described by `cfs --help`
-PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "CONTRIBUTING.md",
-         "CHANGELOG.md": "CHANGELOG.md"}  # fmt: skip
+PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "CONTRIBUTING.md", "CHANGELOG.md": "CHANGELOG.md"}
 LINK = re.compile(r"(?<=\]\()(?!\w+:|#|/)([^)#\s]+)")  # relative: no scheme, no anchor alone
 
-LOADED = re.compile(
-    r"<(?:script|link|img|iframe)\b[^>]*?(?:src|href)=[\"']?(?:https?:)?//[^\"' >]+"
-)
+LOADED = re.compile(r"<(?:script|link|img|iframe)\b[^>]*?(?:src|href)=[\"']?(?:https?:)?//[^\"' >]+")
 
 
 def api_pages() -> dict[str, list[str]]:
@@ -72,10 +69,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
                 if (REPOSITORY / path).is_file():
                     files.append(
                         File.generated(
-                            config, target, abs_src_path=str(REPOSITORY / path),
-                            inclusion=InclusionLevel.NOT_IN_NAV,
+                            config, target, abs_src_path=str(REPOSITORY / path), inclusion=InclusionLevel.NOT_IN_NAV
                         )
-                    )  # fmt: skip
+                    )
     return files
 
 

@@ -115,26 +115,17 @@ class Account:
     def _stops(self) -> list[Note]:
         notes = []
         if self.cut_off:
-            notes.append(
-                Note("THE FILE IS CUT OFF at its end: an unknown part of the building is lost")
-            )
+            notes.append(Note("THE FILE IS CUT OFF at its end: an unknown part of the building is lost"))
         if not self.rooms:
             notes.append(Note("no rooms"))
         elif self.share_used < HALF:
-            notes.append(
-                Note(
-                    "only {percent:.0f} % of the exterior glass is used",
-                    percent=100 * self.share_used,
-                )
-            )
+            notes.append(Note("only {percent:.0f} % of the exterior glass is used", percent=100 * self.share_used))
         return notes
 
     def _cautions(self) -> list[Note]:
         notes = []
         if self.rooms and HALF <= self.share_used < WHOLE:
-            notes.append(
-                Note("{percent:.0f} % of the exterior glass is used", percent=100 * self.share_used)
-            )
+            notes.append(Note("{percent:.0f} % of the exterior glass is used", percent=100 * self.share_used))
         if not self.glass_out:
             notes.append(Note("no exterior glass"))
         if self.glass_assumed > MUCH_ASSUMED * self.glass_used:
@@ -171,9 +162,7 @@ class Account:
         storeys = [
             Note("{storey} {count}", storey=_storey(s.name), count=s.rooms)
             if self.from_geometry
-            else Note(
-                "{storey} {count} of {all}", storey=_storey(s.name), count=s.rooms, all=s.spaces
-            )
+            else Note("{storey} {count} of {all}", storey=_storey(s.name), count=s.rooms, all=s.spaces)
             for s in self.storeys
         ]
         listed = _joined(storeys, ", ")
@@ -191,10 +180,8 @@ class Account:
         used = Note("no exterior glass in a room")
         if self.glass_out > 0:
             used = Note(
-                "{used:.1f} of {all:.1f} m2 of exterior glass used ({percent:.0f} %, {windows} of "
-                "{count} windows)",
-                "{used:.1f} of {all:.1f} m2 of exterior glass used ({percent:.0f} %, {windows} of "
-                "{count} window)",
+                "{used:.1f} of {all:.1f} m2 of exterior glass used ({percent:.0f} %, {windows} of {count} windows)",
+                "{used:.1f} of {all:.1f} m2 of exterior glass used ({percent:.0f} %, {windows} of {count} window)",
                 used=self.glass_used,
                 all=self.glass_out,
                 percent=100 * self.share_used,

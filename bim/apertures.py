@@ -100,9 +100,7 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Issue]]:
     if filling.opening is not None:
         plane, more = _in_its_opening(filling, plane)
         issues += more
-    opening = _filled(
-        shadow(filling.triangles if filling.opening is None else filling.opening, plane)
-    )
+    opening = _filled(shadow(filling.triangles if filling.opening is None else filling.opening, plane))
     if opening.area < SMALLEST_PANE:
         values = {"element": filling.name}
         return None, [Issue("opening-without-area", filling.guid, values, Effect("window"))]
@@ -158,9 +156,7 @@ def _lies_around(one: Aperture, other: Aperture) -> bool:
         return False
     if abs(one.plane.to_plane(other.plane.origin)[2]) > ONE_WINDOW:
         return False
-    outline = shapely.transform(
-        other.glass, lambda p: one.plane.to_plane(other.plane.to_world(p))[:, :2]
-    )
+    outline = shapely.transform(other.glass, lambda p: one.plane.to_plane(other.plane.to_world(p))[:, :2])
     return outline.intersection(one.glass).area > MOSTLY * one.glass.area
 
 
@@ -235,11 +231,7 @@ def _in_its_opening(filling: Filling, plane: Plane) -> tuple[Plane, list[Issue]]
 
 
 def _drawn_glass(
-    filling: Filling,
-    clear: NDArray[np.float64],
-    facing: NDArray[np.bool_],
-    plane: Plane,
-    opening: shapely.Geometry,
+    filling: Filling, clear: NDArray[np.float64], facing: NDArray[np.bool_], plane: Plane, opening: shapely.Geometry
 ) -> tuple[shapely.Geometry, list[Issue]]:
     """Outline of the transparent panes, clipped to the opening."""
     issues = []
@@ -255,9 +247,7 @@ def _drawn_glass(
     return (glass if glass.area >= SMALLEST_PANE else shapely.Polygon()), issues
 
 
-def _assumed_glass(
-    filling: Filling, plane: Plane, opening: shapely.Geometry
-) -> tuple[shapely.Geometry, list[Issue]]:
+def _assumed_glass(filling: Filling, plane: Plane, opening: shapely.Geometry) -> tuple[shapely.Geometry, list[Issue]]:
     """The opening less a frame of the stated, the drawn or the default size."""
     if filling.glazed_fraction is not None and 0 < filling.glazed_fraction <= 1:
         glass = inset_to_fraction(opening, filling.glazed_fraction)

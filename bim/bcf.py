@@ -60,8 +60,7 @@ def write_topics(topics: Sequence[Topic], path: str | PathLike[str], file: str =
         archive.writestr("bcf.version", _xml(version))
         for index, topic in enumerate(topics):
             guid, view = (
-                str(uuid.uuid5(uuid.NAMESPACE_URL, f"{topic.name}\n{part}"))
-                for part in ("topic", "viewpoint")
+                str(uuid.uuid5(uuid.NAMESPACE_URL, f"{topic.name}\n{part}")) for part in ("topic", "viewpoint")
             )
             archive.writestr(f"{guid}/markup.bcf", _xml(_markup(topic, index, file, (guid, view))))
             archive.writestr(f"{guid}/viewpoint.bcfv", _xml(_viewpoint(topic, view)))
@@ -76,11 +75,7 @@ def write_bcf(building: Building, path: str | PathLike[str]) -> int:
     boxes: dict[str, NDArray[np.float64]] = {}
     for guid, box in _boxes(building):
         boxes.setdefault(guid, box)
-    topics = [
-        _of_issues(building, one, boxes)
-        for one in ranked(building.issues)
-        if one.first.severity in PRIORITIES
-    ]
+    topics = [_of_issues(building, one, boxes) for one in ranked(building.issues) if one.first.severity in PRIORITIES]
     write_topics(topics, path, "" if building.file is None else building.file.name)
     return len(topics)
 
@@ -181,9 +176,7 @@ def _point(issue: Issue) -> NDArray[np.float64] | None:
     return None if None in values else np.array(values, dtype=float)
 
 
-def _camera(
-    building: Building, boxes: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _camera(building: Building, boxes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """A camera, in model axes [m], that shows boxes [N, 2, 3] of the building's axes."""
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     middle, _ = in_model(building, (low + high) / 2, VIEW)

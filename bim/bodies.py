@@ -47,9 +47,7 @@ class Span:
 
     def endless(self) -> Span:
         """The same as one that the ray does not come out of."""
-        return replace(
-            self, stop=np.inf, parts=(*self.parts[:-1], replace(self.parts[-1], stop=np.inf))
-        )
+        return replace(self, stop=np.inf, parts=(*self.parts[:-1], replace(self.parts[-1], stop=np.inf)))
 
     def since(self, start: float) -> Span:
         """The part from a distance on [m]."""
@@ -71,9 +69,7 @@ class Bodies:
     item: NDArray[np.int64]  # [N] representation item of each triangle
     turned: dict[int, NDArray[np.bool_]] = field(default_factory=dict)  # of elements asked so far
 
-    def along(
-        self, origin: NDArray[np.float64], direction: NDArray[np.float64], reach: float
-    ) -> list[Span]:
+    def along(self, origin: NDArray[np.float64], direction: NDArray[np.float64], reach: float) -> list[Span]:
         """The elements that a ray is in within its reach [m], by where it enters them.
 
         Where a side of a body is not drawn, it begins or ends where its triangles do, if that is
@@ -153,9 +149,7 @@ def _joined(number: int, parts: list[Part]) -> list[Span]:
     return spans
 
 
-def _faces(
-    distance: NDArray[np.float64], hit: NDArray[np.int64], into: NDArray[np.bool_]
-) -> list[Face]:
+def _faces(distance: NDArray[np.float64], hit: NDArray[np.int64], into: NDArray[np.bool_]) -> list[Face]:
     """Faces of one element along a ray, those in one place once each way, the way in first."""
     faces: dict[tuple[int, bool], Face] = {}
     place, before = 0, float(distance[0])

@@ -65,10 +65,7 @@ class Finishes:
 
 
 def faces_and_windows(
-    pieces: Sequence[Piece],
-    beyond: Sequence[Beyond],
-    records: Sequence[ElementRecord],
-    finishes: Finishes,
+    pieces: Sequence[Piece], beyond: Sequence[Beyond], records: Sequence[ElementRecord], finishes: Finishes
 ) -> tuple[list[Face], list[Window], Counter]:
     """Faces, windows, and how often something had to be assumed.
 
@@ -83,19 +80,23 @@ def faces_and_windows(
         if not len(triangles) or np.linalg.norm(area_vectors(triangles).sum(axis=0)) < 1e-9:
             continue
         if piece.role == "glass":
-            key = (
-                f"{piece.attachment.aperture.filling.guid} {np.round(piece.facet.plane.normal, 3)}"
-            )
+            key = f"{piece.attachment.aperture.filling.guid} {np.round(piece.facet.plane.normal, 3)}"
             glass.setdefault(key, []).append((piece, triangles))
             continue
         kind = _kind(piece, behind, records)
         counts[kind] += 1
         faces.append(
             _face(
-                f"{kind} {counts[kind]}", kind, piece, triangles, behind,
-                records=records, finishes=finishes, assumed=assumed,
+                f"{kind} {counts[kind]}",
+                kind,
+                piece,
+                triangles,
+                behind,
+                records=records,
+                finishes=finishes,
+                assumed=assumed,
             )
-        )  # fmt: skip
+        )
     return faces, [_window(parts) for parts in glass.values()], assumed
 
 
@@ -156,9 +157,20 @@ def _face(
         assumed["adjacency"] += 1
     guid = filling.guid if own else (record.guid if record is not None else None)
     return Face(
-        name, kind, triangles, behind.adjacency, construction, visible, solar, EMISSIVITY,
-        behind.neighbour, guid, gloss, _window([(piece, triangles)]) if is_pane else None, hue,
-    )  # fmt: skip
+        name,
+        kind,
+        triangles,
+        behind.adjacency,
+        construction,
+        visible,
+        solar,
+        EMISSIVITY,
+        behind.neighbour,
+        guid,
+        gloss,
+        _window([(piece, triangles)]) if is_pane else None,
+        hue,
+    )
 
 
 def construction_of(
@@ -185,9 +197,7 @@ def construction_of(
     return Construction(" + ".join(names), tuple(outwards[::-1]), source)
 
 
-def _layers(
-    record: ElementRecord, span: Span, start: float, normal: NDArray[np.float64]
-) -> list[MaterialLayer]:
+def _layers(record: ElementRecord, span: Span, start: float, normal: NDArray[np.float64]) -> list[MaterialLayer]:
     """Layers of one element from the room outwards, from `start` on [m].
 
     Those of its layer set; without one, the bodies that the ray goes through, each of its own
@@ -237,10 +247,19 @@ def _window(parts: Sequence[tuple[Piece, NDArray[np.float64]]]) -> Window:
     filling = attachment.aperture.filling
     triangles = np.concatenate([triangles for _, triangles in parts])
     return Window(
-        filling.guid, filling.name, triangles, filling.host, float(attachment.region.area),
-        filling.u_value, filling.g_value, filling.visible_transmittance, filling.type_name,
-        filling.solar_transmittance, filling.panes, is_open=filling.is_open,
-    )  # fmt: skip
+        filling.guid,
+        filling.name,
+        triangles,
+        filling.host,
+        float(attachment.region.area),
+        filling.u_value,
+        filling.g_value,
+        filling.visible_transmittance,
+        filling.type_name,
+        filling.solar_transmittance,
+        filling.panes,
+        is_open=filling.is_open,
+    )
 
 
 def floor_area(faces: Sequence[Face]) -> float:

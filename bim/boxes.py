@@ -46,9 +46,7 @@ class Boxes:
             np.array([points.max(axis=0) for points in corners]).reshape(-1, 3),
         )
 
-    def near(
-        self, low: NDArray[np.float64], high: NDArray[np.float64], margin: float = 0.0
-    ) -> list[int]:
+    def near(self, low: NDArray[np.float64], high: NDArray[np.float64], margin: float = 0.0) -> list[int]:
         """Indices of those that are at most a margin [m] from a box, rising."""
         met = (self.low <= high + margin) & (self.high >= low - margin)
         return np.flatnonzero(met[:, 0] & met[:, 1] & met[:, 2]).tolist()

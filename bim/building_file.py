@@ -28,17 +28,7 @@ from bim.account import Account, StoreyAccount
 from bim.fenestration import AngularGValue, PlainGlass, ShadingState
 from bim.ifc.corrections import corrections_beside, corrections_file
 from bim.ifc.head import check_head
-from bim.model import (
-    Building,
-    Construction,
-    Element,
-    Face,
-    Georeference,
-    MaterialLayer,
-    Space,
-    SpaceGroup,
-    Window,
-)
+from bim.model import Building, Construction, Element, Face, Georeference, MaterialLayer, Space, SpaceGroup, Window
 from bim.names import AmbiguousName, UnknownName, has_words, unknown_room
 from bim.report.issue import Effect, Issue, Phrase, issue_text
 from mitsuba_cfs.errors import DataError
@@ -50,11 +40,26 @@ from mitsuba_cfs.processes import ended_processes
 RECORDS = {
     kind.__name__: kind
     for kind in (
-        Account, AngularGValue, Building, Construction, Effect, Element, Face, Georeference, Gloss,
-        Issue, MaterialLayer, Phrase, PlainGlass, ShadingState, Space, SpaceGroup, StoreyAccount,
+        Account,
+        AngularGValue,
+        Building,
+        Construction,
+        Effect,
+        Element,
+        Face,
+        Georeference,
+        Gloss,
+        Issue,
+        MaterialLayer,
+        Phrase,
+        PlainGlass,
+        ShadingState,
+        Space,
+        SpaceGroup,
+        StoreyAccount,
         Window,
     )
-}  # fmt: skip
+}
 PLAIN = (str, int, float, bool, type(None))
 SEQUENCES = {"tuple": tuple, "list": list}
 READER = "bim.building_file"  # the module that reads and stores; its source is a part of the key
@@ -67,10 +72,7 @@ class _NotStored(Exception):
 
 
 def read_once(
-    read: Callable[[], Building],
-    files: Sequence[Path],
-    options: Sequence[object],
-    cache: MatrixCache,
+    read: Callable[[], Building], files: Sequence[Path], options: Sequence[object], cache: MatrixCache
 ) -> Building:
     """The building of IFC files from the cache; read and stored where it is not in it.
 
@@ -90,9 +92,7 @@ def read_once(
     return building
 
 
-def _entry(
-    files: Sequence[Path], options: Sequence[object], cache: MatrixCache
-) -> CacheEntry | None:
+def _entry(files: Sequence[Path], options: Sequence[object], cache: MatrixCache) -> CacheEntry | None:
     """The entry by the content of all files; None where one of them cannot be read."""
     corrections = [corrections_file(file) for file in files]
     try:
@@ -188,9 +188,13 @@ def _restored(data: Mapping[str, NDArray[Any]]) -> Building:
 
 # Properties of an element that a selector names, by its keys
 KEYS = {
-    "name": "name", "material": "material", "layer": "layer", "storey": "storey",
-    "location": "storey", "class": "ifc_class",
-}  # fmt: skip
+    "name": "name",
+    "material": "material",
+    "layer": "layer",
+    "storey": "storey",
+    "location": "storey",
+    "class": "ifc_class",
+}
 FACET = re.compile(r'\s*(\w+)\s*(!?=)\s*("[^"]*"|/[^/]*/|[^,+]+)')
 
 
@@ -222,9 +226,7 @@ def selected(elements: Iterable[Element], selector: str, file: str | Path = "") 
     return frozenset(names)
 
 
-def _facet(
-    key: str, sign: str, value: str, selector: str, file: str | Path
-) -> Callable[[Element], bool]:
+def _facet(key: str, sign: str, value: str, selector: str, file: str | Path) -> Callable[[Element], bool]:
     """Whether an element has a property."""
     field, value = KEYS.get(key.lower()), value.strip()
     if field is None:
@@ -334,9 +336,13 @@ def read_elements(
             surroundings=beside.surroundings if reflectance is None else reflectance,
         )
         return read_outdoor_model(
-            path, select, linked=() if options is None else options.linked,
-            corrections=corrections, selected_in=selected_in, progress=progress,
-        )  # fmt: skip
+            path,
+            select,
+            linked=() if options is None else options.linked,
+            corrections=corrections,
+            selected_in=selected_in,
+            progress=progress,
+        )
     options = options or ReadOptions()
     if _format(path) is RADIANCE:
         from bim.radiance.building import read_radiance_elements
@@ -355,9 +361,7 @@ def read_elements(
     return Building(name, (), elements, tuple(issues), file=path), chosen
 
 
-def surrounded(
-    building: Building, files: Sequence[Path], offset: tuple[float, float, float] | None
-) -> Building:
+def surrounded(building: Building, files: Sequence[Path], offset: tuple[float, float, float] | None) -> Building:
     """The building with what files hold of its surroundings, if there are any."""
     if not files:
         return building
@@ -411,9 +415,7 @@ def is_ifc(path: str | PathLike[str]) -> bool:
     return _format(Path(path)) is IFC
 
 
-def held_states(
-    windows: Iterable[Window], path: str | PathLike[str]
-) -> dict[str, tuple[ShadingState, ...]]:
+def held_states(windows: Iterable[Window], path: str | PathLike[str]) -> dict[str, tuple[ShadingState, ...]]:
     """The shading states that a building's file holds for its windows, by GUID."""
     held: dict[str, tuple[ShadingState, ...]] = {}
     if is_ifc(path):
@@ -493,10 +495,7 @@ def _read_gbxml(path: Path, options: ReadOptions, progress: Progress) -> Buildin
     return read_gbxml(path, join=options.join, furniture=options.furniture)
 
 
-FLAGS = {
-    "join": "join", "apertures": "aperture", "facade_panes": "facade-pane",
-    "storeys": "only-storey",
-}  # fmt: skip
+FLAGS = {"join": "join", "apertures": "aperture", "facade_panes": "facade-pane", "storeys": "only-storey"}
 UNREAD = {  # by suffix: what it is, and the file to give instead
     ".oct": "is a Radiance octree; give the scene files (.rad) that it was made of",
     ".ifcxml": "is ifcXML; export the model as IFC (.ifc), or convert it with IfcConvert",
@@ -514,12 +513,8 @@ MARKS = (  # in the first bytes of a file of any suffix
     (b"ISO_10303_28", ".ifcxml"),
     (b"dragonfly_version", ".dfjson"),
 )
-IFC = BuildingFormat(
-    "IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join", "linked", "storeys")
-)
-RADIANCE = BuildingFormat(
-    "Radiance", (".rad",), _check_there, _read_radiance, ("apertures", "facade_panes")
-)
+IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join", "linked", "storeys"))
+RADIANCE = BuildingFormat("Radiance", (".rad",), _check_there, _read_radiance, ("apertures", "facade_panes"))
 HONEYBEE = BuildingFormat("honeybee", (".hbjson",), _check_honeybee, _read_honeybee, ("join",))
 GBXML = BuildingFormat("gbXML", (".gbxml", ".xml"), _check_gbxml, _read_gbxml, ("join",))
 FORMATS: tuple[BuildingFormat, ...] = (IFC, RADIANCE, HONEYBEE, GBXML)

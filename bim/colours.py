@@ -14,11 +14,7 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear sRGB, IEC 61966-2-1:1999; grey
 # XYZ with Bradford's adaptation of the white, so that grey stays grey.  Primaries: IEC 61966-2-1,
 # and `color.h` of Radiance, whose green is (0.29, 0.60)
 TO_RADIANCE = np.array(
-    [
-        [0.8578111, 0.1350964, 0.0070925],
-        [-0.0066512, 1.0060791, 0.0005721],
-        [-0.0030179, -0.0192267, 1.0222446],
-    ]
+    [[0.8578111, 0.1350964, 0.0070925], [-0.0066512, 1.0060791, 0.0005721], [-0.0030179, -0.0192267, 1.0222446]]
 )
 
 
@@ -42,9 +38,7 @@ def hue_of(linear: Sequence[float]) -> Colour:
     return red, green, blue
 
 
-def radiance_colour(
-    reflectance: float, hue: Colour, weights: Sequence[float]
-) -> NDArray[np.float64]:
+def radiance_colour(reflectance: float, hue: Colour, weights: Sequence[float]) -> NDArray[np.float64]:
     """Reflectance of Radiance's red, green and blue [3] whose weighted sum is the reflectance.
 
     A hue so strong that a channel would reflect less than nothing or more than all is paler.

@@ -68,19 +68,13 @@ def _beside(face: Face, back: Face) -> float:
 
 def reveals_between(face: Face, depth: float) -> NDArray[np.float64]:
     """The reveals [E, 2, 3, 3], two triangles an edge of a pane, through the wall behind it."""
-    corners, number = np.unique(
-        np.round(face.triangles.reshape(-1, 3), 6), axis=0, return_inverse=True
-    )
+    corners, number = np.unique(np.round(face.triangles.reshape(-1, 3), 6), axis=0, return_inverse=True)
     triangles = number.reshape(-1, 3)
     edges = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    _, first, count = np.unique(
-        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
-    )
+    _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
     a, b = corners[edges[first[count == 1]]].transpose(1, 0, 2)
     step = depth * face.normal
-    return np.stack(
-        [np.stack([a, b, b + step], axis=1), np.stack([a, b + step, a + step], axis=1)], axis=1
-    )
+    return np.stack([np.stack([a, b, b + step], axis=1), np.stack([a, b + step, a + step], axis=1)], axis=1)
 
 
 def touching(building: Building) -> tuple[Building, dict[Key, Key]]:
@@ -115,12 +109,17 @@ def _through(face: Face, back: Face) -> Sequence[Face]:
         replace(face, triangles=back.triangles[:, ::-1]),
         *(
             Face(
-                f"{face.name} reveal {number}", "reveal", strip, "adiabatic",
-                default_construction("reveal", "adiabatic"), rho, rho,
+                f"{face.name} reveal {number}",
+                "reveal",
+                strip,
+                "adiabatic",
+                default_construction("reveal", "adiabatic"),
+                rho,
+                rho,
             )
             for number, strip in enumerate(reveals_between(face, depth), start=1)
         ),
-    ]  # fmt: skip
+    ]
 
 
 def source_rooms(building: Building, space: Space) -> list[Space]:
@@ -153,12 +152,8 @@ def opened(building: Building) -> Building:
         visible, solar = (_returned(beyond, face.area, band) for band in ("visible", "solar"))
         return replace(face, reflectance_visible=visible, reflectance_solar=solar)
 
-    spaces = tuple(
-        replace(space, faces=tuple(map(opened_face, space.faces))) for space in building.spaces
-    )
-    issues = tuple(
-        replace(issue, code=OPENED.get(issue.code, issue.code)) for issue in building.issues
-    )
+    spaces = tuple(replace(space, faces=tuple(map(opened_face, space.faces))) for space in building.spaces)
+    issues = tuple(replace(issue, code=OPENED.get(issue.code, issue.code)) for issue in building.issues)
     return replace(building, spaces=spaces, issues=issues)
 
 
@@ -177,21 +172,13 @@ def panes_to_windows(building: Building) -> dict[str, int]:
     panes = {space.guid: 0 for space in building.spaces if space.windows}
     newest = list(panes)
     while newest:
-        reached = {
-            guid for one in newest for guid in panes_between(building.spaces, rooms[one])
-        } - panes.keys()
+        reached = {guid for one in newest for guid in panes_between(building.spaces, rooms[one])} - panes.keys()
         panes |= dict.fromkeys(reached, panes[newest[0]] + 1)
         newest = sorted(reached)
     return panes
 
 
-def light_sources(
-    building: Building, space: Space, away: Mapping[str, int], below: int
-) -> list[Space]:
+def light_sources(building: Building, space: Space, away: Mapping[str, int], below: int) -> list[Space]:
     """The rooms behind a room's panes that are fewer than `below` panes away from a window."""
     pairs = panes_between(building.spaces, space)
-    return [
-        other
-        for other in building.spaces
-        if other.guid in pairs and away.get(other.guid, below) < below
-    ]
+    return [other for other in building.spaces if other.guid in pairs and away.get(other.guid, below) < below]

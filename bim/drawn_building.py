@@ -34,9 +34,7 @@ class DrawnModel:
     elevation: float = 0.0  # [m]
 
 
-def drawn_building(
-    model: DrawnModel, *, join: Sequence[str] = (), furniture: bool = False
-) -> Building:
+def drawn_building(model: DrawnModel, *, join: Sequence[str] = (), furniture: bool = False) -> Building:
     """The building with closed rooms, and the account of its import.
 
     Args:
@@ -66,10 +64,16 @@ def drawn_building(
     traced, fine = simplified(list(outdoors.elements))
     issues += [*outdoors.issues, *fine]
     return Building(
-        model.name, tuple(spaces), tuple(traced), tuple(dict.fromkeys(issues)),
-        model.latitude_deg, model.longitude_deg, model.elevation, model.path,
+        model.name,
+        tuple(spaces),
+        tuple(traced),
+        tuple(dict.fromkeys(issues)),
+        model.latitude_deg,
+        model.longitude_deg,
+        model.elevation,
+        model.path,
         _account(model, rooms, spaces, issues),
-    )  # fmt: skip
+    )
 
 
 def _unique(rooms: Sequence[DrawnRoom], path: Path) -> list[DrawnRoom]:
@@ -108,10 +112,7 @@ def _joined(rooms: Sequence[DrawnRoom], text: str, path: Path) -> list[DrawnRoom
     chosen = {one.guid: one.room for one in own}
     first = own[0].room
     faces = tuple(
-        face
-        for room in chosen.values()
-        for face in room.faces
-        if not (face.is_open and face.neighbour in chosen)
+        face for room in chosen.values() for face in room.faces if not (face.is_open and face.neighbour in chosen)
     )
     areas = [room.stated_area for room in chosen.values()]
     volumes = [room.stated_volume for room in chosen.values()]
@@ -129,9 +130,7 @@ def _joined(rooms: Sequence[DrawnRoom], text: str, path: Path) -> list[DrawnRoom
 
 def _towards(room: DrawnRoom, joined: Mapping[str, DrawnRoom], guid: str) -> DrawnRoom:
     """The room with faces that lie towards joined rooms lying towards the one they became."""
-    faces = (
-        replace(face, neighbour=guid) if face.neighbour in joined else face for face in room.faces
-    )
+    faces = (replace(face, neighbour=guid) if face.neighbour in joined else face for face in room.faces)
     return replace(room, faces=tuple(faces))
 
 
@@ -158,9 +157,7 @@ class _Labelled:
         return label_of(self.name, self.long_name, self.guid)
 
 
-def _furnished(
-    spaces: Sequence[Space], model: DrawnModel, wanted: bool
-) -> tuple[list[Space], list[Issue]]:
+def _furnished(spaces: Sequence[Space], model: DrawnModel, wanted: bool) -> tuple[list[Space], list[Issue]]:
     count = sum(len(model.furniture.get(space.guid, ())) for space in spaces)
     if not count or not wanted:
         left = Issue("furniture-left-out", "furniture", {"count": count})
@@ -199,9 +196,7 @@ def _envelope(rooms: Sequence[DrawnRoom], spaces: Sequence[Space]) -> list[Eleme
                 outer = finishes[face.element].outer
                 value = FACADE_REFLECTANCE if outer is None else outer
                 name, kind = face.name, "IfcDoor" if face.kind == "door" else "IfcWall"
-                elements.append(
-                    Element(face.element or "", name, kind, face.triangles, value, value)
-                )
+                elements.append(Element(face.element or "", name, kind, face.triangles, value, value))
         elements += [
             Element(w.guid, w.name, "IfcWindow", w.triangles, GLASS_REFLECTANCE, GLASS_REFLECTANCE)
             for w in space.windows
@@ -225,10 +220,7 @@ def _glass(room: DrawnRoom) -> float:
 
 
 def _account(
-    model: DrawnModel,
-    rooms: Sequence[DrawnRoom],
-    spaces: Sequence[Space],
-    issues: Sequence[Issue],
+    model: DrawnModel, rooms: Sequence[DrawnRoom], spaces: Sequence[Space], issues: Sequence[Issue]
 ) -> Account:
     """The account of the file's rooms and glass."""
     failed = {issue.where for issue in issues if issue.effect.lost == "room"}
@@ -244,9 +236,7 @@ def _account(
     glazed = sum(len(_glazed(room)) for room in rooms)
     return Account(
         tuple(
-            StoreyAccount(
-                name, drawn[name] - lost[name], drawn[name], out[name], min(used[name], out[name])
-            )
+            StoreyAccount(name, drawn[name] - lost[name], drawn[name], out[name], min(used[name], out[name]))
             for name in drawn
         ),
         glazed,
@@ -256,9 +246,7 @@ def _account(
         sum(_glass(room) for room in rooms if room.guid in failed),
         0.0,
         0.0,
-        missing=tuple(
-            label_of(room.name, room.long_name, room.guid) for room in rooms if room.guid in failed
-        ),
+        missing=tuple(label_of(room.name, room.long_name, room.guid) for room in rooms if room.guid in failed),
         leaking=tuple(space.label for space in spaces if open_edges(space.shell)),
         shut_in=shut_in_area(issues),
     )

@@ -37,9 +37,7 @@ GAP = 0.3  # between slats that are closed to an outline [m]
 COVERS = 0.3  # share of the glass
 
 
-def without_drawn_shades(
-    building: Building, shaded: Collection[str]
-) -> tuple[Building, tuple[Issue, ...]]:
+def without_drawn_shades(building: Building, shaded: Collection[str]) -> tuple[Building, tuple[Issue, ...]]:
     """The building without the drawn shades of windows, and a issue for each with its area.
 
     Args: shaded: GUIDs of the windows whose BSDF holds a shade.

@@ -38,9 +38,7 @@ class Luminaire:
         cosine = np.maximum(np.sum(direction * normals, axis=1), 0.0)
         angle = np.radians(self.turned_deg)
         x, y, z = -direction.T
-        frame = np.stack(
-            [np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x, z], 1
-        )
+        frame = np.stack([np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x, z], 1)
         lit = self.photometry.intensity(frame) * cosine / distance**2
         used = np.flatnonzero(lit > 0)
         hit, _ = mesh.first_hits(points[used] + CLEAR * normals[used], direction[used])
@@ -63,12 +61,7 @@ class LampLight:
 
 
 def lamp_light(
-    space: Space,
-    luminaires: Sequence[Luminaire],
-    points: FloatArray,
-    *,
-    paths: int = PATHS,
-    seed: int = 0,
+    space: Space, luminaires: Sequence[Luminaire], points: FloatArray, *, paths: int = PATHS, seed: int = 0
 ) -> LampLight:
     """Light of luminaires on level sensors of a room.
 

@@ -46,9 +46,7 @@ class Enclosed:
     hulls: int = 0  # flat elements without a closed body: their convex hulls
 
 
-def rooms_enclosed_by(
-    elements: Sequence[NDArray[np.float64]], gap: float = GAP, tell: Told | None = None
-) -> Enclosed:
+def rooms_enclosed_by(elements: Sequence[NDArray[np.float64]], gap: float = GAP, tell: Told | None = None) -> Enclosed:
     """Rooms between building elements, each of triangles [N, 3, 3].
 
     Every element is widened by half the gap; the remaining voids are widened again, less the
@@ -97,9 +95,7 @@ def rooms_enclosed_by(
 
 
 def first_rooms_enclosed(
-    elements: Sequence[NDArray[np.float64]],
-    attempts: Sequence[tuple[Sequence[NDArray[np.float64]], float]],
-    tell: Told,
+    elements: Sequence[NDArray[np.float64]], attempts: Sequence[tuple[Sequence[NDArray[np.float64]], float]], tell: Told
 ) -> tuple[int, Enclosed]:
     """Number of the first attempt (elements besides, gap [m]) that finds rooms, and these; -1."""
     for number, (more, gap) in enumerate(attempts):

@@ -38,38 +38,48 @@ def model_frame(name: str) -> Model:
     return {
         "Version": {"Version 1": {"version_identifier": VERSION}},
         "Building": {
-            object_name(name): {"north_axis": 0.0, "terrain": "Suburbs",
-                                "solar_distribution": "FullExterior"}
+            object_name(name): {"north_axis": 0.0, "terrain": "Suburbs", "solar_distribution": "FullExterior"}
         },
         "GlobalGeometryRules": {
-            "rules": {"starting_vertex_position": "UpperLeftCorner",
-                      "vertex_entry_direction": "Counterclockwise", "coordinate_system": "World"}
+            "rules": {
+                "starting_vertex_position": "UpperLeftCorner",
+                "vertex_entry_direction": "Counterclockwise",
+                "coordinate_system": "World",
+            }
         },
         "SimulationControl": {
-            "control": {"do_zone_sizing_calculation": "No",
-                        "run_simulation_for_sizing_periods": "No",
-                        "run_simulation_for_weather_file_run_periods": "Yes"}
+            "control": {
+                "do_zone_sizing_calculation": "No",
+                "run_simulation_for_sizing_periods": "No",
+                "run_simulation_for_weather_file_run_periods": "Yes",
+            }
         },
         "RunPeriod": {
-            "year": {"begin_month": 1, "begin_day_of_month": 1, "end_month": 12,
-                     "end_day_of_month": 31, "day_of_week_for_start_day": "Monday"}
+            "year": {
+                "begin_month": 1,
+                "begin_day_of_month": 1,
+                "end_month": 12,
+                "end_day_of_month": 31,
+                "day_of_week_for_start_day": "Monday",
+            }
         },
         "Timestep": {"steps": {"number_of_timesteps_per_hour": 4}},
         "ScheduleTypeLimits": {"any": {}},
         "Schedule:Constant": {"always": {"hourly_value": 1.0, "schedule_type_limits_name": "any"}},
         "Output:Variable": {
-            "air": {"key_value": "*", "variable_name": "Zone Mean Air Temperature",
-                    "reporting_frequency": "Hourly"}
+            "air": {"key_value": "*", "variable_name": "Zone Mean Air Temperature", "reporting_frequency": "Hourly"}
         },
-        "Zone": {}, "Material": {}, "Material:NoMass": {}, "Construction": {},
-        "BuildingSurface:Detailed": {}, "FenestrationSurface:Detailed": {},
+        "Zone": {},
+        "Material": {},
+        "Material:NoMass": {},
+        "Construction": {},
+        "BuildingSurface:Detailed": {},
+        "FenestrationSurface:Detailed": {},
         "ZoneInfiltration:DesignFlowRate": {},
-    }  # fmt: skip
+    }
 
 
-def opaque_construction(
-    model: Model, layers: list[Layer], outside: FaceFinish, inside: FaceFinish, name: str
-) -> str:
+def opaque_construction(model: Model, layers: list[Layer], outside: FaceFinish, inside: FaceFinish, name: str) -> str:
     """Name of the construction of some layers, outermost first, each face with its own finish.
 
     A single layer becomes two halves, as a material has one absorptance for both of its faces.
@@ -176,9 +186,7 @@ def is_drawable(ring: Ring) -> bool:
     return area > LEAST_SURFACE and area > NEAR * edges.max()
 
 
-def rectangle(
-    triangles: NDArray[np.float64], normal: NDArray[np.float64], area: float
-) -> NDArray[np.float64]:
+def rectangle(triangles: NDArray[np.float64], normal: NDArray[np.float64], area: float) -> NDArray[np.float64]:
     """Upright rectangle [4, 3] round the triangles' middle, of their proportions and that area."""
     plane = plane_through(triangles[0, 0], normal)
     flat = plane.to_plane(triangles.reshape(-1, 3))[:, :2]
@@ -191,14 +199,10 @@ def rectangle(
 def window_rectangles(window: Window) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The glass and what carries it, of the size of the opening, as rectangles [4, 3]."""
     opening = max(window.opening_area, window.area) * 1.001
-    return tuple(
-        rectangle(window.triangles, window.normal, area) for area in (window.area, opening)
-    )
+    return tuple(rectangle(window.triangles, window.normal, area) for area in (window.area, opening))
 
 
-def opaque_surface(
-    kind: str, construction: str, zone: str, outside: str, ring: NDArray[np.float64]
-) -> dict[str, Any]:
+def opaque_surface(kind: str, construction: str, zone: str, outside: str, ring: NDArray[np.float64]) -> dict[str, Any]:
     """A surface; `outside` is EnergyPlus' boundary condition."""
     exposed = "SunExposed" if outside == "Outdoors" else "NoSun"
     return {
@@ -212,18 +216,14 @@ def opaque_surface(
     }
 
 
-def write_window(
-    model: Model, name: str, zone: str, window: Window, *, frame: str, glazing: str
-) -> None:
+def write_window(model: Model, name: str, zone: str, window: Window, *, frame: str, glazing: str) -> None:
     """Write a window: a rectangle of glass in one of the opening, which stands for the frame.
 
     Args: frame, glazing: their constructions.
     """
     glass, opening = window_rectangles(window)
     kind, parent = "Roof" if window.normal[2] > 0.5 else "Wall", f"{name} frame"
-    model["BuildingSurface:Detailed"][parent] = opaque_surface(
-        kind, frame, zone, "Outdoors", opening
-    )
+    model["BuildingSurface:Detailed"][parent] = opaque_surface(kind, frame, zone, "Outdoors", opening)
     model["FenestrationSurface:Detailed"][name] = _window_surface(glazing, parent, glass)
 
 
@@ -244,10 +244,7 @@ def _window_surface(construction: str, parent: str, glass: NDArray[np.float64]) 
 
 def vertices(ring: NDArray[np.float64]) -> list[dict[str, float]]:
     """The corners [N, 3] of a surface."""
-    return [
-        {f"vertex_{axis}_coordinate": float(value) for axis, value in zip("xyz", p, strict=True)}
-        for p in ring
-    ]
+    return [{f"vertex_{axis}_coordinate": float(value) for axis, value in zip("xyz", p, strict=True)} for p in ring]
 
 
 def object_name(text: str) -> str:

@@ -88,10 +88,7 @@ class Schedules:
 
     def _constant(self, value: float) -> str:
         name = f"always {value:g}"
-        self.model["Schedule:Constant"][name] = {
-            "hourly_value": value,
-            "schedule_type_limits_name": "any",
-        }
+        self.model["Schedule:Constant"][name] = {"hourly_value": value, "schedule_type_limits_name": "any"}
         return name
 
     def csv(self) -> str:
@@ -123,8 +120,9 @@ def internal_heat(model: Model, zone: str, gains: Gains, schedules: Schedules) -
 def outdoor_air(model: Model, zone: str, one: Zone, schedules: Schedules) -> tuple[str, ...]:
     """The outdoor air of a zone; what EnergyPlus is not told of it, in sentences."""
     leak, flows = one.leakage, {}
-    factors = dict(zip(("constant_term", "temperature_term", "velocity_term",
-                        "velocity_squared_term"), leak.factors, strict=True))  # fmt: skip
+    factors = dict(
+        zip(("constant_term", "temperature_term", "velocity_term", "velocity_squared_term"), leak.factors, strict=True)
+    )
     flows["leaks"] = one.infiltration_ach, factors
     flows["other air"] = one.other_air_ach, {"constant_term": 1.0}
     notes = []
@@ -174,9 +172,7 @@ def _leakage_area(model: Model, zone: str, one: Zone) -> list[str]:
     return []
 
 
-def ideal_plant(
-    model: Model, zone: str, loads: IdealLoads, schedules: Schedules
-) -> tuple[str, ...]:
+def ideal_plant(model: Model, zone: str, loads: IdealLoads, schedules: Schedules) -> tuple[str, ...]:
     """Two set points and an ideal plant that holds them; what EnergyPlus is not told of it."""
     heats, cools = np.any(np.isfinite(loads.heating_c)), np.any(np.isfinite(loads.cooling_c))
     if not heats and not cools:
@@ -318,10 +314,7 @@ class EnergyPlusTwin:
     def _zone(self, zone: str, room: TwinRoom, depth: Mapping[int, float]) -> None:
         """A room; depth: of the outer face behind that in the room, by surface [m]."""
         one, model = room.zone, self.model
-        model["Zone"][zone] = {
-            "volume": one.volume,
-            "floor_area": max(room.space.floor_area, 0.01),
-        }
+        model["Zone"][zone] = {"volume": one.volume, "floor_area": max(room.space.floor_area, 0.01)}
         if one.air_capacity_factor != 1.0:
             self.notes[f"{one.name}: the air's capacity factor is left out"] = None
         for index, surface in enumerate(one.surfaces):
@@ -337,9 +330,7 @@ class EnergyPlusTwin:
         notes += ideal_plant(model, zone, one.loads, self.schedules)
         self.notes |= dict.fromkeys(notes)
 
-    def _surface(
-        self, zone: str, name: str, surface: OpaqueSurface, faces: Sequence[Face], out: float
-    ) -> None:
+    def _surface(self, zone: str, name: str, surface: OpaqueSurface, faces: Sequence[Face], out: float) -> None:
         """A surface of the balance: its faces, or a rectangle of its area where rooms share it.
 
         Args: out: how far it is moved where it faces outdoors [m].
@@ -362,11 +353,7 @@ class EnergyPlusTwin:
     def _construction(self, name: str, surface: OpaqueSurface) -> tuple[str, str, dict[str, str]]:
         """Construction and boundary condition of a surface, and what belongs to it."""
         layers, outside, extra = list(surface.layers), "Adiabatic", {}
-        outer = FaceFinish(
-            surface.absorptance_out,
-            surface.emissivity_out,
-            surface.roughness.title().replace(" ", ""),
-        )
+        outer = FaceFinish(surface.absorptance_out, surface.emissivity_out, surface.roughness.title().replace(" ", ""))
         inner = FaceFinish(surface.absorptance_in, surface.emissivity_in)
         if surface.outside == "outdoor":
             outside = "Outdoors"
@@ -510,9 +497,8 @@ def _whole_year(name: str, terrain: str, steps: int) -> Model:
     year = model["RunPeriod"]["year"]
     year |= {
         f"use_weather_file_{what}": "No"
-        for what in ("daylight_saving_period", "holidays_and_special_days",
-                     "rain_indicators", "snow_indicators")
-    }  # fmt: skip
+        for what in ("daylight_saving_period", "holidays_and_special_days", "rain_indicators", "snow_indicators")
+    }
     return model | {
         "Timestep": {"steps": {"number_of_timesteps_per_hour": steps}},
         "SurfaceConvectionAlgorithm:Inside": {"one": {"algorithm": "TARP"}},
@@ -541,8 +527,7 @@ def _frame_surface(room: TwinRoom, normal: NDArray[np.float64]) -> OpaqueSurface
     Raises: `DataError` where nothing of the room faces outdoors that way.
     """
     kinds = [
-        room.space.faces[int(np.argmax(room.room.surface_of_face == i))].kind
-        for i in range(len(room.zone.surfaces))
+        room.space.faces[int(np.argmax(room.room.surface_of_face == i))].kind for i in range(len(room.zone.surfaces))
     ]
     fits = [
         (kind != "window frame", -float(one.normal @ normal), i)

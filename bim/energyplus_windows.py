@@ -80,11 +80,7 @@ def complex_state(model: Model, name: str, optics: WindowOptics, *, panes: bool)
     gaps, stack = _layers(model, optics, panes=panes)
     still = [(np.zeros(size), np.zeros(size))] * (len(gaps) - 1)
     sun = optics.absorptances.two_layers(optics.fenestration)
-    absorbed = [
-        (sun.outer, np.zeros(size)),
-        *still,
-        (sun.inner, np.full(size, optics.back_absorptance)),
-    ]
+    absorbed = [(sun.outer, np.zeros(size)), *still, (sun.inner, np.full(size, optics.back_absorptance))]
     layers: dict[str, str] = {f"gap_{k}_name": gap for k, gap in enumerate(gaps, 1)}
     for k, (pair, pane) in enumerate(zip(absorbed, stack, strict=True), 1):
         key = "outside_layer" if k == 1 else f"layer_{k}"
@@ -103,9 +99,7 @@ def complex_state(model: Model, name: str, optics: WindowOptics, *, panes: bool)
     }
 
 
-def shading_control(
-    model: Model, window: str, schedule: str, constructions: Sequence[str], number: int
-) -> None:
+def shading_control(model: Model, window: str, schedule: str, constructions: Sequence[str], number: int) -> None:
     """The window's construction of every time step, by the state that a schedule says."""
     sensor, actuator = f"state_{number}", f"window_{number}"
     model.setdefault("EnergyManagementSystem:Sensor", {})[sensor] = {
@@ -170,10 +164,7 @@ def _thermal_model(model: Model) -> str:
 def _layers(model: Model, optics: WindowOptics, *, panes: bool) -> tuple[list[str], list[str]]:
     """Names of the gaps and of the layers of a system, outermost first."""
     if panes and optics.panes is not None:
-        real = [
-            _pane(model, *one.emissivity, one.thickness, one.conductivity)
-            for one in optics.panes.layers
-        ]
+        real = [_pane(model, *one.emissivity, one.thickness, one.conductivity) for one in optics.panes.layers]
         (gap,) = optics.panes.gaps
         return [_gas_gap(model, gap)], real
     one = optics.fenestration
@@ -205,10 +196,7 @@ def _gas_gap(model: Model, gap: GasGap) -> str:
     known = [(gas, share) for gas, share in gap.gas if share > 0.0]
     gas = " ".join(f"{gas} {share:g}" for gas, share in known)
     name = f"{gas} {1e3 * gap.width:g} mm"
-    mixture: dict[str, object] = {
-        "thickness": gap.width,
-        "number_of_gases_in_mixture": len(known),
-    }
+    mixture: dict[str, object] = {"thickness": gap.width, "number_of_gases_in_mixture": len(known)}
     for k, (one, share) in enumerate(known, 1):
         mixture |= {f"gas_{k}_type": one.title(), f"gas_{k}_fraction": share}
     model.setdefault("WindowMaterial:GasMixture", {})[gas] = mixture

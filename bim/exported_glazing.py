@@ -37,9 +37,7 @@ def glazing_of(window: Window, glazings: Glazings) -> ExportedGlazing:
         visible = normal_transmittance(bands["Visible"]) if visible is None else visible
     if "Solar" in bands:
         solar = normal_transmittance(bands["Solar"]) if solar is None else solar
-    return ExportedGlazing(
-        window.u_value, window.g_value, visible, solar, BsdfFile(bands) if bands else None
-    )
+    return ExportedGlazing(window.u_value, window.g_value, visible, solar, BsdfFile(bands) if bands else None)
 
 
 def without_bsdf(windows: Iterable[Window], glazings: Glazings, model: str) -> tuple[str, ...]:

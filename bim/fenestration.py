@@ -105,11 +105,7 @@ def read_g_table(path: str | Path) -> AngularGValue:
         except (TypeError, ValueError):
             raise DataError("is not a number", file=path, element=f"line {number}") from None
         if not (0 <= key[0] <= 90 and 0 <= table[key] <= 1):
-            raise DataError(
-                f"polar {key[0]:g} or g {table[key]:g} out of range",
-                file=path,
-                element=f"line {number}",
-            )
+            raise DataError(f"polar {key[0]:g} or g {table[key]:g} out of range", file=path, element=f"line {number}")
     polar, azimuth = (sorted({key[i] for key in table}) for i in (0, 1))
     missing = [(p, a) for p in polar for a in azimuth if (p, a) not in table]
     if missing:

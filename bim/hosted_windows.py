@@ -90,11 +90,7 @@ def _largest(shape: shapely.Geometry) -> shapely.Polygon:
     return max(polygons_of(shape), key=lambda polygon: polygon.area)
 
 
-def _host(
-    plane: Plane,
-    glass: shapely.Polygon,
-    parts: Sequence[tuple[Face, Plane, shapely.Polygon]],
-) -> int | None:
+def _host(plane: Plane, glass: shapely.Polygon, parts: Sequence[tuple[Face, Plane, shapely.Polygon]]) -> int | None:
     """The polygon of a face that the glass lies in: that which has most of its border."""
     best, most = None, INSIDE * glass.length
     for index, (_, other, polygon) in enumerate(parts):

@@ -38,9 +38,7 @@ class RoomBoundary:
     issues: list[Issue]
 
 
-def room_boundaries(
-    rooms: Sequence[tuple[RoomSolid, Sequence[Attachment]]],
-) -> list[RoomBoundary | RoomError]:
+def room_boundaries(rooms: Sequence[tuple[RoomSolid, Sequence[Attachment]]]) -> list[RoomBoundary | RoomError]:
     """The boundary of each room with its attachments; the error where there is none."""
     items = [(one.guid, one.name, packed(one.manifold), list(own)) for one, own in rooms]
     boundaries = each_apart(_boundary, items, limit_s=LIMIT_S)
@@ -64,16 +62,12 @@ def spaces_of(bodies: Sequence[Body]) -> list[Solid | ProcessEnded | None]:
     return [_solid_here(one) for one in each_apart(_space, list(bodies), limit_s=LIMIT_S)]
 
 
-def shared_volumes(
-    solids: Sequence[tuple[PackedSolid, Sequence[PackedSolid]]],
-) -> list[list[float] | ProcessEnded]:
+def shared_volumes(solids: Sequence[tuple[PackedSolid, Sequence[PackedSolid]]]) -> list[list[float] | ProcessEnded]:
     """Volumes [m3] that each solid shares with its neighbours."""
     return each_apart(_shared, [(one, list(near)) for one, near in solids], limit_s=LIMIT_S)
 
 
-def parted(
-    items: Sequence[tuple[PackedSolid, Sequence[Body]]],
-) -> list[list[PackedSolid] | ProcessEnded]:
+def parted(items: Sequence[tuple[PackedSolid, Sequence[Body]]]) -> list[list[PackedSolid] | ProcessEnded]:
     """The parts of each solid that bodies cut through, the largest first; none if it stays one."""
     return each_apart(_parted, [(one, list(by)) for one, by in items], limit_s=LIMIT_S)
 
@@ -158,9 +152,7 @@ def _opened(item: tuple[Body, list[Outline]]) -> Body | None:
     return triangles if len(triangles) else None
 
 
-def _boundary(
-    item: tuple[str, str, PackedSolid, list[Attachment]],
-) -> RoomBoundary | RoomError:
+def _boundary(item: tuple[str, str, PackedSolid, list[Attachment]]) -> RoomBoundary | RoomError:
     guid, name, solid, attachments = item
     try:
         return RoomBoundary(*room_pieces(room_solid(guid, name, unpacked(solid)), attachments))

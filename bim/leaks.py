@@ -83,9 +83,7 @@ def may_enclose(elements: Sequence[NDArray[np.float64]], gap: float) -> bool:
     return count > 1 or not labels[0, 0, 0]
 
 
-def _leak(
-    solid: NDArray[np.bool_], size: float
-) -> tuple[Leak | None, tuple[NDArray[np.int64], ...]]:
+def _leak(solid: NDArray[np.bool_], size: float) -> tuple[Leak | None, tuple[NDArray[np.int64], ...]]:
     """The leak of the largest would-be room that has one, in cubes, and the cubes that close it."""
     distance = ndimage.distance_transform_edt(~solid) * size
     above = np.logical_or.accumulate(solid[..., ::-1], axis=2)[..., ::-1]
@@ -142,9 +140,7 @@ def _neck(
     return place, int(np.abs(beside).argmax())
 
 
-def _steps(
-    start: NDArray[np.bool_], goal: NDArray[np.bool_], free: NDArray[np.bool_]
-) -> NDArray[np.int64]:
+def _steps(start: NDArray[np.bool_], goal: NDArray[np.bool_], free: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Steps through free cubes from the start, 0 where the goal was reached before."""
     steps, reached = np.zeros(start.shape, dtype=int), start
     for number in range(1, max(start.shape)):

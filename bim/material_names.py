@@ -28,9 +28,7 @@ from bim.names import plain_text
 
 THICKEST = 0.9  # m: thicker layers of air are none
 # of air layers in walls: thickness [m] up to which the resistance holds [m2 K/W]; EN ISO 6946, t. 8
-AIR_RESISTANCE = (
-    (0.005, 0.11), (0.007, 0.13), (0.010, 0.15), (0.015, 0.17), (math.inf, GAP_RESISTANCE),
-)  # fmt: skip
+AIR_RESISTANCE = ((0.005, 0.11), (0.007, 0.13), (0.010, 0.15), (0.015, 0.17), (math.inf, GAP_RESISTANCE))
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,9 +125,7 @@ def material_named(name: str) -> NamedMaterial:
     text = plain_text(name)
     layer = kind.layer
     if kind.group not in ("air", "frame"):
-        layer = replace(
-            layer, **_stated(text, insulates=kind.group in ("insulation", "insulating", "panel"))
-        )
+        layer = replace(layer, **_stated(text, insulates=kind.group in ("insulation", "insulating", "panel")))
     return NamedMaterial(layer, kind.group)
 
 
@@ -177,9 +173,7 @@ def _hits(words: tuple[str, ...]) -> Iterator[tuple[int, int, int, int]]:
             if all(map(_is_in, parts, words[start : start + len(parts)])):
                 length = sum(len(part.lstrip("=-")) for part in parts)
                 length += 10 * (len(parts) > 1)
-                if (
-                    table()[row].group == "insulating"
-                ):  # gives way to the matter in one word with it
+                if table()[row].group == "insulating":  # gives way to the matter in one word with it
                     length = min(length, 4)
                 yield length, row, start, start + len(parts)
 

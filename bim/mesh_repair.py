@@ -14,9 +14,7 @@ FARTHEST = 1e5  # no building is wider: a body of such size is a fault of the fi
 LONGEST_HOLE = 500  # edges of a hole; a longer one is a sheet, not a solid with a hole
 
 
-def welded_mesh(
-    triangles: NDArray[np.float64], distance: float
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def welded_mesh(triangles: NDArray[np.float64], distance: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices [V, 3] and faces [N, 3]: corners on one grid point merged, collapsed faces out.
 
     None at all of a body with a coordinate that is no number, or beyond any building.
@@ -38,9 +36,7 @@ def _is_of_a_building(points: NDArray[np.float64]) -> bool:
     return not len(flat) or bool(np.ptp(flat, axis=0).max() < FARTHEST)
 
 
-def closed_faces(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> NDArray[np.int64] | None:
+def closed_faces(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64] | None:
     """Faces that may be handed to a library of solids; None where they cannot bound one.
 
     It gets finite vertices of a building's extent, faces whose corners exist and differ, none
@@ -94,9 +90,7 @@ def wound_alike(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDAr
             here = queue.popleft()
             for start, end in ((a, b), (b, c), (c, a)):
                 near = by_edge[min(start, end), max(start, end)]
-                if (
-                    len(near) != 2
-                ):  # a rim, or several faces on one edge: no neighbour to agree with
+                if len(near) != 2:  # a rim, or several faces on one edge: no neighbour to agree with
                     continue
                 other = near[0] if near[1] == here else near[1]
                 if seen[other]:

@@ -55,9 +55,7 @@ def crs_name(text: str) -> str:
     return f"EPSG:{match[1]}" if match else text.strip()
 
 
-def local_metres(
-    lon_lat: NDArray[np.float64], longitude_deg: float, latitude_deg: float
-) -> NDArray[np.float64]:
+def local_metres(lon_lat: NDArray[np.float64], longitude_deg: float, latitude_deg: float) -> NDArray[np.float64]:
     """East and north [N, 2] [m] of places [N, 2] [deg] from one among them.
 
     By the ellipsoid's two radii of curvature there, to the second order of the distance (a parallel
@@ -73,9 +71,7 @@ def local_metres(
     return np.column_stack([east, north * along + east**2 * np.tan(phi) / (2 * across)])
 
 
-def transformed(
-    points: NDArray[np.float64], crs: str, target: str, *, file: str
-) -> NDArray[np.float64]:
+def transformed(points: NDArray[np.float64], crs: str, target: str, *, file: str) -> NDArray[np.float64]:
     """Map coordinates [N, 2] of one system in another one, easting or longitude first.
 
     Raises: `DataError` where `pyproj` is not installed, or knows one of the two not.
@@ -352,12 +348,7 @@ class Building:
     def zone(self, name: str) -> tuple[Space, ...]:
         """The spaces of the zones of that name; none where there is none."""
         key = " ".join(name.split()).casefold()
-        rooms = {
-            guid
-            for z in self.zones
-            if " ".join(z.name.split()).casefold() == key
-            for guid in z.rooms
-        }
+        rooms = {guid for z in self.zones if " ".join(z.name.split()).casefold() == key for guid in z.rooms}
         return tuple(space for space in self.spaces if space.guid in rooms)
 
     def storey(self, name: str) -> tuple[Space, ...]:

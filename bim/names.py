@@ -100,9 +100,7 @@ def item_named(items: Sequence[T], wanted: str, kind: str) -> T:
     matches = [item for item in items if item.guid == wanted]
     matches = matches or [i for i in items if wanted in (i.name, i.long_name, i.label)]
     key = _key(wanted)
-    matches = matches or [
-        item for item in items if key and key in map(_key, (item.name, item.long_name, item.label))
-    ]
+    matches = matches or [item for item in items if key and key in map(_key, (item.name, item.long_name, item.label))]
     matches = matches or [item for item in items if key and key in map(_key, _names_of_parts(item))]
     if not matches:
         there = listed(wanted, (item.label for item in items))

@@ -82,18 +82,13 @@ def cut_by_neighbours(
             for polygon in rest:
                 inside, outside = cut(polygon, region)
                 left += outside
-                result += [
-                    replace(piece, facet=replace(piece.facet, polygon=p), neighbour=guid)
-                    for p in inside
-                ]
+                result += [replace(piece, facet=replace(piece.facet, polygon=p), neighbour=guid) for p in inside]
             rest = left
         result += [replace(piece, facet=replace(piece.facet, polygon=p)) for p in rest]
     return result
 
 
-def _opposite(
-    facet: Facet, rooms: Sequence[RoomSolid]
-) -> list[tuple[float, str, shapely.Geometry]]:
+def _opposite(facet: Facet, rooms: Sequence[RoomSolid]) -> list[tuple[float, str, shapely.Geometry]]:
     """Distance, room and outline in the facet's plane of the faces opposite, nearest first."""
     faces = []
     for room in rooms:
@@ -105,8 +100,7 @@ def _opposite(
             if not -0.05 < distance < DEEPEST_WALL:
                 continue
             region = shapely.transform(
-                other.polygon,
-                lambda p, other=other: facet.plane.to_plane(other.plane.to_world(p))[:, :2],
+                other.polygon, lambda p, other=other: facet.plane.to_plane(other.plane.to_world(p))[:, :2]
             )
             region = shapely.make_valid(region).intersection(facet.polygon)
             if polygons_of(region):
@@ -173,9 +167,7 @@ def _most(by_index: Mapping[int, T], areas: NDArray[np.float64]) -> T:
     return max(shares, key=lambda what: shares[what])
 
 
-def _adjacency(
-    point: NDArray[np.float64], walk: Walk, normal: NDArray[np.float64], around: Surroundings
-) -> str:
+def _adjacency(point: NDArray[np.float64], walk: Walk, normal: NDArray[np.float64], around: Surroundings) -> str:
     """What follows the wall behind a point of it where no room does."""
     stop = walk.stop
     if not np.isfinite(stop):
@@ -187,12 +179,7 @@ def _adjacency(
 
 
 def _walk(
-    point: NDArray[np.float64],
-    normal: NDArray[np.float64],
-    around: Surroundings,
-    own: int,
-    *,
-    back: float,
+    point: NDArray[np.float64], normal: NDArray[np.float64], around: Surroundings, own: int, *, back: float
 ) -> Walk:
     """What a ray out of a face meets, asked from so far back in the room [m]."""
     limit, room = DEEPEST_WALL, -1
@@ -217,11 +204,7 @@ def _walk(
 
 
 def _at_the_face(
-    bodies: Bodies,
-    point: NDArray[np.float64],
-    normal: NDArray[np.float64],
-    limit: float,
-    back: float,
+    bodies: Bodies, point: NDArray[np.float64], normal: NDArray[np.float64], limit: float, back: float
 ) -> list[Span]:
     """Elements that a ray passes between leaving the room and entering the next one [m].
 
@@ -250,16 +233,12 @@ def _without_fittings(walks: Sequence[Walk]) -> list[Walk]:
     ends = [{s.element for s in walk.spans if s.stop <= TOUCHING} for walk in walks]
     loose = set().union(*ends) - set(ends[0]).intersection(*ends)
     return [
-        replace(
-            walk, spans=tuple(s for s in walk.spans if s.stop > TOUCHING or s.element not in loose)
-        )
+        replace(walk, spans=tuple(s for s in walk.spans if s.stop > TOUCHING or s.element not in loose))
         for walk in walks
     ]
 
 
-def _of_one_wall(
-    spans: Sequence[Span], around: Surroundings, normal: NDArray[np.float64]
-) -> list[Span]:
+def _of_one_wall(spans: Sequence[Span], around: Surroundings, normal: NDArray[np.float64]) -> list[Span]:
     """Those until a gap too wide for one wall.
 
     What a wall's ray meets aslant behind the first element is the roof over the wall or its
@@ -287,13 +266,9 @@ def _may_clad(span: Span, around: Surroundings, normal: NDArray[np.float64]) -> 
     return bool(abs(unit @ normal) > PARALLEL or abs(unit[2]) < PLUMB)
 
 
-def _open_or_ground(
-    point: NDArray[np.float64], normal: NDArray[np.float64], around: Surroundings
-) -> str:
+def _open_or_ground(point: NDArray[np.float64], normal: NDArray[np.float64], around: Surroundings) -> str:
     """Beyond a point: "ground" below its level, "outside" where rays escape, else "unknown"."""
-    if point[2] < around.ground_level - 0.1 or (
-        normal[2] < -0.7 and point[2] < around.ground_level + DEEPEST_WALL
-    ):
+    if point[2] < around.ground_level - 0.1 or (normal[2] < -0.7 and point[2] < around.ground_level + DEEPEST_WALL):
         return "ground"
     return "outside" if is_open(point, normal, around.bodies.mesh) else "unknown"
 

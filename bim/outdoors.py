@@ -65,10 +65,7 @@ def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
         cut = dict(zip(covers, bodies, strict=True))
         for index in sorted(covers, reverse=True):
             element, body = elements[index], cut[index]
-            values = {
-                "element": f"{element.ifc_class} {element.name}",
-                "count": len(covers[index]),
-            }
+            values = {"element": f"{element.ifc_class} {element.name}", "count": len(covers[index])}
             if isinstance(body, np.ndarray):
                 elements[index] = replace(element, triangles=body)
                 issues.append(Issue("element-cut-open", element.guid, values))
@@ -83,9 +80,7 @@ def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
     return Outdoors(tuple(elements), tuple(issues))
 
 
-def _within_reach(
-    elements: Sequence[Element], spaces: Sequence[Space]
-) -> tuple[list[Element], list[Issue]]:
+def _within_reach(elements: Sequence[Element], spaces: Sequence[Space]) -> tuple[list[Element], list[Issue]]:
     """The elements without those that stand beyond every horizon, as strays of a file do."""
     if not spaces:
         return list(elements), []
@@ -122,12 +117,7 @@ def _shut_in(elements: Sequence[Element], spaces: Sequence[Space]) -> list[Issue
         for window in space.windows:
             free = near.open_share(window, own)
             if free < LEAST_OPEN:
-                values = {
-                    "window": window.name,
-                    "room": space.label,
-                    "area": window.area,
-                    "open_percent": 100 * free,
-                }
+                values = {"window": window.name, "room": space.label, "area": window.area, "open_percent": 100 * free}
                 issues.append(Issue(SHUT_IN, window.guid, values, Effect(glass=window.area)))
     return issues
 
@@ -158,9 +148,7 @@ def beyond(
     return np.asarray(vertices)[faces] if len(faces) else NOTHING
 
 
-def mirrors_in_view(
-    elements: Sequence[Element], windows: Sequence[Window]
-) -> tuple[list[Element], list[Issue]]:
+def mirrors_in_view(elements: Sequence[Element], windows: Sequence[Window]) -> tuple[list[Element], list[Issue]]:
     """Elements of which the default's panes mirror where a window may see them, and what that is.
 
     The rest, such as edges of panes and panes beside the window in its own facade, reflect as much
@@ -179,10 +167,7 @@ def mirrors_in_view(
             seen.append(replace(element, triangles=element.triangles[mirrors]))
             result.append(seen[-1])
         if not mirrors.all():
-            plain = {
-                "reflectance_visible": GLASS_REFLECTANCE,
-                "reflectance_solar": GLASS_REFLECTANCE,
-            }
+            plain = {"reflectance_visible": GLASS_REFLECTANCE, "reflectance_solar": GLASS_REFLECTANCE}
             rest = element.triangles[~mirrors]
             result.append(replace(element, triangles=rest, gloss=None, **plain))
     if not seen:
@@ -287,9 +272,7 @@ def _first_of_others(
     return nearest, index
 
 
-def _opened(
-    covering: Sequence[tuple[Element, Sequence[Window]]],
-) -> list[NDArray[np.float64] | ProcessEnded | None]:
+def _opened(covering: Sequence[tuple[Element, Sequence[Window]]]) -> list[NDArray[np.float64] | ProcessEnded | None]:
     """Each body with a hole at its windows; None for thin or open ones, which are left out."""
     walls = ("IfcWall", "IfcRoof", "IfcSlab", "IfcCovering", *SITE_CLASSES)
     return opened(
@@ -310,9 +293,7 @@ def _holes(windows: Sequence[Window]) -> list[Outline]:
     return holes
 
 
-def lifted_sites(
-    elements: Sequence[Element], windows: Sequence[Window]
-) -> tuple[list[Element], list[Issue]]:
+def lifted_sites(elements: Sequence[Element], windows: Sequence[Window]) -> tuple[list[Element], list[Issue]]:
     """Elements without the terrain that buries the middle of a window; such terrain is reported."""
     kept, issues = [], []
     for element in elements:

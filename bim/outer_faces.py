@@ -54,9 +54,7 @@ def outer_faces(building: Building, space: Space, room: ThermalRoom) -> OuterFac
         deep = walls.depth(inner, normal, element, thickness)
         points.append(inner + (deep + OFF_THE_WALL)[:, None] * normal)
         depths.append(float(np.median(deep)))
-    glass = [
-        _places(window.triangles)[0] + OFF_THE_WALL / 2 * window.normal for window in space.windows
-    ]
+    glass = [_places(window.triangles)[0] + OFF_THE_WALL / 2 * window.normal for window in space.windows]
     return OuterFaces(
         room.outdoor,
         np.array(points).reshape(-1, PLACES, 3),
@@ -81,15 +79,12 @@ class _NearElements:
         near = [
             element
             for element in elements
-            if np.all(element.triangles.min(axis=(0, 1)) <= high)
-            and np.all(element.triangles.max(axis=(0, 1)) >= low)
+            if np.all(element.triangles.min(axis=(0, 1)) <= high) and np.all(element.triangles.max(axis=(0, 1)) >= low)
         ]
         none = np.empty((0, 3, 3))
         triangles = np.concatenate([none, *(element.triangles for element in near)])
         self.mesh = ray_mesh(triangles)
-        self.normals = np.cross(
-            triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-        )
+        self.normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         self.normals /= np.maximum(np.linalg.norm(self.normals, axis=1), 1e-12)[:, None]
         self.corners = [element.triangles.reshape(-1, 3) for element in near]
         counts = [len(element.triangles) for element in near]

@@ -80,9 +80,7 @@ def area_vectors(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     return 0.5 * np.stack([x, y, z], axis=1)
 
 
-def planar_facets(
-    triangles: NDArray[np.float64], labels: NDArray[np.int64] | None = None
-) -> list[Facet]:
+def planar_facets(triangles: NDArray[np.float64], labels: NDArray[np.int64] | None = None) -> list[Facet]:
     """Plane polygons that triangles [T, 3, 3] of one label [T] merge to, biggest plane first."""
     labels = np.zeros(len(triangles), dtype=int) if labels is None else labels
     vectors = area_vectors(triangles)
@@ -133,10 +131,7 @@ def without_holes(polygon: shapely.Polygon) -> list[shapely.Polygon]:
     if not polygon.interiors:
         return [polygon]
     (x, _), (left, low, right, high) = polygon.interiors[0].centroid.coords[0], polygon.bounds
-    halves = (
-        shapely.box(left - 1, low - 1, x, high + 1),
-        shapely.box(x, low - 1, right + 1, high + 1),
-    )
+    halves = (shapely.box(left - 1, low - 1, x, high + 1), shapely.box(x, low - 1, right + 1, high + 1))
     cut = shapely.intersection([polygon, polygon], halves, grid_size=GRID)
     return [part for half in cut for piece in polygons_of(half) for part in without_holes(piece)]
 

@@ -17,13 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from bim.boundaries import floor_area
-from bim.defaults import (
-    EMISSIVITY,
-    GLASS_REFLECTANCE,
-    ROOM_REFLECTANCE,
-    default_construction,
-    glass_construction,
-)
+from bim.defaults import EMISSIVITY, GLASS_REFLECTANCE, ROOM_REFLECTANCE, default_construction, glass_construction
 from bim.fenestration import PlainGlass, ShadingState
 from bim.mesh_repair import wound_alike
 from bim.model import Construction, Face, Space, Window
@@ -147,9 +141,18 @@ def space_of(room: DrawnRoom) -> tuple[Space, list[Issue]]:
     if not volume > 0:
         raise RoomError(f"room {room.name}: its polygons enclose nothing")
     space = Space(
-        room.guid, room.name, room.storey, volume, floor_area(faces), tuple(faces),
-        tuple(windows), volume, room.stated_area, room.stated_volume, room.long_name,
-    )  # fmt: skip
+        room.guid,
+        room.name,
+        room.storey,
+        volume,
+        floor_area(faces),
+        tuple(faces),
+        tuple(windows),
+        volume,
+        room.stated_area,
+        room.stated_volume,
+        room.long_name,
+    )
     return space, [*issues, *_assumptions(space, room), *soundness_issues(space)]
 
 
@@ -221,9 +224,7 @@ def triangles_of_rings(rings: Sequence[NDArray[np.float64]]) -> NDArray[np.float
     return plane.to_world(corners.reshape(-1, 2)).reshape(-1, 3, 3)
 
 
-def _bent(
-    rings: Sequence[NDArray[np.float64]], whole: shapely.Geometry, plane: Plane
-) -> list[Facet]:
+def _bent(rings: Sequence[NDArray[np.float64]], whole: shapely.Geometry, plane: Plane) -> list[Facet]:
     """Triangles of a polygon that is not plane, on its own corners."""
     corners = np.concatenate(rings)
     tree = cKDTree(plane.to_plane(corners)[:, :2])
@@ -238,9 +239,7 @@ def _bent(
     return facets
 
 
-def _wound(
-    room: DrawnRoom, meshes: list[NDArray[np.float64]], issues: list[Issue]
-) -> list[NDArray[np.float64]]:
+def _wound(room: DrawnRoom, meshes: list[NDArray[np.float64]], issues: list[Issue]) -> list[NDArray[np.float64]]:
     """The parts' triangles with their normals out of the room."""
     shell = np.concatenate(meshes)
     if len(shell) and open_edges(shell):
@@ -296,10 +295,19 @@ def _face(part: _Part, triangles: NDArray[np.float64], count: Counter[str]) -> F
     name = name if count[name] == 1 else f"{name} {count[name]}"
     guid = face.guid if opening is None else opening.guid
     return Face(
-        name, kind, triangles, face.adjacency, construction, visible,
-        visible if solar is None else solar, finish.emissivity, face.neighbour, guid, finish.gloss,
+        name,
+        kind,
+        triangles,
+        face.adjacency,
+        construction,
+        visible,
+        visible if solar is None else solar,
+        finish.emissivity,
+        face.neighbour,
+        guid,
+        finish.gloss,
         pane,
-    )  # fmt: skip
+    )
 
 
 def _kind_by_slope(triangles: NDArray[np.float64], adjacency: str) -> str:
@@ -317,20 +325,26 @@ def _window(parts: Sequence[tuple[_Part, NDArray[np.float64]]]) -> Window:
     opening, values = part.opening, part.opening.glazing
     triangles = np.concatenate([triangles for _, triangles in parts])
     return Window(
-        opening.guid, opening.name, triangles, part.face.guid,
+        opening.guid,
+        opening.name,
+        triangles,
+        part.face.guid,
         float(sum(one.facet.polygon.area for one, _ in parts)),
-        values.u_value, values.g_value, values.visible, values.name, values.solar, values.panes,
-        opening.states, glass=values.glass, up=opening.up,
-    )  # fmt: skip
+        values.u_value,
+        values.g_value,
+        values.visible,
+        values.name,
+        values.solar,
+        values.panes,
+        opening.states,
+        glass=values.glass,
+        up=opening.up,
+    )
 
 
 def _assumptions(space: Space, room: DrawnRoom) -> list[Issue]:
     """How many polygons of a room say nothing of their reflectance or construction."""
-    opaque = [
-        one.finish
-        for face in room.faces
-        for one in (face, *(o for o in face.openings if o.glazing is None))
-    ]
+    opaque = [one.finish for face in room.faces for one in (face, *(o for o in face.openings if o.glazing is None))]
     codes = {"visible": "reflectance-assumed", "construction": "construction-assumed"}
     issues = []
     for field, code in codes.items():

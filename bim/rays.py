@@ -25,10 +25,7 @@ class RayMesh:
     boxes: NDArray[np.float64]  # [2 L - 1, 6] low corner, high corner
 
     def first_hits(
-        self,
-        origins: NDArray[np.float64],
-        directions: NDArray[np.float64],
-        reach: float = np.inf,
+        self, origins: NDArray[np.float64], directions: NDArray[np.float64], reach: float = np.inf
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Distance [R] [m] (inf: none) and triangle [R] (-1: none) that each ray hits first.
 
@@ -39,9 +36,7 @@ class RayMesh:
         directions = np.ascontiguousarray(directions, dtype=float)
         if not len(self.triangles) or not len(origins):
             return np.full(len(origins), np.inf), np.full(len(origins), -1, dtype=np.int64)
-        return _first_hits(
-            origins, directions, float(reach), self.triangles, self.leaves, self.boxes
-        )
+        return _first_hits(origins, directions, float(reach), self.triangles, self.leaves, self.boxes)
 
     def all_hits(
         self, origin: NDArray[np.float64], direction: NDArray[np.float64], reach: float
@@ -54,9 +49,7 @@ class RayMesh:
         if not len(self.triangles):
             return np.empty(0), np.empty(0, dtype=np.int64)
         origin, direction = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
-        distance, hit = _all_hits(
-            origin, direction, float(reach), self.triangles, self.leaves, self.boxes
-        )
+        distance, hit = _all_hits(origin, direction, float(reach), self.triangles, self.leaves, self.boxes)
         hit, first = np.unique(hit, return_index=True)  # some triangles are in two leaves
         order = np.argsort(distance[first], kind="stable")
         return distance[first][order], hit[order]
@@ -97,9 +90,8 @@ def _first_hits(origins, directions, reach, triangles, leaves, boxes):
     stack = np.empty(DEEPEST, dtype=np.int64)
     for r in range(count):
         _hits(
-            origins[r], directions[r], reach, True, distance[r : r + 1], hit[r : r + 1], stack,
-            triangles, leaves, boxes,
-        )  # fmt: skip
+            origins[r], directions[r], reach, True, distance[r : r + 1], hit[r : r + 1], stack, triangles, leaves, boxes
+        )
     return distance, hit
 
 

@@ -149,10 +149,7 @@ def _seen_from(aperture: Aperture, facet: Facet) -> tuple[float, float, shapely.
     heights = aperture.plane.to_plane(corners)[:, 2]
     if heights.min() > BEYOND or heights.max() < -REACH:
         return None
-    flat = shapely.transform(
-        facet.polygon,
-        lambda p: aperture.plane.to_plane(facet.plane.to_world(p))[:, :2],
-    )
+    flat = shapely.transform(facet.polygon, lambda p: aperture.plane.to_plane(facet.plane.to_world(p))[:, :2])
     region = shapely.make_valid(flat).intersection(aperture.opening)
     parts = polygons_of(region)
     if not parts:
@@ -166,9 +163,7 @@ def _seen_from(aperture: Aperture, facet: Facet) -> tuple[float, float, shapely.
     return float(heights.min()), float(heights.max()), region
 
 
-def room_pieces(
-    room: RoomSolid, attachments: Sequence[Attachment]
-) -> tuple[list[Piece], float, list[Issue]]:
+def room_pieces(room: RoomSolid, attachments: Sequence[Attachment]) -> tuple[list[Piece], float, list[Issue]]:
     """Pieces that close the room's air, its volume [m3], and what had to be changed.
 
     A slit as thin as rounding in a region, as faces leave it that meet behind one window, is
@@ -245,10 +240,7 @@ def _painted(facet: Facet, painted: Sequence[Attachment]) -> list[Piece]:
         if facet.plane.normal @ plane.normal < FACING:
             continue
         height = plane.to_plane(facet.plane.to_world(shapely.get_coordinates(facet.polygon)))[:, 2]
-        if (
-            height.max() < attachment.deepest - OVERLAP
-            or height.min() > attachment.nearest + OVERLAP
-        ):
+        if height.max() < attachment.deepest - OVERLAP or height.min() > attachment.nearest + OVERLAP:
             continue
         region = project(attachment.region, plane, facet.plane)
         glass = project(attachment.glass, plane, facet.plane)
@@ -270,9 +262,7 @@ def _painted(facet: Facet, painted: Sequence[Attachment]) -> list[Piece]:
     return [Piece(Facet(facet.plane, p), "room") for p in rest] + pieces
 
 
-def cut(
-    polygon: shapely.Polygon, region: shapely.Geometry
-) -> tuple[list[shapely.Polygon], list[shapely.Polygon]]:
+def cut(polygon: shapely.Polygon, region: shapely.Geometry) -> tuple[list[shapely.Polygon], list[shapely.Polygon]]:
     """Parts of a polygon inside and outside a region; slivers stay with the other part.
 
     Nothing is lost: the parts cover the polygon.

@@ -33,9 +33,7 @@ def horizontal_section(triangles: NDArray[np.float64], z: float) -> shapely.Geom
     edges = _closed(edges)
     cells = shapely.get_parts(shapely.polygonize([shapely.union_all(shapely.linestrings(edges))]))
     inside = [
-        cell
-        for cell in cells
-        if cell.area > SMALLEST_AREA and abs(winding_number(_inner_point(cell), edges)) > 0.5
+        cell for cell in cells if cell.area > SMALLEST_AREA and abs(winding_number(_inner_point(cell), edges)) > 0.5
     ]
     return shapely.union_all(inside) if inside else shapely.Polygon()
 
@@ -172,9 +170,7 @@ def _grid_inside(area: shapely.Geometry, spacing: float) -> NDArray[np.float64]:
     return inside @ back.T
 
 
-def _along_longest_edge(
-    area: shapely.Geometry,
-) -> tuple[shapely.Geometry, NDArray[np.float64]]:
+def _along_longest_edge(area: shapely.Geometry) -> tuple[shapely.Geometry, NDArray[np.float64]]:
     """The area turned so that its longest edge is along x, and the rotation [2, 2] back."""
     biggest = max(shapely.get_parts(area), key=lambda part: part.area)
     ring = np.asarray(biggest.exterior.coords)
@@ -187,9 +183,7 @@ def _along_longest_edge(
     return shapely.transform(area, lambda points: points @ back), back
 
 
-def view_point(
-    space: Space, eye_height: float = 1.2
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def view_point(space: Space, eye_height: float = 1.2) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Position [3] [m] in the middle of the room or nearest to it, horizontal direction [3].
 
     It is that to the biggest window, without one along the room's longest edge; 1.2 m is a
@@ -252,9 +246,7 @@ def model_views(building: Building, space: Space) -> list[ModelView]:
 
 
 def polygon_sensors(
-    ring: NDArray[np.float64],
-    spacing: Sequence[float],
-    holes: Sequence[NDArray[np.float64]] = (),
+    ring: NDArray[np.float64], spacing: Sequence[float], holes: Sequence[NDArray[np.float64]] = ()
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Points [S, 3] on a polygon [N, 3] and its unit normal [3].
 
@@ -299,10 +291,7 @@ def surface_sensors(
     grids = []
     for polygon in merged_polygons(plane.to_plane(surface.triangles)[..., :2]):
         oriented = shapely.orient_polygons(polygon)
-        rings = [
-            plane.to_world(np.asarray(ring.coords)[:-1])
-            for ring in (oriented.exterior, *oriented.interiors)
-        ]
+        rings = [plane.to_world(np.asarray(ring.coords)[:-1]) for ring in (oriented.exterior, *oriented.interiors)]
         grids.append(polygon_sensors(rings[0], spacing, rings[1:])[0])
     points = np.concatenate(grids)
     direction = surface.normal if outdoors else -surface.normal

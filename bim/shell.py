@@ -39,9 +39,7 @@ def welded(points: NDArray[np.float64], distance: float = WELD) -> NDArray[np.fl
     return points[keep]
 
 
-def _with_touching(
-    ring: NDArray[np.float64], vertices: NDArray[np.float64], tree: cKDTree
-) -> list[int]:
+def _with_touching(ring: NDArray[np.float64], vertices: NDArray[np.float64], tree: cKDTree) -> list[int]:
     """Indices of the welded vertices along a ring [N, 3], those of other facets included."""
     corners = tree.query(ring)[1]
     indices: list[int] = []
@@ -64,9 +62,7 @@ def _between(start: int, end: int, vertices: NDArray[np.float64], tree: cKDTree)
     return [int(i) for i in near[between][order]]
 
 
-def _triangles(
-    facet: Facet, rings: list[list[int]], vertices: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _triangles(facet: Facet, rings: list[list[int]], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     """Triangles [T, 3, 3] of one facet on the welded vertices."""
     rings = [ring for ring in rings if len(ring) >= 3]
     if not rings:

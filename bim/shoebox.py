@@ -126,9 +126,7 @@ def shoebox(
     return Building(name, (space,), (*outdoors, *elements), (), latitude_deg, longitude_deg)
 
 
-def _plate(
-    guid: str, plate: Plate, sides: Mapping[str, tuple[Plane, tuple[float, float]]], recess: float
-) -> Element:
+def _plate(guid: str, plate: Plate, sides: Mapping[str, tuple[Plane, tuple[float, float]]], recess: float) -> Element:
     """A plate before a side of the box."""
     if plate.depth <= 0 or plate.start == plate.end:
         raise RoomError(f"{guid}: needs a depth and two ends that differ")
@@ -152,9 +150,7 @@ class _Stated:
     gloss: Mapping[str, Gloss] | None
     emissivity: float
 
-    def face(
-        self, label: str, part: SideFacet, triangles: NDArray[np.float64], *, glazed: bool
-    ) -> Face:
+    def face(self, label: str, part: SideFacet, triangles: NDArray[np.float64], *, glazed: bool) -> Face:
         """A part as the face of a room; glazed: whether its side has windows."""
         side, kind = part.side, part.kind
         exposed = glazed and kind != "reveal"  # reveals lie inside the wall
@@ -163,15 +159,10 @@ class _Stated:
         visible = _pick(self.reflectance, side, kind, ROOM_REFLECTANCE[kind])
         solar = _pick(self.reflectance_solar, side, kind, visible)
         gloss = _pick(self.gloss, side, kind, None)
-        return Face(
-            label, kind, triangles, beyond, construction, visible, solar, self.emissivity,
-            gloss=gloss,
-        )  # fmt: skip
+        return Face(label, kind, triangles, beyond, construction, visible, solar, self.emissivity, gloss=gloss)
 
 
-def _window(
-    room: str, part: SideFacet, triangles: NDArray[np.float64], w: WindowRectangle
-) -> Window:
+def _window(room: str, part: SideFacet, triangles: NDArray[np.float64], w: WindowRectangle) -> Window:
     return Window(
         f"{room}-window-{part.window}",
         f"window {part.window + 1}",
@@ -214,11 +205,7 @@ def _side_planes(
 
 
 def _side_facets(
-    side: str,
-    plane: Plane,
-    size: tuple[float, float],
-    holes: list[tuple[int, WindowRectangle]],
-    recess: float,
+    side: str, plane: Plane, size: tuple[float, float], holes: list[tuple[int, WindowRectangle]], recess: float
 ) -> list[SideFacet]:
     """The wall of one side, and the reveals, frames and glass of its openings."""
     wall = shapely.box(0, 0, *size)
@@ -244,9 +231,7 @@ def _side_facets(
     return [SideFacet(Facet(plane, p), kind, side) for p in polygons_of(wall)] + facets
 
 
-def _reveals(
-    plane: Plane, opening: shapely.Polygon, recess: float, side: str, index: int
-) -> list[SideFacet]:
+def _reveals(plane: Plane, opening: shapely.Polygon, recess: float, side: str, index: int) -> list[SideFacet]:
     """The four surfaces between the wall's inner surface and the glazing plane."""
     x0, y0, x1, y1 = opening.bounds
     corners = plane.to_world(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]))

@@ -76,38 +76,29 @@ def unpacked(solid: PackedSolid) -> manifold3d.Manifold:
     return manifold3d.Manifold(mesh).as_original()
 
 
-def _manifold(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> manifold3d.Manifold | None:
+def _manifold(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> manifold3d.Manifold | None:
     sound = closed_faces(vertices, faces)
     if sound is None:
         return None
     faces = sound
     mesh = manifold3d.Mesh64(
-        np.ascontiguousarray(vertices, dtype=np.float64),
-        np.ascontiguousarray(faces, dtype=np.uint64),
+        np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.uint64)
     )
     manifold = manifold3d.Manifold(mesh)
     good = manifold.status() == manifold3d.Error.NoError and not manifold.is_empty()
     return manifold.as_original() if good else None
 
 
-def prism(
-    polygon: shapely.Geometry, plane: Plane, bottom: float, top: float
-) -> manifold3d.Manifold | None:
+def prism(polygon: shapely.Geometry, plane: Plane, bottom: float, top: float) -> manifold3d.Manifold | None:
     """Right prism over a (multi)polygon of the plane, between two heights above the plane [m]."""
     parts = []
     for part in polygons_of(polygon):
         flat = triangulated(part)
-        low, high = (
-            np.concatenate([flat, np.full((*flat.shape[:2], 1), h)], axis=2) for h in (bottom, top)
-        )
+        low, high = (np.concatenate([flat, np.full((*flat.shape[:2], 1), h)], axis=2) for h in (bottom, top))
         sides = []
         for ring in rings_of(part):
             a, b = ring, np.roll(ring, -1, axis=0)
-            a0, b0, a1, b1 = (
-                np.column_stack([p, np.full(len(p), h)]) for h in (bottom, top) for p in (a, b)
-            )
+            a0, b0, a1, b1 = (np.column_stack([p, np.full(len(p), h)]) for h in (bottom, top) for p in (a, b))
             sides += [np.stack([a0, b0, b1], axis=1), np.stack([a0, b1, a1], axis=1)]
         local = np.concatenate([high, low[:, ::-1], *sides])
         solid = solid_of(plane.to_world(local.reshape(-1, 3)).reshape(-1, 3, 3))
@@ -123,9 +114,7 @@ def union(solids: list[manifold3d.Manifold]) -> manifold3d.Manifold:
     return manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add)
 
 
-def triangles_of(
-    manifold: manifold3d.Manifold,
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def triangles_of(manifold: manifold3d.Manifold) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Triangles [N, 3, 3] and the id of the original solid [N] that each comes from."""
     mesh = manifold.to_mesh64()
     vertices = np.asarray(mesh.vert_properties)[:, :3]

@@ -46,22 +46,48 @@ def room_features(space: Space) -> NDArray[np.float64]:
     corner = space.shell.reshape(-1, 3).min(axis=0)
     scale = ALIKE / ALIKE_SHARE
     rows = [
-        [*(centroid(face.triangles) - corner), *(scale * face.normal), np.sqrt(face.area), 0.0,
-         scale * face.reflectance_visible, scale * face.reflectance_solar, scale * face.emissivity,
-         *(scale * value for value in _gloss(face))]
+        [
+            *(centroid(face.triangles) - corner),
+            *(scale * face.normal),
+            np.sqrt(face.area),
+            0.0,
+            scale * face.reflectance_visible,
+            scale * face.reflectance_solar,
+            scale * face.emissivity,
+            *(scale * value for value in _gloss(face)),
+        ]
         for face in space.faces
-    ]  # fmt: skip
+    ]
     rows += [
-        [*(window.centre - corner), *(scale * window.normal), np.sqrt(window.area), 10.0,
-         np.sqrt(window.opening_area), window.u_value or 0.0, window.g_value or 0.0, 0.0, 0.0]
+        [
+            *(window.centre - corner),
+            *(scale * window.normal),
+            np.sqrt(window.area),
+            10.0,
+            np.sqrt(window.opening_area),
+            window.u_value or 0.0,
+            window.g_value or 0.0,
+            0.0,
+            0.0,
+        ]
         for window in space.windows
-    ]  # fmt: skip
+    ]
     rows += [
-        [*(centroid(part.triangles) - corner), 0.0, 0.0, 0.0,
-         np.sqrt(np.linalg.norm(area_vectors(part.triangles), axis=1).sum()), 20.0,
-         scale * part.reflectance_visible, scale * part.reflectance_solar, 0.0, 0.0, 0.0]
+        [
+            *(centroid(part.triangles) - corner),
+            0.0,
+            0.0,
+            0.0,
+            np.sqrt(np.linalg.norm(area_vectors(part.triangles), axis=1).sum()),
+            20.0,
+            scale * part.reflectance_visible,
+            scale * part.reflectance_solar,
+            0.0,
+            0.0,
+            0.0,
+        ]
         for part in space.furniture
-    ]  # fmt: skip
+    ]
     return np.array(rows).reshape(-1, 13)
 
 

@@ -43,9 +43,19 @@ TURNED = 0.02  # difference of the axes from which a BSDF is turned in its windo
 DEFAULT_GROUND_C = 18.0  # of EnergyPlus
 DEFAULT_U, DEFAULT_G = 1.3, 0.6  # double glazing with low emissivity [W/(m2 K)], [-]
 MONTHS = (
-    "january", "february", "march", "april", "may", "june",
-    "july", "august", "september", "october", "november", "december",
-)  # fmt: skip
+    "january",
+    "february",
+    "march",
+    "april",
+    "may",
+    "june",
+    "july",
+    "august",
+    "september",
+    "october",
+    "november",
+    "december",
+)
 
 
 def write_epjson(
@@ -80,8 +90,7 @@ def write_epjson(
             raise ValueError(f"ground_c: expected 12 monthly values, got {len(ground_c)}")
         model["Site:GroundTemperature:BuildingSurface"] = {
             "ground": {
-                f"{month}_ground_temperature": float(value)
-                for month, value in zip(MONTHS, ground_c, strict=True)
+                f"{month}_ground_temperature": float(value) for month, value in zip(MONTHS, ground_c, strict=True)
             }
         }
     windows = _Windows(model, (u_value, g_value), glazing or {})
@@ -109,9 +118,7 @@ def _losses(spaces: Sequence[Space], dropped: Sequence[float], *, ground: bool) 
         )
 
 
-def _zone(
-    model: Model, zone: str, space: Space, windows: _Windows, air_changes: float
-) -> list[float]:
+def _zone(model: Model, zone: str, space: Space, windows: _Windows, air_changes: float) -> list[float]:
     """Write a room; the areas of surfaces that are too narrow for EnergyPlus [m2]."""
     model["Zone"][zone] = {"volume": space.volume, "floor_area": max(space.floor_area, 0.01)}
     model["ZoneInfiltration:DesignFlowRate"][f"{zone} air"] = {
@@ -145,9 +152,7 @@ def _zone(
 class _Windows:
     """The constructions of glazings, each written once."""
 
-    def __init__(
-        self, model: Model, overrides: tuple[float | None, float | None], glazing: Glazings
-    ) -> None:
+    def __init__(self, model: Model, overrides: tuple[float | None, float | None], glazing: Glazings) -> None:
         self._model, self._overrides, self.glazing = model, overrides, glazing
         self._complex: dict[int, str] = {}  # by the id of the optics
         self.notes: dict[str, None] = {}

@@ -49,9 +49,7 @@ def write_gltf(building: Building, path: str | PathLike[str], *, outdoors: bool 
     write_bytes(path, scene.export(file_type="glb"))
 
 
-def _add_parts(
-    scene: trimesh.Scene, name: str, parts: Sequence[Face | Element], kind: str, turn: int = 1
-) -> None:
+def _add_parts(scene: trimesh.Scene, name: str, parts: Sequence[Face | Element], kind: str, turn: int = 1) -> None:
     """A node of all parts without gloss, and one for each kind of gloss; `turn` -1: seen inside."""
     kinds: dict[tuple[float, float], list[NDArray[np.float64]]] = {}
     for part in parts:
@@ -70,9 +68,7 @@ def _add(
     kind: str,
     factors: tuple[float, float] = (0.0, 1.0),  # metallic, roughness
 ) -> None:
-    mesh = trimesh.Trimesh(
-        triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False
-    )
+    mesh = trimesh.Trimesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False)
     opacity = COLOURS[kind][3]
     mesh.visual = trimesh.visual.TextureVisuals(
         material=trimesh.visual.material.PBRMaterial(

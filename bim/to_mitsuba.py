@@ -105,11 +105,7 @@ def _camera(scene: ElementTree.Element, space: Space) -> None:
     ElementTree.SubElement(sensor, "float", name="near_clip", value="0.001")
     place = ElementTree.SubElement(sensor, "transform", name="to_world")
     ElementTree.SubElement(
-        place,
-        "lookat",
-        origin=_numbers(position),
-        target=_numbers(position + direction),
-        up="0, 0, 1",
+        place, "lookat", origin=_numbers(position), target=_numbers(position + direction), up="0, 0, 1"
     )
     sampler = ElementTree.SubElement(sensor, "sampler", type="independent")
     ElementTree.SubElement(sampler, "integer", name="sample_count", value=str(SAMPLES))

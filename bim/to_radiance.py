@@ -139,16 +139,24 @@ group() {
 LUMINANCE = (0.265, 0.67, 0.065)  # of Radiance's red, green and blue
 BANDS = {  # what the script's words stand for
     "visible": {
-        "{Quantity}": "Illuminance", "{unit}": "lx", "{radiance}": "luminance [cd/m2]",
-        "{result}": "illuminance.txt", "{output}": "", "{weights}": "0.265 0.67 0.065",
+        "{Quantity}": "Illuminance",
+        "{unit}": "lx",
+        "{radiance}": "luminance [cd/m2]",
+        "{result}": "illuminance.txt",
+        "{output}": "",
+        "{weights}": "0.265 0.67 0.065",
         "{efficacy}": "47.435 119.93 11.635",
     },
     "solar": {
-        "{Quantity}": "Irradiance", "{unit}": "W/m2", "{radiance}": "radiance [W/(m2 sr)]",
-        "{result}": "irradiance.txt", "{output}": "-O1 ", "{weights}": "0.265 0.67 0.065",
+        "{Quantity}": "Irradiance",
+        "{unit}": "W/m2",
+        "{radiance}": "radiance [W/(m2 sr)]",
+        "{result}": "irradiance.txt",
+        "{output}": "-O1 ",
+        "{weights}": "0.265 0.67 0.065",
         "{efficacy}": "0.265 0.67 0.065",
     },
-}  # fmt: skip
+}
 
 
 def makefile(band: str) -> str:
@@ -302,9 +310,7 @@ def write_radiance(
     rows = np.concatenate([points, directions], axis=1)
     sensors = _write(folder / "sensors.pts", (_numbers(row) + "\n" for row in rows))
     position, direction = view_point(space)
-    fisheye = (
-        f"rvu -vta -vp {_numbers(position)} -vd {_numbers(direction)} -vu 0 0 1 -vh 180 -vv 180"
-    )
+    fisheye = f"rvu -vta -vp {_numbers(position)} -vd {_numbers(direction)} -vu 0 0 1 -vh 180 -vv 180"
     view = _write(folder / "view.vf", [fisheye + "\n"])
     surfaces = _write(folder / "surfaces.pts", _surface_lines(space, spacing))
     files = {identifier(name): bsdfs.get(name) for name in windows}
@@ -312,9 +318,20 @@ def write_radiance(
     script.chmod(0o755)
     _write(folder / "Makefile", [makefile(band)])
     return RadianceFiles(
-        written, grey, room, scene, shades, windows, bsdfs,
-        _write(folder / "systems.rad", systems), sky, sensors, view, surfaces, script,
-    )  # fmt: skip
+        written,
+        grey,
+        room,
+        scene,
+        shades,
+        windows,
+        bsdfs,
+        _write(folder / "systems.rad", systems),
+        sky,
+        sensors,
+        view,
+        surfaces,
+        script,
+    )
 
 
 def _system(known: FilledGroup, name: str, folder: Path) -> str:
@@ -366,9 +383,7 @@ class _Materials:
             yield radiance_material(name, colour, gloss) + "\n"
 
 
-def _parts(
-    parts: Iterable[Face | Element], materials: _Materials, *, inwards: bool, name: str = ""
-) -> Iterable[str]:
+def _parts(parts: Iterable[Face | Element], materials: _Materials, *, inwards: bool, name: str = "") -> Iterable[str]:
     """Polygons of faces or elements; faces are turned to look into the room."""
     for number, part in enumerate(parts):
         triangles = part.triangles[:, ::-1] if inwards else part.triangles

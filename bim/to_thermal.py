@@ -16,13 +16,7 @@ from thermal.emitters import IdealLoads
 from thermal.zone import Gains, Layer, OpaqueSurface, WindowElement, Zone
 
 # what lies beyond a face, in the words of `thermal`: a neighbour is taken to be as warm as the room
-OUTSIDE = {
-    "outside": "outdoor",
-    "ground": "ground",
-    "space": "twin",
-    "adiabatic": "twin",
-    "unknown": "adiabatic",
-}
+OUTSIDE = {"outside": "outdoor", "ground": "ground", "space": "twin", "adiabatic": "twin", "unknown": "adiabatic"}
 THINNEST = 5e-4  # [m] thinner layers (paint, foils) take no part in the heat balance
 SAME_AREA = 0.02  # the two faces of a partition differ by this share at most
 OPPOSITE = -0.98  # cosine between their normals
@@ -70,12 +64,7 @@ def thermal_room(
         gains=gains or Gains(),
         loads=loads or IdealLoads(),
     )
-    return ThermalRoom(
-        zone,
-        surface_of_face,
-        np.array(outdoor, dtype=np.int64),
-        surface_neighbours(space),
-    )
+    return ThermalRoom(zone, surface_of_face, np.array(outdoor, dtype=np.int64), surface_neighbours(space))
 
 
 def surface_neighbours(space: Space) -> tuple[str | None, ...]:
@@ -99,9 +88,7 @@ def same_surfaces(a: Space, b: Space) -> bool:
     )
 
 
-def coupled_rooms(
-    spaces: Sequence[Space], rooms: Sequence[ThermalRoom]
-) -> tuple[list[ThermalRoom], tuple[str, ...]]:
+def coupled_rooms(spaces: Sequence[Space], rooms: Sequence[ThermalRoom]) -> tuple[list[ThermalRoom], tuple[str, ...]]:
     """The rooms with their shared walls as partitions that heat flows through.
 
     A surface is joined to the one that lies opposite in the room behind it, of the same area
@@ -178,9 +165,7 @@ def door_links(spaces: Sequence[Space], flow: float) -> NDArray[np.float64]:
     doors = np.zeros((len(spaces), len(spaces)))
     for a, space in enumerate(spaces):
         joined = {
-            (face.neighbour, face.element)
-            for face in space.faces
-            if face.kind == "door" and face.neighbour in index
+            (face.neighbour, face.element) for face in space.faces if face.kind == "door" and face.neighbour in index
         }
         for neighbour, _ in joined:
             doors[a, index[neighbour]] += 1.0
@@ -198,10 +183,7 @@ def _faces_of_surfaces(space: Space) -> list[list[int]]:
 
 
 def _other_side(
-    one: OpaqueSurface,
-    room: str,
-    others: Sequence[OpaqueSurface],
-    neighbours: Sequence[str | None],
+    one: OpaqueSurface, room: str, others: Sequence[OpaqueSurface], neighbours: Sequence[str | None]
 ) -> int:
     """The surface of the room behind that is the other face, nearest in area; -1 for none."""
     best, gap = -1, SAME_AREA * one.area
@@ -217,10 +199,7 @@ def layers_of(construction: Construction) -> tuple[Layer, ...]:
     """The layers that count for heat, outermost first; the thickest where none does."""
     thick = [layer for layer in construction.layers if layer.thickness >= THINNEST]
     thick = thick or [max(construction.layers, key=lambda layer: layer.thickness)]
-    return tuple(
-        Layer(layer.thickness, layer.conductivity, layer.density, layer.heat_capacity)
-        for layer in thick
-    )
+    return tuple(Layer(layer.thickness, layer.conductivity, layer.density, layer.heat_capacity) for layer in thick)
 
 
 def _surface(name: str, faces: list[Face], ground_level: float) -> OpaqueSurface:
@@ -242,9 +221,7 @@ def _surface(name: str, faces: list[Face], ground_level: float) -> OpaqueSurface
     )
 
 
-def _windows(
-    space: Space, fenestration: Fenestration | None, ground_level: float
-) -> list[WindowElement]:
+def _windows(space: Space, fenestration: Fenestration | None, ground_level: float) -> list[WindowElement]:
     labels = numbered([window.name or window.guid for window in space.windows])
     windows = []
     for window, label in zip(space.windows, labels, strict=True):

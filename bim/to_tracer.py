@@ -33,9 +33,7 @@ def exterior_surfaces(building: Building, space: Space, band: str = "visible") -
     return element_surfaces((e for e in building.elements if e.guid not in own), band)
 
 
-def outdoors_of_rooms(
-    building: Building, spaces: Sequence[Space], band: str = "visible"
-) -> SharedOutdoors:
+def outdoors_of_rooms(building: Building, spaces: Sequence[Space], band: str = "visible") -> SharedOutdoors:
     """The surroundings of several rooms: all elements, the windows of the rooms last.
 
     A room's rays pass the windows of the room; no window may be that of two of the rooms.
@@ -111,19 +109,10 @@ def orientation_name(window: Window) -> str:
 
 
 def band_scenes(
-    building: Building,
-    space: Space,
-    groups: Sequence[WindowGroup],
-    view: View,
-    bands: Sequence[str] = COLOURS,
+    building: Building, space: Space, groups: Sequence[WindowGroup], view: View, bands: Sequence[str] = COLOURS
 ) -> tuple[DaylightScene, ...]:
     """The scene of a room with a view in each band."""
     return tuple(
-        DaylightScene(
-            furnished_surfaces(space, band),
-            exterior_surfaces(building, space, band),
-            groups,
-            view=view,
-        )
+        DaylightScene(furnished_surfaces(space, band), exterior_surfaces(building, space, band), groups, view=view)
         for band in bands
     )

@@ -25,10 +25,7 @@ Wall = tuple[Piece, float]  # a part of the room's boundary, half the wall behin
 
 
 def area_to_wall_middles(
-    triangles: NDArray[np.float64],
-    pieces: Sequence[Piece],
-    beyond: Sequence[Beyond],
-    records: Sequence[ElementRecord],
+    triangles: NDArray[np.float64], pieces: Sequence[Piece], beyond: Sequence[Beyond], records: Sequence[ElementRecord]
 ) -> float:
     """Area [m2] of a room's outline with each side moved outwards by half of the wall behind it.
 
@@ -49,9 +46,7 @@ def area_to_wall_middles(
     return total
 
 
-def _wall_behind(
-    behind: Beyond, records: Sequence[ElementRecord], normal: NDArray[np.float64]
-) -> float:
+def _wall_behind(behind: Beyond, records: Sequence[ElementRecord], normal: NDArray[np.float64]) -> float:
     """Thickness [m] of the wall that a face lies on: its layers', else the ray's; 0: none."""
     for span in behind.spans:
         record = records[span.element]
@@ -85,10 +80,7 @@ def _moved(ring: NDArray[np.float64], walls: Sequence[Wall]) -> NDArray[np.float
 
 
 def _half_wall(
-    corner: NDArray[np.float64],
-    side: NDArray[np.float64],
-    out: NDArray[np.float64],
-    walls: Sequence[Wall],
+    corner: NDArray[np.float64], side: NDArray[np.float64], out: NDArray[np.float64], walls: Sequence[Wall]
 ) -> float:
     """Half the thickness [m] of the wall behind most of a side's faces; 0 without a wall."""
     length = np.linalg.norm(side)

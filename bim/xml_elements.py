@@ -17,9 +17,7 @@ DEEPEST = 100  # elements within each other
 CHUNK = 1 << 20  # bytes parsed at once
 
 
-def xml_elements(
-    path: Path, root: str, *, depth: int, most_bytes: int
-) -> Iterator[tuple[ElementTree.Element, int]]:
+def xml_elements(path: Path, root: str, *, depth: int, most_bytes: int) -> Iterator[tuple[ElementTree.Element, int]]:
     """The elements of a depth (1: the root) with their lines; what was yielded is not kept.
 
     Names of elements and attributes are without namespaces.

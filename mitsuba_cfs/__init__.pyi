@@ -11,11 +11,7 @@ from .bsdf.generate import (
     generate_tensor_tree as generate_tensor_tree,
 )
 from .bsdf.evaluate import klems_of as klems_of
-from .bsdf.glazing import (
-    Glazing as Glazing,
-    Pane as Pane,
-    specular_klems as specular_klems,
-)
+from .bsdf.glazing import Glazing as Glazing, Pane as Pane, specular_klems as specular_klems
 from .bsdf.klems import KLEMS_FULL as KLEMS_FULL, KlemsBasis as KlemsBasis, KlemsBsdf as KlemsBsdf
 from .bsdf.layers import LayeredSystem as LayeredSystem, combine_layers as combine_layers
 from .bsdf.periodic import PeriodicLayer as PeriodicLayer, SlatMaterial as SlatMaterial
@@ -27,11 +23,7 @@ from .bsdf.xml import write_bsdf_xml as write_bsdf_xml
 from .errors import CfsError as CfsError, DataError as DataError, VariantError as VariantError
 from .glare.annual import AnnualGlare as AnnualGlare
 from .glare.classes import glare_class as glare_class, protection_level as protection_level
-from .glare.evaluation import (
-    GlareOptions as GlareOptions,
-    GlareResult as GlareResult,
-    evaluate as evaluate,
-)
+from .glare.evaluation import GlareOptions as GlareOptions, GlareResult as GlareResult, evaluate as evaluate
 from .gloss import (
     Gloss as Gloss,
     dielectric as dielectric,
@@ -45,11 +37,7 @@ from .images.hdr import Picture as Picture, read_hdr as read_hdr, write_hdr as w
 from .images.view import View as View, fisheye as fisheye, parse_view as parse_view
 from .matrices.cache import MatrixCache as MatrixCache
 from .matrices.mtx_io import read_matrix as read_matrix, write_matrix as write_matrix
-from .methods.glare import (
-    hourly_glare as hourly_glare,
-    pictures as pictures,
-    rated_pictures as rated_pictures,
-)
+from .methods.glare import hourly_glare as hourly_glare, pictures as pictures, rated_pictures as rated_pictures
 from .methods.light import (
     daylight as daylight,
     daylight_coefficients as daylight_coefficients,
@@ -70,11 +58,7 @@ from .methods.phase_matrices import (
 from .methods.point_in_time import PathLight as PathLight
 from .methods.scene import DaylightScene as DaylightScene, Sampling as Sampling
 from .metrics.room import RoomMetrics as RoomMetrics, room_metrics as room_metrics
-from .sky.annual import (
-    AnnualSky as AnnualSky,
-    annual_sky as annual_sky,
-    given_sky as given_sky,
-)
+from .sky.annual import AnnualSky as AnnualSky, annual_sky as annual_sky, given_sky as given_sky
 from .sky.cie import cie_patches as cie_patches
 from .sky.epw import read_epw as read_epw
 from .sky.matrix import sky_matrix as sky_matrix
@@ -82,11 +66,7 @@ from .sky.patches import ReinhartSky as ReinhartSky
 from .sky.sun import sun_directions as sun_directions
 from .sky.epw import read_wea as read_wea
 from .sky.weather import Weather as Weather
-from .surfaces import (
-    Surfaces as Surfaces,
-    WindowGroup as WindowGroup,
-    WindowSurface as WindowSurface,
-)
+from .surfaces import Surfaces as Surfaces, WindowGroup as WindowGroup, WindowSurface as WindowSurface
 from .trace.matrices.daylight import daylight_matrix as daylight_matrix
 from .trace.kernels.estimate import Estimate as Estimate, Stopping as Stopping
 from .trace.matrices.view import view_matrix as view_matrix

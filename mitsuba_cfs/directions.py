@@ -31,15 +31,11 @@ def normalize(vectors: ArrayLike) -> NDArray[np.float64]:
     return vectors / length
 
 
-def sensors_of(
-    points: ArrayLike, directions: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def sensors_of(points: ArrayLike, directions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Positions [S, 3] and unit normals [S, 3] of sensors, also of a single one given as [3]."""
     points, directions = (np.atleast_2d(np.asarray(v, dtype=float)) for v in (points, directions))
     if points.shape != directions.shape or points.shape[1:] != (3,):
-        raise ValueError(
-            f"points {points.shape} and directions {directions.shape}: need [S, 3] each"
-        )
+        raise ValueError(f"points {points.shape} and directions {directions.shape}: need [S, 3] each")
     return points, normalize(directions)
 
 

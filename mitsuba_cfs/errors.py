@@ -38,9 +38,7 @@ class VariantError(CfsError, RuntimeError):
     """No usable Mitsuba variant or LLVM library: says what to install."""
 
 
-def check_number(
-    name: str, value: Any, low: float, high: float = math.inf, *, whole: bool = False
-) -> None:
+def check_number(name: str, value: Any, low: float, high: float = math.inf, *, whole: bool = False) -> None:
     """Raise `ValueError` that names an argument unless it is a finite number from low to high.
 
     Args: whole: whether it must be a whole number.
@@ -64,7 +62,5 @@ def no_such_key(key: str, known: Iterable[str]) -> str:
     """Message for an unknown key: the known key that resembles it most, or all known keys."""
     folded = {one.casefold(): one for one in known}
     near = get_close_matches(key.casefold(), folded, n=1)
-    instead = (
-        f"did you mean {folded[near[0]]}?" if near else "there are " + ", ".join(folded.values())
-    )
+    instead = f"did you mean {folded[near[0]]}?" if near else "there are " + ", ".join(folded.values())
     return f"no such key; {instead}"

@@ -271,9 +271,7 @@ def plain_cell(value: Any) -> Any:
     return value
 
 
-def check_file(
-    path: str | PathLike[str], *, field: str = "--out", inputs: Iterable[Path | None] = ()
-) -> None:
+def check_file(path: str | PathLike[str], *, field: str = "--out", inputs: Iterable[Path | None] = ()) -> None:
     """Raise `DataError` if a file cannot be written, or is an input."""
     if any(one is not None and _same(one, path) for one in inputs):
         raise DataError("is an input of this command", file=path, field=field)
@@ -311,9 +309,7 @@ def stale(folder: Path) -> Iterator[Path]:
                     os.close(handle)
 
 
-def _held(
-    folder: Path, suffix: str, make: Callable[[Path], object]
-) -> tuple[Path, Callable[[], None]]:
+def _held(folder: Path, suffix: str, make: Callable[[Path], object]) -> tuple[Path, Callable[[], None]]:
     """A new temporary locked by this process, and the function that unlocks it."""
     while True:
         part = folder / f".cfs-{secrets.token_hex(4)}.part{suffix}"
@@ -339,9 +335,7 @@ def _locked(handle: int, *, wait: bool) -> bool:
 
 
 @contextmanager
-def _told(
-    path: str | PathLike[str], place: Path, field: str | None, *, probe: Path | None = None
-) -> Iterator[None]:
+def _told(path: str | PathLike[str], place: Path, field: str | None, *, probe: Path | None = None) -> Iterator[None]:
     """Turn a failure to write `place` into one line about the file that the user named.
 
     Args: probe: our own file, where a failure without a reason is looked into.

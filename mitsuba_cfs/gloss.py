@@ -182,9 +182,7 @@ def polarised_shares(
     return tau, r + r * a * tau
 
 
-def _fresnel(
-    cosine: NDArray[np.float64], index: NDArray[np.float64] | float
-) -> NDArray[np.float64]:
+def _fresnel(cosine: NDArray[np.float64], index: NDArray[np.float64] | float) -> NDArray[np.float64]:
     """Fresnel's reflectances [2, ..] of both polarisations at the surface of a dense body."""
     inner = np.sqrt(1 - (1 - cosine**2) / index**2)
     return np.stack(

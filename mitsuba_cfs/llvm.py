@@ -51,9 +51,7 @@ class LlvmLibrary:
         return ".".join(map(str, self.version)) or "unknown"
 
 
-def candidates(
-    folders: Iterable[Path] | None = None, *, x86: bool | None = None
-) -> list[LlvmLibrary]:
+def candidates(folders: Iterable[Path] | None = None, *, x86: bool | None = None) -> list[LlvmLibrary]:
     """Every LLVM library found, best first; one entry per file however many links lead to it.
 
     Args:
@@ -61,9 +59,7 @@ def candidates(
         x86: whether the processor is of this kind; by default asked of the machine.
     """
     x86 = is_x86() if x86 is None else x86
-    files = (
-        _files_in(library_folders()) + _cached_files() if folders is None else _files_in(folders)
-    )
+    files = _files_in(library_folders()) + _cached_files() if folders is None else _files_in(folders)
     by_target: dict[Path, Path] = {}
     for file in files:
         by_target.setdefault(file.resolve(), file)
@@ -71,9 +67,7 @@ def candidates(
     return sorted(judges, key=lambda library: (not library.usable, _negated(library.version)))
 
 
-def select_library(
-    folders: Iterable[Path] | None = None, *, x86: bool | None = None
-) -> Path | None:
+def select_library(folders: Iterable[Path] | None = None, *, x86: bool | None = None) -> Path | None:
     """The library that Dr.Jit will load, named in DRJIT_LIBLLVM_PATH; None if there is none.
 
     Must run before Dr.Jit is first used. The user's own setting is left as it is.
@@ -107,12 +101,7 @@ def library_folders() -> list[Path]:
     if sys.platform == "darwin":
         roots = [Path("/opt/homebrew/opt"), Path("/usr/local/opt")]
         return [*folders, *(path for root in roots for path in sorted(root.glob("llvm*/lib")))]
-    system = [
-        Path("/usr/lib"),
-        Path("/usr/lib64"),
-        Path("/usr/local/lib"),
-        Path("/usr/local/lib64"),
-    ]
+    system = [Path("/usr/lib"), Path("/usr/lib64"), Path("/usr/local/lib"), Path("/usr/local/lib64")]
     multiarch = sorted(Path("/usr/lib").glob("*-linux-*"))
     versioned = [path for root in system for path in sorted(root.glob("llvm*/lib*"))]
     return [*folders, *multiarch, *system, *versioned]

@@ -34,9 +34,7 @@ def times_sky(matrix: ArrayLike, sky: Sky) -> NDArray[np.float64]:
     return np.ascontiguousarray((lit @ rows).T).reshape(*matrix.shape[:-1], hours)
 
 
-def room_side_radiance(
-    transmission: Sequence[ArrayLike], daylight: ArrayLike, sky: Sky
-) -> NDArray[np.float64]:
+def room_side_radiance(transmission: Sequence[ArrayLike], daylight: ArrayLike, sky: Sky) -> NDArray[np.float64]:
     """Radiance that each window patch sends into the room, T D s [G, K, H].
 
     Args:
@@ -68,17 +66,12 @@ def three_phase(
     view, daylight = np.asarray(view), np.asarray(daylight)
     if view.shape[1] != len(daylight):
         raise ValueError(f"the view matrices have {view.shape[1]} groups, D has {len(daylight)}")
-    coefficients = sum(
-        view[:, g] @ (np.asarray(transmission[g]) @ daylight[g]) for g in range(len(daylight))
-    )
+    coefficients = sum(view[:, g] @ (np.asarray(transmission[g]) @ daylight[g]) for g in range(len(daylight)))
     return coefficients @ np.asarray(sky)
 
 
 def sun_beams(
-    beams: Sequence[ArrayLike],
-    through_sun: ArrayLike,
-    direct_daylight: ArrayLike,
-    sun: Sky,
+    beams: Sequence[ArrayLike], through_sun: ArrayLike, direct_daylight: ArrayLike, sun: Sky
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The sun's straight beam on window patches, in two forms [G, K, H].
 

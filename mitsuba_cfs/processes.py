@@ -55,9 +55,7 @@ def process_pool(processes: int, begin: Callable[[], object] | None = None) -> P
 
     Args: begin: what each worker does first.
     """
-    return ProcessPoolExecutor(
-        processes, mp_context=get_context("spawn"), initializer=_begin, initargs=(begin,)
-    )
+    return ProcessPoolExecutor(processes, mp_context=get_context("spawn"), initializer=_begin, initargs=(begin,))
 
 
 def _begin(begin: Callable[[], object] | None) -> None:
@@ -78,9 +76,7 @@ def _end_after(parent_left: Callable[[], object]) -> None:
     threading.Thread(target=watch, name="end-with-parent", daemon=True).start()
 
 
-def answer_apart(
-    function: Callable, *arguments: Any, limit_s: float, told: Told | None = None
-) -> Any:
+def answer_apart(function: Callable, *arguments: Any, limit_s: float, told: Told | None = None) -> Any:
     """Result of `function(*arguments, tell)` in a subprocess that may crash or be stopped.
 
     For native libraries that end a process by a signal, or work for hours, on some inputs. Unlike
@@ -174,9 +170,7 @@ def each_apart(function: Callable, items: Sequence, *, limit_s: float) -> list[A
         try:
             given = [items[index] for index in left]
             rest_s = max(until - time.monotonic(), 0.0)
-            for index, value in zip(
-                left, answer_apart(_each, function, given, limit_s=rest_s), strict=True
-            ):
+            for index, value in zip(left, answer_apart(_each, function, given, limit_s=rest_s), strict=True):
                 results[index] = value
             break
         except ProcessEnded as error:

@@ -26,9 +26,7 @@ class Stage(str):
     total: int
     whole: bool
 
-    def __new__(
-        cls, label: str, noun: str, number: int, total: int, *, whole: bool = False
-    ) -> Stage:
+    def __new__(cls, label: str, noun: str, number: int, total: int, *, whole: bool = False) -> Stage:
         """Label of a stage of item `number` of `total`; whole: the stage is all of the item."""
         stage = super().__new__(cls, label)
         stage.noun, stage.number, stage.total, stage.whole = noun, number, total, whole
@@ -81,9 +79,7 @@ def in_shares(progress: Progress, shares: Mapping[str, float]) -> Progress:
     return inner
 
 
-def item(
-    progress: Progress, noun: str, number: int, total: int, name: str = "", *, whole: bool = False
-) -> Progress:
+def item(progress: Progress, noun: str, number: int, total: int, name: str = "", *, whole: bool = False) -> Progress:
     """A `Progress` of item `number` (from 1) of `total` similar ones: rooms, views, passes.
 
     Args:

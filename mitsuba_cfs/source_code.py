@@ -72,13 +72,8 @@ def _imported(source: bytes, root: Path) -> Iterator[str]:
 
 
 # Statements are matched, as parsing 300 modules takes 0.7 s; a block for type checkers is left out
-_FOR_TYPES = re.compile(
-    rb"^([ \t]*)if (?:typing\.)?TYPE_CHECKING:\n(?:\1[ \t]+.*\n|[ \t]*\n)*", re.M
-)
-_IMPORT = re.compile(
-    rb"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n(]+)|import[ \t]+([^\n]+))",
-    re.M,
-)
+_FOR_TYPES = re.compile(rb"^([ \t]*)if (?:typing\.)?TYPE_CHECKING:\n(?:\1[ \t]+.*\n|[ \t]*\n)*", re.M)
+_IMPORT = re.compile(rb"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n(]+)|import[ \t]+([^\n]+))", re.M)
 _CALLED = re.compile(rb"\bimport_module\(\s*[\"']([\w.]+)[\"']")
 _COMMENT = re.compile(rb"#[^\n]*")
 

@@ -55,9 +55,7 @@ class StoredArrays:
 
     def forget(self) -> None:
         """Release arrays from memory until they are used again."""
-        result = [
-            (reference, map_) for reference in self._maps if (map_ := reference()) is not None
-        ]
+        result = [(reference, map_) for reference in self._maps if (map_ := reference()) is not None]
         self._maps = [one for one, _ in result]
         for _, map_ in result:
             if hasattr(map_, "madvise"):

@@ -35,9 +35,7 @@ class Surfaces:
         if self.triangles.shape != (n, 3, 3):
             raise ValueError(f"triangles: expected [N, 3, 3], got {self.triangles.shape}")
         if self.reflectance.shape != (n,) or self.surface.shape != (n,):
-            raise ValueError(
-                f"reflectance and surface: expected one entry for each of {n} triangles"
-            )
+            raise ValueError(f"reflectance and surface: expected one entry for each of {n} triangles")
         if n and not (np.min(self.reflectance) >= 0 and np.max(self.reflectance) <= 1):
             raise ValueError("reflectance: expected values from 0 to 1")
         if self.gloss and n and len(self.gloss) <= np.max(self.surface):
@@ -67,10 +65,7 @@ class Surfaces:
     def some(self, chosen: NDArray[np.bool_]) -> Surfaces:
         """Some of the triangles; the surfaces keep their numbers."""
         return replace(
-            self,
-            triangles=self.triangles[chosen],
-            reflectance=self.reflectance[chosen],
-            surface=self.surface[chosen],
+            self, triangles=self.triangles[chosen], reflectance=self.reflectance[chosen], surface=self.surface[chosen]
         )
 
 
@@ -79,9 +74,7 @@ class SharedOutdoors:
     """The surroundings of several rooms, their windows among them."""
 
     surfaces: Surfaces
-    owner: NDArray[
-        np.int64
-    ]  # [N] the room that a triangle is a window of; -1: of none, these come first
+    owner: NDArray[np.int64]  # [N] the room that a triangle is a window of; -1: of none, these come first
 
 
 @dataclass(frozen=True, slots=True)

@@ -111,9 +111,7 @@ def two_scenes_fault() -> str | None:
     """Whether the active variant loses rays where one launch traces two scenes; None if not."""
     mi, dr = _tracer("mitsuba"), _tracer("drjit")
     square = np.array([[[-9.0, -9, 0], [9, -9, 0], [0, 9, 0]]])
-    scenes = [
-        load_scene(triangle_mesh(square + np.array([0, 0, distance]))) for distance in (1.0, 2.0)
-    ]
+    scenes = [load_scene(triangle_mesh(square + np.array([0, 0, distance]))) for distance in (1.0, 2.0)]
     ray = mi.Ray3f(dr.zeros(mi.Point3f, 4), mi.Vector3f(0.0, 0.0, 1.0))
     distances = [scene.ray_intersect_preliminary(ray).t for scene in scenes]
     dr.eval(*distances)  # one launch

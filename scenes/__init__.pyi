@@ -1,10 +1,7 @@
 """The names of `import scenes`, and the modules that they come from."""
 
 from .input_files import read_building as read_building
-from .fenestration.systems import (
-    FenestrationSystem as FenestrationSystem,
-    read_system as read_system,
-)
+from .fenestration.systems import FenestrationSystem as FenestrationSystem, read_system as read_system
 from .fenestration.tilts import tilt_states as tilt_states
 from .input_files import read_weather as read_weather
 from .room.control_hour import ControlHour as ControlHour

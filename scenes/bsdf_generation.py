@@ -18,13 +18,7 @@ from mitsuba_cfs.bsdf.evaluate import klems_of
 from mitsuba_cfs.bsdf.fabric_table import FabricShade, named_fabric, read_fabric_table
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial, plastic
-from mitsuba_cfs.bsdf.screens import (
-    fabric_klems,
-    perforated_screen,
-    pleated_shade,
-    prism_panel,
-    woven_screen,
-)
+from mitsuba_cfs.bsdf.screens import fabric_klems, perforated_screen, pleated_shade, prism_panel, woven_screen
 from mitsuba_cfs.bsdf.shade_file import read_shade_file
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
@@ -77,13 +71,7 @@ def generated_file(
         exact = f"hemispherical values within {worst:.1e} (one standard error, worst)"
     else:
         systems, bound = generate_tensor_tree(
-            layer,
-            tensor_tree,
-            rank=3 if isotropic else 4,
-            samples=paths,
-            cull=cull,
-            seed=seed,
-            progress=progress,
+            layer, tensor_tree, rank=3 if isotropic else 4, samples=paths, cull=cull, seed=seed, progress=progress
         )
         leaves = sum(len(tree.values) for tree in systems[0].blocks().values())
         merged = f"{100 * bound:.0f} % and three" if bound else "three"
@@ -98,9 +86,7 @@ def generated_file(
     return file, exact
 
 
-def fabric_file(
-    *, fabrics: Path | None, fabric: str | None, basis: str, name: str
-) -> tuple[BsdfFile, str]:
+def fabric_file(*, fabrics: Path | None, fabric: str | None, basis: str, name: str) -> tuple[BsdfFile, str]:
     """The BSDF file of a fabric in a table (`read_fabric_table`), and what is to be said of it."""
     _needed("fabric", fabrics=fabrics)
     shades, notes = read_fabric_table(fabrics)
@@ -248,10 +234,7 @@ def combined_file(paths: Sequence[Path], name: str = "") -> tuple[BsdfFile, pd.D
     for band in bands:
         system = combine_layers([klems_of(file.band(band)) for file in files])
         systems[band] = system.bsdf
-        for side, shares in (
-            ("front", system.absorptance_front),
-            ("back", system.absorptance_back),
-        ):
+        for side, shares in (("front", system.absorptance_front), ("back", system.absorptance_back)):
             layer, patch = np.indices(shares.shape)
             tables.append(
                 pd.DataFrame(

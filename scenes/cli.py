@@ -151,24 +151,27 @@ def _print_version(ctx: click.Context, _parameter: click.Parameter, wanted: bool
         ctx.exit()
 
 
-@click.group(
-    cls=LazyGroup,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-)
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.option("-v", "--verbose", count=True, help="Log progress (-v) or all details (-vv).")
 @click.option(
-    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version,
-    help="Print the version.",
-)  # fmt: skip
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version, help="Print the version."
+)
 @click.option(
-    "--device", type=click.Choice(["cpu", "cuda"]), envvar="CFS_DEVICE", default="cpu",
+    "--device",
+    type=click.Choice(["cpu", "cuda"]),
+    envvar="CFS_DEVICE",
+    default="cpu",
     show_default=True,
     help="Where rays are traced; docs/benchmarks.md has the tables that were compared on a GPU.",
-)  # fmt: skip
+)
 @click.option(
-    "--progress", type=click.Choice(["bar", "json"]), envvar="CFS_PROGRESS", default="bar",
-    show_default=True, help="Progress on standard error: bars or lines, or a JSON object a line.",
-)  # fmt: skip
+    "--progress",
+    type=click.Choice(["bar", "json"]),
+    envvar="CFS_PROGRESS",
+    default="bar",
+    show_default=True,
+    help="Progress on standard error: bars or lines, or a JSON object a line.",
+)
 def cfs(verbose: int, device: str, progress: str) -> None:
     """Daylight, glare, temperatures and comfort behind complex fenestration systems."""
     os.environ["CFS_DEVICE"] = device  # worker processes inherit it

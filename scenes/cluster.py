@@ -110,11 +110,7 @@ def _asked(requirements: Requirements) -> _Answer:
     return _Answer(worker.state.nthreads, requirements.missing(worker.memory_manager.memory_limit))
 
 
-def _attempted(
-    requirements: Requirements,
-    attempt: Callable[[T], tuple[R, BaseException | None]],
-    item: T,
-) -> _Answer:
+def _attempted(requirements: Requirements, attempt: Callable[[T], tuple[R, BaseException | None]], item: T) -> _Answer:
     """The answer to a task; on the worker."""
     result, error = attempt(item)
     if error is None:
@@ -222,9 +218,7 @@ class Cluster(Generic[T, R]):
     def _reconnect(self) -> list[tuple[T, R]]:
         """Connect to the scheduler that comes in place of one that ended; the tasks begin anew."""
         log.warning(
-            "the Dask scheduler %s has ended; waiting %.0f s for another one there",
-            self._address,
-            WAIT_SECONDS,
+            "the Dask scheduler %s has ended; waiting %.0f s for another one there", self._address, WAIT_SECONDS
         )
         self._client.close(timeout=CONNECT_SECONDS)
         self._attempts.clear()

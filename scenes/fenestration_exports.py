@@ -12,13 +12,7 @@ from bim.model import Space, Window
 from bim.to_energyplus import DEFAULT_G, DEFAULT_U
 from bim.to_radiance import FilledGroup
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
-from scenes.fenestration.resolver import (
-    held_systems,
-    source_notes,
-    stated_values,
-    window_sources,
-    windows_named,
-)
+from scenes.fenestration.resolver import held_systems, source_notes, stated_values, window_sources, windows_named
 from scenes.fenestration.systems import FenestrationSystem, WindowOverrides
 from scenes.fenestration.thermal_system import ThermalSystem, checked_system, window_optics
 from scenes.room.windows import room_windows
@@ -46,11 +40,7 @@ class KnownFenestration:
             for missing, names in self.unfilled.items()
         )
         further = f"{windows_named(self.several)}: only the first shading state is written."
-        return (
-            *source_notes(window_sources(filled, states)),
-            *none,
-            *([further] if self.several else []),
-        )
+        return (*source_notes(window_sources(filled, states)), *none, *([further] if self.several else []))
 
     def glazings(self) -> tuple[dict[str, ExportedGlazing], tuple[str, ...]]:
         """Data of each window by GUID as a run uses them, and a sentence on each assumption.
@@ -62,8 +52,7 @@ class KnownFenestration:
         notes = [note for one in heat.values() for note in one.notes]
         notes += [note for s in self.systems.values() for note in s.notes]
         exported = {
-            key: self._exported(system, heat[key])
-            for key, system in {id(s): s for s in self.systems.values()}.items()
+            key: self._exported(system, heat[key]) for key, system in {id(s): s for s in self.systems.values()}.items()
         }
         result = {guid: exported[id(system)] for guid, system in self.systems.items()}
         held = held_states(self.windows, self.file)

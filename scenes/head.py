@@ -117,10 +117,7 @@ def record_lines(record: Any, file: Path) -> tuple[str, ...]:
     """The lines of a head from its record in a JSON file; `DataError` where it is none."""
     head = validated(HeadRecord, record, file)
     issues = (
-        f"{label}: {one.text}"
-        for severity, label in LABELS.items()
-        for one in head.issues
-        if one.severity == severity
+        f"{label}: {one.text}" for severity, label in LABELS.items() for one in head.issues if one.severity == severity
     )
     return (*head.model, *issues, *(f"assumed: {text}" for text in head.assumed))
 
@@ -128,11 +125,7 @@ def record_lines(record: Any, file: Path) -> tuple[str, ...]:
 def joined(heads: Iterable[Head]) -> Head:
     """One head of several results, each line once."""
     heads = list(heads)
-    issues = {
-        (issue.code, issue.where, str(issue.values)): issue
-        for head in heads
-        for issue in head.issues
-    }
+    issues = {(issue.code, issue.where, str(issue.values)): issue for head in heads for issue in head.issues}
     return Head(
         _once(line for head in heads for line in head.model),
         tuple(issues.values()),
@@ -221,9 +214,7 @@ def model_notes(building: Building) -> tuple[str, ...]:
     """Why the model cannot be used, what was joined, and what no result depends on."""
     account = building.account
     verdict = account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
-    issues = (
-        issue for issue in building.issues if issue.severity == "unused" or issue.code in NOTED
-    )
+    issues = (issue for issue in building.issues if issue.severity == "unused" or issue.code in NOTED)
     return (*verdict, *map(issue_note, issues))
 
 
@@ -233,8 +224,7 @@ def unused_notes(building: Building) -> tuple[str, ...]:
     if not any(map(len, parts)) or building.file is None:
         return ()
     note = Note(
-        "{file} contains uses of rooms ({uses}), sensor grids ({grids}) and views ({views}); they "
-        "are not used here.",
+        "{file} contains uses of rooms ({uses}), sensor grids ({grids}) and views ({views}); they are not used here.",
         file=building.file.name,
         uses=len(building.uses),
         grids=len(building.grids),
@@ -252,9 +242,7 @@ def _once(lines: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(lines))
 
 
-def system_notes(
-    systems: Iterable[FenestrationSystem], *, light_only: bool = False
-) -> tuple[str, ...]:
+def system_notes(systems: Iterable[FenestrationSystem], *, light_only: bool = False) -> tuple[str, ...]:
     """What was assumed of fenestration systems: bands, see-through peaks, U, g and window model."""
     systems = list(systems)
     notes = [note for system in systems for note in (*system.notes, *peak_note(system))]

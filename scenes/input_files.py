@@ -10,13 +10,7 @@ from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 
-from bim.building_file import (
-    STAGES,
-    ReadOptions,
-    building_files,
-    check_building_file,
-    read_building_file,
-)
+from bim.building_file import STAGES, ReadOptions, building_files, check_building_file, read_building_file
 from bim.building_file import files_beside as building_files_beside
 from bim.model import Building
 from mitsuba_cfs.errors import DataError
@@ -31,13 +25,7 @@ from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, rea
 from scenes.fenestration.thermal_file import PEAK_SHARES, files_beside
 from scenes.fenestration.thermal_system import checked_system
 from scenes.input_options import InputOptions
-from scenes.room.operation import (
-    Operation,
-    check_schedules,
-    check_states,
-    check_systems,
-    read_operation,
-)
+from scenes.room.operation import Operation, check_schedules, check_states, check_systems, read_operation
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,9 +118,7 @@ def check_names(names: Sequence[str], field: str = "--space") -> None:
             raise DataError("expected the name or GUID of a room, got nothing", field=field)
 
 
-def read_weather(
-    path: str | PathLike[str], *, hourly: bool = True, temperatures: bool = True
-) -> Weather:
+def read_weather(path: str | PathLike[str], *, hourly: bool = True, temperatures: bool = True) -> Weather:
     """Weather of one year from an EPW file.
 
     Args: hourly: in steps of 1 h; temperatures: else a WEA file is read too, which has none.
@@ -152,8 +138,7 @@ def read_weather(
 def _of_wea(path: Path) -> Weather:
     """The weather of a WEA file, with a note of what it lacks."""
     note = Note(
-        "{file} states no dew point: that of Radiance's programs, {dew:.1f} °C, is used for the "
-        "luminous efficacy.",
+        "{file} states no dew point: that of Radiance's programs, {dew:.1f} °C, is used for the luminous efficacy.",
         file=path.name,
         dew=DEFAULT_DEW_POINT_C,
     )
@@ -161,9 +146,7 @@ def _of_wea(path: Path) -> Weather:
     return replace(weather, notes=(*weather.notes, note))
 
 
-def read_override(
-    options: InputOptions, *, heat: bool, by: str = "--cfs"
-) -> FenestrationSystem | None:
+def read_override(options: InputOptions, *, heat: bool, by: str = "--cfs") -> FenestrationSystem | None:
     """The system of `options.system` for every window.
 
     Args: heat: whether its U, g and BSDF must go together; by: as of `read_system`.
@@ -194,9 +177,14 @@ def overrides_of(
         raise DataError(f"expected more than 0, at most 1, got {tau:g}", field="--tau")
     see_through = tuple(map(peak_share, options.see_through))
     return WindowOverrides(
-        states, options.u_value, options.g_value, light_only=light_only,
-        visible=tau, glazing=options.glazing, see_through=see_through,
-    )  # fmt: skip
+        states,
+        options.u_value,
+        options.g_value,
+        light_only=light_only,
+        visible=tau,
+        glazing=options.glazing,
+        see_through=see_through,
+    )
 
 
 def peak_share(text: str) -> tuple[str, float]:
@@ -244,9 +232,14 @@ def read_building(
     """
     first, *linked = building_files([path] if isinstance(path, str | PathLike) else path)
     read = ReadOptions(
-        tuple(join), furniture, tuple(apertures), tuple(map(Path, surroundings)),
-        surroundings_offset, tuple(facade_panes), tuple(linked),
-    )  # fmt: skip
+        tuple(join),
+        furniture,
+        tuple(apertures),
+        tuple(map(Path, surroundings)),
+        surroundings_offset,
+        tuple(facade_panes),
+        tuple(linked),
+    )
     return read_building_file(first, read, summed(progress, "inputs", STAGES))
 
 

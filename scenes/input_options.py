@@ -34,9 +34,7 @@ class InputOptions:
     see_through: tuple[str, ...] = ()  # FILE=specular, lobe or a share, see `input_files`
     operation: Path | None = None  # shading control, gains, set points
     linked: tuple[Path, ...] = ()  # further files of the same building: facade, structure, site
-    only_storeys: tuple[
-        str, ...
-    ] = ()  # that are read of a large model, with the next ones; none: all
+    only_storeys: tuple[str, ...] = ()  # that are read of a large model, with the next ones; none: all
 
     @property
     def read(self) -> ReadOptions:
@@ -44,10 +42,16 @@ class InputOptions:
         from bim.building_file import ReadOptions  # no `--help` needs a reader
 
         return ReadOptions(
-            tuple(self.join), self.furniture, tuple(self.apertures),
-            tuple(map(Path, self.surroundings)), self.surroundings_offset, tuple(self.facade_panes),
-            tuple(map(Path, self.linked)), tuple(self.spaces), tuple(self.only_storeys),
-        )  # fmt: skip
+            tuple(self.join),
+            self.furniture,
+            tuple(self.apertures),
+            tuple(map(Path, self.surroundings)),
+            self.surroundings_offset,
+            tuple(self.facade_panes),
+            tuple(map(Path, self.linked)),
+            tuple(self.spaces),
+            tuple(self.only_storeys),
+        )
 
     @property
     def rooms(self) -> tuple[str, ...]:

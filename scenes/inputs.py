@@ -60,9 +60,7 @@ class Inputs:
     @property
     def used_systems(self) -> list[FenestrationSystem]:
         """Each system of the windows once."""
-        return list(
-            {id(state): state for states in self.systems.values() for state in states}.values()
-        )
+        return list({id(state): state for states in self.systems.values() for state in states}.values())
 
     @property
     def sources(self) -> list[dict[str, Any]]:
@@ -74,9 +72,8 @@ class Inputs:
     def head(self) -> Head:
         """What was left out, what was assumed, and how much it matters."""
         return head_of(
-            self.building, self.spaces, self.systems, self.weather,
-            notes=self.notes, light_only=self.light_only,
-        )  # fmt: skip
+            self.building, self.spaces, self.systems, self.weather, notes=self.notes, light_only=self.light_only
+        )
 
     @property
     def files(self) -> dict[str, Path]:
@@ -85,10 +82,7 @@ class Inputs:
 
 
 def read_inputs(
-    options: InputOptions,
-    files: InputFiles | None = None,
-    progress: Progress = silent,
-    **chosen: Any,
+    options: InputOptions, files: InputFiles | None = None, progress: Progress = silent, **chosen: Any
 ) -> Inputs:
     """The inputs of a command from its options: the building is read last.
 
@@ -137,9 +131,7 @@ def inputs_of(
     if rooms == "all":
         spaces = named_spaces(building, options.rooms, file)
     else:
-        spaces = chosen_spaces(
-            building, options.rooms, file, lambda s: bool(s.windows or beyond.get(s.guid))
-        )
+        spaces = chosen_spaces(building, options.rooms, file, lambda s: bool(s.windows or beyond.get(s.guid)))
     spaces = spaces[:1] if rooms == "first" else spaces
     traced = {s.guid: s for space in spaces for s in (space, *beyond.get(space.guid, ()))}
     windows = [window for space in traced.values() for window in space.windows]
@@ -161,10 +153,7 @@ def inputs_of(
     building = traced_building(building, systems)
     weather = with_albedo(files.weather, options.albedo)
     weather = weather if operation is None else operation.outdoors(weather)
-    return Inputs(
-        building, spaces, weather, systems, used, options, filled,
-        notes, overrides.light_only,
-    )  # fmt: skip
+    return Inputs(building, spaces, weather, systems, used, options, filled, notes, overrides.light_only)
 
 
 def outdoor_inputs(
@@ -186,9 +175,14 @@ def outdoor_inputs(
     if options.building is None:
         raise ValueError("elements are selected in a building's file")
     building, chosen = read_elements(
-        options.building, select, options=options.read, leave_out=leave_out,
-        reflectance=reflectance, selected_in=file or "", progress=progress,
-    )  # fmt: skip
+        options.building,
+        select,
+        options=options.read,
+        leave_out=leave_out,
+        reflectance=reflectance,
+        selected_in=file or "",
+        progress=progress,
+    )
     weather = with_albedo(files.weather, options.albedo)
     return Inputs(building, (), weather, {}, files.operation, options), chosen
 
@@ -204,10 +198,7 @@ def every_state(systems: Systems) -> Systems:
 
 
 def _unstated(
-    operation: Operation | None,
-    used: Operation | None,
-    building: Building,
-    heat_of: RoomOptions | None,
+    operation: Operation | None, used: Operation | None, building: Building, heat_of: RoomOptions | None
 ) -> tuple[str, ...]:
     """A sentence on gains and leaks that neither the operation nor the building states."""
     if operation is not None:
@@ -220,24 +211,15 @@ def _unstated(
 
 
 def _state_notes(
-    options: InputOptions,
-    operation: Operation | None,
-    filled: Systems,
-    systems: Systems,
-    building: Building,
+    options: InputOptions, operation: Operation | None, filled: Systems, systems: Systems, building: Building
 ) -> tuple[str, ...]:
     """A sentence where windows have more states than are used."""
     if operation is not None and operation.systems and options.system is not None:
         name = operation.file.name
-        note = Note(
-            "--cfs sets the fenestration of the windows; [[system]] of {file} is not used.",
-            file=name,
-        )
+        note = Note("--cfs sets the fenestration of the windows; [[system]] of {file} is not used.", file=name)
         return (note,)
     several = [
-        states[0].name
-        for guid, states in filled.items()
-        if operation is None and len(systems[guid]) == 1 < len(states)
+        states[0].name for guid, states in filled.items() if operation is None and len(systems[guid]) == 1 < len(states)
     ]
     if not several:
         return ()

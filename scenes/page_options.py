@@ -20,9 +20,21 @@ from scenes.toml_file import TomlTable, read_table, validated
 # Optional sections of a page, by their names in a file; those of a room apply to each room.
 # Assumptions and notes are always shown: figures without them mislead.
 RunSection = Literal[
-    "verdict", "orientation", "rooms", "daylight", "glare", "spectral", "operation",
-    "temperatures", "glazing", "model", "problems", "method", "inputs", "glossary",
-]  # fmt: skip
+    "verdict",
+    "orientation",
+    "rooms",
+    "daylight",
+    "glare",
+    "spectral",
+    "operation",
+    "temperatures",
+    "glazing",
+    "model",
+    "problems",
+    "method",
+    "inputs",
+    "glossary",
+]
 StudySection = Literal["verdict", "comparison", "model", "problems", "method", "inputs", "glossary"]
 DossierSection = Literal["rooms", "problems", "sources"]
 GlareSection = Literal["worst", "seats", "views"]

@@ -107,9 +107,7 @@ def _luminance(pixels: NDArray[Any]) -> NDArray[Any]:
     return pixels if pixels.ndim == 2 else EFFICACY * (pixels @ np.asarray(LUMINANCE_WEIGHTS))
 
 
-def _tone_curve(
-    luminance: NDArray[Any], white: float | None = None
-) -> Callable[[NDArray[Any]], NDArray[Any]]:
+def _tone_curve(luminance: NDArray[Any], white: float | None = None) -> Callable[[NDArray[Any]], NDArray[Any]]:
     """What luminance becomes in a print of the picture, 0..1; see `tone_mapped`."""
     lit = luminance[luminance > 0]
     if not lit.size:
@@ -132,9 +130,7 @@ def _srgb(linear: NDArray[Any]) -> NDArray[np.uint8]:
     return (255 * curve + 0.5).astype(np.uint8)
 
 
-def write_tone_mapped(
-    path: Path, pixels: NDArray[Any], *, scale: bool = False, title: str = ""
-) -> None:
+def write_tone_mapped(path: Path, pixels: NDArray[Any], *, scale: bool = False, title: str = "") -> None:
     """Write radiance [ny, nx, 3] or luminance [ny, nx] as a picture for the eye (PNG).
 
     Args:
@@ -173,10 +169,7 @@ def source_colours(count: int) -> NDArray[np.float64]:
 
 
 def check_radiance(
-    result: GlareResult,
-    uniform: tuple[float, float, float] | None = None,
-    *,
-    show_task: bool = False,
+    result: GlareResult, uniform: tuple[float, float, float] | None = None, *, show_task: bool = False
 ) -> NDArray[np.float64]:
     """Radiance [ny, nx, 3] of a check picture: grey, sources coloured, every luminance kept.
 

@@ -39,9 +39,7 @@ class Limits:
                 break
         raise ValueError(text)
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """The number as its type says, then within the bounds."""
         return core_schema.no_info_after_validator_function(self.checked, handler(source))
 

@@ -76,9 +76,7 @@ def _worst(year: RoomYear) -> float:
     return year.glare.worst if year.annual_glare is None else float(year.annual_glare["dgp"].max())
 
 
-def _carpet(
-    times: pd.DatetimeIndex, values: np.ndarray, label: str, top: float, axes: Axes | None
-) -> Axes:
+def _carpet(times: pd.DatetimeIndex, values: np.ndarray, label: str, top: float, axes: Axes | None) -> Axes:
     """Values [H] as colours: days to the right, hours of the day upwards."""
     from matplotlib.dates import date2num
 
@@ -86,9 +84,8 @@ def _carpet(
     grid = day_grid(times, values)
     first = date2num(times[0].normalize())
     image = axes.imshow(
-        grid, extent=(first, first + grid.shape[1], 0, 24), aspect="auto", vmin=0, vmax=top,
-        interpolation="nearest",
-    )  # fmt: skip
+        grid, extent=(first, first + grid.shape[1], 0, 24), aspect="auto", vmin=0, vmax=top, interpolation="nearest"
+    )
     _show_dates(axes)
     axes.set_yticks(range(0, 25, 6))
     axes.set_ylabel("hour")
@@ -128,10 +125,7 @@ def plot_hemispheres(bsdf: Bsdf, incident: NDArray[np.float64], title: str) -> F
     half = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
     outwards = 1.0 if incident[2] > 0 else -1.0
     sides = {"reflected": outwards, "transmitted": -outwards}
-    values = {
-        kind: bsdf_values(bsdf, incident, half * [1, 1, sign]).reshape(t.shape)
-        for kind, sign in sides.items()
-    }
+    values = {kind: bsdf_values(bsdf, incident, half * [1, 1, sign]).reshape(t.shape) for kind, sign in sides.items()}
     highest = max(value.max() for value in values.values())
     norm = LogNorm(max(highest, 1e-9) / 10**DECADES, max(highest, 1e-9))
     figure = Figure(figsize=(11, 5.4), layout="constrained", dpi=130)
@@ -140,9 +134,7 @@ def plot_hemispheres(bsdf: Bsdf, incident: NDArray[np.float64], title: str) -> F
     rings = np.arange(0, 90 + THETA_STEP_DEG, THETA_STEP_DEG)
     for axis, (kind, value) in zip(axes, values.items(), strict=True):
         share = direct_hemispherical(bsdf, _block(kind, outwards), incident)[0]
-        shown = axis.pcolormesh(
-            edges, rings, np.maximum(value, norm.vmin), norm=norm, cmap="inferno", shading="flat"
-        )
+        shown = axis.pcolormesh(edges, rings, np.maximum(value, norm.vmin), norm=norm, cmap="inferno", shading="flat")
         axis.set_title(f"{kind}: {100 * share:.1f} %")
         axis.set_yticks([30, 60, 90], ["30°", "60°", "90°"], color="grey")
         axis.set_xticks(np.radians([0, 90, 180, 270]), ["right", "up", "left", "down"])

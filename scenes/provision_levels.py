@@ -44,7 +44,6 @@ def level_number(provision: DaylightProvision) -> int:
     met = [
         number
         for number, level in enumerate(provision_levels(), 1)
-        if provision.target_illuminance >= level.target
-        and provision.minimum_illuminance >= level.minimum
+        if provision.target_illuminance >= level.target and provision.minimum_illuminance >= level.minimum
     ]
     return max(met, default=0)

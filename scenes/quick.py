@@ -8,8 +8,7 @@ from typing import Any
 from scenes.language.catalogue import N_
 
 NOTE = N_(
-    "Quick run: few rays, few sensors, small pictures. This is a preview; run without --quick for "
-    "reliable results."
+    "Quick run: few rays, few sensors, small pictures. This is a preview; run without --quick for reliable results."
 )
 
 ROOM = {  # by the names of `scenes.room.options.NAMES`: `cfs run` and `cfs study`
@@ -29,10 +28,15 @@ VIEWS = {"size": 200, "samples": 8, "worst": 1}  # of `scenes.year_of_glare.opti
 HEAT = {
     name: ROOM[name]
     for name in (
-        "picture_size", "picture_samples", "sensor_spacing", "sensor_samples", "patch_samples",
-        "sun_points", "path_samples",
+        "picture_size",
+        "picture_samples",
+        "sensor_spacing",
+        "sensor_samples",
+        "patch_samples",
+        "sun_points",
+        "path_samples",
     )
-}  # fmt: skip
+}
 PV = {"samples": 512}  # of `scenes.photovoltaics.study.run_pv`
 
 

@@ -17,16 +17,7 @@ from importlib import metadata
 from pathlib import Path, PurePosixPath
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import (
-    TEMPORARY,
-    json_text,
-    reason,
-    remove_stale,
-    stale,
-    taken,
-    temporary_folder,
-    write_text,
-)
+from mitsuba_cfs.files import TEMPORARY, json_text, reason, remove_stale, stale, taken, temporary_folder, write_text
 
 MARK, PROGRAM, FORMAT = "cfs-results.json", "mitsuba-cfs", 1
 RENAMED = {"ifc export": "export"}  # commands by their earlier names, which marks may have
@@ -58,9 +49,13 @@ class FolderMark:
     def write(self, folder: Path) -> None:
         """Write the mark into its folder."""
         record = {
-            "program": PROGRAM, "format": FORMAT, "version": metadata.version(PROGRAM),
-            "command": self.command, "files": sorted(self.files), "removed": sorted(self.removed),
-        }  # fmt: skip
+            "program": PROGRAM,
+            "format": FORMAT,
+            "version": metadata.version(PROGRAM),
+            "command": self.command,
+            "files": sorted(self.files),
+            "removed": sorted(self.removed),
+        }
         write_text(folder / MARK, json_text(record, indent=1, ensure_ascii=False) + "\n")
 
 
@@ -180,17 +175,13 @@ class ResultFolder:
             raise self._error("is or contains the current folder: name one for results alone")
         for one in inputs:
             if one is not None and Path(os.path.realpath(one)).is_relative_to(self._place):
-                raise self._error(
-                    f"is or contains the input {one}: name a folder for results alone"
-                )
+                raise self._error(f"is or contains the input {one}: name a folder for results alone")
 
     def _take(self) -> None:
         """Have the folder for this process, as long as this object exists."""
         release = taken(self._place)
         if release is None:
-            raise self._error(
-                "another run of cfs is writing there: wait for it, or name another folder"
-            )
+            raise self._error("another run of cfs is writing there: wait for it, or name another folder")
         weakref.finalize(self, release)
 
     def _finish_cut_off(self) -> None:
@@ -206,13 +197,9 @@ class ResultFolder:
         """The mark of the earlier results, or an empty one."""
         mark = FolderMark.read(self._place)
         if mark is None:
-            others = self._place.is_dir() and any(
-                not TEMPORARY.fullmatch(one.name) for one in self._place.iterdir()
-            )
+            others = self._place.is_dir() and any(not TEMPORARY.fullmatch(one.name) for one in self._place.iterdir())
             if others and not self._among:
-                raise self._error(
-                    f"holds other files (and no {MARK} of earlier results): name another folder"
-                )
+                raise self._error(f"holds other files (and no {MARK} of earlier results): name another folder")
             return FolderMark(self._command)
         if mark.command != self._command:
             raise self._error(f"holds results of `cfs {mark.command}`: name another folder")
@@ -250,9 +237,7 @@ class ResultFolder:
         while (aside := self._place / f"results-{number}").exists():
             number += 1
         part.replace(aside)
-        raise self._error(
-            f"holds {name}, which no earlier run wrote; the new results are in {aside.name}"
-        )
+        raise self._error(f"holds {name}, which no earlier run wrote; the new results are in {aside.name}")
 
     @contextmanager
     def _named(self, part: Path) -> Iterator[None]:
@@ -263,9 +248,7 @@ class ResultFolder:
             if error.file is None or not Path(error.file).is_relative_to(part):
                 raise
             file = self.folder / Path(error.file).relative_to(part)
-            raise DataError(
-                error.message, file=file, element=error.element, field=error.field
-            ) from error
+            raise DataError(error.message, file=file, element=error.element, field=error.field) from error
         except OSError as error:
             if error.filename is None or not Path(error.filename).is_relative_to(part):
                 raise
@@ -321,9 +304,7 @@ def _files(folder: Path) -> Iterator[str]:
 def _taken(place: Path, name: str) -> bool:
     """Whether a name cannot be given to a result without touching something else."""
     path = place / name
-    folders = [
-        parent for parent in path.parents if parent.is_relative_to(place) and parent != place
-    ]
+    folders = [parent for parent in path.parents if parent.is_relative_to(place) and parent != place]
     return os.path.lexists(path) or any(os.path.lexists(p) and not p.is_dir() for p in folders)
 
 

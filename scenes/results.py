@@ -222,10 +222,7 @@ class ShadingYear:
                 "time": times[rows + 1],
                 "group": [self.groups[c] for c in columns],
                 "rule": [self.rules[c] for c in columns],
-                "moved_by": [
-                    self._reason(h + 1, c)
-                    for h, c in zip(rows.tolist(), columns.tolist(), strict=True)
-                ],
+                "moved_by": [self._reason(h + 1, c) for h, c in zip(rows.tolist(), columns.tolist(), strict=True)],
                 "from_state": self.states[rows, columns],
                 "to_state": self.states[rows + 1, columns],
             }
@@ -320,17 +317,12 @@ class RoomYear:
         Raises: `ValueError` for a year that was not computed by wavelength.
         """
         if self.spectral is None:
-            raise ValueError(
-                "the year was not computed by wavelength: simulate(..., spectral=True)"
-            )
+            raise ValueError("the year was not computed by wavelength: simulate(..., spectral=True)")
         return self.spectral.eye
 
     def __repr__(self) -> str:
         operative = self.heat.operative_c
-        figures = [
-            f"DA {self.daylight.da:.0f} %",
-            f"operative {operative.min():.1f} to {operative.max():.1f} degC",
-        ]
+        figures = [f"DA {self.daylight.da:.0f} %", f"operative {operative.min():.1f} to {operative.max():.1f} degC"]
         if self.glare.pictures:
             figures.insert(1, f"worst DGP {self.glare.worst:.2f}")
         return f"<{type(self).__name__} {self.space.label!r}: {', '.join(figures)}>"

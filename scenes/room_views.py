@@ -66,9 +66,7 @@ def held_view(building: Building, space: Space) -> NamedView | None:
     return NamedView(views[0].name, views[0].view) if views else None
 
 
-def eyes_of(
-    space: Space, grid: float | None, directions: int, eye_height: float, size: int
-) -> list[NamedView]:
+def eyes_of(space: Space, grid: float | None, directions: int, eye_height: float, size: int) -> list[NamedView]:
     """Fisheye views of eyes all over a room, or of one in its middle, in the directions of each.
 
     Args:
@@ -81,10 +79,7 @@ def eyes_of(
     if grid is not None:
         eyes, _ = sensor_grid(space, grid, eye_height, MARGIN)
     return [
-        NamedView(
-            f"eye{e + 1:03d}_{d + 1}",
-            fisheye(eye, turned(towards, 2 * np.pi * d / directions), size),
-        )
+        NamedView(f"eye{e + 1:03d}_{d + 1}", fisheye(eye, turned(towards, 2 * np.pi * d / directions), size))
         for e, eye in enumerate(eyes)
         for d in range(directions)
     ]

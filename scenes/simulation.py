@@ -42,9 +42,7 @@ class SimulatedYear(RoomYear):
     run: RunResult  # that it is the one room of; without it
     head: Head = NO_HEAD  # what was left out of the model, what was assumed
 
-    def write(
-        self, folder: str | PathLike[str], *, report: bool = True, netcdf: bool = False
-    ) -> None:
+    def write(self, folder: str | PathLike[str], *, report: bool = True, netcdf: bool = False) -> None:
         """Write the files of `cfs run` in the place of its earlier ones.
 
         Raises: `DataError` where the folder holds anything else, or cannot be written to.
@@ -129,9 +127,7 @@ def simulate(
     if isinstance(system, str | PathLike):
         system = read_system(system)
     check_type("weather", weather, Weather)
-    for name, value, kind in (
-        ("system", system, FenestrationSystem), ("operation", operation, Operation),
-    ):  # fmt: skip
+    for name, value, kind in (("system", system, FenestrationSystem), ("operation", operation, Operation)):
         if value is not None:
             check_type(name, value, kind)
     states = () if operation is None else operation.systems

@@ -35,10 +35,16 @@ WANTED = {
     "literal_error": "{expected}",
 }
 KINDS = {  # by the first word of "float_type", "float_parsing" and the like
-    "float": "a number", "int": "a whole number", "bool": "true or false", "string": "a text",
-    "path": "the path of a file", "tuple": "a list", "list": "a list", "dict": "a table",
+    "float": "a number",
+    "int": "a whole number",
+    "bool": "true or false",
+    "string": "a text",
+    "path": "the path of a file",
+    "tuple": "a list",
+    "list": "a list",
+    "dict": "a table",
     "model": "a table",
-}  # fmt: skip
+}
 
 
 class TomlTable(BaseModel):
@@ -120,11 +126,7 @@ def _message(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
 
 def _near(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
     """The choice that a wrong one most resembles."""
-    choices = [
-        str(c)
-        for alternative in _alternatives(_at(model, fault["loc"]))
-        for c in get_args(alternative)
-    ]
+    choices = [str(c) for alternative in _alternatives(_at(model, fault["loc"])) for c in get_args(alternative)]
     near = get_close_matches(str(fault["input"]), choices, n=1)
     return f"; did you mean {near[0]!r}?" if near else ""
 
@@ -182,19 +184,11 @@ class OutdoorTable(TomlTable):
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     # of the ground: a number, twelve by month, "file" (the weather's albedo) or "snow" (its depth)
     albedo: (
-        Share
-        | Annotated[tuple[Share, ...], Field(min_length=12, max_length=12)]
-        | Literal["file", "snow"]
-        | None
+        Share | Annotated[tuple[Share, ...], Field(min_length=12, max_length=12)] | Literal["file", "snow"] | None
     ) = None
 
 
 def read_options(*tables: TomlTable) -> dict[str, object]:
     """The keys of these tables as options of `InputOptions`."""
     names = (*ReadTable.model_fields, *OutdoorTable.model_fields)
-    return {
-        name: getattr(table, name)
-        for table in tables
-        for name in names
-        if name in type(table).model_fields
-    }
+    return {name: getattr(table, name) for table in tables for name in names if name in type(table).model_fields}

@@ -91,14 +91,10 @@ def room_picture(
     radiance = None
     if options.colour:
         steps = part(progress, end, 1.0, "colour")
-        radiance = coloured_picture(
-            luminance, viewed.bands, viewed.tinted, sky, 0, sampling=sampling, progress=steps
-        )
+        radiance = coloured_picture(luminance, viewed.bands, viewed.tinted, sky, 0, sampling=sampling, progress=steps)
     middle = weather.midpoints[hour]
     notes = (*viewed.leaks(), *([] if rated is None else _as_lobe(light, viewed)))
-    return RoomPicture(
-        luminance, view, viewed.space.label, middle, inputs.head, notes, rated, radiance
-    )
+    return RoomPicture(luminance, view, viewed.space.label, middle, inputs.head, notes, rated, radiance)
 
 
 def _as_lobe(light: PathLight, viewed: ViewedRoom) -> tuple[str, ...]:

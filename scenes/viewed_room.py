@@ -28,9 +28,7 @@ class ViewedRoom:
     seasons: tuple[Season, ...]  # surroundings outdoors by months
     scenes: tuple[DaylightScene, ...]  # of each season
     bands: tuple[DaylightScene, ...] = ()  # the first scene by red, green and blue
-    tinted: tuple[
-        Sequence[Sequence[SystemOptics]], ...
-    ] = ()  # the optics by red, green and blue [3][G][1]
+    tinted: tuple[Sequence[Sequence[SystemOptics]], ...] = ()  # the optics by red, green and blue [3][G][1]
 
     @property
     def scene(self) -> DaylightScene:
@@ -43,11 +41,7 @@ class ViewedRoom:
 
 
 def viewed_room(
-    inputs: Inputs,
-    view_of: Callable[[Building, Space], View],
-    *,
-    colour: bool = False,
-    month: int | None = None,
+    inputs: Inputs, view_of: Callable[[Building, Space], View], *, colour: bool = False, month: int | None = None
 ) -> ViewedRoom:
     """The first room of the inputs, in the visible band.
 
@@ -65,10 +59,7 @@ def viewed_room(
     visible, *bands = band_scenes(
         times[0].building, room, windows.groups, view, ("visible", *(COLOURS if colour else ()))
     )
-    others = (
-        band_scenes(season.building, room, windows.groups, view, ("visible",))[0]
-        for season in times[1:]
-    )
+    others = (band_scenes(season.building, room, windows.groups, view, ("visible",))[0] for season in times[1:])
     changed = as_lobes(windows.systems)
     lobes = None if changed is None else replace(windows, systems=changed).optics()
     optics = windows.optics()

@@ -11,14 +11,7 @@ import logging
 import pickle
 from collections import defaultdict, deque
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    CancelledError,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
@@ -224,9 +217,7 @@ class _Crew(Generic[T]):
         ready, _ = wait(self.at_work, return_when=FIRST_COMPLETED)
         if any(map(_lost, ready)):  # then no other task of this pool ends
             ready, _ = wait(self.at_work)
-        items = {
-            future: self.at_work.pop(future) for future in list(self.at_work) if future in ready
-        }
+        items = {future: self.at_work.pop(future) for future in list(self.at_work) if future in ready}
         done = [(item, future.result) for future, item in items.items() if not _lost(future)]
         return done, [item for future, item in items.items() if _lost(future)]
 

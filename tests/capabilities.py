@@ -79,10 +79,12 @@ def _keys() -> Iterator[Capability]:
     models = {one for one in models if "[" not in one.__name__}
     models = {one for one in models if all("[" in sub.__name__ for sub in one.__subclasses__())}
     inner = {
-        held for one in models for field in one.model_fields.values()
+        held
+        for one in models
+        for field in one.model_fields.values()
         for held in _types(field.annotation)
         if isinstance(held, type) and issubclass(held, BaseModel)
-    }  # fmt: skip
+    }
 
     def walk(model: Any, path: str, above: frozenset[Any]) -> Iterator[Capability]:
         for key, field in model.model_fields.items():
@@ -190,9 +192,10 @@ def mentioned(kind: str, name: str, repository: Path = REPOSITORY) -> str:
     """A test file that mentions the capability, the one that does so most often; or nothing."""
     patterns = [re.compile(pattern) for pattern in _patterns(kind, name)]
     counts = {
-        file: len(patterns[0].findall(text)) for file, text in _tests(repository).items()
+        file: len(patterns[0].findall(text))
+        for file, text in _tests(repository).items()
         if all(pattern.search(text) for pattern in patterns)
-    }  # fmt: skip
+    }
     if counts:
         return max(counts, key=lambda file: (counts[file], file))
     shared = kind == "option" and len(patterns) > 1  # an option that other commands have too
@@ -230,9 +233,7 @@ def renamed(capability: Capability, renames: dict[str, str]) -> Capability | Non
     return capability
 
 
-def missing(
-    before: Iterable[Capability], now: Iterable[Capability], renames: dict[str, str]
-) -> list[Capability]:
+def missing(before: Iterable[Capability], now: Iterable[Capability], renames: dict[str, str]) -> list[Capability]:
     """Capabilities of a stored list that are there neither by name nor by a rename."""
     there = set(now)
     expected = ((one, renamed(one, renames)) for one in before)
@@ -246,8 +247,7 @@ def read_renames() -> dict[str, str]:
 
 def compared(before: dict[Capability, str], now: dict[Capability, str]) -> str:
     """A table by kind: how many there were and are, and how many of them a test mentions."""
-    lines = ["| kind | before | mentioned by a test | now | mentioned by a test |",
-             "|---|---|---|---|---|"]  # fmt: skip
+    lines = ["| kind | before | mentioned by a test | now | mentioned by a test |", "|---|---|---|---|---|"]
     for kind in sorted({kind for kind, _ in {*before, *now}}):
         counts = []
         for listed in (before, now):
@@ -272,8 +272,10 @@ def main(arguments: list[str]) -> int:
         return bool(gone)
     repository = options.repository.resolve()
     if repository != REPOSITORY:  # its own packages, in a Python of its own
-        code = ("import runpy, sys; sys.path.insert(0, sys.argv[1]); "
-                "m = runpy.run_path(sys.argv[2]); m['show'](m['Path'](sys.argv[1]))")  # fmt: skip
+        code = (
+            "import runpy, sys; sys.path.insert(0, sys.argv[1]); "
+            "m = runpy.run_path(sys.argv[2]); m['show'](m['Path'](sys.argv[1]))"
+        )
         command = [sys.executable, "-P", "-c", code, str(repository), __file__]
         return subprocess.run(command, check=False, cwd=repository).returncode
     show(repository)

@@ -19,9 +19,17 @@ WAIT = 120  # [s] for an answer: the processor may be shared with many
 CLOSING = 5  # [s] for the browser to end by itself
 LEFT = ("navigated or closed", "Cannot find context", "context was destroyed")  # the page asked
 KEYS = {
-    "ArrowRight": 39, "ArrowLeft": 37, "ArrowDown": 40, "ArrowUp": 38, " ": 32, "Tab": 9,
-    "Enter": 13, "Escape": 27, "PageUp": 33, "PageDown": 34,
-}  # fmt: skip
+    "ArrowRight": 39,
+    "ArrowLeft": 37,
+    "ArrowDown": 40,
+    "ArrowUp": 38,
+    " ": 32,
+    "Tab": 9,
+    "Enter": 13,
+    "Escape": 27,
+    "PageUp": 33,
+    "PageDown": 34,
+}
 
 
 def chromium() -> str | None:
@@ -40,17 +48,29 @@ class Page:
         if browser is None:
             raise FileNotFoundError("no Chromium on this machine")
         command = [
-            browser, "--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run",
-            "--disable-background-networking", "--disable-component-update", "--disable-sync",
-            f"--user-data-dir={folder / 'profile'}", f"--window-size={width},{height}",
-            "--remote-debugging-pipe", *flags, "about:blank",
-        ]  # fmt: skip
+            browser,
+            "--headless=new",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+            f"--user-data-dir={folder / 'profile'}",
+            f"--window-size={width},{height}",
+            "--remote-debugging-pipe",
+            *flags,
+            "about:blank",
+        ]
         # Chromium reads from 3 and writes to 4; dash knows no descriptor above 9
         shell = ["bash", "-c", f'exec "$@" 3<&{to_read} 4>&{to_write}', "bash", *map(str, command)]
         self._process = subprocess.Popen(
-            shell, pass_fds=(to_read, to_write), stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL, start_new_session=True,
-        )  # fmt: skip
+            shell,
+            pass_fds=(to_read, to_write),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
         os.close(to_read)
         os.close(to_write)
         self._number, self._rest, self._session = 0, b"", ""
@@ -76,9 +96,7 @@ class Page:
     def __enter__(self) -> Page:
         return self
 
-    def __exit__(
-        self, kind: type | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type | None, value: BaseException | None, trace: TracebackType | None) -> None:
         self.close()
 
     def close(self) -> None:
@@ -138,9 +156,7 @@ class Page:
 
     def value(self, expression: str) -> Any:
         """What JavaScript gives, awaited."""
-        found = self.send(
-            "Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True
-        )
+        found = self.send("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
         if "exceptionDetails" in found:
             raise AssertionError(found["exceptionDetails"]["exception"]["description"])
         return found["result"].get("value")

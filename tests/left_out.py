@@ -11,20 +11,21 @@ BRINGS_IN = [  # what a reason looks like, and what would bring its tests in
     (r"nbclient", "pip install '.[notebooks]'"),
     (r"axe-core", "pip install --no-deps axe-playwright-python==0.1.8 (`make test` does)"),
     (r"\.\./shared/data", "a folder ../shared/data with real IFC, EPW, BSDF and HDR files"),
-    (r"\.\./shared/reference", "a folder ../shared/reference with results of EnergyPlus and "
-                               "ASHRAE 140's example programs"),
+    (
+        r"\.\./shared/reference",
+        "a folder ../shared/reference with results of EnergyPlus and ASHRAE 140's example programs",
+    ),
     (r"xarray|h5netcdf", "pip install -c constraints.txt '.[netcdf]'"),
     (r"pyproj", "pip install -c constraints.txt '.[georeference]'"),
     (r"pyradiance|Radiance|rfluxmtx|evalglare|no \w+$", PEERS),
     (r"pywincalc|the engine failed", f"{PEERS}; pywincalc has wheels for Python up to 3.12"),
     (r"pyenergyplus|EnergyPlus", PEERS),
     (r"distributed", PEERS),
-    (r"Chromium",
-     "a Chromium on the path (Debian: apt-get install chromium; as root `make test` does)"),
+    (r"Chromium", "a Chromium on the path (Debian: apt-get install chromium; as root `make test` does)"),
     (r"no disk can be mounted", "running as root where a small file system can be mounted"),
     (r"no LLVM 15 or 16", "an LLVM 15 or 16 beside the good one, and x86"),
     (r"Linux|linux|SIGKILL", "Linux"),
-]  # fmt: skip
+]
 UNKNOWN = "not known: say it in tests/left_out.py"
 
 
@@ -45,10 +46,7 @@ def left_out_lines(reasons: Iterable[str], deselected: int) -> list[str]:
     for reason in reasons:
         found[brings_in(reason)] += 1
         said.setdefault(brings_in(reason), reason)
-    lines = [
-        f"{count} left out ({said[means]}); brought in by: {means}"
-        for means, count in found.most_common()
-    ]
+    lines = [f"{count} left out ({said[means]}); brought in by: {means}" for means, count in found.most_common()]
     if deselected:
         lines.append(f"{deselected} left out by -m or -k; brought in by: make test-all")
     return lines

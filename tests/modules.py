@@ -73,9 +73,7 @@ def measures() -> dict[str, int]:
         "lines that are empty": lines.count(""),
         "lines of docstrings": docstrings,
         "lines with `# fmt: skip`": sum("# fmt: skip" in line for line in lines),
-        "modules with a single importer": sum(
-            len(of) == 1 for name, of in importers.items() if name not in packages
-        ),
+        "modules with a single importer": sum(len(of) == 1 for name, of in importers.items() if name not in packages),
         "lines of imports": statements,
         "modules in the longest chain of imports": max(depth.values()),
     }

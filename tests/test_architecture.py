@@ -34,19 +34,26 @@ TRACING = (
 SOLVERS = tuple(
     f"mitsuba_cfs/methods/{name}.py"
     for name in (
-        "coefficients", "colour_view", "glare", "light", "optics", "phase_light",
-        "phase_matrices", "phase_pictures", "point_in_time", "reflected_sun", "standard_error",
-        "spectral_light", "sun_by_patches", "view_cache", "window_reflection",
+        "coefficients",
+        "colour_view",
+        "glare",
+        "light",
+        "optics",
+        "phase_light",
+        "phase_matrices",
+        "phase_pictures",
+        "point_in_time",
+        "reflected_sun",
+        "standard_error",
+        "spectral_light",
+        "sun_by_patches",
+        "view_cache",
+        "window_reflection",
     )
-)  # fmt: skip
+)
 IFC = ("bim/ifc/", "scenes/demo/")
 PLOTTING = ("scenes/",)
-LIMITED = {
-    "mitsuba": TRACING,
-    "drjit": TRACING,
-    "ifcopenshell": IFC,
-    "matplotlib": PLOTTING,
-}
+LIMITED = {"mitsuba": TRACING, "drjit": TRACING, "ifcopenshell": IFC, "matplotlib": PLOTTING}
 LONGEST_MODULE = 800  # advice: one subject; a module with a single importer belongs on its page
 CATCH_ALL_NAMES = {"utils.py", "util.py", "common.py", "helpers.py", "misc.py"}
 

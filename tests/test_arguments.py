@@ -44,7 +44,9 @@ CASES: list[tuple[str, Callable, str, tuple]] = [
         (make.__name__, _slats(make), name, bad)
         for make in (cfs.venetian_blind, vertical_louvre)
         for name, bad in (
-            ("depth", (*NEGATIVE, 0)), ("spacing", (*NEGATIVE, 0)), ("thickness", NEGATIVE),
+            ("depth", (*NEGATIVE, 0)),
+            ("spacing", (*NEGATIVE, 0)),
+            ("thickness", NEGATIVE),
             ("tilt", RADIANS),
         )
     ),
@@ -52,32 +54,44 @@ CASES: list[tuple[str, Callable, str, tuple]] = [
     *(("SlatMaterial", _sheet, name, SHARE) for name in ("specular", "straight", "pane")),
     *(
         ("Sampling", cfs.Sampling, name, COUNT)
-        for name in ("sensor_samples", "patch_samples", "sun_points", "view_samples",
-                     "outdoor_samples", "picture_samples", "hour_samples", "subdivision")
+        for name in (
+            "sensor_samples",
+            "patch_samples",
+            "sun_points",
+            "view_samples",
+            "outdoor_samples",
+            "picture_samples",
+            "hour_samples",
+            "subdivision",
+        )
     ),
     *(("Sampling", cfs.Sampling, name, NEGATIVE) for name in ("window_parts", "memory", "seed")),
     ("Stopping", cfs.Stopping, "batches", (*COUNT, 1)),
     ("Stopping", cfs.Stopping, "max_batches", COUNT),
     *(("Stopping", cfs.Stopping, name, OPTIONAL) for name in ("target_error", "time_limit")),
-    *(
-        ("GlareOptions", cfs.GlareOptions, name, OPTIONAL)
-        for name in ("threshold", "peak", "illuminance", "age")
-    ),
+    *(("GlareOptions", cfs.GlareOptions, name, OPTIONAL) for name in ("threshold", "peak", "illuminance", "age")),
     ("GlareOptions", cfs.GlareOptions, "search_radius", (*NEGATIVE, 0, 12.0)),
     *(
         ("GlareOptions", cfs.GlareOptions, name, ("x", None, 3))
         for name in ("background", "grouping", "sun", "field_of_view", "position_model")
     ),
-    ("pane", cfs.pane, "index", (*NEGATIVE, 0.5)), ("pane", cfs.pane, "transmissivity", SHARE),
+    ("pane", cfs.pane, "index", (*NEGATIVE, 0.5)),
+    ("pane", cfs.pane, "transmissivity", SHARE),
     ("pane", cfs.pane, "panes", COUNT),
     ("fisheye", lambda **v: cfs.fisheye((0, 0, 1), (0, 1, 0), **v), "size", COUNT),
     *(
-        ("MaterialLayer", lambda **v: bim.MaterialLayer(
-            **{"name": "a", "thickness": 0.1, "conductivity": 1.0, "density": 1e3,
-               "heat_capacity": 1e3, **v}), name, (*NEGATIVE, 0))
+        (
+            "MaterialLayer",
+            lambda **v: bim.MaterialLayer(
+                **{"name": "a", "thickness": 0.1, "conductivity": 1.0, "density": 1e3, "heat_capacity": 1e3, **v}
+            ),
+            name,
+            (*NEGATIVE, 0),
+        )
         for name in ("thickness", "conductivity", "density", "heat_capacity")
     ),
-    ("write_epjson", _box, "u_value", OPTIONAL), ("write_epjson", _box, "g_value", OPTIONAL),
+    ("write_epjson", _box, "u_value", OPTIONAL),
+    ("write_epjson", _box, "g_value", OPTIONAL),
     ("write_epjson", _box, "air_changes", NEGATIVE),
     *(
         ("BalanceOptions", thermal.BalanceOptions, name, (math.nan, math.inf, -100.0))
@@ -87,8 +101,11 @@ CASES: list[tuple[str, Callable, str, tuple]] = [
     *(
         ("RoomOptions", scenes.RoomOptions.of, name, bad)
         for name, bad in (
-            ("sensor_spacing", (*NEGATIVE, 0)), ("sensor_height", NEGATIVE),
-            ("sensor_margin", NEGATIVE), ("picture_size", COUNT), ("floor_per_person", (0, -1)),
+            ("sensor_spacing", (*NEGATIVE, 0)),
+            ("sensor_height", NEGATIVE),
+            ("sensor_margin", NEGATIVE),
+            ("picture_size", COUNT),
+            ("floor_per_person", (0, -1)),
         )
     ),
     ("RoomOptions", scenes.RoomOptions, "heat_step_s", (*NEGATIVE, 0, 7200)),
@@ -97,7 +114,7 @@ CASES: list[tuple[str, Callable, str, tuple]] = [
         ("IdealLoads", thermal.IdealLoads, name, (math.nan, np.array([20.0, math.nan])))
         for name in ("heating_c", "cooling_c")
     ),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(

@@ -4,15 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.capabilities import (
-    STORED,
-    capabilities,
-    mentioned,
-    missing,
-    read_renames,
-    read_stored,
-    renamed,
-)
+from tests.capabilities import STORED, capabilities, mentioned, missing, read_renames, read_stored, renamed
 
 
 @pytest.fixture(scope="module")

@@ -16,10 +16,7 @@ REPOSITORY = Path(__file__).parent.parent
 PACKAGES = ("mitsuba_cfs", "bim", "thermal", "scenes")
 PEERS = {"pyradiance", "pyenergyplus-lbnl", "pywincalc"}
 # The Makefile's and mkdocs.yml's
-RUN_BY_NAME = {
-    "ruff", "mypy", "pytest-cov", "pytest-xdist",
-    "mkdocs", "mkdocs-material", "mkdocstrings-python",
-}  # fmt: skip
+RUN_BY_NAME = {"ruff", "mypy", "pytest-cov", "pytest-xdist", "mkdocs", "mkdocs-material", "mkdocstrings-python"}
 # Loaded by another package, where our source has this attribute
 LOADED_BY = {"pyarrow": "to_parquet"}  # pandas
 PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
@@ -118,11 +115,7 @@ def test_an_unused_dependency_is_found(name: str) -> None:
 
 def test_locked_versions_are_of_what_is_asked_for() -> None:
     """Each dependency has a line in constraints.txt, and each line belongs to one of them."""
-    locked = {
-        _name(line)
-        for line in (REPOSITORY / "constraints.txt").read_text().splitlines()
-        if "==" in line
-    }
+    locked = {_name(line) for line in (REPOSITORY / "constraints.txt").read_text().splitlines() if "==" in line}
     asked = [*PROJECT["dependencies"]]
     asked += [line for lines in PROJECT["optional-dependencies"].values() for line in lines]
     todo, closure = [_name(line) for line in asked] + ["distributed"], {"setuptools"}

@@ -18,14 +18,19 @@ pytestmark = pytest.mark.early
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILES = {  # the names that the pages use
-    "blind.xml": VENETIAN_BLIND, "blind.toml": VENETIAN_BLIND.with_suffix(".toml"),
-    "shade.xml": VENETIAN_BLIND, "CITY.epw": WEATHER, "city.epw": WEATHER, "Lyon.epw": WEATHER,
-    "house.ifc": OFFICE, "office.ifc": OFFICE,
+    "blind.xml": VENETIAN_BLIND,
+    "blind.toml": VENETIAN_BLIND.with_suffix(".toml"),
+    "shade.xml": VENETIAN_BLIND,
+    "CITY.epw": WEATHER,
+    "city.epw": WEATHER,
+    "Lyon.epw": WEATHER,
+    "house.ifc": OFFICE,
+    "office.ifc": OFFICE,
     "model.hbjson": REPOSITORY / "docs" / "tutorials" / "two_rooms.hbjson",
     "quarter.city.json": REPOSITORY / "docs" / "tutorials" / "quarter.city.json",
     "horizon.csv": REPOSITORY / "docs" / "tutorials" / "horizon.csv",
     "office.rad": REPOSITORY / "docs" / "tutorials" / "office.rad",
-}  # fmt: skip
+}
 
 
 def examples(page: Path, language: str) -> list[str]:
@@ -57,9 +62,14 @@ def two_facades() -> dict:
     points, up = np.array([[2.0, 1.0, 0.8], [1.0, 4.5, 0.8]]), np.tile([0.0, 0.0, 1.0], (2, 1))
     view = fisheye((2.0, 2.0, 1.2), (0, -1, 0), 48)
     sampling = Sampling(
-        sensor_samples=256, patch_samples=64, sun_points=16, view_samples=1, outdoor_samples=1,
-        subdivision=1, window_parts=1,
-    )  # fmt: skip
+        sensor_samples=256,
+        patch_samples=64,
+        sun_points=16,
+        view_samples=1,
+        outdoor_samples=1,
+        subdivision=1,
+        window_parts=1,
+    )
     scene = DaylightScene(interior, exterior, groups, points, up, view)
     return {"scene": scene, "sampling": sampling}
 
@@ -81,18 +91,23 @@ def given(page: str) -> dict:
     sky = np.full((P, H), 1000.0, dtype=np.float32)
     return {
         "pictures_of_the_year": [np.full((64, 64), 100.0, dtype=np.float32)],
-        "interior": room.room(), "exterior": room.NOTHING, "groups": room.window_groups(),
+        "interior": room.room(),
+        "exterior": room.NOTHING,
+        "groups": room.window_groups(),
         "view": fisheye((1.8, 2.0, 1.2), (0, -1, 0), 48),
         "scattering": [sun_scattering(read_bsdf_xml(VENETIAN_BLIND).band("Visible"))],
-        "T_D_s": np.full((1, K, H), 200.0), "T_Dd_sd": np.zeros((1, K, H)),
-        "D": np.full((1, K, P), 1.0 / P), "D_d": np.zeros((1, K, P)), "sky": sky, "s_d": 0 * sky,
-        "sun_directions": np.tile([0.0, -0.8, 0.6], (H, 1)), "direct_normal": np.full(H, 5e4),
-    }  # fmt: skip
+        "T_D_s": np.full((1, K, H), 200.0),
+        "T_Dd_sd": np.zeros((1, K, H)),
+        "D": np.full((1, K, P), 1.0 / P),
+        "D_d": np.zeros((1, K, P)),
+        "sky": sky,
+        "s_d": 0 * sky,
+        "sun_directions": np.tile([0.0, -0.8, 0.6], (H, 1)),
+        "direct_normal": np.full(H, 5e4),
+    }
 
 
-@pytest.mark.parametrize(
-    "page", [page for page in PAGES if examples(page, "python")], ids=lambda page: page.name
-)
+@pytest.mark.parametrize("page", [page for page in PAGES if examples(page, "python")], ids=lambda page: page.name)
 def test_python_examples_run(page, folder, variant):
     """Those of a page one after the other, with one another's names."""
     names = given(page.name)
@@ -127,13 +142,7 @@ def test_the_system_and_operation_files_of_the_quick_start_are_read(folder):
 
 
 def test_the_page_of_the_quick_start_is_read(folder):
-    from scenes.page_options import (
-        DossierSection,
-        GlareSection,
-        RunSection,
-        StudySection,
-        read_page,
-    )
+    from scenes.page_options import DossierSection, GlareSection, RunSection, StudySection, read_page
 
     text = (REPOSITORY / "docs" / "quickstart.md").read_text("utf-8")
     (code,) = [c for c in examples(REPOSITORY / "docs" / "quickstart.md", "toml") if "logo" in c]
@@ -168,9 +177,7 @@ def test_tables_of_the_heat_page_have_no_unknown_keys(folder):
 
 
 MEASURED = "twin_house_*.toml"  # their files are written from measured data, test_twin_house
-TUTORIALS = sorted(
-    path for path in (REPOSITORY / "docs" / "tutorials").glob("*.toml") if not path.match(MEASURED)
-)
+TUTORIALS = sorted(path for path in (REPOSITORY / "docs" / "tutorials").glob("*.toml") if not path.match(MEASURED))
 
 
 @pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.name)

@@ -10,34 +10,34 @@ DOCS = REPOSITORY / "docs"
 SAID = ("- Judge:", "- Shared:", "- Cannot show:")
 # Heads of tables that claim nothing: what there is, what is asked for, what is written
 NO_EVIDENCE = {
-    "architecture.md": "all", "bim.md": "all", "capabilities.md": "all",
-    "formats.md": "all", "glossary.md": "all",
+    "architecture.md": "all",
+    "bim.md": "all",
+    "capabilities.md": "all",
+    "formats.md": "all",
+    "glossary.md": "all",
     "issues.md": "all",
     "quickstart.md": "all",
     "validation.md": {"| subject | judged by | page |"},
     "bsdf.md": {"| stated | by | used as | DGP |"},
     "daylight.md": {"| function | gives |"},
-    "glare.md": {
-        "| index | of | source |", "| option | default | |",
-        "| part of a five-phase picture | resolution |",
-    },
+    "glare.md": {"| index | of | source |", "| option | default | |", "| part of a five-phase picture | resolution |"},
     "radiance.md": {"| type | as | status | how |"},
-    "thermal.md": {
-        "| to | read |", "| closure | absorptances from | layer resistance | film resistances |",
-    },
+    "thermal.md": {"| to | read |", "| closure | absorptances from | layer resistance | film resistances |"},
     "control.md": {
-        "| of `ControlHour` | what |", "| rule or key | closed | test |",
+        "| of `ControlHour` | what |",
+        "| rule or key | closed | test |",
         "| scenario | set points | source | not available, left out |",
     },
     "comply.md": {
-        "| in the folder of results | what |", "| option | what |",
+        "| in the folder of results | what |",
+        "| option | what |",
         "| rule | quantity | set-up | weather that it asks for |",
     },
     "spectral.md": {"| file | content |", "| part | spectrum |"},
     "app.md": {"| file | content | read by |"},
     "studies.md": {"| in the folder | what |", "| event | what is done |"},
     "pv.md": {"| key | meaning |"},
-}  # fmt: skip
+}
 ONCE = {"benchmarks.md", "reliability.md"}  # pages that say it once, for all of their tables
 
 
@@ -62,10 +62,10 @@ def silent(name: str, page: str) -> list[str]:
     exempt = NO_EVIDENCE.get(name, set())
     above = page if name in ONCE else ""
     return [
-        head for head, text in tables(page)
-        if exempt != "all" and head not in exempt
-        and not all(word in text or word in above for word in SAID)
-    ]  # fmt: skip
+        head
+        for head, text in tables(page)
+        if exempt != "all" and head not in exempt and not all(word in text or word in above for word in SAID)
+    ]
 
 
 @pytest.mark.parametrize("name", sorted(path.name for path in DOCS.glob("*.md")))

@@ -29,8 +29,9 @@ BROAD = {  # module and function: why
     "scenes/cli.py: run": "one line for a user's mistake; raises everything else again",
 }
 TABLES = {  # constructors of plain dataclasses take the keys of a file that the program has written
-    "scenes/calibration/costs.py: read", "scenes/calibration/errors.py: read",
-}  # fmt: skip
+    "scenes/calibration/costs.py: read",
+    "scenes/calibration/errors.py: read",
+}
 ALL = {"Exception", "BaseException"}
 MISTAKES = {"TypeError", "AttributeError", "NameError", "KeyError", "IndexError", "LookupError"}
 PACKAGES = ("bim", "mitsuba_cfs", "scenes", "thermal")
@@ -41,9 +42,7 @@ def names(node: ast.expr | None) -> set[str]:
     if node is None:
         return {"BaseException"}
     parts = node.elts if isinstance(node, ast.Tuple) else [node]
-    return {
-        part.attr if isinstance(part, ast.Attribute) else getattr(part, "id", "") for part in parts
-    }
+    return {part.attr if isinstance(part, ast.Attribute) else getattr(part, "id", "") for part in parts}
 
 
 def guarded(tree: ast.Module) -> Iterator[tuple[int, str, set[str], list[ast.stmt]]]:

@@ -17,10 +17,13 @@ PLAIN = {  # json.dumps that write no results
     "mitsuba_cfs/files.py",  # `json_text` itself
     "scenes/study/store.py",  # a case's own file, which it reads again
     "bim/building_file.py",  # an entry of the cache, which may hold NaN
-    "bim/ifc/corrections_draft.py", "bim/ifc/correct.py",  # values of TOML
+    "bim/ifc/corrections_draft.py",
+    "bim/ifc/correct.py",  # values of TOML
     "scenes/room/operation.py",  # likewise
-    "scenes/commands/self_test.py", "scenes/cost/reference.py", "scenes/calibration/shipped.py",
-}  # fmt: skip
+    "scenes/commands/self_test.py",
+    "scenes/cost/reference.py",
+    "scenes/calibration/shipped.py",
+}
 
 
 def test_json_has_null_for_nan_and_no_infinity():
@@ -47,8 +50,5 @@ def test_a_table_has_empty_cells_for_nan_and_no_infinity(tmp_path, suffix):
 
 
 def test_every_writer_of_json_is_this_one():
-    users = {
-        file_name(path) for path in MODULES
-        if re.search(r"\bjson\.dumps?\(", path.read_text(encoding="utf-8"))
-    }  # fmt: skip
+    users = {file_name(path) for path in MODULES if re.search(r"\bjson\.dumps?\(", path.read_text(encoding="utf-8"))}
     assert users == PLAIN

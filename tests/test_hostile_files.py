@@ -91,13 +91,21 @@ visible = 0.6
 
 
 RING = [[8.0, 50.0], [8.001, 50.0], [8.001, 50.001], [8.0, 50.0]]
-FOOTPRINTS = {"type": "FeatureCollection", "features": [
-    {"type": "Feature", "properties": {"height": 9.0, "building:levels": "3", "name": "block"},
-     "geometry": {"type": "Polygon", "coordinates": [RING]}},
-    {"type": "Feature",
-     "properties": {"crown_radius": 3.0, "height": 8.0, "transmittance": "deciduous"},
-     "geometry": {"type": "Point", "coordinates": [8.0, 50.0]}},
-]}  # fmt: skip
+FOOTPRINTS = {
+    "type": "FeatureCollection",
+    "features": [
+        {
+            "type": "Feature",
+            "properties": {"height": 9.0, "building:levels": "3", "name": "block"},
+            "geometry": {"type": "Polygon", "coordinates": [RING]},
+        },
+        {
+            "type": "Feature",
+            "properties": {"crown_radius": 3.0, "height": 8.0, "transmittance": "deciduous"},
+            "geometry": {"type": "Point", "coordinates": [8.0, 50.0]},
+        },
+    ],
+}
 MESH = "o box\nv 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 5\nf 1 2 3\nf 1 3 4\nf 1 2 4\nf 2 3 4\n"
 TERRAIN = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 10\n1 2 3\n4 5 6\n"
 
@@ -153,9 +161,7 @@ def glare_of(file: Path) -> None:
         result = evaluate(picture.luminance, picture.view)
     except ValueError:  # which the command tells with the file's name
         return
-    assert np.isfinite(
-        [result.dgp, result.Ev, result.dgi, result.mean_luminance, result.Lveil]
-    ).all()
+    assert np.isfinite([result.dgp, result.Ev, result.dgi, result.mean_luminance, result.Lveil]).all()
 
 
 def functions(file: Path) -> None:
@@ -276,57 +282,51 @@ def json_text(content: object) -> Callable[[Path], object]:
 ROWS = {
     "klems": Row("b.xml", klems, mutators.of_xml, read_bsdf_xml),
     "tensor tree": Row("b.xml", tree, mutators.of_xml, read_bsdf_xml),
-    "beside a bsdf": Row("b.toml", beside, mutators.of_toml,
-                         lambda file: read_system(file.with_suffix(".xml"))),
+    "beside a bsdf": Row("b.toml", beside, mutators.of_toml, lambda file: read_system(file.with_suffix(".xml"))),
     "goniometer": Row("m.txt", text(GONIOMETER), mutators.of_text, read_measurement),
     "epw": Row("w.epw", weather, mutators.of_weather, read_epw),
     "wea": Row("w.wea", wea, mutators.of_text, lambda file: read_wea(file, whole_year=False)),
-    "measured": Row("w.csv", measured, mutators.of_text, lambda file: read_measured(
-        file, latitude_deg=42, longitude_deg=-88, timezone_h=-6)),
+    "measured": Row(
+        "w.csv",
+        measured,
+        mutators.of_text,
+        lambda file: read_measured(file, latitude_deg=42, longitude_deg=-88, timezone_h=-6),
+    ),
     "gbxml": Row("b.gbxml", text(gbxml_rooms()), mutators.of_xml, read_building_file),
     "hbjson": Row("b.hbjson", json_text(honeybee_rooms()), mutators.of_json, read_building_file),
     "radiance": Row("b.rad", text(ROOM), mutators.of_text, read_building_file),
-    "cityjson": Row("c.city.json", json_text(city({"a": ((0, 0, 0), (9, 9, 9))})),
-                    mutators.of_json, read_surroundings),
+    "cityjson": Row("c.city.json", json_text(city({"a": ((0, 0, 0), (9, 9, 9))})), mutators.of_json, read_surroundings),
     "citygml": Row("c.gml", text(model(WHOLE, PART, RELIEF)), mutators.of_xml, read_surroundings),
     "geojson": Row("f.geojson", json_text(FOOTPRINTS), mutators.of_json, read_surroundings),
     "mesh": Row("m.obj", text(MESH), mutators.of_text, read_surroundings),
     "terrain": Row("t.asc", text(TERRAIN), mutators.of_text, read_surroundings),
-    "horizon": Row("h.csv", text("A,H_hor\n-180,5\n-90,10\n0,3\n90,2\n"), mutators.of_text,
-                   read_horizon),
+    "horizon": Row("h.csv", text("A,H_hor\n-180,5\n-90,10\n0,3\n90,2\n"), mutators.of_text, read_horizon),
     "picture": Row("p.hdr", picture, mutators.of_picture, glare_of),
-    "matrix": Row("m.mtx", matrix,
-                  mutators.of_picture, read_matrix),
-    "matrix of text": Row("m.mtx", matrix_of_text,
-                          mutators.of_text, read_matrix),
+    "matrix": Row("m.mtx", matrix, mutators.of_picture, read_matrix),
+    "matrix of text": Row("m.mtx", matrix_of_text, mutators.of_text, read_matrix),
     "study": Row("study.toml", copied(DEMO / "study.toml"), mutators.of_toml, read_study),
-    "operation": Row("controlled.toml", copied(DEMO / "controlled.toml"), mutators.of_toml,
-                     read_operation),
-    "heat study": Row("office.toml", heat_study,
-                      mutators.of_toml, read_heat_study),
-    "pv study": Row("facade_pv.toml", copied(DEMO / "facade_pv.toml"), mutators.of_toml,
-                    read_pv_study),
+    "operation": Row("controlled.toml", copied(DEMO / "controlled.toml"), mutators.of_toml, read_operation),
+    "heat study": Row("office.toml", heat_study, mutators.of_toml, read_heat_study),
+    "pv study": Row("facade_pv.toml", copied(DEMO / "facade_pv.toml"), mutators.of_toml, read_pv_study),
     "fabric table": Row("s.csv", text(SHEET), mutators.of_text, read_fabric_table),
-    "blind product": Row("s.json", json_text(product("venetian")), mutators.of_json,
-                         read_shade_file),
+    "blind product": Row("s.json", json_text(product("venetian")), mutators.of_json, read_shade_file),
     "pane product": Row("p.json", json_text(PRODUCT), mutators.of_json, read_pane_file),
     "pane of optics": Row("p.dat", text(OPTICS), mutators.of_text, read_pane_file),
     "optical data": Row("p.json", json_text(OPTICAL), mutators.of_json, read_pane_file),
     "glazing layers": Row("p.json", json_text(LAYERS), mutators.of_json, read_glazing_layers),
     "angular table": Row("a.csv", text(ANGULAR), mutators.of_text, read_angular_table),
     "table of g": Row("g.csv", text(G_VALUES), mutators.of_text, read_g_table),
-    "radiance cell": Row("c.rad", text(CELLULAR), mutators.of_text,
-                         lambda file: read_radiance_layer(file, PERIOD)),
-    "function file": Row("weave.cal", functions, mutators.of_text,
-                         lambda file: read_building_file(file.with_name("b.rad"))),
-    "page": Row("page.toml", text(PAGE), mutators.of_toml,
-                lambda file: read_page(file, Literal["model", "rooms"])),
+    "radiance cell": Row("c.rad", text(CELLULAR), mutators.of_text, lambda file: read_radiance_layer(file, PERIOD)),
+    "function file": Row(
+        "weave.cal", functions, mutators.of_text, lambda file: read_building_file(file.with_name("b.rad"))
+    ),
+    "page": Row("page.toml", text(PAGE), mutators.of_toml, lambda file: read_page(file, Literal["model", "rooms"])),
     "room uses": Row("uses.toml", text(USES), mutators.of_toml, read_uses),
     "corrections": Row("c.toml", text(CORRECTIONS), mutators.of_toml, read_corrections),
     "explorer": Row("case.js", explorer, mutators.of_script, explored),
     "mark": Row("cfs-results.json", mark, mutators.of_json, results_again),
     "case of a study": Row("case.npz", case_result, mutators.of_arrays, stored),
-}  # fmt: skip
+}
 
 # Mutations that were no line once: row, number
 REGRESSIONS: list[tuple[str, int]] = [("pv study", 82)]

@@ -41,8 +41,7 @@ PHRASES = {  # a regular expression, and what to write
     r"brought to light|comes? to light": "showed",
     r"worked out": "computed",
     r"by (two|three|five) phases": "with the five-phase method",
-    r"(behind|before) (a|the|its|each) (pane|blind|window|glass|shade|screen)s?\b":
-        "say which side: outside, on the room side of",
+    r"(behind|before) (a|the|its|each) (pane|blind|window|glass|shade|screen)s?\b": "say which side: outside, on the room side of",
     r"(a|an|each|every|one) (row|ray|path|column|line|picture) an? "
     r"(hour|pixel|sensor|case|room|patch)": "... per ...",
     r"\bmend(s|ed|ing)?\b": "fix",
@@ -54,12 +53,20 @@ PHRASES = {  # a regular expression, and what to write
     r"so far apart": "spacing",
     r"asks? for nothing": "needs no, loads nothing",
     r"to be had\b": "available",
-}  # fmt: skip
+}
 NAMES = {  # names of public functions, classes, parameters and fields
-    "found": "result", "said": "message", "heard": "callbacks", "given": "overrides",
-    "mine": "the thing itself", "theirs": "the thing itself", "ours": "the thing itself",
-    "kept": "cached", "looks": "views", "ways": "paths", "standing": "outdoors",
-}  # fmt: skip
+    "found": "result",
+    "said": "message",
+    "heard": "callbacks",
+    "given": "overrides",
+    "mine": "the thing itself",
+    "theirs": "the thing itself",
+    "ours": "the thing itself",
+    "kept": "cached",
+    "looks": "views",
+    "ways": "paths",
+    "standing": "outdoors",
+}
 PREFIXES = ("kept_", "found_", "said_", "heard_", "given_")
 ALLOWED = {"given_sky"}  # public names that stay until the next breaking version
 

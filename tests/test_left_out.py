@@ -46,12 +46,7 @@ def test_every_reason_to_skip_says_what_would_help():
 
 def test_lines_are_grouped_by_what_would_help():
     lines = left_out_lines(
-        [
-            "no folder (../shared/data)",
-            "could not import 'pyradiance'",
-            "no folder (../shared/data)",
-        ],
-        deselected=7,
+        ["no folder (../shared/data)", "could not import 'pyradiance'", "no folder (../shared/data)"], deselected=7
     )
     assert [int(line.split()[0]) for line in lines] == [2, 1, 7]
     assert "../shared/data" in lines[0] and "peers" in lines[1] and "test-all" in lines[2]
@@ -59,9 +54,7 @@ def test_lines_are_grouped_by_what_would_help():
 
 def test_a_run_ends_with_them(tmp_path):
     """A clean copy of conftest's hook beside three tests, of which one runs."""
-    (tmp_path / "conftest.py").write_text(
-        "from tests.left_out import pytest_terminal_summary\n", encoding="utf-8"
-    )
+    (tmp_path / "conftest.py").write_text("from tests.left_out import pytest_terminal_summary\n", encoding="utf-8")
     (tmp_path / "test_some.py").write_text(
         "import pytest\n"
         "def test_runs(): pass\n"
@@ -70,10 +63,23 @@ def test_a_run_ends_with_them(tmp_path):
         encoding="utf-8",
     )
     run = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-m", "not xslow", "-p", "no:cacheprovider",
-         "--rootdir", str(tmp_path), str(tmp_path)],
-        cwd=REPOSITORY, capture_output=True, text=True,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-m",
+            "not xslow",
+            "-p",
+            "no:cacheprovider",
+            "--rootdir",
+            str(tmp_path),
+            str(tmp_path),
+        ],
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
+    )
     assert "1 left out (could not import 'pyradiance_of_nobody'" in run.stdout, run.stdout
     assert "1 left out by -m or -k" in run.stdout
     assert "1 left out (" in "\n".join(run.stdout.splitlines()[-5:])
@@ -84,15 +90,12 @@ def needs_shared() -> dict[str, dict[str, bool]]:
     found = {}
     for path in (REPOSITORY / "tests").rglob("test_*.py"):
         functions = {
-            node.name: node for node in ast.parse(path.read_text("utf-8")).body
-            if isinstance(node, ast.FunctionDef)
-        }  # fmt: skip
+            node.name: node for node in ast.parse(path.read_text("utf-8")).body if isinstance(node, ast.FunctionDef)
+        }
 
         def needs(node: ast.FunctionDef, functions: dict = functions) -> bool:
             names = {argument.arg for argument in node.args.args}
-            return bool(names & SHARED) or any(
-                needs(functions[name]) for name in names & set(functions)
-            )
+            return bool(names & SHARED) or any(needs(functions[name]) for name in names & set(functions))
 
         found[path.relative_to(REPOSITORY / "tests").as_posix()] = {
             name: needs(node) for name, node in functions.items() if name.startswith("test_")

@@ -40,9 +40,7 @@ def test_workers_end_where_their_parent_is_killed(tmp_path, busy):
     script.write_text(busy)
     root = str(Path(__file__).parents[1])
     environment = os.environ | {"PYTHONPATH": root}
-    with subprocess.Popen(
-        [sys.executable, script], stdout=subprocess.PIPE, text=True, env=environment
-    ) as process:
+    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True, env=environment) as process:
         worker = int(process.stdout.readline())
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
@@ -83,7 +81,6 @@ def test_a_signal_at_the_start_of_a_task_ends_the_program():
     """It comes while the timer of the task starts; the exit would wait for that for 600 s."""
     root = Path(__file__).parents[1]
     process = subprocess.run(
-        [sys.executable, "-c", INTERRUPTED], cwd=root, capture_output=True, text=True,
-        timeout=120, check=False,
-    )  # fmt: skip
+        [sys.executable, "-c", INTERRUPTED], cwd=root, capture_output=True, text=True, timeout=120, check=False
+    )
     assert process.stderr.rstrip().endswith("KeyboardInterrupt")

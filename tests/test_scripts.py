@@ -16,19 +16,14 @@ from tests.scripts import called, parser_of, run_script, scripts
 
 PACKAGES = ("tests.validation", "tests.benchmarks")
 SCRIPTS = [(package, name) for package in PACKAGES for name in scripts(package)]
-COMMAND = re.compile(
-    r"python -m (tests\.(?:validation|benchmarks))[ \t]+([\w-]+)((?:[^`\n]|\\\n)*)"
-)
+COMMAND = re.compile(r"python -m (tests\.(?:validation|benchmarks))[ \t]+([\w-]+)((?:[^`\n]|\\\n)*)")
 
 
 def commands() -> list[tuple[str, str, str, str]]:
     """File, package, name and options of each command of the documentation."""
     files = [*(REPOSITORY / "docs").rglob("*.md"), *(REPOSITORY / "docs").rglob("*.toml")]
     files += (REPOSITORY / "tests").rglob("SOURCE.md")
-    return [
-        (file.name, *parts)
-        for file in sorted(files) for parts in COMMAND.findall(file.read_text("utf-8"))
-    ]  # fmt: skip
+    return [(file.name, *parts) for file in sorted(files) for parts in COMMAND.findall(file.read_text("utf-8"))]
 
 
 def main(
@@ -47,9 +42,7 @@ def main(
 
 def test_a_signature_is_a_command_line():
     parser = parser_of(main, "x", "text")
-    assert called(main, parser.parse_args(["a"])) == (
-        Path("a"), (1, 2), 3, [], "one", None, False,
-    )  # fmt: skip
+    assert called(main, parser.parse_args(["a"])) == (Path("a"), (1, 2), 3, [], "one", None, False)
     words = ["a", "5", "--size", "7", "--only", "b", "c", "--only", "d", "--kind", "two"]
     found = called(main, parser.parse_args([*words, "--json", "f", "--every"]))
     assert found == (Path("a"), [5], 7, ["b", "c", "d"], "two", Path("f"), True)

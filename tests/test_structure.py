@@ -19,8 +19,7 @@ from tests.modules import MODULES, dotted, file_name, imports
 # what it imports.  What shares a rank knows nothing of the others there.
 RANKS = {
     "mitsuba_cfs": (
-        {"directions", "errors", "interpreter", "llvm", "notes", "phases", "processes",
-         "progress", "source_code"},
+        {"directions", "errors", "interpreter", "llvm", "notes", "phases", "processes", "progress", "source_code"},
         {"gloss"},
         {"compiled", "files", "spectra", "surfaces", "variants"},
         {"bsdf", "images", "sky", "stored_arrays", "window_parts"},
@@ -31,9 +30,18 @@ RANKS = {
     "mitsuba_cfs.trace": ({"kernels"}, {"matrices"}, {"sun"}, {"paths"}, {"pictures"}),
     "scenes": (
         {"language"},
-        {"demo", "figures", "plausible", "quick", "result_folder",
-         "toml_file", "user_errors", "pictures", "room_views",
-         "bsdf_generation"},
+        {
+            "demo",
+            "figures",
+            "plausible",
+            "quick",
+            "result_folder",
+            "toml_file",
+            "user_errors",
+            "pictures",
+            "room_views",
+            "bsdf_generation",
+        },
         {"cluster", "page_options", "provision_levels"},
         {"workers"},
         {"fenestration", "cost"},
@@ -45,15 +53,14 @@ RANKS = {
         {"inputs", "fenestration_exports"},
         {"run", "viewed_room", "picture_options"},
         {"explore"},
-        {"comply", "heat", "calibration", "picture_files", "photovoltaics",
-         "simulation", "year_of_glare"},
+        {"comply", "heat", "calibration", "picture_files", "photovoltaics", "simulation", "year_of_glare"},
         {"study", "view_picture"},
         {"study_report"},
         {"app"},
         {"commands"},
         {"cli"},
     ),
-}  # fmt: skip
+}
 MOST_POSITIONAL = 6
 # These decorators compile with numba, which fails where one compiled function calls another by a
 # keyword-only parameter (0.68: no such call binds).  `dr.syntax` has no such excuse
@@ -188,10 +195,7 @@ def test_no_function_takes_many_positional_parameters() -> None:
         ("mitsuba_cfs/trace/kernels/x.py", "from mitsuba_cfs import methods"),
         ("mitsuba_cfs/trace/kernels/x.py", "import mitsuba_cfs.trace.matrices.view"),
         ("mitsuba_cfs/trace/sun/x.py", "from mitsuba_cfs.trace import paths"),
-        (
-            "mitsuba_cfs/trace/sun/x.py",
-            "def f():\n    from mitsuba_cfs.methods.glare import pictures",
-        ),
+        ("mitsuba_cfs/trace/sun/x.py", "def f():\n    from mitsuba_cfs.methods.glare import pictures"),
         ("scenes/results.py", "if TYPE_CHECKING:\n    from scenes.report.page import write_report"),
         ("scenes/heat/x.py", "from importlib import import_module\nimport_module('scenes.study')"),
         ("scenes/study/x.py", "from scenes.commands.room_options import seed_option"),

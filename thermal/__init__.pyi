@@ -53,11 +53,7 @@ from .ground import (
 from .gvalue import ThermalData as ThermalData, thermal_data as thermal_data
 from .iso15099 import Iso15099Data as Iso15099Data, iso15099_data as iso15099_data
 from .emitters import HeatedSlab as HeatedSlab, IdealLoads as IdealLoads
-from .moisture import (
-    Humidity as Humidity,
-    MoistZone as MoistZone,
-    zone_humidity as zone_humidity,
-)
+from .moisture import Humidity as Humidity, MoistZone as MoistZone, zone_humidity as zone_humidity
 from .ventilation import (
     AirTransfer as AirTransfer,
     Leakage as Leakage,

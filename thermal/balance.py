@@ -51,9 +51,7 @@ class Stretch:
 
 def stretches(hours: int, steps: int, most: int) -> list[Stretch]:
     """The stretches of no more than so many rows that follow each other."""
-    return [
-        Stretch(first, min(first + most, hours), hours, steps) for first in range(0, hours, most)
-    ]
+    return [Stretch(first, min(first + most, hours), hours, steps) for first in range(0, hours, most)]
 
 
 def drive_of(
@@ -80,17 +78,18 @@ def drive_of(
         _driven(
             zones,
             [c.suns[a % len(c.suns)] if c else sun for c, sun in zip(controls, solar, strict=True)],
-            [c.gains[a % len(c.gains)] if c else zone.gains
-             for c, zone in zip(controls, zones, strict=True)],
+            [c.gains[a % len(c.gains)] if c else zone.gains for c, zone in zip(controls, zones, strict=True)],
             stretch,
             np.stack([stretch.of(mix[a % len(mix)]) for mix in of_hour], axis=1),
         )
         for a in range(count)
-    ]  # fmt: skip
+    ]
     first = every[0]
-    some = {k: np.stack([one[k] for one in every]) for k in first} if count > 1 else {
-        k: values[None, :0] for k, values in first.items()
-    }  # fmt: skip
+    some = (
+        {k: np.stack([one[k] for one in every]) for k in first}
+        if count > 1
+        else {k: values[None, :0] for k, values in first.items()}
+    )
     fans = [zone.supply or SupplyAir(0.0) for zone in zones]
     slabs = [zone.slab or HeatedSlab("", 1.0) for zone in zones]
     beside = [one for zone in zones for one in zone.beside]
@@ -105,33 +104,21 @@ def drive_of(
         airing=_hourly([z.airing.share if z.airing else 0.0 for z in zones], stretch, "windows"),
         transfer=_hourly([one.flow for one in transfers], stretch, "air between zones"),
         beside=np.stack(
-            [
-                _hourly([getattr(one, key) for one in beside], stretch, "air beside")
-                for key in ("flow", "share")
-            ],
-            axis=2,
+            [_hourly([getattr(one, key) for one in beside], stretch, "air beside") for key in ("flow", "share")], axis=2
         ),
         beside_c=_set_points([one.beside_c for one in beside], stretch),
         heating_c=_set_points([z.loads.heating_c for z in zones], stretch),
         cooling_c=_set_points([z.loads.cooling_c for z in zones], stretch),
         limit=np.array([[z.loads.heating_limit, z.loads.cooling_limit] for z in zones]),
         slab_c=np.stack(
-            [
-                _set_points([getattr(slab, key) for slab in slabs], stretch)
-                for key in ("heating_c", "cooling_c")
-            ],
-            axis=2,
+            [_set_points([getattr(slab, key) for slab in slabs], stretch) for key in ("heating_c", "cooling_c")], axis=2
         ),
     )
     return drive, steps if rows == hours else 1
 
 
 def _driven(
-    zones: Sequence[Zone],
-    solar: Sequence[Solar],
-    gains: Sequence[Gains],
-    stretch: Stretch,
-    mix: NDArray[np.int64],
+    zones: Sequence[Zone], solar: Sequence[Solar], gains: Sequence[Gains], stretch: Stretch, mix: NDArray[np.int64]
 ) -> dict[str, Any]:
     """The arrays that `Drive` and `Alternatives` have in common."""
     rows, pairs = len(solar[0].inside), list(zip(zones, solar, strict=True))
@@ -154,9 +141,7 @@ def _shape(controls: Sequence[TemperatureControl | None]) -> tuple[int, int, int
     return len(controls), max(map(len, every), default=0), max(levels, default=0)
 
 
-def _conditions(
-    controls: Sequence[TemperatureControl | None], stretch: Stretch
-) -> dict[str, NDArray[Any]]:
+def _conditions(controls: Sequence[TemperatureControl | None], stretch: Stretch) -> dict[str, NDArray[Any]]:
     """The conditions of all zones, as `Alternatives` has them; those that a zone lacks stay 0."""
     zones, most, _ = _shape(controls)
     limits = np.full((zones, most, 3), np.inf)
@@ -184,21 +169,14 @@ def _conditions(
     return {"limits": limits, "waits": waits, "reads": reads, "asked": table}
 
 
-def _zone_sun(
-    zone: Zone, sun: Solar, rows: int, stretch: Stretch
-) -> tuple[list[FloatArray], list[FloatArray]]:
+def _zone_sun(zone: Zone, sun: Solar, rows: int, stretch: Stretch) -> tuple[list[FloatArray], list[FloatArray]]:
     """Sun at the inside [W] and the outside [W/m2] of walls, windows and frames, each [R, ...].
 
     Args: rows: of the whole sun.
     """
     walls, windows = len(zone.surfaces), len(zone.windows)
     item = f"solar of zone {zone.name}"
-    for name, width in (
-        ("inside", walls),
-        ("facade", walls),
-        ("absorbed_outer", windows),
-        ("absorbed_inner", windows),
-    ):
+    for name, width in (("inside", walls), ("facade", walls), ("absorbed_outer", windows), ("absorbed_inner", windows)):
         got = getattr(sun, name).shape
         require(got == (rows, width), item, f"{name}: expected {(rows, width)}, got {got}")
     area = np.array([w.area for w in zone.windows])
@@ -221,9 +199,7 @@ def _zone_sun(
 
 def _middle_sun(zone: Zone, sun: Solar, stretch: Stretch) -> FloatArray:
     """Sun [R, N] [W/m2] that panes behind interior shades absorb."""
-    glass = (
-        np.zeros_like(sun.absorbed_inner) if sun.absorbed_middle is None else sun.absorbed_middle
-    )
+    glass = np.zeros_like(sun.absorbed_inner) if sun.absorbed_middle is None else sun.absorbed_middle
     part = stretch.of(np.asarray(glass))
     walls, frames = (np.zeros((len(part), n)) for n in (len(zone.surfaces), len(framed(zone))))
     return np.concatenate([walls, part, frames], axis=1)
@@ -235,9 +211,7 @@ def _states(zone: Zone, sun: Solar, stretch: Stretch) -> NDArray[np.int64]:
     return stretch.of(sun.state)
 
 
-def _flows(
-    values: Sequence[ArrayLike], zones: Sequence[Zone], stretch: Stretch, item: str
-) -> FloatArray:
+def _flows(values: Sequence[ArrayLike], zones: Sequence[Zone], stretch: Stretch, item: str) -> FloatArray:
     """Flows [H, Z] [m3/s] from air changes."""
     volume = np.array([zone.volume for zone in zones])
     return np.ascontiguousarray(_hourly(values, stretch, item) * volume / 3600.0)
@@ -272,9 +246,7 @@ def _hourly(values: Sequence[ArrayLike], stretch: Stretch, item: str) -> NDArray
     return _table([stretch.of(array) for array in arrays], stretch.size, item)
 
 
-def _table(
-    arrays: Sequence[FloatArray], rows: int, item: str, *, missing: bool = False
-) -> FloatArray:
+def _table(arrays: Sequence[FloatArray], rows: int, item: str, *, missing: bool = False) -> FloatArray:
     """The arrays, of so many rows or of none, as columns."""
     for array in arrays:
         require(missing or not bool(np.any(np.isnan(array))), item, "missing values")
@@ -286,9 +258,7 @@ def _table(
     return table
 
 
-def _set_points(
-    values: Sequence[ArrayLike], stretch: Stretch, *, missing: bool = False
-) -> NDArray[np.float64]:
+def _set_points(values: Sequence[ArrayLike], stretch: Stretch, *, missing: bool = False) -> NDArray[np.float64]:
     """Set points of every step [T, Z], from one value, hourly values, or values of every step."""
     columns, whole = [], stretch.hours * stretch.steps
     for value in values:
@@ -473,18 +443,15 @@ def simulate_zones(
         for zone, sun, control in zip(zones, solar, controls, strict=True)
     ]
     net = network(
-        zones, mixes, step_s=step_s, terrain=options.terrain, cell=options.cell,
-        link=link, transfers=transfers,
-    )  # fmt: skip
+        zones, mixes, step_s=step_s, terrain=options.terrain, cell=options.cell, link=link, transfers=transfers
+    )
     method = _method(options, steps, step_s)
     outdoors = _weather(climate, steps)
     state = _start(net, _shape(controls), options.start_c)
     work, years, days = _work(net, state), [], 0
     first_day = min(round(24 * HOUR / row_s), climate.hours)
     for stretch in stretches(climate.hours, steps, max(STRETCH, first_day)):
-        drive, every = drive_of(
-            zones, climate, solar, stretch, mixes, transfers=transfers, controls=controls
-        )
+        drive, every = drive_of(zones, climate, solar, stretch, mixes, transfers=transfers, controls=controls)
         method = method._replace(solar_every=every)
         weather = records.OutdoorConditions(*map(stretch.of, outdoors))
         if not stretch.first:
@@ -492,9 +459,7 @@ def simulate_zones(
         means = kernel.hourly_means(stretch.size, state)
         kernel.advance(net, state, work, weather, drive, method, stretch.size, means)
         np.divide(means.terms, steps, out=means.terms)
-        results = (
-            _result(zone, net, z, means, days=days, drive=drive) for z, zone in enumerate(zones)
-        )
+        results = (_result(zone, net, z, means, days=days, drive=drive) for z, zone in enumerate(zones))
         years.append([*map(storage or (lambda result: result), results)])
         told(stretch.last / climate.hours)
     if storage is not None:
@@ -527,9 +492,13 @@ class SteppedZone:
         self._steps, self._row_s = _steps_per_row(step_s, row_s), row_s
         self._mix, no_conditions = window_mix(zone, states, len(states)), (1, 0, 0)
         self._net = network(
-            [zone], [self._mix], step_s=step_s, terrain=self._options.terrain,
-            cell=self._options.cell, link=_links(None, 1),
-        )  # fmt: skip
+            [zone],
+            [self._mix],
+            step_s=step_s,
+            terrain=self._options.terrain,
+            cell=self._options.cell,
+            link=_links(None, 1),
+        )
         self._method = _method(self._options, self._steps, step_s)
         self._weather = _weather(climate, self._steps)
         self._state = _start(self._net, no_conditions, self._options.start_c)
@@ -589,8 +558,7 @@ def _mixes(zone: Zone, suns: Sequence[Solar], hours: int) -> WindowMix:
     """The emissivities of a zone's windows in all its alternatives, one after the other."""
     if len(suns) == 1:
         return window_mix(zone, suns[0].state, hours)
-    states = [np.zeros((hours, len(zone.windows)), np.int64) if s.state is None else s.state
-              for s in suns]  # fmt: skip
+    states = [np.zeros((hours, len(zone.windows)), np.int64) if s.state is None else s.state for s in suns]
     return window_mix(zone, np.concatenate(states), hours * len(suns))
 
 
@@ -702,15 +670,7 @@ def _work(net: Network, state: records.State) -> records.Workspace:
     )
 
 
-def _result(
-    zone: Zone,
-    net: Network,
-    z: int,
-    means: records.Means,
-    *,
-    days: int,
-    drive: records.Drive,
-) -> ZoneResult:
+def _result(zone: Zone, net: Network, z: int, means: records.Means, *, days: int, drive: records.Drive) -> ZoneResult:
     air, terms = means.air[:, z], means.terms[:, z]
     mine = np.flatnonzero(net.faces.zone == z)
     inner, outer, windows = means.inner[:, mine], means.outer[:, mine], net.faces.window[mine]

@@ -208,9 +208,7 @@ def layer_absorptances(
     return LayerAbsorptances(outer=alpha - kept, inner=kept, clipped=clipped)
 
 
-def node_absorptances(
-    by_layer: ArrayLike, shade: ShadeNode, more: ArrayLike = 0.0
-) -> LayerAbsorptances:
+def node_absorptances(by_layer: ArrayLike, shade: ShadeNode, more: ArrayLike = 0.0) -> LayerAbsorptances:
     """Absorptances of a shade, the outermost and the innermost pane, from those of all layers.
 
     A pane between both divides its heat by the resistances to either side.
@@ -249,9 +247,7 @@ def linear_u(u_value: float, *, slope: float = SLOPE, reference_c: float = 10.0)
     return LayerResistance("linear U", (at_ten, per_kelvin, R_OUTER + R_INNER))
 
 
-def fit_conductance_surface(
-    mean_c: ArrayLike, difference: ArrayLike, resistance: ArrayLike
-) -> LayerResistance:
+def fit_conductance_surface(mean_c: ArrayLike, difference: ArrayLike, resistance: ArrayLike) -> LayerResistance:
     """R(T_m, dT) fitted by least squares to resistances [m2 K/W] of an ISO 15099 program."""
     x, d = np.asarray(mean_c, float) - 10.0, np.abs(np.asarray(difference, float))
     basis = np.stack([np.ones_like(x), x, d, d**2, x * d, x**2], axis=1)
@@ -261,10 +257,7 @@ def fit_conductance_surface(
 
 
 def with_realised_films(
-    plain: Fenestration,
-    *,
-    r_inner_realised: float | None = None,
-    r_outer_realised: float | None = None,
+    plain: Fenestration, *, r_inner_realised: float | None = None, r_outer_realised: float | None = None
 ) -> Fenestration:
     """The better closure: layer-to-environment resistances that the system really has.
 

@@ -14,13 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from thermal.blackbox import (
-    SLOPE,
-    Fenestration,
-    LayerResistance,
-    linear_u,
-    with_realised_films,
-)
+from thermal.blackbox import SLOPE, Fenestration, LayerResistance, linear_u, with_realised_films
 from thermal.errors import require, require_range
 from thermal.glazing import Gap
 from thermal.glazing_unit import GlazingUnit
@@ -36,21 +30,30 @@ BY_DIRECTION = ", g by direction"  # of a key of `ERRORS`
 # the larger of a blind's and a shade's
 ERRORS: dict[str, dict[str, tuple[float, float]]] = {
     "none": {
-        "typical": (0.14, 0.17), "typical" + BY_DIRECTION: (0.13, 0.17),
-        "gap": (0.14, 0.18), "constant": (0.29, 0.41),
-        "linear": (0.61, 0.85), "layers": (0.17, 0.21),
+        "typical": (0.14, 0.17),
+        "typical" + BY_DIRECTION: (0.13, 0.17),
+        "gap": (0.14, 0.18),
+        "constant": (0.29, 0.41),
+        "linear": (0.61, 0.85),
+        "layers": (0.17, 0.21),
     },
     "external": {
-        "typical": (0.17, 0.25), "typical" + BY_DIRECTION: (0.27, 0.39),
-        "gap": (0.16, 0.23), "constant": (0.18, 0.28),
-        "linear": (0.35, 0.52), "layers": (0.12, 0.18),
+        "typical": (0.17, 0.25),
+        "typical" + BY_DIRECTION: (0.27, 0.39),
+        "gap": (0.16, 0.23),
+        "constant": (0.18, 0.28),
+        "linear": (0.35, 0.52),
+        "layers": (0.12, 0.18),
     },
     "internal": {
-        "typical": (0.18, 0.17), "typical" + BY_DIRECTION: (0.39, 0.39),
-        "gap": (0.19, 0.16), "constant": (0.37, 0.35),
-        "linear": (0.55, 1.03), "layers": (0.20, 0.25),
+        "typical": (0.18, 0.17),
+        "typical" + BY_DIRECTION: (0.39, 0.39),
+        "gap": (0.19, 0.16),
+        "constant": (0.37, 0.35),
+        "linear": (0.55, 1.03),
+        "layers": (0.20, 0.25),
     },
-}  # fmt: skip
+}
 
 
 # The inputs with which `ERRORS` were measured
@@ -97,9 +100,7 @@ class Closure:
     @property
     def states_films(self) -> bool:
         """Whether the films are given that the faces really have."""
-        return not (
-            self.realised_inner_resistance is None and self.realised_outer_resistance is None
-        )
+        return not (self.realised_inner_resistance is None and self.realised_outer_resistance is None)
 
     def with_typical(self, unit: GlazingUnit | None, u_value: float) -> Closure:
         """Closure with what typical layers add: all of it, or the films of their shade.
@@ -107,9 +108,7 @@ class Closure:
         Args: unit: of `typical_unit`; None: there is none with this U, and R is constant.
         """
         if unit is None:
-            return self if self.u_model not in BY_LAYERS else replace(
-                self, u_model="constant", gap=None
-            )  # fmt: skip
+            return self if self.u_model not in BY_LAYERS else replace(self, u_model="constant", gap=None)
         if self.u_model in BY_LAYERS:
             return replace(self, unit=unit)
         if self.states_films or unit.shade_place not in FACES:
@@ -160,9 +159,7 @@ class Closure:
         words = {
             "typical": ThermalNote("ISO 15099 with typical layers"),
             "constant": ThermalNote("Kuhn's Blackbox model with constant resistance"),
-            "linear": ThermalNote(
-                "U-value linear in temperature, {slope:.3g} %/K", {"slope": 100 * self.slope}
-            ),
+            "linear": ThermalNote("U-value linear in temperature, {slope:.3g} %/K", {"slope": 100 * self.slope}),
             "gap": ThermalNote("ISO 15099 with typical panes and the stated gas gap"),
             "surface": ThermalNote("resistance by temperature as stated, R(T_m, dT)"),
             "layers": ThermalNote("ISO 15099, layer by layer"),
@@ -178,8 +175,5 @@ class Closure:
         return ThermalNote(
             "{model}; RMS error against EnergyPlus in {cases} cases of low-e double glazing, "
             "{inputs}: air {air:.2f} K, glass {glass:.2f} K",
-            {
-                "model": words, "cases": CASES, "inputs": INPUTS.get(key, PLAIN),
-                "air": known[0], "glass": known[1],
-            },
-        )  # fmt: skip
+            {"model": words, "cases": CASES, "inputs": INPUTS.get(key, PLAIN), "air": known[0], "glass": known[1]},
+        )

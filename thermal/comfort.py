@@ -35,9 +35,7 @@ def mean_radiant_temperature(surface_c: ArrayLike, view_factors: ArrayLike) -> N
     return (kelvin**4 @ f) ** 0.25 - KELVIN
 
 
-def room_centre_mrt(
-    surface_c: ArrayLike, floor_c: ArrayLike, area: ArrayLike | None = None
-) -> NDArray[np.float64]:
+def room_centre_mrt(surface_c: ArrayLike, floor_c: ArrayLike, area: ArrayLike | None = None) -> NDArray[np.float64]:
     """MRT [H] [degC] at the room's centre: mean of all surfaces' mean and of the floor.
 
     Args: surface_c: [H, N]; floor_c: [H]; area: [N] weights, plain mean (dissertation) without.
@@ -47,9 +45,7 @@ def room_centre_mrt(
     return 0.5 * (surfaces @ (weight / weight.sum()) + np.asarray(floor_c, dtype=float))
 
 
-def operative_temperature(
-    air_c: ArrayLike, mrt_c: ArrayLike, air_speed: float = 0.1
-) -> NDArray[np.float64]:
+def operative_temperature(air_c: ArrayLike, mrt_c: ArrayLike, air_speed: float = 0.1) -> NDArray[np.float64]:
     """Operative temperature [...] [degC]: the mean below 0.2 m/s, else ISO 7726's weights."""
     air, mrt = np.asarray(air_c, dtype=float), np.asarray(mrt_c, dtype=float)
     require(air_speed >= 0, "air speed", f"is negative: {air_speed} m/s")
@@ -57,9 +53,7 @@ def operative_temperature(
     return (mrt + weight * air) / (1.0 + weight)
 
 
-def running_mean(
-    outdoor_c: ArrayLike, *, alpha: float = 0.7, days: int = 7, per_day: int = 24
-) -> NDArray[np.float64]:
+def running_mean(outdoor_c: ArrayLike, *, alpha: float = 0.7, days: int = 7, per_day: int = 24) -> NDArray[np.float64]:
     """Running mean outdoor temperature [H] [degC] of the days before, the year taken as cyclic.
 
     (1 - a) sum_k a^(k-1) t_(d-k) / (1 - a^n): the division, missing in the dissertation, makes the
@@ -91,9 +85,7 @@ def _daily_means(outdoor_c: ArrayLike, per_day: int) -> NDArray[np.float64]:
     return outdoor.reshape(-1, per_day).mean(axis=1)
 
 
-def _days_before(
-    daily: NDArray[np.float64], weights: NDArray[np.float64], per_day: int
-) -> NDArray[np.float64]:
+def _days_before(daily: NDArray[np.float64], weights: NDArray[np.float64], per_day: int) -> NDArray[np.float64]:
     mean = sum(w * np.roll(daily, k + 1) for k, w in enumerate(weights))
     return np.repeat(mean, per_day)
 
@@ -131,9 +123,7 @@ def adaptive_comfort(
     return AdaptiveComfort(band, mean, low, high, applicable, within, excess)
 
 
-def comfort_by_outdoors(
-    operative_c: ArrayLike, outdoor_c: ArrayLike, band: str, *, per_day: int
-) -> AdaptiveComfort:
+def comfort_by_outdoors(operative_c: ArrayLike, outdoor_c: ArrayLike, band: str, *, per_day: int) -> AdaptiveComfort:
     """Operative temperatures [H] against the adaptive comfort band of a standard.
 
     Args: outdoor_c: [H] of whole days with so many values each.
@@ -162,9 +152,7 @@ class ComfortSummary:
     discomfort_by_month: NDArray[np.int64]  # [12] hours outside the band or not applicable
 
 
-def summarise(
-    comfort: AdaptiveComfort, chosen: ArrayLike, months: ArrayLike | None = None
-) -> ComfortSummary:
+def summarise(comfort: AdaptiveComfort, chosen: ArrayLike, months: ArrayLike | None = None) -> ComfortSummary:
     """Counts of the chosen hours [H] (a mask); months: [H] 1 to 12, a common year without."""
     mask = np.asarray(chosen, dtype=bool)
     valid = mask & comfort.applicable
@@ -209,9 +197,7 @@ def pmv_ppd(
     from pythermalcomfort.models import pmv_ppd_iso
 
     air, mrt, speed, moist = _surroundings(air_c, mrt_c, air_speed, humidity)
-    result = pmv_ppd_iso(
-        tdb=air, tr=mrt, vr=speed, rh=moist, met=metabolic_rate, clo=clothing, **_PLAIN
-    )
+    result = pmv_ppd_iso(tdb=air, tr=mrt, vr=speed, rh=moist, met=metabolic_rate, clo=clothing, **_PLAIN)
     return np.asarray(result.pmv, dtype=float), np.asarray(result.ppd, dtype=float)
 
 

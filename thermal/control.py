@@ -51,9 +51,7 @@ def by_threshold(
     return state
 
 
-def by_glare(
-    closure: ArrayLike, excess: Callable[[int, StateArray], NDArray[np.float64]], hours: int
-) -> StateArray:
+def by_glare(closure: ArrayLike, excess: Callable[[int, StateArray], NDArray[np.float64]], hours: int) -> StateArray:
     """The most open combination of states [H] without glare; the last one where none has none.
 
     Of equally open ones the one with the least glare. Combinations are rated only in the hours in
@@ -151,9 +149,7 @@ def strides(conditions: Sequence[Condition]) -> StateArray:
 def levels_of(number: int, conditions: Sequence[Condition]) -> tuple[int, ...]:
     """The level of each condition in the combination of a number."""
     steps = strides(conditions)
-    return tuple(
-        number // int(step) % one.levels for one, step in zip(conditions, steps, strict=True)
-    )
+    return tuple(number // int(step) % one.levels for one, step in zip(conditions, steps, strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,9 +199,7 @@ def cut_off_angle(tilt: ArrayLike, width: float, spacing: float) -> NDArray[np.f
     return np.arctan2(spacing / width - np.sin(beta), np.cos(beta))
 
 
-def by_cut_off(
-    sun_local: ArrayLike, beam: ArrayLike, tilts: ArrayLike, width: float, spacing: float
-) -> StateArray:
+def by_cut_off(sun_local: ArrayLike, beam: ArrayLike, tilts: ArrayLike, width: float, spacing: float) -> StateArray:
     """The most open slat tilt [H] that stops the beam; the last one where none does.
 
     Args: sun_local: [H, 3]; beam: [H] on the facade [W/m2] (0: slats stay open); tilts: [J] [rad]
@@ -266,9 +260,7 @@ def with_few_moves(states: StateArray, most: int, rows_of_day: int) -> StateArra
     return result
 
 
-def sun_depth(
-    sun: ArrayLike, outwards: ArrayLike, corners: ArrayLike, plane: float
-) -> NDArray[np.float64]:
+def sun_depth(sun: ArrayLike, outwards: ArrayLike, corners: ArrayLike, plane: float) -> NDArray[np.float64]:
     """Distance from a window's foot to which the sun reaches on a level plane [H] [m].
 
     Each corner c of the glass casts a spot at c - s (c_z - plane)/s_z; the depth is the distance of
@@ -320,8 +312,6 @@ def switched(suns: Sequence[Solar], chosen: ArrayLike, states: ArrayLike | None 
         return np.stack(arrays)[at, np.arange(rows)]
 
     names = ("absorbed_outer", "absorbed_inner", "absorbed_middle", "inside", "facade")
-    parts: dict[str, Any] = {
-        name: pick(name) for name in (*names, "window_inside", "window_facade")
-    }
+    parts: dict[str, Any] = {name: pick(name) for name in (*names, "window_inside", "window_facade")}
     of_windows = np.repeat(choice[:, None], windows, axis=1) if states is None else states
     return Solar(**parts, state=np.asarray(of_windows, dtype=np.int64))

@@ -82,9 +82,7 @@ def natural_outside(surface_c: float, air_c: float, normal_z: float) -> float:
 
 
 @register_jitable(**INLINED)
-def doe2_outside(
-    surface_c: float, air_c: float, normal_z: float, forced: float, roughness: float
-) -> float:
+def doe2_outside(surface_c: float, air_c: float, normal_z: float, forced: float, roughness: float) -> float:
     """DOE-2 outside film: h_n + R_f (sqrt(h_n^2 + h_f^2) - h_n), h_f = a V^b of smooth glass."""
     natural = natural_outside(surface_c, air_c, normal_z)
     return natural + roughness * (np.sqrt(natural * natural + forced * forced) - natural)

@@ -79,17 +79,13 @@ def elimination(unknowns: int, pairs: Iterable[tuple[int, int]]) -> Elimination:
             run.append(products[0] if len(products) and (np.diff(products) == 1).all() else -1)
     targets = np.concatenate(target).astype(np.uint64)
     return Elimination(
-        place=place, start=start, rows=rows.astype(np.uint64), target=targets,
-        run=np.array(run, dtype=np.int64),
-    )  # fmt: skip
+        place=place, start=start, rows=rows.astype(np.uint64), target=targets, run=np.array(run, dtype=np.int64)
+    )
 
 
 @inlined
 def eliminate(
-    system: Elimination,
-    diagonal: NDArray[np.float64],
-    below: NDArray[np.float64],
-    right: NDArray[np.float64],
+    system: Elimination, diagonal: NDArray[np.float64], below: NDArray[np.float64], right: NDArray[np.float64]
 ) -> None:
     """Solve the system in place: L D L' column by column; `right` becomes the solution.
 

@@ -30,8 +30,7 @@ class IdealLoads:
 
     def __post_init__(self) -> None:
         crossed = np.max(self.heating_c) > np.min(self.cooling_c) and np.any(
-            _same_length(self.heating_c, self.cooling_c)
-            > _same_length(self.cooling_c, self.heating_c)
+            _same_length(self.heating_c, self.cooling_c) > _same_length(self.cooling_c, self.heating_c)
         )
         require(not crossed, "set points", "the heating set point lies above the cooling one")
         for name in ("heating_c", "cooling_c", "heating_limit", "cooling_limit"):

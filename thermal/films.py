@@ -6,13 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal.climate import SIGMA
-from thermal.convection import (
-    constant_inside,
-    doe2_outside,
-    iso15099_inside,
-    mowitt_outside,
-    tarp_inside,
-)
+from thermal.convection import constant_inside, doe2_outside, iso15099_inside, mowitt_outside, tarp_inside
 from thermal.network import WINDOW, Faces
 from thermal.records import Method, OutdoorConditions, inlined
 
@@ -55,9 +49,8 @@ def inside_film(faces: Faces, i: int, surface: float, air: float, method: Method
 
 @inlined
 def outside_exchange(
-    faces: Faces, i: int, surface: float, emissivity: float,
-    weather: OutdoorConditions, t: int, method: Method,
-) -> tuple[float, float]:  # fmt: skip
+    faces: Faces, i: int, surface: float, emissivity: float, weather: OutdoorConditions, t: int, method: Method
+) -> tuple[float, float]:
     """Sum of the outside coefficients [W/(m2 K)], and of them times their temperatures."""
     out, sky = weather.outdoor[t], weather.sky[t]
     nx, ny, nz = faces.normal[i]

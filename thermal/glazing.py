@@ -44,11 +44,7 @@ class Gap:
             require_range(emissivity, 1e-3, 1.0, "gap emissivity")
 
     def conductance(
-        self,
-        difference: float,
-        position: str = "vertical",
-        *,
-        mean_temperature: float = MEAN_TEMPERATURE,
+        self, difference: float, position: str = "vertical", *, mean_temperature: float = MEAN_TEMPERATURE
     ) -> float:
         """h_s = h_r + h_g [W/(m2 K)] with a temperature difference [K] across it.
 

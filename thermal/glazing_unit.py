@@ -224,9 +224,7 @@ def venetian_layer(
     open_share = max(1.0 - blocked / (slat_spacing + slat_thickness), 0.0)
     c1, c2, c3, c4 = BLIND
     front = c1 * (open_share * max(cosine, 1e-3) ** c2) ** c3
-    return GlazingLayer(
-        max(c4 * across, 1e-5), conductivity, sides, passed, Openings(*edges, min(front, 1.0))
-    )
+    return GlazingLayer(max(c4 * across, 1e-5), conductivity, sides, passed, Openings(*edges, min(front, 1.0)))
 
 
 def sheet_layer(
@@ -251,9 +249,7 @@ def sheet_layer(
     return GlazingLayer(thickness, conductivity, (sides[0], sides[1]), passed, openings)
 
 
-def perforated_layer(
-    hole: float, spacing: float, *, thickness: float = 0.0006, **sheet: object
-) -> GlazingLayer:
+def perforated_layer(hole: float, spacing: float, *, thickness: float = 0.0006, **sheet: object) -> GlazingLayer:
     """A sheet with round holes of a diameter [m] on a square grid [m] as a layer.
 
     Longwave passes the holes by the view factor of their two ends.
@@ -312,8 +308,7 @@ def _slat_longwave(
         leaving = solve @ (rho * factors[:n, source])
         lengths = np.array([np.linalg.norm(b - a) for a, b in strips])
         arrives = [
-            factors[face, :n] @ leaving + (factors[face, source] if face != source else 0.0)
-            for face in (other, source)
+            factors[face, :n] @ leaving + (factors[face, source] if face != source else 0.0) for face in (other, source)
         ]
         scale = lengths[[other, source]] / lengths[source]
         results.append([float(a * s) for a, s in zip(arrives, scale, strict=True)])

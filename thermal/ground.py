@@ -87,8 +87,9 @@ class GroundElement:
         virtual = missing - depth / self.soil.conductivity
         return (_resistance(virtual), ground, *construction)
 
-    def temperature(self, indoor_c: float, mean_c: float, swing_c: float, coldest: float,
-                    hours: ArrayLike) -> NDArray[np.float64]:  # fmt: skip
+    def temperature(
+        self, indoor_c: float, mean_c: float, swing_c: float, coldest: float, hours: ArrayLike
+    ) -> NDArray[np.float64]:
         """Temperature [H] [degC] beyond the virtual layer (F.2, C.3), indoors at a steady mean.
 
         Args: mean_c, swing_c, coldest: of the outdoor year's harmonic, `harmonic`; hours: [H] of
@@ -117,9 +118,7 @@ def slab_u(place: Footprint, thickness: float) -> float:
     return float(k / (0.457 * b + thickness))
 
 
-def edge_transmittance(
-    place: Footprint, thickness: float, width: float, resistance: float, *, vertical: bool
-) -> float:
+def edge_transmittance(place: Footprint, thickness: float, width: float, resistance: float, *, vertical: bool) -> float:
     """Psi_g,ed [W/(m K)] of edge insulation (annex D); negative: what it saves.
 
     Args: width: horizontal width or vertical depth [m]; resistance: of the insulation [m2 K/W].
@@ -131,11 +130,7 @@ def edge_transmittance(
 
 
 def slab_on_ground(
-    place: Footprint,
-    resistance: float,
-    *,
-    edge: tuple[float, float] | None = None,
-    vertical: bool = True,
+    place: Footprint, resistance: float, *, edge: tuple[float, float] | None = None, vertical: bool = True
 ) -> GroundElement:
     """A slab on the ground; edge: depth or width [m] and resistance [m2 K/W] of its insulation.
 
@@ -146,11 +141,7 @@ def slab_on_ground(
     if edge is not None:
         width, insulation = edge
         more = k * insulation - _soil_replaced(insulation)
-        u += (
-            2
-            * edge_transmittance(place, d, width, insulation, vertical=vertical)
-            / (place.dimension)
-        )
+        u += 2 * edge_transmittance(place, d, width, insulation, vertical=vertical) / (place.dimension)
         left = np.exp(-(2.0 if vertical else 1.0) * width / depth)
         swing = (1 - left) * np.log(depth / (d + more) + 1) + left * swing
     share = 0.37 * place.perimeter * k * swing / place.area
@@ -205,9 +196,7 @@ def basement(
     wall_swing = 0.37 * k * 2 * (1 - left) * np.log(reach / wall + 1) / depth
     return (
         GroundElement(floor_u, float(floor_swing), 1.0, floor_resistance, R_SI_DOWN, place.soil),
-        GroundElement(
-            float(wall_u), float(wall_swing), 1.0, wall_resistance, R_SI_ACROSS, place.soil
-        ),
+        GroundElement(float(wall_u), float(wall_swing), 1.0, wall_resistance, R_SI_ACROSS, place.soil),
     )
 
 
@@ -225,10 +214,7 @@ def over_unheated_basement(
 
     Source: ISO 13370:2017, 7.4 and H.8.
     """
-    (floor, wall), (k, reach) = (
-        basement(place, floor_resistance, wall_resistance, depth),
-        _soil(place),
-    )
+    (floor, wall), (k, reach) = (basement(place, floor_resistance, wall_resistance, depth), _soil(place))
     a, p = place.area, place.perimeter
     above = 1.0 / (2 * R_SI_DOWN + resistance)
     air = AIR_WH * CELLAR_AIR * a * (depth + height)

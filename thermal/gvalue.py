@@ -80,8 +80,7 @@ def thermal_data(
         u_value = typical_u
         notes.append(
             ThermalNote(
-                "{system}: no U-value given; {u_value:g} W/(m2 K) is assumed, as for low-e double "
-                "glazing {shade}.",
+                "{system}: no U-value given; {u_value:g} W/(m2 K) is assumed, as for low-e double glazing {shade}.",
                 {"system": item, "u_value": u_value, "shade": _SHADES[shading_position]},
             )
         )
@@ -99,9 +98,7 @@ def thermal_data(
     return ThermalData(u_value, g_from_inward_share(tau, rho, share), tuple(notes))
 
 
-def inward_share(
-    transmittance: float, reflectance: float, g_value: float, *, item: str = "fenestration"
-) -> float:
+def inward_share(transmittance: float, reflectance: float, g_value: float, *, item: str = "fenestration") -> float:
     """Share N of the absorbed sun that reaches the room: (g - tau)/(1 - tau - rho)."""
     require_range(g_value, 0.0, 1.0, f"{item}: g")
     message = (
@@ -118,9 +115,7 @@ def inward_share(
     return share
 
 
-def g_from_inward_share(
-    transmittance: ArrayLike, reflectance: ArrayLike, share: float
-) -> NDArray[np.float64]:
+def g_from_inward_share(transmittance: ArrayLike, reflectance: ArrayLike, share: float) -> NDArray[np.float64]:
     """g = tau + N (1 - tau - rho) [...] for an inward share N."""
     tau, rho = np.asarray(transmittance, dtype=float), np.asarray(reflectance, dtype=float)
     return tau + share * np.maximum(1.0 - tau - rho, 0.0)

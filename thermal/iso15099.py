@@ -41,9 +41,7 @@ class Conditions:
 
 def prescribed(outdoor_c: float, indoor_c: float, sun: float = 0.0) -> Conditions:
     """Conditions with the films of a measurement: convection 20 and 2.7 W/(m2 K)."""
-    return Conditions(
-        Environment(outdoor_c, CONVECTION_OUTSIDE), Environment(indoor_c, CONVECTION_INSIDE), sun
-    )
+    return Conditions(Environment(outdoor_c, CONVECTION_OUTSIDE), Environment(indoor_c, CONVECTION_INSIDE), sun)
 
 
 # By standard: the state of U, and that of g.  NFRC 100 and 200: wind 5.5 and 2.75 m/s, 4 + 4 v
@@ -70,9 +68,7 @@ class UnitBalance:
     gap_outlet_c: FloatArray  # [G]
 
 
-def unit_balance(
-    unit: GlazingUnit, conditions: Conditions, absorbed: ArrayLike = 0.0
-) -> UnitBalance:
+def unit_balance(unit: GlazingUnit, conditions: Conditions, absorbed: ArrayLike = 0.0) -> UnitBalance:
     """The steady state of a unit; absorbed: sun in each layer [N] [W/m2].
 
     Raises: `ThermalInputError` where no state settles.
@@ -85,14 +81,10 @@ def _start(unit: GlazingUnit, conditions: Conditions) -> UnitState:
     n = len(unit.layers)
     ends = [e.air_c + 273.15 for e in (conditions.outdoor, conditions.indoor)]
     faces = np.linspace(ends[0], ends[1], 2 * n + 2)[1:-1].copy()
-    return UnitState(
-        faces, np.zeros(2 * n), np.zeros((n - 1, 6)), np.zeros(2), np.zeros((4 * n, 4 * n + 1))
-    )
+    return UnitState(faces, np.zeros(2 * n), np.zeros((n - 1, 6)), np.zeros(2), np.zeros((4 * n, 4 * n + 1)))
 
 
-def _balance(
-    unit: GlazingUnit, arrays: UnitArrays, state: UnitState, absorbed: ArrayLike
-) -> UnitBalance:
+def _balance(unit: GlazingUnit, arrays: UnitArrays, state: UnitState, absorbed: ArrayLike) -> UnitBalance:
     """The balance from where the state is."""
     sun = np.broadcast_to(np.asarray(absorbed, dtype=float), (len(unit.layers),)).copy()
     change = settle(arrays, sun, state)
@@ -137,9 +129,7 @@ def iso15099_g_values(
     return tau + np.maximum(np.array(secondary), 0.0).reshape(tau.shape)
 
 
-def yearly_g_values(
-    unit: GlazingUnit, transmittance: ArrayLike, absorptance: ArrayLike
-) -> FloatArray:
+def yearly_g_values(unit: GlazingUnit, transmittance: ArrayLike, absorptance: ArrayLike) -> FloatArray:
     """g [...] as the Blackbox takes it for a year: the mean of `G_STATES`, films prescribed."""
     tau, alpha = (np.ascontiguousarray(v, dtype=float) for v in (transmittance, absorptance))
     return np.frombuffer(_yearly_g(unit, tau.tobytes(), alpha.tobytes())).reshape(tau.shape).copy()
@@ -172,8 +162,7 @@ def iso15099_data(unit: GlazingUnit, u_value: float | None = None) -> Iso15099Da
     """
     found, r_outer, _, r_inner, _ = _dark_state(unit, *U_STATE_C)
     mean, difference, resistance = (
-        np.array(column)
-        for column in zip(*(_middle(state) for state in _dark_states(unit)), strict=True)
+        np.array(column) for column in zip(*(_middle(state) for state in _dark_states(unit)), strict=True)
     )
     computed = found
     if u_value is not None:
@@ -197,9 +186,7 @@ def _shade_node(
     arrays = unit.arrays(*(Environment(t, CONVECTION_INSIDE) for t in U_STATE_C))
     exterior = unit.shade_place == "external"
     at = 0 if exterior else -1  # of the shade, and of its gap
-    if unit.shade_place not in ("internal", "external") or arrays.air[at] not in (
-        INDOORS, OUTDOORS
-    ):  # fmt: skip
+    if unit.shade_place not in ("internal", "external") or arrays.air[at] not in (INDOORS, OUTDOORS):
         return None
     shade, pane = (unit.layers[k] for k in ((0, 1) if exterior else (-1, -2)))
     kept, gaps = (slice(1, None), slice(1, None)) if exterior else (slice(-1), slice(-1))
@@ -252,10 +239,7 @@ def _dark_shares(unit: GlazingUnit, shift: float, exterior: bool) -> dict[str, A
         nodes = outer * faces[0] / of_panes[0], outer, inner
     else:
         nodes = outer, inner, 1.0 - (1.0 - inner) * (warm - faces[-1]) / (warm - of_panes[-1])
-    return {
-        "sun": tuple(shares.reshape(-1, 2).mean(axis=1).tolist()),
-        "inward": tuple(float(node) for node in nodes),
-    }
+    return {"sun": tuple(shares.reshape(-1, 2).mean(axis=1).tolist()), "inward": tuple(float(node) for node in nodes)}
 
 
 DarkState = tuple[float, float, float, float, tuple[float, float]]

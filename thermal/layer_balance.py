@@ -72,14 +72,7 @@ def _nusselt_upright(rayleigh: float, aspect: float) -> float:
 
 @inlined
 def gap_convection(
-    fractions: FloatArray,
-    gap: int,
-    width: float,
-    height: float,
-    tilt: float,
-    outer: float,
-    inner: float,
-    mean: float,
+    fractions: FloatArray, gap: int, width: float, height: float, tilt: float, outer: float, inner: float, mean: float
 ) -> float:
     """Conductance [W/(m2 K)] by convection of a gap between two faces [K], its gas at a mean [K].
 
@@ -105,9 +98,7 @@ def pressure_terms(
 
 
 @inlined
-def driven_speed(
-    quadratic: float, linear: float, first: float, second: float, height: float, tilt: float
-) -> float:
+def driven_speed(quadratic: float, linear: float, first: float, second: float, height: float, tilt: float) -> float:
     """Speed [m/s] that the difference between two air temperatures [K] drives."""
     density = PRESSURE * 28.97 / (8314.462175 * REFERENCE_K)
     pressure = density * REFERENCE_K * GRAVITY * height * abs(np.sin(tilt))
@@ -164,15 +155,11 @@ def speed_by_air(
         return 0.0
     # the speed that the air drives less that which it has: above zero at `low`, not so at `high`
     over = high
-    under = _drives(
-        fractions, gap, width, height, tilt, closed, mean, inlet, at, a, b, high
-    ) - high  # fmt: skip
+    under = _drives(fractions, gap, width, height, tilt, closed, mean, inlet, at, a, b, high) - high
     side = 0
     for _ in range(HALVINGS):
         speed = (low * under - high * over) / (under - over)
-        excess = _drives(
-            fractions, gap, width, height, tilt, closed, mean, inlet, at, a, b, speed
-        ) - speed  # fmt: skip
+        excess = _drives(fractions, gap, width, height, tilt, closed, mean, inlet, at, a, b, speed) - speed
         if abs(excess) < LEAST_EXCESS:
             return speed
         if excess > 0.0:
@@ -233,13 +220,7 @@ def ends_of_loop(
 
 @inlined
 def _stays(
-    fractions: FloatArray,
-    gap: int,
-    width: float,
-    height: float,
-    closed: float,
-    mean: float,
-    speed: float,
+    fractions: FloatArray, gap: int, width: float, height: float, closed: float, mean: float, speed: float
 ) -> float:
     """Share of its difference from the faces that air keeps over the height of a gap."""
     if speed <= 1e-12:
@@ -270,20 +251,10 @@ def speed_in_loop(
     low, high = 0.0, driven_speed(a, b, mean, mean_next, height, tilt)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        out, back = ends_of_loop(
-            fractions, gap, widths, height, closed, closed_next, mean, mean_next, middle
-        )
+        out, back = ends_of_loop(fractions, gap, widths, height, closed, closed_next, mean, mean_next, middle)
         first = air_in_gap(fractions, gap, width, height, closed, middle, mean, back, mean)[1]
         second = air_in_gap(
-            fractions,
-            gap + 1,
-            width_next,
-            height,
-            closed_next,
-            middle * ratio,
-            mean_next,
-            out,
-            mean_next,
+            fractions, gap + 1, width_next, height, closed_next, middle * ratio, mean_next, out, mean_next
         )[1]
         if driven_speed(a, b, first, second, height, tilt) > middle:
             low = middle
@@ -320,9 +291,7 @@ class UnitState(NamedTuple):
 
     faces: NDArray[np.float64]  # [2 N] [K]
     radiosity: NDArray[np.float64]  # [2 N] [W/m2]
-    gap: NDArray[
-        np.float64
-    ]  # [G, 6] conductance, heat to the faces, speed, inlet, outlet, mean [K]
+    gap: NDArray[np.float64]  # [G, 6] conductance, heat to the faces, speed, inlet, outlet, mean [K]
     film: NDArray[np.float64]  # [2] convection outdoors, indoors [W/(m2 K)]
     matrix: NDArray[np.float64]  # [4 N, 4 N + 1] scratch
 
@@ -357,9 +326,7 @@ def _films(unit: UnitArrays, state: UnitState) -> None:
     state.film[0] = unit.films[0, 1]
     state.film[1] = unit.films[1, 1]
     if unit.films[1, 1] < 0.0:
-        state.film[1] = free_convection(
-            state.faces[last], unit.films[1, 0], unit.place[0], unit.place[1], unit.gas
-        )
+        state.film[1] = free_convection(state.faces[last], unit.films[1, 0], unit.place[0], unit.place[1], unit.gas)
 
 
 @inlined
@@ -410,9 +377,7 @@ def _gaps(unit: UnitArrays, state: UnitState) -> None:
             speed, inlet = unit.forced[g, 0], unit.forced[g, 1]
         elif kind != CLOSED:
             inlet = unit.films[0 if kind == OUTDOORS else 1, 0]
-            speed = speed_by_air(
-                unit.gas, g, unit.width[g], height, tilt, unit.impedance[g], closed, mean, inlet, at
-            )
+            speed = speed_by_air(unit.gas, g, unit.width[g], height, tilt, unit.impedance[g], closed, mean, inlet, at)
         _moving(unit, state, g, closed, speed, inlet, at)
 
 
@@ -421,9 +386,7 @@ def _still(unit: UnitArrays, state: UnitState, g: int) -> tuple[float, float]:
     """The temperature of a gap's gas [K], and its conductance if the gas did not move along."""
     outer, inner = state.faces[2 * g + 1], state.faces[2 * g + 2]
     at = state.gap[g, 5] if state.gap[g, 5] > 0.0 else 0.5 * (outer + inner)
-    return at, gap_convection(
-        unit.gas, g, unit.width[g], unit.place[0], unit.place[1], outer, inner, at
-    )
+    return at, gap_convection(unit.gas, g, unit.width[g], unit.place[0], unit.place[1], outer, inner, at)
 
 
 @inlined
@@ -433,12 +396,8 @@ def _loop(unit: UnitArrays, state: UnitState, g: int, at: float, closed: float) 
     at_next, closed_next = _still(unit, state, g + 1)
     mean = 0.5 * (state.faces[2 * g + 1] + state.faces[2 * g + 2])
     mean_next = 0.5 * (state.faces[2 * g + 3] + state.faces[2 * g + 4])
-    speed = speed_in_loop(
-        unit.gas, g, unit.width, height, tilt, unit.impedance, closed, closed_next, mean, mean_next
-    )
-    out, back = ends_of_loop(
-        unit.gas, g, unit.width, height, closed, closed_next, mean, mean_next, speed
-    )
+    speed = speed_in_loop(unit.gas, g, unit.width, height, tilt, unit.impedance, closed, closed_next, mean, mean_next)
+    out, back = ends_of_loop(unit.gas, g, unit.width, height, closed, closed_next, mean, mean_next, speed)
     _moving(unit, state, g, closed, speed, back, at)
     turned = speed * unit.width[g] / unit.width[g + 1]
     _moving(unit, state, g + 1, closed_next, turned, out, at_next)
@@ -448,14 +407,10 @@ def _loop(unit: UnitArrays, state: UnitState, g: int, at: float, closed: float) 
 
 
 @inlined
-def _moving(
-    unit: UnitArrays, state: UnitState, g: int, closed: float, speed: float, inlet: float, at: float
-) -> None:
+def _moving(unit: UnitArrays, state: UnitState, g: int, closed: float, speed: float, inlet: float, at: float) -> None:
     """Note a gap whose air moves with a speed from an inlet temperature."""
     mean = 0.5 * (state.faces[2 * g + 1] + state.faces[2 * g + 2])
-    outlet, average, heat = air_in_gap(
-        unit.gas, g, unit.width[g], unit.place[0], closed, speed, mean, inlet, at
-    )
+    outlet, average, heat = air_in_gap(unit.gas, g, unit.width[g], unit.place[0], closed, speed, mean, inlet, at)
     state.gap[g, 0] = closed + 2.0 * speed
     state.gap[g, 1], state.gap[g, 2] = heat, speed
     state.gap[g, 3], state.gap[g, 4], state.gap[g, 5] = inlet, outlet, average

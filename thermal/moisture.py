@@ -29,22 +29,33 @@ def saturation_pressure(temperature_c: ArrayLike) -> FloatArray:
     """
     c = np.asarray(temperature_c, dtype=float)
     t = c + 273.15
-    ice = (-5.6745359e3 / t + 6.3925247 - 9.677843e-3 * t + 6.2215701e-7 * t**2
-           + 2.0747825e-9 * t**3 - 9.484024e-13 * t**4 + 4.1635019 * np.log(t))  # fmt: skip
-    water = (-5.8002206e3 / t + 1.3914993 - 4.8640239e-2 * t + 4.1764768e-5 * t**2
-             - 1.4452093e-8 * t**3 + 6.5459673 * np.log(t))  # fmt: skip
+    ice = (
+        -5.6745359e3 / t
+        + 6.3925247
+        - 9.677843e-3 * t
+        + 6.2215701e-7 * t**2
+        + 2.0747825e-9 * t**3
+        - 9.484024e-13 * t**4
+        + 4.1635019 * np.log(t)
+    )
+    water = (
+        -5.8002206e3 / t
+        + 1.3914993
+        - 4.8640239e-2 * t
+        + 4.1764768e-5 * t**2
+        - 1.4452093e-8 * t**3
+        + 6.5459673 * np.log(t)
+    )
     return np.exp(np.where(c < 0.0, ice, water))
 
 
-def humidity_ratio(relative: ArrayLike, temperature_c: ArrayLike, pressure: ArrayLike
-) -> FloatArray:  # fmt: skip
+def humidity_ratio(relative: ArrayLike, temperature_c: ArrayLike, pressure: ArrayLike) -> FloatArray:
     """Vapour per dry air [...] [kg/kg] at a relative humidity of 0 to 1; pressure [Pa]."""
     vapour = np.asarray(relative, dtype=float) * saturation_pressure(temperature_c)
     return RATIO * vapour / (np.asarray(pressure, dtype=float) - vapour)
 
 
-def relative_humidity(ratio: ArrayLike, temperature_c: ArrayLike, pressure: ArrayLike
-) -> FloatArray:  # fmt: skip
+def relative_humidity(ratio: ArrayLike, temperature_c: ArrayLike, pressure: ArrayLike) -> FloatArray:
     """Relative humidity [...], 0 to 1, of a humidity ratio [kg/kg]."""
     w = np.asarray(ratio, dtype=float)
     vapour = np.asarray(pressure, dtype=float) * w / (RATIO + w)
@@ -110,15 +121,17 @@ def zone_humidity(
     cooled = np.array([z.dehumidify_to < 1.0 for z in zones])
     given, taken = np.maximum(latent, 0.0), np.maximum(-latent, 0.0) * cooled
     relative = relative_humidity(means, air, pressure[:, None])
-    return tuple(
-        Humidity(means[:, z], relative[:, z], given[:, z], taken[:, z]) for z in range(count)
-    )
+    return tuple(Humidity(means[:, z], relative[:, z], given[:, z], taken[:, z]) for z in range(count))
 
 
 def _hours(
-    start: FloatArray, flow: FloatArray, density: FloatArray, links: FloatArray,
-    inflow: FloatArray, air: tuple[FloatArray, FloatArray, FloatArray],
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    start: FloatArray,
+    flow: FloatArray,
+    density: FloatArray,
+    links: FloatArray,
+    inflow: FloatArray,
+    air: tuple[FloatArray, FloatArray, FloatArray],
+) -> tuple[FloatArray, FloatArray]:
     """Mean ratio of each hour [H, Z], and the vapour added (or taken: negative) [kg/s].
 
     flow: outdoor air, inflow: vapour, both but for other zones [kg/s]; air: mass per length of the

@@ -23,9 +23,7 @@ from thermal.ventilation import AirTransfer, SupplyAir, WindowAiring
 from thermal.zone import ROUGHNESS, Layer, OpaqueSurface, WindowElement, Zone
 
 
-def exchange_from_view_factors(
-    area: ArrayLike, emissivity: ArrayLike, view_factors: ArrayLike
-) -> NDArray[np.float64]:
+def exchange_from_view_factors(area: ArrayLike, emissivity: ArrayLike, view_factors: ArrayLike) -> NDArray[np.float64]:
     """Exchange areas X [N, N] [m2] of grey surfaces: Q_ij = X_ij sigma (T_i^4 - T_j^4).
 
     Hottel's total exchange areas; X is symmetric, and A_i eps_i = sum_j X_ij with j = i included.
@@ -138,14 +136,23 @@ def air_paths(zones: Sequence[Zone], transfers: Sequence[AirTransfer], terrain: 
     pairs = [(index[one.source], index[one.target]) for one in transfers]
     openings = [(z, one) for z, zone in enumerate(zones) for one in zone.beside]
     return AirPaths(
-        leak=np.array(
-            [(*x.factors, x.stack, x.stack_exponent, x.wind, x.wind_exponent) for x in leaks]
-        ),
+        leak=np.array([(*x.factors, x.stack, x.stack_exponent, x.wind, x.wind_exponent) for x in leaks]),
         wind=np.array([local_wind_factor(mean_height(zone), terrain) for zone in zones]),
         airing=np.array([(x.wind, x.stack, float(x.both), x.flow) for x in airings]),
         opens=np.array(
-            [(x.open_above_c, x.close_below_c, x.least_difference, x.greatest_wind,
-              x.least_outdoor_c, x.heating_while_open, x.operative, x.hybrid) for x in airings],
+            [
+                (
+                    x.open_above_c,
+                    x.close_below_c,
+                    x.least_difference,
+                    x.greatest_wind,
+                    x.least_outdoor_c,
+                    x.heating_while_open,
+                    x.operative,
+                    x.hybrid,
+                )
+                for x in airings
+            ],
             dtype=np.float64,
         ),
         site=local_wind_factor(SITE_HEIGHT, terrain),
@@ -154,7 +161,7 @@ def air_paths(zones: Sequence[Zone], transfers: Sequence[AirTransfer], terrain: 
         transfer=np.array(pairs, dtype=np.int64).reshape(-1, 2),
         beside=np.array([z for z, _ in openings], dtype=np.int64),
         buoyant=np.array([one.buoyant for _, one in openings], dtype=np.float64),
-    )  # fmt: skip
+    )
 
 
 def named_faces(zones: Sequence[Zone], names: Sequence[str]) -> list[int]:
@@ -167,9 +174,7 @@ def named_faces(zones: Sequence[Zone], names: Sequence[str]) -> list[int]:
     return found
 
 
-def emitters(
-    zones: Sequence[Zone], slabs: Sequence[int], mode_count: NDArray[np.uint64]
-) -> Emitters:
+def emitters(zones: Sequence[Zone], slabs: Sequence[int], mode_count: NDArray[np.uint64]) -> Emitters:
     """The emitters of the zones; slabs: their faces; mode_count: [N] of the faces' own walls."""
     power = []
     for zone, face in zip(zones, slabs, strict=True):
@@ -184,10 +189,7 @@ def emitters(
     return Emitters(
         radiant=np.array([(x.heating_radiant, x.cooling_radiant) for x in loads]),
         acts_at=np.stack(
-            [
-                named_faces(zones, [getattr(x, key) for x in loads])
-                for key in ("heating_surface", "cooling_surface")
-            ],
+            [named_faces(zones, [getattr(x, key) for x in loads]) for key in ("heating_surface", "cooling_surface")],
             axis=1,
         ),
         slab=np.array(slabs, dtype=np.int64),
@@ -336,8 +338,7 @@ def window_mix(zone: Zone, state: NDArray[np.int64] | None, hours: int) -> Windo
     require(state.shape == (hours, len(windows)), item, f"expected {(hours, len(windows))}")
     count = np.array([len(w.states) for w in windows])
     require(bool(np.all((state >= 0) & (state < count))), item, "a state that no window has")
-    columns = [np.array([s.emissivity_in for s in w.states])[state[:, i]]
-               for i, w in enumerate(windows)]  # fmt: skip
+    columns = [np.array([s.emissivity_in for s in w.states])[state[:, i]] for i, w in enumerate(windows)]
     table = np.array(columns).reshape(len(windows), hours).T
     if not len(windows) or bool(np.all(table == table[0])):
         return WindowMix(table[:1], np.zeros(hours, dtype=np.int64))
@@ -371,9 +372,7 @@ def network(
     return Network(faces, modes, glass, radiation, couplings, system, capacity, paths, heated)
 
 
-def _radiation(
-    zones: Sequence[Zone], mixes: Sequence[WindowMix], faces: Faces
-) -> tuple[Radiation, NDArray[np.int64]]:
+def _radiation(zones: Sequence[Zone], mixes: Sequence[WindowMix], faces: Faces) -> tuple[Radiation, NDArray[np.int64]]:
     """The exchange in every zone, and the pairs of faces [P, 2] between which there is any."""
     pairs, exchange, share = [np.empty((0, 2), dtype=np.int64)], [np.empty(0)], []
     first_face = np.searchsorted(faces.zone, np.arange(len(zones) + 1))
@@ -400,9 +399,7 @@ def _radiation(
     return radiation, np.concatenate(pairs)
 
 
-def _couplings(
-    faces: Faces, seen: NDArray[np.int64], link: NDArray[np.float64]
-) -> tuple[Couplings, Elimination]:
+def _couplings(faces: Faces, seen: NDArray[np.int64], link: NDArray[np.float64]) -> tuple[Couplings, Elimination]:
     """What is coupled, and the system's columns; seen: [P, 2] faces that see each other."""
     n = faces.area.size
     films = np.stack([np.arange(n), n + faces.zone], axis=1)
@@ -435,9 +432,7 @@ def _emissivities(zone: Zone, windows: NDArray[np.float64]) -> NDArray[np.float6
     return np.array([*(s.emissivity_in for s in zone.surfaces), *windows, *frames])
 
 
-def _zone_exchange(
-    zone: Zone, area: NDArray[np.float64], eps: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _zone_exchange(zone: Zone, area: NDArray[np.float64], eps: NDArray[np.float64]) -> NDArray[np.float64]:
     if len(area) == 1:
         return np.zeros((1, 1))
     if zone.view_factors is None:
@@ -450,9 +445,7 @@ def _zone_exchange(
     return exchange_from_view_factors(area, eps, zone.view_factors)
 
 
-def _partners(
-    zones: Sequence[Zone], elements: list[tuple[int, OpaqueSurface | WindowElement]]
-) -> list[int]:
+def _partners(zones: Sequence[Zone], elements: list[tuple[int, OpaqueSurface | WindowElement]]) -> list[int]:
     names = {zone.name: z for z, zone in enumerate(zones)}
     where = {(z, e.name): i for i, (z, e) in enumerate(elements)}
     partners = [-1] * len(elements)
@@ -464,11 +457,7 @@ def _partners(
         j = where.get((names[e.outside], e.partner), -1)
         require(j >= 0, item, f"zone {e.outside} has no surface {e.partner!r}")
         other = elements[j][1]
-        mutual = (
-            isinstance(other, OpaqueSurface)
-            and other.outside == zones[z].name
-            and other.partner == e.name
-        )
+        mutual = isinstance(other, OpaqueSurface) and other.outside == zones[z].name and other.partner == e.name
         require(mutual, item, f"its partner {other.name} does not name it back")
         same = abs(other.area - e.area) <= 0.01 * e.area
         require(same, item, f"its partner has {other.area:g} m2 instead of {e.area:g} m2")
@@ -497,9 +486,8 @@ def _walls(
             at_pipes = modes.from_nodes[grid.node_at(pipes[i], f"heated slab {e.name}")]
         ports.append((count, len(modes.decay), _two_port(grid, modes, step_s)))
         rows.append(
-            (modes.decay, modes.at_out, modes.at_in, modes.from_out, modes.from_in, modes.heat,
-             modes.even, at_pipes)
-        )  # fmt: skip
+            (modes.decay, modes.at_out, modes.at_in, modes.from_out, modes.from_in, modes.heat, modes.even, at_pipes)
+        )
         count += len(modes.decay)
     if not rows:
         return ports, Modes(*np.zeros((len(Modes._fields), 0)))
@@ -553,9 +541,7 @@ def _faces(
     )
 
 
-def known_surfaces(
-    elements: Sequence[OpaqueSurface | WindowElement],
-) -> list[OpaqueSurface]:
+def known_surfaces(elements: Sequence[OpaqueSurface | WindowElement]) -> list[OpaqueSurface]:
     """The surfaces whose outer face has a known temperature of its own, in order."""
     return [e for e in elements if isinstance(e, OpaqueSurface) and e.outside == "known"]
 
@@ -587,7 +573,12 @@ def _glass(elements: list[tuple[int, OpaqueSurface | WindowElement]]) -> Glass:
             emissivity[w, j] = state.emissivity_out
             if (one := state.shade) is not None:
                 shade[w, j] = (
-                    one.width, one.height, one.tilt, one.impedance, one.exchange, one.pane_weight,
+                    one.width,
+                    one.height,
+                    one.tilt,
+                    one.impedance,
+                    one.exchange,
+                    one.pane_weight,
                     one.exterior,
-                )  # fmt: skip
+                )
     return Glass(kind, coefficient, extra, shade, emissivity)

@@ -33,9 +33,7 @@ def arrivals(present: ArrayLike, rows_of_day: int) -> NDArray[np.bool_]:
     return first
 
 
-def lightswitch_2002(
-    direct_sun: ArrayLike, present: ArrayLike, rows_of_day: int, *, closed: int = 1
-) -> StateArray:
+def lightswitch_2002(direct_sun: ArrayLike, present: ArrayLike, rows_of_day: int, *, closed: int = 1) -> StateArray:
     """States [H] of a blind of Lightswitch-2002's active user.
 
     It is raised once a day, by those who come first, and lowered whenever people are there and
@@ -105,9 +103,7 @@ def haldi_robinson_2010(
     return result
 
 
-def _moved(
-    share: float, indoors_lx: float, outdoors_lx: float, arriving: bool, draws: FloatArray
-) -> float:
+def _moved(share: float, indoors_lx: float, outdoors_lx: float, arriving: bool, draws: FloatArray) -> float:
     """The unshaded share of a blind after a step; draws: [4] even random numbers."""
     lowers = LOWER_ON_ARRIVAL if arriving else LOWER_DURING_PRESENCE
     raises = RAISE_ON_ARRIVAL if arriving else RAISE_DURING_PRESENCE
@@ -120,9 +116,7 @@ def _moved(
     return share
 
 
-def _new_share(
-    share: float, outdoors_lx: float, lowered: bool, draw: float, second: float
-) -> float:
+def _new_share(share: float, outdoors_lx: float, lowered: bool, draw: float, second: float) -> float:
     if draw < _probability(LOWER_WHOLLY if lowered else RAISE_WHOLLY, outdoors_lx, share):
         return 0.0 if lowered else 1.0
     if not lowered:

@@ -10,9 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermal.errors import require
 
 
-def performance(
-    table: float | Sequence[tuple[float, float]], outdoor_c: ArrayLike
-) -> NDArray[np.float64]:
+def performance(table: float | Sequence[tuple[float, float]], outdoor_c: ArrayLike) -> NDArray[np.float64]:
     """Coefficient of performance [H]: one, or linear between pairs of outdoor temperature and COP.
 
     Beyond the first and the last pair theirs holds.

@@ -64,9 +64,7 @@ class PredictedYear:
     lamps: FloatArray  # [H] [W]
 
 
-def noisy_forecast(
-    hours: int, ahead: int, *, sun_error: float, temperature_error_k: float, seed: int = 0
-) -> Forecast:
+def noisy_forecast(hours: int, ahead: int, *, sun_error: float, temperature_error_k: float, seed: int = 0) -> Forecast:
     """A forecast whose error grows with the square root of the hours ahead to its value at 24 h.
 
     Errors of one forecast are a random walk, of two forecasts independent.
@@ -111,17 +109,40 @@ def predicted_year(
     counts = hours.counts if hours.move_wh > 0 else ()
     result = np.zeros((count, 4))
     _run(
-        np.array([zone.opaque, zone.mass, zone.mass_area, zone.area, zone.heating_limit,
-                  zone.cooling_limit, hours.dimming is not None, *weights, start_c,
-                  *(hours.dimming or Dimming(1.0)).numbers]),
-        zone.windows, zone.air, zone.outdoor_c, zone.behind_c, zone.heating_c, zone.cooling_c,
-        hours.sun, hours.daylight, hours.lamps, hours.internal, hours.penalty,
-        count if once else max(ahead, 1), once, forecast.shift,
+        np.array(
+            [
+                zone.opaque,
+                zone.mass,
+                zone.mass_area,
+                zone.area,
+                zone.heating_limit,
+                zone.cooling_limit,
+                hours.dimming is not None,
+                *weights,
+                start_c,
+                *(hours.dimming or Dimming(1.0)).numbers,
+            ]
+        ),
+        zone.windows,
+        zone.air,
+        zone.outdoor_c,
+        zone.behind_c,
+        zone.heating_c,
+        zone.cooling_c,
+        hours.sun,
+        hours.daylight,
+        hours.lamps,
+        hours.internal,
+        hours.penalty,
+        count if once else max(ahead, 1),
+        once,
+        forecast.shift,
         none + 1 if forecast.sun is None else forecast.sun,
         none if forecast.warmer_k is None else forecast.warmer_k,
-        np.array(counts or (1,), dtype=np.int64), hours.move_wh if counts else 0.0,
+        np.array(counts or (1,), dtype=np.int64),
+        hours.move_wh if counts else 0.0,
         result,
-    )  # fmt: skip
+    )
     return PredictedYear(result[:, 0].astype(np.int64), *result[:, 1:].T)
 
 
@@ -143,26 +164,25 @@ def _hour(
 ) -> float:
     """Write the `responses` of a combination into out [6]; returns the power of its lamps."""
     if constants[6] > 0:
-        lamps *= _lamp_share(
-            daylight,
-            constants[11],
-            constants[12],
-            constants[13],
-            constants[14],
-            constants[15],
-        )
+        lamps *= _lamp_share(daylight, constants[11], constants[12], constants[13], constants[14], constants[15])
     responses(
-        air, windows, constants[0], constants[1], constants[2], constants[3], outdoor_c, behind_c,
-        internal + lamps, sun, out,
-    )  # fmt: skip
+        air,
+        windows,
+        constants[0],
+        constants[1],
+        constants[2],
+        constants[3],
+        outdoor_c,
+        behind_c,
+        internal + lamps,
+        sun,
+        out,
+    )
     return lamps
 
 
 @compiled()
-def _power(
-    mass_c: float, out: NDArray[np.float64], low: float, high: float,
-    constants: NDArray[np.float64],
-) -> float:  # fmt: skip
+def _power(mass_c: float, out: NDArray[np.float64], low: float, high: float, constants: NDArray[np.float64]) -> float:
     """Power of heating, negative of cooling, that holds the set points [W]."""
     free = out[0] + out[1] * mass_c
     if free < low:

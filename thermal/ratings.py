@@ -10,20 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal.glazing import GASES, Gap, en410_g_value, en673_u_value, gap_conductances
 from thermal.glazing_unit import GlazingUnit
-from thermal.gvalue import (
-    KAPPA,
-    InternalShade,
-    external_shade_g,
-    integrated_shade_g,
-    internal_shade_g,
-)
-from thermal.iso15099 import (
-    ISO_52022_3,
-    NFRC,
-    Conditions,
-    iso15099_g_values,
-    iso15099_u_value,
-)
+from thermal.gvalue import KAPPA, InternalShade, external_shade_g, integrated_shade_g, internal_shade_g
+from thermal.iso15099 import ISO_52022_3, NFRC, Conditions, iso15099_g_values, iso15099_u_value
 
 FloatArray = NDArray[np.float64]
 # EN 14501:2021: class 0 from the first limit on, class 4 below the last
@@ -71,15 +59,11 @@ class ThermalRating:
 
     def solar_class(self, of: str) -> int:
         """EN 14501's class 0 (least effect) to 4 of "g", "secondary" or "tau"."""
-        value = {
-            "g": self.g_value, "secondary": self.secondary, "tau": self.transmittance,
-        }[of]  # fmt: skip
+        value = {"g": self.g_value, "secondary": self.secondary, "tau": self.transmittance}[of]
         return sum(value < limit for limit in CLASSES[of])
 
 
-def layered_ratings(
-    unit: GlazingUnit, transmittance: float, absorptance: ArrayLike
-) -> list[ThermalRating]:
+def layered_ratings(unit: GlazingUnit, transmittance: float, absorptance: ArrayLike) -> list[ThermalRating]:
     """NFRC 100/200, ISO 52022-3 at both conditions, and EN 673 with EN 410 where there is no shade.
 
     Args: absorptance: of each layer at normal incidence [N].
@@ -92,9 +76,7 @@ def layered_ratings(
     reference, summer = ISO_52022_3
     found = [
         ThermalRating("NFRC", iso15099_u_value(unit, NFRC[0]), transmittance, g(NFRC[1])),
-        ThermalRating(
-            "ISO 52022-3, reference", iso15099_u_value(unit, reference), transmittance, g(reference)
-        ),
+        ThermalRating("ISO 52022-3, reference", iso15099_u_value(unit, reference), transmittance, g(reference)),
         ThermalRating("ISO 52022-3, summer", None, transmittance, g(summer)),
     ]
     if unit.shade_place == "none" and _known_to_en673(unit):
@@ -112,16 +94,10 @@ def _european(unit: GlazingUnit, tau: float, alpha: FloatArray) -> ThermalRating
         Gap(gap.width, gap.gas, (a.emissivity[1], b.emissivity[0]))
         for gap, a, b in zip(unit.gaps, unit.layers, unit.layers[1:], strict=False)
     ]
-    position = (
-        "vertical" if unit.tilt_deg > 60 else "tilted" if unit.tilt_deg > 15 else "horizontal"
-    )
+    position = "vertical" if unit.tilt_deg > 60 else "tilted" if unit.tilt_deg > 15 else "horizontal"
     solid = [layer.thickness / layer.conductivity for layer in unit.layers]
     u_value = en673_u_value(
-        solid,
-        gaps,
-        position=position,
-        emissivity_in=unit.layers[-1].emissivity[1],
-        conductivity=1.0,
+        solid, gaps, position=position, emissivity_in=unit.layers[-1].emissivity[1], conductivity=1.0
     )
     halves = 0.5 * (np.array(solid[:-1]) + np.array(solid[1:]))
     between = 1.0 / gap_conductances(gaps, position) + halves
@@ -130,12 +106,7 @@ def _european(unit: GlazingUnit, tau: float, alpha: FloatArray) -> ThermalRating
 
 
 def shade_ratings(
-    transmittance: float,
-    reflectance: float,
-    place: str,
-    glazing: ReferenceGlazing,
-    *,
-    kappa: float = KAPPA,
+    transmittance: float, reflectance: float, place: str, glazing: ReferenceGlazing, *, kappa: float = KAPPA
 ) -> list[ThermalRating]:
     """A shade before, behind or in a glazing: EN 13363-1, and Kuhn's formula for an interior one.
 
@@ -156,9 +127,17 @@ def shade_ratings(
     found = [ThermalRating(f"EN 13363-1, {place}", None, passed, g_value)]
     if place == "internal":
         both = InternalShade(
-            glazing.transmittance, glazing.reflectance_outside, glazing.g_value,
-            glazing.transmittance, glazing.reflectance_inside, glazing.u_value, tau, rho, tau, rho,
-        )  # fmt: skip
+            glazing.transmittance,
+            glazing.reflectance_outside,
+            glazing.g_value,
+            glazing.transmittance,
+            glazing.reflectance_inside,
+            glazing.u_value,
+            tau,
+            rho,
+            tau,
+            rho,
+        )
         passed_kuhn, _, g_kuhn = both.kuhn(kappa=kappa)
         method = f"Kuhn 2006, kappa {kappa:g}"
         found.append(ThermalRating(method, None, float(passed_kuhn), float(g_kuhn)))

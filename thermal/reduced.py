@@ -51,12 +51,7 @@ class ReducedZone:
 
 
 def reduced_zone(
-    zone: Zone,
-    climate: Climate,
-    facade: FloatArray,
-    states: NDArray[np.int64],
-    *,
-    terrain: str = "suburbs",
+    zone: Zone, climate: Climate, facade: FloatArray, states: NDArray[np.int64], *, terrain: str = "suburbs"
 ) -> ReducedZone:
     """The reduced model of a zone.
 
@@ -78,10 +73,9 @@ def reduced_zone(
     opaque = float((u * areas)[lost].sum())
     capacity = np.array([_capacity(one) for one in zone.surfaces])
     mass, squares = float(capacity @ areas), float(capacity**2 @ areas)
-    glass = np.array([
-        sum(w.area * w.states[j].u_value for w, j in zip(zone.windows, chosen, strict=True))
-        for chosen in states
-    ])  # fmt: skip
+    glass = np.array(
+        [sum(w.area * w.states[j].u_value for w, j in zip(zone.windows, chosen, strict=True)) for chosen in states]
+    )
     frames = sum(w.frame_area * w.frame_u for w in zone.windows)
     window_area = sum(w.area + w.frame_area for w in zone.windows)
     loads = zone.loads
@@ -146,12 +140,8 @@ def _outdoor_air(zone: Zone, climate: Climate, terrain: str) -> FloatArray:
     gap = np.abs(np.clip(outdoor, lower, np.maximum(lower, upper)) - outdoor)
     wind = climate.wind_speed * local_wind_factor(mean_height(zone), terrain)
     a, b, c, d = leaks.factors
-    changes = changes + _by_hour(zone.infiltration_ach, hours) * (
-        a + b * gap + c * wind + d * wind**2
-    )
-    by_test = np.hypot(
-        leaks.stack * gap**leaks.stack_exponent, leaks.wind * wind**leaks.wind_exponent
-    )
+    changes = changes + _by_hour(zone.infiltration_ach, hours) * (a + b * gap + c * wind + d * wind**2)
+    by_test = np.hypot(leaks.stack * gap**leaks.stack_exponent, leaks.wind * wind**leaks.wind_exponent)
     return changes * zone.volume / 3600.0 + by_test
 
 

@@ -33,13 +33,7 @@ ROOM_AIR = np.array([[1.0, 0.0, 0.0, 0.0]])  # fractions of gases [1, 4]
 
 @inlined
 def gap_exchange(
-    width: float,
-    height: float,
-    tilt: float,
-    impedance: float,
-    pane_c: float,
-    shade_c: float,
-    air_c: float,
+    width: float, height: float, tilt: float, impedance: float, pane_c: float, shade_c: float, air_c: float
 ) -> tuple[float, float]:
     """Convective h and F [W/(m2 K)] of the gap beside a shade.
 
@@ -77,11 +71,7 @@ def shaded_row(
     faces, glass = net.faces, net.glass
     w, z, sun, out = faces.window[i], faces.zone[i], t // method.solar_every, weather.outdoor[t]
     shading = drive.state[t // method.steps, w]
-    shade, kind, c = (
-        glass.shade[w, shading],
-        glass.kind[w, shading],
-        glass.coefficient[w, shading],
-    )
+    shade, kind, c = (glass.shade[w, shading], glass.kind[w, shading], glass.coefficient[w, shading])
     emissivity, row, sources = glass.emissivity_out[w, shading], work.outdoor[i], work.nodes[i, 0]
     outer, middle, inner = state.glass[i]
     exterior = shade[6] > 0.0
@@ -176,9 +166,7 @@ def seen(nodes: FloatArray, weight: float) -> float:
 
 
 @inlined
-def _solve(
-    outer: float, first: float, middle: float, second: float, inner: float, right: FloatArray
-) -> None:
+def _solve(outer: float, first: float, middle: float, second: float, inner: float, right: FloatArray) -> None:
     """Solve the chain of three nodes in place; right: [3].
 
     Args: diagonals of the three, and the conductances between them.

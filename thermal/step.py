@@ -28,28 +28,8 @@ from numpy.typing import NDArray
 from thermal.climate import SIGMA
 from thermal.elimination import eliminate
 from thermal.films import cube, inside_film, layer_conductance, outside_exchange
-from thermal.network import (
-    ADIABATIC,
-    KNOWN,
-    OUTDOOR,
-    PARTITION,
-    PARTNER,
-    TWIN,
-    WINDOW,
-    Faces,
-    Modes,
-    Network,
-)
-from thermal.records import (
-    AIR_HEAT,
-    Drive,
-    Method,
-    OutdoorConditions,
-    State,
-    Workspace,
-    inlined,
-    summed,
-)
+from thermal.network import ADIABATIC, KNOWN, OUTDOOR, PARTITION, PARTNER, TWIN, WINDOW, Faces, Modes, Network
+from thermal.records import AIR_HEAT, Drive, Method, OutdoorConditions, State, Workspace, inlined, summed
 from thermal.shaded_window import shaded_row, take_nodes
 from thermal.ventilation import REFERENCE_DENSITY
 
@@ -59,9 +39,8 @@ TOO_WARM_SHUT, TOO_COLD_OPEN = 2, 4  # what was tried in the step, added to thes
 
 @inlined
 def start_air_flows(
-    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
-    t: int, hour: int,
-) -> None:  # fmt: skip
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int, hour: int
+) -> None:
     """Set windows and bypass of every zone to their states of the step before."""
     for z in range(work.flow.size):
         work.shut[z] = False
@@ -73,9 +52,8 @@ def start_air_flows(
 
 @inlined
 def set_air_flows(
-    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
-    t: int, hour: int,
-) -> None:  # fmt: skip
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int, hour: int
+) -> None:
     """Set the air of every zone from outdoors, through its windows when open, and from its fan."""
     for z in range(work.flow.size):
         _set_supply(net, state, work, weather, drive, t, hour, z)
@@ -87,9 +65,7 @@ def set_air_flows(
 
 
 @inlined
-def _leaks(
-    net: Network, state: State, weather: OutdoorConditions, drive: Drive, t: int, hour: int, z: int
-) -> float:
+def _leaks(net: Network, state: State, weather: OutdoorConditions, drive: Drive, t: int, hour: int, z: int) -> float:
     a, b, c, d, s, m, w, n = net.paths.leak[z]
     gap, v = abs(state.air[z] - weather.outdoor[t]), weather.speed[t] * net.paths.wind[z]
     flow = drive.leaks[hour, z] * (a + b * gap + c * v + d * v * v)
@@ -101,9 +77,8 @@ def _leaks(
 
 @inlined
 def _set_limits(
-    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
-    t: int, hour: int, z: int,
-) -> None:  # fmt: skip
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int, hour: int, z: int
+) -> None:
     """Air temperatures at which the windows close and open."""
     above, below, difference = net.paths.opens[z, 0], net.paths.opens[z, 1], net.paths.opens[z, 2]
     if net.paths.opens[z, 6] > 0.0:  # limits of the operative temperature
@@ -118,9 +93,8 @@ def _set_limits(
 
 @inlined
 def _airing(
-    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
-    t: int, hour: int, z: int,
-) -> float:  # fmt: skip
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int, hour: int, z: int
+) -> float:
     """Air through the windows when open [m3/s]; 0 where they must stay shut."""
     greatest, least_out = net.paths.opens[z, 3], net.paths.opens[z, 4]
     v, out = weather.speed[t] * net.paths.site, weather.outdoor[t]
@@ -145,9 +119,8 @@ def mean_radiant(net: Network, state: State, mix: int, z: int) -> float:
 
 @inlined
 def _set_supply(
-    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive,
-    t: int, hour: int, z: int,
-) -> None:  # fmt: skip
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int, hour: int, z: int
+) -> None:
     """Set the air of a fan with all heat recovered, and with what its least lets it bypass."""
     full = weather.density[t] * AIR_HEAT * drive.supply[hour, z]
     given, inside, out = drive.supply_c[t, z], state.air[z], weather.outdoor[t]
@@ -226,9 +199,7 @@ def _radiated(net: Network, work: Workspace, drive: Drive, z: int, i: int, share
 
 
 @inlined
-def close_air(
-    net: Network, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int
-) -> None:
+def close_air(net: Network, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int) -> None:
     """Rows of the air: the plant holds the set point, or gives a known load."""
     n, place, pairs = net.faces.area.size, net.system.place, net.couplings
     d, b = work.diagonal, work.right
@@ -252,9 +223,7 @@ def close_air(
 
 
 @inlined
-def plants_agree(
-    net: Network, work: Workspace, state: State, weather: OutdoorConditions, drive: Drive, t: int
-) -> bool:
+def plants_agree(net: Network, work: Workspace, state: State, weather: OutdoorConditions, drive: Drive, t: int) -> bool:
     """Set the loads; whether each plant does what its zone's temperature asks, else it changes."""
     faces, pairs, x = net.faces, net.couplings, work.unknown
     n, heat = faces.area.size, weather.density[t] * AIR_HEAT
@@ -331,9 +300,7 @@ def _bypass_agrees(work: Workspace, z: int, air: float) -> bool:
 
 
 @inlined
-def _opening(
-    opening: int, air: float, lower: float, upper: float, possible: bool
-) -> tuple[int, bool, bool]:
+def _opening(opening: int, air: float, lower: float, upper: float, possible: bool) -> tuple[int, bool, bool]:
     """What it does next, whether that is what it does, and whether it is partly open and holds.
 
     It opens above the upper temperature and closes below the lower one [degC].
@@ -372,9 +339,7 @@ def _whole_load(net: Network, work: Workspace, z: int, convective: float) -> flo
 
 
 @inlined
-def _plant(
-    plant: int, air: float, load: float, rounding: float, drive: Drive, t: int, z: int
-) -> int:
+def _plant(plant: int, air: float, load: float, rounding: float, drive: Drive, t: int, z: int) -> int:
     """What the plant must do where, doing `plant`, it gives this air temperature and load."""
     if plant == HEATS:
         if load > drive.limit[z, 0]:
@@ -479,12 +444,7 @@ def _window_row(
     emissivity = net.glass.emissivity_out[w, shading]
     h, h_t = outside_exchange(net.faces, i, state.outer[i], emissivity, weather, t, method)
     extra = net.glass.extra[w, shading, 0]
-    c = layer_conductance(
-        net.glass.kind[w, shading],
-        net.glass.coefficient[w, shading],
-        state.inner[i],
-        state.outer[i],
-    )
+    c = layer_conductance(net.glass.kind[w, shading], net.glass.coefficient[w, shading], state.inner[i], state.outer[i])
     outer_diagonal = h + extra + c
     h_t += extra * weather.outdoor[t]
     outer_right = h_t + outer_sun
@@ -499,20 +459,12 @@ def _window_row(
 def _share(net: Network, drive: Drive, hour: int, z: int, i: int) -> float:
     """Share of the zone's radiant gains that face i takes."""
     first, last = net.radiation.first_face[z], net.radiation.first_face[z + 1]
-    return net.radiation.share[
-        net.radiation.at_share[z] + drive.mix[hour, z] * (last - first) + i - first
-    ]
+    return net.radiation.share[net.radiation.at_share[z] + drive.mix[hour, z] * (last - first) + i - first]
 
 
 @inlined
 def _assemble(
-    net: Network,
-    state: State,
-    work: Workspace,
-    weather: OutdoorConditions,
-    drive: Drive,
-    t: int,
-    method: Method,
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int, method: Method
 ) -> None:
     """The linear system of a step, in the order of elimination."""
     faces, pairs, place = net.faces, net.couplings, net.system.place
@@ -532,9 +484,7 @@ def _assemble(
                 own, film, r = shaded_row(net, i, state, work, weather, drive, t, method)
                 inner_sun = 0.0  # it is in the row
             else:
-                own, r = _window_row(
-                    net, i, state, work, weather, t, shading, drive.outer[sun, i], method
-                )
+                own, r = _window_row(net, i, state, work, weather, t, shading, drive.outer[sun, i], method)
         elif kind == PARTNER:
             p = faces.partner[i]
             c_o, _, g_o, _, u_o, v_o, _, _ = faces.port[p]
@@ -585,13 +535,7 @@ def _choose_supply(work: Workspace, z: int) -> None:
 
 @inlined
 def _assemble_air(
-    net: Network,
-    state: State,
-    work: Workspace,
-    weather: OutdoorConditions,
-    drive: Drive,
-    t: int,
-    method: Method,
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int, method: Method
 ) -> None:
     """Conductance of each zone's air and what flows into it, but for its faces; its neighbours."""
     hour, pairs = t // method.steps, net.couplings
@@ -635,9 +579,7 @@ def _assemble_air(
 
 
 @inlined
-def _outer_from_inner(
-    net: Network, state: State, work: Workspace, drive: Drive, t: int, hour: int
-) -> None:
+def _outer_from_inner(net: Network, state: State, work: Workspace, drive: Drive, t: int, hour: int) -> None:
     faces = net.faces
     for i in range(faces.area.size):
         kind = faces.kind[i]
@@ -656,13 +598,7 @@ def _outer_from_inner(
 
 @inlined
 def step(
-    net: Network,
-    state: State,
-    work: Workspace,
-    weather: OutdoorConditions,
-    drive: Drive,
-    t: int,
-    method: Method,
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int, method: Method
 ) -> None:
     """One time step: iterate the coefficients."""
     n, hour = net.faces.area.size, t // method.steps

@@ -53,8 +53,7 @@ def sherman_grimsrud(area_cm2: float, *, stack: float, wind: float) -> Leakage:
     return Leakage((1.0, 0.0, 0.0, 0.0), flow * stack**0.5, 0.5, flow * wind**0.5, 1.0)
 
 
-def aim2(coefficient: float, exponent: float, *, stack: float, wind: float, shelter: float = 1.0
-) -> Leakage:  # fmt: skip
+def aim2(coefficient: float, exponent: float, *, stack: float, wind: float, shelter: float = 1.0) -> Leakage:
     """Flow by the enhanced model: sqrt((c C_s dT^n)^2 + (c C_w (s v)^(2n))^2) [m3/s].
 
     Args: coefficient, exponent: c [m3/(s Pa^n)] and n of a pressure test; stack, wind: C_s
@@ -137,8 +136,9 @@ def cross_flow(areas: ArrayLike, azimuths_deg: ArrayLike, height: float) -> tupl
         quarter = np.floor(np.mod(azimuth - first + 45.0, 360.0) / 90.0).astype(int)
         sides = np.bincount(quarter, weights=area, minlength=4)
         others = area.sum() - sides
-        across.append(sum(0.25 / np.sqrt(1 / a**2 + 1 / b**2) for a, b in zip(sides, others,
-                          strict=True) if a > 0 and b > 0))  # fmt: skip
+        across.append(
+            sum(0.25 / np.sqrt(1 / a**2 + 1 / b**2) for a, b in zip(sides, others, strict=True) if a > 0 and b > 0)
+        )
     wind = (DISCHARGE * min(across)) ** 2 * PRESSURE
     return float(wind), float(0.25 * area.sum() ** 2 * STACK * height)
 

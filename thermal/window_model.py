@@ -15,12 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal.blackbox import (
-    Fenestration,
-    LayerAbsorptances,
-    layer_absorptances,
-    node_absorptances,
-)
+from thermal.blackbox import Fenestration, LayerAbsorptances, layer_absorptances, node_absorptances
 from thermal.closure import Closure
 from thermal.errors import require
 from thermal.glazing import Gap
@@ -74,9 +69,7 @@ def typical_unit(
     if position != "none":
         wide = SHADE_EDGES[position] if edges is None else edges
         faces = (emissivity, emissivity)
-        shade = sheet_layer(
-            0.0, thickness=0.0005, conductivity=0.15, edges=(wide,) * 4, emissivity=faces
-        )
+        shade = sheet_layer(0.0, thickness=0.0005, conductivity=0.15, edges=(wide,) * 4, emissivity=faces)
     width = SHADE_DISTANCE.get(position, 0.0) if distance is None else distance
     return _unit_of_u(position, u_value, gap, shade, width)
 
@@ -145,9 +138,7 @@ def _unit_of_u(
     if u_value <= u_of(by_coating(LEAST_EMISSIVITY)):
         return by_coating(LEAST_EMISSIVITY)  # the rest of the resistance is added to it
     if u_value <= u_of(by_coating(UNCOATED)):
-        return by_coating(
-            bisected(lambda e: u_of(by_coating(e)) - u_value, LEAST_EMISSIVITY, UNCOATED)
-        )
+        return by_coating(bisected(lambda e: u_of(by_coating(e)) - u_value, LEAST_EMISSIVITY, UNCOATED))
 
     def by_width(width: float) -> GlazingUnit:
         return whole(2, UNCOATED, GasGap(width, AIR))
@@ -163,18 +154,12 @@ def _unit_of_u(
 def _panes(count: int, emissivity: float) -> tuple[GlazingLayer, ...]:
     """Panes from outside to inside, all but the outermost coated on their outer face."""
     coated = emissivity < 0.5 * UNCOATED
-    inner = replace(
-        CLEAR, emissivity=(emissivity, UNCOATED), solar=COATED if coated else CLEAR.solar
-    )
+    inner = replace(CLEAR, emissivity=(emissivity, UNCOATED), solar=COATED if coated else CLEAR.solar)
     return (CLEAR, *[inner] * (count - 1))
 
 
 def _with_shade(
-    position: str,
-    panes: tuple[GlazingLayer, ...],
-    gap: GasGap,
-    shade: GlazingLayer | None,
-    distance: float,
+    position: str, panes: tuple[GlazingLayer, ...], gap: GasGap, shade: GlazingLayer | None, distance: float
 ) -> GlazingUnit:
     gaps = (gap,) * (len(panes) - 1)
     if shade is None:
@@ -232,9 +217,14 @@ class WindowModel:
         unit = self.closure.unit
         if closed.shade is None or unit is None or self.absorbed is None:
             return layer_absorptances(
-                transmittance, reflectance, g_value, closed.u_value,
-                r_outer=closed.r_outer, r_inner=closed.r_inner, item=item,
-            )  # fmt: skip
+                transmittance,
+                reflectance,
+                g_value,
+                closed.u_value,
+                r_outer=closed.r_outer,
+                r_inner=closed.r_inner,
+                item=item,
+            )
         of_layers = yearly_g_values(unit, transmittance, self.absorbed)
         return node_absorptances(self.absorbed, closed.shade, np.asarray(g_value) - of_layers)
 
@@ -275,13 +265,9 @@ def window_model(
     guessed = guess is not None
     if closure.unit is not None:
         by_layer = absorbed(closure.unit, tau, rho, incidence)
-        data = layered_thermal_data(
-            closure.unit, tau, rho, by_layer, u_value=u_value, g_normal=g_normal, item=item
-        )
+        data = layered_thermal_data(closure.unit, tau, rho, by_layer, u_value=u_value, g_normal=g_normal, item=item)
         return WindowModel(data, closure, place, guessed, absorbed=by_layer)
-    data = thermal_data(
-        tau, rho, shading_position=place, u_value=u_value, g_normal=g_normal, item=item
-    )
+    data = thermal_data(tau, rho, shading_position=place, u_value=u_value, g_normal=g_normal, item=item)
     unit = typical_unit(place, data.u_value, closure.gap)
     closed = closure.with_typical(unit, data.u_value)
     if unit is None:
@@ -320,9 +306,7 @@ def g_of_unit(
         falls = -1.0 if excess(low) > excess(high) else 1.0
         unit = absorbing(unit, bisected(lambda factor: falls * excess(factor), low, high))
     by_layer = absorbed(unit, tau, rho, incidence)
-    layered = layered_thermal_data(
-        unit, tau, rho, by_layer, u_value=data.u_value, g_normal=first, item=item
-    )
+    layered = layered_thermal_data(unit, tau, rho, by_layer, u_value=data.u_value, g_normal=first, item=item)
     return layered.g_value, by_layer
 
 

@@ -91,9 +91,7 @@ class OpaqueSurface:
         ):
             require_range(value, 0.0, 1.0, f"{item}: {label}")
         known = ", ".join(ROUGHNESS)
-        require(
-            self.roughness in ROUGHNESS, item, f"roughness {self.roughness!r} is not of {known}"
-        )
+        require(self.roughness in ROUGHNESS, item, f"roughness {self.roughness!r} is not of {known}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,9 +144,7 @@ class Zone:
     air_capacity_factor: float = 1.0  # multiplies the heat capacity of the air (furniture)
     # [N, N] view factors between inside faces (surfaces, then windows, then frames); None: star
     view_factors: NDArray[np.float64] | None = None
-    leakage: Leakage = field(
-        default_factory=Leakage
-    )  # how wind and temperatures change the infiltration
+    leakage: Leakage = field(default_factory=Leakage)  # how wind and temperatures change the infiltration
     other_air_ach: NDArray[np.float64] | float = 0.0  # [H] [1/h] outdoor air that nothing changes
     supply: SupplyAir | None = None
     airing: WindowAiring | None = None
@@ -247,9 +243,8 @@ class Dimming:
 
 
 def lamp_share(
-    daylight: FloatArray, needed: float, read: float, least_light: float, least_power: float,
-    off: float,
-) -> FloatArray:  # fmt: skip
+    daylight: FloatArray, needed: float, read: float, least_light: float, least_power: float, off: float
+) -> FloatArray:
     """Share of the lamps' power by daylight [lx], of arrays, or compiled of numbers.
 
     Args:

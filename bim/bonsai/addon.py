@@ -21,8 +21,13 @@ from typing import Any
 
 Colour = tuple[float, float, float, float]
 # viridis at five equal steps, sRGB 0 to 1
-STOPS = ((0.267, 0.005, 0.329), (0.229, 0.322, 0.546), (0.128, 0.567, 0.551),
-         (0.369, 0.789, 0.383), (0.993, 0.906, 0.144))  # fmt: skip
+STOPS = (
+    (0.267, 0.005, 0.329),
+    (0.229, 0.322, 0.546),
+    (0.128, 0.567, 0.551),
+    (0.369, 0.789, 0.383),
+    (0.993, 0.906, 0.144),
+)
 POLL_S = 0.5  # how often the panel looks whether the command has ended
 
 
@@ -47,9 +52,7 @@ QUANTITIES = {
 }
 
 
-def run_command(
-    program: str, ifc: str, weather: str, out: str, *, quick: bool = True, system: str = ""
-) -> list[str]:
+def run_command(program: str, ifc: str, weather: str, out: str, *, quick: bool = True, system: str = "") -> list[str]:
     """The words of the command that computes the open file.
 
     Raises: `ValueError` in one line for a file that is not given or not there.
@@ -78,9 +81,7 @@ def room_values(results: str, quantity: str) -> dict[str, float]:
             values = [float(cell) for cell in cells if cell]
             if values:
                 by_room[guid] = max(values)
-    except (
-        OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, csv.Error,
-    ) as error:  # fmt: skip
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, csv.Error) as error:
         raise ValueError(f"cfs: {folder} holds no results of cfs run ({error})") from None
     return by_room
 

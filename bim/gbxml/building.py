@@ -26,14 +26,7 @@ from bim.drawn_building import DrawnModel, drawn_building
 from bim.gbxml.document import SI, Document, read_document
 from bim.model import Building, Construction, Element, MaterialLayer, Space
 from bim.planes import newell_normal
-from bim.polygon_rooms import (
-    DrawnFace,
-    DrawnOpening,
-    DrawnRoom,
-    GlazingValues,
-    SurfaceFinish,
-    triangles_of_rings,
-)
+from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, GlazingValues, SurfaceFinish, triangles_of_rings
 from bim.report.issue import Issue
 from bim.use import (
     CLOCK,
@@ -50,9 +43,17 @@ from bim.use import (
 
 # of a window type or an opening: not read
 PARTS = (
-    "Glaze", "Gap", "Frame", "Blind", "Shade", "ShadeControl", "ShadingCoeff", "Reflectance",
-    "Emittance", "GlazeConductivity",
-)  # fmt: skip
+    "Glaze",
+    "Gap",
+    "Frame",
+    "Blind",
+    "Shade",
+    "ShadeControl",
+    "ShadingCoeff",
+    "Reflectance",
+    "Emittance",
+    "GlazeConductivity",
+)
 ANGLES = ("incidentAngle", "solarIncidentAngle")  # attributes [deg]
 SHADES = ("interiorShadeType", "exteriorShadeType")  # attributes of an opening, not read
 
@@ -89,12 +90,8 @@ class Constructions:
     def _finish(self, one: ElementTree.Element) -> SurfaceFinish:
         layers = self.document.optional(lambda: self._layers(one), self.issues) or []
         name = _name(one)
-        construction = (
-            Construction(name, tuple(layers), self.document.file.name) if layers else None
-        )
-        visible, solar = (
-            self._share(one, "Reflectance", kind) for kind in ("IntVisible", "IntSolar")
-        )
+        construction = Construction(name, tuple(layers), self.document.file.name) if layers else None
+        visible, solar = (self._share(one, "Reflectance", kind) for kind in ("IntVisible", "IntSolar"))
         outer = self._share(one, "Reflectance", "ExtVisible")
         absorbed = self._share(one, "Absorptance", "IntSolar")
         if solar is None and absorbed is not None:
@@ -113,18 +110,14 @@ class Constructions:
                 layers += self._layer(material)
         return layers
 
-    def _referred(
-        self, owner: ElementTree.Element, kind: str, name: str | None
-    ) -> ElementTree.Element:
+    def _referred(self, owner: ElementTree.Element, kind: str, name: str | None) -> ElementTree.Element:
         return self.document.referred(owner, kind, name, self._by_id)
 
     def _layer(self, material: ElementTree.Element) -> list[MaterialLayer]:
         """The layer of a material; none where it states no resistance."""
         name = _name(material)
         fields = ("Thickness", "Conductivity", "Density", "SpecificHeat")
-        thickness, conductivity, density, capacity = (
-            self._quantity(material, field) for field in fields
-        )
+        thickness, conductivity, density, capacity = (self._quantity(material, field) for field in fields)
         resistance = self._quantity(material, "R-value")
         if not thickness or not conductivity:
             if not resistance:
@@ -143,9 +136,7 @@ class Constructions:
 
     def is_glass(self, opening: ElementTree.Element) -> bool:
         """Whether an opening of any type has a window type, or a construction that passes light."""
-        return opening.get("windowTypeIdRef", "") in self._by_id["WindowType"] or bool(
-            self.transmittance(opening)
-        )
+        return opening.get("windowTypeIdRef", "") in self._by_id["WindowType"] or bool(self.transmittance(opening))
 
     def transmittance(self, surface: ElementTree.Element) -> float | None:
         """Visible transmittance that a surface's construction states."""
@@ -169,9 +160,7 @@ class Constructions:
             values = GlazingValues(name=name) if known is None else self._values(known)
             self._windows[name] = values
         of_type, own = self._windows[name], self._values(opening)  # the opening's own go first
-        stated = {
-            field: getattr(own, field) for field in ("u_value", "g_value", "visible", "solar")
-        }
+        stated = {field: getattr(own, field) for field in ("u_value", "g_value", "visible", "solar")}
         return replace(of_type, **{field: v for field, v in stated.items() if v is not None})
 
     def _values(self, known: ElementTree.Element) -> GlazingValues:
@@ -196,9 +185,7 @@ class Constructions:
         """A quantity [SI]; None where it is not stated or cannot be read."""
         return self.document.optional(lambda: self.document.quantity(owner, name), self.issues)
 
-    def _share(
-        self, owner: ElementTree.Element, what: str, kind: str | None = None
-    ) -> float | None:
+    def _share(self, owner: ElementTree.Element, what: str, kind: str | None = None) -> float | None:
         """A share of 1 of that kind at normal incidence; None as for `_quantity`."""
         return self.document.optional(lambda: self._stated(owner, what, kind), self.issues)
 
@@ -229,10 +216,14 @@ class Constructions:
 T = TypeVar("T")
 WEEKDAYS, WEEKEND = KINDS[:5], KINDS[5:7]
 DAY_TYPES = {  # the kinds of days of each; those of design days are in no year
-    "Weekday": WEEKDAYS, "Weekend": WEEKEND, "Holiday": ("holiday",),
-    "WeekendOrHoliday": (*WEEKEND, "holiday"), "All": KINDS, "AllOtherDays": KINDS,
+    "Weekday": WEEKDAYS,
+    "Weekend": WEEKEND,
+    "Holiday": ("holiday",),
+    "WeekendOrHoliday": (*WEEKEND, "holiday"),
+    "All": KINDS,
+    "AllOtherDays": KINDS,
     **{kind[:3].capitalize(): (kind,) for kind in KINDS[:7]},
-}  # fmt: skip
+}
 DESIGN_DAYS = ("HeatingDesignDay", "CoolingDesignDay", "CustomDay1", "CustomDay2")
 CELSIUS = {"C": (0.0, 1.0), "F": (32.0, 1.8), "K": (273.15, 1.0), "R": (491.67, 1.8)}
 HELD = {"Heated": "heating_c", "Cooled": "cooling_c"}
@@ -318,9 +309,7 @@ class UseReader:
             if power is not None:
                 yield key, power
 
-    def _power(
-        self, element: ElementTree.Element, field: str, schedule: str, space: Space
-    ) -> ScheduledValue | None:
+    def _power(self, element: ElementTree.Element, field: str, schedule: str, space: Space) -> ScheduledValue | None:
         power = self.document.quantity(element, field)
         if power is None:
             return None
@@ -371,9 +360,7 @@ class UseReader:
         name = None if zone is None else zone.get("outAirSchedIdRef")
         return ScheduledValue(flow, None if not name else self._schedule(zone, name))
 
-    def _set_points(
-        self, element: ElementTree.Element, zone: ElementTree.Element | None
-    ) -> Iterator[tuple[str, Any]]:
+    def _set_points(self, element: ElementTree.Element, zone: ElementTree.Element | None) -> Iterator[tuple[str, Any]]:
         if zone is None:
             return
         kind = element.get("conditionType", "HeatedAndCooled")
@@ -397,9 +384,7 @@ class UseReader:
             return None
         stated = np.array(self.document.number(design, least=-459.67, most=1000.0))
         constant = float(self._celsius(stated, design.get("unit", file_unit), zone))
-        self._issues.append(
-            Issue("set-point-without-schedule", self.document.file.name, {"field": field})
-        )
+        self._issues.append(Issue("set-point-without-schedule", self.document.file.name, {"field": field}))
         return YearSchedule.constant(field, constant)
 
     def _celsius(self, values: np.ndarray, unit: str, owner: ElementTree.Element) -> np.ndarray:
@@ -421,9 +406,7 @@ class UseReader:
             self._schedules[name] = YearSchedule.of_rules(label, self._rules(element))
         return self._schedules[name]
 
-    def _referred(
-        self, owner: ElementTree.Element, kind: str, name: str | None
-    ) -> ElementTree.Element:
+    def _referred(self, owner: ElementTree.Element, kind: str, name: str | None) -> ElementTree.Element:
         return self.document.referred(owner, kind, name, self._by_id)
 
     def _rules(self, schedule: ElementTree.Element) -> Iterator[DayRule]:
@@ -458,8 +441,7 @@ class UseReader:
         try:
             return day_of_year(int(text[5:7]), int(text[8:10]))
         except ValueError:
-            raise self.document.fault(f"expected YYYY-MM-DD, got {text[:20]!r}", part, field)\
-                from None  # fmt: skip
+            raise self.document.fault(f"expected YYYY-MM-DD, got {text[:20]!r}", part, field) from None
 
 
 # of a surface: kind of the face of its first room, and what lies beyond with one room
@@ -485,9 +467,7 @@ DOORS = ("NonSlidingDoor", "Air")
 GLAZED = ("FixedWindow", "OperableWindow", "FixedSkylight", "OperableSkylight", "SlidingDoor")
 
 
-def read_gbxml(
-    path: str | PathLike[str], *, join: Sequence[str] = (), furniture: bool = False
-) -> Building:
+def read_gbxml(path: str | PathLike[str], *, join: Sequence[str] = (), furniture: bool = False) -> Building:
     """The building of a gbXML file, in metres, turned to true north.
 
     Read are spaces, surfaces, openings, shades, constructions with layers, window types, location;
@@ -548,8 +528,7 @@ class _Reader:
             for k, n in unplaced.items()
         ]
         self.issues += [
-            Issue("walls-level", document.file.name, {"count": n, "type": k})
-            for k, n in self.level.items()
+            Issue("walls-level", document.file.name, {"count": n, "type": k}) for k, n in self.level.items()
         ]
         path = "Campus/Building/BuildingStorey"
         storeys = {guid: _name(one) for guid, one in document.by_id((path,))[path].items()}
@@ -563,19 +542,21 @@ class _Reader:
         campus = root.find("Campus")
         name = "" if campus is None else _name(campus)
         return DrawnModel(
-            document.file, name or document.file.stem, rooms, tuple(elements),
+            document.file,
+            name or document.file.stem,
+            rooms,
+            tuple(elements),
             issues=(*self.issues, *self.constructions.issues),
-            latitude_deg=latitude, longitude_deg=longitude,
+            latitude_deg=latitude,
+            longitude_deg=longitude,
             elevation=(elevation or 0.0) * document.length,
-        )  # fmt: skip
+        )
 
     def _location(self, field: str, most: float) -> float | None:
         element = self.document.root.find(f"Campus/Location/{field}")
         if element is None or not (element.text or "").strip():
             return None
-        return self.document.optional(
-            lambda: self.document.number(element, least=-most, most=most), self.issues
-        )
+        return self.document.optional(lambda: self.document.number(element, least=-most, most=most), self.issues)
 
     def _turn(self) -> NDArray[np.float64]:
         """Rotation [3, 3] from the model's axes to the world's, by CADModelAzimuth."""
@@ -587,9 +568,7 @@ class _Reader:
         c, s = np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))
         return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
-    def _beside(
-        self, surface: ElementTree.Element, spaces: dict[str, ElementTree.Element]
-    ) -> list[str]:
+    def _beside(self, surface: ElementTree.Element, spaces: dict[str, ElementTree.Element]) -> list[str]:
         """The spaces that a surface names, each once."""
         named = [one.get("spaceIdRef", "") for one in surface.iterfind("AdjacentSpaceId")]
         for name in named:
@@ -608,11 +587,7 @@ class _Reader:
             self.issues.append(Issue("shade-taken-as-opaque", surface.get("id", ""), values))
 
     def _face(
-        self,
-        surface: ElementTree.Element,
-        ring: NDArray[np.float64],
-        beside: Sequence[str],
-        number: int,
+        self, surface: ElementTree.Element, ring: NDArray[np.float64], beside: Sequence[str], number: int
     ) -> DrawnFace:
         """The surface as the face of one of its rooms; number 1 sees its other side."""
         guid, kind = surface.get("id", ""), surface.get("surfaceType", "")
@@ -626,19 +601,22 @@ class _Reader:
             ring, finish = ring[::-1], finish.turned()
             guid, face_kind = f"{guid}-2", face_kind if face_kind == "wall" else ""
         return DrawnFace(
-            guid, _name(surface), face_kind, (ring,), "space" if between else alone,
-            beside[1 - number] if between else None, finish,
+            guid,
+            _name(surface),
+            face_kind,
+            (ring,),
+            "space" if between else alone,
+            beside[1 - number] if between else None,
+            finish,
             tuple(
                 one
                 for k, opening in enumerate(surface.iterfind("Opening"))
                 if (one := self._opening(opening, f"{surface.get('id')}-opening-{k}", number))
             ),
             kind == "Air",
-        )  # fmt: skip
+        )
 
-    def _opening(
-        self, opening: ElementTree.Element, without_id: str, number: int
-    ) -> DrawnOpening | None:
+    def _opening(self, opening: ElementTree.Element, without_id: str, number: int) -> DrawnOpening | None:
         ring, guid = self.document.ring(opening), opening.get("id") or without_id
         kind = opening.get("openingType", "")
         if ring is None or kind == "Air":
@@ -676,18 +654,19 @@ class _Reader:
         self.issues.append(Issue("space-without-surfaces", space.get("id", ""), values))
         return True
 
-    def _room(
-        self, space: ElementTree.Element, faces: Sequence[DrawnFace], storeys: dict[str, str]
-    ) -> DrawnRoom:
+    def _room(self, space: ElementTree.Element, faces: Sequence[DrawnFace], storeys: dict[str, str]) -> DrawnRoom:
         area, volume = (
             self.document.optional(partial(self.document.size, space, field), self.issues)
             for field in ("Area", "Volume")
         )
         return DrawnRoom(
-            space.get("id", ""), _name(space), tuple(faces),
+            space.get("id", ""),
+            _name(space),
+            tuple(faces),
             storeys.get(space.get("buildingStoreyIdRef", ""), ""),
-            stated_area=area or None, stated_volume=volume or None,
-        )  # fmt: skip
+            stated_area=area or None,
+            stated_volume=volume or None,
+        )
 
 
 def _is_slab(ring: NDArray[np.float64]) -> bool:

@@ -22,41 +22,70 @@ from mitsuba_cfs.errors import DataError
 T = TypeVar("T")
 MOST_BYTES = 256 << 20
 METRES = {
-    "Kilometers": 1e3, "Meters": 1.0, "Centimeters": 0.01, "Millimeters": 1e-3, "Miles": 1609.344,
-    "Yards": 0.9144, "Feet": 0.3048, "Inches": 0.0254,
-}  # fmt: skip
+    "Kilometers": 1e3,
+    "Meters": 1.0,
+    "Centimeters": 0.01,
+    "Millimeters": 1e-3,
+    "Miles": 1609.344,
+    "Yards": 0.9144,
+    "Feet": 0.3048,
+    "Inches": 0.0254,
+}
 SQUARE_METRES = {
-    "SquareKilometers": 1e6, "SquareMeters": 1.0, "SquareCentimeters": 1e-4,
-    "SquareMillimeters": 1e-6, "SquareMiles": 1609.344**2, "SquareYards": 0.9144**2,
-    "SquareFeet": 0.3048**2, "SquareInches": 0.0254**2,
-}  # fmt: skip
+    "SquareKilometers": 1e6,
+    "SquareMeters": 1.0,
+    "SquareCentimeters": 1e-4,
+    "SquareMillimeters": 1e-6,
+    "SquareMiles": 1609.344**2,
+    "SquareYards": 0.9144**2,
+    "SquareFeet": 0.3048**2,
+    "SquareInches": 0.0254**2,
+}
 CUBIC_METRES = {
-    "CubicKilometers": 1e9, "CubicMeters": 1.0, "CubicCentimeters": 1e-6, "CubicMillimeters": 1e-9,
-    "CubicMiles": 1609.344**3, "CubicYards": 0.9144**3, "CubicFeet": 0.3048**3,
+    "CubicKilometers": 1e9,
+    "CubicMeters": 1.0,
+    "CubicCentimeters": 1e-6,
+    "CubicMillimeters": 1e-9,
+    "CubicMiles": 1609.344**3,
+    "CubicYards": 0.9144**3,
+    "CubicFeet": 0.3048**3,
     "CubicInches": 0.0254**3,
-}  # fmt: skip
+}
 SIZES = {"Area": ("areaUnit", SQUARE_METRES), "Volume": ("volumeUnit", CUBIC_METRES)}
 # units of a quantity's own attribute, as factors to SI
 BTU_PER_HOUR, CFM, SQUARE_FOOT = 0.29307107, 4.71947443e-4, 0.3048**2
 WATT_PER_AREA = {"WattPerSquareMeter": 1.0, "WattPerSquareFoot": 1 / SQUARE_FOOT}
-FLOW_PER_AREA = {"LPerSecPerSquareM": 1e-3, "CFMPerSquareFoot": CFM / SQUARE_FOOT,
-                 "CubicMPerHourPerSquareM": 1 / 3600, "CubicMPerSecPerSquareM": 1.0}  # fmt: skip
-FLOW = {"LPerSec": 1e-3, "CFM": CFM, "CubicMPerHr": 1 / 3600, "CubicMPerSec": 1.0,
-        "LPerSecPerPerson": 1e-3, "CFMPerPerson": CFM}  # fmt: skip
+FLOW_PER_AREA = {
+    "LPerSecPerSquareM": 1e-3,
+    "CFMPerSquareFoot": CFM / SQUARE_FOOT,
+    "CubicMPerHourPerSquareM": 1 / 3600,
+    "CubicMPerSecPerSquareM": 1.0,
+}
+FLOW = {
+    "LPerSec": 1e-3,
+    "CFM": CFM,
+    "CubicMPerHr": 1 / 3600,
+    "CubicMPerSec": 1.0,
+    "LPerSecPerPerson": 1e-3,
+    "CFMPerPerson": CFM,
+}
 BTU_INCH = 0.1442279  # BTU in/(h ft2 F) in W/(m K)
 SI = {
     "U-value": {"WPerSquareMeterK": 1.0, "BtuPerHourSquareFtF": 5.678263},
     "R-value": {"SquareMeterKPerW": 1.0, "HrSquareFtFPerBTU": 1 / 5.678263},
     "Conductivity": {"WPerMeterK": 1.0, "WPerCmC": 100.0, "BtuPerHourFtF": 12 * BTU_INCH},
-    "Density": {"KgPerCubicM": 1.0, "GramsPerCubicCm": 1e3, "LbsPerCubicIn": 27679.905,
-                "LbsPerCubicFt": 16.018463},
+    "Density": {"KgPerCubicM": 1.0, "GramsPerCubicCm": 1e3, "LbsPerCubicIn": 27679.905, "LbsPerCubicFt": 16.018463},
     "SpecificHeat": {"JPerKgK": 1.0, "BTUPerLbF": 4186.8},
     "Thickness": METRES,
     "PeopleHeatGain": {"WattPerPerson": 1.0, "BtuPerHourPerson": BTU_PER_HOUR},
-    "LightPowerPerArea": WATT_PER_AREA, "EquipPowerPerArea": WATT_PER_AREA,
-    "InfiltrationFlowPerArea": FLOW_PER_AREA, "OAFlowPerArea": FLOW_PER_AREA,
-    "OAFlowPerPerson": FLOW, "OAFlowPerSpace": FLOW, "OAFlowPerZone": FLOW,
-}  # fmt: skip
+    "LightPowerPerArea": WATT_PER_AREA,
+    "EquipPowerPerArea": WATT_PER_AREA,
+    "InfiltrationFlowPerArea": FLOW_PER_AREA,
+    "OAFlowPerArea": FLOW_PER_AREA,
+    "OAFlowPerPerson": FLOW,
+    "OAFlowPerSpace": FLOW,
+    "OAFlowPerZone": FLOW,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,15 +110,15 @@ class Document:
 
     def by_id(self, kinds: Sequence[str]) -> dict[str, dict[str, ElementTree.Element]]:
         """The elements of some paths by their id; nothing refers to those without one."""
-        return {
-            kind: {one.get("id", ""): one for one in self.root.iterfind(kind) if one.get("id")}
-            for kind in kinds
-        }
+        return {kind: {one.get("id", ""): one for one in self.root.iterfind(kind) if one.get("id")} for kind in kinds}
 
     def referred(
-        self, owner: ElementTree.Element, kind: str, name: str | None,
+        self,
+        owner: ElementTree.Element,
+        kind: str,
+        name: str | None,
         known: Mapping[str, Mapping[str, ElementTree.Element]],
-    ) -> ElementTree.Element:  # fmt: skip
+    ) -> ElementTree.Element:
         """The element that another one refers to.
 
         Args: known: of `by_id`.
@@ -99,9 +128,7 @@ class Document:
             raise self.fault(f"no {kind} {name!r:.60}", owner)
         return element
 
-    def number(
-        self, element: ElementTree.Element, *, least: float = -math.inf, most: float = math.inf
-    ) -> float:
+    def number(self, element: ElementTree.Element, *, least: float = -math.inf, most: float = math.inf) -> float:
         """The number that an element holds, within limits."""
         text = (element.text or "").strip()
         try:

@@ -25,9 +25,7 @@ VERSION = "6.01"
 LEAST_PART = 1e-4  # [m2] smaller parts of shades are left out
 
 
-def write_gbxml(
-    building: Building, path: str | PathLike[str], *, glazing: Glazings | None = None
-) -> tuple[str, ...]:
+def write_gbxml(building: Building, path: str | PathLike[str], *, glazing: Glazings | None = None) -> tuple[str, ...]:
     """Write rooms, windows, constructions, reflectances and obstructions as gbXML 6.01.
 
     Not written: BSDF data (their transmittances are), shading states, gloss, furniture, the space
@@ -39,9 +37,13 @@ def write_gbxml(
     Returns: a sentence on the BSDF that are left out.
     """
     units = {
-        "temperatureUnit": "C", "lengthUnit": "Meters", "areaUnit": "SquareMeters",
-        "volumeUnit": "CubicMeters", "useSIUnitsForResults": "true", "version": VERSION,
-    }  # fmt: skip
+        "temperatureUnit": "C",
+        "lengthUnit": "Meters",
+        "areaUnit": "SquareMeters",
+        "volumeUnit": "CubicMeters",
+        "useSIUnitsForResults": "true",
+        "version": VERSION,
+    }
     root = ElementTree.Element("gbXML", {"xmlns": SCHEMA, **units})
     building, sides = touching(building)
     number_of = {space.guid: number for number, space in enumerate(building.spaces)}
@@ -51,10 +53,7 @@ def write_gbxml(
     _text(campus, "Name", building.name)
     location = _part(campus, "Location")
     _text(location, "ZipcodeOrPostalCode", "")  # required by the schema; not known here
-    for field, value in (
-        ("Latitude", building.latitude_deg),
-        ("Longitude", building.longitude_deg),
-    ):
+    for field, value in (("Latitude", building.latitude_deg), ("Longitude", building.longitude_deg)):
         if value is not None:
             _text(location, field, f"{value:.6f}")
     _text(location, "Elevation", f"{building.elevation:.3f}")
@@ -83,9 +82,7 @@ def write_gbxml(
 class _Writer:
     """The surfaces of a campus, and the constructions and window types that they refer to."""
 
-    def __init__(
-        self, root: ElementTree.Element, glazing: Glazings, air: Mapping[Key, int]
-    ) -> None:
+    def __init__(self, root: ElementTree.Element, glazing: Glazings, air: Mapping[Key, int]) -> None:
         self._root, self._glazing = root, glazing
         self._air = air  # number of the space beyond a face of air
         self._constructions: dict[_Finish, str] = {}
@@ -105,9 +102,7 @@ class _Writer:
                 kind = _kind(part) if beyond is None else "Air"
                 finish = AIR if beyond is not None else _finish(part.face)
                 construction = self._construction(finish)
-                surface = _part(
-                    campus, "Surface", id=guid, surfaceType=kind, constructionIdRef=construction
-                )
+                surface = _part(campus, "Surface", id=guid, surfaceType=kind, constructionIdRef=construction)
                 name = part.panes[0][0].name if part.face is None else part.face.name
                 _text(surface, "Name", f"{space.label} {name}")
                 for adjacent in (number,) if beyond is None else (number, beyond):
@@ -117,23 +112,18 @@ class _Writer:
                     if polygon.contains(pane.representative_point()):
                         self._opening(surface, window, part.plane, pane)
 
-    def _opening(
-        self, surface: ElementTree.Element, window: Window, plane: Plane, pane: shapely.Polygon
-    ) -> None:
+    def _opening(self, surface: ElementTree.Element, window: Window, plane: Plane, pane: shapely.Polygon) -> None:
         kind = "FixedSkylight" if plane.normal[2] > 0.7 else "FixedWindow"
         opening = _part(
-            surface, "Opening", id=f"opening-{self._openings}", openingType=kind,
-            windowTypeIdRef=self._window(window),
-        )  # fmt: skip
+            surface, "Opening", id=f"opening-{self._openings}", openingType=kind, windowTypeIdRef=self._window(window)
+        )
         self._openings += 1
         _text(opening, "Name", window.name or window.guid)
         _loop(opening, plane, shapely.Polygon(pane.exterior))
 
     def shade(self, campus: ElementTree.Element, element: Element, number: int) -> None:
         """A surface for each plane part of an obstruction."""
-        construction = self._construction(
-            _Finish("obstruction", (), outside=element.reflectance_visible)
-        )
+        construction = self._construction(_Finish("obstruction", (), outside=element.reflectance_visible))
         parts = [
             (facet.plane, polygon)
             for facet in planar_facets(element.triangles)
@@ -142,9 +132,8 @@ class _Writer:
         ]
         for index, (plane, polygon) in enumerate(parts):
             surface = _part(
-                campus, "Surface", id=f"shade-{number}-{index}", surfaceType="Shade",
-                constructionIdRef=construction,
-            )  # fmt: skip
+                campus, "Surface", id=f"shade-{number}-{index}", surfaceType="Shade", constructionIdRef=construction
+            )
             _text(surface, "Name", element.name or element.guid)
             _loop(surface, plane, polygon)
 
@@ -153,9 +142,7 @@ class _Writer:
 
     def _window(self, window: Window) -> str:
         known = glazing_of(window, self._glazing)
-        key = (
-            known.u_value, known.g_value, known.visible_transmittance, known.solar_transmittance,
-        )  # fmt: skip
+        key = (known.u_value, known.g_value, known.visible_transmittance, known.solar_transmittance)
         guid = f"window-type-{len(self._windows)}"
         return self._windows.setdefault(key, (guid, window, known))[0]
 
@@ -167,9 +154,10 @@ class _Writer:
             for number in range(len(finish.layers)):
                 _part(construction, "LayerId", layerIdRef=f"{guid}-layer-{number}")
             for kind, value in (
-                ("IntVisible", finish.visible), ("IntSolar", finish.solar),
+                ("IntVisible", finish.visible),
+                ("IntSolar", finish.solar),
                 ("ExtVisible", finish.outside),
-            ):  # fmt: skip
+            ):
                 if value is not None:
                     _share(construction, "Reflectance", value, kind)
             for number, layer in enumerate(finish.layers):
@@ -191,9 +179,7 @@ class _Writer:
                 _text(window_type, "U-value", _decimal(known.u_value), unit="WPerSquareMeterK")
             if known.g_value is not None:
                 _text(window_type, "SolarHeatGainCoeff", _decimal(known.g_value), unit="Fraction")
-            for kind, share in (
-                ("Visible", known.visible_transmittance), ("Solar", known.solar_transmittance),
-            ):  # fmt: skip
+            for kind, share in (("Visible", known.visible_transmittance), ("Solar", known.solar_transmittance)):
                 if share is not None:
                     _share(window_type, "Transmittance", share, kind)
 
@@ -243,10 +229,8 @@ def _kind(part: HostedPolygon) -> str:
         level = "wall"
     kinds = {
         "outside": {"floor": "ExposedFloor", "ceiling": "Roof", "wall": "ExteriorWall"},
-        "ground": {
-            "floor": "SlabOnGrade", "ceiling": "UndergroundCeiling", "wall": "UndergroundWall",
-        },
-    }  # fmt: skip
+        "ground": {"floor": "SlabOnGrade", "ceiling": "UndergroundCeiling", "wall": "UndergroundWall"},
+    }
     inside = {"floor": "InteriorFloor", "ceiling": "Ceiling", "wall": "InteriorWall"}
     return kinds.get(adjacency, inside)[level]
 

@@ -40,14 +40,7 @@ from bim.honeybee.schema import (
 from bim.honeybee.use import UseLibrary
 from bim.model import Building, Element
 from bim.planes import newell_normal
-from bim.polygon_rooms import (
-    DrawnFace,
-    DrawnOpening,
-    DrawnRoom,
-    GlazingValues,
-    SurfaceFinish,
-    triangles_of_rings,
-)
+from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, GlazingValues, SurfaceFinish, triangles_of_rings
 from bim.radiance.materials import RadianceMaterial, material_of
 from bim.radiance.primitives import VOID, Primitive
 from bim.radiance.xform import read_xform
@@ -195,9 +188,7 @@ class ModifierLibrary:
         elif kind == "glass":
             numbers = [self.objects.number(modifier, f"{c}_transmissivity", 0.0) for c in COLOURS]
             index = modifier.get("refraction_index")
-            numbers += (
-                [] if index is None else [self.objects.number(modifier, "refraction_index", 1.52)]
-            )
+            numbers += [] if index is None else [self.objects.number(modifier, "refraction_index", 1.52)]
         elif kind == "BSDF":
             return RadianceMaterial(modifier["identifier"], "BSDF", bsdf=modifier["identifier"])
         name = modifier["identifier"]
@@ -263,16 +254,14 @@ class ModifierLibrary:
     def _bsdf(self, modifier: Mapping[str, Any]) -> ShadingState:
         name, data = modifier["identifier"], modifier.get("bsdf_data")
         if not isinstance(data, str):
-            raise DataError("expected the text of a BSDF XML", file=self.file, element=name,
-                            field="bsdf_data")  # fmt: skip
+            raise DataError("expected the text of a BSDF XML", file=self.file, element=name, field="bsdf_data")
         with scratch_folder() as folder:
             path = folder / "bsdf.xml"
             path.write_bytes(_decoded(data))
             try:
                 bands = read_bsdf_xml(path).bands
             except DataError as error:
-                raise DataError(error.message, file=self.file, element=name, field="bsdf_data")\
-                    from None  # fmt: skip
+                raise DataError(error.message, file=self.file, element=name, field="bsdf_data") from None
         return ShadingState(bands=dict(bands))
 
 
@@ -298,9 +287,7 @@ SAME_UP = 1e-3  # difference of unit up vectors that are taken as one
 PARALLEL = 1e-3  # sine of the angle between up vector and normal
 
 
-def read_honeybee(
-    path: str | PathLike[str], *, join: Sequence[str] = (), furniture: bool = False
-) -> Building:
+def read_honeybee(path: str | PathLike[str], *, join: Sequence[str] = (), furniture: bool = False) -> Building:
     """The building of an HBJSON file, in metres.
 
     Read are rooms with faces, apertures, doors and shades, constructions and construction sets,
@@ -347,15 +334,14 @@ class _Reader:
         rooms = tuple(self._room(room) for room in model.rooms or ())
         elements = [e for room in model.rooms or () for e in self._shades(_outdoor(room), room)]
         elements += [
-            e for shade in (*(model.orphaned_shades or ()), *(model.shade_meshes or ()))
+            e
+            for shade in (*(model.orphaned_shades or ()), *(model.shade_meshes or ()))
             for e in self._shades([shade], None)
-        ]  # fmt: skip
+        ]
         for face in model.orphaned_faces or ():
             elements += self._orphan(face, "IfcWall")
             elements += self._shades(_outdoor(face), None)
-        furniture = {
-            room.identifier: tuple(self._shades(_indoor(room), room)) for room in model.rooms or ()
-        }
+        furniture = {room.identifier: tuple(self._shades(_indoor(room), room)) for room in model.rooms or ()}
         for kind in ("apertures", "doors"):
             count = len(getattr(model, f"orphaned_{kind}") or ())
             if count:
@@ -367,9 +353,7 @@ class _Reader:
         self.issues += shade_issues(model, self.path)
         self.issues += [*self.energy.objects.issues, *self.light.objects.issues]
         self._group_issues()
-        return DrawnModel(
-            self.path, model.label, rooms, tuple(elements), furniture, tuple(self.issues)
-        )
+        return DrawnModel(self.path, model.label, rooms, tuple(elements), furniture, tuple(self.issues))
 
     def _room(self, room: HoneybeeRoom) -> DrawnRoom:
         faces = tuple(self._face(face, room) for face in room.faces)
@@ -389,10 +373,16 @@ class _Reader:
             name = self.energy.objects.name(own.energy, of_room.energy, part, field)
         kind = FACE_KINDS.get(face.face_type, "")
         return DrawnFace(
-            face.identifier, face.label, kind, face.geometry.rings(self.scale), adjacency,
-            neighbour, self._finish(face, room, name, part), tuple(openings),
+            face.identifier,
+            face.label,
+            kind,
+            face.geometry.rings(self.scale),
+            adjacency,
+            neighbour,
+            self._finish(face, room, name, part),
+            tuple(openings),
             face.face_type == "AirBoundary",
-        )  # fmt: skip
+        )
 
     def _behind(self, face: RoomFace, condition: Condition) -> tuple[str, str | None]:
         adjacency = ADJACENCY.get(condition.type, "adiabatic")
@@ -408,11 +398,7 @@ class _Reader:
         return "adiabatic", None
 
     def _finish(
-        self,
-        one: RoomFace | HoneybeeDoor,
-        room: HoneybeeRoom | None,
-        construction: str | None,
-        part: str,
+        self, one: RoomFace | HoneybeeDoor, room: HoneybeeRoom | None, construction: str | None, part: str
     ) -> SurfaceFinish:
         """What modifiers say of light and the construction of heat."""
         opaque = None if construction is None else self.energy.opaque(construction)
@@ -430,11 +416,13 @@ class _Reader:
         if gloss is not None and (solar or 0.0) + gloss.at_normal > 1:
             solar = 1.0 - gloss.at_normal
         return SurfaceFinish(
-            None if opaque is None else opaque.construction, material.diffuse,
+            None if opaque is None else opaque.construction,
+            material.diffuse,
             material.diffuse if solar is None else solar,
-            0.9 if opaque is None else opaque.emissivity, gloss,
+            0.9 if opaque is None else opaque.emissivity,
+            gloss,
             material.diffuse if opaque is None else opaque.outer_visible,
-        )  # fmt: skip
+        )
 
     def _opening(self, one: HoneybeeAperture, face: RoomFace, room: HoneybeeRoom) -> DrawnOpening:
         rings = one.geometry.rings(self.scale)
@@ -463,13 +451,17 @@ class _Reader:
         states = self._states(one, modifier, glazing)
         up = self._up(one, modifier, rings[0]) if states else None
         return DrawnOpening(
-            one.identifier, one.label, rings[0], glazing=glazing, states=states,
-            holes=rings[1:], up=up, both_sides=min(one.identifier, *_other_side(one)),
-        )  # fmt: skip
+            one.identifier,
+            one.label,
+            rings[0],
+            glazing=glazing,
+            states=states,
+            holes=rings[1:],
+            up=up,
+            both_sides=min(one.identifier, *_other_side(one)),
+        )
 
-    def _by_modifier(
-        self, one: HoneybeeAperture, values: GlazingValues, modifier: str | None
-    ) -> GlazingValues:
+    def _by_modifier(self, one: HoneybeeAperture, values: GlazingValues, modifier: str | None) -> GlazingValues:
         """The values with the visible transmittance of a glass, and its law of the angle."""
         material = None if modifier is None else self.light.material(modifier)
         if material is None or material.kind == "BSDF":
@@ -479,13 +471,9 @@ class _Reader:
             self.issues.append(Issue("modifier-not-glass", one.identifier, known))
             return values
         glass = PlainGlass(((material.transmissivity, material.index),))
-        return replace(
-            values, visible=glass.transmittance, name=values.name or material.name, glass=glass
-        )
+        return replace(values, visible=glass.transmittance, name=values.name or material.name, glass=glass)
 
-    def _states(
-        self, one: HoneybeeAperture, modifier: str | None, values: GlazingValues
-    ) -> tuple[ShadingState, ...]:
+    def _states(self, one: HoneybeeAperture, modifier: str | None, values: GlazingValues) -> tuple[ShadingState, ...]:
         """The optics of an aperture by state: BSDFs; of a dynamic group also its panes of glass."""
         held = _held(one)
         names = [modifier, *(s.get("modifier") for s in held[1:])]
@@ -509,19 +497,13 @@ class _Reader:
             self.issues.append(Issue("states-with-shades", one.identifier, {"element": one.label}))
         return tuple(states) if states and states[0].name == "" else ()
 
-    def _up(
-        self, one: HoneybeeAperture, modifier: str | None, ring: np.ndarray
-    ) -> np.ndarray | None:
+    def _up(self, one: HoneybeeAperture, modifier: str | None, ring: np.ndarray) -> np.ndarray | None:
         """The up vector [3] that the BSDFs of an aperture's states share; None without a BSDF.
 
         Raises: `DataError` where they differ, or where it is the aperture's normal.
         """
         names = [modifier, *(state.get("modifier") for state in _held(one)[1:])]
-        ups = [
-            (name, up)
-            for name in names
-            if isinstance(name, str) and (up := self.light.up_vector(name)) is not None
-        ]
+        ups = [(name, up) for name in names if isinstance(name, str) and (up := self.light.up_vector(name)) is not None]
         if not ups:
             return None
         first, up = ups[0]
@@ -546,9 +528,7 @@ class _Reader:
         name = self.light.objects.name(face.properties.radiance, {}, part, "exterior_modifier")
         yield from self._element(face.identifier, face.label, kind, triangles_of_rings(rings), name)
 
-    def _shades(
-        self, shades: Iterable[Shade | ShadeMesh], room: HoneybeeRoom | None
-    ) -> Iterator[Element]:
+    def _shades(self, shades: Iterable[Shade | ShadeMesh], room: HoneybeeRoom | None) -> Iterator[Element]:
         room_light = {} if room is None else room.properties.radiance
         for shade in shades:
             try:
@@ -559,8 +539,7 @@ class _Reader:
                 )
             except ValueError:
                 message = "a face has a corner that there is not"
-                raise DataError(message, file=self.path, element=shade.identifier,
-                                field="geometry.faces") from None  # fmt: skip
+                raise DataError(message, file=self.path, element=shade.identifier, field="geometry.faces") from None
             part, field = "shade_set", "exterior_modifier"
             if shade.is_detached and room is None:
                 part, field = "", "context_modifier"
@@ -593,9 +572,8 @@ def _by_construction(opaque: OpaqueValues | None) -> SurfaceFinish:
     if opaque is None:
         return SurfaceFinish()
     return SurfaceFinish(
-        opaque.construction, opaque.inner_visible, opaque.inner_solar, opaque.emissivity, None,
-        opaque.outer_visible,
-    )  # fmt: skip
+        opaque.construction, opaque.inner_visible, opaque.inner_solar, opaque.emissivity, None, opaque.outer_visible
+    )
 
 
 def _with_values(state: ShadingState, values: GlazingValues, *, shaded: bool) -> ShadingState:
@@ -604,9 +582,11 @@ def _with_values(state: ShadingState, values: GlazingValues, *, shaded: bool) ->
         pane = state.angular is not None  # of glass: as much heat goes through it
         return replace(state, u_value=values.u_value, shading_position="none") if pane else state
     return replace(
-        state, u_value=values.u_value, g_normal=values.g_value,
+        state,
+        u_value=values.u_value,
+        g_normal=values.g_value,
         shading_position="none" if values.g_value is not None else None,
-    )  # fmt: skip
+    )
 
 
 def _set_field(condition: Condition, *, energy: bool) -> str:

@@ -99,9 +99,7 @@ class EnergyLibrary:
             if material is None:
                 raise self.objects.fault(f"no material {one!r:.60}", construction, "materials")
             if not isinstance(material.get("identifier"), str):
-                raise self.objects.fault(
-                    "expected materials with an identifier", construction, "materials"
-                )
+                raise self.objects.fault("expected materials with an identifier", construction, "materials")
             layers.append(material)
         return layers
 
@@ -164,9 +162,7 @@ class EnergyLibrary:
 
     def _glazing(self, name: str, layers: Sequence[dict], height: float) -> GlazingValues | None:
         kinds = [str(one.get("type", "")) for one in layers]
-        simple = [
-            m for m, k in zip(layers, kinds, strict=True) if k.startswith("EnergyWindowMaterialSim")
-        ]
+        simple = [m for m, k in zip(layers, kinds, strict=True) if k.startswith("EnergyWindowMaterialSim")]
         if simple:
             one = simple[0]
             return GlazingValues(
@@ -210,9 +206,7 @@ class EnergyLibrary:
         ends_in_gap = bool(unshaded) and str(unshaded[-1].get("type", "")) in GAPS
         return unshaded[:-1] if behind_shade and ends_in_gap else unshaded
 
-    def _layered(
-        self, name: str, panes: Sequence[dict], gaps: Sequence[dict], height: float
-    ) -> GlazingValues:
+    def _layered(self, name: str, panes: Sequence[dict], gaps: Sequence[dict], height: float) -> GlazingValues:
         bands = {}
         for band in ("visible", "solar"):
             bands[band] = [self._pane(pane, band) for pane in panes]
@@ -229,14 +223,10 @@ class EnergyLibrary:
             )
             for pane in panes
         ]
-        unit = GlazingUnit(
-            tuple(layers), tuple(self._gap(gap) for gap in gaps), float(np.clip(height, 0.05, 50.0))
-        )
+        unit = GlazingUnit(tuple(layers), tuple(self._gap(gap) for gap in gaps), float(np.clip(height, 0.05, 50.0)))
         g_value = iso15099_g_values(unit, NFRC[1], solar.tau, solar.absorptance)
         u_value = iso15099_u_value(unit, NFRC[0])
-        return GlazingValues(
-            u_value, float(g_value), float(visible.tau), float(solar.tau), len(panes), name
-        )
+        return GlazingValues(u_value, float(g_value), float(visible.tau), float(solar.tau), len(panes), name)
 
     def _pane(self, pane: Mapping[str, Any], band: str) -> PaneOptics:
         tau, rho = (
@@ -247,9 +237,7 @@ class EnergyLibrary:
         back = pane.get(f"{band}_reflectance_back")
         back = rho if not isinstance(back, int | float) else float(back)
         if tau + max(rho, back) > 1 + 1e-9 or back < 0:
-            raise self.objects.fault(
-                "passes and reflects more than it gets", pane, f"{band}_reflectance"
-            )
+            raise self.objects.fault("passes and reflects more than it gets", pane, f"{band}_reflectance")
         return PaneOptics(np.array(tau), np.array(rho), np.array(back))
 
     def _width(self, gap: Mapping[str, Any]) -> float:
@@ -262,10 +250,7 @@ class EnergyLibrary:
         known = isinstance(names, list) and isinstance(shares, list) and len(names) == len(shares)
         if not known or not all(one in GASES for one in names):
             raise self.objects.fault(f"expected of {', '.join(GASES)}", gap, "gas_type")
-        return GasGap(
-            self._width(gap),
-            tuple((GASES[n], float(s)) for n, s in zip(names, shares, strict=True)),
-        )
+        return GasGap(self._width(gap), tuple((GASES[n], float(s)) for n, s in zip(names, shares, strict=True)))
 
 
 def _scatters(material: Mapping[str, Any]) -> bool:

@@ -18,9 +18,7 @@ NAMED = 4  # of many things so many are named
 class NamedObjects:
     """The objects of one extension by identifier, those of its global set among them."""
 
-    def __init__(
-        self, properties: Mapping[str, Any], kinds: tuple[str, ...], sets: str, file: Path
-    ) -> None:
+    def __init__(self, properties: Mapping[str, Any], kinds: tuple[str, ...], sets: str, file: Path) -> None:
         """kinds: lists of objects, such as "materials"; sets: the extension's noun."""
         self.file = file
         self.issues: list[Issue] = []  # names of objects that are not in the file
@@ -36,9 +34,7 @@ class NamedObjects:
         """The object of that identifier."""
         return self._objects[kind].get(name)
 
-    def name(
-        self, own: Mapping[str, Any], room: Mapping[str, Any], part: str, field: str
-    ) -> str | None:
+    def name(self, own: Mapping[str, Any], room: Mapping[str, Any], part: str, field: str) -> str | None:
         """What a surface names itself, else its room's set, else the global one; None if none does.
 
         An object in place of a name, as files that are not abridged have it, is known by its name

@@ -78,9 +78,7 @@ class ScheduleLibrary:
 
     def _rules(self, held: Mapping[str, Any]) -> Iterator[DayRule]:
         """The rules in their order, the holiday's first; the default day holds elsewhere."""
-        days = {
-            str(one.get("identifier")): self._day(one) for one in _objects(held, "day_schedules")
-        }
+        days = {str(one.get("identifier")): self._day(one) for one in _objects(held, "day_schedules")}
 
         def day(named: Any) -> NDArray[np.float64]:
             if isinstance(named, dict):
@@ -165,11 +163,14 @@ def _fixed(held: Mapping[str, Any]) -> NDArray[np.float64]:
     return np.repeat(hourly[:, None, :], len(KINDS), axis=1)
 
 
-LOADS = ("people", "lighting", "electric_equipment", "gas_equipment", "infiltration",
-         "ventilation", "setpoint")  # fmt: skip
+LOADS = ("people", "lighting", "electric_equipment", "gas_equipment", "infiltration", "ventilation", "setpoint")
 NOT_READ = (  # fields of a room's extension of energy
-    "service_hot_water", "process_loads", "internal_masses", "window_vent_control", "fans",
-)  # fmt: skip
+    "service_hot_water",
+    "process_loads",
+    "internal_masses",
+    "window_vent_control",
+    "fans",
+)
 INDOORS = 24.0  # at which a person's heat is split [degC]
 SEATED = 120.0  # heat of a person at light office work, which honeybee-energy takes [W]
 IDEAL = "IdealAirSystem"
@@ -187,8 +188,7 @@ class UseLibrary:
     def issues(self) -> tuple[Issue, ...]:
         """Uses that are ignored, each once with its rooms."""
         return tuple(
-            replace(issue, values=issue.values | {"rooms": tuple(rooms)})
-            for issue, rooms in self._rooms.items()
+            replace(issue, values=issue.values | {"rooms": tuple(rooms)}) for issue, rooms in self._rooms.items()
         )
 
     def use(self, room: HoneybeeRoom, space: Space) -> StatedUse | None:
@@ -231,9 +231,7 @@ class UseLibrary:
 class _Parts:
     """The loads of one room."""
 
-    def __init__(
-        self, library: UseLibrary, room: HoneybeeRoom, space: Space, loads: Mapping[str, dict]
-    ) -> None:
+    def __init__(self, library: UseLibrary, room: HoneybeeRoom, space: Space, loads: Mapping[str, dict]) -> None:
         self.library, self.room, self.space, self.loads = library, room, space, loads
         self.number = library.objects.number
         self.report = partial(library._report, room)
@@ -288,18 +286,13 @@ class _Parts:
         schedule: YearSchedule | None = None
         for kind in kinds:
             one = self._of(kind)
-            away = sum(
-                self.number(one, f, 0.0, most=1.0) for f in ("latent_fraction", "lost_fraction")
-            )
+            away = sum(self.number(one, f, 0.0, most=1.0) for f in ("latent_fraction", "lost_fraction"))
             if away:
                 self.report("gain-lost", load=Phrase(kind), percent=100 * away)
             power = self.number(one, "watts_per_area", 0.0) * self.space.floor_area
             part = self._share(kind).times(power * max(1.0 - away, 0.0))
             schedule = part if schedule is None else schedule.plus(part)
-        yield (
-            "equipment_w",
-            ScheduledValue(0.0) if schedule is None else ScheduledValue(1.0, schedule),
-        )
+        yield ("equipment_w", ScheduledValue(0.0) if schedule is None else ScheduledValue(1.0, schedule))
 
     def _air(self) -> Iterator[tuple[str, Any]]:
         leaks, fan, space = self._of("infiltration"), self._of("ventilation"), self.space
@@ -307,10 +300,7 @@ class _Parts:
         yield "infiltration_m3_s", ScheduledValue(flow, self._share("infiltration"))
         if leaks:
             names = ("constant_coefficient", "temperature_coefficient", "velocity_coefficient")
-            a, b, c = (
-                self.number(leaks, name, default)
-                for name, default in zip(names, (1.0, 0.0, 0.0), strict=True)
-            )
+            a, b, c = (self.number(leaks, name, default) for name, default in zip(names, (1.0, 0.0, 0.0), strict=True))
             yield "infiltration_factors", (a, b, c, 0.0)
         system = self.library.hvac(self.room)
         if system is None:
@@ -358,8 +348,12 @@ class _Parts:
     def _radiant(self) -> float | None:
         """The radiant share of people, lamps and equipment, by their power."""
         people, area = self._of("people"), self.space.floor_area
-        weights = [(self.number(people, "people_per_area", 0.0) * area * 100.0,
-                    self.number(people, "radiant_fraction", 0.3, most=1.0))]  # fmt: skip
+        weights = [
+            (
+                self.number(people, "people_per_area", 0.0) * area * 100.0,
+                self.number(people, "radiant_fraction", 0.3, most=1.0),
+            )
+        ]
         for kind in ("lighting", "electric_equipment", "gas_equipment"):
             one = self._of(kind)
             radiant = self.number(one, "radiant_fraction", 0.0, most=1.0)
@@ -373,9 +367,16 @@ def sensible_heat(activity: float, air_c: float = INDOORS) -> float:
     """Dry heat of a person of an activity [W], EnergyPlus Engineering Reference, "People"."""
     m, t = activity, air_c
     dry = (
-        6.461927 + 0.946892 * m + 2.55737e-5 * m**2 + 7.139322 * t - 0.0627909 * t * m
-        + 5.89172e-5 * t * m**2 - 0.198550 * t**2 + 9.40018e-4 * t**2 * m - 1.49532e-6 * t**2 * m**2
-    )  # fmt: skip
+        6.461927
+        + 0.946892 * m
+        + 2.55737e-5 * m**2
+        + 7.139322 * t
+        - 0.0627909 * t * m
+        + 5.89172e-5 * t * m**2
+        - 0.198550 * t**2
+        + 9.40018e-4 * t**2 * m
+        - 1.49532e-6 * t**2 * m**2
+    )
     return float(np.clip(dry, 0.0, activity))
 
 

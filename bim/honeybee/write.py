@@ -53,20 +53,20 @@ def write_honeybee(
     building, sides = touching(building)
     air = _air_boundaries(building, sides, guids, names)
     parts = {space.guid: hosted_polygons(space) for space in building.spaces}
-    rooms = [
-        _room(space, parts[space.guid], guids, names, library=library, air=air)
-        for space in building.spaces
-    ]
+    rooms = [_room(space, parts[space.guid], guids, names, library=library, air=air) for space in building.spaces]
     windows = {window.guid for window in building.windows}
     meshes = [_mesh(e, names, library) for e in building.elements if e.guid not in windows]
     model = {
-        "type": "Model", "identifier": names.of(building.name or "building"),
-        "display_name": building.name, "units": "Meters",
+        "type": "Model",
+        "identifier": names.of(building.name or "building"),
+        "display_name": building.name,
+        "units": "Meters",
         "tolerance": _tolerance([one.polygon.area for some in parts.values() for one in some]),
-        "angle_tolerance": 1.0, "rooms": rooms, "shade_meshes": meshes,
-        "properties": {"type": "ModelProperties", "energy": library.energy(),
-                       "radiance": library.radiance()},
-    }  # fmt: skip
+        "angle_tolerance": 1.0,
+        "rooms": rooms,
+        "shade_meshes": meshes,
+        "properties": {"type": "ModelProperties", "energy": library.energy(), "radiance": library.radiance()},
+    }
     write_text(Path(path), json_text(model, indent=1) + "\n")
     return without_bsdf(building.windows, glazing or {}, "Honeybee's energy model")
 
@@ -113,17 +113,24 @@ class _Library:
                 name = f"{key}_{number}"
                 names.append(name)
                 self._materials[name] = {
-                    "type": "EnergyMaterial", "identifier": name, "display_name": layer.name,
-                    "thickness": layer.thickness, "conductivity": layer.conductivity,
+                    "type": "EnergyMaterial",
+                    "identifier": name,
+                    "display_name": layer.name,
+                    "thickness": layer.thickness,
+                    "conductivity": layer.conductivity,
                     "density": layer.density,
                     "specific_heat": max(layer.heat_capacity, LEAST_CAPACITY),
-                    "roughness": "MediumRough", "thermal_absorptance": 0.9,
-                    "solar_absorptance": absorbed[0], "visible_absorptance": absorbed[1],
-                }  # fmt: skip
+                    "roughness": "MediumRough",
+                    "thermal_absorptance": 0.9,
+                    "solar_absorptance": absorbed[0],
+                    "visible_absorptance": absorbed[1],
+                }
             self._constructions[key] = {
-                "type": "OpaqueConstructionAbridged", "identifier": key, "materials": names,
+                "type": "OpaqueConstructionAbridged",
+                "identifier": key,
+                "materials": names,
                 "display_name": one.name,
-            }  # fmt: skip
+            }
         return key
 
     def glazing(self, window: Window) -> str | None:
@@ -140,16 +147,8 @@ class _Library:
         fields = {name: round(float(value), 6) for name, value in values.items()}
         key = "glazing_" + "_".join(f"{value:.6g}" for value in fields.values())
         material = f"{key}_system"
-        self._materials[material] = {
-            "type": "EnergyWindowMaterialSimpleGlazSys",
-            "identifier": material,
-            **fields,
-        }
-        self._constructions[key] = {
-            "type": "WindowConstructionAbridged",
-            "identifier": key,
-            "materials": [material],
-        }
+        self._materials[material] = {"type": "EnergyWindowMaterialSimpleGlazSys", "identifier": material, **fields}
+        self._constructions[key] = {"type": "WindowConstructionAbridged", "identifier": key, "materials": [material]}
         return key
 
     def optics(self, window: Window) -> str | None:
@@ -168,11 +167,17 @@ class _Library:
             name = f"bsdf_{len(self._bsdfs)}_{identifier(file.name)[:50]}"
             self._bsdfs[key] = name
             self._modifiers[name] = {
-                "type": "BSDF", "identifier": name, "display_name": file.name or name,
-                "modifier": None, "dependencies": [], "up_orientation": list(key[1:]),
-                "thickness": 0.0, "function_file": ".", "transform": None,
+                "type": "BSDF",
+                "identifier": name,
+                "display_name": file.name or name,
+                "modifier": None,
+                "dependencies": [],
+                "up_orientation": list(key[1:]),
+                "thickness": 0.0,
+                "function_file": ".",
+                "transform": None,
                 "bsdf_data": bsdf_xml(BsdfFile({"Visible": visible}, file.name)),
-            }  # fmt: skip
+            }
         return self._bsdfs[key]
 
     def _glass(self, window: Window, known: ExportedGlazing) -> str:
@@ -182,9 +187,13 @@ class _Library:
         passed = pane_transmissivity(float(known.visible_transmittance or 0.0), index)
         name = f"glass_{passed:.6f}_{index:g}".replace(".", "_")
         self._modifiers[name] = {
-            "type": "Glass", "identifier": name, "modifier": None, "dependencies": [],
-            "refraction_index": index, **{f"{c}_transmissivity": round(passed, 9) for c in "rgb"},
-        }  # fmt: skip
+            "type": "Glass",
+            "identifier": name,
+            "modifier": None,
+            "dependencies": [],
+            "refraction_index": index,
+            **{f"{c}_transmissivity": round(passed, 9) for c in "rgb"},
+        }
         return name
 
     def modifier(self, reflectance: float) -> str:
@@ -192,15 +201,23 @@ class _Library:
         name = f"grey_{reflectance:.4f}"
         colours = {f"{c}_reflectance": round(float(reflectance), 4) for c in "rgb"}
         self._modifiers[name] = {
-            "type": "Plastic", "identifier": name, "modifier": None, "dependencies": [],
-            "specularity": 0.0, "roughness": 0.0, **colours,
-        }  # fmt: skip
+            "type": "Plastic",
+            "identifier": name,
+            "modifier": None,
+            "dependencies": [],
+            "specularity": 0.0,
+            "roughness": 0.0,
+            **colours,
+        }
         return name
 
     def energy(self) -> dict[str, Any]:
         """The extension of energy."""
-        return {"type": "ModelEnergyProperties", "materials": list(self._materials.values()),
-                "constructions": list(self._constructions.values())}  # fmt: skip
+        return {
+            "type": "ModelEnergyProperties",
+            "materials": list(self._materials.values()),
+            "constructions": list(self._constructions.values()),
+        }
 
     def radiance(self) -> dict[str, Any]:
         """The extension of light."""
@@ -214,14 +231,13 @@ def _air_boundaries(
     labels = {key: names.of(f"{guids[key[0]]}_{key[1]}") for key in sides}
     return {
         key: {
-            "identifier": labels[key], "face_type": "AirBoundary",
-            "boundary_condition": {
-                "type": "Surface", "boundary_condition_objects": [labels[other], guids[other[0]]],
-            },
+            "identifier": labels[key],
+            "face_type": "AirBoundary",
+            "boundary_condition": {"type": "Surface", "boundary_condition_objects": [labels[other], guids[other[0]]]},
             "properties": _properties("Face"),
         }
         for key, other in sides.items()
-    }  # fmt: skip
+    }
 
 
 def _tolerance(areas: Sequence[float]) -> float:
@@ -248,25 +264,35 @@ def _room(
         faces.append(
             _face(part, part.face, own=own, names=names, library=library)
             if boundary is None
-            else {"type": "Face", "display_name": part.face.name, **boundary,
-                  "geometry": _geometry(part.plane, part.polygon)}
-        )  # fmt: skip
+            else {
+                "type": "Face",
+                "display_name": part.face.name,
+                **boundary,
+                "geometry": _geometry(part.plane, part.polygon),
+            }
+        )
     return {
-        "type": "Room", "identifier": own, "display_name": space.label, "faces": faces,
-        "story": space.storey or None, "properties": _properties("Room"),
-    }  # fmt: skip
+        "type": "Room",
+        "identifier": own,
+        "display_name": space.label,
+        "faces": faces,
+        "story": space.storey or None,
+        "properties": _properties("Room"),
+    }
 
 
 def _own_face(part: HostedPolygon, own: str, names: _Names, library: _Library) -> dict:
     """A face for glass that lies in none."""
     ((window, pane),) = part.panes
     return {
-        "type": "Face", "identifier": names.of(f"{own}_{window.name or 'window'}_wall"),
-        "face_type": "Wall", "geometry": _geometry(part.plane, part.polygon),
+        "type": "Face",
+        "identifier": names.of(f"{own}_{window.name or 'window'}_wall"),
+        "face_type": "Wall",
+        "geometry": _geometry(part.plane, part.polygon),
         "boundary_condition": {"type": "Outdoors"},
         "apertures": [_aperture(window, part.plane, pane, names, library)],
         "properties": _properties("Face"),
-    }  # fmt: skip
+    }
 
 
 def _face(part: HostedPolygon, face: Face, *, own: str, names: _Names, library: _Library) -> dict:
@@ -279,42 +305,39 @@ def _face(part: HostedPolygon, face: Face, *, own: str, names: _Names, library: 
     )
     slope = "RoofCeiling" if plane.normal[2] > 0.7 else "Wall"
     return {
-        "type": "Face", "identifier": names.of(f"{own}_{face.name}"), "display_name": face.name,
-        "face_type": TYPES.get(face.kind, slope), "geometry": _geometry(plane, part.polygon),
+        "type": "Face",
+        "identifier": names.of(f"{own}_{face.name}"),
+        "display_name": face.name,
+        "face_type": TYPES.get(face.kind, slope),
+        "geometry": _geometry(plane, part.polygon),
         "boundary_condition": {"type": condition},
         "apertures": [_aperture(w, plane, pane, names, library) for w, pane in windows],
-        "properties": _properties(
-            "Face", construction, library.modifier(face.total_reflectance("visible"))
-        ),
-    }  # fmt: skip
+        "properties": _properties("Face", construction, library.modifier(face.total_reflectance("visible"))),
+    }
 
 
-def _aperture(
-    window: Window, plane: Plane, pane: shapely.Polygon, names: _Names, library: _Library
-) -> dict:
+def _aperture(window: Window, plane: Plane, pane: shapely.Polygon, names: _Names, library: _Library) -> dict:
     return {
-        "type": "Aperture", "identifier": names.of(window.name or window.guid),
-        "display_name": window.name or window.guid, "geometry": _geometry(plane, pane),
-        "is_operable": False, "boundary_condition": {"type": "Outdoors"},
-        "properties": _properties(
-            "Aperture", library.glazing(window), library.optics(window)
-        ),
-    }  # fmt: skip
+        "type": "Aperture",
+        "identifier": names.of(window.name or window.guid),
+        "display_name": window.name or window.guid,
+        "geometry": _geometry(plane, pane),
+        "is_operable": False,
+        "boundary_condition": {"type": "Outdoors"},
+        "properties": _properties("Aperture", library.glazing(window), library.optics(window)),
+    }
 
 
 def _mesh(element: Element, names: _Names, library: _Library) -> dict:
-    corners, index = np.unique(
-        element.triangles.reshape(-1, 3).round(6), axis=0, return_inverse=True
-    )
+    corners, index = np.unique(element.triangles.reshape(-1, 3).round(6), axis=0, return_inverse=True)
     return {
-        "type": "ShadeMesh", "identifier": names.of(element.name or element.guid),
-        "display_name": element.name, "is_detached": True,
-        "geometry": {"type": "Mesh3D", "vertices": corners.tolist(),
-                     "faces": index.reshape(-1, 3).tolist()},
-        "properties": _properties(
-            "ShadeMesh", None, library.modifier(element.reflectance_visible)
-        ),
-    }  # fmt: skip
+        "type": "ShadeMesh",
+        "identifier": names.of(element.name or element.guid),
+        "display_name": element.name,
+        "is_detached": True,
+        "geometry": {"type": "Mesh3D", "vertices": corners.tolist(), "faces": index.reshape(-1, 3).tolist()},
+        "properties": _properties("ShadeMesh", None, library.modifier(element.reflectance_visible)),
+    }
 
 
 def _geometry(plane: Plane, polygon: shapely.Polygon) -> dict:

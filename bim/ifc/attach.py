@@ -49,9 +49,7 @@ def attach(
     return len(elements)
 
 
-def _removed(
-    model: ifcopenshell.file, targets: Sequence[Entity], state: ShadingState, location: str | None
-) -> bool:
+def _removed(model: ifcopenshell.file, targets: Sequence[Entity], state: ShadingState, location: str | None) -> bool:
     """Remove the state and the reference that the targets have already; whether there was one."""
     removed = False
     if state.holds_data:

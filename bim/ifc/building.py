@@ -37,13 +37,7 @@ from bim.ifc.defects import DRAWN_TWICE, model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.fenestration_read import read_fenestration
 from bim.ifc.furniture import furnished
-from bim.ifc.glass_of_rooms import (
-    GlassAccount,
-    GlassOfRooms,
-    apertures_in,
-    glass_of_rooms,
-    lost_glass,
-)
+from bim.ifc.glass_of_rooms import GlassAccount, GlassOfRooms, apertures_in, glass_of_rooms, lost_glass
 from bim.ifc.materials import SURFACES
 from bim.ifc.open_spaces import open_spaces
 from bim.ifc.passages import LARGEST_DOOR, Passage, open_apertures, passages
@@ -138,10 +132,7 @@ def _same(records: Sequence[SpaceRecord], shared: Shared, left: set[int]) -> lis
 
 
 def _by_scheme(
-    model: ifcopenshell.file,
-    records: Sequence[SpaceRecord],
-    same: Sequence[tuple[int, int]],
-    key: Key,
+    model: ifcopenshell.file, records: Sequence[SpaceRecord], same: Sequence[tuple[int, int]], key: Key
 ) -> tuple[set[int], str]:
     """Spaces whose room another scheme draws too, and that scheme; none where `key` is alike."""
     involved = {i for pair in same for i in pair}
@@ -152,18 +143,11 @@ def _by_scheme(
     count = Counter(scheme.values())
     volume = {name: sum(records[i].volume for i in involved if scheme[i] == name) for name in count}
     chosen = min(count, key=lambda name: (-count[name], volume[name], name))
-    gone = {
-        i
-        for pair in same
-        for i, other in (pair, pair[::-1])
-        if scheme[i] != chosen and scheme[other] == chosen
-    }
+    gone = {i for pair in same for i, other in (pair, pair[::-1]) if scheme[i] != chosen and scheme[other] == chosen}
     return gone, chosen
 
 
-def _filled(
-    records: Sequence[SpaceRecord], same: Sequence[tuple[int, int]], shared: Shared
-) -> set[int]:
+def _filled(records: Sequence[SpaceRecord], same: Sequence[tuple[int, int]], shared: Shared) -> set[int]:
     """Spaces that smaller ones, or earlier ones of their size, fill."""
     gone: set[int] = set()
     involved = sorted({i for pair in same for i in pair}, key=lambda i: (records[i].volume, i))
@@ -175,9 +159,7 @@ def _filled(
     return gone
 
 
-def _schemes(
-    gone: set[int], records: Sequence[SpaceRecord], model: ifcopenshell.file, key: Key
-) -> tuple[Phrase, ...]:
+def _schemes(gone: set[int], records: Sequence[SpaceRecord], model: ifcopenshell.file, key: Key) -> tuple[Phrase, ...]:
     count = Counter(key(_entity(model, records[i])) for i in gone)
     return tuple(
         Phrase("scheme", {"name": name or Phrase("no-scheme"), "count": number})
@@ -209,10 +191,7 @@ def _group(space: ifcopenshell.entity_instance) -> str:
 
 
 def joined_rooms(
-    source: Source,
-    records: Sequence[SpaceRecord],
-    apertures: Sequence[Aperture],
-    bodies: NDArray[np.float64],
+    source: Source, records: Sequence[SpaceRecord], apertures: Sequence[Aperture], bodies: NDArray[np.float64]
 ) -> tuple[list[SpaceRecord], list[Passage], list[Issue]]:
     """Rooms with those of the corrections' `join` made one, and the passages left between rooms.
 
@@ -237,9 +216,7 @@ def joined_rooms(
     return records, openings, [*issues, *_open_pairs(records, openings, source)]
 
 
-def _open_pairs(
-    records: Sequence[SpaceRecord], openings: Sequence[Passage], source: Source
-) -> list[Issue]:
+def _open_pairs(records: Sequence[SpaceRecord], openings: Sequence[Passage], source: Source) -> list[Issue]:
     """What there is to say of each pair of rooms that stay open to each other, once."""
     by_pair: dict[frozenset[str], list[Passage]] = {}
     for passage in openings:
@@ -262,15 +239,11 @@ def _open_pairs(
     return issues
 
 
-def _joined_by_size(
-    records: list[SpaceRecord], openings: Sequence[Passage]
-) -> tuple[list[SpaceRecord], list[Issue]]:
+def _joined_by_size(records: list[SpaceRecord], openings: Sequence[Passage]) -> tuple[list[SpaceRecord], list[Issue]]:
     """Rooms with those made one that openings larger than a door lead between."""
     large = [passage for passage in openings if passage.is_large]
     number = {record.guid: i for i, record in enumerate(records)}
-    rows, columns = (
-        np.array([[number[r] for r in passage.rooms] for passage in large]).reshape(-1, 2).T
-    )
+    rows, columns = np.array([[number[r] for r in passage.rooms] for passage in large]).reshape(-1, 2).T
     links = coo_array((np.ones(len(large)), (rows, columns)), shape=(len(records),) * 2)
     _, group = connected_components(links, directed=False)
     rooms, issues = [], []
@@ -281,9 +254,7 @@ def _joined_by_size(
             continue
         one, why = _one_room(parts, large)
         names = tuple(part.label for part in parts)
-        widest = max(
-            passage.area for passage in large if passage.rooms <= {part.guid for part in parts}
-        )
+        widest = max(passage.area for passage in large if passage.rooms <= {part.guid for part in parts})
         values = {"rooms": names, "area": widest, "limit": LARGEST_DOOR, "reason": why}
         if one is None:
             issues.append(Issue("rooms-not-joined-by-size", parts[0].guid, values))
@@ -294,9 +265,7 @@ def _joined_by_size(
     return rooms, issues
 
 
-def _one_room(
-    parts: list[SpaceRecord], openings: Sequence[Passage]
-) -> tuple[SpaceRecord | None, Phrase | str]:
+def _one_room(parts: list[SpaceRecord], openings: Sequence[Passage]) -> tuple[SpaceRecord | None, Phrase | str]:
     """One room of several, or why there is none."""
     try:
         one = _joined(parts, openings) if len(parts) > 1 else None
@@ -381,15 +350,11 @@ def account_of(
     for window in (window for space in built for window in space.windows):
         used[window.guid] += window.area
     again = {p.where for p in issues if p.code == DRAWN_TWICE}
-    panes = [
-        one for one in glass.glass if one.out > 0 and (used[one.guid] or one.guid not in again)
-    ]
+    panes = [one for one in glass.glass if one.out > 0 and (used[one.guid] or one.guid not in again)]
     lost = {one.guid: one.out - one.used for one in panes if one.out - one.used > 0.01}
     low = {one.guid for one in panes if one.low is not None}
     return Account(
-        _storeys(
-            source, kept, panes, used, Counter(map(storey_of, drawn)) if not from_geometry else None
-        ),
+        _storeys(source, kept, panes, used, Counter(map(storey_of, drawn)) if not from_geometry else None),
         len(panes),
         sum(used[one.guid] > 0 for one in panes),
         sum(min(used[one.guid], one.out) for one in panes if one.assumed),
@@ -494,11 +459,7 @@ def read_ifc(
     if any(record.raised for record in records):
         glass = glass_of_rooms(source, apertures, records, mesh)
     elements, finishes, faults = bounding_elements(
-        source.model,
-        source.walls,
-        source.placed.rotation,
-        source.damage,
-        materials=source.corrections.materials,
+        source.model, source.walls, source.placed.rotation, source.damage, materials=source.corrections.materials
     )
     issues += [*glass.issues, *faults]
     around = _surroundings(mesh, source.walls, records, source.ground)
@@ -509,9 +470,7 @@ def read_ifc(
     boxes = Boxes.of([record.solid for record in records])
     for index, boundary in enumerate(boundaries):
         tell("rooms", SEARCH + (1 - SEARCH) * index / len(records))
-        of_boundary, more = _space(
-            index, boundary, records, around, boxes=boxes, elements=elements, finishes=finishes
-        )
+        of_boundary, more = _space(index, boundary, records, around, boxes=boxes, elements=elements, finishes=finishes)
         spaces += of_boundary
         issues += more
     again = {issue.where for issue in issues if issue.code == DRAWN_TWICE}
@@ -527,18 +486,19 @@ def read_ifc(
     tell("surroundings", 1.0)
     issues += [*more, *source.damage.issues]
     return Building(
-        source.name, tuple(spaces), outside, tuple(dict.fromkeys(issues)),
-        source.latitude_deg, source.longitude_deg, source.elevation, Path(path),
-        account_of(
-            source, drawn.read, spaces, glass, issues, repeated=[r.guid for r in drawn.repeated]
-        ),
-        map_georeference(
-            source.model, source.placed,
-            north_is_corrected=source.corrections.north_deg is not None,
-        ),
+        source.name,
+        tuple(spaces),
+        outside,
+        tuple(dict.fromkeys(issues)),
+        source.latitude_deg,
+        source.longitude_deg,
+        source.elevation,
+        Path(path),
+        account_of(source, drawn.read, spaces, glass, issues, repeated=[r.guid for r in drawn.repeated]),
+        map_georeference(source.model, source.placed, north_is_corrected=source.corrections.north_deg is not None),
         source.placed.matrix(),
         zones=read_zones(source.model, source.damage),
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -550,16 +510,18 @@ class _Rooms:
     covers: list[Shape]  # slabs, roofs and ceilings that end rooms
 
 
-def _rooms(
-    source: Source, mesh: RayMesh, tell: Callable[[float], None]
-) -> tuple[_Rooms, list[Issue]]:
+def _rooms(source: Source, mesh: RayMesh, tell: Callable[[float], None]) -> tuple[_Rooms, list[Issue]]:
     """The spaces that are rooms; found from geometry where the file has none."""
     stated = source.corrections.stated_outdoors(source.model)
     records, issues = read_spaces(
-        source.model, source.shapes, source.quantity_scales(), source.damage, stated=stated,
+        source.model,
+        source.shapes,
+        source.quantity_scales(),
+        source.damage,
+        stated=stated,
         removed=source.corrections.removed(source.model),
         names=source.corrections.named(source.model),
-    )  # fmt: skip
+    )
     records, repeated, more = one_of_each(source.model, records)
     issues += more
     indoors = [record.guid for record in records if record.step_id in stated]
@@ -580,18 +542,13 @@ def _rooms(
     return _Rooms(read, records, repeated, passages, covers), issues
 
 
-def with_states(
-    spaces: Sequence[Space], held: Sequence[Mapping[str, tuple[ShadingState, ...]]]
-) -> list[Space]:
+def with_states(spaces: Sequence[Space], held: Sequence[Mapping[str, tuple[ShadingState, ...]]]) -> list[Space]:
     """The rooms with what linked files hold for their windows, of the first that has any."""
     states: dict[str, tuple[ShadingState, ...]] = {}
     for one in held:
         states = {**one, **states}
     return [
-        replace(
-            space,
-            windows=tuple(replace(w, states=states.get(w.guid, w.states)) for w in space.windows),
-        )
+        replace(space, windows=tuple(replace(w, states=states.get(w.guid, w.states)) for w in space.windows))
         for space in spaces
     ]
 
@@ -604,16 +561,20 @@ def guessed_walls(spaces: Sequence[Space]) -> list[Issue]:
         if face.kind == "wall" and face.adjacency == "outside" and not known:
             areas[face.construction.name, face.construction.layers] += face.area
     return [
-        Issue("outer-wall-guessed", name, {
-            "wall": name, "area": area,
-            "u": 1 / (sum(layer.resistance for layer in layers) + SURFACES),
-            "layers": tuple(
-                f"{1000 * layer.thickness:.0f} mm {layer.name} ({layer.conductivity:.3g} W/mK)"
-                for layer in layers
-            ),
-        })
+        Issue(
+            "outer-wall-guessed",
+            name,
+            {
+                "wall": name,
+                "area": area,
+                "u": 1 / (sum(layer.resistance for layer in layers) + SURFACES),
+                "layers": tuple(
+                    f"{1000 * layer.thickness:.0f} mm {layer.name} ({layer.conductivity:.3g} W/mK)" for layer in layers
+                ),
+            },
+        )
         for (name, layers), area in areas.most_common()
-    ]  # fmt: skip
+    ]
 
 
 def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, ...], list[Issue]]:
@@ -692,8 +653,7 @@ def _closed_space(
     except shapely.errors.ShapelyError as error:
         raise RoomError(f"its neighbours cannot be cut out: {error}") from error
     beyond = [
-        Beyond((), "outside") if piece.role == "glass" else what_lies_beyond(piece, around, index)
-        for piece in pieces
+        Beyond((), "outside") if piece.role == "glass" else what_lies_beyond(piece, around, index) for piece in pieces
     ]
     faces, windows, assumed = faces_and_windows(pieces, beyond, elements, finishes)
     area = floor_area(faces)
@@ -703,18 +663,27 @@ def _closed_space(
         middles = area_to_wall_middles(body, pieces, beyond, elements)
         middles = middles if agree(middles, record.stated_area) else None
     space = Space(
-        record.guid, record.name, record.storey, boundary.volume, area, tuple(faces),
+        record.guid,
+        record.name,
+        record.storey,
+        boundary.volume,
+        area,
+        tuple(faces),
         tuple(windows),
-        record.volume, record.stated_area, record.stated_volume, record.long_name, middles,
-        record.type_name, record.raised, record.cut,
-    )  # fmt: skip
+        record.volume,
+        record.stated_area,
+        record.stated_volume,
+        record.long_name,
+        middles,
+        record.type_name,
+        record.raised,
+        record.cut,
+    )
     return space, boundary.issues + _assumptions(record, assumed) + soundness_issues(space)
 
 
 def _assumptions(record: SpaceRecord, assumed: Counter[str]) -> list[Issue]:
     guid, name = record.solid.guid, record.solid.name
     return [
-        Issue(f"{key}-assumed", guid, {"room": name, "count": count})
-        for key, count in sorted(assumed.items())
-        if count
+        Issue(f"{key}-assumed", guid, {"room": name, "count": count}) for key, count in sorted(assumed.items()) if count
     ]

@@ -38,9 +38,7 @@ class StoredGroup:
     room: str = ""  # its label, for the group's name in the model
 
 
-def write_control(
-    path: str | PathLike[str], out: str | Path, groups: Sequence[StoredGroup]
-) -> None:
+def write_control(path: str | PathLike[str], out: str | Path, groups: Sequence[StoredGroup]) -> None:
     """Write `out`: the model with these groups, in place of those that it has.
 
     Raises: `DataError` where the model cannot be read or written or lacks a window.
@@ -55,13 +53,14 @@ def write_control(
         name = f"{group.room}: {group.name}" if group.room else group.name
         described = (KIND, name, *group.windows)
         owner = owner_of(model)
-        entity = model.create_entity(
-            "IfcGroup", new_guid(model, *described), owner, name, DESCRIPTION, KIND
-        )
+        entity = model.create_entity("IfcGroup", new_guid(model, *described), owner, name, DESCRIPTION, KIND)
         model.create_entity(
-            "IfcRelAssignsToGroup", new_guid(model, "windows", *described), owner,
-            RelatedObjects=windows, RelatingGroup=entity,
-        )  # fmt: skip
+            "IfcRelAssignsToGroup",
+            new_guid(model, "windows", *described),
+            owner,
+            RelatedObjects=windows,
+            RelatingGroup=entity,
+        )
         properties = [_property(model, "name", group.name)]
         properties += [_property(model, key, value) for key, value in group.rule.items()]
         give_set(model, [entity], SET_NAME, DESCRIPTION, properties)
@@ -75,9 +74,7 @@ def read_control(path: str | PathLike[str]) -> tuple[StoredGroup, ...]:
     """
     model, groups = open_ifc(path), []
     for entity in _groups(model):
-        windows = [
-            one.GlobalId for relation in _assigned(entity) for one in relation.RelatedObjects or ()
-        ]
+        windows = [one.GlobalId for relation in _assigned(entity) for one in relation.RelatedObjects or ()]
         rule = {
             one.Name: _value(one, path, entity)
             for relation in entity.IsDefinedBy or ()
@@ -117,9 +114,7 @@ def _property(model: ifcopenshell.file, name: str, value: Any) -> Entity:
         kind = "IfcReal"
     elif not isinstance(value, str) or value.startswith(AS_JSON):
         stored = json_text(value)
-    return model.create_entity(
-        "IfcPropertySingleValue", name, None, model.create_entity(kind, stored), None
-    )
+    return model.create_entity("IfcPropertySingleValue", name, None, model.create_entity(kind, stored), None)
 
 
 def _value(one: Entity, path: str | PathLike[str], group: Entity) -> Any:

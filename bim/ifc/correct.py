@@ -34,17 +34,32 @@ from mitsuba_cfs.files import check_file, write_text
 WITH_GLASS = ("IfcWindow", "IfcDoor", "IfcCurtainWall", "IfcPlate", "IfcMember")
 HEAD = "# Corrections that the model cannot hold; the others are written in it.\n"
 PROPERTIES = {  # entity and attribute of IFC2X3, property set and measure of IFC4
-    "conductivity": ("IfcThermalMaterialProperties", "ThermalConductivity",
-                     "Pset_MaterialThermal", "IfcThermalConductivityMeasure"),
-    "heat_capacity": ("IfcThermalMaterialProperties", "SpecificHeatCapacity",
-                      "Pset_MaterialThermal", "IfcSpecificHeatCapacityMeasure"),
-    "density": ("IfcGeneralMaterialProperties", "MassDensity",
-                "Pset_MaterialCommon", "IfcMassDensityMeasure"),
-    "visible": ("IfcOpticalMaterialProperties", "VisibleReflectanceFront",
-                "Pset_MaterialOptical", "IfcPositiveRatioMeasure"),
-    "solar": ("IfcOpticalMaterialProperties", "SolarReflectanceFront",
-              "Pset_MaterialOptical", "IfcPositiveRatioMeasure"),
-}  # fmt: skip
+    "conductivity": (
+        "IfcThermalMaterialProperties",
+        "ThermalConductivity",
+        "Pset_MaterialThermal",
+        "IfcThermalConductivityMeasure",
+    ),
+    "heat_capacity": (
+        "IfcThermalMaterialProperties",
+        "SpecificHeatCapacity",
+        "Pset_MaterialThermal",
+        "IfcSpecificHeatCapacityMeasure",
+    ),
+    "density": ("IfcGeneralMaterialProperties", "MassDensity", "Pset_MaterialCommon", "IfcMassDensityMeasure"),
+    "visible": (
+        "IfcOpticalMaterialProperties",
+        "VisibleReflectanceFront",
+        "Pset_MaterialOptical",
+        "IfcPositiveRatioMeasure",
+    ),
+    "solar": (
+        "IfcOpticalMaterialProperties",
+        "SolarReflectanceFront",
+        "Pset_MaterialOptical",
+        "IfcPositiveRatioMeasure",
+    ),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,9 +105,13 @@ def correct(path: str | PathLike[str], out: str | PathLike[str]) -> Corrected:
     rest = tomllib.loads(Path(corrections.file).read_text(encoding="utf-8"))
     painted = _are_painted(model, paints, corrections.paints, set(optical))
     for key, written in (
-        ("leave_out", True), ("only", True), ("outdoors", True), ("north", has_north),
-        ("material", are_written), ("reflectance", painted),
-    ):  # fmt: skip
+        ("leave_out", True),
+        ("only", True),
+        ("outdoors", True),
+        ("north", has_north),
+        ("material", are_written),
+        ("reflectance", painted),
+    ):
         if isinstance(written, Sequence):
             rest[key] = [v for v, w in zip(rest.get(key, []), written, strict=True) if not w]
         elif written:
@@ -205,9 +224,7 @@ def _thickness(model: ifcopenshell.file, material: Any) -> float | None:
     return thicknesses.pop() if len(thicknesses) == 1 and not others else None
 
 
-def _optical_values(
-    model: ifcopenshell.file, paints: Mapping[int, Paint]
-) -> dict[int, dict[str, float]]:
+def _optical_values(model: ifcopenshell.file, paints: Mapping[int, Paint]) -> dict[int, dict[str, float]]:
     """New reflectances by the STEP id of materials that only elements of one paint have."""
     values = {}
     for material in model.by_type("IfcMaterial"):
@@ -220,10 +237,7 @@ def _optical_values(
 
 
 def _are_painted(
-    model: ifcopenshell.file,
-    paints: Mapping[int, Paint],
-    entries: Sequence[Paint],
-    materials: set[int],
+    model: ifcopenshell.file, paints: Mapping[int, Paint], entries: Sequence[Paint], materials: set[int]
 ) -> list[bool]:
     """For each entry, whether all its elements have materials, and these its reflectances."""
     painted = {id(entry): True for entry in entries}

@@ -60,9 +60,23 @@ if TYPE_CHECKING:
     import ifcopenshell
 
 LAYER = re.compile(r'(?:^|,)\s*layer\s*=\s*("[^"]*"|[^,+]+)')  # CAD layer: ours, not ifcopenshell's
-KEYS = ("leave_out", "only", "opaque", "keep", "join", "surroundings", "reflectance", "north",
-        "outdoors", "indoors", "material", "close_gaps",
-        "as_drawn", "room", "glass")  # fmt: skip
+KEYS = (
+    "leave_out",
+    "only",
+    "opaque",
+    "keep",
+    "join",
+    "surroundings",
+    "reflectance",
+    "north",
+    "outdoors",
+    "indoors",
+    "material",
+    "close_gaps",
+    "as_drawn",
+    "room",
+    "glass",
+)
 OPEN = "open"  # asks for the rooms that are open to each other by more than a door
 PAINT_KEYS = ("select", "visible", "solar", "specular", "roughness")
 MATERIAL_KEYS = {  # of [[material]]: lowest and highest value
@@ -149,11 +163,7 @@ class Corrections:
 
     def named(self, model: ifcopenshell.file) -> dict[int, RoomName]:
         """The names of spaces, by STEP id; later entries win."""
-        return {
-            step_id: one
-            for one in self.room_names
-            for step_id in chosen(model, one.select, self.file)
-        }
+        return {step_id: one for one in self.room_names for step_id in chosen(model, one.select, self.file)}
 
     def glass_areas(self, model: ifcopenshell.file) -> dict[str, float]:
         """Area of glass [m2] of windows, doors and openings, by GUID; later entries win."""
@@ -238,18 +248,23 @@ def read_corrections(path: str | PathLike[str]) -> Corrections:
         raise DataError("expected a list of lists of names", file=path, field="join")
     join = tuple(_texts({"join": group}, "join", path) for group in groups)
     return Corrections(
-        _texts(table, "leave_out", path), _texts(table, "only", path), paints, surroundings, join,
-        str(path), _texts(table, "keep", path), _texts(table, "opaque", path),
-        north_deg=_north(table, path), outdoors=_texts(table, "outdoors", path),
+        _texts(table, "leave_out", path),
+        _texts(table, "only", path),
+        paints,
+        surroundings,
+        join,
+        str(path),
+        _texts(table, "keep", path),
+        _texts(table, "opaque", path),
+        north_deg=_north(table, path),
+        outdoors=_texts(table, "outdoors", path),
         indoors=_texts(table, "indoors", path),
         materials=tuple(_material(entry, path) for entry in _tables(table, "material", path)),
         as_drawn=_texts(table, "as_drawn", path),
-        close_gaps=(
-            None if "close_gaps" not in table else _share(table["close_gaps"], path, "close_gaps")
-        ),
+        close_gaps=(None if "close_gaps" not in table else _share(table["close_gaps"], path, "close_gaps")),
         room_names=tuple(_room_name(entry, path) for entry in _tables(table, "room", path)),
         glass=tuple(_glass(entry, path) for entry in _tables(table, "glass", path)),
-    )  # fmt: skip
+    )
 
 
 def _tables(table: dict[str, Any], key: str, path: Path) -> list[Any]:
@@ -304,11 +319,7 @@ def _material(entry: dict[str, Any], path: Path) -> MaterialCorrection:
         raise DataError(message, file=path, field="material")
     for key, value in values.items():
         low, high = MATERIAL_KEYS[key]
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int | float)
-            or not low <= value <= high
-        ):
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
             message = f"expected a number from {low:g} to {high:g}, got {value!r}"
             raise DataError(message, file=path, field=f"material.{key}")
     return MaterialCorrection(entry["name"], {k: float(v) for k, v in values.items()})
@@ -331,9 +342,7 @@ def _paint(entry: dict[str, Any], path: Path) -> Paint:
     specular = _share(entry.get("specular", 0.0), path, "specular")
     roughness = _share(entry.get("roughness", 0.0), path, "roughness")
     if roughness > ROUGHEST:
-        raise DataError(
-            f"expected 0 to {ROUGHEST:g}, got {roughness:g}", file=path, field="roughness"
-        )
+        raise DataError(f"expected 0 to {ROUGHEST:g}, got {roughness:g}", file=path, field="roughness")
     if max(visible, solar) + specular > 1:
         message = "expected at most 1 together with visible and with solar"
         raise DataError(message, file=path, field="specular")

@@ -40,10 +40,7 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def cut_rooms(
-    records: Sequence[SpaceRecord],
-    lids: Sequence[Shape],
-    building: RayMesh,
-    fixed: Collection[int] = (),
+    records: Sequence[SpaceRecord], lids: Sequence[Shape], building: RayMesh, fixed: Collection[int] = ()
 ) -> tuple[list[SpaceRecord], list[Issue]]:
     """The rooms, those cut that go through what covers them, each with an issue.
 
@@ -53,9 +50,7 @@ def cut_rooms(
     """
     boxes = Boxes.of_triangles([lid.triangles for lid in lids])
     wholly = {
-        index: goes_through(record, lids, boxes)
-        for index, record in enumerate(records)
-        if record.step_id not in fixed
+        index: goes_through(record, lids, boxes) for index, record in enumerate(records) if record.step_id not in fixed
     }
     through = [i for i, all_of_it in wholly.items() if all_of_it or _leaves(records[i], building)]
     if not through:
@@ -100,9 +95,7 @@ def goes_through(record: SpaceRecord, lids: Sequence[Shape], boxes: Boxes) -> bo
     height = float(record.solid.high[2] - record.solid.low[2])
     for sign in (1.0, -1.0):
         facets = [f for f in record.solid.facets if sign * f.plane.normal[2] > 0.5]
-        points = [
-            f.plane.to_world(np.array(f.polygon.representative_point().coords)) for f in facets
-        ]
+        points = [f.plane.to_world(np.array(f.polygon.representative_point().coords)) for f in facets]
         weights = np.array([f.polygon.area for f in facets])
         if not len(weights):
             continue

@@ -63,11 +63,7 @@ class Damage:
         named = getattr(of, "Name", None) or ""
         label = "The project" if of is None else f"{of.is_a()} {named}"
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        values: dict[str, str | Phrase] = {
-            "element": label,
-            "data": Phrase(f"data-{data}"),
-            "reason": reason,
-        }
+        values: dict[str, str | Phrase] = {"element": label, "data": Phrase(f"data-{data}"), "reason": reason}
         self._issues.setdefault((guid, data), Issue("damaged-data", guid, values))
 
 
@@ -85,20 +81,14 @@ def instances(model: ifcopenshell.file, name: str) -> list[ifcopenshell.entity_i
         return []
 
 
-def type_of(
-    element: ifcopenshell.entity_instance, damage: Damage | None = None
-) -> ifcopenshell.entity_instance | None:
+def type_of(element: ifcopenshell.entity_instance, damage: Damage | None = None) -> ifcopenshell.entity_instance | None:
     """The type of an element; None where the file states none."""
     damage = Damage() if damage is None else damage
-    type_ = damage.read(
-        ifcopenshell.util.element.get_type, element, of=element, data="type", default=None
-    )
+    type_ = damage.read(ifcopenshell.util.element.get_type, element, of=element, data="type", default=None)
     return next(iter(entities(type_)), None)
 
 
-def placement_of(
-    element: ifcopenshell.entity_instance, damage: Damage | None = None
-) -> NDArray[np.float64] | None:
+def placement_of(element: ifcopenshell.entity_instance, damage: Damage | None = None) -> NDArray[np.float64] | None:
     """Placement [4, 4] of an element in the file's units; None where the file states none."""
     if element.ObjectPlacement is None:
         return None

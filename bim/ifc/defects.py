@@ -48,19 +48,13 @@ def model_defects(model: ifcopenshell.file, shapes: Sequence[Shape]) -> list[Iss
 def repeated_guids(model: ifcopenshell.file) -> list[Issue]:
     """GlobalIds that more than one entity has."""
     counts = Counter(root.GlobalId for root in model.by_type("IfcRoot"))
-    return [
-        Issue("guid-repeated", guid, {"count": count})
-        for guid, count in counts.items()
-        if count > 1
-    ]
+    return [Issue("guid-repeated", guid, {"count": count}) for guid, count in counts.items() if count > 1]
 
 
 def without_body(model: ifcopenshell.file) -> list[Issue]:
     """Walls, slabs and roofs that are neither drawn nor made of parts."""
     return [
-        Issue(
-            "element-without-geometry", one.GlobalId, {"element": f"{one.is_a()} {one.Name or ''}"}
-        )
+        Issue("element-without-geometry", one.GlobalId, {"element": f"{one.is_a()} {one.Name or ''}"})
         for name in SOLID_CLASSES
         for one in model.by_type(name)
         if one.Representation is None and not one.IsDecomposedBy

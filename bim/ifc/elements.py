@@ -82,10 +82,7 @@ def bounding_elements(
 
 
 def _record(
-    element: ifcopenshell.entity_instance,
-    shape: Shape,
-    reader: MaterialReader,
-    rotation: NDArray[np.float64],
+    element: ifcopenshell.entity_instance, shape: Shape, reader: MaterialReader, rotation: NDArray[np.float64]
 ) -> ElementRecord:
     layers = reader.layers_of(element)
     of_items, known = reader.of_items(element, np.unique(shape.item).tolist())
@@ -131,10 +128,17 @@ def outdoor_elements(
         entity = model.by_id(shape.step_id)
         default = SITE_REFLECTANCE if shape.ifc_class.startswith(SITE) else FACADE_REFLECTANCE
         base = Element(
-            shape.guid, shape.name or shape.ifc_class, shape.ifc_class, shape.triangles, default,
-            default, next(iter(cad_layers_of(entity)), ""), storey_of(entity),
-            material_name(entity), shape.step_id in drawn_shades,
-        )  # fmt: skip
+            shape.guid,
+            shape.name or shape.ifc_class,
+            shape.ifc_class,
+            shape.triangles,
+            default,
+            default,
+            next(iter(cad_layers_of(entity)), ""),
+            storey_of(entity),
+            material_name(entity),
+            shape.step_id in drawn_shades,
+        )
         for index in np.unique(shape.style_index):
             visible = solar = default
             gloss, hue = None, GREY

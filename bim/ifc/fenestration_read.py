@@ -105,9 +105,7 @@ def _own_sets(source: Entity | None) -> Iterable[Entity]:
 def _referenced(source: Entity | None, folder: Path) -> Iterable[Path]:
     """BSDF XML files that documents or libraries associated with an element name."""
     for relation in getattr(source, "HasAssociations", None) or ():
-        reference = getattr(relation, "RelatingDocument", None) or getattr(
-            relation, "RelatingLibrary", None
-        )
+        reference = getattr(relation, "RelatingDocument", None) or getattr(relation, "RelatingLibrary", None)
         location = getattr(reference, "Location", None)
         if not location or not location.lower().endswith(".xml"):
             continue
@@ -130,9 +128,7 @@ def _state(pset: Entity, file: str | Path, guid: str) -> ShadingState:
                 field, read = THERMAL[prop.Name]
                 thermal[field] = read(prop)
     except ValueError as error:
-        raise DataError(
-            f"cannot be understood: {error}", file=file or None, element=guid, field=pset.Name
-        ) from None
+        raise DataError(f"cannot be understood: {error}", file=file or None, element=guid, field=pset.Name) from None
     return ShadingState(name, bands, **thermal)
 
 
@@ -188,18 +184,14 @@ def _bsdf(prop: Entity) -> Bsdf:
             raise ValueError(f"{prop.UsageName!r} states no rank")
         rank = int(digits[1])
         trees = {
-            key: TensorTree(
-                rank, _numbers(parts[f"{name}: depths"], np.int64), _numbers(values[name])
-            )
+            key: TensorTree(rank, _numbers(parts[f"{name}: depths"], np.int64), _numbers(values[name]))
             for key, name in BLOCKS.items()
             if name in values
         }
         return TensorTreeBsdf(**trees)
     basis_in, basis_out = (_basis(parts, side) for side in ("Incident", "Outgoing"))
     shape = (basis_out.size, basis_in.size)
-    blocks = {
-        key: _numbers(values[name]).reshape(shape) for key, name in BLOCKS.items() if name in values
-    }
+    blocks = {key: _numbers(values[name]).reshape(shape) for key, name in BLOCKS.items() if name in values}
     return KlemsBsdf(basis_in, basis_out, **blocks)
 
 
@@ -209,8 +201,7 @@ def _basis(parts: dict[str, Entity], side: str) -> KlemsBasis:
     if not ranges:
         raise ValueError(f"{polar.Name!r} is empty")
     lower, upper = (
-        [_number(getattr(one, f"{end}BoundValue", None), polar.Name) for one in ranges]
-        for end in ("Lower", "Upper")
+        [_number(getattr(one, f"{end}BoundValue", None), polar.Name) for one in ranges] for end in ("Lower", "Upper")
     )
     rings = _listed(parts[f"{side} azimuthal angle ranges"])
     sizes = tuple(len(_listed(ring)) for ring in rings)

@@ -100,9 +100,7 @@ class _Writer:
 
     def single(self, name: str, measure: str, value: float, unit: Entity | None = None) -> Entity:
         number = self._model.create_entity(measure, float(value))
-        return self._model.create_entity(
-            "IfcPropertySingleValue", Name=name, NominalValue=number, Unit=unit
-        )
+        return self._model.create_entity("IfcPropertySingleValue", Name=name, NominalValue=number, Unit=unit)
 
     def text(self, name: str, value: str) -> Entity:
         label = self._model.create_entity("IfcLabel", value)
@@ -139,9 +137,7 @@ class _Writer:
             one = self.bounded("Wavelength range", low, high, measure, self._nanometre)
             parts.append(self.complex("Wavelength ranges", band, [one]))
         if isinstance(bsdf, KlemsBsdf):
-            parts += self._angles("Incident", bsdf.basis_in) + self._angles(
-                "Outgoing", bsdf.basis_out
-            )
+            parts += self._angles("Incident", bsdf.basis_in) + self._angles("Outgoing", bsdf.basis_out)
             values = [self.numbers(BLOCKS[k], block) for k, block in bsdf.blocks().items()]
             usage = KLEMS
         else:
@@ -168,8 +164,7 @@ class _Writer:
             step = 2 * np.pi / count
             edges = (np.arange(count + 1) - 0.5) * step
             ranges = [
-                self.bounded(f"Angle range {k + 1}", *edges[k : k + 2], measure, self._radian)
-                for k in range(count)
+                self.bounded(f"Angle range {k + 1}", *edges[k : k + 2], measure, self._radian) for k in range(count)
             ]
             azimuth.append(self.complex(f"Polar range {ring + 1}", "azimuths", ranges))
         return [
@@ -207,10 +202,7 @@ class _Writer:
         parts = [self.numbers("Height, width, tilt", (unit.height, unit.width, unit.tilt_deg))]
         for number, layer in enumerate(unit.layers, start=1):
             heat = (layer.thickness, layer.conductivity, layer.infrared_transmittance)
-            held = [
-                self.numbers(HEAT_OF_LAYER, heat),
-                self.numbers("Emissivities", layer.emissivity, RATIO),
-            ]
+            held = [self.numbers(HEAT_OF_LAYER, heat), self.numbers("Emissivities", layer.emissivity, RATIO)]
             if layer.solar is not None:
                 held.append(self.numbers(SOLAR_OF_LAYER, layer.solar, RATIO))
             if layer.openings is not None:

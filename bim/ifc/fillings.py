@@ -29,9 +29,19 @@ PANELS = (
     "IfcCovering",
 )
 # of the glass, from which nothing is computed
-UNREAD = ("FillGas", "GlassColor", "GlassThickness1", "GlassThickness2", "GlassThickness3",
-          "ShadingCoefficient", "SolarAbsorption", "SolarReflectance", "Translucency",
-          "ThermalTransmittanceSummer", "VisibleLightReflectance")  # fmt: skip
+UNREAD = (
+    "FillGas",
+    "GlassColor",
+    "GlassThickness1",
+    "GlassThickness2",
+    "GlassThickness3",
+    "ShadingCoefficient",
+    "SolarAbsorption",
+    "SolarReflectance",
+    "Translucency",
+    "ThermalTransmittanceSummer",
+    "VisibleLightReflectance",
+)
 LEAST_GLASS = 0.05  # transparent area that makes a panel a window [m2]
 
 
@@ -117,9 +127,7 @@ def _panel(element, shape: Shape | None, scale: float, damage: Damage | None) ->
     return _filling(element, shape, None, element, scale, damage)
 
 
-def _filling(
-    element, shape: Shape, body: Shape | None, host, scale: float, damage: Damage | None
-) -> Filling:
+def _filling(element, shape: Shape, body: Shape | None, host, scale: float, damage: Damage | None) -> Filling:
     psets = psets_of(element, damage)
     element_type = type_of(element, damage)
     opaque = [style for style in shape.styles if not style.is_glass]
@@ -150,8 +158,7 @@ def _unread_glazing(one: Filling, psets: dict[str, dict[str, Any]]) -> list[Issu
     if None not in (one.g_value, one.visible_transmittance):
         return []
     names = sorted({n for stated in psets.values() for n in stated} & set(UNREAD))
-    values = {"element": f"{one.ifc_class} {one.name}", "part": ", ".join(names),
-              "glazing": one.type_name}  # fmt: skip
+    values = {"element": f"{one.ifc_class} {one.name}", "part": ", ".join(names), "glazing": one.type_name}
     return [Issue("glazing-part-not-read", one.guid, values)] if names else []
 
 

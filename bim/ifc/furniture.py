@@ -30,9 +30,7 @@ ASKED = 64  # corners of a piece that are asked for their room
 MOST = 0.5  # share of them in a room from which the piece stands in it
 
 
-def furnished(
-    source: Source, spaces: Sequence[Space], *, wanted: bool
-) -> tuple[list[Space], list[Issue]]:
+def furnished(source: Source, spaces: Sequence[Space], *, wanted: bool) -> tuple[list[Space], list[Issue]]:
     """The rooms with their furniture where it is wanted, and what became of each piece."""
     pieces = [one for one in source.model.by_type(FURNITURE) if one.Representation is not None]
     gone = source.corrections.removed(source.model)
@@ -64,26 +62,17 @@ def furnished(
 
 
 def _with(spaces: Sequence[Space], pieces_of: Mapping[int, list[Element]]) -> list[Space]:
-    return [
-        replace(space, furniture=tuple(pieces_of.get(index, ())))
-        for index, space in enumerate(spaces)
-    ]
+    return [replace(space, furniture=tuple(pieces_of.get(index, ()))) for index, space in enumerate(spaces)]
 
 
-def _placed(
-    shape: Shape, spaces: Sequence[Space], meshes: Sequence[RayMesh]
-) -> tuple[int | None, Issue | None]:
+def _placed(shape: Shape, spaces: Sequence[Space], meshes: Sequence[RayMesh]) -> tuple[int | None, Issue | None]:
     """Index of the room that a piece stands in, or what there is to say of it."""
     label = f"{shape.ifc_class} {shape.name}"
     if is_named_shade(shape.name):
         for space in spaces:
             for window in space.windows:
                 if hangs_at(shape.triangles, window):
-                    values = {
-                        "element": label,
-                        "window": window.name or window.guid,
-                        "window_guid": window.guid,
-                    }
+                    values = {"element": label, "window": window.name or window.guid, "window_guid": window.guid}
                     return None, Issue("curtain-at-window", shape.guid, values)
     corners = shape.triangles.reshape(-1, 3)
     corners = corners[np.linspace(0, len(corners) - 1, min(ASKED, len(corners))).astype(int)]
@@ -98,9 +87,7 @@ def _placed(
 def _share_inside(points: NDArray[np.float64], shell: RayMesh) -> float:
     """Share of points [N, 3] in a closed surface: those whose ray up meets it from inside."""
     corners = shell.triangles.reshape(-1, 3)
-    if np.any(points.min(axis=0) > corners.max(axis=0)) or np.any(
-        points.max(axis=0) < corners.min(axis=0)
-    ):
+    if np.any(points.min(axis=0) > corners.max(axis=0)) or np.any(points.max(axis=0) < corners.min(axis=0)):
         return 0.0
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     _, hit = shell.first_hits(points, up)
@@ -110,17 +97,19 @@ def _share_inside(points: NDArray[np.float64], shell: RayMesh) -> float:
 def _elements(shape: Shape) -> list[Element]:
     """A piece as an `Element` for each of its styles, without what one sees through."""
     base = Element(
-        shape.guid, shape.name or shape.ifc_class, shape.ifc_class, shape.triangles,
-        FURNITURE_REFLECTANCE, FURNITURE_REFLECTANCE,
-    )  # fmt: skip
+        shape.guid,
+        shape.name or shape.ifc_class,
+        shape.ifc_class,
+        shape.triangles,
+        FURNITURE_REFLECTANCE,
+        FURNITURE_REFLECTANCE,
+    )
     parts = []
     for index in np.unique(shape.style_index[~shape.transparent]):
         piece = replace(base, triangles=shape.triangles[shape.style_index == index])
         if index >= 0:
             style = shape.styles[index]
             visible, solar = style.reflectances
-            piece = replace(
-                piece, reflectance_visible=visible, reflectance_solar=solar, hue=style.hue
-            )
+            piece = replace(piece, reflectance_visible=visible, reflectance_solar=solar, hue=style.hue)
         parts.append(piece)
     return parts

@@ -97,9 +97,7 @@ def apertures_in(source: Source) -> tuple[list[Aperture], list[Issue]]:
     return kept, issues
 
 
-def _corrected(
-    filling: Filling, areas: Mapping[str, float], file: str
-) -> tuple[Aperture | None, list[Issue]]:
+def _corrected(filling: Filling, areas: Mapping[str, float], file: str) -> tuple[Aperture | None, list[Issue]]:
     """The filling in its plane, with the area of glass [m2] by GUID that the corrections state.
 
     Raises: `DataError` for an area larger than the opening.
@@ -114,10 +112,7 @@ def _corrected(
 
 
 def glass_of_rooms(
-    source: Source,
-    apertures: Sequence[Aperture],
-    records: Sequence[SpaceRecord],
-    building: RayMesh,
+    source: Source, apertures: Sequence[Aperture], records: Sequence[SpaceRecord], building: RayMesh
 ) -> GlassOfRooms:
     """Which part of which window, door or glazed opening each room has, and the rest's account.
 
@@ -136,16 +131,11 @@ def glass_of_rooms(
         issues += _issues_of(aperture, attached, one, records)
     unfilled = _unfilled(source, records, building, attachments)
     return GlassOfRooms(
-        (*attachments, *unfilled.attachments),
-        (*glass, *unfilled.glass),
-        unfilled.closed,
-        (*issues, *unfilled.issues),
+        (*attachments, *unfilled.attachments), (*glass, *unfilled.glass), unfilled.closed, (*issues, *unfilled.issues)
     )
 
 
-def lost_glass(
-    attachments: Sequence[Attachment], spaces: Sequence[Space], repeated: Collection[str]
-) -> list[Issue]:
+def lost_glass(attachments: Sequence[Attachment], spaces: Sequence[Space], repeated: Collection[str]) -> list[Issue]:
     """Glass before a room that is no window of the finished room; rooms left out say so themselves.
 
     None is known: the last net under the cutting of solids.
@@ -208,9 +198,7 @@ def _account(
     return GlassAccount(filling.guid, storey, out, used, assumed, low, heights)
 
 
-def _inner_point(
-    aperture: Aperture, attached: Sequence[Attachment], building: RayMesh
-) -> NDArray[np.float64] | None:
+def _inner_point(aperture: Aperture, attached: Sequence[Attachment], building: RayMesh) -> NDArray[np.float64] | None:
     """A point [3] on the room side of glass without a room; None where it faces no outdoors.
 
     Where both sides are enclosed, as below a canopy, the rest of a pane faces the same side as
@@ -236,9 +224,7 @@ def _inner_point(
     return point - np.sign(out) * ASIDE * normal
 
 
-def _room_below(
-    point: NDArray[np.float64], records: Sequence[SpaceRecord], building: RayMesh
-) -> SpaceRecord | None:
+def _room_below(point: NDArray[np.float64], records: Sequence[SpaceRecord], building: RayMesh) -> SpaceRecord | None:
     """The room whose top lies below a point with no slab between."""
     below = [
         r
@@ -256,10 +242,7 @@ def _room_below(
 
 
 def _issues_of(
-    aperture: Aperture,
-    attached: Sequence[Attachment],
-    one: GlassAccount,
-    records: Sequence[SpaceRecord],
+    aperture: Aperture, attached: Sequence[Attachment], one: GlassAccount, records: Sequence[SpaceRecord]
 ) -> list[Issue]:
     """What there is to say of a filling's glass and the rooms beside it."""
     filling = aperture.filling
@@ -289,10 +272,7 @@ def _issues_of(
 
 
 def _unfilled(
-    source: Source,
-    records: Sequence[SpaceRecord],
-    building: RayMesh,
-    filled: Sequence[Attachment],
+    source: Source, records: Sequence[SpaceRecord], building: RayMesh, filled: Sequence[Attachment]
 ) -> GlassOfRooms:
     """Openings to the outdoors that nothing fills: glazed, or closed as doors."""
     attachments, glass, issues, closed = [], [], [], 0.0
@@ -360,9 +340,14 @@ def _pane_of(source: Source, opening, host) -> Filling | None:
         return None
     pane = plane.to_world(np.concatenate([triangulated(p) for p in polygons_of(outline)]))
     return Filling(
-        body.guid, opening.Name or body.guid, NOT_FILLED, pane, np.zeros(len(pane), dtype=bool),
-        opening=pane, host=host.GlobalId,
-    )  # fmt: skip
+        body.guid,
+        opening.Name or body.guid,
+        NOT_FILLED,
+        pane,
+        np.zeros(len(pane), dtype=bool),
+        opening=pane,
+        host=host.GlobalId,
+    )
 
 
 def _holds_one(filling: Filling, middles: NDArray[np.float64]) -> bool:
@@ -376,9 +361,7 @@ def _goes_through(aperture: Aperture, building: RayMesh) -> bool:
     """Whether nothing stands in the opening or before it."""
     middle = shapely.get_coordinates(shapely.point_on_surface(aperture.opening))
     point, normal = aperture.plane.to_world(middle), aperture.plane.normal
-    _, hit = building.first_hits(
-        np.repeat(point, 2, axis=0), np.stack([normal, -normal]), CLEAR_WAY
-    )
+    _, hit = building.first_hits(np.repeat(point, 2, axis=0), np.stack([normal, -normal]), CLEAR_WAY)
     return bool(np.all(hit < 0))
 
 

@@ -49,9 +49,7 @@ def model_names(archive: zipfile.ZipFile, path: Path) -> list[str]:
     # zipfile unpacks no more than it says here
     size = sum(archive.getinfo(name).file_size for name in names)
     if size > LARGEST:
-        message = (
-            f"unpacks to {size / 1e9:.1f} GB, more than {LARGEST / 1e9:.1f} GB: unzip it first"
-        )
+        message = f"unpacks to {size / 1e9:.1f} GB, more than {LARGEST / 1e9:.1f} GB: unzip it first"
         raise DataError(message, file=path)
     return names
 

@@ -24,13 +24,7 @@ from numpy.typing import NDArray
 from bim.ifc.damage import entities, placement_of
 from bim.ifc.north import map_conversions, true_north
 from bim.ifc.placing import to_map
-from bim.ifc.project import (
-    length_scale,
-    mend_guids,
-    numbered_guid,
-    site_location,
-    storeys_in,
-)
+from bim.ifc.project import length_scale, mend_guids, numbered_guid, site_location, storeys_in
 from bim.report.issue import Issue, Phrase
 from mitsuba_cfs.errors import DataError
 
@@ -63,13 +57,7 @@ class _Frame:
             place[:3, 3] *= unit
         drawn = [placement_of(one) for one in model.by_type("IfcElement") if one.Representation]
         places = [unit * one[:3, 3] for one in drawn if one is not None]
-        return cls(
-            to_map(model),
-            (latitude, longitude),
-            elevation,
-            place,
-            np.array(places).reshape(-1, 3),
-        )
+        return cls(to_map(model), (latitude, longitude), elevation, place, np.array(places).reshape(-1, 3))
 
     def gap(self, other: _Frame, matrix: NDArray[np.float64]) -> float:
         """Distance of the plans of both files [m], the other moved by [4, 4]."""
@@ -88,9 +76,7 @@ class _Transform:
     matrix: NDArray[np.float64]  # [4, 4]
 
 
-def one_model(
-    models: Mapping[str, ifcopenshell.file],
-) -> tuple[ifcopenshell.file, list[Issue]]:
+def one_model(models: Mapping[str, ifcopenshell.file]) -> tuple[ifcopenshell.file, list[Issue]]:
     """The first of the models with what the others add, and how each of these was placed.
 
     Args: models: by the name of the file; they are changed.
@@ -104,15 +90,10 @@ def one_model(
     first = _Frame.of(model)
     for name, other in others:
         if other.schema != model.schema:
-            message = (
-                f"has schema {other.schema}, {first_name} has {model.schema}: export both in one"
-            )
+            message = f"has schema {other.schema}, {first_name} has {model.schema}: export both in one"
             raise DataError(message, file=name)
         frame = _Frame.of(other)
-        transforms = [
-            (transform, first.gap(frame, transform.matrix))
-            for transform in _transforms(first, frame)
-        ]
+        transforms = [(transform, first.gap(frame, transform.matrix)) for transform in _transforms(first, frame)]
         convert_units(other, model)
         issues += _added(model, other, transforms, names=(name, first_name))
     return model, issues
@@ -133,13 +114,9 @@ def _added(
     name, first_name = names
     unit = length_scale(model)
     known = {(one.GlobalId, one.is_a()): one for one in _roots(model)}
-    pairs = [
-        (one, known[key]) for one in _roots(other) if (key := (one.GlobalId, one.is_a())) in known
-    ]
+    pairs = [(one, known[key]) for one in _roots(other) if (key := (one.GlobalId, one.is_a())) in known]
     transform, apart = _fitting(model, other, pairs, transforms)
-    pairs = [
-        (one, same) for one, same in pairs if _distance(one, same, transform, unit) <= COINCIDES
-    ]
+    pairs = [(one, same) for one, same in pairs if _distance(one, same, transform, unit) <= COINCIDES]
     issues = _north_issues(model, other, transform, name, first_name)
     if not np.allclose(transform.matrix, np.eye(4)):
         move(other, transform.matrix, unit)
@@ -160,24 +137,24 @@ def _added(
     for old, first in same.items():
         double = added[old]
         if getattr(first, "Representation", 0) is None and double.Representation is not None:
-            first.Representation, first.ObjectPlacement = (
-                double.Representation,
-                double.ObjectPlacement,
-            )
+            first.Representation, first.ObjectPlacement = (double.Representation, double.ObjectPlacement)
         for holder in model.get_inverse(double):
             ifcopenshell.util.element.replace_attribute(holder, double, first)
         model.remove(double)
     mend_guids(model)
     values = {
-        "file": name, "first": first_name, "by": Phrase(transform.by), "elements": count - repeated,
-        "repeated": repeated, "storeys": len(storeys), "angle": _turn_deg(transform.matrix),
+        "file": name,
+        "first": first_name,
+        "by": Phrase(transform.by),
+        "elements": count - repeated,
+        "repeated": repeated,
+        "storeys": len(storeys),
+        "angle": _turn_deg(transform.matrix),
         "distance": float(np.linalg.norm(transform.matrix[:3, 3])),
-    }  # fmt: skip
+    }
     issues.append(Issue("file-linked", name, values))
     if apart > MARGIN:
-        issues.append(
-            Issue("file-apart", name, {"file": name, "first": first_name, "distance": apart})
-        )
+        issues.append(Issue("file-apart", name, {"file": name, "first": first_name, "distance": apart}))
     return issues
 
 
@@ -245,9 +222,7 @@ def move(model: ifcopenshell.file, matrix: NDArray[np.float64], unit: float) -> 
         top.RelativePlacement = _axes(model, place)
     bare = [one for one in model.by_type("IfcProduct") if one.ObjectPlacement is None]
     for product in (one for one in bare if one.Representation is not None):
-        product.ObjectPlacement = model.create_entity(
-            "IfcLocalPlacement", RelativePlacement=_axes(model, turn)
-        )
+        product.ObjectPlacement = model.create_entity("IfcLocalPlacement", RelativePlacement=_axes(model, turn))
 
 
 def _axes(model: ifcopenshell.file, place: NDArray[np.float64]) -> Entity:
@@ -262,11 +237,7 @@ def _turn_deg(matrix: NDArray[np.float64]) -> float:
 
 
 def _north_issues(
-    model: ifcopenshell.file,
-    other: ifcopenshell.file,
-    transform: _Transform,
-    name: str,
-    first_name: str,
+    model: ifcopenshell.file, other: ifcopenshell.file, transform: _Transform, name: str, first_name: str
 ) -> list[Issue]:
     """An issue where both files state TrueNorth and these differ once the file is placed."""
     norths = [true_north(one)[0] for one in (model, other)]
@@ -344,9 +315,7 @@ def _same_storeys(
     unit = length_scale(model)
     taken = {one.id() for one in repeated}
     heights = [
-        (float(place[2, 3]), storey)
-        for storey in storeys_in(model)
-        if (place := placement_of(storey)) is not None
+        (float(place[2, 3]), storey) for storey in storeys_in(model) if (place := placement_of(storey)) is not None
     ]
     pairs = []
     for storey in storeys_in(other):

@@ -26,10 +26,7 @@ NAMES = {
     "density": ("MassDensity",),
     "heat_capacity": ("SpecificHeatCapacity",),
 }
-OPTICAL = {
-    "visible": ("VisibleReflectanceFront",),
-    "solar": ("SolarReflectanceFront",),
-}
+OPTICAL = {"visible": ("VisibleReflectanceFront",), "solar": ("SolarReflectanceFront",)}
 
 SURFACES = 0.17  # resistances of both surfaces of an outer wall: EN ISO 6946:2017 [m2 K/W]
 INSULATING = ("insulation", "insulating")  # groups of materials
@@ -83,9 +80,7 @@ class MaterialReader:
         table = self._properties.setdefault(material.id(), {})
         named = {
             p.Name: getattr(getattr(p, "NominalValue", None), "wrappedValue", None)
-            for p in getattr(one, "Properties", None)
-            or getattr(one, "ExtendedProperties", None)
-            or ()
+            for p in getattr(one, "Properties", None) or getattr(one, "ExtendedProperties", None) or ()
         }
         for key, names in NAMES.items():
             for name in names:
@@ -167,9 +162,7 @@ class MaterialReader:
             self.issues["shape aspects"] = Issue("aspect-contradicts-style", "", values)
         return layers, stated
 
-    def shares_of(
-        self, element: ifcopenshell.entity_instance
-    ) -> tuple[tuple[NamedMaterial, float], ...]:
+    def shares_of(self, element: ifcopenshell.entity_instance) -> tuple[tuple[NamedMaterial, float], ...]:
         """Materials listed without thicknesses, if insulation is one, and their shares of 1.
 
         By IfcMaterialConstituent.Fraction where each has one, else in equal parts.  A list without
@@ -185,9 +178,7 @@ class MaterialReader:
         materials = [getattr(one, "Material", one) for one in parts]
         if not any(named_material(one).group in INSULATING for one in materials):
             return ()
-        return tuple(
-            (self.material(one)[0], f) for one, f in zip(materials, fractions, strict=True)
-        )
+        return tuple((self.material(one)[0], f) for one, f in zip(materials, fractions, strict=True))
 
     def _constituents(self, element: ifcopenshell.entity_instance) -> dict[str, Any]:
         """Materials of an element without layers, by the names of constituents or their own."""
@@ -221,9 +212,7 @@ class MaterialReader:
         slip = stated.get("heat_capacity", 0.0) * 1000.0
         if "heat_capacity" not in values and _is_physical("heat_capacity", slip):
             values["heat_capacity"] = slip
-            issue = Issue(
-                "heat-capacity-in-kilojoules", name, {"material": name, "stated": slip / 1000}
-            )
+            issue = Issue("heat-capacity-in-kilojoules", name, {"material": name, "stated": slip / 1000})
             self.issues.setdefault(f"{name} kJ", issue)
         wrong = sorted(set(stated) - set(values))
         values |= self._corrected(name)
@@ -237,10 +226,7 @@ class MaterialReader:
                 "material": name,
                 "missing": tuple(map(Phrase, missing)),
                 "default": default.layer.name,
-                "impossible": tuple(
-                    Phrase("impossible-value", {"name": Phrase(k), "value": stated[k]})
-                    for k in wrong
-                ),
+                "impossible": tuple(Phrase("impossible-value", {"name": Phrase(k), "value": stated[k]}) for k in wrong),
             }
             code = "material-unknown" if unknown else "material-incomplete"
             code = "material-impossible" if wrong else code
@@ -275,21 +261,21 @@ def own_materials(
     return entities(damage.read(read, element, of=element, data="material", default=[]))
 
 
-def _material_of(
-    element: ifcopenshell.entity_instance, damage: Damage | None
-) -> ifcopenshell.entity_instance | None:
+def _material_of(element: ifcopenshell.entity_instance, damage: Damage | None) -> ifcopenshell.entity_instance | None:
     """The material associated with an element or its type: a usage, set, list or material."""
     damage = Damage() if damage is None else damage
     material = damage.read(
-        ifcopenshell.util.element.get_material, element, should_skip_usage=False,
-        of=element, data="material", default=None,
-    )  # fmt: skip
+        ifcopenshell.util.element.get_material,
+        element,
+        should_skip_usage=False,
+        of=element,
+        data="material",
+        default=None,
+    )
     return next(iter(entities(material)), None)
 
 
-def _with_material(
-    element: ifcopenshell.entity_instance, damage: Damage | None
-) -> ifcopenshell.entity_instance:
+def _with_material(element: ifcopenshell.entity_instance, damage: Damage | None) -> ifcopenshell.entity_instance:
     """The element, or where it has no material the whole that it is a part of and that has one.
 
     A roof's material is the roof's, its body that of its slabs (IfcRelAggregates).

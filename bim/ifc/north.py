@@ -57,11 +57,7 @@ def map_conversions(model: ifcopenshell.file) -> list[MapConversion]:
         names = [next((p["ePSet_ProjectedCRS"] for p in psets if "ePSet_ProjectedCRS" in p), {})]
         return [_conversion(one, names[0].get("Name"), None) for one in conversions]
     return [
-        _conversion(
-            one.get_info(),
-            getattr(one.TargetCRS, "Name", None),
-            getattr(one.TargetCRS, "MapUnit", None),
-        )
+        _conversion(one.get_info(), getattr(one.TargetCRS, "Name", None), getattr(one.TargetCRS, "MapUnit", None))
         for one in model.by_type("IfcMapConversion")
     ]
 
@@ -99,11 +95,7 @@ def north_rotation(
     difference = (_azimuth(true) - _azimuth(grid) + 180.0) % 360.0 - 180.0
     if abs(difference) <= CONVERGENCE_DEG:
         return _turned(*true), issues
-    values = {
-        "map": _azimuth(grid),
-        "true": _azimuth(true),
-        "difference": abs(difference),
-    }
+    values = {"map": _azimuth(grid), "true": _azimuth(true), "difference": abs(difference)}
     return _turned(*grid), [*issues, Issue("north-contradicts-map", "IfcMapConversion", values)]
 
 

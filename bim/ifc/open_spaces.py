@@ -88,11 +88,7 @@ def open_spaces(
 
 
 def _reason(
-    record: SpaceRecord,
-    records: Sequence[SpaceRecord],
-    shares: Mapping[str, Openness],
-    boxes: Boxes,
-    windows: Boxes,
+    record: SpaceRecord, records: Sequence[SpaceRecord], shares: Mapping[str, Openness], boxes: Boxes, windows: Boxes
 ) -> Phrase | None:
     """Why a space is outdoors; None for a room.
 
@@ -134,9 +130,7 @@ def _has_outdoor_name(record: SpaceRecord) -> bool:
     return OUTDOOR_NAMES.search(plain_text(f"{record.name} {record.long_name}")) is not None
 
 
-def _openness(
-    record: SpaceRecord, records: Sequence[SpaceRecord], boxes: Boxes, building: RayMesh
-) -> Openness:
+def _openness(record: SpaceRecord, records: Sequence[SpaceRecord], boxes: Boxes, building: RayMesh) -> Openness:
     facets = [f for f in record.solid.facets if f.polygon.area > SMALLEST]
     upper = [facet for facet in facets if facet.plane.normal[2] > 0.3]
     sides = [facet for facet in facets if abs(facet.plane.normal[2]) <= 0.3]
@@ -147,8 +141,7 @@ def _openness(
     above = [(_under_sky(f, float(record.solid.low[2]), building), f.polygon.area) for f in upper]
     free_sides = [(_free(f, building, others), f) for f in sides]
     return Openness(
-        _share(above),
-        _share([(_open_across(free, f, building), f.polygon.area) for free, f in free_sides]),
+        _share(above), _share([(_open_across(free, f, building), f.polygon.area) for free, f in free_sides])
     )
 
 

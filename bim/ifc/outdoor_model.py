@@ -33,8 +33,7 @@ def read_outdoor_model(
     source = read_source(path, corrections, progress or (lambda stage, fraction: None), linked)
     elements = outdoor_elements(source.model, source.elements, reflectance=corrections.surroundings)
     selected = tuple(
-        frozenset(source.model.by_id(i).GlobalId for i in chosen(source.model, query, selected_in))
-        for query in select
+        frozenset(source.model.by_id(i).GlobalId for i in chosen(source.model, query, selected_in)) for query in select
     )
     building = Building(source.name, (), tuple(elements), source.issues, file=Path(path))
     return building, selected

@@ -74,9 +74,7 @@ class _Drawn:
         return cls(triangles, Boxes(triangles.min(axis=1), triangles.max(axis=1)))
 
 
-def open_apertures(
-    source: Source, records: Sequence[SpaceRecord], bodies: NDArray[np.float64]
-) -> list[Aperture]:
+def open_apertures(source: Source, records: Sequence[SpaceRecord], bodies: NDArray[np.float64]) -> list[Aperture]:
     """What may lie open between rooms: unfilled openings, and where rooms touch.
 
     Args: bodies: triangles [N, 3, 3] of all that may stand there [m].
@@ -89,9 +87,15 @@ def open_apertures(
         body = shape.triangles
         beside = None if host is None else beside_opening(source.shapes.get(host.id()), shape)
         filling = Filling(
-            shape.guid, shape.name, "IfcOpeningElement", body, np.zeros(len(body), dtype=bool),
-            opening=body, is_open=True, beside=beside,
-        )  # fmt: skip
+            shape.guid,
+            shape.name,
+            "IfcOpeningElement",
+            body,
+            np.zeros(len(body), dtype=bool),
+            opening=body,
+            is_open=True,
+            beside=beside,
+        )
         aperture, _ = aperture_of(filling)
         if aperture is not None:
             result.append(replace(aperture, glass=aperture.opening))
@@ -151,11 +155,7 @@ def _common_faces(one: RoomSolid, other: RoomSolid, bodies: _Drawn) -> Iterator[
     for facet in one.facets:
         plane = facet.plane
         shared = shapely.union_all(
-            [
-                _shared(facet, back)
-                for back in other.facets
-                if back.plane.normal @ plane.normal < OPPOSITE
-            ]
+            [_shared(facet, back) for back in other.facets if back.plane.normal @ plane.normal < OPPOSITE]
         )
         if shared.area < SMALLEST:
             continue
@@ -171,23 +171,14 @@ def _shared(facet: Facet, other: Facet) -> shapely.Geometry:
     corners = other.plane.to_world(shapely.get_coordinates(other.polygon))
     if np.abs(facet.plane.to_plane(corners)[:, 2]).max() > TOUCHING:
         return shapely.Polygon()
-    flat = shapely.transform(
-        other.polygon, lambda points: facet.plane.to_plane(other.plane.to_world(points))[:, :2]
-    )
+    flat = shapely.transform(other.polygon, lambda points: facet.plane.to_plane(other.plane.to_world(points))[:, :2])
     return shapely.union_all(polygons_of(shapely.make_valid(flat).intersection(facet.polygon)))
 
 
-def _free(
-    region: shapely.Geometry,
-    plane: Plane,
-    heights: tuple[float, float],
-    bodies: _Drawn,
-) -> shapely.Geometry:
+def _free(region: shapely.Geometry, plane: Plane, heights: tuple[float, float], bodies: _Drawn) -> shapely.Geometry:
     """The part of a region [m] with nothing between two heights above its plane [m]."""
     box = np.array(shapely.bounds(region)).reshape(2, 2)
-    corners = plane.to_world(
-        np.array([[x, y, z] for x in box[:, 0] for y in box[:, 1] for z in heights])
-    )
+    corners = plane.to_world(np.array([[x, y, z] for x in box[:, 0] for y in box[:, 1] for z in heights]))
     near = bodies.boxes.near(corners.min(axis=0), corners.max(axis=0))
     local = plane.to_plane(bodies.triangles[near])
     for height, up in zip(heights, (1.0, -1.0), strict=True):

@@ -62,8 +62,7 @@ def in_world(shapes: dict[int, Shape], rotation: NDArray[np.float64]) -> Placed:
             moved = {"distance_km": distance / 1000, "east": float(east), "north": float(north)}
             issues.append(Issue("model-far-from-origin", "project", moved))
     world = {
-        key: replace(shape, triangles=scale * shape.triangles @ rotation.T - offset)
-        for key, shape in shapes.items()
+        key: replace(shape, triangles=scale * shape.triangles @ rotation.T - offset) for key, shape in shapes.items()
     }
     return Placed(world, rotation, scale, offset, tuple(issues))
 
@@ -72,9 +71,7 @@ def _typical_height(shapes: dict[int, Shape]) -> float:
     """Median height of spaces, else of walls [m]; 0 without either."""
     for prefix in ("IfcSpace", "IfcWall"):
         heights = [
-            float(np.ptp(shape.triangles[..., 2]))
-            for shape in shapes.values()
-            if shape.ifc_class.startswith(prefix)
+            float(np.ptp(shape.triangles[..., 2])) for shape in shapes.values() if shape.ifc_class.startswith(prefix)
         ]
         if heights:
             return float(np.median(heights))
@@ -83,9 +80,7 @@ def _typical_height(shapes: dict[int, Shape]) -> float:
 
 def _whole_height(shapes: dict[int, Shape]) -> float:
     """Height of all shapes together [m]."""
-    z = [
-        (shape.triangles[..., 2].min(), shape.triangles[..., 2].max()) for shape in shapes.values()
-    ]
+    z = [(shape.triangles[..., 2].min(), shape.triangles[..., 2].max()) for shape in shapes.values()]
     return float(max(top for _, top in z) - min(bottom for bottom, _ in z))
 
 

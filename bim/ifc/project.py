@@ -117,9 +117,7 @@ def _mend_stars(model: ifcopenshell.file) -> None:
 def ending_issues(path: str | PathLike[str]) -> list[Issue]:
     """An issue for each STEP file that has lost its end."""
     path = Path(path)
-    return [
-        Issue("file-cut-off", name) for name, end in _ends(path) if b"END-ISO-10303-21" not in end
-    ]
+    return [Issue("file-cut-off", name) for name, end in _ends(path) if b"END-ISO-10303-21" not in end]
 
 
 def _ends(path: Path) -> Iterator[tuple[str, bytes]]:
@@ -160,26 +158,17 @@ def length_scale(model: ifcopenshell.file) -> float:
     return _unit_scale(model, "LENGTHUNIT", Damage())
 
 
-def _unit(
-    model: ifcopenshell.file, kind: str, damage: Damage
-) -> ifcopenshell.entity_instance | None:
-    return damage.read(
-        ifcopenshell.util.unit.get_project_unit, model, kind, of=None, data="units", default=None
-    )
+def _unit(model: ifcopenshell.file, kind: str, damage: Damage) -> ifcopenshell.entity_instance | None:
+    return damage.read(ifcopenshell.util.unit.get_project_unit, model, kind, of=None, data="units", default=None)
 
 
 def _unit_scale(model: ifcopenshell.file, kind: str, damage: Damage) -> float:
     return float(
-        damage.read(
-            ifcopenshell.util.unit.calculate_unit_scale, model, kind,
-            of=None, data="units", default=1.0,
-        )
-    )  # fmt: skip
+        damage.read(ifcopenshell.util.unit.calculate_unit_scale, model, kind, of=None, data="units", default=1.0)
+    )
 
 
-def site_location(
-    model: ifcopenshell.file,
-) -> tuple[float | None, float | None, float, list[Issue]]:
+def site_location(model: ifcopenshell.file) -> tuple[float | None, float | None, float, list[Issue]]:
     """Latitude and longitude (east positive) [deg], elevation [m], and what is wrong with them."""
     for site in model.by_type("IfcSite"):
         latitude, longitude = _degrees(site.RefLatitude), _degrees(site.RefLongitude)
@@ -219,9 +208,7 @@ def storey_of(element: ifcopenshell.entity_instance) -> str:
     return (container.Name or "") if container is not None else ""
 
 
-def parent_of(
-    element: ifcopenshell.entity_instance,
-) -> ifcopenshell.entity_instance | None:
+def parent_of(element: ifcopenshell.entity_instance) -> ifcopenshell.entity_instance | None:
     """What contains, aggregates or is filled or voided by the element; None at the top."""
     for relations, attribute in (
         ("ContainedInStructure", "RelatingStructure"),
@@ -236,9 +223,7 @@ def parent_of(
     return None
 
 
-def definitions_of(
-    holder: ifcopenshell.entity_instance | None,
-) -> list[ifcopenshell.entity_instance]:
+def definitions_of(holder: ifcopenshell.entity_instance | None) -> list[ifcopenshell.entity_instance]:
     """Property and quantity sets of an element or of a type itself."""
     definitions = entities(getattr(holder, "HasPropertySets", None))
     for relation in getattr(holder, "IsDefinedBy", None) or ():
@@ -248,9 +233,7 @@ def definitions_of(
     return definitions
 
 
-def psets_of(
-    element: ifcopenshell.entity_instance, damage: Damage | None = None
-) -> dict[str, dict[str, Any]]:
+def psets_of(element: ifcopenshell.entity_instance, damage: Damage | None = None) -> dict[str, dict[str, Any]]:
     """Properties and quantities, by the name of their set, of an element and its type.
 
     Complex properties are left out: through the numbers of a BSDF it takes a second.
@@ -267,9 +250,7 @@ def psets_of(
 
 
 def _plain_values(
-    definition: ifcopenshell.entity_instance,
-    element: ifcopenshell.entity_instance,
-    damage: Damage,
+    definition: ifcopenshell.entity_instance, element: ifcopenshell.entity_instance, damage: Damage
 ) -> dict[str, object]:
     if not definition.is_a("IfcPropertySet"):
         read = ifcopenshell.util.element.get_property_definition

@@ -36,11 +36,7 @@ def new_guid(model: ifcopenshell.file, *described: str) -> str:
 
 
 def give_set(
-    model: ifcopenshell.file,
-    targets: Sequence[Entity],
-    name: str,
-    description: str,
-    properties: Sequence[Entity],
+    model: ifcopenshell.file, targets: Sequence[Entity], name: str, description: str, properties: Sequence[Entity]
 ) -> None:
     """Give elements or types a property set; one of that name that they have is replaced."""
     for target in targets:
@@ -48,18 +44,16 @@ def give_set(
     owner = owner_of(model)
     described = [name, *(target.GlobalId for target in targets)]
     pset = model.create_entity(
-        "IfcPropertySet", new_guid(model, "set", *described), owner, name, description,
-        list(properties),
-    )  # fmt: skip
+        "IfcPropertySet", new_guid(model, "set", *described), owner, name, description, list(properties)
+    )
     types = [target for target in targets if target.is_a("IfcTypeObject")]
     for target in types:
         target.HasPropertySets = [*(target.HasPropertySets or ()), pset]
     objects = [target for target in targets if not target.is_a("IfcTypeObject")]
     if objects:
         model.create_entity(
-            "IfcRelDefinesByProperties", new_guid(model, "relation", *described), owner, None,
-            None, objects, pset,
-        )  # fmt: skip
+            "IfcRelDefinesByProperties", new_guid(model, "relation", *described), owner, None, None, objects, pset
+        )
 
 
 def take_off(model: ifcopenshell.file, target: Entity, name: str) -> bool:
@@ -88,9 +82,7 @@ def take_off(model: ifcopenshell.file, target: Entity, name: str) -> bool:
     return bool(sets)
 
 
-def list_of_numbers(
-    model: ifcopenshell.file, name: str, measure: str, values: Sequence[float]
-) -> Entity:
+def list_of_numbers(model: ifcopenshell.file, name: str, measure: str, values: Sequence[float]) -> Entity:
     """A property that lists numbers, each an instance of the measure; give it its unit then.
 
     Read from text, as one by one they take four times as long: a BSDF has 168 000. In seventeen

@@ -68,9 +68,7 @@ def _define(owner: ElementTree.Element, templates: Iterable[PropertyTemplate], w
     """A PropertyDef of each template, in the schema's order."""
     for one in templates:
         place = f"{within}/{one.name}"
-        made = ElementTree.SubElement(
-            owner, "PropertyDef", ifdguid=uuid.uuid5(NAMESPACE, place).hex
-        )
+        made = ElementTree.SubElement(owner, "PropertyDef", ifdguid=uuid.uuid5(NAMESPACE, place).hex)
         _text(made, "Name", one.name)
         words = [one.usage, FIRST if one.many else ""]
         _text(made, "Definition", "; ".join(filter(None, words)))
@@ -151,9 +149,7 @@ def fenestration_templates() -> Mapping[str, PropertyTemplate]:
 def write_templates(path: str | PathLike[str]) -> None:
     """Write an IFC4 project library with the template of the set."""
     model = ifcopenshell.file(schema="IFC4")
-    library = model.create_entity(
-        "IfcProjectLibrary", _guid("library"), Name="Fenestration data", Description=WHAT
-    )
+    library = model.create_entity("IfcProjectLibrary", _guid("library"), Name="Fenestration data", Description=WHAT)
     held = [_template(model, one, SET_NAME) for one in fenestration_templates().values()]
     template = model.create_entity(
         "IfcPropertySetTemplate",
@@ -164,9 +160,7 @@ def write_templates(path: str | PathLike[str]) -> None:
         ApplicableEntity=",".join(HOLDERS),
         HasPropertyTemplates=held,
     )
-    model.create_entity(
-        "IfcRelDeclares", _guid("declares"), RelatingContext=library, RelatedDefinitions=[template]
-    )
+    model.create_entity("IfcRelDeclares", _guid("declares"), RelatingContext=library, RelatedDefinitions=[template])
     save(model, path)
 
 
@@ -209,9 +203,7 @@ def _whole_states() -> Iterator[ShadingState]:
     )
     angles = AngularGValue(np.zeros(1), np.zeros(1), np.ones((1, 1)))
     for closure, bsdf in zip(closures, (klems, tree, klems, tree), strict=True):
-        yield ShadingState(
-            "", {"Visible": bsdf, "Solar": bsdf}, angles, 1.0, 0.5, np.ones(145), closure, "none"
-        )
+        yield ShadingState("", {"Visible": bsdf, "Solar": bsdf}, angles, 1.0, 0.5, np.ones(145), closure, "none")
 
 
 def _templates(properties: Iterable[Entity]) -> dict[str, PropertyTemplate]:
@@ -250,9 +242,7 @@ def _value(prop: Entity) -> Entity:
     return prop.LowerBoundValue if prop.is_a("IfcPropertyBoundedValue") else prop.NominalValue
 
 
-def _merged(
-    one: Mapping[str, PropertyTemplate], other: Mapping[str, PropertyTemplate]
-) -> dict[str, PropertyTemplate]:
+def _merged(one: Mapping[str, PropertyTemplate], other: Mapping[str, PropertyTemplate]) -> dict[str, PropertyTemplate]:
     """The templates of both; what both have holds the members of both."""
     merged = dict(one)
     for name, template in other.items():
@@ -264,10 +254,7 @@ def _merged(
         if template.usage not in usage.split(" or "):
             usage = f"{usage} or {template.usage}"
         merged[name] = replace(
-            known,
-            usage=usage,
-            many=known.many or template.many,
-            members=_merged(known.members, template.members),
+            known, usage=usage, many=known.many or template.many, members=_merged(known.members, template.members)
         )
     return merged
 
@@ -278,17 +265,27 @@ def _template(model: ifcopenshell.file, one: PropertyTemplate, within: str) -> E
     if one.kind == "P_COMPLEX":
         held = [_template(model, member, path) for member in one.members.values()]
         return model.create_entity(
-            "IfcComplexPropertyTemplate", _guid(path), Name=one.name, Description=what,
-            UsageName=one.usage, TemplateType="P_COMPLEX", HasPropertyTemplates=held,
-        )  # fmt: skip
+            "IfcComplexPropertyTemplate",
+            _guid(path),
+            Name=one.name,
+            Description=what,
+            UsageName=one.usage,
+            TemplateType="P_COMPLEX",
+            HasPropertyTemplates=held,
+        )
     unit = None
     if one.unit is not None:
         kind, prefix, name = one.unit
         unit = model.create_entity("IfcSIUnit", UnitType=kind, Prefix=prefix, Name=name)
     return model.create_entity(
-        "IfcSimplePropertyTemplate", _guid(path), Name=one.name, Description=what,
-        TemplateType=one.kind, PrimaryMeasureType=one.measure, PrimaryUnit=unit,
-    )  # fmt: skip
+        "IfcSimplePropertyTemplate",
+        _guid(path),
+        Name=one.name,
+        Description=what,
+        TemplateType=one.kind,
+        PrimaryMeasureType=one.measure,
+        PrimaryUnit=unit,
+    )
 
 
 def _guid(path: str) -> str:
@@ -304,10 +301,7 @@ def _specification(
     applicability = _child(made, "applicability", minOccurs="0", maxOccurs="unbounded")
     _values(_child(_child(applicability, "entity"), "name"), [name.upper() for name in holders])
     of_property = _child(
-        _child(made, "requirements"),
-        "property",
-        dataType=one.measure.upper(),
-        cardinality=cardinality,
+        _child(made, "requirements"), "property", dataType=one.measure.upper(), cardinality=cardinality
     )
     _restricted(_child(of_property, "propertySet"), pattern=f"{SET_NAME}(: .+)?")
     _child(_child(of_property, "baseName"), "simpleValue").text = one.name

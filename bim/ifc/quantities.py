@@ -5,8 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-AREA_NAMES = ("GrossFloorArea", "NetFloorArea", "GSA BIM Area", "Area", "Gross Area", "FloorArea",
-              "Gemessene Nettofläche")  # fmt: skip
+AREA_NAMES = (
+    "GrossFloorArea",
+    "NetFloorArea",
+    "GSA BIM Area",
+    "Area",
+    "Gross Area",
+    "FloorArea",
+    "Gemessene Nettofläche",
+)
 VOLUME_NAMES = ("NetVolume", "GrossVolume", "Volume", "Gross Volume")
 HEIGHT_NAMES = ("Height", "FinishCeilingHeight")
 BASE_SETS = ("Qto_SpaceBaseQuantities", "BaseQuantities")
@@ -22,14 +29,9 @@ class QuantityScales:
     volume: float  # [m3]
 
 
-def stated_quantities(
-    psets: dict[str, dict[str, Any]], scales: QuantityScales
-) -> tuple[float | None, float | None]:
+def stated_quantities(psets: dict[str, dict[str, Any]], scales: QuantityScales) -> tuple[float | None, float | None]:
     """Stated floor area [m2] and volume [m3]; base quantities first, then other property sets."""
-    return (
-        _first(psets, AREA_NAMES, scales.area),
-        _first(psets, VOLUME_NAMES, scales.volume),
-    )
+    return (_first(psets, AREA_NAMES, scales.area), _first(psets, VOLUME_NAMES, scales.volume))
 
 
 def _first(psets: dict[str, dict[str, Any]], names: tuple[str, ...], scale: float) -> float | None:
@@ -42,9 +44,7 @@ def _all(psets: dict[str, dict[str, Any]], names: tuple[str, ...]) -> list[float
     order = sorted(psets, key=lambda name: (name not in BASE_SETS, name))
     values = (psets[pset].get(name) for name in names for pset in order)
     return [
-        float(value)
-        for value in values
-        if isinstance(value, int | float) and not isinstance(value, bool) and value > 0
+        float(value) for value in values if isinstance(value, int | float) and not isinstance(value, bool) and value > 0
     ]
 
 

@@ -148,10 +148,7 @@ SAME_HEIGHT = 0.05  # heights stated and drawn that agree to this are one [m]
 
 
 def raised_rooms(
-    source: Source,
-    records: Sequence[SpaceRecord],
-    glass: GlassOfRooms,
-    covers: Sequence[Shape],
+    source: Source, records: Sequence[SpaceRecord], glass: GlassOfRooms, covers: Sequence[Shape]
 ) -> tuple[list[SpaceRecord], list[Issue]]:
     """The rooms, those raised that end below their glass, and what was done with each of these.
 
@@ -209,12 +206,7 @@ def _share_above(record: SpaceRecord, above: float, glass: GlassOfRooms) -> floa
 
 
 def _raised(
-    source: Source,
-    index: int,
-    records: Sequence[SpaceRecord],
-    lids: Sequence[Body],
-    share_above: float,
-    most: float,
+    source: Source, index: int, records: Sequence[SpaceRecord], lids: Sequence[Body], share_above: float, most: float
 ) -> tuple[SpaceRecord, Phrase | None]:
     """The room with the air above it, up to so much higher [m]; or as it is, and why."""
     record = records[index]

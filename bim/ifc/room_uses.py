@@ -24,11 +24,7 @@ def read_room_uses(*paths: str | PathLike[str]) -> dict[str, tuple[tuple[str, st
     models = open_all(paths).values()
     for space in (space for model in models for space in model.by_type("IfcSpace")):
         psets = psets_of(space)
-        texts = [
-            (f"{name}.{key}", str(psets[name][key]))
-            for name, key in PROPERTIES
-            if psets.get(name, {}).get(key)
-        ]
+        texts = [(f"{name}.{key}", str(psets[name][key])) for name, key in PROPERTIES if psets.get(name, {}).get(key)]
         for reference in ifcopenshell.util.classification.get_references(space):
             text = " ".join(filter(None, (reference[1], reference.Name)))  # its code, its name
             if text:

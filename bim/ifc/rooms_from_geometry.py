@@ -65,15 +65,9 @@ def rooms_from_geometry(source: Source, tell: Tell) -> tuple[list[SpaceRecord], 
     roof = _slab(low, high, wall_high[2])
     wider = source.corrections.close_gaps or WIDER
     closed = Phrase("gaps-closed", {"gap_mm": 1000 * wider})
-    attempts = [
-        ([], GAP, Phrase("joined-by-openings")),
-        ([], wider, closed),
-    ]
+    attempts = [([], GAP, Phrase("joined-by-openings")), ([], wider, closed)]
     if upright:  # a roof alone is no building that lacks its floor
-        attempts += [
-            ([floor], GAP, Phrase("floor-added")),
-            ([floor, roof], GAP, Phrase("floor-and-roof-added")),
-        ]
+        attempts += [([floor], GAP, Phrase("floor-added")), ([floor, roof], GAP, Phrase("floor-and-roof-added"))]
     if upright and source.corrections.close_gaps:
         attempts.append(([floor, roof], wider, closed))
     number, rooms = search.rooms([(more, gap) for more, gap, _ in attempts])
@@ -119,9 +113,7 @@ class _Search:
         self._bodies, self._tell = bodies, tell
         self._until = time.monotonic() + LIMIT_S
 
-    def rooms(
-        self, attempts: list[tuple[list[Body], float]]
-    ) -> tuple[int, list[manifold3d.Manifold]]:
+    def rooms(self, attempts: list[tuple[list[Body], float]]) -> tuple[int, list[manifold3d.Manifold]]:
         """Number of the first attempt (bodies besides, gap) that finds rooms, and their solids."""
         for _ in range(MOST_LEFT_OUT + 1):
             left = max(self._until - time.monotonic(), 0.0)  # 0 raises the time limit
@@ -174,17 +166,12 @@ def _lack_of_spaces(source: Source) -> Phrase:
 def _uncut_bodies(source: Source) -> list[tuple[Shape, str, Body]]:
     """The bounding elements, their labels and triangles in the world, openings not cut."""
     filling = {
-        relation.RelatedBuildingElement.id()
-        for relation in source.model.by_type("IfcRelFillsElement")
+        relation.RelatedBuildingElement.id() for relation in source.model.by_type("IfcRelFillsElement")
     }  # the walls that host them are closed without them
-    wanted = {
-        key for key, shape in source.shapes.items() if shape.ifc_class.startswith(BOUNDING)
-    } - filling
+    wanted = {key for key, shape in source.shapes.items() if shape.ifc_class.startswith(BOUNDING)} - filling
     everything = {one.id() for one in source.model.by_type("IfcProduct")}
     shapes, _ = read_shapes(source.model, without=everything - wanted, cut_openings=False)
-    return [
-        (s, f"{s.ifc_class} {s.name}", source.placed.to_world(s.triangles)) for s in shapes.values()
-    ]
+    return [(s, f"{s.ifc_class} {s.name}", source.placed.to_world(s.triangles)) for s in shapes.values()]
 
 
 def _box(bodies: list[Body]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -192,13 +179,10 @@ def _box(bodies: list[Body]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return corners.min(axis=0), corners.max(axis=0)
 
 
-def _slab(
-    low: NDArray[np.float64], high: NDArray[np.float64], bottom: float, *, beyond: float = 1.0
-) -> Body:
+def _slab(low: NDArray[np.float64], high: NDArray[np.float64], bottom: float, *, beyond: float = 1.0) -> Body:
     """A slab over the whole building and so far beyond it [m], `CAP` thick."""
     (x0, y0), (x1, y1) = low[:2] - beyond, high[:2] + beyond
-    c = np.array([[x, y, z] for z in (bottom, bottom + CAP) for x, y in
-                  ((x0, y0), (x1, y0), (x1, y1), (x0, y1))])  # fmt: skip
+    c = np.array([[x, y, z] for z in (bottom, bottom + CAP) for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))])
     quads = [(3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
     return c[[corner for a, b, d, e in quads for corner in ((a, b, d), (a, d, e))]]
 

@@ -102,9 +102,7 @@ def read_shapes(
         wanted = [
             product
             for product in model.by_type("IfcProduct")
-            if product.id() not in without
-            and not product.is_a().startswith(tuple(skipped))
-            and _has_body(product)
+            if product.id() not in without and not product.is_a().startswith(tuple(skipped)) and _has_body(product)
         ]
         if not wanted:
             return {}, []
@@ -136,10 +134,7 @@ def _has_body(product: ifcopenshell.entity_instance) -> bool:
     if product.Representation is None:
         return False
     kinds = ("Body", "Facetation", "Body-FallBack", "Tessellation", "SurfaceModel", "Surface")
-    return any(
-        (r.RepresentationIdentifier or "Body") in kinds
-        for r in product.Representation.Representations or ()
-    )
+    return any((r.RepresentationIdentifier or "Body") in kinds for r in product.Representation.Representations or ())
 
 
 def _shape(element, reader: _Styles) -> Shape | None:
@@ -156,9 +151,7 @@ def _shape(element, reader: _Styles) -> Shape | None:
     index = np.where(index < len(styles), index, -1)
     item = np.array(geometry.item_ids, dtype=np.int64)
     item = item if len(item) == len(faces) else np.zeros(len(faces), dtype=np.int64)
-    return Shape(
-        element.guid, element.id, element.type, element.name, vertices[faces], styles, index, item
-    )
+    return Shape(element.guid, element.id, element.type, element.name, vertices[faces], styles, index, item)
 
 
 class _Styles:
@@ -174,9 +167,7 @@ class _Styles:
             colour = style.diffuse
             values = colour.components if hasattr(colour, "components") else colour
             transparency = style.transparency if np.isfinite(style.transparency) else 0.0
-            self._known[style.name] = surface_style(
-                self._model, style.name, tuple(values)[:3], transparency
-            )
+            self._known[style.name] = surface_style(self._model, style.name, tuple(values)[:3], transparency)
         return self._known[style.name]
 
 

@@ -50,10 +50,7 @@ DEEPEST = 20  # operands of operands of a body
 
 
 def keep_storeys(
-    model: ifcopenshell.file,
-    names: Sequence[str],
-    file: str | PathLike[str],
-    damage: Damage,
+    model: ifcopenshell.file, names: Sequence[str], file: str | PathLike[str], damage: Damage
 ) -> list[Issue]:
     """Remove the products of other storeys from a model; the issue says how many.
 
@@ -114,18 +111,14 @@ def _host(product: Entity) -> Entity | None:
     return None
 
 
-def check_storeys(
-    models: Sequence[ifcopenshell.file], names: Sequence[str], file: str | PathLike[str]
-) -> None:
+def check_storeys(models: Sequence[ifcopenshell.file], names: Sequence[str], file: str | PathLike[str]) -> None:
     """Raise `DataError` for a name that no storey of the models has."""
     there = [storey for model in models for storey in storeys_in(model)]
     for name in names:
         _named(there, name, file)
 
 
-def _chosen(
-    model: ifcopenshell.file, names: Sequence[str], file: str | PathLike[str]
-) -> list[Entity]:
+def _chosen(model: ifcopenshell.file, names: Sequence[str], file: str | PathLike[str]) -> list[Entity]:
     storeys = storeys_in(model)
     return [storey for name in names for storey in _named(storeys, name, file)]
 
@@ -194,10 +187,7 @@ def _rise_of(item: Entity, depth: int) -> float:
     if item.is_a("IfcBooleanResult") and depth:
         return _rise_of(item.FirstOperand, depth - 1)
     if item.is_a("IfcMappedItem") and depth:
-        return max(
-            (_rise_of(one, depth - 1) for one in item.MappingSource.MappedRepresentation.Items),
-            default=0.0,
-        )
+        return max((_rise_of(one, depth - 1) for one in item.MappingSource.MappedRepresentation.Items), default=0.0)
     return 0.0
 
 
@@ -216,9 +206,7 @@ class Source:
     longitude_deg: float | None
     elevation: float
     issues: tuple[Issue, ...]
-    damage: Damage = field(
-        default_factory=Damage
-    )  # gathers what cannot be read, as it is asked for
+    damage: Damage = field(default_factory=Damage)  # gathers what cannot be read, as it is asked for
 
     @property
     def shapes(self) -> dict[int, Shape]:
@@ -250,9 +238,7 @@ class Source:
     def quantity_scales(self) -> QuantityScales:
         """Factors from the file's units of length, area and volume to m, m2 and m3."""
         return QuantityScales(
-            length_scale(self.model),
-            area_scale(self.model, "AREAUNIT"),
-            area_scale(self.model, "VOLUMEUNIT"),
+            length_scale(self.model), area_scale(self.model, "AREAUNIT"), area_scale(self.model, "VOLUMEUNIT")
         )
 
 
@@ -291,9 +277,7 @@ def read_source(
     latitude, longitude, elevation, site = site_location(model)
     check_materials(model, corrections)
     removed = corrections.removed(model)
-    shapes, faults = read_shapes(
-        model, lambda fraction: tell("geometry", fraction), without=removed
-    )
+    shapes, faults = read_shapes(model, lambda fraction: tell("geometry", fraction), without=removed)
     unglazed = corrections.unglazed(model)
     shapes |= {key: opaque(shapes[key]) for key in unglazed if key in shapes}
     shapes, phantoms = judged_transparent(model, shapes, damage)
@@ -302,17 +286,12 @@ def read_source(
         if step_id in shapes:
             shapes[step_id] = painted(shapes[step_id], paint)
     if corrections.file:
-        values = {
-            "removed": len(removed),
-            "repainted": len(corrections.painted(model)),
-            "unglazed": len(unglazed),
-        }
+        values = {"removed": len(removed), "repainted": len(corrections.painted(model)), "unglazed": len(unglazed)}
         issues.append(Issue("corrections-used", corrections.file, values))
     placed = in_world(shapes, rotation)
     return Source(
-        Path(path), model, placed, corrections, latitude, longitude, elevation,
-        tuple([*issues, *placed.issues]), damage,
-    )  # fmt: skip
+        Path(path), model, placed, corrections, latitude, longitude, elevation, tuple([*issues, *placed.issues]), damage
+    )
 
 
 def check_materials(model: ifcopenshell.file, corrections: Corrections) -> None:
@@ -335,9 +314,7 @@ def painted(shape: Shape, paint: Paint) -> Shape:
     values = {"reflectance": paint.visible, "solar": paint.solar, "stated": None, "hue": GREY}
     values["gloss"] = paint.gloss
     styles = tuple(
-        (replace(style, gloss=paint.gloss) if paint.gloss else style)
-        if style.is_glass
-        else replace(style, **values)
+        (replace(style, gloss=paint.gloss) if paint.gloss else style) if style.is_glass else replace(style, **values)
         for style in shape.styles
     )
     plain = SurfaceStyle("correction", paint.visible, 0.0, None, paint.solar, paint.gloss)

@@ -151,10 +151,7 @@ def _points(curve: ifcopenshell.entity_instance) -> NDArray[np.float64] | None:
 
 
 def _differences(
-    element: ifcopenshell.entity_instance,
-    boundary: _Stated,
-    room: Space,
-    hosts: Mapping[str, str],
+    element: ifcopenshell.entity_instance, boundary: _Stated, room: Space, hosts: Mapping[str, str]
 ) -> list[Issue]:
     """What the file says otherwise of one element at a room."""
     faces = [f for f in room.faces if f.element == element.GlobalId and f.kind != "reveal"]
@@ -176,9 +173,7 @@ def _differences(
     return [Issue("boundary-neighbour-differs", element.GlobalId, values | neighbours)]
 
 
-def _own_areas(
-    guid: str, faces: Sequence[Face], room: Space, hosts: Mapping[str, str]
-) -> tuple[float, float]:
+def _own_areas(guid: str, faces: Sequence[Face], room: Space, hosts: Mapping[str, str]) -> tuple[float, float]:
     """Area [m2] of an element at a room: without the openings in it, and with them."""
     same_window = [window for window in room.windows if window.guid == guid]
     if same_window:

@@ -207,11 +207,7 @@ def check_rooms(
         return
     zones = [zone.name for model in models for zone in read_zones(model)]
     storeys = [one.Name or "" for model in models for one in storeys_in(model)]
-    names = {
-        *zones,
-        *storeys,
-        *(text for one in drawn for text in (one.guid, one.name, one.long_name)),
-    }
+    names = {*zones, *storeys, *(text for one in drawn for text in (one.guid, one.name, one.long_name))}
     names |= {text or "" for one in corrected for text in (one.name, one.long_name)}
     for room in rooms:
         if any(has_words(room, name) or has_words(name, room) for name in names if name.strip()):
@@ -231,8 +227,5 @@ def _type_name(space: ifcopenshell.entity_instance, damage: Damage | None) -> st
 def is_outdoors(space: ifcopenshell.entity_instance, psets: dict[str, dict[str, Any]]) -> bool:
     """Whether the file says that a space is external."""
     common = psets.get("Pset_SpaceCommon", {})
-    kinds = (
-        getattr(space, "InteriorOrExteriorSpace", None),
-        getattr(space, "PredefinedType", None),
-    )
+    kinds = (getattr(space, "InteriorOrExteriorSpace", None), getattr(space, "PredefinedType", None))
     return common.get("IsExternal") is True or "EXTERNAL" in kinds

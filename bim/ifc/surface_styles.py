@@ -39,9 +39,7 @@ class SurfaceStyle:
         return self.transparency > CLEAR
 
 
-def surface_style(
-    model: ifcopenshell.file, name: str, colour: Sequence[float], transparency: float
-) -> SurfaceStyle:
+def surface_style(model: ifcopenshell.file, name: str, colour: Sequence[float], transparency: float) -> SurfaceStyle:
     """The surface style that the geometry engine names "<class>-<STEP id>".
 
     In this order: IfcSurfaceStyleLighting.DiffuseReflectionColour and a DiffuseColour given as a

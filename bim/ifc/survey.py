@@ -133,9 +133,7 @@ def markdown(rows: Sequence[Surveyed]) -> str:
         if row.refused:
             lines.append(f"| {name} | refused: {row.refused.split(': ', 1)[-1]} |" + " |" * 15)
             continue
-        area = f"{row.areas_between_walls}" + (
-            f" + {row.areas_to_middles} to middles" if row.areas_to_middles else ""
-        )
+        area = f"{row.areas_between_walls}" + (f" + {row.areas_to_middles} to middles" if row.areas_to_middles else "")
         lines.append(
             f"| {name} | {row.schema} | {row.rooms} | {row.spaces or 'found'} "
             f"| {row.rooms_with_windows} | {row.windows} | {row.glass:.1f} "
@@ -144,11 +142,7 @@ def markdown(rows: Sequence[Surveyed]) -> str:
             f"| {row.issues} | {row.check_s:.1f} | {row.export_s:.1f} | {row.cpu_s:.1f} "
             f"| {row.memory_mb:.0f} |"
         )
-    total = {
-        f.name: sum(getattr(r, f.name) for r in rows)
-        for f in fields(Surveyed)
-        if f.type in ("int", "float")
-    }
+    total = {f.name: sum(getattr(r, f.name) for r in rows) for f in fields(Surveyed) if f.type in ("int", "float")}
     lines.append(
         f"\n{len(rows)} files, {sum(bool(r.refused) for r in rows)} refused; {total['rooms']} rooms"
         f" ({total['open_rooms']} with an open edge), {total['windows']} windows with "

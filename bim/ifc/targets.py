@@ -63,13 +63,9 @@ Entity = ifcopenshell.entity_instance
 # facade: from and to, clockwise from north [deg]
 FINEST = 0.001  # azimuths are compared to this [deg]; a quarter ends that much before the next
 QUARTERS = {
-    name: (middle - 45, middle + 45 - FINEST)
-    for name, middle in {"N": 360, "E": 90, "S": 180, "W": 270}.items()
+    name: (middle - 45, middle + 45 - FINEST) for name, middle in {"N": 360, "E": 90, "S": 180, "W": 270}.items()
 }
-EIGHTHS = {
-    name: (middle - 22.5, middle + 22.5)
-    for name, middle in {"NE": 45, "SE": 135, "SW": 225, "NW": 315}.items()
-}
+EIGHTHS = {name: (middle - 22.5, middle + 22.5) for name, middle in {"NE": 45, "SE": 135, "SW": 225, "NW": 315}.items()}
 SECTOR = re.compile(r"^(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)$")
 
 

@@ -55,9 +55,7 @@ WITHIN = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / [[3], [6], [6]
 HALF = 0.5  # display transparency of a pane that nothing else names; share of a sheet's area
 DOWN = -0.5  # z of an outward normal from which a face looks down: 30 degrees below the horizon
 AIR = re.compile(r"(?<![^\W_])(air|luft|aire|aria|lucht|ilma)(?![^\W_])|空気|воздух")
-SEPARATION = re.compile(
-    r"contact direct|(room|space) separat|raumtrennlinie|separation de pieces?|virtual|virtuel"
-)
+SEPARATION = re.compile(r"contact direct|(room|space) separat|raumtrennlinie|separation de pieces?|virtual|virtuel")
 NOT_AIR = re.compile(r"air (barrier|infiltration|gap)|luftdicht|luftschicht|lame d'air")
 GLASS = re.compile(
     r"glas|glaz|verre|vitr|cristal|vidr|vetr[oa]|szk[lł]|\bsklo|cam\b|lasi\b|polycarb|polikarb"
@@ -95,11 +93,7 @@ def judged_transparent(
             kept[key] = judged
         if judged is not shape:
             area = transparent_area(shape)
-            values = {
-                "element": f"{shape.ifc_class} {shape.name}",
-                "area": area,
-                "reason": Phrase(why),
-            }
+            values = {"element": f"{shape.ifc_class} {shape.name}", "area": area, "reason": Phrase(why)}
             code = "transparent-left-out" if judged is None else "transparent-taken-as-opaque"
             issues.append(Issue(code, shape.guid, values, Effect(glass=area)))
     return kept, issues
@@ -112,14 +106,10 @@ def is_phantom(ifc_class: str, normal: np.ndarray) -> bool:
 
 def transparent_area(shape: Shape) -> float:
     """Area [m2] of the transparent surfaces of a body, one side of it."""
-    return float(
-        0.5 * np.linalg.norm(area_vectors(shape.triangles[shape.transparent]), axis=1).sum()
-    )
+    return float(0.5 * np.linalg.norm(area_vectors(shape.triangles[shape.transparent]), axis=1).sum())
 
 
-def _judged(
-    element: ifcopenshell.entity_instance, shape: Shape, damage: Damage | None
-) -> tuple[Shape | None, str]:
+def _judged(element: ifcopenshell.entity_instance, shape: Shape, damage: Damage | None) -> tuple[Shape | None, str]:
     """The shape as it is, opaque, or None where it is no body, and the phrase that says why."""
     if shape.ifc_class.startswith("IfcMember"):
         if not _is_bar(shape):
@@ -132,9 +122,7 @@ def _judged(
     if SEPARATION.search(names) or (materials and all(_is_air(text) for text in materials)):
         return None, "air"
     styles = tuple(
-        style
-        if not style.is_glass or _is_pane(style, materials, thickness)
-        else replace(style, transparency=0.0)
+        style if not style.is_glass or _is_pane(style, materials, thickness) else replace(style, transparency=0.0)
         for style in shape.styles
     )
     if styles == shape.styles:
@@ -146,9 +134,7 @@ def _judged(
     return replace(shape, styles=styles), "not-called-glass"
 
 
-def _lying(
-    shapes: Mapping[int, Shape], sheets: Collection[int], judged: Collection[int]
-) -> set[int]:
+def _lying(shapes: Mapping[int, Shape], sheets: Collection[int], judged: Collection[int]) -> set[int]:
     """STEP ids of those sheets that lie on another body, or another window.
 
     Args: judged: transparent elements, on which no other one lies.
@@ -158,9 +144,7 @@ def _lying(
     bodies = [
         shape.triangles
         for key, shape in shapes.items()
-        if key not in judged
-        and shape.ifc_class not in NO_ELEMENTS
-        and not shape.ifc_class.startswith("IfcSite")
+        if key not in judged and shape.ifc_class not in NO_ELEMENTS and not shape.ifc_class.startswith("IfcSite")
     ]
     mesh = ray_mesh(np.concatenate(bodies or [np.empty((0, 3, 3))]))
     return {key for key in sheets if _lies_on(shapes[key], mesh)}
@@ -208,8 +192,7 @@ def _names_a_body(text: str) -> bool:
 def _material_texts(element: ifcopenshell.entity_instance, damage: Damage | None) -> list[str]:
     """Name and category of each material, as `plain_text`."""
     return [
-        plain_text(f"{one.Name or ''} {getattr(one, 'Category', None) or ''}")
-        for one in own_materials(element, damage)
+        plain_text(f"{one.Name or ''} {getattr(one, 'Category', None) or ''}") for one in own_materials(element, damage)
     ]
 
 

@@ -118,9 +118,7 @@ def _with_furniture(indoors: Indoors, normals: NDArray[np.float64]) -> Indoors:
     goes_on = (hit >= 0) & np.where(from_front, back[hit], front[hit])
     used = indoors.bounds.any(axis=0)
     behind = used & (indoors.bounds.all(axis=0) | goes_on)
-    areas = np.linalg.norm(
-        np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1
-    )
+    areas = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
     body = indoors.body[indoors.owner]
     total, part = (np.bincount(body, areas * chosen) for chosen in (used, behind))
     stands = (part > 0.5 * total)[body]
@@ -134,9 +132,7 @@ def _bodies(triangles: NDArray[np.float64], owner: NDArray[np.int64]) -> NDArray
     index = cKDTree(vertices).query(corners)[1]
     count = int(owner.max()) + 1
     size = count + len(vertices)
-    links = csr_array(
-        (np.ones(len(index)), (np.repeat(owner, 3), count + index)), shape=(size, size)
-    )
+    links = csr_array((np.ones(len(index)), (np.repeat(owner, 3), count + index)), shape=(size, size))
     return connected_components(links, directed=False)[1][:count]
 
 
@@ -161,9 +157,7 @@ BEFORE = 5e-4  # distance of a layer's outdoor side from the layer [m]
 LIKELY = (0.5, 2.0)  # enclosed volume over that of floor and height, where the shell is sound
 
 
-def read_radiance_building(
-    path: Path, apertures: Sequence[str] = (), facades: Sequence[str] = ()
-) -> Building:
+def read_radiance_building(path: Path, apertures: Sequence[str] = (), facades: Sequence[str] = ()) -> Building:
     """The room of a Radiance scene file.
 
     Args:
@@ -174,18 +168,13 @@ def read_radiance_building(
     Raises: `DataError` for what is no scene, has no such material, or shows no room.
     """
     scene = read_radiance(path)
-    panes = panes_of(
-        scene, apertures or _clear(scene, path, facades), facades, named=bool(apertures)
-    )
+    panes = panes_of(scene, apertures or _clear(scene, path, facades), facades, named=bool(apertures))
     if not panes.windows:
         message = "no pane has a room behind it: name the windows' material"
         raise DataError(message, file=path, field="aperture")
     names = numbered([window.surface.name for window in panes.windows])
     layer_issues: dict[Issue, None] = {}
-    windows = tuple(
-        _window(name, window, layer_issues)
-        for name, window in zip(names, panes.windows, strict=True)
-    )
+    windows = tuple(_window(name, window, layer_issues) for name, window in zip(names, panes.windows, strict=True))
     used = [pane for window in panes.windows for pane in window.panes]
     objects = opaque_objects(scene, scene.of_modifiers(facades), used)
     if not objects:
@@ -206,9 +195,7 @@ def read_radiance_building(
     return Building(path.stem, (space,), elements, every_issue, file=path)
 
 
-def read_radiance_elements(
-    path: Path, facades: Sequence[str] = ()
-) -> tuple[tuple[Element, ...], tuple[Issue, ...]]:
+def read_radiance_elements(path: Path, facades: Sequence[str] = ()) -> tuple[tuple[Element, ...], tuple[Issue, ...]]:
     """Every opaque surface of a Radiance scene file, by its name in the file.
 
     Args: facades: as of `read_radiance_building`.
@@ -216,9 +203,7 @@ def read_radiance_elements(
     scene = read_radiance(path)
     objects = opaque_objects(scene, scene.of_modifiers(facades))
     names = numbered([thing.name for thing in objects])
-    elements = tuple(
-        _element(name, thing, thing.triangles) for name, thing in zip(names, objects, strict=True)
-    )
+    elements = tuple(_element(name, thing, thing.triangles) for name, thing in zip(names, objects, strict=True))
     return elements, scene.issues
 
 
@@ -231,18 +216,22 @@ def _window(name: str, window: PanedWindow, issues: dict[Issue, None]) -> Window
         states, up = (layered.state,), layered.up
         issues |= dict.fromkeys(layered.issues)
     return Window(
-        name, name, triangles, opening_area=_area(triangles),
+        name,
+        name,
+        triangles,
+        opening_area=_area(triangles),
         visible_transmittance=None if glass is None else glass.transmittance,
-        type_name=window.panes[-1].material.name, states=states, glass=glass, up=up,
+        type_name=window.panes[-1].material.name,
+        states=states,
+        glass=glass,
+        up=up,
         covered_area=window.covered * _area(triangles),
-    )  # fmt: skip
+    )
 
 
 def _clear(scene: RadianceScene, path: Path, facades: Sequence[str]) -> list[str]:
     dark = {id(thing) for thing in scene.of_modifiers(facades)} if facades else set()
-    names = {
-        thing.material.name for thing in scene.objects if is_pane(thing) and id(thing) not in dark
-    }
+    names = {thing.material.name for thing in scene.objects if is_pane(thing) and id(thing) not in dark}
     if not names:
         there = ", ".join(sorted({thing.material.name for thing in scene.objects})[:12])
         message = "has no glass, fabric or BSDF"
@@ -268,9 +257,7 @@ def _material_issues(objects: Sequence[RadianceObject]) -> list[Issue]:
 def _not_read(scene: RadianceScene) -> str:
     """Surfaces that are left out, for the error of a room that is not closed without them."""
     left_out = [issue for issue in scene.issues if issue.code == "surfaces-not-read"]
-    types = [
-        f"{one.values['count']} of type {one.values['type']} ({one.where})" for one in left_out
-    ]
+    types = [f"{one.values['count']} of type {one.values['type']} ({one.where})" for one in left_out]
     return f"; surfaces that are not read: {', '.join(types)}" if types else ""
 
 
@@ -298,9 +285,7 @@ def _space(
     leaks = open_edges(shell)
     if leaks:
         issues.append(Issue("room-with-open-edges", name, {"room": name, "count": leaks}))
-    return Space(
-        f"{name}-room", name, "", volume, floor, faces, windows, volume, furniture=furniture
-    ), issues
+    return Space(f"{name}-room", name, "", volume, floor, faces, windows, volume, furniture=furniture), issues
 
 
 def _faces(
@@ -331,9 +316,18 @@ def _faces(
         beyond = "outside" if outside else "adiabatic"
         shine = thing.material
         faces.append(
-            Face(thing.name, kind, own, beyond, default_construction(kind, beyond),
-                 shine.diffuse, shine.diffuse, gloss=shine.gloss, element=thing.name)
-        )  # fmt: skip
+            Face(
+                thing.name,
+                kind,
+                own,
+                beyond,
+                default_construction(kind, beyond),
+                shine.diffuse,
+                shine.diffuse,
+                gloss=shine.gloss,
+                element=thing.name,
+            )
+        )
     return tuple(faces)
 
 
@@ -359,14 +353,17 @@ def _gap_sides(windows: Sequence[PanedWindow]) -> Iterator[Element]:
             rho = front_reflectance(layer, window.outwards[-1])
             triangles = window.surface.triangles + BEFORE * window.surface.normal
             yield Element(
-                f"cavity-{layer.name}", layer.name, layer.material.kind, triangles, rho, rho,
+                f"cavity-{layer.name}",
+                layer.name,
+                layer.material.kind,
+                triangles,
+                rho,
+                rho,
                 material=layer.material.name,
-            )  # fmt: skip
+            )
 
 
-def _floor_level(
-    triangles: NDArray[np.float64], normals: NDArray[np.float64], areas: NDArray[np.float64]
-) -> float:
+def _floor_level(triangles: NDArray[np.float64], normals: NDArray[np.float64], areas: NDArray[np.float64]) -> float:
     """Height of most of what lies below the room [m]."""
     low = normals[:, 2] < -FLAT
     heights = np.round(triangles[low][..., 2].mean(axis=1), 2)
@@ -385,9 +382,8 @@ def _beside(triangles: NDArray[np.float64], normal: NDArray[np.float64], window:
 def _element(guid: str, thing: RadianceObject, triangles: NDArray[np.float64]) -> Element:
     shine = thing.material
     return Element(
-        guid, thing.name, shine.kind, triangles, shine.diffuse, shine.diffuse,
-        material=shine.name, gloss=shine.gloss,
-    )  # fmt: skip
+        guid, thing.name, shine.kind, triangles, shine.diffuse, shine.diffuse, material=shine.name, gloss=shine.gloss
+    )
 
 
 def _area(triangles: NDArray[np.float64]) -> float:

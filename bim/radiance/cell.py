@@ -62,13 +62,9 @@ def slat_material(thing: RadianceObject) -> SlatMaterial:
     if material.kind in BLACK:
         return SlatMaterial(material.name, black, black)
     if kind == "mirror":
-        return SlatMaterial(
-            material.name, black, black, specular=luminance(numbers), back_is_black=True
-        )
+        return SlatMaterial(material.name, black, black, specular=luminance(numbers), back_is_black=True)
     if kind == "glass":
-        return SlatMaterial(
-            material.name, black, black, index=material.index, pane=material.transmissivity
-        )
+        return SlatMaterial(material.name, black, black, index=material.index, pane=material.transmissivity)
     if kind == "dielectric" and min(numbers[:3]) == 1 and numbers[4] == 0:
         return SlatMaterial(material.name, black, black, index=numbers[3])
     raise primitive.fault(

@@ -44,15 +44,11 @@ def opaque_surfaces(scene: RadianceScene, facades: Iterable[str] = ()) -> Surfac
 
 
 def opaque_objects(
-    scene: RadianceScene,
-    facades: Iterable[RadianceObject] = (),
-    panes: Iterable[RadianceObject] = (),
+    scene: RadianceScene, facades: Iterable[RadianceObject] = (), panes: Iterable[RadianceObject] = ()
 ) -> list[RadianceObject]:
     """The objects of `opaque_surfaces`, in its order, without translucent panes."""
     dark, clear = {id(thing) for thing in facades}, {id(thing) for thing in panes}
-    return [
-        o for o in scene.objects if (o.material.is_opaque and id(o) not in clear) or id(o) in dark
-    ]
+    return [o for o in scene.objects if (o.material.is_opaque and id(o) not in clear) or id(o) in dark]
 
 
 def scene_windows(scene: RadianceScene, modifiers: Iterable[str]) -> list[WindowSurface]:
@@ -96,9 +92,7 @@ def _window(thing: RadianceObject, solid: RayMesh, panes: RayMesh) -> WindowSurf
     return WindowSurface(thing.name, outwards)
 
 
-def _sky_seen(
-    triangles: NDArray[np.float64], normal: NDArray[np.float64], solid: RayMesh, panes: RayMesh
-) -> float:
+def _sky_seen(triangles: NDArray[np.float64], normal: NDArray[np.float64], solid: RayMesh, panes: RayMesh) -> float:
     """Share of a hemisphere's rays before triangles [T, 3, 3] that meet nothing and lead up."""
     rays = np.tile(hemisphere(normal, RAYS), (len(triangles), 1))
     starts = np.repeat(triangles.mean(axis=1) + BEFORE * normal, RAYS, axis=0)
@@ -107,9 +101,7 @@ def _sky_seen(
     return float(np.mean(is_free & (rays[:, 2] > 0)))
 
 
-def plain_glass(
-    panes: Sequence[RadianceObject], beside: NDArray[np.float64] | None = None
-) -> PlainGlass | None:
+def plain_glass(panes: Sequence[RadianceObject], beside: NDArray[np.float64] | None = None) -> PlainGlass | None:
     """The panes of a window, the outer one first; None where one is no `glass` without pattern.
 
     Args: beside: share of light that meets the innermost alone, by angle of incidence.
@@ -120,9 +112,7 @@ def plain_glass(
     return PlainGlass(each, () if beside is None else tuple(beside.tolist()))
 
 
-def glass_shares(
-    material: RadianceMaterial,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def glass_shares(material: RadianceMaterial) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Transmittance and reflectance [512] of a `glass` at even steps of the cosine, 0 to 1.
 
     `mitsuba_cfs.AngularOptics` takes them as `straight` and `mirrored`.

@@ -22,22 +22,39 @@ from mitsuba_cfs.files import reason
 
 Values = NDArray[np.float64]
 DEEPEST = 64  # functions that call each other
-TOKEN = re.compile(
-    r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([A-Za-z_][\w.]*)|(.))"
-)
+TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([A-Za-z_][\w.]*)|(.))")
 CONSTANTS = {"PI": np.pi, "DEGREE": np.pi / 180, "FTINY": 1e-7, "FHUGE": 1e10}
 BUILT_IN: dict[str, Callable[..., Values]] = {
     "if": lambda a, b, c: np.where(a > 0, b, c),
-    "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "tan": np.tan, "asin": np.arcsin,
-    "acos": np.arccos, "atan": np.arctan, "atan2": np.arctan2, "exp": np.exp, "log": np.log,
-    "log10": np.log10, "floor": np.floor, "ceil": np.ceil, "abs": np.abs,
-    "sgn": np.sign, "sq": lambda a: a * a, "min": np.minimum, "max": np.maximum,
-    "bound": lambda a, b, c: np.clip(b, a, c), "mod": lambda n, d: n - np.floor(n / d) * d,
-    "frac": lambda a: a - np.floor(a), "and": lambda a, b: np.where(a > 0, b, a),
-    "or": lambda a, b: np.where(a > 0, a, b), "not": lambda a: np.where(a > 0, -1.0, 1.0),
-    "Atan2": lambda a, b: np.degrees(np.arctan2(a, b)), "Sin": lambda a: np.sin(np.radians(a)),
-    "Cos": lambda a: np.cos(np.radians(a)), "Tan": lambda a: np.tan(np.radians(a)),
-}  # fmt: skip
+    "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
+    "tan": np.tan,
+    "asin": np.arcsin,
+    "acos": np.arccos,
+    "atan": np.arctan,
+    "atan2": np.arctan2,
+    "exp": np.exp,
+    "log": np.log,
+    "log10": np.log10,
+    "floor": np.floor,
+    "ceil": np.ceil,
+    "abs": np.abs,
+    "sgn": np.sign,
+    "sq": lambda a: a * a,
+    "min": np.minimum,
+    "max": np.maximum,
+    "bound": lambda a, b, c: np.clip(b, a, c),
+    "mod": lambda n, d: n - np.floor(n / d) * d,
+    "frac": lambda a: a - np.floor(a),
+    "and": lambda a, b: np.where(a > 0, b, a),
+    "or": lambda a, b: np.where(a > 0, a, b),
+    "not": lambda a: np.where(a > 0, -1.0, 1.0),
+    "Atan2": lambda a, b: np.degrees(np.arctan2(a, b)),
+    "Sin": lambda a: np.sin(np.radians(a)),
+    "Cos": lambda a: np.cos(np.radians(a)),
+    "Tan": lambda a: np.tan(np.radians(a)),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +84,7 @@ class FunctionFile:
 
     definitions: Mapping[str, tuple[tuple[str, ...], _Node]]
 
-    def value(
-        self, expression: str, variables: Mapping[str, Values | float], numbers: Sequence[float]
-    ) -> Values:
+    def value(self, expression: str, variables: Mapping[str, Values | float], numbers: Sequence[float]) -> Values:
         """Value [..] of an expression.
 
         Args: variables: of the ray by name (Rdot, Px, ...); numbers: of the primitive, A1 on.
@@ -78,9 +93,7 @@ class FunctionFile:
         """
         known = CONSTANTS | {f"A{i}": a for i, a in enumerate(numbers, 1)} | dict(variables)
         with np.errstate(all="ignore"):
-            return _Evaluation(self.definitions, known, numbers).value(
-                _Parser(expression).whole(), {}, 0
-            )
+            return _Evaluation(self.definitions, known, numbers).value(_Parser(expression).whole(), {}, 0)
 
 
 @dataclass(frozen=True, slots=True)

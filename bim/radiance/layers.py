@@ -23,15 +23,7 @@ from numpy.typing import NDArray
 from bim.fenestration import ShadingState
 from bim.radiance.functions import find_functions
 from bim.radiance.materials import LUMINANCE, SYSTEMS, luminance
-from bim.radiance.patterns import (
-    COMPUTED_PATTERNS,
-    EVEN,
-    TURNS,
-    evaluated,
-    functions_of,
-    pattern_values,
-    ray_variables,
-)
+from bim.radiance.patterns import COMPUTED_PATTERNS, EVEN, TURNS, evaluated, functions_of, pattern_values, ray_variables
 from bim.radiance.primitives import VOID
 from bim.radiance.scene import RadianceObject
 from bim.report.issue import Issue
@@ -108,9 +100,7 @@ def layered_window(
         if outwards[0]:  # the front of its data is on the side that the normal leaves
             bands = {name: band.turned_round() for name, band in bands.items()}
         if not any(shares):
-            return LayeredWindow(
-                ShadingState(bands=bands, file=path), up_vector(thing), tuple(issues)
-            )
+            return LayeredWindow(ShadingState(bands=bands, file=path), up_vector(thing), tuple(issues))
         if any(isinstance(band, TensorTreeBsdf) for band in bands.values()):
             raise thing.definitions[-1].primitive.fault(
                 "adds diffuse shares to a tensor tree, which is not computed: "
@@ -120,9 +110,7 @@ def layered_window(
         state = ShadingState(bands=bands, layers=(path,))
         return LayeredWindow(state, up_vector(thing), tuple(issues))
     layers = [
-        _bsdf_layer(thing, outward)
-        if thing.material.kind in SYSTEMS
-        else _layer(thing, outward, issues)
+        _bsdf_layer(thing, outward) if thing.material.kind in SYSTEMS else _layer(thing, outward, issues)
         for thing, outward in zip(things, outwards, strict=True)
     ]
     rough = [layer for layer in layers if isinstance(layer, TensorTreeBsdf)]
@@ -187,9 +175,7 @@ def _in_series(layers: Sequence[KlemsBsdf], facing: NDArray[np.float64] | None) 
 
 def _mixed(system: KlemsBsdf, inner: KlemsBsdf, share: NDArray[np.float64]) -> KlemsBsdf:
     """A system with a share [K] of the light from outdoors that meets its innermost layer alone."""
-    blocks = {
-        "transmission_front": share, "transmission_back": share[:, None], "reflection_front": share,
-    }  # fmt: skip
+    blocks = {"transmission_front": share, "transmission_back": share[:, None], "reflection_front": share}
     mixed = {}
     for name, part in blocks.items():
         whole, other = getattr(system, name), getattr(inner, name)
@@ -208,12 +194,7 @@ def up_vector(thing: RadianceObject) -> NDArray[np.float64] | None:
     if len(primitive.strings) < start + 4:
         return None
     functions, frame = functions_of(definition, primitive.strings[start + 3 :])
-    up = np.array(
-        [
-            float(evaluated(definition, functions, text, {}))
-            for text in primitive.strings[start : start + 3]
-        ]
-    )
+    up = np.array([float(evaluated(definition, functions, text, {})) for text in primitive.strings[start : start + 3]])
     up = frame[:3, :3] @ up
     if not np.linalg.norm(up) > 0:
         raise primitive.fault("its up vector is zero")
@@ -286,9 +267,7 @@ def _thickness(thing: RadianceObject) -> list[Issue]:
     return [Issue("bsdf-thickness", where, {"surface": thing.name, "thickness": thickness})]
 
 
-def _layer(
-    thing: RadianceObject, outward: bool, issues: list[Issue]
-) -> WindowLayer | TensorTreeBsdf:
+def _layer(thing: RadianceObject, outward: bool, issues: list[Issue]) -> WindowLayer | TensorTreeBsdf:
     material, zero = thing.material, np.zeros(len(ANGLES))
     if thing.parts:
         return _mixed_layer(thing, outward, issues)
@@ -312,8 +291,13 @@ def _layer(
         scale = pattern_values(thing.triangles, thing.normal, patterns, ANGLES)
     if np.ptp(scale, axis=1).max() > EVEN:
         first = patterns[0].primitive
-        values = {"pattern": first.name, "surface": thing.name, "mean": float(scale.mean()),
-                  "least": float(scale.min()), "greatest": float(scale.max())}  # fmt: skip
+        values = {
+            "pattern": first.name,
+            "surface": thing.name,
+            "mean": float(scale.mean()),
+            "least": float(scale.min()),
+            "greatest": float(scale.max()),
+        }
         issues.append(Issue("glass-pattern-averaged", f"{first.file}:{first.line}", values))
     if material.kind == "glass":
         passed = np.full(len(ANGLES), material.transmissivity)
@@ -340,10 +324,15 @@ def _mixed_layer(thing: RadianceObject, outward: bool, issues: list[Issue]) -> W
     if np.ptp(share, axis=1).max() > EVEN:
         where = f"{definition.primitive.file}:{definition.primitive.line}"
         foreground, background = (part.material.name for part in thing.parts)
-        of_pane = {"surface": thing.name, "mixture": definition.primitive.name,
-                   "foreground": foreground, "background": background,
-                   "mean": 100 * float(share.mean()), "least": 100 * float(share.min()),
-                   "greatest": 100 * float(share.max())}  # fmt: skip
+        of_pane = {
+            "surface": thing.name,
+            "mixture": definition.primitive.name,
+            "foreground": foreground,
+            "background": background,
+            "mean": 100 * float(share.mean()),
+            "least": 100 * float(share.min()),
+            "greatest": 100 * float(share.max()),
+        }
         issues.append(Issue("glass-mixture-averaged", where, of_pane))
     mean = share.mean(axis=1)
 
@@ -352,22 +341,17 @@ def _mixed_layer(thing: RadianceObject, outward: bool, issues: list[Issue]) -> W
         return mean * one + (1.0 - mean) * other
 
     specular = PaneOptics(*(mixed(f"specular.{name}") for name in ("tau", "rho_front", "rho_back")))
-    return WindowLayer(
-        specular, *(mixed(name) for name in ("scattered", "reflected_front", "reflected_back"))
-    )
+    return WindowLayer(specular, *(mixed(name) for name in ("scattered", "reflected_front", "reflected_back")))
 
 
-def _trans_layer(
-    thing: RadianceObject, colour: NDArray[np.float64]
-) -> WindowLayer | TensorTreeBsdf:
+def _trans_layer(thing: RadianceObject, colour: NDArray[np.float64]) -> WindowLayer | TensorTreeBsdf:
     """A `trans`: diffuse and straight transmission; a rough one scatters both beams in lobes."""
     numbers = thing.definitions[-1].primitive.numbers
     specular, roughness, passed, straight = numbers[3], numbers[4], *numbers[-2:]
     is_rough = passed * straight > 0 and roughness**2 > SMOOTH
     if is_rough and roughness < NARROWEST:
         raise thing.definitions[-1].primitive.fault(
-            f"scatters its beam in a lobe of roughness {roughness:g}: computed are 0 and "
-            f"{NARROWEST:.3f} or more"
+            f"scatters its beam in a lobe of roughness {roughness:g}: computed are 0 and {NARROWEST:.3f} or more"
         )
     mirrored = lacquer(specular, roughness).reflectance(np.cos(ANGLES))
     rest = colour * luminance(numbers) * (1 - mirrored)
@@ -383,9 +367,7 @@ def _trans_layer(
     return TensorTreeBsdf(through, through, back, back, see_through=0.0)
 
 
-def _function_layer(
-    thing: RadianceObject, outward: bool, colour: NDArray[np.float64]
-) -> WindowLayer:
+def _function_layer(thing: RadianceObject, outward: bool, colour: NDArray[np.float64]) -> WindowLayer:
     """A `BRTDfunc` with specular functions of the angle of incidence and diffuse shares."""
     definition = thing.definitions[-1]
     primitive = definition.primitive
@@ -398,22 +380,17 @@ def _function_layer(
         names = ray_variables(points, frame, side * normal, normal, ANGLES)
         texts = primitive.strings[:9]
         each = [
-            np.maximum(evaluated(definition, functions, text, names), 0.0)
-            + np.zeros((len(ANGLES), TURNS))
+            np.maximum(evaluated(definition, functions, text, names), 0.0) + np.zeros((len(ANGLES), TURNS))
             for text in texts
         ]
         if any(values.max() > 0 for values in each[6:]):
-            raise primitive.fault(
-                "its functions of two directions (brtd) are not computed: give a BSDF"
-            )
+            raise primitive.fault("its functions of two directions (brtd) are not computed: give a BSDF")
         grey = [np.tensordot(LUMINANCE, np.stack(each[i : i + 3]), axes=1) for i in (0, 3)]
         for values in grey:
             if not values.max() <= 1 + 1e-6:
                 raise primitive.fault(f"a function is {values.max():g}: expected 1 at the most")
             if np.ptp(values, axis=1).max() > APART * max(values.max(), 1e-9):
-                raise primitive.fault(
-                    "depends on the azimuth of the light: make its BSDF by genBSDF"
-                )
+                raise primitive.fault("depends on the azimuth of the light: make its BSDF by genBSDF")
         shares.append([np.clip(values.mean(axis=1), 0, 1) for values in grey])
     front, back, passed = (luminance(primitive.numbers[i : i + 3]) for i in (0, 3, 6))
     if not outward:
@@ -421,9 +398,8 @@ def _function_layer(
     tau = np.stack([shares[0][1]] * 2)
     rho_front, rho_back = (np.stack([one[0]] * 2) for one in shares)
     return WindowLayer(
-        PaneOptics(tau * colour, rho_front * colour, rho_back * colour),
-        passed * colour, front * colour, back * colour,
-    )  # fmt: skip
+        PaneOptics(tau * colour, rho_front * colour, rho_back * colour), passed * colour, front * colour, back * colour
+    )
 
 
 def _patch_means(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -21,12 +21,33 @@ SYSTEMS = ("BSDF", "aBSDF")
 BLACK = ("light", "glow", "illum", "spotlight")
 MATERIALS = (*OPAQUE, *CLEAR, *SYSTEMS, *BLACK, "mirror", "BRTDfunc")
 PATTERNS = (
-    "colorfunc", "brightfunc", "colordata", "brightdata", "colorpict", "colortext", "brighttext",
-    "texfunc", "texdata", "spectrum", "specfile", "specfunc", "specdata", "specpict",
-)  # fmt: skip
+    "colorfunc",
+    "brightfunc",
+    "colordata",
+    "brightdata",
+    "colorpict",
+    "colortext",
+    "brighttext",
+    "texfunc",
+    "texdata",
+    "spectrum",
+    "specfile",
+    "specfunc",
+    "specdata",
+    "specpict",
+)
 GLASS_INDEX = 1.52  # where a glass states none
-NUMBERS = {"plastic": 5, "metal": 5, "trans": 7, "mirror": 3, "glass": 3, "dielectric": 5,
-           "plastic2": 6, "metal2": 6, "trans2": 8}  # fmt: skip
+NUMBERS = {
+    "plastic": 5,
+    "metal": 5,
+    "trans": 7,
+    "mirror": 3,
+    "glass": 3,
+    "dielectric": 5,
+    "plastic2": 6,
+    "metal2": 6,
+    "trans2": 8,
+}
 
 
 @dataclass(frozen=True, slots=True)

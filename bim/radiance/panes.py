@@ -69,9 +69,7 @@ def is_pane(thing: RadianceObject) -> bool:
     return material.kind in ("glass", "BRTDfunc", *SYSTEMS) or material.is_translucent
 
 
-def panes_of(
-    scene: RadianceScene, apertures: Sequence[str], facades: Sequence[str], *, named: bool
-) -> Panes:
+def panes_of(scene: RadianceScene, apertures: Sequence[str], facades: Sequence[str], *, named: bool) -> Panes:
     """Windows of a scene's room, and its glass that is not simulated.
 
     Panes of glass, fabrics, translucent panels and BSDF in front of a window, at most half a
@@ -201,8 +199,7 @@ class _Space:
                     f"{thing.material.name} as the aperture to leave this pane out"
                 )
             left_out.append(other)
-            values = {"pane": other.name, "window": thing.name, "distance": distance,
-                      "share": 100 * share}  # fmt: skip
+            values = {"pane": other.name, "window": thing.name, "distance": distance, "share": 100 * share}
             where = f"{other.primitive.file}:{other.primitive.line}"
             issues.append(Issue("pane-before-window", where, values, Effect(glass=surface.area)))
         walled = 1.0 - stacks.total() / POINTS
@@ -231,9 +228,7 @@ class _Space:
         starts = np.repeat(points + BEFORE * inwards, RAYS, axis=0)
         rays = np.tile(hemisphere(inwards, RAYS), (POINTS, 1))
         cosine = rays @ inwards
-        depth = max(
-            float((one.triangles[0, 0] - surface.triangles[0, 0]) @ inwards) for one in behind
-        )
+        depth = max(float((one.triangles[0, 0] - surface.triangles[0, 0]) @ inwards) for one in behind)
         distance, hit = self._mesh.first_hits(starts, rays)
         past = np.flatnonzero((hit >= 0) & (distance * cosine > depth + BEFORE))
         ends = starts[past] + (distance[past, None] - BEFORE) * rays[past]
@@ -245,9 +240,7 @@ class _Space:
                 seen[~seen] = ~meets & (ways @ one.normal < 0)
         return float(cosine[past[seen]].sum() / cosine.sum())
 
-    def shares(
-        self, surface: WindowSurface, front: _Front
-    ) -> tuple[NDArray[np.float64] | None, NDArray[np.float64]]:
+    def shares(self, surface: WindowSurface, front: _Front) -> tuple[NDArray[np.float64] | None, NDArray[np.float64]]:
         """Shares [N] of light at `ANGLES` by what is in front of a pane.
 
         Means over azimuths.  First of the light from outdoors, what meets the pane past the rims
@@ -266,8 +259,7 @@ class _Space:
         far = (hit < 0) | (distance * (directions @ surface.normal) > depth)
         covered = (hit >= 0) & np.isin(self._owner[hit], front.numbers)
         past, facing = (
-            values.reshape(len(points), len(polar), TURNS).mean(axis=2)
-            for values in (far & ~covered, covered)
+            values.reshape(len(points), len(polar), TURNS).mean(axis=2) for values in (far & ~covered, covered)
         )
         free = past.sum(axis=0)
         beside = np.interp(ANGLES, polar, free / np.maximum(free + facing.sum(axis=0), 1 / TURNS))
@@ -343,9 +335,7 @@ def _points_off_edges(surface: WindowSurface) -> NDArray[np.float64]:
     return points + BEFORE * (surface.triangles.mean(axis=(0, 1)) - points)
 
 
-def cone(
-    normal: NDArray[np.float64], polar: NDArray[np.float64], turns: int
-) -> NDArray[np.float64]:
+def cone(normal: NDArray[np.float64], polar: NDArray[np.float64], turns: int) -> NDArray[np.float64]:
     """Directions [N, turns, 3] at polar angles [N] from a normal."""
     phi = 2 * np.pi * (np.arange(turns) + 0.5) / turns
     x = np.cross(normal, [0.0, 0.0, 1.0] if abs(normal[2]) < 0.9 else [1.0, 0.0, 0.0])

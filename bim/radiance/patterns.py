@@ -86,9 +86,7 @@ def ray_variables(
     return names | {f"N{a}P": names[f"N{a}"] for a in "xyz"} | {"RdotP": names["Rdot"]}
 
 
-def functions_of(
-    definition: Definition, rest: Sequence[str]
-) -> tuple[FunctionFile, NDArray[np.float64]]:
+def functions_of(definition: Definition, rest: Sequence[str]) -> tuple[FunctionFile, NDArray[np.float64]]:
     """Functions and frame [4, 4] of a primitive, from its file's name and transformation on."""
     primitive, frame = definition.primitive, definition.frame
     if not rest or rest[0] == ".":
@@ -107,10 +105,7 @@ def functions_of(
 
 
 def evaluated(
-    definition: Definition,
-    functions: FunctionFile,
-    text: str,
-    names: Mapping[str, NDArray[np.float64]],
+    definition: Definition, functions: FunctionFile, text: str, names: Mapping[str, NDArray[np.float64]]
 ) -> NDArray[np.float64]:
     """Value [..] of an expression of a primitive; `DataError` where it cannot be evaluated."""
     try:

@@ -38,9 +38,7 @@ class Primitive:
 
     def fault(self, message: str) -> DataError:
         """An error that names the place of this primitive."""
-        return DataError(
-            message, file=f"{self.file}:{self.line}", element=f"{self.kind} {self.name}"
-        )
+        return DataError(message, file=f"{self.file}:{self.line}", element=f"{self.kind} {self.name}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +59,7 @@ class Command:
 
     def fault(self, message: str) -> DataError:
         """An error that names the place of this line."""
-        return DataError(
-            message, file=f"{self.file}:{self.line}", element=f"!{self.programs[0][0]}"
-        )
+        return DataError(message, file=f"{self.file}:{self.line}", element=f"!{self.programs[0][0]}")
 
 
 def read_statements(path: Path) -> Iterator[Primitive | Command]:
@@ -142,12 +138,9 @@ class _Words:
             text = text[:-1] + " " + self.lines[self.line]
             self.line += 1
         if re.search(r"[`$;&<>]", text):
-            self._refuse(
-                start, f"!{text.strip()}: only programs and their pipes are read, no shell"
-            )
+            self._refuse(start, f"!{text.strip()}: only programs and their pipes are read, no shell")
         programs = tuple(
-            tuple(next(filter(None, m.groups()), "") for m in WORD.finditer(part))
-            for part in text.split("|")
+            tuple(next(filter(None, m.groups()), "") for m in WORD.finditer(part)) for part in text.split("|")
         )
         if not all(programs):
             self._refuse(start, f"!{text.strip()}: a program's name is missing")
@@ -158,9 +151,7 @@ class _Words:
         start = self.line
         kind, name = self._word("the type", start), self._word("the name", start)
         if kind == "alias":
-            return Primitive(
-                modifier, kind, name, (self._word("the name", start),), (), self.path, start
-            )
+            return Primitive(modifier, kind, name, (self._word("the name", start),), (), self.path, start)
         strings = [self._word("its strings", start) for _ in range(self._count(start, "strings"))]
         for _ in range(self._count(start, "integers")):
             self._word("its integers", start)

@@ -19,24 +19,9 @@ import trimesh
 from numpy.typing import NDArray
 
 from bim.planes import newell_normal, plane_through, triangulated
-from bim.radiance.materials import (
-    MATERIALS,
-    MIXTURE,
-    PATTERNS,
-    RadianceMaterial,
-    material_of,
-    mixed_material,
-)
+from bim.radiance.materials import MATERIALS, MIXTURE, PATTERNS, RadianceMaterial, material_of, mixed_material
 from bim.radiance.patterns import COMPUTED_PATTERNS, EVEN, pattern_values
-from bim.radiance.primitives import (
-    VOID,
-    Command,
-    Definition,
-    Primitive,
-    count_of,
-    number_of,
-    read_statements,
-)
+from bim.radiance.primitives import VOID, Command, Definition, Primitive, count_of, number_of, read_statements
 from bim.radiance.xform import Xform, read_xform
 from bim.report.issue import Issue, area_words
 from mitsuba_cfs.errors import DataError
@@ -62,9 +47,7 @@ def triangles_of(primitive: Primitive) -> NDArray[np.float64]:
         raise primitive.fault(f"a coordinate or size is above {LARGEST:g}")
     if kind == "polygon":
         if len(numbers) < 9 or len(numbers) % 3:
-            raise primitive.fault(
-                f"expected three numbers of each corner, got {len(numbers)} numbers"
-            )
+            raise primitive.fault(f"expected three numbers of each corner, got {len(numbers)} numbers")
         return polygon_triangles(numbers.reshape(-1, 3))
     if len(numbers) != ARGUMENTS[kind]:
         raise primitive.fault(f"expected {ARGUMENTS[kind]} numbers, got {len(numbers)}")
@@ -139,10 +122,7 @@ def genbox(words: tuple[str, ...]) -> tuple[str, list[Polygon]]:
     if set(rest[3:]) - {"-i"}:
         raise ValueError(f"option {next(w for w in rest[3:] if w != '-i')} is not read")
     turn = -1 if "-i" in rest[3:] else 1
-    return material, [
-        (f"{name}.{side}", np.array(corners, float)[::turn] * size)
-        for side, corners in SIDES.items()
-    ]
+    return material, [(f"{name}.{side}", np.array(corners, float)[::turn] * size) for side, corners in SIDES.items()]
 
 
 def genprism(words: tuple[str, ...]) -> tuple[str, list[Polygon]]:
@@ -157,12 +137,7 @@ def genprism(words: tuple[str, ...]) -> tuple[str, list[Polygon]]:
     if count < 3 or len(outline) < 2 * count:
         raise ValueError(f"expected the x and y of {words[3]} corners, at least three")
     ring = np.column_stack([outline.reshape(-1, 2), np.zeros(count)])
-    along, is_open, has_ends, rest = (
-        np.array([0.0, 0.0, 1.0]),
-        False,
-        True,
-        list(words[4 + 2 * count :]),
-    )
+    along, is_open, has_ends, rest = (np.array([0.0, 0.0, 1.0]), False, True, list(words[4 + 2 * count :]))
     while rest:
         option = rest.pop(0)
         if option == "-l":
@@ -232,9 +207,7 @@ class RadianceScene:
         for name in wanted:
             if name not in known:
                 there = ", ".join(sorted(known)[:12])
-                raise DataError(
-                    f"no surface has it; there are {there}", file=self.files[0], element=name
-                )
+                raise DataError(f"no surface has it; there are {there}", file=self.files[0], element=name)
         return [thing for thing in self.objects if set(thing.modifiers) & set(wanted)]
 
 
@@ -397,9 +370,7 @@ class _Reader:
             material = mixed_material(material.name, share, *(part.material for part in parts))
             if not material.is_translucent and np.ptp(values) > EVEN:
                 self._leave_out("material-mixture-averaged", mixture.primitive)
-        return RadianceObject(
-            name, material, known.names, triangles, surface, known.definitions, tuple(parts)
-        )
+        return RadianceObject(name, material, known.names, triangles, surface, known.definitions, tuple(parts))
 
     def _material(self, modifier: str, surface: Primitive, area: float) -> _Modifier | None:
         """The material of a surface of that area [m2]; None where none is read."""
@@ -465,18 +436,13 @@ class _Reader:
         return _Modifier(material, names, (mixture,), tuple(parts))
 
     def _with_patterns(
-        self,
-        material: RadianceMaterial,
-        definitions: Sequence[Definition],
-        triangles: NDArray[np.float64],
+        self, material: RadianceMaterial, definitions: Sequence[Definition], triangles: NDArray[np.float64]
     ) -> RadianceMaterial:
         """An opaque material with the mean of its patterns over a surface."""
         patterns = definitions[:-1]
         if not patterns or not material.is_opaque:
             return material
-        first = next(
-            (one.primitive for one in patterns if one.primitive.kind not in COMPUTED_PATTERNS), None
-        )
+        first = next((one.primitive for one in patterns if one.primitive.kind not in COMPUTED_PATTERNS), None)
         patterns = [one for one in patterns if one.primitive.kind in COMPUTED_PATTERNS]
         if first is not None:
             self._leave_out("material-patterns-left-out", first, first.kind)
@@ -500,9 +466,7 @@ class _Reader:
         while modifier != VOID:
             known = self.defined.get(modifier)
             if known is None or any(one is known for one in patterns):
-                raise surface.fault(
-                    f"modifier {modifier} of {material.name} is not defined before it"
-                )
+                raise surface.fault(f"modifier {modifier} of {material.name} is not defined before it")
             if known.primitive.kind == "alias":
                 modifier = known.primitive.strings[0]
                 continue
@@ -510,9 +474,7 @@ class _Reader:
             modifier = known.primitive.modifier
         return patterns
 
-    def _leave_out(
-        self, code: str, primitive: Primitive, kind: str = "", area: float = 0.0
-    ) -> None:
+    def _leave_out(self, code: str, primitive: Primitive, kind: str = "", area: float = 0.0) -> None:
         self.left_out[code, kind] += 1
         self.areas[code, kind] += area
         self.first.setdefault((code, kind), primitive)
@@ -558,14 +520,6 @@ def _name(primitive: Primitive, outer: tuple[Xform, ...]) -> str:
 
 def _primitives(command: Command, material: str, polygons: list[Polygon]) -> list[Primitive]:
     return [
-        Primitive(
-            material,
-            "polygon",
-            name,
-            (),
-            tuple(corners.ravel().tolist()),
-            command.file,
-            command.line,
-        )
+        Primitive(material, "polygon", name, (), tuple(corners.ravel().tolist()), command.file, command.line)
         for name, corners in polygons
     ]

@@ -71,9 +71,7 @@ def _copies(stages: list[tuple[str, int, list[NDArray[np.float64]]]]) -> Iterato
         once = np.eye(4)
         for move in moves:
             once = move @ once
-        powers = [
-            np.linalg.matrix_power(once, k) for k in (range(times) if kind == "-a" else [times])
-        ]
+        powers = [np.linalg.matrix_power(once, k) for k in (range(times) if kind == "-a" else [times])]
         copies = [power @ before for before in copies for power in powers]
     return iter(copies)
 

@@ -40,11 +40,7 @@ def page() -> str:
     """The page in Markdown: a table of the codes of each chapter of the catalogue."""
     parts = [HEAD]
     for title, codes in _chapters():
-        parts += [
-            f"\n## {title}\n",
-            "| code | severity | what | effect | fix |",
-            "|---|---|---|---|---|",
-        ]
+        parts += [f"\n## {title}\n", "| code | severity | what | effect | fix |", "|---|---|---|---|---|"]
         parts += [_row(code, catalogue()[code]) for code in codes]
     return "\n".join(parts) + "\n"
 

@@ -143,9 +143,7 @@ def issue_text(issue: Issue, audience: Audience = "python", fill: Fill = filled)
     words = {key: _words(value, fill) for key, value in issue.values.items()}
     fix = template.fix if audience == "python" else template.fix_command or template.fix
     texts = (
-        fill(text, template.singular.get(text, ""), **{"where": issue.where, **words})
-        if text
-        else ""
+        fill(text, template.singular.get(text, ""), **{"where": issue.where, **words}) if text else ""
         for text in (template.what, template.effect, fix)
     )
     return IssueText(*texts)
@@ -160,9 +158,7 @@ def issue_note(issue: Issue, audience: Audience = "command") -> Note:
 
 
 def issue_rows(
-    issues: Iterable[Issue],
-    audience: Audience = "python",
-    fill: Fill = filled,
+    issues: Iterable[Issue], audience: Audience = "python", fill: Fill = filled
 ) -> list[tuple[str, str, str, str, str]]:
     """Rows of `COLUMNS`; the consequence is the effect with the fix."""
     rows: list[tuple[str, str, str, str, str]] = []
@@ -207,8 +203,6 @@ def _template(code: str, table: Mapping[str, Any]) -> Template:
         raise ValueError(f"issue {code}: severity {table['severity']!r} is none of {SEVERITIES}")
     singular = {table[key]: table[f"{key}-one"] for key in table if f"{key}-one" in table}
     texts = {
-        key.replace("-", "_"): value
-        for key, value in table.items()
-        if key != "group" and not key.endswith("-one")
+        key.replace("-", "_"): value for key, value in table.items() if key != "group" and not key.endswith("-one")
     }
     return Template(**texts, group=tuple(table.get("group", ())), singular=singular)

@@ -5,16 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bim.report.issue import (
-    Audience,
-    Fill,
-    Issue,
-    IssueText,
-    Phrase,
-    catalogue,
-    issue_text,
-    phrases,
-)
+from bim.report.issue import Audience, Fill, Issue, IssueText, Phrase, catalogue, issue_text, phrases
 from mitsuba_cfs.notes import filled
 
 LOST = {"room": 2, "window": 1}

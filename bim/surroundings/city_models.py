@@ -150,14 +150,10 @@ def monthly_transmittance(foliage: Foliage, latitude_deg: float | None) -> tuple
     if foliage == "evergreen":
         return (LEAFED,) * 12
     shift = 6 if latitude_deg is not None and latitude_deg < 0 else 0
-    return tuple(
-        LEAFED if (month + shift - 1) % 12 + 1 in LEAFY_MONTHS else BARE for month in range(1, 13)
-    )
+    return tuple(LEAFED if (month + shift - 1) % 12 + 1 in LEAFY_MONTHS else BARE for month in range(1, 13))
 
 
-def _metres(
-    fields: dict[str, Any], name: str, element: str, path: Path, default: float | None = None
-) -> float:
+def _metres(fields: dict[str, Any], name: str, element: str, path: Path, default: float | None = None) -> float:
     value = fields.get(name, default)
     if not is_number(value) or not 0 <= value < 200:
         message = f"expected metres, got {value!r:.40}"
@@ -265,9 +261,7 @@ def _number(fields: dict[str, Any], names: tuple[str, ...], name: str, path: Pat
             try:
                 value = float(value.strip().removesuffix("m").strip().replace(",", "."))
             except ValueError:
-                raise DataError(
-                    f"expected metres, got {value[:40]!r}", file=path, element=name, field=key
-                ) from None
+                raise DataError(f"expected metres, got {value[:40]!r}", file=path, element=name, field=key) from None
         if value is None:
             continue
         if not is_number(value) or not 0 <= value < 10_000:
@@ -302,8 +296,7 @@ def _flat(points: np.ndarray) -> np.ndarray:
     return np.column_stack([points, np.zeros(len(points))])
 
 
-TERRAINS = ("TINRelief", "Road", "LandUse", "WaterBody", "Railway", "TransportSquare", "Square",
-            "PlantCover")  # fmt: skip
+TERRAINS = ("TINRelief", "Road", "LandUse", "WaterBody", "Railway", "TransportSquare", "Square", "PlantCover")
 FINEST = 3.0  # level of detail below which geometry is taken: 2.2 is, 3 (with openings) is not
 NO_GEOMETRY = "objects-without-geometry"  # code of the issue
 
@@ -313,9 +306,7 @@ def city_object(name: str, kind: str, triangles: NDArray[np.float64]) -> Surroun
     return SurroundingObject(name, triangles, TERRAIN if kind in TERRAINS else BODY)
 
 
-def triangles_of_surfaces(
-    surfaces: Iterable[Sequence[NDArray[np.float64]]],
-) -> NDArray[np.float64]:
+def triangles_of_surfaces(surfaces: Iterable[Sequence[NDArray[np.float64]]]) -> NDArray[np.float64]:
     """Triangles [T, 3, 3] of polygons, each of an outline [N, 3] and its holes."""
     triangles = [np.empty((0, 3, 3))]
     for rings in surfaces:
@@ -372,9 +363,7 @@ def read_citygml(path: Path) -> SurroundingsFile:
                 member.left_out[NO_GEOMETRY] += 1
         objects += member.objects
         left_out += member.left_out
-    return SurroundingsFile(
-        path, tuple(objects), next(iter(systems), None), left_out=tuple(left_out.items())
-    )
+    return SurroundingsFile(path, tuple(objects), next(iter(systems), None), left_out=tuple(left_out.items()))
 
 
 def _systems(element: Element) -> Iterator[str]:
@@ -432,9 +421,7 @@ def _geometries(feature: Element) -> Iterator[tuple[int, int, list[Element]]]:
         yield level, KINDS.index("Surface"), owners
 
 
-def _finest(
-    geometries: list[tuple[int, int, list[Element]]], name: str, member: _Member
-) -> tuple[list[Rings], int]:
+def _finest(geometries: list[tuple[int, int, list[Element]]], name: str, member: _Member) -> tuple[list[Rings], int]:
     """The surfaces of the finest complete geometry, and how many of them were not found.
 
     Where none is complete, of the one with most surfaces.
@@ -444,9 +431,7 @@ def _finest(
         seen: set[int] = set()
         missing: list[str] = []
         surfaces = [
-            _rings(polygon, name, member)
-            for owner in owners
-            for polygon in _polygons(owner, member, seen, missing)
+            _rings(polygon, name, member) for owner in owners for polygon in _polygons(owner, member, seen, missing)
         ]
         if surfaces and not missing:
             return surfaces, 0
@@ -454,9 +439,7 @@ def _finest(
     return max(complete, key=lambda one: len(one[0]))
 
 
-def _polygons(
-    owner: Element, member: _Member, seen: set[int], missing: list[str]
-) -> Iterator[Element]:
+def _polygons(owner: Element, member: _Member, seen: set[int], missing: list[str]) -> Iterator[Element]:
     """The polygons in an element and those that it names, each once: links may go in circles."""
     waiting = [owner]
     while waiting:
@@ -585,17 +568,14 @@ def _level(geometry: dict[str, Any]) -> float:
         return 0.0
 
 
-def _triangles(
-    geometry: dict[str, Any], vertices: NDArray[np.float64], name: str, path: Path
-) -> NDArray[np.float64]:
+def _triangles(geometry: dict[str, Any], vertices: NDArray[np.float64], name: str, path: Path) -> NDArray[np.float64]:
     """Triangles [T, 3, 3] of all surfaces of a geometry."""
     boundaries, depth = geometry.get("boundaries"), DEPTH[geometry["type"]]
     if not _is_nested(boundaries, depth + 1, len(vertices)):
         message = "expected lists of the numbers of vertices"
         raise DataError(message, file=path, element=name[:60], field="boundaries")
     return triangles_of_surfaces(
-        [vertices[np.asarray(ring, dtype=int)] for ring in one]
-        for one in _surfaces(boundaries, depth)
+        [vertices[np.asarray(ring, dtype=int)] for ring in one] for one in _surfaces(boundaries, depth)
     )
 
 

@@ -23,8 +23,18 @@ from mitsuba_cfs.files import reason
 
 SUFFIXES = (".obj", ".stl", ".ply", ".glb", ".gltf")
 # what trimesh's readers raise where a file is none of theirs: NumPy's, struct's and their own
-FAULTS = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, AssertionError,
-          NotImplementedError, EOFError, MemoryError, struct.error)  # fmt: skip
+FAULTS = (
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    AssertionError,
+    NotImplementedError,
+    EOFError,
+    MemoryError,
+    struct.error,
+)
 UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0, 0, 0, 1.0]])
 
 
@@ -57,9 +67,7 @@ def read_meshes(path: Path) -> SurroundingsFile:
         _check_data(content, path)
     resolver = _NoFiles()
     try:
-        scene = trimesh.load_scene(
-            io.BytesIO(content), file_type=kind, resolver=resolver, skip_materials=True
-        )
+        scene = trimesh.load_scene(io.BytesIO(content), file_type=kind, resolver=resolver, skip_materials=True)
         meshes = [
             (m.metadata.get("name"), np.asarray(m.triangles, dtype=float))
             for m in scene.dump()
@@ -67,9 +75,7 @@ def read_meshes(path: Path) -> SurroundingsFile:
         ]
     except FAULTS as error:
         reason = (str(error).splitlines() or [""])[0][:120]
-        raise DataError(
-            f"is no {kind.upper()} mesh: {reason or type(error).__name__}", file=path
-        ) from None
+        raise DataError(f"is no {kind.upper()} mesh: {reason or type(error).__name__}", file=path) from None
     objects = []
     for number, (named, triangles) in enumerate(meshes, 1):
         if kind in ("glb", "gltf"):

@@ -43,13 +43,7 @@ from bim.rays import RayMesh, ray_mesh
 from bim.report.issue import Issue, Phrase
 from bim.shell import enclosed_volume
 from bim.surroundings.city_models import SUFFIXES as CITYGML
-from bim.surroundings.city_models import (
-    monthly_transmittance,
-    read_citygml,
-    read_cityjson,
-    read_footprints,
-    read_trees,
-)
+from bim.surroundings.city_models import monthly_transmittance, read_citygml, read_cityjson, read_footprints, read_trees
 from bim.surroundings.objects import (
     SUFFIXES,
     TERRAIN,
@@ -103,11 +97,16 @@ def crown_elements(
         months = tuple((np.flatnonzero(counts >= last) + 1).tolist())
         elements.append(
             Element(
-                f"{guid}-{layer}", crown.name, crown.ifc_class, leaves[first:last],
-                REFLECTANCE_VISIBLE, REFLECTANCE_SOLAR, layer=TREE_LAYER,
+                f"{guid}-{layer}",
+                crown.name,
+                crown.ifc_class,
+                leaves[first:last],
+                REFLECTANCE_VISIBLE,
+                REFLECTANCE_SOLAR,
+                layer=TREE_LAYER,
                 months=() if len(months) == 12 else months,
             )
-        )  # fmt: skip
+        )
     return elements
 
 
@@ -145,9 +144,7 @@ def _paths(mesh: RayMesh, axis: int) -> FloatArray:
     return lengths[(crossings > 0) & ~odd]
 
 
-def _inside(
-    mesh: RayMesh, origins: FloatArray, direction: FloatArray
-) -> tuple[FloatArray, NDArray[np.int64]]:
+def _inside(mesh: RayMesh, origins: FloatArray, direction: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
     """How far [n] rays go inside a closed mesh [m], and how often [n] they cross it."""
     rays = np.broadcast_to(direction, origins.shape)
     t, lengths = np.zeros(len(origins)), np.zeros(len(origins))
@@ -263,8 +260,7 @@ def horizon_wall(
 
 FloatArray = NDArray[np.float64]
 GRIDS = (".asc", ".xyz")
-HEADER = ("ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize",
-          "nodata_value")  # fmt: skip
+HEADER = ("ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "nodata_value")
 MOST_NODES = 20_000_000
 OFF_GRID = 0.01  # of a step: nodes of an XYZ list may lie beside their place
 NODATA = -9999.0  # where no header says another
@@ -318,15 +314,11 @@ def _kept(line: FloatArray, distance: FloatArray, steps_deg: float) -> NDArray[n
     return np.array([*kept, len(line) - 1])
 
 
-def _worst(
-    nodes: FloatArray, rows: NDArray[np.int64], columns: NDArray[np.int64], flat: FloatArray
-) -> float:
+def _worst(nodes: FloatArray, rows: NDArray[np.int64], columns: NDArray[np.int64], flat: FloatArray) -> float:
     """Greatest difference in height between nodes and the mean of the cells kept [degrees]."""
     few = nodes[np.ix_(rows, columns)][..., 2]
     across = np.stack([np.interp(np.arange(nodes.shape[1]), columns, row) for row in few])
-    whole = np.stack(
-        [np.interp(np.arange(nodes.shape[0]), rows, column) for column in across.T], axis=1
-    )
+    whole = np.stack([np.interp(np.arange(nodes.shape[0]), rows, column) for column in across.T], axis=1)
     off = np.abs(nodes[..., 2] - whole)
     seen = np.degrees(np.arctan2(off, np.maximum(flat, 1.0)))
     return float(np.nanmax(seen)) if np.isfinite(seen).any() else 0.0
@@ -341,9 +333,7 @@ def _ascii_grid(text: str, path: Path) -> FloatArray:
         try:
             fields[name] = float(words[1])
         except ValueError:
-            raise DataError(
-                f"expected a number, got {words[1]!r:.40}", file=path, field=name
-            ) from None
+            raise DataError(f"expected a number, got {words[1]!r:.40}", file=path, field=name) from None
         words = words[2:]
     missing = [name for name in ("ncols", "nrows", "cellsize") if name not in fields]
     for axis in "xy":
@@ -356,10 +346,7 @@ def _ascii_grid(text: str, path: Path) -> FloatArray:
     if not (whole and rows * columns <= MOST_NODES):
         message = f"expected 2 and more, {MOST_NODES} in all at the most"
         raise DataError(message, file=path, field="ncols, nrows")
-    place = [
-        fields.get(f"{axis}llcenter", fields.get(f"{axis}llcorner", 0.0) + step / 2)
-        for axis in "xy"
-    ]
+    place = [fields.get(f"{axis}llcenter", fields.get(f"{axis}llcorner", 0.0) + step / 2) for axis in "xy"]
     if not (0 < step < 1e5 and are_coordinates(np.array(place))):
         raise DataError("expected metres", file=path, field="cellsize")
     heights = _numbers(" ".join(words), path)
@@ -416,9 +403,7 @@ SAME_PLACE = 0.5  # share of a room that a footprint covers which is the buildin
 
 
 def with_surroundings(
-    building: Building,
-    files: Sequence[str | PathLike[str]],
-    offset: Sequence[float] | None = None,
+    building: Building, files: Sequence[str | PathLike[str]], offset: Sequence[float] | None = None
 ) -> Building:
     """The building with what files hold of its surroundings.
 
@@ -452,10 +437,7 @@ def with_surroundings(
             elements.append(_element(SurroundingObject("horizon", walls), file, len(elements)))
             continue
         context = read_surroundings(file)
-        placed = [
-            replace(one, foliage=named.get(one.name, one.foliage))
-            for one in _placed(context, building, offset)
-        ]
+        placed = [replace(one, foliage=named.get(one.name, one.foliage)) for one in _placed(context, building, offset)]
         crowns = [one for one in placed if one.foliage is not None]
         trees += [(one, f"{file.stem}-tree-{n}") for n, one in enumerate(crowns)]
         placed = [one for one in placed if one.foliage is None]
@@ -518,10 +500,7 @@ def _named_crowns(files: Sequence[Path]) -> dict[str, Foliage]:
 
 
 def _leaves(
-    trees: Sequence[tuple[SurroundingObject, str]],
-    building: Building,
-    centre: NDArray[np.float64],
-    size: float,
+    trees: Sequence[tuple[SurroundingObject, str]], building: Building, centre: NDArray[np.float64], size: float
 ) -> tuple[list[Element], list[Issue]]:
     """The leaves of crowns, and what is to be said of them at the head of every result."""
     elements: list[Element] = []
@@ -553,12 +532,16 @@ def _by_month(shares: Sequence[float]) -> tuple[Phrase, ...]:
     starts = [month for month in range(12) if shares[month] != shares[month - 1]]
     ends = [(month - 1) % 12 for month in (*starts[1:], starts[0])]
     return tuple(
-        Phrase("share-of-months", {
-            "percent": 100 * shares[first],
-            "first": Phrase(f"month-{first + 1}"), "last": Phrase(f"month-{last + 1}"),
-        })
+        Phrase(
+            "share-of-months",
+            {
+                "percent": 100 * shares[first],
+                "first": Phrase(f"month-{first + 1}"),
+                "last": Phrase(f"month-{last + 1}"),
+            },
+        )
         for first, last in zip(starts, ends, strict=True)
-    )  # fmt: skip
+    )
 
 
 def _is_horizon(path: Path) -> bool:
@@ -568,9 +551,7 @@ def _is_horizon(path: Path) -> bool:
     return path.suffix.lower() == ".json" and "horizon" in path.name.lower()
 
 
-def _placed(
-    context: SurroundingsFile, building: Building, offset: Sequence[float] | None
-) -> list[SurroundingObject]:
+def _placed(context: SurroundingsFile, building: Building, offset: Sequence[float] | None) -> list[SurroundingObject]:
     """The file's objects in the building's world."""
     if offset is not None:
         moved = np.asarray(offset, dtype=float)
@@ -584,14 +565,10 @@ def _placed(
         raise DataError(message, file=context.path, field="coordinate system")
     if context.crs is None and not context.on_own_map:
         return list(context.objects)
-    return [
-        _each(one, lambda points: _to_world(points, context, building)) for one in context.objects
-    ]
+    return [_each(one, lambda points: _to_world(points, context, building)) for one in context.objects]
 
 
-def _each(
-    one: SurroundingObject, move: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-) -> SurroundingObject:
+def _each(one: SurroundingObject, move: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> SurroundingObject:
     """An object with its points [N, 3] moved."""
     triangles = move(one.triangles.reshape(-1, 3)).reshape(-1, 3, 3)
     if one.nodes is None:
@@ -620,9 +597,7 @@ def _meshed(
     return elements, issues
 
 
-def _to_world(
-    points: NDArray[np.float64], context: SurroundingsFile, building: Building
-) -> NDArray[np.float64]:
+def _to_world(points: NDArray[np.float64], context: SurroundingsFile, building: Building) -> NDArray[np.float64]:
     file, place = str(context.path), building.georeference
     if place is not None:
         flat = transformed(points[:, :2], context.crs or place.crs, place.crs, file=file)
@@ -644,15 +619,11 @@ def _to_world(
 
 
 def _beside(
-    objects: Sequence[SurroundingObject],
-    context: SurroundingsFile,
-    building: Building,
-    centre: NDArray[np.float64],
+    objects: Sequence[SurroundingObject], context: SurroundingsFile, building: Building, centre: NDArray[np.float64]
 ) -> tuple[list[SurroundingObject], list[Issue]]:
     """The objects that are not the building itself and not beyond all sight."""
     rooms = [
-        (shapely.MultiPoint(s.shell.reshape(-1, 3)[:, :2]).convex_hull, s.shell.reshape(-1, 3))
-        for s in building.spaces
+        (shapely.MultiPoint(s.shell.reshape(-1, 3)[:, :2]).convex_hull, s.shell.reshape(-1, 3)) for s in building.spaces
     ]
     kept, own, far = [], [], 0
     for one in objects:
@@ -673,9 +644,7 @@ def _beside(
     return kept, issues
 
 
-def _is_building_itself(
-    one: SurroundingObject, rooms: Sequence[tuple[shapely.Geometry, NDArray[np.float64]]]
-) -> bool:
+def _is_building_itself(one: SurroundingObject, rooms: Sequence[tuple[shapely.Geometry, NDArray[np.float64]]]) -> bool:
     corners = one.triangles.reshape(-1, 3)
     if one.ifc_class != SurroundingObject.__dataclass_fields__["ifc_class"].default:
         return False

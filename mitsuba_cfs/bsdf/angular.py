@@ -10,15 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.evaluate import through_peak
-from mitsuba_cfs.bsdf.glazing import (
-    Glazing,
-    Pane,
-    PaneOptics,
-    glazing_values,
-    pane_optics,
-    polarised_values,
-    stack,
-)
+from mitsuba_cfs.bsdf.glazing import Glazing, Pane, PaneOptics, glazing_values, pane_optics, polarised_values, stack
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, spectral_glazing
 from mitsuba_cfs.errors import DataError
@@ -77,9 +69,7 @@ class AngularTable:
         values = self.transmittance if values is None else values
         return self._at(values, end, np.arccos(np.linspace(0.0, 1.0, STEPS)))
 
-    def patch_means(
-        self, basis: KlemsBasis, values: FloatArray | None = None, end: float = 0.0
-    ) -> FloatArray:
+    def patch_means(self, basis: KlemsBasis, values: FloatArray | None = None, end: float = 0.0) -> FloatArray:
         """Means [K] over the patches in cos(theta) d_omega; the transmittance by default."""
         places = (np.arange(PLACES) + 0.5) / PLACES
         theta, _ = basis.angles_within(np.arange(basis.size)[:, None], places, 0.5)

@@ -43,14 +43,10 @@ def venetian_blind(
     check_number("segments", segments, 1, whole=True)
     profile = slat_profile(depth, radius, thickness, 1 if np.isinf(radius) else segments)
     c, s = np.cos(tilt), np.sin(tilt)
-    turned = np.stack(
-        [profile[..., 1] * c - profile[..., 0] * s, profile[..., 0] * c + profile[..., 1] * s], -1
-    )
+    turned = np.stack([profile[..., 1] * c - profile[..., 0] * s, profile[..., 0] * c + profile[..., 1] * s], -1)
     width = width or max(spacing, depth)
     triangles = extrude(turned, width)
-    return PeriodicLayer(
-        triangles, np.zeros(len(triangles), dtype=np.int64), (material,), (width, spacing)
-    )
+    return PeriodicLayer(triangles, np.zeros(len(triangles), dtype=np.int64), (material,), (width, spacing))
 
 
 def vertical_louvre(material: SlatMaterial, **options: Any) -> PeriodicLayer:
@@ -60,9 +56,7 @@ def vertical_louvre(material: SlatMaterial, **options: Any) -> PeriodicLayer:
     return PeriodicLayer(triangles, flat.material, flat.materials, flat.period[::-1])
 
 
-def slat_profile(
-    depth: float, radius: float, thickness: float, segments: int
-) -> NDArray[np.float64]:
+def slat_profile(depth: float, radius: float, thickness: float, segments: int) -> NDArray[np.float64]:
     """Edges [N, 2, 2] of a slat's section: across (outwards) and up, seen along the slat [m]."""
     if not radius >= depth / 2:
         raise ValueError(f"radius: expected at least half the depth {depth} m, got {radius} m")

@@ -30,8 +30,7 @@ class Finding:
 def check_bsdf(file: BsdfFile) -> list[Finding]:
     """Findings about a BSDF file."""
     findings = [
-        Finding("warning", "file", note, "the values used differ from those in the file")
-        for note in file.notes
+        Finding("warning", "file", note, "the values used differ from those in the file") for note in file.notes
     ]
     findings += _check_bands(file)
     for band, bsdf in file.bands.items():
@@ -49,13 +48,9 @@ def check_bsdf(file: BsdfFile) -> list[Finding]:
 def _check_bands(file: BsdfFile) -> list[Finding]:
     findings = []
     if "Visible" not in file.bands:
-        findings.append(
-            Finding("error", "file", "no Visible band", "daylight cannot be computed with it")
-        )
+        findings.append(Finding("error", "file", "no Visible band", "daylight cannot be computed with it"))
     if "Solar" not in file.bands:
-        findings.append(
-            Finding("warning", "file", "no Solar band", "heat gains need another file's values")
-        )
+        findings.append(Finding("warning", "file", "no Solar band", "heat gains need another file's values"))
     colour = [band for band in ("CIE-X", "CIE-Z") if band in file.bands]
     if len(colour) == 1:
         findings.append(Finding("warning", "file", f"{colour[0]} alone", "colour is left out"))
@@ -68,9 +63,7 @@ def _check_blocks(band: str, bsdf: Bsdf) -> list[Finding]:
         block, label = getattr(bsdf, name), f"{band} {name.replace('_', ' ')}"
         if name.startswith("reflection"):
             if block is None:
-                findings.append(
-                    Finding("warning", label, "is absent", "taken for black, as Radiance does")
-                )
+                findings.append(Finding("warning", label, "is absent", "taken for black, as Radiance does"))
             continue
         other = "transmission_" + ("back" if name.endswith("front") else "front")
         if bsdf.is_dummy(block):

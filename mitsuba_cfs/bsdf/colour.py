@@ -16,11 +16,7 @@ from mitsuba_cfs.bsdf.tensor_tree import TensorTree
 COLOUR_BANDS = ("CIE-X", "CIE-Z")
 # linear sRGB from CIE XYZ (IEC 61966-2-1, as Mitsuba's `xyz_to_srgb`); its white is D65
 XYZ_TO_RGB = np.array(
-    [
-        [3.240479, -1.537150, -0.498535],
-        [-0.969256, 1.875991, 0.041556],
-        [0.055648, -0.204043, 1.057311],
-    ]
+    [[3.240479, -1.537150, -0.498535], [-0.969256, 1.875991, 0.041556], [0.055648, -0.204043, 1.057311]]
 )
 RGB_TO_XYZ = np.linalg.inv(XYZ_TO_RGB)
 WHITE = RGB_TO_XYZ.sum(axis=1)  # [3] X, Y, Z of what reflects all
@@ -35,9 +31,7 @@ def relative_rgb(x: ArrayLike, y: ArrayLike, z: ArrayLike) -> NDArray[np.float64
     x, y, z = (np.asarray(band, dtype=float) for band in (x, y, z))
     dark = y <= 0
     scale = 1 / np.where(dark, 1.0, y)
-    xyz = np.stack(
-        [np.where(dark, 1.0, x * scale), np.ones_like(y), np.where(dark, 1.0, z * scale)]
-    )
+    xyz = np.stack([np.where(dark, 1.0, x * scale), np.ones_like(y), np.where(dark, 1.0, z * scale)])
     rgb = np.maximum(np.tensordot(xyz * WHITE.reshape(-1, *[1] * y.ndim), XYZ_TO_RGB, (0, 1)), 0.0)
     return rgb / (rgb @ RGB_TO_XYZ[1])[..., None]
 

@@ -16,9 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 # EN 410 table 2: wavelength [nm], normalised distribution of global solar radiation (air mass 1)
 # times the wavelength interval
-SOLAR_NM = np.array(
-    [*range(300, 800, 20), *range(800, 2100, 50), *range(2100, 2501, 100)], dtype=float
-)
+SOLAR_NM = np.array([*range(300, 800, 20), *range(800, 2100, 50), *range(2100, 2501, 100)], dtype=float)
 SOLAR_SHARE = 1e-4 * np.fromstring(
     "5 69 122 145 177 235 268 294 343 339 326 318 321 312 294 289 289 280 273 246 237 220 230 199 "
     "211 330 453 381 220 329 306 185 136 210 211 166 42 10 44 95 123 110 106 93 68 24 5 2 12 30 37 "
@@ -77,9 +75,7 @@ def colour_rendering_index(wavelength_nm: ArrayLike, value: ArrayLike) -> float:
     return float(np.mean(indices))
 
 
-def _weighted(
-    wavelength_nm: ArrayLike, value: ArrayLike, nm: NDArray[Any], weight: NDArray[Any]
-) -> float:
+def _weighted(wavelength_nm: ArrayLike, value: ArrayLike, nm: NDArray[Any], weight: NDArray[Any]) -> float:
     """Mean of the data at `nm` by `weight`; the data must reach over where the weight is."""
     rising = _rising(wavelength_nm)
     _check_reach(rising, nm, weight)
@@ -90,10 +86,7 @@ def _check_reach(given: NDArray[Any], nm: NDArray[Any], weight: NDArray[Any]) ->
     """Raise `ValueError` for data that leave out more than `LEFT_OUT` of the weight."""
     beyond = (nm < given[0] - 1e-6) | (nm > given[-1] + 1e-6)
     if weight[beyond].sum() > LEFT_OUT * weight.sum():
-        raise ValueError(
-            f"spectral data from {given[0]:g} to {given[-1]:g} nm: "
-            f"expected {nm[0]:g} to {nm[-1]:g} nm"
-        )
+        raise ValueError(f"spectral data from {given[0]:g} to {given[-1]:g} nm: expected {nm[0]:g} to {nm[-1]:g} nm")
 
 
 def _rising(wavelength_nm: ArrayLike) -> NDArray[np.float64]:

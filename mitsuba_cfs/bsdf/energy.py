@@ -16,9 +16,7 @@ DIRECTION_LIMIT = 1.5  # times as much, of a single direction: no noise of a mea
 ENERGY_SLACK = 1e-3  # above 1 by which rounded files may be
 
 
-def check_energy(
-    bsdf: Bsdf, limit: float, *, file: str | PathLike[str], band: str
-) -> tuple[str, ...]:
+def check_energy(bsdf: Bsdf, limit: float, *, file: str | PathLike[str], band: str) -> tuple[str, ...]:
     """Notes on energy conservation; `DataError` where a side scatters more light than it receives.
 
     Grazing directions of measured and computed data often do so by a few per cent, and contain

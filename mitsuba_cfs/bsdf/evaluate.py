@@ -31,10 +31,7 @@ def bsdf_values(bsdf: Bsdf, incident: ArrayLike, outgoing: ArrayLike) -> NDArray
     front = incident[:, 2] > 0
     reflected = front == (outgoing[:, 2] > 0)
     for side, chosen in (("front", front), ("back", ~front)):
-        for kind, mask in (
-            ("reflection", chosen & reflected),
-            ("transmission", chosen & ~reflected),
-        ):
+        for kind, mask in (("reflection", chosen & reflected), ("transmission", chosen & ~reflected)):
             if mask.any():
                 values[mask] = _block_values(bsdf, f"{kind}_{side}", incident[mask], outgoing[mask])
     return values
@@ -55,9 +52,7 @@ def direct_hemispherical(bsdf: Bsdf, block: str, incident: ArrayLike) -> NDArray
     if tree.rank == 3:
         cell = (_isotropic_position(incident) * (1 << tree.depth)).astype(int)
         return shares[np.minimum(cell, len(shares) - 1)]
-    cell = np.minimum(
-        (disk_to_square(incident_disk(incident)) * len(shares)).astype(int), len(shares) - 1
-    )
+    cell = np.minimum((disk_to_square(incident_disk(incident)) * len(shares)).astype(int), len(shares) - 1)
     return shares[cell[:, 0], cell[:, 1]]
 
 
@@ -255,9 +250,7 @@ def klems_of(bsdf: Bsdf, basis: KlemsBasis = KLEMS_FULL, *, samples: int = 64) -
     return KlemsBsdf(basis, basis, **blocks, see_through=straight)
 
 
-def _block(
-    bsdf: Bsdf, rest: Bsdf, name: str, basis: KlemsBasis, samples: int
-) -> NDArray[np.float64]:
+def _block(bsdf: Bsdf, rest: Bsdf, name: str, basis: KlemsBasis, samples: int) -> NDArray[np.float64]:
     """One block [K out, K in] [1/sr]; `rest`: the same without its beam."""
     from scipy.stats import qmc  # half a second, for trees only
 
@@ -283,16 +276,12 @@ def _block(
     return scattered + np.diag((whole - share) / omega)
 
 
-def _sent_on(
-    bsdf: Bsdf, name: str, incident: NDArray[np.float64], samples: int
-) -> NDArray[np.float64]:
+def _sent_on(bsdf: Bsdf, name: str, incident: NDArray[np.float64], samples: int) -> NDArray[np.float64]:
     """Share [K] of the light of each patch that a block sends on, the mean of its directions."""
     return direct_hemispherical(bsdf, name, incident).reshape(samples, -1).mean(axis=0)
 
 
-def _directions(
-    basis: KlemsBasis, patches: NDArray[np.int64], u: float, v: float
-) -> NDArray[np.float64]:
+def _directions(basis: KlemsBasis, patches: NDArray[np.int64], u: float, v: float) -> NDArray[np.float64]:
     """Components [K, 3] of a point of each patch, z upwards; see `KlemsBasis`."""
     theta, phi = basis.angles_within(patches, u, v)
     sine = np.sin(theta)
@@ -317,11 +306,7 @@ class ThroughPeak:
 
 
 def through_peak(
-    block: NDArray[np.float64],
-    basis: KlemsBasis,
-    share: float | None = None,
-    *,
-    contrast: float = 2.0,
+    block: NDArray[np.float64], basis: KlemsBasis, share: float | None = None, *, contrast: float = 2.0
 ) -> ThroughPeak:
     """Separate the through beam of a block [K out, K in] [1/sr].
 
@@ -432,9 +417,7 @@ def neighbours(basis: KlemsBasis) -> list[NDArray[np.int64]]:
     return result
 
 
-def held_beams(
-    transmission: NDArray[np.float64], beams: NDArray[np.float64], basis: KlemsBasis
-) -> NDArray[np.float64]:
+def held_beams(transmission: NDArray[np.float64], beams: NDArray[np.float64], basis: KlemsBasis) -> NDArray[np.float64]:
     """Direct part [K out, K in] of a matrix T [K out, K in] (`KlemsBsdf.transmission_matrix`).
 
     Of each column as much as its beam [K in] carries, from the diagonal first and then from the

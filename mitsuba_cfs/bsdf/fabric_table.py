@@ -201,9 +201,7 @@ def _row(path: Path, line: int, cells: list[str], columns: list[_Column]) -> _Ro
     return row
 
 
-def _scale(
-    path: Path, line: int, columns: list[_Column], rows: list[_Row]
-) -> tuple[list[str], list[str]]:
+def _scale(path: Path, line: int, columns: list[_Column], rows: list[_Row]) -> tuple[list[str], list[str]]:
     """Bring all values to shares of 1 and metres.
 
     A column without a unit is in percent where it has values above 1; if all its values are 0 to
@@ -212,11 +210,7 @@ def _scale(
 
     Returns: titles without a unit that are in percent by their values; that are shares.
     """
-    shares = [
-        column
-        for column in columns
-        if column.quantity not in TEXTS and column.quantity != "thickness"
-    ]
+    shares = [column for column in columns if column.quantity not in TEXTS and column.quantity != "thickness"]
     bare = {one.quantity: _bare(one, rows) for one in shares}
     by_value = [share for share in shares if max(bare[share.quantity], default=0) > 1]
     whole = [one for one in shares if any(bare[one.quantity]) and one not in by_value]
@@ -280,9 +274,18 @@ def _shade(row: _Row) -> FabricShade:
             raise row.error(f"with tau_IR it makes {value + infrared:.3f}, above 1", quantity)
     openness = at.get("openness", direct)
     return FabricShade(
-        name, row.cells.get("manufacturer", ""), solar, visible, openness, (front, back),
-        infrared, at.get("tau_UV"), at.get("thickness"), row.line, tuple(notes),
-    )  # fmt: skip
+        name,
+        row.cells.get("manufacturer", ""),
+        solar,
+        visible,
+        openness,
+        (front, back),
+        infrared,
+        at.get("tau_UV"),
+        at.get("thickness"),
+        row.line,
+        tuple(notes),
+    )
 
 
 def _direct(row: _Row) -> tuple[float, str]:

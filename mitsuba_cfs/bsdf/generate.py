@@ -142,15 +142,10 @@ def _scatter(layer: TracedLayer, triangle, d, random, active):
     wi = frame.to_local(-d)
     material = mi.UInt32(gather(layer.material, triangle, active))
     rows = [material * layer.channels + channel for channel in range(layer.channels)]
-    reflected = [
-        dr.select(side > 0, gather(layer.front, row, active), gather(layer.back, row, active))
-        for row in rows
-    ]
+    reflected = [dr.select(side > 0, gather(layer.front, row, active), gather(layer.back, row, active)) for row in rows]
     through = [gather(layer.through, row, active) for row in rows]
     specular = dr.select(
-        side > 0,
-        gather(layer.specular, material, active),
-        gather(layer.specular_back, material, active),
+        side > 0, gather(layer.specular, material, active), gather(layer.specular_back, material, active)
     )
     alpha = gather(layer.roughness, material, active)
 
@@ -273,16 +268,21 @@ def generate_klems(
 
     patches = TracedBasis(basis)
     sums, per_row = trace_bins(
-        TracedLayer(layer), patches, basis.size, patches, basis.size,
-        rows=BATCHES, samples=samples, seed=seed, progress=progress,
-    )  # fmt: skip
+        TracedLayer(layer),
+        patches,
+        basis.size,
+        patches,
+        basis.size,
+        rows=BATCHES,
+        samples=samples,
+        seed=seed,
+        progress=progress,
+    )
     means = [total / per_row / basis.projected_solid_angles() for total in sums]
     if reciprocal:
         means = [_reciprocal(mean, basis) for mean in means]
     spread = [mean.std(axis=0, ddof=1) / np.sqrt(BATCHES) for mean in means]
-    return GeneratedBsdf(
-        tuple(_klems(basis, m.mean(axis=0)) for m in means), tuple(_klems(basis, s) for s in spread)
-    )
+    return GeneratedBsdf(tuple(_klems(basis, m.mean(axis=0)) for m in means), tuple(_klems(basis, s) for s in spread))
 
 
 def generate_tensor_tree(
@@ -312,16 +312,24 @@ def generate_tensor_tree(
     incident = squares if rank == 4 else TracedRings(levels)
     cells = width**2 if rank == 4 else width // 2
     sums, per_row = trace_bins(
-        TracedLayer(layer), incident, cells, squares, width**2,
-        rows=1, samples=samples, seed=seed, turned=rank == 3, single=True, progress=progress,
-    )  # fmt: skip
+        TracedLayer(layer),
+        incident,
+        cells,
+        squares,
+        width**2,
+        rows=1,
+        samples=samples,
+        seed=seed,
+        turned=rank == 3,
+        single=True,
+        progress=progress,
+    )
     noise = width**2 / np.pi / per_row / (2 if rank == 4 else 1)
     systems, bounds = [], []
     for total in sums:
         values = total[0] * np.float32(width**2 / np.pi / per_row)
         result = {
-            name: culled_tree(grid, cull, noise=noise)
-            for name, grid in _dense_grids(values, rank, width).items()
+            name: culled_tree(grid, cull, noise=noise) for name, grid in _dense_grids(values, rank, width).items()
         }
         systems.append(TensorTreeBsdf(**{name: tree for name, (tree, _) in result.items()}))
         bounds += [bound for _, bound in result.values()]

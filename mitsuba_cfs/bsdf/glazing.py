@@ -183,8 +183,7 @@ def specular_klems(pane: Pane | Glazing, basis: KlemsBasis, *, subdivision: int 
     else:
         values = glazing_values(pane, theta)
     tau, rho_front, rho_back = (
-        np.diag(value.mean(axis=1)[basis.rings] / basis.projected_solid_angles())
-        for value in values
+        np.diag(value.mean(axis=1)[basis.rings] / basis.projected_solid_angles()) for value in values
     )
     return KlemsBsdf(basis, basis, tau, tau, rho_front, rho_back)
 
@@ -222,9 +221,7 @@ def solar_reflectance(u_value: float, g_value: float, transmittance: float) -> f
         lambda: 199.8208128 * gain**3 - 90.639733 * gain**2 + 19.737055 * gain + 6.766575,
         lambda: 29.436546 * gain**3 - 21.943415 * gain**2 + 9.945872 * gain + 7.426151,
     )
-    outer = 1 / _between(
-        u_value, lambda: 5.763355 * gain + 20.541528, lambda: 2.225824 * gain + 20.57708
-    )
+    outer = 1 / _between(u_value, lambda: 5.763355 * gain + 20.541528, lambda: 2.225824 * gain + 20.57708)
     layer = max(_layer_resistance(u_value), 0.0)
     inwards = (outer + 0.5 * layer) / (outer + layer + inner)
     return float(np.clip(1 - transmittance - gain / inwards, 0.0, 1.0 - transmittance - ROUNDING))
@@ -324,10 +321,7 @@ def hemispherical_mean(values: ArrayLike, theta: ArrayLike) -> FloatArray:
 
 
 def absorbed_by_layers(
-    layers: Sequence[Pane | None],
-    transmittance: ArrayLike,
-    reflectance: ArrayLike,
-    theta: ArrayLike,
+    layers: Sequence[Pane | None], transmittance: ArrayLike, reflectance: ArrayLike, theta: ArrayLike
 ) -> FloatArray:
     """Absorptance of every layer [K, N] of a system; its sum is 1 - tau - rho of the system.
 

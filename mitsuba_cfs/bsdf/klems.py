@@ -127,12 +127,8 @@ def _basis(name: str, bounds_deg: list[float], phi_counts: list[int]) -> KlemsBa
     return KlemsBasis(name, tuple(np.radians(bounds_deg).tolist()), tuple(phi_counts))
 
 
-KLEMS_FULL = _basis(
-    "LBNL/Klems Full", [0, 5, 15, 25, 35, 45, 55, 65, 75, 90], [1, 8, 16, 20, 24, 24, 24, 16, 12]
-)
-KLEMS_HALF = _basis(
-    "LBNL/Klems Half", [0, 6.5, 19.5, 32.5, 45.5, 58.5, 71.5, 90], [1, 8, 12, 16, 20, 12, 8]
-)
+KLEMS_FULL = _basis("LBNL/Klems Full", [0, 5, 15, 25, 35, 45, 55, 65, 75, 90], [1, 8, 16, 20, 24, 24, 24, 16, 12])
+KLEMS_HALF = _basis("LBNL/Klems Half", [0, 6.5, 19.5, 32.5, 45.5, 58.5, 71.5, 90], [1, 8, 12, 16, 20, 12, 8])
 KLEMS_QUARTER = _basis("LBNL/Klems Quarter", [0, 9, 27, 45, 63, 90], [1, 8, 12, 12, 8])
 STANDARD_BASES = (KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER)
 

@@ -39,10 +39,7 @@ def combine_layers(layers: list[KlemsBsdf]) -> LayeredSystem:
     if not layers:
         raise ValueError("a system needs a layer")
     basis = layers[0].basis_in
-    if any(
-        basis not in (layer.basis_in, layer.basis_out) or layer.basis_in != layer.basis_out
-        for layer in layers
-    ):
+    if any(basis not in (layer.basis_in, layer.basis_out) or layer.basis_in != layer.basis_out for layer in layers):
         raise ValueError("the layers are on different bases")
     power = [_power_blocks(layer) for layer in layers]
     identity = np.eye(basis.size)
@@ -60,9 +57,7 @@ def combine_layers(layers: list[KlemsBsdf]) -> LayeredSystem:
     return LayeredSystem(bsdf, front[2], back[2])
 
 
-Power = Sequence[
-    tuple[NDArray[np.float64], ...]
-]  # Tf, Tb, Rf, Rb of each layer, the outermost first
+Power = Sequence[tuple[NDArray[np.float64], ...]]  # Tf, Tb, Rf, Rb of each layer, the outermost first
 Flows = list[NDArray[np.float64]]  # [K, K] in each gap
 
 
@@ -72,18 +67,11 @@ def _power_blocks(layer: KlemsBsdf) -> tuple[NDArray[np.float64], ...]:
     area = layer.basis_out.projected_solid_angles()[:, None]
     return tuple(
         area * block
-        for block in (
-            full.transmission_front,
-            full.transmission_back,
-            full.reflection_front,
-            full.reflection_back,
-        )
+        for block in (full.transmission_front, full.transmission_back, full.reflection_front, full.reflection_back)
     )
 
 
-def _flows(
-    power: Power, outside: NDArray[np.float64], inside: NDArray[np.float64]
-) -> tuple[Flows, Flows]:
+def _flows(power: Power, outside: NDArray[np.float64], inside: NDArray[np.float64]) -> tuple[Flows, Flows]:
     """Flows towards the room and back [N + 1] in the gaps, the outer ones given.
 
     From the room outwards each stack of layers is closed to (what it sends back) = S F + e; going

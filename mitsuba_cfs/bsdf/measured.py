@@ -149,9 +149,7 @@ def patterns_of(measurements: Sequence[Measurement], block: str) -> list[Pattern
         once, group = np.unique(step, axis=0, return_inverse=True)
         count = np.bincount(group)
         mean = [np.bincount(group, band) / count for band in values.T]
-        patterns.append(
-            Pattern(part[0].path, np.array(incident), once * SAME, np.stack(mean, axis=-1))
-        )
+        patterns.append(Pattern(part[0].path, np.array(incident), once * SAME, np.stack(mean, axis=-1)))
     return patterns
 
 
@@ -188,12 +186,9 @@ class ScatteringInterpolant:
         Axes are those of `TensorTree`; `points` as in `matrix`.
         """
         cells = 1 << levels
-        corners = np.stack(np.meshgrid(*[np.arange(cells)] * 2, indexing="ij"), -1).reshape(
-            -1, 1, 2
-        )
+        corners = np.stack(np.meshgrid(*[np.arange(cells)] * 2, indexing="ij"), -1).reshape(-1, 1, 2)
         disk_in, disk_out = (
-            square_to_disk((corners + _even_points(total / cells**2)) / cells)
-            for total in (points, OUTGOING * points)
+            square_to_disk((corners + _even_points(total / cells**2)) / cells) for total in (points, OUTGOING * points)
         )
         means = self._means(disk_in, disk_out, np.full(cells**2, np.pi / cells**2))
         return means.swapaxes(1, 2).reshape(-1, cells, cells, cells, cells)
@@ -205,8 +200,7 @@ class ScatteringInterpolant:
             points of outgoing light, so that a lobe narrower than a patch is always sampled.
         """
         disk_in, disk_out = (
-            _patch_points(basis, _even_points(total / basis.size))
-            for total in (points, OUTGOING * points)
+            _patch_points(basis, _even_points(total / basis.size)) for total in (points, OUTGOING * points)
         )
         return self._means(disk_in, disk_out, basis.projected_solid_angles())
 
@@ -225,9 +219,7 @@ class ScatteringInterpolant:
                 total[:, :, number] += value.reshape(-1, parts, count).mean(axis=-1)
         return np.maximum(total / disk_in.shape[1], 0.0)
 
-    def _pattern_at(
-        self, disk_in: FloatArray, disk_out: FloatArray, areas: FloatArray
-    ) -> FloatArray:
+    def _pattern_at(self, disk_in: FloatArray, disk_out: FloatArray, areas: FloatArray) -> FloatArray:
         """BSDF [bands, N] [1/sr] for one incident direction, scaled to its share of light.
 
         `disk_in` [2] and `disk_out` [N, 2] in the axes of trees and Klems bases; `areas` [N] of
@@ -241,9 +233,7 @@ class ScatteringInterpolant:
             value += weight * pattern.at(moved @ turn)
             share += weight * pattern.share
         sampled = value @ areas
-        return (
-            value * np.divide(share, sampled, out=np.ones_like(share), where=sampled > 0)[:, None]
-        )
+        return value * np.divide(share, sampled, out=np.ones_like(share), where=sampled > 0)[:, None]
 
     def _neighbours(self, incident: FloatArray) -> list[tuple[Pattern, float, FloatArray]]:
         """Patterns to mix for a point [2] of the disk: each with its weight and turn [2, 2]."""

@@ -27,9 +27,7 @@ LARGEST_BYTES = 256 << 20
 GRAZING_DEG = 0.5  # nearer than this to the sample's plane a value over its cosine says nothing
 BANDS = {"cie-y": ("Visible",), "cie-xyz": ("CIE-X", "Visible", "CIE-Z")}
 FORMATS = ("bsdf", "brdf", "btdf", "dsf")
-HEADER = re.compile(
-    r"#\s*(sample_name|colorimetry|format|incident_angle|intheta|inphi|upphi)\b:?\s*(.*)"
-)
+HEADER = re.compile(r"#\s*(sample_name|colorimetry|format|incident_angle|intheta|inphi|upphi)\b:?\s*(.*)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +87,7 @@ def _incident(header: dict[str, str], path: Path) -> FloatArray:
         keys = ("intheta", "inphi")
         angles = np.concatenate([_numbers(header.get(key, ""), 1, path, key) for key in keys])
     if not 0 <= angles[0] <= 180:
-        raise DataError(
-            f"polar angle {angles[0]:g}: expected 0 to 180", file=path, field="incident_angle"
-        )
+        raise DataError(f"polar angle {angles[0]:g}: expected 0 to 180", file=path, field="incident_angle")
     return angles
 
 

@@ -48,9 +48,7 @@ class SlatMaterial:
             check_number(name, getattr(self, name), 0.0, 1.0)
         for share in (*self.reflectance_front, *self.reflectance_back, *self.transmittance):
             check_number(f"material {self.name}: a reflectance or transmittance", share, 0.0, 1.0)
-        worst = (
-            np.maximum(self.reflectance_front, self.reflectance_back) + self.diffuse_transmittance
-        )
+        worst = np.maximum(self.reflectance_front, self.reflectance_back) + self.diffuse_transmittance
         whole = np.max(worst) + self.specular + self.straight
         if self.index and (self.index < 1 or whole > 0):
             raise ValueError(f"material {self.name}: a clear body has an index above 1, no colour")
@@ -70,9 +68,7 @@ class SlatMaterial:
         return np.array(self.transmittance or (0.0,) * self.channels)
 
 
-def plastic(
-    name: str, *colour: float, specular: float = 0.0, roughness: float = 0.0
-) -> SlatMaterial:
+def plastic(name: str, *colour: float, specular: float = 0.0, roughness: float = 0.0) -> SlatMaterial:
     """The material of Radiance's `plastic`, one colour [C] for both sides."""
     diffuse = tuple((1 - specular) * value for value in colour)
     return SlatMaterial(name, diffuse, diffuse, specular=specular, roughness=roughness)
@@ -153,14 +149,10 @@ def stacked(layers: list[PeriodicLayer], gaps: list[float]) -> PeriodicLayer:
         material.append(layer.material + len(materials))
         materials += layer.materials
         top -= layer.thickness + gap
-    return PeriodicLayer(
-        np.concatenate(triangles), np.concatenate(material), materials, layers[0].period
-    )
+    return PeriodicLayer(np.concatenate(triangles), np.concatenate(material), materials, layers[0].period)
 
 
-def write_radiance(
-    layer: PeriodicLayer, path: str | PathLike[str], columns: int, rows: int
-) -> None:
+def write_radiance(layer: PeriodicLayer, path: str | PathLike[str], columns: int, rows: int) -> None:
     """Write columns x rows cells as a Radiance scene for genBSDF.
 
     In Radiance's BSDF frame: x to the left, y up, z into the room, all of the layer at z <= 0.
@@ -171,9 +163,7 @@ def write_radiance(
         file.writelines(_radiance_lines(layer, triangles * [-1, 1, -1], material))
 
 
-def _radiance_lines(
-    layer: PeriodicLayer, triangles: NDArray[np.float64], material: NDArray[np.int64]
-) -> Iterator[str]:
+def _radiance_lines(layer: PeriodicLayer, triangles: NDArray[np.float64], material: NDArray[np.int64]) -> Iterator[str]:
     for index, sheet in enumerate(layer.materials):
         alike = sheet.reflectance_front == sheet.reflectance_back
         if sheet.transmittance or sheet.index or sheet.straight or sheet.back_is_black or not alike:

@@ -105,9 +105,7 @@ def without_peak(klems: KlemsBsdf) -> tuple[KlemsBsdf, NDArray[np.float64]]:
         through_peak(block, klems.basis_in, klems.see_through)
         for block in (full.transmission_front, full.transmission_back)
     ]
-    rest = replace(
-        full, transmission_front=peaks[0].scattered, transmission_back=peaks[1].scattered
-    )
+    rest = replace(full, transmission_front=peaks[0].scattered, transmission_back=peaks[1].scattered)
     return rest, np.stack([peak.transmittance for peak in peaks])
 
 
@@ -130,9 +128,7 @@ def _read(props) -> tuple[KlemsBsdf, tuple[KlemsBsdf, KlemsBsdf] | None]:
 def entry_colours(klems: KlemsBsdf, colour: tuple[KlemsBsdf, KlemsBsdf]) -> NDArray[np.float64]:
     """Linear sRGB over the grey value [mode, side, K, same or other side, K, 3] of each entry."""
     if any((b.basis_in, b.basis_out) != (klems.basis_in, klems.basis_out) for b in colour):
-        raise ValueError(
-            "the CIE-X and CIE-Z bands are on another angle basis than the Visible one"
-        )
+        raise ValueError("the CIE-X and CIE-Z bands are on another angle basis than the Visible one")
     bands = [scattering_tables(band) for band in (colour[0], klems, colour[1])]
     return relative_rgb(*(np.stack([reversed_tables(t), t]) for t in bands))
 

@@ -47,10 +47,7 @@ def window_bsdf():
             self.north = mi.Vector3f(0, 1, 0)
             common = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide | mi.BSDFFlags.Anisotropic
             common |= mi.BSDFFlags.NonSymmetric
-            self.m_components = [
-                mi.BSDFFlags.GlossyReflection | common,
-                mi.BSDFFlags.GlossyTransmission | common,
-            ]
+            self.m_components = [mi.BSDFFlags.GlossyReflection | common, mi.BSDFFlags.GlossyTransmission | common]
             self.m_flags = self.m_components[0] | self.m_components[1]
             self.colour = None  # a `TracedColour`
             self.peak = bool(props.get("peak", False))
@@ -145,9 +142,7 @@ def window_bsdf():
             u = sample1 * total
             beam = (u >= scattered) & (straight > 0)
             through = (u >= reflected) & (u < scattered) & (transmitted > 0)
-            u = dr.select(through, u - reflected, u) / dr.maximum(
-                dr.select(through, transmitted, reflected), TINY
-            )
+            u = dr.select(through, u - reflected, u) / dr.maximum(dr.select(through, transmitted, reflected), TINY)
             u = dr.clip(u, 0.0, ONE_BELOW)
             other, value, density, entry = self.draw(ctx, known, through, u, sample2, active)
 

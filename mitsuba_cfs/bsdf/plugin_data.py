@@ -26,9 +26,7 @@ def read_band(props, kind: type[Bsdf]) -> tuple[Bsdf, tuple[Bsdf, Bsdf] | None]:
     bsdf = bands.get(band)
     if not isinstance(bsdf, kind):
         held = ", ".join(f"{name} ({type(b).__name__})" for name, b in bands.items())
-        raise DataError(
-            f"expected a {kind.__name__}, the file holds {held}", file=path, element=band
-        )
+        raise DataError(f"expected a {kind.__name__}, the file holds {held}", file=path, element=band)
     if band != "Visible" or not all(name in bands for name in COLOUR_BANDS):
         return bsdf, None
     return bsdf, (bands[COLOUR_BANDS[0]], bands[COLOUR_BANDS[1]])
@@ -61,8 +59,7 @@ class TracedColour:
             below = cell(place, last)
             above = place - mi.Float(below)
             parts = [
-                gather(spectrum, below, active) * (1 - above)
-                + gather(spectrum, below + 1, active) * above
+                gather(spectrum, below, active) * (1 - above) + gather(spectrum, below + 1, active) * above
                 for spectrum in self.primaries
             ]
             seen.append(rgb[0] * parts[0] + rgb[1] * parts[1] + rgb[2] * parts[2])

@@ -38,9 +38,7 @@ class FabricBand:
         if not 0 <= self.direct <= self.transmittance:
             raise ValueError("expected a direct share between 0 and the transmittance")
         most = max(self.reflectance_front, self.reflectance_back)
-        if min(self.reflectance_front, self.reflectance_back) < 0 or (
-            self.transmittance + most > 1 + 1e-9
-        ):
+        if min(self.reflectance_front, self.reflectance_back) < 0 or (self.transmittance + most > 1 + 1e-9):
             raise ValueError("expected transmittance and reflectance of 1 at most, together")
 
 
@@ -73,12 +71,7 @@ def fabric_klems(band: FabricBand, basis: KlemsBasis = KLEMS_FULL) -> KlemsBsdf:
 
 
 def perforated_screen(
-    material: SlatMaterial,
-    *,
-    spacing: float,
-    openness: float,
-    thickness: float = 0.0,
-    segments: int = 24,
+    material: SlatMaterial, *, spacing: float, openness: float, thickness: float = 0.0, segments: int = 24
 ) -> PeriodicLayer:
     """A sheet with round holes in a square grid.
 
@@ -103,9 +96,7 @@ def perforated_screen(
     return _with_hole(hole, rim, thickness, material, spacing)
 
 
-def woven_screen(
-    material: SlatMaterial, *, spacing: float, openness: float, thickness: float
-) -> PeriodicLayer:
+def woven_screen(material: SlatMaterial, *, spacing: float, openness: float, thickness: float) -> PeriodicLayer:
     """Square holes between flat threads, the sheet `thickness` thick: a roller shade's fabric.
 
     Source: the square-mesh model of roller fabrics; openness is the direct transmittance at normal
@@ -119,9 +110,7 @@ def woven_screen(
     return _with_hole(hole, rim, thickness, material, spacing)
 
 
-def thread_screen(
-    material: SlatMaterial, *, diameter: float, spacing: float, segments: int = 16
-) -> PeriodicLayer:
+def thread_screen(material: SlatMaterial, *, diameter: float, spacing: float, segments: int = 16) -> PeriodicLayer:
     """Round upright threads before round level ones, on a square grid.
 
     Args:
@@ -146,17 +135,11 @@ def thread_screen(
 
 
 def _with_hole(
-    hole: NDArray[np.float64],
-    rim: NDArray[np.float64],
-    thickness: float,
-    material: SlatMaterial,
-    spacing: float,
+    hole: NDArray[np.float64], rim: NDArray[np.float64], thickness: float, material: SlatMaterial, spacing: float
 ) -> PeriodicLayer:
     """A sheet with a hole in each period, from the corners of the hole and of the period [n, 2]."""
     face = _ring(hole, rim, spacing / 2)
-    faces = [
-        np.concatenate([face, np.full((*face.shape[:2], 1), z)], -1) for z in _faces(thickness)
-    ]
+    faces = [np.concatenate([face, np.full((*face.shape[:2], 1), z)], -1) for z in _faces(thickness)]
     if thickness > 0:
         faces.append(_walls(hole, thickness))
     return _sheet(np.concatenate(faces), material, spacing)
@@ -164,24 +147,14 @@ def _with_hole(
 
 def pleated_shade(material: SlatMaterial, *, depth: float, spacing: float) -> PeriodicLayer:
     """A fabric folded to and fro, `spacing` from fold to fold of one side and `depth` deep [m]."""
-    edges = np.array(
-        [
-            [[0.0, 0.0], [spacing / 2, depth]],
-            [[spacing / 2, depth], [spacing, 0.0]],
-        ]
-    )
+    edges = np.array([[[0.0, 0.0], [spacing / 2, depth]], [[spacing / 2, depth], [spacing, 0.0]]])
     triangles = extrude(edges, max(spacing, depth))
     return PeriodicLayer(
-        triangles,
-        np.zeros(len(triangles), dtype=np.int64),
-        (material,),
-        (max(spacing, depth), spacing),
+        triangles, np.zeros(len(triangles), dtype=np.int64), (material,), (max(spacing, depth), spacing)
     )
 
 
-def prism_panel(
-    index: float, *, pitch: float, angle: float, thickness: float, channels: int = 1
-) -> PeriodicLayer:
+def prism_panel(index: float, *, pitch: float, angle: float, thickness: float, channels: int = 1) -> PeriodicLayer:
     """A clear panel, flat outside, with horizontal prisms towards the room.
 
     Args:
@@ -199,10 +172,7 @@ def prism_panel(
     triangles = extrude(np.array(edges), max(pitch, thickness + drop))
     material = clear_body("clear", index, channels=channels)
     return PeriodicLayer(
-        triangles,
-        np.zeros(len(triangles), dtype=np.int64),
-        (material,),
-        (max(pitch, thickness + drop), pitch),
+        triangles, np.zeros(len(triangles), dtype=np.int64), (material,), (max(pitch, thickness + drop), pitch)
     )
 
 
@@ -238,6 +208,4 @@ def _walls(outline: NDArray[Any], thickness: float) -> NDArray[np.float64]:
     top = np.concatenate([outline, np.full((len(outline), 1), thickness / 2)], -1)
     bottom = top * [1, 1, -1]
     next_top, next_bottom = np.roll(top, -1, axis=0), np.roll(bottom, -1, axis=0)
-    return np.concatenate(
-        [np.stack([top, bottom, next_bottom], 1), np.stack([top, next_bottom, next_top], 1)]
-    )
+    return np.concatenate([np.stack([top, bottom, next_bottom], 1), np.stack([top, next_bottom, next_top], 1)])

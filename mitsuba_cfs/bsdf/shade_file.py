@@ -99,9 +99,7 @@ class ShadeFile:
         else:
             names = ("thread_diameter", "thread_spacing")
             diameter, spacing = (
-                (size[name] for name in names)
-                if self.kind == "woven"
-                else (2 * size["dimension_x"], size["spacing_x"])
+                (size[name] for name in names) if self.kind == "woven" else (2 * size["dimension_x"], size["spacing_x"])
             )
             cell = "threads" if self.kind == "woven" else "holes"
             keys = [f"{cell} = {{ diameter = {diameter:g}, spacing = {spacing:g} }}"]
@@ -155,9 +153,7 @@ def _geometry(table: dict[str, Any], kind: str, path: Path) -> dict[str, float]:
         low, high = (-90.0, 90.0) if name == "slat_tilt" else (0.0, LONGEST_MM)
         may_be_zero = name in ("slat_tilt", "slat_curvature")
         if not low <= value <= high or (value == 0 and not may_be_zero):
-            message = (
-                f"expected a number from {low:g} to {high:g}, got {str(table.get(name))[:40]!r}"
-            )
+            message = f"expected a number from {low:g} to {high:g}, got {str(table.get(name))[:40]!r}"
             raise DataError(message, file=path, field=name)
         geometry[name] = float(np.radians(value)) if name == "slat_tilt" else value / 1000
     if kind == "perforated-screen" and geometry["spacing_x"] != geometry["spacing_y"]:

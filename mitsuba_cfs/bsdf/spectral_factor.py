@@ -11,11 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.colour import relative_rgb
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.spectral_pane import (
-    SpectralPane,
-    diffuse_reflectance,
-    spectral_transmittance,
-)
+from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, diffuse_reflectance, spectral_transmittance
 from mitsuba_cfs.spectra.channels import Channels
 from mitsuba_cfs.spectra.detectors import NANOMETRES, illuminant, sensitivities
 
@@ -35,9 +31,7 @@ class SpectralFactor:
     whole: bool = True  # of all its layers; otherwise the rest passes all wavelengths equally
 
     @staticmethod
-    def of_panes(
-        panes: Sequence[SpectralPane], shade: ArrayLike = 1.0, reflectance: ArrayLike = 0.0
-    ) -> SpectralFactor:
+    def of_panes(panes: Sequence[SpectralPane], shade: ArrayLike = 1.0, reflectance: ArrayLike = 0.0) -> SpectralFactor:
         """That of panes in series.
 
         Args:
@@ -79,10 +73,7 @@ class SpectralFactor:
         theta, _ = KLEMS_FULL.angles_within(np.arange(KLEMS_FULL.size)[:, None], places, 0.5)
         theta = np.minimum(theta, ANGLES[-1])
         visible = np.interp(theta, ANGLES, self.visible).mean(axis=1)
-        means = [
-            np.interp(theta, ANGLES, row).mean(axis=1)
-            for row in channels.mean(self.transmittance).T
-        ]
+        means = [np.interp(theta, ANGLES, row).mean(axis=1) for row in channels.mean(self.transmittance).T]
         return _relative(np.array(means), visible)
 
 

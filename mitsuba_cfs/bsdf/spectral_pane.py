@@ -28,21 +28,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.bsdf.en410 import (
-    colour_rendering_index,
-    solar_value,
-    ultraviolet_value,
-    visible_value,
-)
-from mitsuba_cfs.bsdf.glazing import (
-    CLEAR_ABOVE,
-    Pane,
-    PaneOptics,
-    StackOptics,
-    coated_values,
-    stack,
-    uncoated_values,
-)
+from mitsuba_cfs.bsdf.en410 import colour_rendering_index, solar_value, ultraviolet_value, visible_value
+from mitsuba_cfs.bsdf.glazing import CLEAR_ABOVE, Pane, PaneOptics, StackOptics, coated_values, stack, uncoated_values
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
 
@@ -113,19 +100,13 @@ def optical_data_of(document: dict[str, Any], path: Path) -> OpticalData:
         emissivity=(infrared[0], infrared[1]),
         infrared_transmittance=passed,
         thickness_mm=_value_stated(_table(own, "physicalProperties", path), "thickness", path),
-        conductivity=_value_stated(
-            _table(own, "materialBulkProperties", path), "conductivity", path
-        ),
-        coated=_differs(rows, visible, infrared)
-        if coated_side is None
-        else coated_side not in ("NEITHER", "NA"),
+        conductivity=_value_stated(_table(own, "materialBulkProperties", path), "conductivity", path),
+        coated=_differs(rows, visible, infrared) if coated_side is None else coated_side not in ("NEITHER", "NA"),
     )
 
 
 def _differs(
-    rows: list[list[float]],
-    visible: tuple[float, float, float] | None,
-    emissivity: list[float | None],
+    rows: list[list[float]], visible: tuple[float, float, float] | None, emissivity: list[float | None]
 ) -> bool:
     """Whether the sides differ as only a coating makes them."""
     triples = [row[1:] for row in rows] + ([list(visible)] if visible else [])
@@ -188,9 +169,7 @@ def _points(block: str, sides: tuple[str, ...], points: list[Any], path: Path) -
             value = _value_stated(results, result, path, where)
             if value is not None:
                 for side in sides:
-                    yield _Point(
-                        where, key, side, result, leaves, polar, _share(value, path, where, result)
-                    )
+                    yield _Point(where, key, side, result, leaves, polar, _share(value, path, where, result))
 
 
 def _share(value: float, path: Path, where: str, field: str) -> float:
@@ -249,9 +228,7 @@ def _table(owner: Any, name: str, path: Path, where: str | None = None) -> dict[
     return result or {}
 
 
-def _value_stated(
-    table: dict[str, Any], name: str, path: Path, where: str | None = None
-) -> float | None:
+def _value_stated(table: dict[str, Any], name: str, path: Path, where: str | None = None) -> float | None:
     """The finite number of a name, with or without its uncertainty; None where there is none."""
     result = table.get(name)
     if isinstance(result, dict):
@@ -491,10 +468,7 @@ def product_pane(product: dict[str, Any], path: Path, *, material: bool = False)
         material or _is_coated(product.get("coated_side")),
         thickness=None if thickness is None else thickness / 1000.0,
         conductivity=_stated(measured, "conductivity", path),
-        emissivity=(
-            _stated(measured, "emissivity_front", path),
-            _stated(measured, "emissivity_back", path),
-        ),
+        emissivity=(_stated(measured, "emissivity_front", path), _stated(measured, "emissivity_back", path)),
         infrared_transmittance=_stated(measured, "tir_front", path),
         visible=None if tau is None or front is None or back is None else (tau, front, back),
     )
@@ -600,15 +574,20 @@ class SpectralPane:
     def turned(self) -> SpectralPane:
         """The pane the other way round."""
         return SpectralPane(
-            self.name, self.wavelength_nm, self.transmittance, self.reflectance_back,
-            self.reflectance_front, self.thickness, self.conductivity, self.emissivity[::-1],
-            self.infrared_transmittance, self.coated,
-        )  # fmt: skip
+            self.name,
+            self.wavelength_nm,
+            self.transmittance,
+            self.reflectance_back,
+            self.reflectance_front,
+            self.thickness,
+            self.conductivity,
+            self.emissivity[::-1],
+            self.infrared_transmittance,
+            self.coated,
+        )
 
 
-def read_spectral_pane(
-    path: str | PathLike[str], *, thickness: float | None = None
-) -> SpectralPane:
+def read_spectral_pane(path: str | PathLike[str], *, thickness: float | None = None) -> SpectralPane:
     """The pane of a file, see `pane_file.read_pane_file`.
 
     Args: thickness: [m] where the file states none.
@@ -624,10 +603,17 @@ def read_spectral_pane(
     front, back = (EMISSIVITY if e is None else e for e in file.emissivity)
     wavelength_nm, tau, rho_front, rho_back = file.spectrum.T
     return SpectralPane(
-        file.name, wavelength_nm, tau, rho_front, rho_back, thickness,
-        file.conductivity or 1.0, (front, back),
-        file.infrared_transmittance or 0.0, file.coated,
-    )  # fmt: skip
+        file.name,
+        wavelength_nm,
+        tau,
+        rho_front,
+        rho_back,
+        thickness,
+        file.conductivity or 1.0,
+        (front, back),
+        file.infrared_transmittance or 0.0,
+        file.coated,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -641,10 +627,7 @@ class BandValues:
 
 
 def spectral_glazing(
-    panes: Sequence[SpectralPane],
-    theta: ArrayLike = 0.0,
-    *,
-    spectrum: str | FloatArray = SPECTRA[0],
+    panes: Sequence[SpectralPane], theta: ArrayLike = 0.0, *, spectrum: str | FloatArray = SPECTRA[0]
 ) -> Mapping[str, BandValues]:
     """Panes from outside to inside as one glazing in "Solar" and "Visible", by wavelength.
 
@@ -667,9 +650,7 @@ def spectral_glazing(
     return result
 
 
-def spectral_transmittance(
-    panes: Sequence[SpectralPane], wavelength_nm: ArrayLike, theta: ArrayLike
-) -> FloatArray:
+def spectral_transmittance(panes: Sequence[SpectralPane], wavelength_nm: ArrayLike, theta: ArrayLike) -> FloatArray:
     """Transmittance [A, N] of panes in series by angle of incidence [A] [rad] and wavelength [N].
 
     Source: as of `spectral_glazing`.
@@ -725,9 +706,7 @@ def solar_average(spectrum: str | FloatArray) -> Average:
     nm, sun = _g173(spectrum.split()[-1]) if isinstance(spectrum, str) else spectrum.T
 
     def average(wavelength: FloatArray, value: FloatArray) -> float:
-        return float(
-            np.trapezoid(np.interp(nm, wavelength, value) * sun, nm) / np.trapezoid(sun, nm)
-        )
+        return float(np.trapezoid(np.interp(nm, wavelength, value) * sun, nm) / np.trapezoid(sun, nm))
 
     return average
 

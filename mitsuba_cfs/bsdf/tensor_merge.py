@@ -13,11 +13,7 @@ DARK = 1e-3 / np.pi  # [1/sr] what differs by less than a 0.1 % diffuser may be 
 
 
 def merged_tree(
-    grid: NDArray[np.floating],
-    *,
-    relative: float = 0.1,
-    absolute: float = 0.0,
-    noise: float = 0.0,
+    grid: NDArray[np.floating], *, relative: float = 0.1, absolute: float = 0.0, noise: float = 0.0
 ) -> TensorTree:
     """The tree of a dense grid [2^n] * rank [1/sr] within an error bound.
 
@@ -59,9 +55,7 @@ def merged_tree(
     return TensorTree(rank, depths, np.concatenate([v for _, v in result])[order].astype(float))
 
 
-def culled_tree(
-    grid: NDArray[np.floating], cull: float, *, noise: float = 0.0
-) -> tuple[TensorTree, float]:
+def culled_tree(grid: NDArray[np.floating], cull: float, *, noise: float = 0.0) -> tuple[TensorTree, float]:
     """The tree that keeps at most 1 - `cull` of a grid's cells, and the relative bound it took.
 
     As `rttree_reduce -t` does by percentage; the bound is found by bisection, and is at most 1.

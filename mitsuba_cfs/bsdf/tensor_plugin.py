@@ -40,9 +40,7 @@ class PluginTrees:
 
 
 def plugin_trees(
-    bsdf: TensorTreeBsdf,
-    peak: bool,
-    colour: tuple[TensorTreeBsdf, TensorTreeBsdf] | None = None,
+    bsdf: TensorTreeBsdf, peak: bool, colour: tuple[TensorTreeBsdf, TensorTreeBsdf] | None = None
 ) -> PluginTrees:
     """The trees of a system; rank 4 draws from those that it finds values in."""
     whole, rank = forward_trees(bsdf), next(iter(bsdf.blocks().values())).rank
@@ -62,9 +60,7 @@ def plugin_trees(
     return PluginTrees(valued, drawn, beams, np.concatenate(colours))
 
 
-def _without_peaks(
-    bsdf: TensorTreeBsdf, whole: list[TensorTree]
-) -> tuple[list[TensorTree], NDArray[np.float64]]:
+def _without_peaks(bsdf: TensorTreeBsdf, whole: list[TensorTree]) -> tuple[list[TensorTree], NDArray[np.float64]]:
     """The forward trees without their through peaks, and the beams of `PluginTrees`.
 
     The way back of rank 3 is known by means only, which would blur a peak: it is taken out first.
@@ -190,9 +186,7 @@ def _register(variant: str) -> None:
             self.drawn = TracedTrees(trees.drawn)
             same = trees.valued is trees.drawn
             self.valued = self.drawn if same else TracedTrees(trees.valued)
-            self.value_roots, self.draw_roots = map(
-                integers, (trees.valued.roots, trees.drawn.roots)
-            )
+            self.value_roots, self.draw_roots = map(integers, (trees.valued.roots, trees.drawn.roots))
             if trees.beams is not None:
                 self.beams, self.beam_cells = table(trees.beams), trees.beams.shape[-1]
             if trees.colours is not None:
@@ -249,11 +243,7 @@ def _register(variant: str) -> None:
         def totals(self, ctx, known, active):
             position, _ = self.place(known)
             return tuple(
-                self.drawn.total(
-                    gather_root(self.draw_roots, self.tree(ctx, known, through), active),
-                    position,
-                    active,
-                )
+                self.drawn.total(gather_root(self.draw_roots, self.tree(ctx, known, through), active), position, active)
                 for through in (mi.Mask(False), mi.Mask(True))
             )
 

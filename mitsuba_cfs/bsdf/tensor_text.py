@@ -54,11 +54,7 @@ def _grid_levels(counts: NDArray[np.int64], rank: int) -> NDArray[np.int64]:
 
 
 def _check_nesting(
-    opening: NDArray[Any],
-    nesting: NDArray[Any],
-    is_grid: NDArray[Any],
-    depths: NDArray[Any],
-    rank: int,
+    opening: NDArray[Any], nesting: NDArray[Any], is_grid: NDArray[Any], depths: NDArray[Any], rank: int
 ) -> None:
     """Every branch has 2^rank children: the volumes of what is inside it add up to its own."""
     deepest = int(nesting.max())
@@ -103,9 +99,7 @@ def row_major_order(rank: int, level: int) -> NDArray[np.int64]:
     return index
 
 
-def format_tree(
-    rank: int, depths: NDArray[np.int64], values: NDArray[np.float64], digits: int
-) -> Iterator[str]:
+def format_tree(rank: int, depths: NDArray[np.int64], values: NDArray[np.float64], digits: int) -> Iterator[str]:
     """The braces of a tree's leaves (Morton order); siblings that are all leaves make one grid."""
     siblings = 1 << rank
     to_row_major = np.argsort(row_major_order(rank, 1))

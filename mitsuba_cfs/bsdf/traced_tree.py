@@ -155,9 +155,7 @@ class TracedTrees:
         total = first + second
         share = dr.select(total > 0, first / dr.maximum(total, TINY), 0.5)
         second_half = u >= share
-        rest = dr.select(
-            second_half, (u - share) / dr.maximum(1 - share, TINY), u / dr.maximum(share, TINY)
-        )
+        rest = dr.select(second_half, (u - share) / dr.maximum(1 - share, TINY), u / dr.maximum(share, TINY))
         rest = dr.clip(rest, 0.0, ONE_BELOW)
         return inside & second_half, dr.select(inside, rest, u)
 

@@ -138,9 +138,7 @@ def _angle_bases(layer: ElementTree.Element, path: str | PathLike[str]) -> dict[
         for block in element.findall("AngleBasisBlock"):
             lower = _number(_need(block, "ThetaBounds/LowerTheta", path), path)
             if abs(lower - bounds[-1]) > 1e-3:
-                raise DataError(
-                    "theta bounds disagree", file=path, element=name, field="LowerTheta"
-                )
+                raise DataError("theta bounds disagree", file=path, element=name, field="LowerTheta")
             bounds.append(_number(_need(block, "ThetaBounds/UpperTheta", path), path))
             counts.append(int(_number(_need(block, "nPhis", path), path)))
         try:
@@ -167,9 +165,7 @@ class _KlemsReader:
     bases: dict[str, KlemsBasis]
     rows: bool
 
-    def block(
-        self, element: ElementTree.Element, where: str, path: str | PathLike[str]
-    ) -> KlemsBlock:
+    def block(self, element: ElementTree.Element, where: str, path: str | PathLike[str]) -> KlemsBlock:
         basis_in = self._basis(element, "ColumnAngleBasis", where, path)
         basis_out = self._basis(element, "RowAngleBasis", where, path)
         text = _text(_need(element, "ScatteringData", path))
@@ -179,8 +175,7 @@ class _KlemsReader:
             got = str(len(values))
         if got != str(expected):
             raise DataError(
-                f"expected {basis_out.size} x {basis_in.size} = {expected} values "
-                f"({basis_in.name}), got {got}",
+                f"expected {basis_out.size} x {basis_in.size} = {expected} values ({basis_in.name}), got {got}",
                 file=path,
                 element=where,
                 field="ScatteringData",
@@ -189,18 +184,14 @@ class _KlemsReader:
             return basis_in, basis_out, values.reshape(basis_in.size, basis_out.size).T.copy()
         return basis_in, basis_out, values.reshape(basis_out.size, basis_in.size)
 
-    def band(
-        self, blocks: Mapping[str, KlemsBlock], where: str, path: str | PathLike[str]
-    ) -> KlemsBsdf:
+    def band(self, blocks: Mapping[str, KlemsBlock], where: str, path: str | PathLike[str]) -> KlemsBsdf:
         bases = {(basis_in, basis_out) for basis_in, basis_out, _ in blocks.values()}
         if len(bases) != 1:
             raise DataError("the blocks are on different angle bases", file=path, element=where)
         values: dict[str, Any] = {name: block for name, (*_, block) in blocks.items()}
         return KlemsBsdf(*bases.pop(), **values)
 
-    def _basis(
-        self, element: ElementTree.Element, tag: str, where: str, path: str | PathLike[str]
-    ) -> KlemsBasis:
+    def _basis(self, element: ElementTree.Element, tag: str, where: str, path: str | PathLike[str]) -> KlemsBasis:
         name = _text(_need(element, tag, path))
         if name.lower() not in self.bases:
             raise DataError(f"unknown angle basis {name!r}", file=path, element=where, field=tag)
@@ -213,34 +204,22 @@ class _TreeReader:
 
     rank: int
 
-    def block(
-        self, element: ElementTree.Element, where: str, path: str | PathLike[str]
-    ) -> TensorTree:
+    def block(self, element: ElementTree.Element, where: str, path: str | PathLike[str]) -> TensorTree:
         basis = _text(_need(element, "AngleBasis", path))
         if basis.lower() != "lbnl/shirley-chiu":
-            raise DataError(
-                f"expected LBNL/Shirley-Chiu, got {basis!r}",
-                file=path,
-                element=where,
-                field="AngleBasis",
-            )
+            raise DataError(f"expected LBNL/Shirley-Chiu, got {basis!r}", file=path, element=where, field="AngleBasis")
         text = _text(_need(element, "ScatteringData", path))
         try:
             return TensorTree.from_text(text, self.rank)
         except ValueError as error:
             raise DataError(str(error), file=path, element=where, field="ScatteringData") from None
 
-    def band(
-        self, blocks: Mapping[str, Any], where: str, path: str | PathLike[str]
-    ) -> TensorTreeBsdf:
+    def band(self, blocks: Mapping[str, Any], where: str, path: str | PathLike[str]) -> TensorTreeBsdf:
         return TensorTreeBsdf(**blocks)
 
 
 def _read_blocks(
-    layer: ElementTree.Element,
-    path: str | PathLike[str],
-    notes: list[str],
-    reader: _KlemsReader | _TreeReader,
+    layer: ElementTree.Element, path: str | PathLike[str], notes: list[str], reader: _KlemsReader | _TreeReader
 ) -> dict[str, Bsdf]:
     """BSDF of every band; `reader` interprets the blocks."""
     blocks: dict[str, dict[str, Any]] = {}
@@ -268,10 +247,7 @@ def _without_negatives(block: Block, where: str, notes: list[str]) -> Block:
     values = block.values if isinstance(block, TensorTree) else block[-1]
     negative = values < 0
     if negative.any():
-        notes.append(
-            f"{where}: {np.count_nonzero(negative)} negative values "
-            f"(lowest {values.min():.3g}) read as zero"
-        )
+        notes.append(f"{where}: {np.count_nonzero(negative)} negative values (lowest {values.min():.3g}) read as zero")
         values[negative] = 0.0
     return block
 
@@ -285,14 +261,10 @@ def parse_numbers(
         values = np.array(words, dtype=np.float64)
     except ValueError:
         bad = next(word for word in words if not _is_number(word))
-        raise DataError(
-            f"not a number: {bad[:40]!r}", file=file, element=element, field=field
-        ) from None
+        raise DataError(f"not a number: {bad[:40]!r}", file=file, element=element, field=field) from None
     if not np.isfinite(values).all():
         where = int(np.flatnonzero(~np.isfinite(values))[0])
-        raise DataError(
-            f"value {where} is not finite: {words[where]}", file=file, element=element, field=field
-        )
+        raise DataError(f"value {where} is not finite: {words[where]}", file=file, element=element, field=field)
     return values
 
 
@@ -333,9 +305,7 @@ def _material(layer: ElementTree.Element, path: str | PathLike[str]) -> dict[str
     return result
 
 
-def _need(
-    element: ElementTree.Element, tags: str, path: str | PathLike[str]
-) -> ElementTree.Element:
+def _need(element: ElementTree.Element, tags: str, path: str | PathLike[str]) -> ElementTree.Element:
     need = element.find(tags)
     if need is None:
         raise DataError("is missing", file=path, element=element.tag, field=tags)
@@ -347,19 +317,14 @@ def _text(element: ElementTree.Element | None) -> str:
 
 
 def _number(
-    element: ElementTree.Element,
-    path: str | PathLike[str],
-    least: float = -math.inf,
-    most: float = math.inf,
+    element: ElementTree.Element, path: str | PathLike[str], least: float = -math.inf, most: float = math.inf
 ) -> float:
     try:
         value = float(_text(element))
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise DataError(
-            f"expected a number, got {_text(element)[:40]!r}", file=path, field=element.tag
-        )
+        raise DataError(f"expected a number, got {_text(element)[:40]!r}", file=path, field=element.tag)
     if not least <= value <= most:
         bounds = f"of at least {least:g}" if most == math.inf else f"from {least:g} to {most:g}"
         raise DataError(f"expected a number {bounds}, got {value:g}", file=path, field=element.tag)
@@ -408,11 +373,7 @@ def _material_lines(bsdf: BsdfFile) -> Iterator[str]:
     yield "<Material>\n"
     yield f"\t<Name>{escape(bsdf.name, quote=False)}</Name>\n"
     yield f"\t<Manufacturer>{escape(bsdf.manufacturer, quote=False)}</Manufacturer>\n"
-    for tag, length in (
-        ("Thickness", bsdf.thickness),
-        ("Width", bsdf.width),
-        ("Height", bsdf.height),
-    ):
+    for tag, length in (("Thickness", bsdf.thickness), ("Width", bsdf.width), ("Height", bsdf.height)):
         if length is not None:
             yield f'\t<{tag} unit="meter">{length:.9g}</{tag}>\n'
     yield f"\t<DeviceType>{escape(bsdf.device_type, quote=False)}</DeviceType>\n"
@@ -461,9 +422,7 @@ def _angle_basis(basis: KlemsBasis) -> Iterator[str]:
     yield "\t</AngleBasis>\n"
 
 
-def _block(
-    band: str, name: str, bsdf: Bsdf, block: NDArray[np.float64] | TensorTree, digits: int
-) -> Iterator[str]:
+def _block(band: str, name: str, bsdf: Bsdf, block: NDArray[np.float64] | TensorTree, digits: int) -> Iterator[str]:
     kind, side = name.split("_")
     source, detector = SPECTRA.get(band, SPECTRA["Visible"])
     yield (

@@ -28,10 +28,7 @@ from mitsuba_cfs.progress import Progress, silent
 
 BATCH_BYTES = 128 * 2**20  # of the pictures of a batch of hours
 ROW_BYTES = 16 * 2**20  # read at a time of a matrix on disk
-FIGURES = (
-    "dgp", "Ev", "dgi", "ugr", "cgi", "vcp", "sources", "background_luminance",
-    "dgp_standard_error",
-)  # fmt: skip
+FIGURES = ("dgp", "Ev", "dgi", "ugr", "cgi", "vcp", "sources", "background_luminance", "dgp_standard_error")
 MAGIC = b"\x93NUMPY"  # first bytes of a file of ratings
 
 log = logging.getLogger(__name__)
@@ -51,8 +48,7 @@ class PictureMatrix:
     def __post_init__(self) -> None:
         if self.rows.ndim != 2 or self.row.shape != self.share.shape or self.row.ndim != 1:
             raise ValueError(
-                f"rows {self.rows.shape}, row {self.row.shape}, share {self.share.shape}: "
-                "expected [m, N], [n], [n]"
+                f"rows {self.rows.shape}, row {self.row.shape}, share {self.share.shape}: expected [m, N], [n], [n]"
             )
 
     def with_rows(self, rows: NDArray[np.float32]) -> PictureMatrix:
@@ -118,9 +114,7 @@ class Pictures(Protocol):
     def values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """Luminance [h, n] [cd/m2] of the pixels in some hours [h]."""
 
-    def without_disc(
-        self, batch: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
+    def without_disc(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
         """The same without the sun's disc and its images in mirrors, and these [h]."""
 
     def add_disc(self, values: NDArray[np.float32], batch: NDArray[np.int64]) -> None:
@@ -184,9 +178,7 @@ class ThreePhasePictures:
         add_seen(own, self.seen, luminance)
         return self.reflected.of_rows(luminance), own
 
-    def without_disc(
-        self, batch: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
+    def without_disc(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
         """See `Pictures`; the patches include the sun."""
         return self.values(batch), self.discs(batch)
 
@@ -232,9 +224,7 @@ def annual_glare(
     options = options or GlareOptions()
     own = None if illuminance is None else np.asarray(illuminance, dtype=float)
     if own is not None and own.shape != (pictures.hours,):
-        raise ValueError(
-            f"illuminance {own.shape}: expected one for each of {pictures.hours} hours"
-        )
+        raise ValueError(f"illuminance {own.shape}: expected one for each of {pictures.hours} hours")
     table = _begin(checkpoint, pictures.hours)
     left = np.flatnonzero(np.isnan(table[:, 0]))
     size = max(1, BATCH_BYTES // (4 * max(1, len(pictures.pixels))))
@@ -264,14 +254,9 @@ def annual_glare(
         signs = random_signs(pictures.view, pictures.pixels)
 
         def error(
-            values: NDArray[np.float32],
-            noise: NDArray[np.float32],
-            discs: tuple[SunDisc, ...],
-            hour: int,
+            values: NDArray[np.float32], noise: NDArray[np.float32], discs: tuple[SunDisc, ...], hour: int
         ) -> float:
-            return dgp_error(
-                lambda some: rated(some, discs, hour).unlimited_dgp, values, noise, signs
-            )
+            return dgp_error(lambda some: rated(some, discs, hour).unlimited_dgp, values, noise, signs)
 
         for start in range(0, len(by_halves), size):
             batch = by_halves[start : start + size]
@@ -288,18 +273,14 @@ def finished_glare(checkpoint: Path, hours: int) -> AnnualGlare | None:
     return None if np.isnan(table).any() else AnnualGlare(*table.T)
 
 
-def full_picture(
-    values: NDArray[np.float32], pixels: NDArray[np.int64], view: View
-) -> NDArray[np.float32]:
+def full_picture(values: NDArray[np.float32], pixels: NDArray[np.int64], view: View) -> NDArray[np.float32]:
     """A picture [ny, nx] from the luminance [n] of the pixels inside the view."""
     picture = np.zeros(view.height * view.width, dtype=np.float32)
     picture[pixels] = values
     return picture.reshape(view.height, view.width)
 
 
-def add_seen(
-    values: NDArray[np.float32], shares: sparse.csr_array, luminance: NDArray[np.float32]
-) -> None:
+def add_seen(values: NDArray[np.float32], shares: sparse.csr_array, luminance: NDArray[np.float32]) -> None:
     """Add the patches that pixels show to values [h, n]; shares [n, N], luminance [N, h]."""
     some = np.flatnonzero(np.diff(shares.indptr))  # most pixels show none
     shown = np.ascontiguousarray((shares[some] @ luminance).T)
@@ -311,9 +292,7 @@ def flat(window_luminance: ArrayLike, columns: int) -> NDArray[np.float32]:
     """Luminance [G, K, H] as [G * K, H]."""
     luminance = np.asarray(window_luminance, dtype=np.float32)
     if luminance.ndim != 3 or luminance.shape[0] * luminance.shape[1] != columns:
-        raise ValueError(
-            f"window luminance {luminance.shape}: expected [G, K, H] with {columns} patches"
-        )
+        raise ValueError(f"window luminance {luminance.shape}: expected [G, K, H] with {columns} patches")
     return luminance.reshape(columns, -1)
 
 
@@ -339,8 +318,7 @@ def _begin(checkpoint: Path | None, hours: int) -> NDArray[np.float64]:
         return empty
     if table.shape != empty.shape:
         raise DataError(
-            f"ratings of shape {table.shape}, expected {empty.shape}: from another year, delete it",
-            file=checkpoint,
+            f"ratings of shape {table.shape}, expected {empty.shape}: from another year, delete it", file=checkpoint
         )
     return table
 

@@ -41,9 +41,7 @@ def random_signs(view: View, pixels: NDArray[np.int64]) -> NDArray[np.float32]:
     for _ in range(DRAWS):
         down, right = random.integers(0, across, 2)
         y, x = (row + down) // across, (column + right) // across
-        of_block = random.choice(
-            np.array([-1, 1], dtype=np.float32), size=(y.max(initial=0) + 1, x.max(initial=0) + 1)
-        )
+        of_block = random.choice(np.array([-1, 1], dtype=np.float32), size=(y.max(initial=0) + 1, x.max(initial=0) + 1))
         signs.append(of_block[y, x])
     return np.stack(signs)
 
@@ -61,10 +59,7 @@ def dgp_error(
         values, noise: [n] luminance, and half the difference of two halves of the paths [cd/m2].
         signs: [DRAWS, n] as of `random_signs`.
     """
-    off = [
-        dgp(np.maximum(values + s * noise, 0)) - dgp(np.maximum(values - s * noise, 0))
-        for s in signs
-    ]
+    off = [dgp(np.maximum(values + s * noise, 0)) - dgp(np.maximum(values - s * noise, 0)) for s in signs]
     return float(STUDENT * np.sqrt(np.mean(np.square(off))) / 2)
 
 
@@ -75,9 +70,7 @@ def hours_by_halves(dgp: NDArray[np.float64]) -> NDArray[np.int64]:
     return order[np.round(np.linspace(0, len(dgp) - 1, count)).astype(np.int64)]
 
 
-def dgp_errors(
-    dgp: NDArray[np.float64], hours: NDArray[np.int64], errors: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def dgp_errors(dgp: NDArray[np.float64], hours: NDArray[np.int64], errors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Standard error of the DGP of every hour [H] from those of some.
 
     Args: hours: [n] as of `hours_by_halves`; errors: [n] as of `dgp_error`.

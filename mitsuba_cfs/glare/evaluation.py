@@ -128,9 +128,7 @@ class GlareResult:
     @cached_property
     def Lveil(self) -> float:
         """Veiling luminance after Poynter [cd/m2]."""
-        return indices.veiling_luminance(
-            self.sources.luminance, self.sources.solid_angle, self.sigma
-        )
+        return indices.veiling_luminance(self.sources.luminance, self.sources.solid_angle, self.sigma)
 
     @property
     def labels(self) -> NDArray[np.int32]:
@@ -276,9 +274,7 @@ def _in_field(disc: SunDisc, geometry: GlareView, options: GlareOptions) -> bool
     return bool(seen(geometry, options.field_of_view)[geometry.pixel_at(disc.direction)])
 
 
-def prepare(
-    luminance: ArrayLike, geometry: GlareView
-) -> tuple[NDArray[np.float64], float, float, float]:
+def prepare(luminance: ArrayLike, geometry: GlareView) -> tuple[NDArray[np.float64], float, float, float]:
     """A picture [ny, nx] checked, in scan order [nx, ny], 0 where a pixel does not count.
 
     Returns:
@@ -317,12 +313,7 @@ def _threshold(options: GlareOptions, task: float) -> float:
 
 
 def _background(
-    options: GlareOptions,
-    geometry: GlareView,
-    sources: Sources,
-    Ev: float,
-    direct: float,
-    mean: float,
+    options: GlareOptions, geometry: GlareView, sources: Sources, Ev: float, direct: float, mean: float
 ) -> float:
     """Background luminance [cd/m2]."""
     if options.background == "indirect":

@@ -103,10 +103,7 @@ class GlareView:
             stretch = 1.0
         elif view.kind == "angular" and radius < 1.0:
             widest = np.pi / 2 + radius
-            per_radian = max(
-                view.width / np.radians(view.horizontal_deg),
-                view.height / np.radians(view.vertical_deg),
-            )
+            per_radian = max(view.width / np.radians(view.horizontal_deg), view.height / np.radians(view.vertical_deg))
             stretch = widest / np.sin(widest)
         else:
             return longest

@@ -63,9 +63,7 @@ def age_factor(age: float) -> float:
     return 1.0 / (1.1 - 0.5 * age / 100.0)
 
 
-def daylight_glare_index(
-    luminance: ArrayLike, omega: ArrayLike, position: ArrayLike, background: float
-) -> float:
+def daylight_glare_index(luminance: ArrayLike, omega: ArrayLike, position: ArrayLike, background: float) -> float:
     """DGI = 10 log10 sum 0.478 L^1.6 (omega/P^2)^0.8/(L_b + 0.07 omega^0.5 L).
 
     Source: Hopkinson (1972), Chauvel et al. (1982).
@@ -73,17 +71,13 @@ def daylight_glare_index(
     return _daylight_glare_index(luminance, omega, position, background)
 
 
-def modified_dgi(
-    luminance: ArrayLike, omega: ArrayLike, position: ArrayLike, illuminance: float
-) -> float:
+def modified_dgi(luminance: ArrayLike, omega: ArrayLike, position: ArrayLike, illuminance: float) -> float:
     """DGI with (E_v/pi)^0.85 for the background luminance. Source: Fisekis et al. (2003)."""
     adaptation = (illuminance / math.pi) ** 0.85
     return _daylight_glare_index(luminance, omega, position, adaptation)
 
 
-def _daylight_glare_index(
-    luminance: ArrayLike, omega: ArrayLike, position: ArrayLike, background: float
-) -> float:
+def _daylight_glare_index(luminance: ArrayLike, omega: ArrayLike, position: ArrayLike, background: float) -> float:
     L, w, P = (np.asarray(a, dtype=float) for a in (luminance, omega, position))
     if L.size == 0:
         return 0.0
@@ -102,11 +96,7 @@ def unified_glare_rating(contrast: float, background: float) -> float:
 
 
 def experimental_ugr(
-    luminance: ArrayLike,
-    omega: ArrayLike,
-    position: ArrayLike,
-    background: float,
-    illuminance: float,
+    luminance: ArrayLike, omega: ArrayLike, position: ArrayLike, background: float, illuminance: float
 ) -> float:
     """8 log10(E_v/pi) + 8 log10(sum L omega/P^2 / L_b). Source: Fisekis et al. (2003)."""
     L, w, P = (np.asarray(a, dtype=float) for a in (luminance, omega, position))
@@ -138,9 +128,7 @@ def cie_glare_index(contrast: float, illuminance: float, direct: float) -> float
     return 8 * _log10(2 * (1 + direct / 500) * _ratio(contrast, illuminance))
 
 
-def discomfort_glare_rating(
-    luminance: ArrayLike, omega: ArrayLike, position: ArrayLike, field: float
-) -> float:
+def discomfort_glare_rating(luminance: ArrayLike, omega: ArrayLike, position: ArrayLike, field: float) -> float:
     """DGR = (sum 0.5 L Q/(P F^0.44))^(n^-0.0914), Q = 20.4 omega + 1.52 omega^0.2 - 0.075.
 
     F is the average luminance of the field of view. Source: IES RQQ (1966).

@@ -59,9 +59,7 @@ def kim_index(sigma: ArrayLike, tau: ArrayLike) -> NDArray[np.float64]:
     return np.exp((s - middle) / width)
 
 
-def view_angles(
-    directions: ArrayLike, view: View
-) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+def view_angles(directions: ArrayLike, view: View) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """sigma, tau [...] [rad] and whether below the line of sight, of unit directions [..., 3].
 
     tau is measured from the view's up vector as it was given, not from its part across the line of
@@ -78,9 +76,7 @@ def view_angles(
     return np.arccos(cosine), tau, directions @ up < 0
 
 
-def position_index(
-    directions: ArrayLike, view: View, *, model: str = "guth"
-) -> NDArray[np.float64]:
+def position_index(directions: ArrayLike, view: View, *, model: str = "guth") -> NDArray[np.float64]:
     """Position index [...] of sources in unit directions [..., 3], at most 16.
 
     Args:

@@ -59,13 +59,7 @@ def source_lines(result: GlareResult) -> list[str]:
 
 def _of_picture(result: GlareResult) -> tuple[float, ...]:
     """Quantities of the whole picture, one per output line."""
-    return (
-        result.background_luminance,
-        result.task_luminance,
-        result.Ev,
-        result.Ev_direct,
-        result.largest_luminance,
-    )
+    return (result.background_luminance, result.task_luminance, result.Ev, result.Ev_direct, result.largest_luminance)
 
 
 def _no_source(result: GlareResult) -> str:
@@ -114,9 +108,7 @@ def _weighted_by_position(result: GlareResult) -> tuple[list[float], list[float]
     if result.options.position_model == "guth":
         index = geometry.guth
     else:
-        index = position_index(
-            geometry.directions, geometry.view, model=result.options.position_model
-        )
+        index = position_index(geometry.directions, geometry.view, model=result.options.position_model)
     values = picture[geometry.valid]
     divisor = index[geometry.valid].astype(np.float32).astype(np.float64)
     omega = geometry.solid_angle[geometry.valid]
@@ -149,19 +141,13 @@ def area_line(name: str, area: areas.AreaStatistics) -> str:
 
 def band_line(area: areas.AreaStatistics) -> str:
     """The line of -B."""
-    keys = (
-        "band_omega,band_av_lum,band_median_lum,band_std_lum,band_perc_75,band_perc_95,"
-        "band_lum_min,band_lum_max"
-    )
+    keys = "band_omega,band_av_lum,band_median_lum,band_std_lum,band_perc_75,band_perc_95,band_lum_min,band_lum_max"
     return f"band:{keys}: {_six(_luminances(area))}"
 
 
 def mask_line(area: areas.AreaStatistics, result: GlareResult) -> str:
     """The line of -A, with PGSV for a mask that is the window (-99 without a task area)."""
-    keys = (
-        "no_pixels,omega,av_lum,median_lum,std_lum,perc_75,perc_95,lum_min,lum_max,"
-        "pgsv_con,pgsv_sat,pgsv,Ev_mask"
-    )
+    keys = "no_pixels,omega,av_lum,median_lum,std_lum,perc_75,perc_95,lum_min,lum_max,pgsv_con,pgsv_sat,pgsv,Ev_mask"
     task = result.task_luminance if result.options.task is not None else 0.0
     whole = areas.pgsv(area, result.mean_luminance, result.Ev, task) if task > 0 else -99.0
     values = (

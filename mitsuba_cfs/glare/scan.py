@@ -90,9 +90,7 @@ def label_bright(luminance, valid, directions, threshold, radius, reach, follow)
                     continue
                 label = last
                 if last == 0 or not follow:
-                    label = search(
-                        labels, directions, no_omega, x, y, radius, cosine, reach, 0, 0, 0
-                    )
+                    label = search(labels, directions, no_omega, x, y, radius, cosine, reach, 0, 0, 0)
                 if label == 0:
                     count += 1
                     label = count
@@ -186,9 +184,7 @@ def move_source(labels, sums, boxes, luminance, solid_angle, old, new):
 
 
 @compiled(nogil=True)
-def merge_sources(
-    labels, sums, luminance, solid_angle, valid, directions, radius, reach, lowest, highest, edges
-):
+def merge_sources(labels, sums, luminance, solid_angle, valid, directions, radius, reach, lowest, highest, edges):
     """Second scan: sources near a larger one join it, until none does.
 
     Only labels lowest..highest take part; `edges`: only pixels with a different neighbour look.
@@ -209,9 +205,7 @@ def merge_sources(
                     continue
                 if not larger_in_reach(sums, boxes, x, y, own, lowest, highest, reach, reach):
                     continue
-                new = search(
-                    labels, directions, omega, x, y, radius, cosine, reach, own, lowest, highest
-                )
+                new = search(labels, directions, omega, x, y, radius, cosine, reach, own, lowest, highest)
                 if new > 0:
                     move_source(labels, sums, boxes, luminance, solid_angle, own, new)
                     changed = True

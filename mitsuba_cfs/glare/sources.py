@@ -53,9 +53,7 @@ def glare_sources(
     step = geometry.pixels_in(search_radius)
     reach = geometry.reach(radius / 2)
     valid, directions, omega = geometry.valid, geometry.directions, geometry.solid_angle
-    labels, count = scan.label_bright(
-        luminance, valid, directions, threshold, radius, reach, step > 1.0
-    )
+    labels, count = scan.label_bright(luminance, valid, directions, threshold, radius, reach, step > 1.0)
     if not count:
         return Sources(labels, *np.empty((6, 0)))
     peaks = peak if step >= 1.0 else None
@@ -83,9 +81,14 @@ def pixel_sources(luminance: NDArray[np.float64], geometry: GlareView, threshold
     labels[x, y] = np.arange(1, len(x) + 1)
     L = luminance[x, y]
     return Sources(
-        labels, np.ones(len(x)), geometry.solid_angle[x, y], L, x.astype(float), y.astype(float),
+        labels,
+        np.ones(len(x)),
+        geometry.solid_angle[x, y],
+        L,
+        x.astype(float),
+        y.astype(float),
         L * geometry.projected[x, y],
-    )  # fmt: skip
+    )
 
 
 def with_disc(sources: Sources, disc: SunDisc, illuminance: float, geometry: GlareView) -> Sources:
@@ -99,10 +102,7 @@ def with_disc(sources: Sources, disc: SunDisc, illuminance: float, geometry: Gla
         labels = labels.copy()
         labels[x, y] = count + 1
     own = (0.0, disc.solid_angle, disc.luminance, x, y, illuminance)
-    values = (
-        sources.pixels, sources.solid_angle, sources.luminance, sources.x, sources.y,
-        sources.illuminance,
-    )  # fmt: skip
+    values = (sources.pixels, sources.solid_angle, sources.luminance, sources.x, sources.y, sources.illuminance)
     return Sources(labels, *(np.append(a, b) for a, b in zip(values, own, strict=True)))
 
 
@@ -123,17 +123,12 @@ def _extract_peaks(
     for source in range(1, count + 1):
         if sums[source, scan.COUNT] > 0 and brightest[source] >= limit:
             first = last + 1
-            last = scan.peaks_of(
-                source, first, labels, sums, luminance, omega, valid, directions, limit, radius
-            )
+            last = scan.peaks_of(source, first, labels, sums, luminance, omega, valid, directions, limit, radius)
             scan.merge_sources(labels, sums, *fixed, first, last, False)
 
 
 def _collect(
-    labels: NDArray[np.int32],
-    sums: NDArray[np.float64],
-    luminance: NDArray[np.floating],
-    geometry: GlareView,
+    labels: NDArray[np.int32], sums: NDArray[np.float64], luminance: NDArray[np.floating], geometry: GlareView
 ) -> Sources:
     """The sources that have pixels, numbered in the order in which they were made."""
     kept = np.flatnonzero(sums[:, scan.COUNT] > 0)

@@ -35,9 +35,7 @@ def seen_disc(directions: ArrayLike, luminance: ArrayLike) -> SunDisc | None:
     flux, square = L.sum(), (L**2).sum()
     middle = L @ np.asarray(directions, dtype=float)
     return SunDisc(
-        middle / np.linalg.norm(middle),
-        float(square / flux),
-        float(flux**2 / square * SUN_SOLID_ANGLE / len(L)),
+        middle / np.linalg.norm(middle), float(square / flux), float(flux**2 / square * SUN_SOLID_ANGLE / len(L))
     )
 
 

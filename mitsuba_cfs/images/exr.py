@@ -16,9 +16,7 @@ from mitsuba_cfs.files import write_bytes
 from mitsuba_cfs.images.view import View, format_view
 
 
-def write_exr(
-    path: str | PathLike[str], pixels: ArrayLike, view: View | None = None, *, comment: str = ""
-) -> None:
+def write_exr(path: str | PathLike[str], pixels: ArrayLike, view: View | None = None, *, comment: str = "") -> None:
     """Write a picture in 32-bit floats, whole or not at all, with its VIEW as an attribute.
 
     Args: pixels: luminance [ny, nx] [cd/m2] (channel Y) or radiance [ny, nx, 3] [W/m2/sr] (R G B).

@@ -62,12 +62,7 @@ def decode_scanlines(data: NDArray[np.uint8], rgbe: NDArray[np.uint8]) -> int:
     for line in range(lines):
         if at + 4 > size:
             return line
-        new = (
-            SHORTEST <= width <= LONGEST
-            and data[at] == 2
-            and data[at + 1] == 2
-            and data[at + 2] < 128
-        )
+        new = SHORTEST <= width <= LONGEST and data[at] == 2 and data[at + 1] == 2 and data[at + 2] < 128
         if new:
             if (data[at + 2] << 8 | data[at + 3]) != width:
                 return line
@@ -142,9 +137,7 @@ def _encode(rgbe: NDArray[np.uint8], out: NDArray[np.uint8]) -> int:
                 while start < width:  # find the next run of four or more equal bytes
                     run = 1
                     while (
-                        start + run < width
-                        and run < 127
-                        and rgbe[line, start + run, plane] == rgbe[line, start, plane]
+                        start + run < width and run < 127 and rgbe[line, start + run, plane] == rgbe[line, start, plane]
                     ):
                         run += 1
                     if run >= 4:
@@ -189,9 +182,7 @@ VIEW_PROGRAMS = ("VIEW=", "rpict", "rview", "rvu", "rpiece", "pinterp")
 class Picture:
     """A Radiance picture, upright: row 0 is its top, column 0 its left."""
 
-    pixels: NDArray[
-        np.float32
-    ]  # [ny, nx, 3] radiance [W/m2/sr] (or XYZ [cd/m2]), exposure taken out
+    pixels: NDArray[np.float32]  # [ny, nx, 3] radiance [W/m2/sr] (or XYZ [cd/m2]), exposure taken out
     view: View | None  # None where the header has no valid view
     exposure: float  # product of the file's EXPOSURE lines
     header: tuple[str, ...]  # lines of the header
@@ -235,11 +226,7 @@ def read_hdr(path: str | PathLike[str]) -> Picture:
     rgbe = np.empty((*shape, 4), dtype=np.uint8)
     lines = decode_scanlines(np.frombuffer(data, dtype=np.uint8)[start:], rgbe)
     if lines < shape[0]:
-        raise DataError(
-            f"the data ends or is damaged in scanline {lines + 1} of {shape[0]}",
-            file=path,
-            field="pixels",
-        )
+        raise DataError(f"the data ends or is damaged in scanline {lines + 1} of {shape[0]}", file=path, field="pixels")
     rgbe = rgbe[:: signs[0], :: signs[1]]
     rgbe = np.ascontiguousarray(rgbe.swapaxes(0, 1) if transposed else rgbe)
     exposure, correction = _exposure(header, path)
@@ -266,9 +253,7 @@ def _header(data: bytes, path: str | PathLike[str]) -> tuple[tuple[str, ...], st
     return tuple(line.rstrip("\r") for line in lines), resolution, newline + 1
 
 
-def _orientation(
-    resolution: str, path: str | PathLike[str]
-) -> tuple[tuple[int, int], tuple[int, int], bool]:
+def _orientation(resolution: str, path: str | PathLike[str]) -> tuple[tuple[int, int], tuple[int, int], bool]:
     """Steps along lines and pixels that set a picture upright, its stored shape, if X is first."""
     words = resolution.split()
     axes = [word[-1:] for word in words[::2]]
@@ -279,17 +264,13 @@ def _orientation(
     known = sorted(axes) == ["X", "Y"] and all(w in ("+X", "-X", "+Y", "-Y") for w in words[::2])
     if not known or min(shape) < 1:
         raise DataError(
-            f"expected a resolution like -Y 800 +X 800, found {resolution!r:.60}",
-            file=path,
-            field="resolution",
+            f"expected a resolution like -Y 800 +X 800, found {resolution!r:.60}", file=path, field="resolution"
         )
     upright = {"-Y": 1, "+Y": -1, "+X": 1, "-X": -1}
     return (upright[words[0]], upright[words[2]]), shape, axes[0] == "X"
 
 
-def _exposure(
-    header: tuple[str, ...], path: str | PathLike[str]
-) -> tuple[float, NDArray[np.float64]]:
+def _exposure(header: tuple[str, ...], path: str | PathLike[str]) -> tuple[float, NDArray[np.float64]]:
     """Product of EXPOSURE= lines, and of COLORCORR= lines [3]."""
     exposure, correction = 1.0, np.ones(3)
     for line in header:
@@ -303,9 +284,7 @@ def _exposure(
         except (IndexError, ValueError):
             raise DataError(f"not a number: {value!r:.60}", file=path, field=name) from None
     if not (0 < exposure < np.inf and np.all((correction > 0) & (correction < np.inf))):
-        raise DataError(
-            f"expected a positive factor, found {exposure:g}", file=path, field="EXPOSURE"
-        )
+        raise DataError(f"expected a positive factor, found {exposure:g}", file=path, field="EXPOSURE")
     return exposure, correction
 
 

@@ -295,14 +295,7 @@ def _unit_or_zero(vectors: NDArray[Any]) -> NDArray[Any]:
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
-_SIZES = {
-    "h": "horizontal_deg",
-    "v": "vertical_deg",
-    "s": "shift",
-    "l": "lift",
-    "o": "fore",
-    "a": "aft",
-}
+_SIZES = {"h": "horizontal_deg", "v": "vertical_deg", "s": "shift", "l": "lift", "o": "fore", "a": "aft"}
 _VECTORS = {"p": "position", "d": "direction", "u": "up"}
 
 

@@ -33,9 +33,17 @@ RECENT_HASHES = 32  # of dataclasses
 PLAIN = {type(None), bool, int, float, str, bytes}  # whose `repr` tells values apart
 # RuntimeError: of zipfile, for a damaged file that seems encrypted or otherwise compressed
 UNREADABLE = (
-    OSError, ValueError, KeyError, TypeError, IndexError, EOFError, MemoryError, RuntimeError,
-    zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
+    OSError,
+    ValueError,
+    KeyError,
+    TypeError,
+    IndexError,
+    EOFError,
+    MemoryError,
+    RuntimeError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")
@@ -139,9 +147,7 @@ class MatrixCache:
     def trim(self, keep: Path | None = None) -> None:
         """Delete the longest unused files until the folder holds less than the limit."""
         result = [(file, _status(file)) for file in self.folder.glob("*.npz")]
-        files = sorted(
-            ((file, status) for file, status in result if status), key=lambda item: item[1].st_mtime
-        )
+        files = sorted(((file, status) for file, status in result if status), key=lambda item: item[1].st_mtime)
         total = sum(status.st_size for _, status in files)
         for file, status in files:
             if total <= self.limit:
@@ -208,9 +214,7 @@ def _batch_mean(data: Mapping[str, NDArray[Any]]) -> BatchMean | None:
     return BatchMean(count, mean, spread, covariance, seconds, finished) if whole else None
 
 
-def cached_or_computed(
-    entry: CacheEntry | None, compute: Callable[[], NDArray[np.float64]]
-) -> NDArray[np.float64]:
+def cached_or_computed(entry: CacheEntry | None, compute: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return the cached matrix, or compute and store it: for matrices without batches."""
     cached = None if entry is None else entry.load()
     if cached is not None and cached.finished:

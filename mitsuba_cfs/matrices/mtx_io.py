@@ -54,9 +54,7 @@ def read_matrix(path: str | PathLike[str]) -> NDArray[np.float64]:
     values = _values(data, header, path)
     if values.size != np.prod(shape):
         raise DataError(
-            f"expected {shape[0]} x {shape[1]} x {shape[2]} values, got {values.size}",
-            file=path,
-            field="data",
+            f"expected {shape[0]} x {shape[1]} x {shape[2]} values, got {values.size}", file=path, field="data"
         )
     if not np.isfinite(values).all():
         row, column, _ = np.unravel_index(np.argmin(np.isfinite(values)), shape)
@@ -106,9 +104,7 @@ def write_matrix(
         _write_values(file, values, FORMATS[format])
 
 
-def luminance(
-    matrix: ArrayLike, weights: tuple[float, float, float] = LUMINANCE_WEIGHTS
-) -> NDArray[np.float64]:
+def luminance(matrix: ArrayLike, weights: tuple[float, float, float] = LUMINANCE_WEIGHTS) -> NDArray[np.float64]:
     """Weighted sum [rows, columns] of three components, or the only one."""
     matrix = np.asarray(matrix, dtype=float)
     if matrix.ndim != 3 or matrix.shape[-1] not in (1, 3):
@@ -140,8 +136,7 @@ def read_header(file: BinaryIO, path: str | PathLike[str]) -> MatrixHeader:
             raise DataError("missing from the header", file=path, field=key)
     if fields["FORMAT"] not in FORMATS:
         raise DataError(
-            f"expected ascii, float or double, got {fields['FORMAT']} "
-            "(`rmtxop -ff` of Radiance converts it)",
+            f"expected ascii, float or double, got {fields['FORMAT']} (`rmtxop -ff` of Radiance converts it)",
             file=path,
             field="FORMAT",
         )

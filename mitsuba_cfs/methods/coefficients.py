@@ -20,12 +20,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.bsdf.evaluate import held_beams
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.optics import States, SystemOptics, straight_transmittance
-from mitsuba_cfs.methods.phase_matrices import (
-    INDOOR_DEPTH,
-    OUTDOOR_DEPTH,
-    PhaseMatrices,
-    has_sharp_beam,
-)
+from mitsuba_cfs.methods.phase_matrices import INDOOR_DEPTH, OUTDOOR_DEPTH, PhaseMatrices, has_sharp_beam
 from mitsuba_cfs.methods.window_reflection import (
     by_way_of_outdoors,
     reflects,
@@ -50,9 +45,7 @@ class StraightView:
     """The outdoors or the adjacent room that sensors see through a group in one state."""
 
     values: Estimate  # B [S, P]
-    direct: (
-        Array | None
-    )  # B_d [S, P], without what the outdoors reflects; None with the three-phase method
+    direct: Array | None  # B_d [S, P], without what the outdoors reflects; None with the three-phase method
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,17 +59,12 @@ class GroupCoefficients:
     by_sun: Array | None  # [S, P] what is computed at the sun's own angle instead; five phases
 
 
-def group_coefficients(
-    matrices: PhaseMatrices, systems: Sequence[States]
-) -> tuple[tuple[GroupCoefficients, ...], ...]:
+def group_coefficients(matrices: PhaseMatrices, systems: Sequence[States]) -> tuple[tuple[GroupCoefficients, ...], ...]:
     """Coefficients of each window group in each of its states [G][J].
 
     Args: matrices: with those of the sensors; systems: the states of each window group [G].
     """
-    return tuple(
-        tuple(_of_group(matrices, optics, g) for optics in states)
-        for g, states in enumerate(systems)
-    )
+    return tuple(tuple(_of_group(matrices, optics, g) for optics in states) for g, states in enumerate(systems))
 
 
 def _of_group(matrices: PhaseMatrices, optics: SystemOptics, g: int) -> GroupCoefficients:
@@ -155,9 +143,7 @@ def beam_matrix(optics: SystemOptics) -> Array:
     return held_beams(optics.transmission, beams, KLEMS_FULL)
 
 
-def _straight_view(
-    matrices: PhaseMatrices, optics: SystemOptics, g: int, beam: Array
-) -> StraightView | None:
+def _straight_view(matrices: PhaseMatrices, optics: SystemOptics, g: int, beam: Array) -> StraightView | None:
     """B and B_d of a group in a state; None where the method takes none."""
     if not beam.any():
         return None
@@ -165,11 +151,18 @@ def _straight_view(
     inner = g - len(scene.outdoor_groups)
     if inner >= 0:  # nothing comes straight from the sky
         values = adjacent_view(
-            (scene.interior, scene.groups), g, beam, matrices.adjacent[inner], scene.sensors(),
-            samples=INNER_SHARE * chosen.sensor_samples // BATCHES, max_depth=INDOOR_DEPTH,
-            stopping=stopping, seed=chosen.seed, cache=matrices.cache,
+            (scene.interior, scene.groups),
+            g,
+            beam,
+            matrices.adjacent[inner],
+            scene.sensors(),
+            samples=INNER_SHARE * chosen.sensor_samples // BATCHES,
+            max_depth=INDOOR_DEPTH,
+            stopping=stopping,
+            seed=chosen.seed,
+            cache=matrices.cache,
             scenes=matrices.scenes,
-        )  # fmt: skip
+        )
         return StraightView(values, np.zeros_like(values.values) if matrices.five_phase else None)
     if not has_sharp_beam(matrices, g):
         return None
@@ -177,11 +170,19 @@ def _straight_view(
 
     def traced(depth: int) -> Estimate:
         matrix = straight_view_matrix(
-            scene.interior, scene.exterior, scene.groups, scattering, *scene.sensors(),
-            subdivision=chosen.subdivision, samples=max(chosen.sensor_samples // BATCHES, 1),
-            max_depth=depth, stopping=stopping, seed=chosen.seed, cache=matrices.cache,
+            scene.interior,
+            scene.exterior,
+            scene.groups,
+            scattering,
+            *scene.sensors(),
+            subdivision=chosen.subdivision,
+            samples=max(chosen.sensor_samples // BATCHES, 1),
+            max_depth=depth,
+            stopping=stopping,
+            seed=chosen.seed,
+            cache=matrices.cache,
             scenes=matrices.scenes,
-        )  # fmt: skip
+        )
         return matrix.part(np.s_[g])
 
     values = traced(OUTDOOR_DEPTH)
@@ -216,11 +217,7 @@ def reflected_shares(matrices: PhaseMatrices, optics: Sequence[SystemOptics]) ->
 
 
 def _reflected_shares(
-    view: Estimate,
-    daylight: Estimate,
-    exchange: Estimate | None,
-    outdoors: Estimate | None,
-    *optics: SystemOptics,
+    view: Estimate, daylight: Estimate, exchange: Estimate | None, outdoors: Estimate | None, *optics: SystemOptics
 ) -> ReflectedShares:
     """Of V, D, W and X."""
     shares: Array | None = None

@@ -84,12 +84,7 @@ def _rgb(x: ArrayLike, z: ArrayLike) -> NDArray[np.float64]:
     return relative_rgb(x, np.ones_like(x), z)
 
 
-def has_colour(
-    bands: Sequence[DaylightScene],
-    systems: Sequence[Sequence[States]],
-    sky: AnnualSky,
-    hour: int,
-) -> bool:
+def has_colour(bands: Sequence[DaylightScene], systems: Sequence[Sequence[States]], sky: AnnualSky, hour: int) -> bool:
     """Whether a picture of the scenes by red, green and blue in one of the hours L is not grey.
 
     It is grey where all surfaces reflect the bands equally, the windows transmit them equally, and
@@ -140,16 +135,17 @@ def coloured_picture(
     disc = float(sky.illuminance[hour]) / SUN_SOLID_ANGLE
     skies = [Sky(patches * shade.patches[:, c], towards, disc * shade.sun[c]) for c in range(3)]
     rgb = colour_picture(
-        [path_tracing_room(*own, state) for own in zip(bands, systems, strict=True)], skies,
-        bands[0].eye, samples=max(sampling.picture_samples // FEWER, 1), seed=sampling.seed,
+        [path_tracing_room(*own, state) for own in zip(bands, systems, strict=True)],
+        skies,
+        bands[0].eye,
+        samples=max(sampling.picture_samples // FEWER, 1),
+        seed=sampling.seed,
         progress=progress,
-    )  # fmt: skip
+    )
     return with_luminance(smoothed_colour(rgb, luminance), luminance)
 
 
-def smoothed_colour(
-    rgb: NDArray[np.floating], luminance: NDArray[np.floating]
-) -> NDArray[np.float64]:
+def smoothed_colour(rgb: NDArray[np.floating], luminance: NDArray[np.floating]) -> NDArray[np.float64]:
     """The bands of a picture [ny, nx, 3], averaged where the picture's luminance is nearly alike.
 
     Few paths leave blotches of colour, where the luminance, of many more paths, shows what belongs
@@ -178,9 +174,7 @@ def smoothed_colour(
     return np.moveaxis(bands[:3], 0, -1).astype(float)
 
 
-def with_luminance(
-    rgb: NDArray[np.floating], luminance: NDArray[np.floating]
-) -> NDArray[np.float32]:
+def with_luminance(rgb: NDArray[np.floating], luminance: NDArray[np.floating]) -> NDArray[np.float32]:
     """Radiance [ny, nx, 3] of the colours of one picture and the luminance [cd/m2] of another.
 
     What is black in the first is grey.

@@ -20,35 +20,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.glare import indices
-from mitsuba_cfs.glare.annual import (
-    FIGURES,
-    AnnualGlare,
-    Pictures,
-    annual_glare,
-    figures,
-    full_picture,
-)
+from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, Pictures, annual_glare, figures, full_picture
 from mitsuba_cfs.glare.dgp_error import dgp_error, dgp_errors, hours_by_halves, random_signs
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.matrices.cache import CacheEntry, cached_or_computed
 from mitsuba_cfs.methods import METRICS, UnknownMethodError
-from mitsuba_cfs.methods.light import (
-    Light,
-    SeasonalLight,
-    eye_illuminance,
-    illuminance,
-    with_systems,
-)
+from mitsuba_cfs.methods.light import Light, SeasonalLight, eye_illuminance, illuminance, with_systems
 from mitsuba_cfs.methods.optics import States, hourly_states
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.phase_matrices import few_pictures
-from mitsuba_cfs.methods.phase_pictures import (
-    pictures_by_state,
-    pictures_in_state,
-    with_phase_pictures,
-)
+from mitsuba_cfs.methods.phase_pictures import pictures_by_state, pictures_in_state, with_phase_pictures
 from mitsuba_cfs.methods.point_in_time import (
     PathLight,
     discs_of_room,
@@ -175,11 +158,7 @@ def metric_values(light: Light, metric: str) -> NDArray[np.float64]:
 
 
 def pictures(
-    light: PhaseLight | PathLight,
-    hours: ArrayLike,
-    state: State = None,
-    *,
-    progress: Progress = silent,
+    light: PhaseLight | PathLight, hours: ArrayLike, state: State = None, *, progress: Progress = silent
 ) -> list[Picture]:
     """Luminance pictures [ny, nx] [cd/m2] of some hours [n] of the light's sky."""
     hours = hour_numbers(hours, len(light.sky.lit))
@@ -230,9 +209,7 @@ def rated_pictures(
     return [results[i] for i in range(len(hours))]
 
 
-def _picture_error(
-    picture: Picture, noise: Picture, geometry: GlareView, how: dict[str, Any]
-) -> float:
+def _picture_error(picture: Picture, noise: Picture, geometry: GlareView, how: dict[str, Any]) -> float:
     """Standard error of the DGP of a picture; `how`: options of `evaluate`."""
 
     def dgp(values: NDArray[np.float32]) -> float:
@@ -264,9 +241,7 @@ def _path_pictures(
         yield _Made(i, one.bare, one.discs, one.shown, None)
 
 
-def _phase_pictures(
-    light: PhaseLight, hours: NDArray[np.int64], rows: NDArray[np.int64]
-) -> Iterator[_Made]:
+def _phase_pictures(light: PhaseLight, hours: NDArray[np.int64], rows: NDArray[np.int64]) -> Iterator[_Made]:
     """Pictures of hours [n] in their states [G, n] from matrices."""
     for numbers, of_kind in pictures_by_state(light, hours, rows):
         whole = partial(full_picture, pixels=of_kind.pixels, view=of_kind.view)
@@ -294,28 +269,26 @@ def _of_seasons(
     for i, season in enumerate(_in_seasons(light, chosen, rows)):
         end = (done + len(season.columns)) / len(chosen)
         rated = hourly_glare(
-            season.light, metric, season.state, hours=season.hours, options=options,
+            season.light,
+            metric,
+            season.state,
+            hours=season.hours,
+            options=options,
             checkpoint=_numbered(checkpoint, f"season-{i}"),
             progress=part(progress, done / len(chosen), end, "glare"),
-        )  # fmt: skip
+        )
         table[:, season.columns] = [getattr(rated, name) for name in FIGURES]
         done += len(season.columns)
     return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)
 
 
 def _rated_in_seasons(
-    light: SeasonalLight,
-    hours: NDArray[np.int64],
-    rows: NDArray[np.int64],
-    options: GlareOptions,
-    progress: Progress,
+    light: SeasonalLight, hours: NDArray[np.int64], rows: NDArray[np.int64], options: GlareOptions, progress: Progress
 ) -> list[tuple[Picture, GlareResult]]:
     """The pictures of hours [n] in their states [G, n], season by season, and their glare."""
     results: dict[int, tuple[Picture, GlareResult]] = {}
     for season in _in_seasons(light, hours, rows):
-        rated = rated_pictures(
-            season.light, season.hours, season.state, options=options, progress=progress
-        )
+        rated = rated_pictures(season.light, season.hours, season.state, options=options, progress=progress)
         results |= dict(zip(season.columns.tolist(), rated, strict=True))
     return [results[i] for i in range(len(hours))]
 
@@ -330,9 +303,7 @@ class _Season:
     state: NDArray[np.int64]  # [G, l] of all hours of the season
 
 
-def _in_seasons(
-    light: SeasonalLight, hours: NDArray[np.int64], rows: NDArray[np.int64]
-) -> Iterator[_Season]:
+def _in_seasons(light: SeasonalLight, hours: NDArray[np.int64], rows: NDArray[np.int64]) -> Iterator[_Season]:
     """Hours [n] in their states [G, n], season by season."""
     for one, of_season in light.seasons():
         columns = np.flatnonzero(np.isin(hours, of_season))

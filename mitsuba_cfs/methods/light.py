@@ -26,19 +26,9 @@ from mitsuba_cfs.methods.phase_light import (
     phase_light,
     with_sensor_light,
 )
-from mitsuba_cfs.methods.phase_matrices import (
-    DEFAULT_NEEDS,
-    PhaseMatrices,
-    phase_matrices,
-    with_eye,
-)
+from mitsuba_cfs.methods.phase_matrices import DEFAULT_NEEDS, PhaseMatrices, phase_matrices, with_eye
 from mitsuba_cfs.methods.phase_pictures import with_phase_pictures
-from mitsuba_cfs.methods.point_in_time import (
-    BATCHES,
-    PathLight,
-    path_eye_illuminance,
-    path_illuminance,
-)
+from mitsuba_cfs.methods.point_in_time import BATCHES, PathLight, path_eye_illuminance, path_illuminance
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.methods.standard_error import NoiseOfSums, noise_of_sums
 from mitsuba_cfs.metrics.noise import Noise
@@ -125,9 +115,13 @@ def daylight(
         return PathLight(scene, systems, sky, sampling or Sampling())
     if matrices is None:
         matrices = phase_matrices(
-            scene, sampling, five_phase=method == "five-phase", needs=needs, cache=cache,
+            scene,
+            sampling,
+            five_phase=method == "five-phase",
+            needs=needs,
+            cache=cache,
             progress=part(progress, 0.0, 0.7),
-        )  # fmt: skip
+        )
     return phase_light(matrices, systems, sky, needs=needs, progress=part(progress, 0.7, 1.0))
 
 
@@ -190,9 +184,7 @@ def with_systems(
         sky = one.sky.part(among)
         if isinstance(one, PhaseLight):
             sun = None if one.reflected is None else one.reflected.part(among)
-            changed: PhaseLight | PathLight = phase_light(
-                one.matrices, systems, sky, needs=(), reflected=sun
-            )
+            changed: PhaseLight | PathLight = phase_light(one.matrices, systems, sky, needs=(), reflected=sun)
         else:
             changed = replace(one, systems=systems, sky=sky)
         yield changed, rows[:, columns], columns
@@ -329,9 +321,7 @@ def with_view(light: ByPhases, view: View) -> ByPhases:
     return _with_view(light, view)
 
 
-def with_pictures(
-    light: ByPhases, *, direct: bool = False, progress: Progress = silent
-) -> ByPhases:
+def with_pictures(light: ByPhases, *, direct: bool = False, progress: Progress = silent) -> ByPhases:
     """The light with the matrices of the view's pixels, for several calls that need them.
 
     Args: direct: those of eDGP.
@@ -353,9 +343,7 @@ def path_light_of(light: ByPhases) -> PathLight | SeasonalLight:
     return _by_path_tracing(light)
 
 
-def hours_by_season(
-    each: Sequence[T], season: NDArray[np.int64]
-) -> list[tuple[T, NDArray[np.int64]]]:
+def hours_by_season(each: Sequence[T], season: NDArray[np.int64]) -> list[tuple[T, NDArray[np.int64]]]:
     """The item of each season, with its hours; seasons without hours are left out.
 
     Where there are no hours at all, the first season with none.
@@ -375,15 +363,11 @@ def in_order_of_hours(parts: Sequence[tuple[Array, NDArray[np.int64]]]) -> Array
 
 
 def _by_season(
-    light: SeasonalLight,
-    state: State | None,
-    of_season: Callable[[PhaseLight | PathLight, State], Array],
+    light: SeasonalLight, state: State | None, of_season: Callable[[PhaseLight | PathLight, State], Array]
 ) -> Array:
     """Values [.., L] of all hours, each by the light of its season."""
     rows = _states(light, state)
-    return in_order_of_hours(
-        [(of_season(one, rows[:, hours]), hours) for one, hours in light.seasons()]
-    )
+    return in_order_of_hours([(of_season(one, rows[:, hours]), hours) for one, hours in light.seasons()])
 
 
 def _states(light: SeasonalLight, state: State | None) -> State:

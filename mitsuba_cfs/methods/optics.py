@@ -15,13 +15,7 @@ from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.evaluate import klems_of
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.sky.annual import AnnualSky
-from mitsuba_cfs.trace.kernels.scattering import (
-    AngularBeam,
-    AngularScattering,
-    Scattering,
-    patch_beams,
-    sun_scattering,
-)
+from mitsuba_cfs.trace.kernels.scattering import AngularBeam, AngularScattering, Scattering, patch_beams, sun_scattering
 from mitsuba_cfs.trace.paths.scene import PathOptics, path_optics, without_peaks
 
 PATCH_ANGLES = 32  # angles of incidence in each patch, for its mean
@@ -120,9 +114,7 @@ class BsdfOptics:
         if self._angular is None:
             return self._coarse.transmission_matrix()
         rest = without_peaks(self._coarse, "transmission")
-        return rest.transmission_matrix() + np.diag(
-            self._angular.patch_means(self._coarse.basis_in)
-        )
+        return rest.transmission_matrix() + np.diag(self._angular.patch_means(self._coarse.basis_in))
 
     @cached_property
     def scattering(self) -> Scattering:
@@ -158,9 +150,7 @@ class BsdfOptics:
         return block if mirror is None else block + mirror
 
 
-def _tinted_klems(
-    bsdf: KlemsBsdf, theta: NDArray[np.float64], factor: NDArray[np.float64]
-) -> KlemsBsdf:
+def _tinted_klems(bsdf: KlemsBsdf, theta: NDArray[np.float64], factor: NDArray[np.float64]) -> KlemsBsdf:
     """Klems matrices with their transmission times factors by the angle outdoors."""
     front, back = bsdf.transmission_front, bsdf.transmission_back
     if front is not None:
@@ -202,9 +192,7 @@ class AngularOptics:
         }
         for name, values in shares.items():
             if values.ndim != 1 or len(values) < 2 or (values < 0).any():
-                raise ValueError(
-                    f"{name}: expected shares of two angles or more, none negative, got {values}"
-                )
+                raise ValueError(f"{name}: expected shares of two angles or more, none negative, got {values}")
         cosine = np.linspace(0.0, 1.0, max(map(len, shares.values())))
         each = [np.interp(cosine, np.linspace(0, 1, len(v)), v) for v in shares.values()]
         total = np.sum(each, axis=0)
@@ -286,9 +274,7 @@ def check_systems(systems: Sequence[States], scene_groups: Sequence[object]) -> 
             raise ValueError(f"systems[{number}]: expected a list of states, got {states!r:.60}")
         for state in states:
             if not hasattr(type(state), "paths"):  # of every `SystemOptics`
-                raise ValueError(
-                    f"systems[{number}]: expected BsdfOptics or AngularOptics, got {state!r:.60}"
-                )
+                raise ValueError(f"systems[{number}]: expected BsdfOptics or AngularOptics, got {state!r:.60}")
 
 
 def neighbours(states: States, j: int) -> tuple[int, int, float] | None:
@@ -309,9 +295,7 @@ def straight_transmittance(optics: SystemOptics) -> NDArray[np.float64]:
     return np.minimum(beam, np.diag(optics.transmission))
 
 
-def hourly_states(
-    state: ArrayLike | None, systems: Sequence[States], sky: AnnualSky
-) -> NDArray[np.int64]:
+def hourly_states(state: ArrayLike | None, systems: Sequence[States], sky: AnnualSky) -> NDArray[np.int64]:
     """The state of each window group in each hour of a sky [G, L].
 
     Args:
@@ -338,9 +322,7 @@ def hourly_states(
     return rows
 
 
-def combinations(
-    rows: NDArray[np.int64],
-) -> Iterator[tuple[tuple[int, ...], NDArray[np.int64]]]:
+def combinations(rows: NDArray[np.int64]) -> Iterator[tuple[tuple[int, ...], NDArray[np.int64]]]:
     """Each combination of the states [G] of some hours [G, L], and the hours that have it."""
     kinds, kind = np.unique(rows, axis=1, return_inverse=True)
     for i, combination in enumerate(kinds.T):

@@ -41,12 +41,7 @@ from mitsuba_cfs.methods.optics import (
     in_state,
     neighbours,
 )
-from mitsuba_cfs.methods.phase_matrices import (
-    DEFAULT_NEEDS,
-    PhaseMatrices,
-    with_needs,
-    with_sensors,
-)
+from mitsuba_cfs.methods.phase_matrices import DEFAULT_NEEDS, PhaseMatrices, with_needs, with_sensors
 from mitsuba_cfs.methods.reflected_sun import (
     ReflectedSun,
     SunlitRoom,
@@ -76,9 +71,7 @@ class WindowLight:
     """The luminance of a window part towards the room in one state [cd/m2]."""
 
     whole: NDArray[np.float32]  # [K, L] T D s
-    sun: (
-        NDArray[np.float32] | None
-    )  # [K, L] T D_d s_d, the sun alone; None with the three-phase method
+    sun: NDArray[np.float32] | None  # [K, L] T D_d s_d, the sun alone; None with the three-phase method
     beam: NDArray[np.float32] | None  # [K, L] its straight beam; None where none passes
 
 
@@ -190,9 +183,7 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
     light = with_reflected_sun(light)
     # states that are the mean of two others are added up after these
     traced = tuple(map(traced_states, light.systems))
-    chosen = [
-        [states[j] for j in numbers] for states, numbers in zip(light.systems, traced, strict=True)
-    ]
+    chosen = [[states[j] for j in numbers] for states, numbers in zip(light.systems, traced, strict=True)]
     coefficients = group_coefficients(light.matrices, chosen)
     if not light.matrices.five_phase:
         sensors = [list(map(SensorLight, group)) for group in coefficients]
@@ -201,10 +192,7 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
         suns = _direct_sun(light, chosen, hours, progress)
         reflected = _reflected_to_sensors(light, coefficients)
         sensors = [
-            [
-                _sensor_light(light, one, g, reflected.get((g, j)), (suns[j], hours))
-                for j, one in enumerate(group)
-            ]
+            [_sensor_light(light, one, g, reflected.get((g, j)), (suns[j], hours)) for j, one in enumerate(group)]
             for g, group in enumerate(coefficients)
         ]
     whole = zip(light.systems, sensors, strict=True)
@@ -230,9 +218,7 @@ def with_means(states: States, sensors: Sequence[SensorLight]) -> tuple[SensorLi
     return tuple(result)
 
 
-def _mean_light(
-    optics: SystemOptics, low: SensorLight, high: SensorLight, share: float
-) -> SensorLight:
+def _mean_light(optics: SystemOptics, low: SensorLight, high: SensorLight, share: float) -> SensorLight:
     """The mean of the sensors' light in two states, `share` of `high`."""
 
     def mean(one: Array | None, other: Array | None) -> Array | None:
@@ -322,9 +308,7 @@ def coefficients_in_state(light: PhaseLight, state: int) -> Array:
     return coefficients[: len(light.scene.points)]
 
 
-def window_light(
-    matrices: PhaseMatrices, q: int, optics: SystemOptics, sky: AnnualSky
-) -> WindowLight:
+def window_light(matrices: PhaseMatrices, q: int, optics: SystemOptics, sky: AnnualSky) -> WindowLight:
     """The luminance of a window part towards the room under a sky."""
     # single precision: the noise of D is a hundred thousand times its rounding
     T, daylight = [optics.transmission.astype(np.float32)], matrices.daylight.values
@@ -369,9 +353,7 @@ def sky_in(light: PhaseLight, hours: NDArray[np.int64]) -> NDArray[np.floating]:
     return light.sky.whole if all_hours(light, hours) else light.sky.whole[:, hours]
 
 
-def _without_direct_sun(
-    light: PhaseLight, kind: Sequence[int], hours: NDArray[np.int64], some: slice
-) -> Array:
+def _without_direct_sun(light: PhaseLight, kind: Sequence[int], hours: NDArray[np.int64], some: slice) -> Array:
     """Illuminance [s, h] but for the direct sun, in hours with each group in a state [G].
 
     Few sensors before many hours, and the groups as one.
@@ -434,14 +416,21 @@ def _direct_sun(
         scattering = [o.scattering for o in in_state(systems, [j] * len(scene.groups))]
         matrices.append(
             direct_sun_matrix(
-                scene.interior, scene.exterior, scene.groups, scattering, *scene.sensors(),
+                scene.interior,
+                scene.exterior,
+                scene.groups,
+                scattering,
+                *scene.sensors(),
                 suns=light.sky.direction[hours],
                 window_points=max(chosen.sun_points // SUN_BATCHES, 1),
-                stopping=Stopping(batches=SUN_BATCHES), seed=chosen.seed, by_group=True,
+                stopping=Stopping(batches=SUN_BATCHES),
+                seed=chosen.seed,
+                by_group=True,
                 progress=part(progress, j / states, (j + 1) / states, "daylight"),
-                cache=light.matrices.cache, scenes=light.matrices.scenes,
+                cache=light.matrices.cache,
+                scenes=light.matrices.scenes,
             )
-        )  # fmt: skip
+        )
     return matrices
 
 
@@ -455,9 +444,7 @@ def shining_hours(light: PhaseLight) -> NDArray[np.int64]:
     return np.flatnonzero(np.any(sky.direction @ facing.T > 0, axis=1) & lit)
 
 
-def _sunlit_room(
-    light: PhaseLight, coefficients: Sequence[Sequence[GroupCoefficients]]
-) -> SunlitRoom | None:
+def _sunlit_room(light: PhaseLight, coefficients: Sequence[Sequence[GroupCoefficients]]) -> SunlitRoom | None:
     """The room that the sun's beam lights; None where no group passes one."""
     outdoors = coefficients[: len(light.scene.outdoor_groups)]
     if light.reflected is None or not any(_passes_beam(one) for group in outdoors for one in group):
@@ -475,9 +462,7 @@ def _reflected_to_sensors(
     each = {(g, j): one for g, group in enumerate(outdoors) for j, one in enumerate(group)}
     groups = [(g, one) for (g, _), one in each.items()]
     room = _sunlit_room(light, coefficients)
-    return dict(
-        zip(each, reflected_to_sensors(light.matrices, light.reflected, room, groups), strict=True)
-    )
+    return dict(zip(each, reflected_to_sensors(light.matrices, light.reflected, room, groups), strict=True))
 
 
 def _passes_beam(one: GroupCoefficients) -> bool:

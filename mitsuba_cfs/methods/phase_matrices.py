@@ -41,12 +41,7 @@ from mitsuba_cfs.trace.matrices.adjacent import (
     window_exchange,
 )
 from mitsuba_cfs.trace.matrices.daylight import BATCHES as CELL_BATCHES
-from mitsuba_cfs.trace.matrices.daylight import (
-    cell_daylight,
-    cells_of_rooms,
-    daylight_matrix,
-    daylight_of_rooms,
-)
+from mitsuba_cfs.trace.matrices.daylight import cell_daylight, cells_of_rooms, daylight_matrix, daylight_of_rooms
 from mitsuba_cfs.trace.matrices.view import view_matrix, views_of_rooms
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown, adjacent_picture
 from mitsuba_cfs.trace.pictures.annual import ViewMatrices, ViewNoise, view_matrices
@@ -109,9 +104,7 @@ def _view_entries(
     return pictures, cache.entry("view sunlit", view, *inputs, by=by)
 
 
-def _stored_view(
-    data: Mapping[str, NDArray[Any]], view: View, sunlit: SunlitRows | None
-) -> ViewMatrices | None:
+def _stored_view(data: Mapping[str, NDArray[Any]], view: View, sunlit: SunlitRows | None) -> ViewMatrices | None:
     """None where their shares of the sunlit surfaces are missing from the cache."""
     if data["sunlit"] and sunlit is None:
         return None
@@ -217,9 +210,7 @@ def phase_matrices(
     sampling = sampling or Sampling()
     scenes = SceneCache() if scenes is None else scenes
     parts = _parts(scene, sampling, cache, scenes)
-    matrices = _outdoors(
-        scene, sampling, parts, five_phase=five_phase, cache=cache, scenes=scenes, progress=progress
-    )
+    matrices = _outdoors(scene, sampling, parts, five_phase=five_phase, cache=cache, scenes=scenes, progress=progress)
     return with_needs(matrices, needs, progress=progress)
 
 
@@ -252,15 +243,14 @@ def matrices_together(
     passes = [(OUTDOOR_DEPTH, False), *([(1, False)] if five_phase else [])]
     if five_phase and outdoors.surfaces.glossy:
         passes.append((1, True))
-    fronts = [TracedRoom(one.exterior, of.groups, number=i)
-              for i, (one, of) in enumerate(zip(scenes, parts, strict=True))]  # fmt: skip
+    fronts = [
+        TracedRoom(one.exterior, of.groups, number=i) for i, (one, of) in enumerate(zip(scenes, parts, strict=True))
+    ]
     options = [
-        _daylight_options(sampling, len(one.groups), len(of.groups))
-        for one, of in zip(scenes, parts, strict=True)
+        _daylight_options(sampling, len(one.groups), len(of.groups)) for one, of in zip(scenes, parts, strict=True)
     ]
     whole, *direct = (
-        _daylight_together(fronts, outdoors, options, depth, plain=plain, common=common)
-        for depth, plain in passes
+        _daylight_together(fronts, outdoors, options, depth, plain=plain, common=common) for depth, plain in passes
     )
     progress("daylight of several rooms", 0.5)
     matrices = []
@@ -268,20 +258,21 @@ def matrices_together(
         beams = [part[i].values for part in direct]
         matrices.append(
             PhaseMatrices(
-                one, sampling, five_phase, cache, of, (), whole[i],
+                one,
+                sampling,
+                five_phase,
+                cache,
+                of,
+                (),
+                whole[i],
                 direct_daylight=beams[0] if beams else None,
                 straight_daylight=beams[-1] if beams else None,
                 scenes=shared,
             )
-        )  # fmt: skip
-    rooms = [
-        TracedRoom(one.scene.interior, one.parts.groups, *sensors_of(*one.scene.sensors()))
-        for one in matrices
-    ]
+        )
+    rooms = [TracedRoom(one.scene.interior, one.parts.groups, *sensors_of(*one.scene.sensors())) for one in matrices]
     sharp = [any(has_sharp_beam(one, g) for g in range(len(one.scene.groups))) for one in matrices]
-    views = views_of_rooms(
-        rooms, max_depth=INDOOR_DEPTH, with_direct=any(sharp), **_view_options(sampling), **common
-    )
+    views = views_of_rooms(rooms, max_depth=INDOOR_DEPTH, with_direct=any(sharp), **_view_options(sampling), **common)
     progress("daylight of several rooms", 1.0)
     return [
         replace(one, sensors=whole, direct_sensors=None if part is None else part.values)
@@ -290,21 +281,21 @@ def matrices_together(
 
 
 def _parts_together(
-    scenes: Sequence[DaylightScene],
-    outdoors: SharedOutdoors,
-    sampling: Sampling,
-    common: dict[str, Any],
+    scenes: Sequence[DaylightScene], outdoors: SharedOutdoors, sampling: Sampling, common: dict[str, Any]
 ) -> list[Parts]:
     """The window groups of each room, cut where the view outdoors differs within a group."""
     cells = [[window_cells(group) for group in one.groups] for one in scenes]
     daylight = cells_of_rooms(
         [TracedRoom(one.exterior, one.groups, number=i) for i, one in enumerate(scenes)],
-        outdoors, cells, [_cell_samples(sampling, of) for of in cells],
-        max_depth=OUTDOOR_DEPTH, seed=sampling.seed, **common,
-    )  # fmt: skip
+        outdoors,
+        cells,
+        [_cell_samples(sampling, of) for of in cells],
+        max_depth=OUTDOOR_DEPTH,
+        seed=sampling.seed,
+        **common,
+    )
     return [
-        _parts_of_cells(one.groups, of, light, sampling)
-        for one, of, light in zip(scenes, cells, daylight, strict=True)
+        _parts_of_cells(one.groups, of, light, sampling) for one, of, light in zip(scenes, cells, daylight, strict=True)
     ]
 
 
@@ -329,16 +320,12 @@ def _daylight_together(
         alike.setdefault(repr(chosen), []).append(i)
     estimates: dict[int, Estimate] = {}
     for some in alike.values():
-        traced = daylight_of_rooms(
-            [rooms[i] for i in some], outdoors, max_depth=depth, **options[some[0]], **common
-        )
+        traced = daylight_of_rooms([rooms[i] for i in some], outdoors, max_depth=depth, **options[some[0]], **common)
         estimates |= dict(zip(some, traced, strict=True))
     return [estimates[i] for i in range(len(rooms))]
 
 
-def with_needs(
-    matrices: PhaseMatrices, needs: Iterable[str], *, progress: Progress = silent
-) -> PhaseMatrices:
+def with_needs(matrices: PhaseMatrices, needs: Iterable[str], *, progress: Progress = silent) -> PhaseMatrices:
     """The matrices with those that some metrics need besides."""
     for metric in needs:
         if metric != "DGP":
@@ -351,22 +338,30 @@ def with_needs(
 def with_eye(matrices: PhaseMatrices, view: View) -> PhaseMatrices:
     """The matrices of the same room for another eye; nothing is traced."""
     return replace(
-        matrices, scene=replace(matrices.scene, view=view), sensors=None, direct_sensors=None,
-        view=None, direct_view=None, adjacent_shown=None,
-    )  # fmt: skip
+        matrices,
+        scene=replace(matrices.scene, view=view),
+        sensors=None,
+        direct_sensors=None,
+        view=None,
+        direct_view=None,
+        adjacent_shown=None,
+    )
 
 
-def with_outdoors(
-    matrices: PhaseMatrices, scene: DaylightScene, *, progress: Progress = silent
-) -> PhaseMatrices:
+def with_outdoors(matrices: PhaseMatrices, scene: DaylightScene, *, progress: Progress = silent) -> PhaseMatrices:
     """The matrices of the same room with other outdoors, its windows cut into the same parts.
 
     Args: scene: equal to that of the matrices but for the exterior and the adjacent rooms.
     """
     outdoors = _outdoors(
-        scene, matrices.sampling, matrices.parts, five_phase=matrices.five_phase,
-        cache=matrices.cache, scenes=matrices.scenes, progress=progress,
-    )  # fmt: skip
+        scene,
+        matrices.sampling,
+        matrices.parts,
+        five_phase=matrices.five_phase,
+        cache=matrices.cache,
+        scenes=matrices.scenes,
+        progress=progress,
+    )
     indoors = {
         name: getattr(matrices, name)
         for name in ("sensors", "direct_sensors", "exchange", "view", "direct_view", "sunlit")
@@ -392,9 +387,14 @@ def as_five_phase(matrices: PhaseMatrices) -> PhaseMatrices:
     if matrices.sensors is None or matrices.direct_sensors is not None:
         return matrices
     direct = view_matrix(
-        matrices.scene.interior, matrices.parts.groups, *matrices.scene.sensors(), max_depth=1,
-        cache=matrices.cache, scenes=matrices.scenes, **_view_options(matrices.sampling),
-    )  # fmt: skip
+        matrices.scene.interior,
+        matrices.parts.groups,
+        *matrices.scene.sensors(),
+        max_depth=1,
+        cache=matrices.cache,
+        scenes=matrices.scenes,
+        **_view_options(matrices.sampling),
+    )
     return replace(matrices, direct_sensors=direct.values)
 
 
@@ -410,9 +410,7 @@ def with_sensors(matrices: PhaseMatrices, *, progress: Progress = silent) -> Pha
     """The matrices with V of the scene's sensors, and V_d where the straight beam is apart."""
     if matrices.sensors is not None:
         return matrices
-    room = TracedRoom(
-        matrices.scene.interior, matrices.parts.groups, *sensors_of(*matrices.scene.sensors())
-    )
+    room = TracedRoom(matrices.scene.interior, matrices.parts.groups, *sensors_of(*matrices.scene.sensors()))
     ((sensors, direct),) = views_of_rooms(
         [room],
         max_depth=INDOOR_DEPTH,
@@ -422,14 +420,10 @@ def with_sensors(matrices: PhaseMatrices, *, progress: Progress = silent) -> Pha
         scenes=matrices.scenes,
         **_view_options(matrices.sampling),
     )
-    return replace(
-        matrices, sensors=sensors, direct_sensors=None if direct is None else direct.values
-    )
+    return replace(matrices, sensors=sensors, direct_sensors=None if direct is None else direct.values)
 
 
-def with_exchange(
-    matrices: PhaseMatrices, *, indoors: bool = False, outdoors: bool = False
-) -> PhaseMatrices:
+def with_exchange(matrices: PhaseMatrices, *, indoors: bool = False, outdoors: bool = False) -> PhaseMatrices:
     """The matrices with W (indoors) and X (outdoors), for windows that reflect."""
     parts = matrices.parts.groups
     common: dict[str, Any] = {
@@ -460,9 +454,7 @@ def with_exchange(
     return matrices
 
 
-def with_view_matrices(
-    matrices: PhaseMatrices, *, direct: bool = False, progress: Progress = silent
-) -> PhaseMatrices:
+def with_view_matrices(matrices: PhaseMatrices, *, direct: bool = False, progress: Progress = silent) -> PhaseMatrices:
     """The matrices with V of the view's pixels, or V_d if `direct`, as eDGP takes it."""
     if direct:
         matrices = with_direct_daylight(matrices, progress=progress)
@@ -480,10 +472,16 @@ def with_adjacent_shown(matrices: PhaseMatrices) -> PhaseMatrices:
         return matrices
     scene, chosen = matrices.scene, matrices.sampling
     shown = adjacent_picture(
-        scene.interior, matrices.parts.groups, matrices.behind(), scene.eye,
-        subdivision=chosen.subdivision, samples=chosen.outdoor_samples,
-        max_depth=INDOOR_DEPTH, seed=chosen.seed, scenes=matrices.scenes,
-    )  # fmt: skip
+        scene.interior,
+        matrices.parts.groups,
+        matrices.behind(),
+        scene.eye,
+        subdivision=chosen.subdivision,
+        samples=chosen.outdoor_samples,
+        max_depth=INDOOR_DEPTH,
+        seed=chosen.seed,
+        scenes=matrices.scenes,
+    )
     return replace(matrices, adjacent_shown=tuple(shown))
 
 
@@ -528,14 +526,11 @@ def adjacent_room(matrices: PhaseMatrices, room: AdjacentRoom) -> AdjacentRoomLi
         beam[q] = room.straight[n]
     scene = matrices.scene
     return AdjacentRoomLight(
-        scene.interior, matrices.parts.groups, through, scene.exterior, beam, daylight,
-        matrices.behind(),
-    )  # fmt: skip
+        scene.interior, matrices.parts.groups, through, scene.exterior, beam, daylight, matrices.behind()
+    )
 
 
-def _parts(
-    scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None, scenes: SceneCache
-) -> Parts:
+def _parts(scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None, scenes: SceneCache) -> Parts:
     """The window groups, cut where the view outdoors differs within a group."""
     outdoors = _parts_of_outdoor_groups(scene, sampling, cache, scenes)
     if not scene.adjacent:
@@ -571,10 +566,7 @@ def _cell_samples(sampling: Sampling, cells: Sequence[Cells]) -> int:
 
 
 def _parts_of_cells(
-    groups: Sequence[WindowGroup],
-    cells: Sequence[Cells],
-    daylight: Sequence[NDArray[np.float64]],
-    sampling: Sampling,
+    groups: Sequence[WindowGroup], cells: Sequence[Cells], daylight: Sequence[NDArray[np.float64]], sampling: Sampling
 ) -> Parts:
     """The parts of groups by the light of their cells."""
     lights = map(CellLight, groups, cells, daylight)
@@ -597,14 +589,13 @@ def _outdoors(
     estimates = []
     if scene.outdoor_groups:
         estimates.append(
-            _daylight(scene, sampling, parts, OUTDOOR_DEPTH, part(progress, 0.0, 0.2, "daylight"),
-                      cache=cache, scenes=scenes)
-        )  # fmt: skip
+            _daylight(
+                scene, sampling, parts, OUTDOOR_DEPTH, part(progress, 0.0, 0.2, "daylight"), cache=cache, scenes=scenes
+            )
+        )
     estimates += _inner_daylight(scene, sampling, parts, adjacent, cache, scenes)
     daylight = joined(estimates) if estimates else _no_daylight(sampling)
-    matrices = PhaseMatrices(
-        scene, sampling, five_phase, cache, parts, adjacent, daylight, scenes=scenes
-    )
+    matrices = PhaseMatrices(scene, sampling, five_phase, cache, parts, adjacent, daylight, scenes=scenes)
     return with_direct_daylight(matrices, progress=progress) if five_phase else matrices
 
 
@@ -651,9 +642,7 @@ def _daylight_options(sampling: Sampling, groups: int, parts: int) -> dict[str, 
     }
 
 
-def _direct_daylight(
-    matrices: PhaseMatrices, exterior: Surfaces, progress: Progress
-) -> NDArray[np.float64]:
+def _direct_daylight(matrices: PhaseMatrices, exterior: Surfaces, progress: Progress) -> NDArray[np.float64]:
     """D_d [Q, K, P] past an exterior; 0 of parts that look into another room.
 
     The sun comes through these by patches.
@@ -666,9 +655,14 @@ def _direct_daylight(
         direct[:outer] = daylight[:outer]
     elif outer:
         direct[:outer] = _daylight(
-            replace(scene, exterior=exterior), matrices.sampling, matrices.parts, 1,
-            part(progress, 0.2, 0.3, "daylight"), cache=matrices.cache, scenes=matrices.scenes,
-        ).values  # fmt: skip
+            replace(scene, exterior=exterior),
+            matrices.sampling,
+            matrices.parts,
+            1,
+            part(progress, 0.2, 0.3, "daylight"),
+            cache=matrices.cache,
+            scenes=matrices.scenes,
+        ).values
     return direct
 
 
@@ -679,21 +673,12 @@ def _adjacent_rooms(
     rooms: dict[int, AdjacentRoomLight] = {}
     for room in scene.adjacent:
         if id(room.scene) not in rooms:
-            matrices = phase_matrices(
-                room.scene,
-                sampling,
-                five_phase=False,
-                needs=(),
-                cache=cache,
-                scenes=scenes,
-            )
+            matrices = phase_matrices(room.scene, sampling, five_phase=False, needs=(), cache=cache, scenes=scenes)
             rooms[id(room.scene)] = adjacent_room(matrices, room)
     return tuple(rooms[id(room.scene)] for room in scene.adjacent)
 
 
-def _rooms_behind(
-    scene: DaylightScene, parts: Parts, adjacent: Sequence[AdjacentRoomLight]
-) -> tuple[GlassToRoom, ...]:
+def _rooms_behind(scene: DaylightScene, parts: Parts, adjacent: Sequence[AdjacentRoomLight]) -> tuple[GlassToRoom, ...]:
     inner = range(len(scene.outdoor_groups), len(scene.groups))
     return tuple(
         GlassToRoom(int(parts.of(g)[0]), len(parts.of(g)), room.beam, lit)
@@ -712,13 +697,19 @@ def _inner_daylight(
     """D [q, K, P] of the parts of each group that looks into another room."""
     return [
         adjacent_daylight(
-            room.surfaces, room.groups, room.luminance, [parts.groups[q] for q in parts.of(g)],
+            room.surfaces,
+            room.groups,
+            room.luminance,
+            [parts.groups[q] for q in parts.of(g)],
             samples=max(sampling.patch_samples // INNER_SHARE // BATCHES, 1),
-            max_depth=INDOOR_DEPTH, stopping=Stopping(batches=BATCHES), seed=sampling.seed,
-            cache=cache, scenes=scenes,
+            max_depth=INDOOR_DEPTH,
+            stopping=Stopping(batches=BATCHES),
+            seed=sampling.seed,
+            cache=cache,
+            scenes=scenes,
         )
         for g, room in enumerate(adjacent, len(scene.outdoor_groups))
-    ]  # fmt: skip
+    ]
 
 
 def _view_options(sampling: Sampling) -> dict[str, Any]:
@@ -743,11 +734,7 @@ def _view_inputs(matrices: PhaseMatrices, depth: int) -> tuple[object, ...]:
 
 
 def _view(
-    matrices: PhaseMatrices,
-    depth: int,
-    light: PatchLight | None = None,
-    *,
-    progress: Progress = silent,
+    matrices: PhaseMatrices, depth: int, light: PatchLight | None = None, *, progress: Progress = silent
 ) -> ViewMatrices:
     scene, chosen = matrices.scene, matrices.sampling
     trace = partial(

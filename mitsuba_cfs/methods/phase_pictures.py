@@ -20,14 +20,7 @@ from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.methods.coefficients import direct_daylight, direct_transmittance
 from mitsuba_cfs.methods.optics import SystemOptics, combinations, in_state
-from mitsuba_cfs.methods.phase_light import (
-    PhaseLight,
-    WindowLight,
-    all_hours,
-    sky_in,
-    window_light,
-    with_reflected_sun,
-)
+from mitsuba_cfs.methods.phase_light import PhaseLight, WindowLight, all_hours, sky_in, window_light, with_reflected_sun
 from mitsuba_cfs.methods.phase_matrices import (
     PhaseMatrices,
     few_pictures,
@@ -56,9 +49,7 @@ BEAM_SAMPLES = 16  # rays of a tile to the windows, for each path of a pixel of 
 T = TypeVar("T")
 
 
-def with_phase_pictures(
-    light: PhaseLight, *, direct: bool = False, progress: Progress = silent
-) -> PhaseLight:
+def with_phase_pictures(light: PhaseLight, *, direct: bool = False, progress: Progress = silent) -> PhaseLight:
     """The light with the matrices of the view's pixels; `direct`: with those of eDGP."""
     matrices = with_view_matrices(light.matrices, direct=direct, progress=progress)
     return replace(light, matrices=matrices)
@@ -111,9 +102,13 @@ def pictures_in_state(
         return pictures
     sky, daylight = light.sky.whole[:, hours], matrices.daylight.values
     return AdjacentRoomPictures(
-        pictures, matrices.adjacent_shown, _traced(view).seen, matrices.behind(),
-        daylight.astype(np.float32), sky.astype(np.float32),
-    )  # fmt: skip
+        pictures,
+        matrices.adjacent_shown,
+        _traced(view).seen,
+        matrices.behind(),
+        daylight.astype(np.float32),
+        sky.astype(np.float32),
+    )
 
 
 def _five_phase_pictures(
@@ -135,34 +130,45 @@ def _five_phase_pictures(
     else:
         luminance = _window_luminance(light, hours, state, windows, optics, sun)
     pictures = FivePhasePictures(
-        view, sun, luminance, _stacked([one.sun for one in windows], luminance.shape),
-        sky.direction[hours], sky.illuminance[hours], beam=_beams(windows, luminance.shape),
-    )  # fmt: skip
+        view,
+        sun,
+        luminance,
+        _stacked([one.sun for one in windows], luminance.shape),
+        sky.direction[hours],
+        sky.illuminance[hours],
+        beam=_beams(windows, luminance.shape),
+    )
     seen = outdoors(
-        interior, exterior, parts, scattering, eye, subdivision=matrices.sampling.subdivision,
-        samples=matrices.sampling.outdoor_samples, seed=matrices.sampling.seed,
+        interior,
+        exterior,
+        parts,
+        scattering,
+        eye,
+        subdivision=matrices.sampling.subdivision,
+        samples=matrices.sampling.outdoor_samples,
+        seed=matrices.sampling.seed,
         scenes=matrices.scenes,
-    )  # fmt: skip
+    )
     daylight = direct_daylight(matrices) if direct else matrices.daylight.values
     pictures.show_outdoors(
-        seen, daylight, direct_daylight(matrices), sky.without_sun(hours), sky.sun_alone(hours),
+        seen,
+        daylight,
+        direct_daylight(matrices),
+        sky.without_sun(hours),
+        sky.sun_alone(hours),
         light=_beam_light(matrices, in_state(light.systems, state)),
-    )  # fmt: skip
+    )
     return pictures
 
 
-def _windows(
-    light: PhaseLight, hours: NDArray[np.int64], state: Sequence[int]
-) -> list[WindowLight]:
+def _windows(light: PhaseLight, hours: NDArray[np.int64], state: Sequence[int]) -> list[WindowLight]:
     """The luminance of each window part [Q] in some hours."""
     sky = light.sky if all_hours(light, hours) else light.sky.part(hours)
     optics = light.optics(state)
     return [window_light(light.matrices, q, one, sky) for q, one in enumerate(optics)]
 
 
-def _direct_luminance(
-    light: PhaseLight, hours: NDArray[np.int64], state: Sequence[int]
-) -> NDArray[np.floating]:
+def _direct_luminance(light: PhaseLight, hours: NDArray[np.int64], state: Sequence[int]) -> NDArray[np.floating]:
     """Luminance of the windows by the light straight from sky and sun, T D_d s [Q, K, n]."""
     transmission = [one.transmission for one in light.optics(state)]
     sky = light.sky.whole[:, hours]
@@ -223,20 +229,24 @@ def _beam_light(matrices: PhaseMatrices, optics: Sequence[SystemOptics]) -> Beam
     if scene.exterior.glossy or all(one is None for one in scattering):
         return None
     return beam_light(
-        scene.interior, scene.exterior, parts.groups, scattering, np.stack(beams), scene.eye,
+        scene.interior,
+        scene.exterior,
+        parts.groups,
+        scattering,
+        np.stack(beams),
+        scene.eye,
         subdivision=matrices.sampling.subdivision,
         samples=BEAM_SAMPLES * matrices.sampling.view_samples,
-        seed=matrices.sampling.seed, scenes=matrices.scenes,
-    )  # fmt: skip
+        seed=matrices.sampling.seed,
+        scenes=matrices.scenes,
+    )
 
 
 def _beams(windows: Sequence[WindowLight], shape: tuple[int, ...]) -> NDArray[np.float32]:
     return _stacked([one.beam for one in windows], shape)
 
 
-def _stacked(
-    values: Sequence[NDArray[np.float32] | None], shape: tuple[int, ...]
-) -> NDArray[np.float32]:
+def _stacked(values: Sequence[NDArray[np.float32] | None], shape: tuple[int, ...]) -> NDArray[np.float32]:
     """Luminances of the parts [Q, K, n], 0 where there are none."""
     stacked = np.zeros(shape, dtype=np.float32)
     for q, one in enumerate(values):
@@ -293,9 +303,7 @@ class AdjacentRoomPictures:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
         return self._with_rooms(self.pictures.values(batch), batch)
 
-    def without_disc(
-        self, batch: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
+    def without_disc(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
         values, discs = self.pictures.without_disc(batch)
         return self._with_rooms(values, batch), discs
@@ -317,9 +325,7 @@ class AdjacentRoomPictures:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
         return self.pictures.noise(batch)
 
-    def _with_rooms(
-        self, values: NDArray[np.float32], batch: NDArray[np.int64]
-    ) -> NDArray[np.float32]:
+    def _with_rooms(self, values: NDArray[np.float32], batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """The values [h, n] with the rooms in place of the patches of the glass."""
         sky = self.sky[:, batch]
         by_patches = np.zeros((*self.daylight.shape[:2], len(batch)), dtype=np.float32)

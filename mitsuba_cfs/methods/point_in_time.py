@@ -90,9 +90,7 @@ def path_illuminance(
     return lit, variance
 
 
-def path_eye_illuminance(
-    light: PathLight, hours: NDArray[np.int64], state: State | None = None
-) -> Array:
+def path_eye_illuminance(light: PathLight, hours: NDArray[np.int64], state: State | None = None) -> Array:
     """Illuminance at the view's eye in some hours [n], their numbers among the sky's [lx]."""
     view, rows = light.scene.eye, light.states_of(state)[:, hours]
     point, direction = np.atleast_2d(view.position), np.atleast_2d(view.direction)
@@ -116,9 +114,7 @@ def path_picture(
     return picture_of_room(light, room, hour, **options)
 
 
-def picture_of_room(
-    light: PathLight, room: PathTracingScene, hour: int, **options: Any
-) -> NDArray[np.float32]:
+def picture_of_room(light: PathLight, room: PathTracingScene, hour: int, **options: Any) -> NDArray[np.float32]:
     """The same of a room in its state."""
     chosen = light.sampling
     options = {"samples": chosen.picture_samples, "seed": chosen.seed} | options
@@ -130,9 +126,7 @@ def discs_of_room(light: PathLight, room: PathTracingScene, hour: int) -> tuple[
     return discs_seen(room, path_sky(light, hour), light.scene.eye)
 
 
-def picture_with_disc(
-    light: PathLight, room: PathTracingScene, hour: int, **options: Any
-) -> PathPicture:
+def picture_with_disc(light: PathLight, room: PathTracingScene, hour: int, **options: Any) -> PathPicture:
     """The picture of one hour, the sun's discs apart and in their pixels."""
     bare = picture_of_room(light, room, hour, disc=False, **options)
     shown = with_discs(bare, room, path_sky(light, hour), light.scene.eye)

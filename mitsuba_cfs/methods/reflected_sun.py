@@ -22,12 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.methods.coefficients import (
-    GroupCoefficients,
-    beam_matrix,
-    direct_daylight,
-    without_straight,
-)
+from mitsuba_cfs.methods.coefficients import GroupCoefficients, beam_matrix, direct_daylight, without_straight
 from mitsuba_cfs.methods.phase_matrices import PhaseMatrices
 from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -94,12 +89,8 @@ def reflected_sun(matrices: PhaseMatrices, sky: AnnualSky) -> ReflectedSun:
     suns = sky.direction[shining], sky.illuminance[shining]
     paths = sampling.patch_samples // WINDOW_SHARE // BATCHES
     samples = max(paths * len(scene.groups) // len(parts), 4)
-    shares = window_shares(
-        outside, samples=samples, places=sampling.sun_points, seeds=_seeds(matrices)
-    )
-    before = (
-        light.reshape(*by_patches.shape[:2], -1) for light in outdoor_light(shares, outside, *suns)
-    )
+    shares = window_shares(outside, samples=samples, places=sampling.sun_points, seeds=_seeds(matrices))
+    before = (light.reshape(*by_patches.shape[:2], -1) for light in outdoor_light(shares, outside, *suns))
     return ReflectedSun(sky, shining, inside, outside, tuple(before), by_patches)
 
 
@@ -111,23 +102,14 @@ def sunlit_room(matrices: PhaseMatrices, sun: ReflectedSun) -> SunlitRoom | None
     samples = _sensor_samples(matrices, ROOM_SHARE)
     cells = room_cells(sun.inside, samples=samples)
     shares = tuple(
-        room_shares(
-            cells,
-            sun.inside,
-            matrices.scene.sensors(),
-            samples=samples,
-            seed=_seed(matrices, batch),
-        )
+        room_shares(cells, sun.inside, matrices.scene.sensors(), samples=samples, seed=_seed(matrices, batch))
         for batch in range(BATCHES)
     )
     return SunlitRoom(cells[0], shares)
 
 
 def reflected_to_sensors(
-    matrices: PhaseMatrices,
-    sun: ReflectedSun,
-    room: SunlitRoom | None,
-    groups: Sequence[tuple[int, GroupCoefficients]],
+    matrices: PhaseMatrices, sun: ReflectedSun, room: SunlitRoom | None, groups: Sequence[tuple[int, GroupCoefficients]]
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64], Estimate]]:
     """Illuminance to add to that of the sensors through groups in a state each [S, L] [lx].
 
@@ -138,8 +120,7 @@ def reflected_to_sensors(
     """
     seen = iter(_outdoors_seen(matrices, sun, groups))
     return [
-        _to_sensors(matrices, sun, room, one, g, next(seen) if one.straight is not None else ())
-        for g, one in groups
+        _to_sensors(matrices, sun, room, one, g, next(seen) if one.straight is not None else ()) for g, one in groups
     ]
 
 
@@ -151,10 +132,14 @@ def _outdoors_seen(
     if not sun.before:
         return [()] * len(straight)
     views = view_shares(
-        sun.inside, sun.outside, straight, matrices.scene.sensors(),
-        samples=_sensor_samples(matrices, SENSOR_SHARE), places=matrices.sampling.sun_points,
+        sun.inside,
+        sun.outside,
+        straight,
+        matrices.scene.sensors(),
+        samples=_sensor_samples(matrices, SENSOR_SHARE),
+        places=matrices.sampling.sun_points,
         seeds=_seeds(matrices),
-    )  # fmt: skip
+    )
     light = outdoor_light(views, sun.outside, *sun.suns)
     return [light[i : i + BATCHES] for i in range(0, len(light), BATCHES)]
 
@@ -227,9 +212,7 @@ def replaced_before(sun: ReflectedSun, shares: Array | None, hours: NDArray[np.i
     return values - times_sky(by_patches, sun.sky.sun_alone(hours))
 
 
-def replaced_through(
-    sun: ReflectedSun, parts: NDArray[np.int64], shares: Sequence[Array]
-) -> NDArray[np.float64]:
+def replaced_through(sun: ReflectedSun, parts: NDArray[np.int64], shares: Sequence[Array]) -> NDArray[np.float64]:
     """Light of sensors from outdoors by shadow rays less by patches, in all hours [S, L].
 
     Without what they see straight through the window.
@@ -246,11 +229,7 @@ def replaced_through(
 
 
 def _by_patches(
-    matrices: PhaseMatrices,
-    sun: ReflectedSun,
-    group: GroupCoefficients,
-    rest: Sequence[Array],
-    g: int,
+    matrices: PhaseMatrices, sun: ReflectedSun, group: GroupCoefficients, rest: Sequence[Array], g: int
 ) -> NDArray[np.float64] | float:
     """The sun that the outdoors reflects in V T D s, at the sensors [S, L] [lx]."""
     if not sun.before:

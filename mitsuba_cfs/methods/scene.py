@@ -41,9 +41,7 @@ class DaylightScene:
 
     def __post_init__(self) -> None:
         if self.points.shape != self.normals.shape or self.points.shape[1:] != (3,):
-            raise ValueError(
-                f"points {self.points.shape}, normals {self.normals.shape}: expected [S, 3] both"
-            )
+            raise ValueError(f"points {self.points.shape}, normals {self.normals.shape}: expected [S, 3] both")
         if not (np.isfinite(self.points).all() and np.isfinite(self.normals).all()):
             raise ValueError("points and normals: expected finite numbers")
         if len(self.adjacent) > len(self.groups):
@@ -68,9 +66,7 @@ class DaylightScene:
         """Positions and directions [S + 1, 3] of sensors, the eye last; [S, 3] without a view."""
         if self.view is None:
             return self.points, self.normals
-        eye, direction = (
-            np.asarray(a, dtype=float)[None] for a in (self.view.position, self.view.direction)
-        )
+        eye, direction = (np.asarray(a, dtype=float)[None] for a in (self.view.position, self.view.direction))
         return np.concatenate([self.points, eye]), np.concatenate([self.normals, direction])
 
 
@@ -94,9 +90,14 @@ class Sampling:
 
     def __post_init__(self) -> None:
         for name in (
-            "sensor_samples", "patch_samples", "sun_points", "view_samples", "outdoor_samples",
-            "picture_samples", "hour_samples",
-        ):  # fmt: skip
+            "sensor_samples",
+            "patch_samples",
+            "sun_points",
+            "view_samples",
+            "outdoor_samples",
+            "picture_samples",
+            "hour_samples",
+        ):
             check_number(name, getattr(self, name), 1, whole=True)
         check_number("subdivision", self.subdivision, 1, whole=True)  # Reinhart's MF
         for name in ("window_parts", "memory", "seed"):

@@ -61,13 +61,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.spectra.channels import Channels
-from mitsuba_cfs.spectra.daylight import (
-    COMPONENTS,
-    WATER_CM,
-    SpectralSky,
-    daylight_components,
-    spectral_sky,
-)
+from mitsuba_cfs.spectra.daylight import COMPONENTS, WATER_CM, SpectralSky, daylight_components, spectral_sky
 from mitsuba_cfs.spectra.detectors import NANOMETRES
 from mitsuba_cfs.surfaces import WindowGroup
 from mitsuba_cfs.trace.kernels.scattering import Scattering
@@ -179,17 +173,18 @@ def sky_spectra(sky: AnnualSky, water_cm: ArrayLike = WATER_CM) -> SpectralSky:
     """The spectra of the skies, grounds and suns of hours."""
     luminance = sky.without_sun()
     return spectral_sky(
-        luminance, ReinhartSky.of_size(len(luminance)).horizontal_weights,
-        np.asarray(sky.illuminance, dtype=float), sky.direction[:, 2], water_cm,
-    )  # fmt: skip
+        luminance,
+        ReinhartSky.of_size(len(luminance)).horizontal_weights,
+        np.asarray(sky.illuminance, dtype=float),
+        sky.direction[:, 2],
+        water_cm,
+    )
 
 
 class _Season:
     """The light of the hours of one season, in the modes of its systems' factors."""
 
-    def __init__(
-        self, light: PhaseLight, factors: Factors, channels: Channels, water_cm: Array
-    ) -> None:
+    def __init__(self, light: PhaseLight, factors: Factors, channels: Channels, water_cm: Array) -> None:
         self._light, self.sky = light, sky_spectra(light.sky, water_cm)
         # power of sun and ground in each band per lumen and of the sky's components
         self._sun, self._ground = channels.power(self.sky.sun), channels.power(self.sky.ground)
@@ -225,18 +220,21 @@ class _Season:
         for light in self._modes:
             whole = sky_coefficients(light, kind)
             coefficients.append(whole.astype(np.float32))
-            by_sun.append(
-                times_sky(whole, sun_in(light, hours)) + in_place_of_sun(light, kind, hours)
-            )
+            by_sun.append(times_sky(whole, sun_in(light, hours)) + in_place_of_sun(light, kind, hours))
             if light.matrices.five_phase:
                 direct.append(direct_sun_of_all(light, kind, hours))
         amount = sky.amount
         return _Modes(
-            np.array(coefficients), np.array(by_sun), np.array(direct) if direct else None,
+            np.array(coefficients),
+            np.array(by_sun),
+            np.array(direct) if direct else None,
             amount if all_hours(self._light, hours) else amount[..., hours],
-            sky.ground_luminance[hours], self._shares, self._components, self._sun[hours],
+            sky.ground_luminance[hours],
+            self._shares,
+            self._components,
+            self._sun[hours],
             self._ground[hours],
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -345,10 +343,7 @@ class _GroupInState:
         """The light in a mode."""
         one, patches = self._one, self._angles.patches[m]
         coefficients = one.coefficients
-        whole = sum(
-            (rest * patches) @ daylight
-            for rest, daylight in zip(self._rest, self._daylight, strict=True)
-        )
+        whole = sum((rest * patches) @ daylight for rest, daylight in zip(self._rest, self._daylight, strict=True))
         by_sun = None
         if coefficients.by_sun is not None:
             by_sun = sum((shares * patches) @ daylight for shares, daylight in self._by_sun)
@@ -375,9 +370,7 @@ class _GroupInState:
         )
 
 
-def _outdoors_seen(
-    light: PhaseLight, group: GroupCoefficients, parts: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _outdoors_seen(light: PhaseLight, group: GroupCoefficients, parts: NDArray[np.int64]) -> NDArray[np.float64]:
     """Shares [S, 1, K] of the patches of incidence in what sensors see of reflecting outdoors."""
     matrices = light.matrices
     seen = np.zeros((len(group.whole), len(group.beam)))

@@ -17,13 +17,7 @@ from mitsuba_cfs.methods.coefficients import (
     without_straight,
 )
 from mitsuba_cfs.methods.optics import SystemOptics, combinations
-from mitsuba_cfs.methods.phase_light import (
-    PhaseLight,
-    State,
-    coefficients_in_state,
-    sensor_light,
-    states_of,
-)
+from mitsuba_cfs.methods.phase_light import PhaseLight, State, coefficients_in_state, sensor_light, states_of
 from mitsuba_cfs.methods.reflected_sun import replaced_luminance
 from mitsuba_cfs.methods.subdivision import coarse_sky
 from mitsuba_cfs.methods.window_reflection import (
@@ -115,9 +109,7 @@ def _of_tracing(light: PhaseLight, rows: State, weights: Array | None) -> Noise:
     return noise
 
 
-def _weighted_sky(
-    light: PhaseLight, some: NDArray[np.bool_], weights: Array | None
-) -> tuple[Array, ...]:
+def _weighted_sky(light: PhaseLight, some: NDArray[np.bool_], weights: Array | None) -> tuple[Array, ...]:
     """Sums over some hours: the whole sky, the sun alone, and the rest [P, 1] or [P, S]."""
     sky = light.sky
     if weights is None:
@@ -146,9 +138,7 @@ def _of_method(light: PhaseLight, rows: State) -> Noise:
     return Noise(np.zeros(count), shared, np.zeros(count))
 
 
-def _exchange_variance(
-    light: PhaseLight, optics: Sequence[SystemOptics], hours: NDArray[np.int64]
-) -> Array:
+def _exchange_variance(light: PhaseLight, optics: Sequence[SystemOptics], hours: NDArray[np.int64]) -> Array:
     """Variance of each sensor's mean over the sky's hours by the noise of W and X [S].
 
     Args:
@@ -178,11 +168,7 @@ def _exchange_variance(
 
 
 def _part_noise(
-    light: PhaseLight,
-    group: GroupCoefficients,
-    q: int,
-    sky: Array,
-    sun: tuple[NDArray[np.floating], ...] | None,
+    light: PhaseLight, group: GroupCoefficients, q: int, sky: Array, sun: tuple[NDArray[np.floating], ...] | None
 ) -> Noise:
     """Noise of the sensors [S] by V and D of a part of a group in a state.
 
@@ -211,9 +197,7 @@ def _part_noise(
     return by_view + by_daylight
 
 
-def _error_of_means(
-    light: PhaseLight, group: GroupCoefficients, g: int, some: NDArray[np.bool_]
-) -> Array:
+def _error_of_means(light: PhaseLight, group: GroupCoefficients, g: int, some: NDArray[np.bool_]) -> Array:
     """Error of the sensors' mean [S] by D's means over a group's parts, in some of the hours."""
     matrices = light.matrices
     points, normals = light.scene.sensors()

@@ -45,9 +45,7 @@ def sunny_hour_error(light: ByPhases, state: NDArray[np.int64] | None, illuminan
     return np.divide(off, mean, out=np.zeros_like(mean), where=mean > 0)
 
 
-def _of_season(
-    light: PhaseLight, rows: NDArray[np.int64], illuminance: Array
-) -> tuple[Array, Array, int]:
+def _of_season(light: PhaseLight, rows: NDArray[np.int64], illuminance: Array) -> tuple[Array, Array, int]:
     """Mean square error and mean illuminance of sunny hours [S], and how many hours have sun."""
     sunny = shining_hours(light)
     if not len(sunny):

@@ -47,9 +47,7 @@ def reflects_outdoors(matrices: PhaseMatrices, optics: Sequence[SystemOptics]) -
 
 def with_exchange_of(matrices: PhaseMatrices, optics: Sequence[SystemOptics]) -> PhaseMatrices:
     """The matrices with W and X as far as the systems reflect."""
-    return with_exchange(
-        matrices, indoors=reflects(optics), outdoors=reflects_outdoors(matrices, optics)
-    )
+    return with_exchange(matrices, indoors=reflects(optics), outdoors=reflects_outdoors(matrices, optics))
 
 
 def reflected_luminance(
@@ -148,10 +146,7 @@ def through(optics: Sequence[SystemOptics], shares: Array) -> Array:
 
 
 def variance_by_room(
-    view: NDArray[np.float64],
-    exchange: Estimate,
-    optics: Sequence[SystemOptics],
-    luminance: NDArray[np.floating],
+    view: NDArray[np.float64], exchange: Estimate, optics: Sequence[SystemOptics], luminance: NDArray[np.floating]
 ) -> NDArray[np.float64]:
     """Variance of the sensors' light [S] by the noise of W, that of its first order.
 
@@ -166,10 +161,7 @@ def variance_by_room(
 
 
 def variance_by_outdoors(
-    shares: NDArray[np.float64],
-    exchange: Estimate,
-    optics: Sequence[SystemOptics],
-    before: NDArray[np.floating],
+    shares: NDArray[np.float64], exchange: Estimate, optics: Sequence[SystemOptics], before: NDArray[np.floating]
 ) -> NDArray[np.float64]:
     """Variance of the sensors' light [S] by the noise of X, that of its first order.
 
@@ -193,9 +185,7 @@ def _outdoor_reflection(one: SystemOptics) -> NDArray[np.float64] | None:
 
 
 def _by_part(
-    optics: Sequence[SystemOptics],
-    matrix_of: Callable[[SystemOptics], NDArray[np.float64] | None],
-    shares: Array,
+    optics: Sequence[SystemOptics], matrix_of: Callable[[SystemOptics], NDArray[np.float64] | None], shares: Array
 ) -> Array:
     """Shares [n, Q * K] times a matrix [K, K] of each part's system; 0 where it has none."""
     K, products = KLEMS_FULL.size, np.zeros_like(shares)

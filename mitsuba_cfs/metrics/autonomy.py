@@ -22,9 +22,7 @@ UDI_LIMITS = (100.0, 300.0, 3000.0)  # [lx] Mardaljevic et al. 2012: fell short,
 UDI_LIMITS_2005 = (100.0, 300.0, 2000.0)  # [lx] upper limit of Nabil and Mardaljevic 2005
 
 
-def daylight_autonomy(
-    illuminance: ArrayLike, hours: ArrayLike, threshold: float = THRESHOLD
-) -> FloatArray:
+def daylight_autonomy(illuminance: ArrayLike, hours: ArrayLike, threshold: float = THRESHOLD) -> FloatArray:
     """DA [S]: share (0 to 1) of the scheduled time steps with at least `threshold` lx.
 
     Args:
@@ -92,9 +90,7 @@ def daylight_autonomy_noise(
     return together.scaled(np.sqrt(share)) + Noise(crossing, nothing, nothing)
 
 
-def continuous_daylight_autonomy(
-    illuminance: ArrayLike, hours: ArrayLike, threshold: float = THRESHOLD
-) -> FloatArray:
+def continuous_daylight_autonomy(illuminance: ArrayLike, hours: ArrayLike, threshold: float = THRESHOLD) -> FloatArray:
     """cDA [S]: mean over the scheduled time steps of the part of `threshold` that is met.
 
     Source: Rogers 2006, Daylighting Metric Development.
@@ -146,8 +142,7 @@ def scheduled(illuminance: ArrayLike, hours: ArrayLike) -> NDArray[np.float64]:
     values, hours = np.asarray(illuminance), np.asarray(hours)
     if values.ndim != 2 or hours.shape != (len(values),) or hours.dtype != bool:
         raise ValueError(
-            f"expected illuminance [H, S] and a mask [H], got {values.shape} and "
-            f"{hours.shape} of {hours.dtype}"
+            f"expected illuminance [H, S] and a mask [H], got {values.shape} and {hours.shape} of {hours.dtype}"
         )
     if not hours.any():
         raise ValueError("the schedule has no time step")

@@ -21,9 +21,7 @@ RULES = ("hourly", "sensor")
 class DaylightProvision:
     """Quantities that determine a room's level of daylight provision."""
 
-    target_illuminance: (
-        float  # [lx] reached on half the area (95 % under rooflights), half the time
-    )
+    target_illuminance: float  # [lx] reached on half the area (95 % under rooflights), half the time
     minimum_illuminance: float  # [lx] reached on 95 % of the area, half the time
 
 

@@ -9,12 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr
 
-from mitsuba_cfs.metrics.autonomy import (
-    area_share,
-    daylight_autonomy,
-    scheduled,
-    sensor_weights,
-)
+from mitsuba_cfs.metrics.autonomy import area_share, daylight_autonomy, scheduled, sensor_weights
 from mitsuba_cfs.metrics.noise import Noise
 
 FloatArray = NDArray[np.float64]
@@ -47,11 +42,7 @@ def spatial_daylight_autonomy(
 
 
 def sunlit_hours(
-    direct_illuminance: ArrayLike,
-    hours: ArrayLike,
-    *,
-    step_h: float = 1.0,
-    threshold: float = ASE_THRESHOLD,
+    direct_illuminance: ArrayLike, hours: ArrayLike, *, step_h: float = 1.0, threshold: float = ASE_THRESHOLD
 ) -> FloatArray:
     """Hours [S] of the scheduled time with more than `threshold` lx straight from the sun."""
     return step_h * np.count_nonzero(scheduled(direct_illuminance, hours) > threshold, axis=0)
@@ -101,9 +92,7 @@ def blinds_operated(
     if direct.ndim != 3:
         raise ValueError(f"direct_illuminance: expected [G][H, S], got {direct.shape}")
     weights = sensor_weights(areas, direct.shape[2])
-    most = most_area * (
-        1 + 1e-9
-    )  # the sum of equal weights has rounding errors, the limit has none
+    most = most_area * (1 + 1e-9)  # the sum of equal weights has rounding errors, the limit has none
     closed = np.zeros(direct.shape[:2], dtype=bool)
     for hour in np.flatnonzero((direct.sum(axis=0) >= threshold) @ weights > most):
         through = np.flatnonzero(direct[:, hour].any(axis=1))
@@ -114,11 +103,7 @@ def blinds_operated(
 
 
 def spatial_daylight_autonomy_error(
-    autonomy: ArrayLike,
-    noise: Noise,
-    *,
-    areas: ArrayLike | None = None,
-    time: float = SDA_TIME,
+    autonomy: ArrayLike, noise: Noise, *, areas: ArrayLike | None = None, time: float = SDA_TIME
 ) -> float:
     """Standard error of sDA (0 to 1) from the noise of DA.
 

@@ -38,11 +38,7 @@ class Noise:
 
     def __add__(self, other: Noise) -> Noise:
         """The noise of a sum of independent illuminances."""
-        return Noise(
-            self.own + other.own,
-            self.shared + other.shared,
-            self.by_freedom + other.by_freedom,
-        )
+        return Noise(self.own + other.own, self.shared + other.shared, self.by_freedom + other.by_freedom)
 
     def scaled(self, factor: Array) -> Noise:
         """The noise of the illuminance times a factor [S]."""
@@ -59,9 +55,7 @@ class Noise:
         doi:10.2307/3002019.
         """
         total = self.own + self.shared
-        freedom = np.divide(
-            total**2, self.by_freedom, out=np.full_like(total, MANY), where=self.by_freedom > 0
-        )
+        freedom = np.divide(total**2, self.by_freedom, out=np.full_like(total, MANY), where=self.by_freedom > 0)
         factor: Array = stdtrit(np.clip(freedom, 1.0, MANY), ndtr(COVERED)) / COVERED
         return factor
 

@@ -26,9 +26,7 @@ class Photometry:
 
     name: str
     gamma_deg: FloatArray  # [V] from straight down, 0 to 180
-    c_deg: (
-        FloatArray  # [C] around the vertical, from C0 (+x) anticlockwise; 0 to 360, both included
-    )
+    c_deg: FloatArray  # [C] around the vertical, from C0 (+x) anticlockwise; 0 to 360, both included
     candela: FloatArray  # [C, V]
     watts: float  # of lamps and gear; 0: not stated
 
@@ -101,10 +99,7 @@ def _lm63(text: str, path: Path) -> Photometry:
     row = next((n for n, line in enumerate(lines) if line.strip().startswith("TILT=")), None)
     if row is None:
         raise DataError("has no line TILT=", file=path)
-    name = next(
-        (line.partition("]")[2].strip() for line in lines[:row] if line.startswith("[LUMINAIRE]")),
-        path.stem,
-    )
+    name = next((line.partition("]")[2].strip() for line in lines[:row] if line.startswith("[LUMINAIRE]")), path.stem)
     words = [word for line in lines[row + 1 :] for word in line.replace(",", " ").split()]
     numbers = [_number(word, path) for word in words]
     tilt = lines[row].strip()[5:].strip().upper()
@@ -130,9 +125,7 @@ def _lm63(text: str, path: Path) -> Photometry:
     return _around(name, gamma, c, factor * values.reshape(horizontal, vertical), watts, path)
 
 
-def _around(
-    name: str, gamma: FloatArray, c: FloatArray, candela: FloatArray, watts: float, path: Path
-) -> Photometry:
+def _around(name: str, gamma: FloatArray, c: FloatArray, candela: FloatArray, watts: float, path: Path) -> Photometry:
     """The photometry with planes all around, of those from 0 to 0, 90, 180 or 360 degrees."""
     last = c[-1]
     if len(c) == 1:
@@ -190,7 +183,5 @@ def _eulumdat(text: str, path: Path) -> Photometry:
         ring, both = _ring(np.concatenate([turned, 180.0 - turned]), both)
         return _around(name, gamma, ring, both, watts, path)
     if int(symmetry) == 0:
-        return _around(
-            name, gamma, np.append(c, 360.0), np.append(values, values[:1], axis=0), watts, path
-        )
+        return _around(name, gamma, np.append(c, 360.0), np.append(values, values[:1], axis=0), watts, path)
     return _around(name, gamma, c[:count], values, watts, path)

@@ -115,8 +115,7 @@ def room_metrics(
     ]
     return RoomMetrics(
         daylight_autonomy=100.0 * enough,
-        continuous_daylight_autonomy=100.0
-        * autonomy.continuous_daylight_autonomy(illuminance, ten),
+        continuous_daylight_autonomy=100.0 * autonomy.continuous_daylight_autonomy(illuminance, ten),
         useful_daylight=useful[0],
         useful_daylight_2005=useful[1][1:3].sum(axis=0),
         mean_illuminance=np.mean(autonomy.scheduled(illuminance, half), axis=0, dtype=float),

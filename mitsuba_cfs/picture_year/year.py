@@ -264,10 +264,7 @@ class _Work:
         self._sparse[self.window] = False
         count = np.bincount(self.row, minlength=rows.shape[1])
         even = np.ones(len(self.window))
-        self.patterns = (
-            patterns_of(rows, np.maximum(count, 1), ROWS),
-            patterns_of(own[:, self.window], even, WINDOWS),
-        )
+        self.patterns = (patterns_of(rows, np.maximum(count, 1), ROWS), patterns_of(own[:, self.window], even, WINDOWS))
         self._geometry = GlareView(pictures.view)
         projected = in_picture_order(self._geometry.projected).ravel()[pictures.pixels]
         of_rows = np.bincount(self.row, projected * self.share, minlength=rows.shape[1])
@@ -316,12 +313,19 @@ class _Work:
     def year(self, check: DgpCheck | None = None) -> PictureYear:
         """The compressed pictures."""
         steps = [np.abs(a).max(axis=0, initial=1e-12) / MOST for a in self._amounts]
-        whole = [
-            np.round(a / s).astype(np.int16) for a, s in zip(self._amounts, steps, strict=True)
-        ]
+        whole = [np.round(a / s).astype(np.int16) for a, s in zip(self._amounts, steps, strict=True)]
         return PictureYear(
-            self._pictures.view, self._pictures.pixels, self.row, self.share, self.window,
-            *self.patterns, self.scale, (whole[0], whole[1]),
+            self._pictures.view,
+            self._pictures.pixels,
+            self.row,
+            self.share,
+            self.window,
+            *self.patterns,
+            self.scale,
+            (whole[0], whole[1]),
             (steps[0].astype(np.float32), steps[1].astype(np.float32)),
-            self.floor, tuple(self.codes), tuple(self.discs), check,
-        )  # fmt: skip
+            self.floor,
+            tuple(self.codes),
+            tuple(self.discs),
+            check,
+        )

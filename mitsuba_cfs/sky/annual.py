@@ -75,9 +75,7 @@ def _from_file(weather: Weather, source: str) -> Weather:
         warm = int(np.count_nonzero(snow & (_daily_means(weather) > TOO_WARM_C)))
         if warm:
             message = f"has snow in {warm} hours of days warmer than {TOO_WARM_C:g} °C on average"
-            raise DataError(
-                f"{message}; state the albedo by month", file=weather.file, field="albedo"
-            )
+            raise DataError(f"{message}; state the albedo by month", file=weather.file, field="albedo")
         return replace(weather, albedo=np.where(snow, SNOW, weather.albedo), notes=notes)
     stated = weather.stated_albedo
     if stated is None or np.isnan(stated).all():
@@ -86,10 +84,8 @@ def _from_file(weather: Weather, source: str) -> Weather:
     too_bright = int(np.count_nonzero(values > BRIGHTEST))
     if too_bright:
         note = Note(
-            "{file}: the albedo is above {most:g} in {count} hours, which no ground reflects; it "
-            "is used as it is.",
-            "{file}: the albedo is above {most:g} in {count} hour, which no ground reflects; it is "
-            "used as it is.",
+            "{file}: the albedo is above {most:g} in {count} hours, which no ground reflects; it is used as it is.",
+            "{file}: the albedo is above {most:g} in {count} hour, which no ground reflects; it is used as it is.",
             file=_name(weather),
             count=too_bright,
             most=BRIGHTEST,
@@ -99,10 +95,7 @@ def _from_file(weather: Weather, source: str) -> Weather:
 
 
 def _without_gaps(
-    weather: Weather,
-    values: NDArray[np.float64],
-    field: str,
-    otherwise: float | NDArray[np.float64],
+    weather: Weather, values: NDArray[np.float64], field: str, otherwise: float | NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Values [H] with short gaps (NaN) interpolated and long ones filled, and the notes of that."""
     between = interpolated(values, round(LONGEST_GAP_H / weather.step_h))
@@ -180,9 +173,7 @@ class AnnualSky:
     solar: NDArray[np.floating] | None = None  # [P, L] radiance, the sun among it [W/m2/sr]
     _lit_sun: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
     _totals: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
-    _of_year: dict[Callable[..., Any], Any] = field(
-        default_factory=dict, init=False, repr=False, compare=False
-    )
+    _of_year: dict[Callable[..., Any], Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, function: Callable[[Weather], T], weather: Weather) -> T:
         """A result of the weather of these skies alone, made once for all rooms."""
@@ -279,9 +270,7 @@ def annual_sky(
     place: dict[str, Any] = {"towards": towards, "rotation_deg": rotation_deg}
     visible = sky_series(weather, **place)
     radiance = three_part(sky_series(weather, "solar", **place)) if solar else None
-    return _of_series(
-        visible, radiance, subdivision, hours, sun=sun, reflectance=weather.albedo, ground=ground
-    )
+    return _of_series(visible, radiance, subdivision, hours, sun=sun, reflectance=weather.albedo, ground=ground)
 
 
 def given_sky(
@@ -310,15 +299,7 @@ def given_sky(
     moment: dict[str, Any] = {"day_of_year": day_of_year, "dew_point_c": dew_point_c}
     visible = series_for_suns(*given, **moment)
     radiance = three_part(series_for_suns(*given, "solar", **moment)) if solar else None
-    return _of_series(
-        visible,
-        radiance,
-        subdivision,
-        hours,
-        sun=sun,
-        reflectance=ground_reflectance,
-        ground=ground,
-    )
+    return _of_series(visible, radiance, subdivision, hours, sun=sun, reflectance=ground_reflectance, ground=ground)
 
 
 def hour_numbers(hours: ArrayLike, count: int) -> NDArray[np.int64]:
@@ -341,11 +322,7 @@ def _of_series(
 ) -> AnnualSky:
     every = len(series.sun)
     lit = np.flatnonzero(is_up(series.sun)) if hours is None else hour_numbers(hours, every)
-    options: dict[str, Any] = {
-        "ground_reflectance": reflectance,
-        "ground": ground,
-        "dtype": np.float32,
-    }
+    options: dict[str, Any] = {"ground_reflectance": reflectance, "ground": ground, "dtype": np.float32}
     return AnnualSky(
         series_matrix(series, lit, subdivision, **options),
         series.sun[lit],

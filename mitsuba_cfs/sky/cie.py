@@ -34,9 +34,7 @@ GENERAL_SKIES = np.array(
 )
 
 
-def relative_luminance(
-    kind: str | int, directions: ArrayLike, sun: ArrayLike | None = None
-) -> FloatArray:
+def relative_luminance(kind: str | int, directions: ArrayLike, sun: ArrayLike | None = None) -> FloatArray:
     """Luminance over that of the zenith [N] of directions [N, 3] above the horizon.
 
     Args:

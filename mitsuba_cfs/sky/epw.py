@@ -15,13 +15,7 @@ from mitsuba_cfs.files import reason, write_bytes
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky import weather_table
 from mitsuba_cfs.sky.sun import direct_normal_from_global, sun_directions
-from mitsuba_cfs.sky.weather import (
-    Weather,
-    dew_point,
-    relative_humidity,
-    sky_longwave,
-    standard_pressure,
-)
+from mitsuba_cfs.sky.weather import Weather, dew_point, relative_humidity, sky_longwave, standard_pressure
 from mitsuba_cfs.sky.weather_table import (
     TYPICAL_LEAP_YEAR,
     TYPICAL_YEAR,
@@ -99,14 +93,7 @@ def write_wea(weather: Weather, path: str | PathLike[str]) -> None:
     write_bytes(path, (head + "".join(lines)).encode("ascii", "replace"))
 
 
-WEA_HEADER = (
-    "place",
-    "latitude",
-    "longitude",
-    "time_zone",
-    "site_elevation",
-    "weather_data_file_units",
-)
+WEA_HEADER = ("place", "latitude", "longitude", "time_zone", "site_elevation", "weather_data_file_units")
 
 
 def wea_rows(path: FilePath) -> tuple[Location, int, NDArray[np.float64], int]:
@@ -133,9 +120,7 @@ def wea_rows(path: FilePath) -> tuple[Location, int, NDArray[np.float64], int]:
         parts = line.split()
         if len(parts) < 5:
             raise DataError(
-                f"expected month day hour direct diffuse, got {line!r}",
-                file=path,
-                element=f"line {first + i}",
+                f"expected month day hour direct diffuse, got {line!r}", file=path, element=f"line {first + i}"
             )
         names = ("month", "day", "hour", "direct irradiance", "diffuse irradiance")
         rows[i] = [number(parts[j], path, first + i, name) for j, name in enumerate(names)]
@@ -156,9 +141,7 @@ def wea_times(
     wrong = days.isna().to_numpy() | (rows[:, 2] < 0) | (rows[:, 2] > 24)
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise DataError(
-            "is not a date of month, day and hour", file=path, element=f"line {first_line + row}"
-        )
+        raise DataError("is not a date of month, day and hour", file=path, element=f"line {first_line + row}")
     middle = pd.DatetimeIndex(days) + pd.to_timedelta(np.round(rows[:, 2] * 3600), unit="s")
     gaps = np.diff(middle) / np.timedelta64(1, "h")
     step = float(np.min(gaps)) if len(gaps) else 1.0
@@ -251,8 +234,7 @@ def filled_gaps(column: weather_table.EpwColumns, site: str) -> tuple[str, ...]:
     """A note for each field that has interpolated values."""
     return tuple(
         Note(
-            "Weather {site}: {field}: {count} missing values, the first in line {line}, are "
-            "interpolated.",
+            "Weather {site}: {field}: {count} missing values, the first in line {line}, are interpolated.",
             "Weather {site}: {field}: {count} missing value, in line {line}, is interpolated.",
             site=site,
             field=field,
@@ -286,8 +268,7 @@ def implausible(
         Note(
             "Weather {site}: {field}: {count} implausible values, the first in line {line}: "
             "{value:g}; they are used as they are.",
-            "Weather {site}: {field}: {count} implausible value, in line {line}: {value:g}; it is "
-            "used as it is.",
+            "Weather {site}: {field}: {count} implausible value, in line {line}: {value:g}; it is used as it is.",
             site=site,
             field=field,
             count=int(np.count_nonzero(wrong)),
@@ -305,9 +286,7 @@ def spikes(values: FloatArray) -> NDArray[np.bool_]:
     return (np.minimum(abs(before), abs(after)) > SPIKE_K) & (before * after > 0)
 
 
-def _pressure(
-    column: weather_table.EpwColumns, site: weather_table.Location
-) -> tuple[FloatArray, tuple[str, ...]]:
+def _pressure(column: weather_table.EpwColumns, site: weather_table.Location) -> tuple[FloatArray, tuple[str, ...]]:
     """Pressure [H] [Pa], the standard atmosphere's where it is missing or impossible, and a note.
 
     It enters the refraction of the sun's light (its mean) and the density of the outdoor air: an

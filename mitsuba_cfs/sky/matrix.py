@@ -59,13 +59,9 @@ def gendaylit_ground(
     from_zenith = np.pi / 2 - height
     x = (height - np.pi / 4) / (np.pi / 4)
     clear = 0.274 * (0.91 + 10.0 * np.exp(-3.0 * from_zenith) + 0.45 * sun[:, 2] ** 2)
-    between = (2.739 + 0.9891 * np.sin(0.3119 + 2.6 * height)) * np.exp(
-        -from_zenith * (0.4441 + 1.48 * height)
-    )
+    between = (2.739 + 0.9891 * np.sin(0.3119 + 2.6 * height)) * np.exp(-from_zenith * (0.4441 + 1.48 * height))
     factor = np.where(
-        clearness >= CLEAR_FROM,
-        polyval(x, CLEAR_SKY) / clear / np.pi,
-        polyval(x, INTERMEDIATE_SKY) / between / np.pi,
+        clearness >= CLEAR_FROM, polyval(x, CLEAR_SKY) / clear / np.pi, polyval(x, INTERMEDIATE_SKY) / between / np.pi
     )
     factor = np.where(clearness <= 1.0, OVERCAST, factor)
     return reflectance * (zenith * factor + direct_horizontal / np.pi)
@@ -156,8 +152,7 @@ def series_for_suns(
     direct, diffuse = (np.asarray(a, dtype=float) for a in (direct_normal, diffuse_horizontal))
     if towards.shape[1:] != (3,) or {direct.shape, diffuse.shape} != {(len(towards),)}:
         raise ValueError(
-            f"suns {towards.shape}, irradiances {direct.shape}, {diffuse.shape}: "
-            "expected [H, 3], [H], [H]"
+            f"suns {towards.shape}, irradiances {direct.shape}, {diffuse.shape}: expected [H, 3], [H], [H]"
         )
     model = perez_sky(direct, diffuse, towards, day_of_year=day_of_year, dew_point_c=dew_point_c)
     dark = direct + diffuse <= DARK
@@ -195,11 +190,7 @@ def sky_series(
     if direct is None or diffuse is None:
         raise ValueError(f"the weather of {weather.site} has no illuminance")
     dark = weather.direct_normal + weather.diffuse_horizontal <= DARK
-    return replace(
-        series,
-        diffuse_horizontal=np.where(dark, 0.0, diffuse),
-        direct_normal=np.where(dark, 0.0, direct),
-    )
+    return replace(series, diffuse_horizontal=np.where(dark, 0.0, diffuse), direct_normal=np.where(dark, 0.0, direct))
 
 
 def _dew_point(weather: Weather) -> FloatArray:
@@ -250,19 +241,21 @@ def sky_matrix(
     Raises: `ValueError` for an unknown option, or illuminances that the weather does not have.
     """
     series = sky_series(
-        weather,
-        band,
-        sun_model=sun_model,
-        rotation_deg=rotation_deg,
-        measured_illuminance=measured_illuminance,
+        weather, band, sun_model=sun_model, rotation_deg=rotation_deg, measured_illuminance=measured_illuminance
     )
     reflectance = weather.albedo if ground_reflectance is None else ground_reflectance
     chosen = sun_module.is_up(series.sun) if sun_up_only else np.ones(len(series.sun), dtype=bool)
     return series_matrix(
-        series, np.flatnonzero(chosen) if hours is None else hours, subdivision, parts,
-        sun_patches=sun_patches, ground_reflectance=reflectance, ground=ground, dtype=dtype,
+        series,
+        np.flatnonzero(chosen) if hours is None else hours,
+        subdivision,
+        parts,
+        sun_patches=sun_patches,
+        ground_reflectance=reflectance,
+        ground=ground,
+        dtype=dtype,
         progress=progress,
-    )  # fmt: skip
+    )
 
 
 def series_matrix(
@@ -342,11 +335,7 @@ def sun_matrix(
     """
     sky = ReinhartSky(subdivision)
     series = sky_series(
-        weather,
-        band,
-        sun_model=sun_model,
-        rotation_deg=rotation_deg,
-        measured_illuminance=measured_illuminance,
+        weather, band, sun_model=sun_model, rotation_deg=rotation_deg, measured_illuminance=measured_illuminance
     )
     hours = np.flatnonzero(series.direct_normal > 0)
     size = max(1, CHUNK_BYTES // (8 * sky.size))

@@ -36,9 +36,7 @@ def measured_weather(
     whole = np.asarray(global_horizontal, dtype=float)
     diffuse = np.asarray(diffuse_horizontal, dtype=float)
     sine = sun.sun_directions(site, model=sun_model)[:, 2]
-    direct = sun.direct_normal_from_global(
-        whole, diffuse, sine, least_altitude_deg=least_altitude_deg
-    )
+    direct = sun.direct_normal_from_global(whole, diffuse, sine, least_altitude_deg=least_altitude_deg)
     low = sine <= np.sin(np.radians(least_altitude_deg))
     return replace(
         site,
@@ -74,12 +72,7 @@ def read_measured(
     gaps = np.diff(times) / np.timedelta64(1, "h")
     if len(gaps) == 0 or np.any(gaps <= 0):
         row = int(np.argmax(gaps <= 0)) + 1 if len(gaps) else 0
-        raise DataError(
-            "expected at least two rising times",
-            file=path,
-            element=f"line {row + 2}",
-            field="time",
-        )
+        raise DataError("expected at least two rising times", file=path, element=f"line {row + 2}", field="time")
     step = float(np.min(gaps))
     none = np.zeros(len(times))
     site = Weather(
@@ -111,9 +104,7 @@ def _table(path: str | PathLike[str]) -> pd.DataFrame:
     for name in COLUMNS:
         if name not in table:
             raise DataError("missing: expected " + ", ".join(COLUMNS), file=path, field=name)
-    result = pd.DataFrame(
-        {"time": pd.to_datetime(table["time"], format="ISO8601", errors="coerce")}
-    )
+    result = pd.DataFrame({"time": pd.to_datetime(table["time"], format="ISO8601", errors="coerce")})
     if getattr(result["time"].dtype, "tz", None) is not None:
         raise DataError("expected times without a zone", file=path, field="time")
     wrong = {"time": result["time"].isna()}
@@ -126,9 +117,6 @@ def _table(path: str | PathLike[str]) -> pd.DataFrame:
             row = int(np.argmax(bad))
             expected = "a date" if name == "time" else f"-20 to {MOST_IRRADIANCE:g} W/m2"
             raise DataError(
-                f"expected {expected}, got {table[name].iloc[row]!r}",
-                file=path,
-                element=f"line {row + 2}",
-                field=name,
+                f"expected {expected}, got {table[name].iloc[row]!r}", file=path, element=f"line {row + 2}", field=name
             )
     return result

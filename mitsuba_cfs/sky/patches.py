@@ -50,9 +50,7 @@ class ReinhartSky:
         altitude = np.where(row < len(counts) - 1, height * (row + 0.5), np.pi / 2)
         azimuth = 2 * np.pi * column / counts[row]
         level = np.where(row < len(counts) - 1, np.cos(altitude), 0.0)
-        centres = np.stack(
-            [level * np.sin(azimuth), level * np.cos(azimuth), np.sin(altitude)], axis=-1
-        )
+        centres = np.stack([level * np.sin(azimuth), level * np.cos(azimuth), np.sin(altitude)], axis=-1)
         edges = np.sin(np.append(height * np.arange(len(counts)), np.pi / 2))
         omega = 2 * np.pi * np.diff(edges) / counts
         values = {

@@ -167,9 +167,7 @@ def luminance_coefficients(
     return result
 
 
-def relative_luminance(
-    coefficients: FloatArray, cos_zenith: FloatArray, cos_sun: FloatArray
-) -> FloatArray:
+def relative_luminance(coefficients: FloatArray, cos_zenith: FloatArray, cos_sun: FloatArray) -> FloatArray:
     """[1 + a exp(b/cos zeta)] [1 + c exp(d gamma) + e cos^2 gamma], at least 0: [N, H].
 
     Args: `cos_zenith` [N] > 0, `cos_sun` [N, H] cosine of the angle gamma to the sun.

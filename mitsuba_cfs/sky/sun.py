@@ -27,9 +27,7 @@ def sun_directions(weather: Weather, *, model: str = "spa") -> NDArray[np.float6
     if model not in SUN_MODELS:
         raise ValueError(f"sun model: expected one of {SUN_MODELS}, got {model!r}")
     spa = model == "spa"
-    directions = (
-        _spa_directions(weather, weather.midpoints) if spa else _radiance_directions(weather)
-    )
+    directions = _spa_directions(weather, weather.midpoints) if spa else _radiance_directions(weather)
     return rotated(directions, weather.turned_deg) if weather.turned_deg else directions
 
 
@@ -70,9 +68,7 @@ def declination_and_time(weather: Weather) -> tuple[NDArray[np.float64], NDArray
     day = t.day_of_year.to_numpy().astype(float)
     hour = (t.hour + t.minute / 60 + t.second / 3600).to_numpy()
     declination = 0.4093 * np.sin(2 * np.pi / 365 * (day - 81))
-    equation_of_time = 0.170 * np.sin(4 * np.pi / 373 * (day - 80)) - 0.129 * np.sin(
-        2 * np.pi / 355 * (day - 8)
-    )
+    equation_of_time = 0.170 * np.sin(4 * np.pi / 373 * (day - 80)) - 0.129 * np.sin(2 * np.pi / 355 * (day - 8))
     return declination, hour + equation_of_time + weather.longitude_deg / 15 - weather.timezone_h
 
 

@@ -79,6 +79,4 @@ class ThreePartSeries(SkySeries):
 
 def three_part(series: SkySeries) -> ThreePartSeries:
     """Series of the solar band with the three-part sky."""
-    return ThreePartSeries(
-        series.sun, series.model, series.diffuse_horizontal, series.direct_normal
-    )
+    return ThreePartSeries(series.sun, series.model, series.diffuse_horizontal, series.direct_normal)

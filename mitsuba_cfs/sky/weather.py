@@ -44,9 +44,7 @@ class Weather:
     relative_humidity: FloatArray | None = None  # [H] 0 to 1
     pressure_pa: FloatArray | None = None  # [H]
     wind_speed: FloatArray | None = None  # [H] [m/s]
-    wind_direction_deg: FloatArray | None = (
-        None  # [H] that the wind blows from, clockwise from north
-    )
+    wind_direction_deg: FloatArray | None = None  # [H] that the wind blows from, clockwise from north
     horizontal_infrared: FloatArray | None = None  # [H] sky longwave on a horizontal plane [W/m2]
     # ground reflectance, one or [H], see `albedo`; 0.2 is gendaymtx's and EnergyPlus's default
     albedo: float | FloatArray = 0.2
@@ -63,8 +61,7 @@ class Weather:
     def __post_init__(self) -> None:
         if not -90 <= self.latitude_deg <= 90 or not -180 <= self.longitude_deg <= 180:
             raise ValueError(
-                f"expected latitude -90..90 and longitude -180..180, "
-                f"got {self.latitude_deg}, {self.longitude_deg}"
+                f"expected latitude -90..90 and longitude -180..180, got {self.latitude_deg}, {self.longitude_deg}"
             )
         if not self.step_h > 0:
             raise ValueError(f"step_h: expected a positive number of hours, got {self.step_h}")
@@ -94,9 +91,7 @@ class Weather:
         wind = self.wind_direction_deg
         if wind is not None:
             wind = np.mod(wind - angle_deg, 360.0)
-        return replace(
-            self, turned_deg=(self.turned_deg + angle_deg) % 360.0, wind_direction_deg=wind
-        )
+        return replace(self, turned_deg=(self.turned_deg + angle_deg) % 360.0, wind_direction_deg=wind)
 
     @property
     def weekday(self) -> NDArray[np.int64]:
@@ -144,9 +139,7 @@ def standard_pressure(elevation_m: float) -> float:
     return 101325.0 * (1 - 2.25577e-5 * elevation_m) ** 5.2559
 
 
-def sky_longwave(
-    dry_bulb_c: ArrayLike, dew_point_c: ArrayLike, sky_cover: ArrayLike
-) -> NDArray[np.float64]:
+def sky_longwave(dry_bulb_c: ArrayLike, dew_point_c: ArrayLike, sky_cover: ArrayLike) -> NDArray[np.float64]:
     """Horizontal infrared irradiance from the sky [W/m2]; `sky_cover` in tenths.
 
     Source: Walton 1983 / Clark and Allen 1978, as in EnergyPlus's Engineering Reference.
@@ -168,11 +161,7 @@ SOURCE = "Theeuwes et al. 2017"
 
 
 def maximum_heat_island(
-    sky_view: float,
-    vegetation: float,
-    heating: ArrayLike,
-    temperature_range: ArrayLike,
-    wind: ArrayLike,
+    sky_view: float, vegetation: float, heating: ArrayLike, temperature_range: ArrayLike, wind: ArrayLike
 ) -> NDArray[np.float64]:
     """Greatest excess of the air in a street over that in the country within a day [..] [K].
 
@@ -191,10 +180,7 @@ def maximum_heat_island(
     urban heat island effect for cities in northwestern Europe", Int. J. Climatology 37,
     doi 10.1002/joc.4717; the range from memory, as the paper was not available.
     """
-    for name, value, (low, high) in (
-        ("sky_view", sky_view, SKY_VIEW),
-        ("vegetation", vegetation, VEGETATION),
-    ):
+    for name, value, (low, high) in (("sky_view", sky_view, SKY_VIEW), ("vegetation", vegetation, VEGETATION)):
         if not low <= value <= high:
             raise ValueError(f"{name}: expected {low:g} to {high:g} ({SOURCE}), got {value:g}")
     wind = np.asarray(wind, dtype=float)
@@ -204,9 +190,7 @@ def maximum_heat_island(
     return (2 - sky_view - vegetation) * (np.asarray(heating) * range_**3 / wind) ** 0.25
 
 
-def in_city(
-    weather: Weather, sky_view: float, vegetation: float, hourly_shares: Sequence[float]
-) -> Weather:
+def in_city(weather: Weather, sky_view: float, vegetation: float, hourly_shares: Sequence[float]) -> Weather:
     """The same weather with the air of a street: warmer, the water in it as before.
 
     The excess of an hour is the maximum of its day, from 8 o'clock to 8 o'clock, times a share.
@@ -254,9 +238,7 @@ def in_city(
     )
 
 
-def _notes(
-    weather: Weather, maximum: NDArray[np.float64], excess: NDArray[np.float64]
-) -> list[str]:
+def _notes(weather: Weather, maximum: NDArray[np.float64], excess: NDArray[np.float64]) -> list[str]:
     notes: list[str] = [
         Note(
             "Weather {site}: air of an urban street, on average {mean:.1f} K and at most "
@@ -270,10 +252,7 @@ def _notes(
             median=float(np.median(maximum)),
         )
     ]
-    for value, (low, high) in (
-        (weather.latitude_deg, NORTH_DEG),
-        (weather.longitude_deg, EAST_DEG),
-    ):
+    for value, (low, high) in ((weather.latitude_deg, NORTH_DEG), (weather.longitude_deg, EAST_DEG)):
         if not low <= value <= high:
             notes.append(
                 Note(

@@ -60,9 +60,7 @@ def whole_days(weather: Weather) -> Days | None:
     together: the sun position must not enter it.
     """
     steps = weather.per_day
-    _, index, count = np.unique(
-        weather.midpoints.normalize().asi8, return_index=True, return_counts=True
-    )
+    _, index, count = np.unique(weather.midpoints.normalize().asi8, return_index=True, return_counts=True)
     rows = index[count == steps][:, None] + np.arange(steps)
     radiation = weather.global_horizontal
     if radiation is None:
@@ -125,9 +123,7 @@ def _fitting(weather: Weather, late: float) -> dict[str, float]:
     return fitting
 
 
-def noon_offset(
-    latitude_deg: float, radiation: FloatArray, declination: FloatArray, hour: FloatArray
-) -> float:
+def noon_offset(latitude_deg: float, radiation: FloatArray, declination: FloatArray, hour: FloatArray) -> float:
     """Median solar hour [h] about which the radiation of the clearest days is centred, 0 at noon.
 
     Args: radiation, declination [rad], hour: solar, 0 at noon [h]; [days, steps] each.
@@ -295,19 +291,12 @@ def number(text: str, path: FilePath, line: int, field: str) -> float:
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise DataError(
-            f"expected a number, got {text!r}", file=path, element=f"line {line}", field=field
-        )
+        raise DataError(f"expected a number, got {text!r}", file=path, element=f"line {line}", field=field)
     return value
 
 
 def checked(
-    path: FilePath,
-    first_line: int,
-    field: str,
-    values: NDArray[np.float64],
-    low: float,
-    high: float,
+    path: FilePath, first_line: int, field: str, values: NDArray[np.float64], low: float, high: float
 ) -> NDArray[np.float64]:
     """`values` if each is NaN or within its bounds; else `DataError` with the first that is not."""
     wrong = (values < low) | (values > high)
@@ -327,9 +316,7 @@ def location(path: FilePath, name: str, numbers: tuple[float, float, float, floa
     bounds = (("latitude", 90.0), ("longitude", 180.0), ("time zone", 14.0), ("elevation", 9000.0))
     for (field, bound), value in zip(bounds, numbers, strict=True):
         if abs(value) > bound:
-            raise DataError(
-                f"expected -{bound:g} to {bound:g}, got {value:g}", file=path, field=field
-            )
+            raise DataError(f"expected -{bound:g} to {bound:g}, got {value:g}", file=path, field=field)
     return Location(name, *numbers)
 
 
@@ -348,13 +335,9 @@ def epw_location(head: list[str], path: FilePath) -> Location:
     """The site of the LOCATION line."""
     parts = [part.strip() for part in head[0].split(",")]
     if len(parts) < 10:
-        raise DataError(
-            f"expected 10 fields, got {len(parts)}", file=path, element="line 1", field="LOCATION"
-        )
+        raise DataError(f"expected 10 fields, got {len(parts)}", file=path, element="line 1", field="LOCATION")
     names = ("latitude", "longitude", "time zone", "elevation")
-    latitude, longitude, zone, elevation = (
-        number(parts[6 + i], path, 1, name) for i, name in enumerate(names)
-    )
+    latitude, longitude, zone, elevation = (number(parts[6 + i], path, 1, name) for i, name in enumerate(names))
     name = ", ".join(part for part in (parts[1], parts[3]) if part not in ("", "-"))
     return location(path, name, (latitude, longitude, zone, elevation))
 
@@ -365,9 +348,7 @@ def epw_first_weekday(head: list[str]) -> int | None:
     return WEEK.index(parts[4]) if len(parts) > 4 and parts[4] in WEEK else None
 
 
-def epw_ground(
-    head: list[str], path: FilePath
-) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
+def epw_ground(head: list[str], path: FilePath) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
     """Depths [G] [m] and monthly temperatures [G, 12] [deg C] of the ground; None if not given."""
     parts = [part.strip() for part in head[3].split(",")][1:]
     count = int(number(parts[0], path, 4, "GROUND TEMPERATURES")) if parts and parts[0] else 0
@@ -411,9 +392,7 @@ class EpwColumns:
         for i, row in enumerate(self.rows):
             if len(row) < 24:
                 raise DataError(
-                    f"expected at least 24 fields, got {len(row)}",
-                    file=path,
-                    element=f"line {self.first_line + i}",
+                    f"expected at least 24 fields, got {len(row)}", file=path, element=f"line {self.first_line + i}"
                 )
 
     def error(self, field: str, row: int, message: str) -> DataError:
@@ -426,9 +405,7 @@ class EpwColumns:
             field=field,
         )
 
-    def _numbers(
-        self, column: int, field: str, rows: NDArray[np.int64] | None = None
-    ) -> NDArray[np.float64]:
+    def _numbers(self, column: int, field: str, rows: NDArray[np.int64] | None = None) -> NDArray[np.float64]:
         rows = np.arange(len(self.rows)) if rows is None else rows
         texts = [self.rows[row][column] for row in rows]
         try:
@@ -499,9 +476,7 @@ class EpwColumns:
     def times(self) -> tuple[pd.DatetimeIndex, float]:
         """Interval ends [H] and the step [h]; `DataError` where an hour is missing or misplaced."""
         count = len(self.rows)
-        dates = np.stack(
-            [self._numbers(i, name) for i, name in enumerate(("year", "month", "day", "hour"))]
-        )
+        dates = np.stack([self._numbers(i, name) for i, name in enumerate(("year", "month", "day", "hour"))])
         years = np.unique(dates[0]).astype(int)
         leap = bool(np.any((dates[1] == 2) & (dates[2] == 29)))
         year = year_of(years, leap)
@@ -516,9 +491,7 @@ class EpwColumns:
             row = int(np.argmax(wrong))
             month, day, hour = wanted[:, row]
             raise self.error(
-                "time",
-                row,
-                f"hours missing or out of order: expected month {month}, day {day}, hour {hour}",
+                "time", row, f"hours missing or out of order: expected month {month}, day {day}, hour {hour}"
             )
         check_length(self.path, count, steps, leap)
         return ends, 1.0 / steps

@@ -60,10 +60,9 @@ def daylight_components() -> FloatArray:
     from colour.colorimetry.datasets import illuminants
 
     tables = illuminants.SDS_BASIS_FUNCTIONS_CIE_ILLUMINANT_D_SERIES
-    return np.stack([
-        np.interp(NANOMETRES, tables[name].wavelengths, tables[name].values)
-        for name in ("S0", "S1", "S2")
-    ])  # fmt: skip
+    return np.stack(
+        [np.interp(NANOMETRES, tables[name].wavelengths, tables[name].values) for name in ("S0", "S1", "S2")]
+    )
 
 
 def sun_spectra(height: ArrayLike, water_cm: ArrayLike = WATER_CM) -> FloatArray:
@@ -79,11 +78,17 @@ def sun_spectra(height: ArrayLike, water_cm: ArrayLike = WATER_CM) -> FloatArray
     zenith = np.degrees(np.arccos(sine))
     water = np.broadcast_to(np.asarray(water_cm, dtype=float), zenith.shape)
     spectrum = pvlib.spectrum.spectrl2(
-        apparent_zenith=zenith, aoi=zenith, surface_tilt=0.0, ground_albedo=0.2,
-        surface_pressure=PRESSURE_PA, precipitable_water=water, ozone=OZONE_CM,
+        apparent_zenith=zenith,
+        aoi=zenith,
+        surface_tilt=0.0,
+        ground_albedo=0.2,
+        surface_pressure=PRESSURE_PA,
+        precipitable_water=water,
+        ozone=OZONE_CM,
         relative_airmass=pvlib.atmosphere.get_relative_airmass(zenith),
-        aerosol_turbidity_500nm=AEROSOL_500NM, dayofyear=np.ones_like(zenith),
-    )  # fmt: skip
+        aerosol_turbidity_500nm=AEROSOL_500NM,
+        dayofyear=np.ones_like(zenith),
+    )
     nm, beam = spectrum["wavelength"], np.reshape(spectrum["dni"], (-1, len(zenith)))
     return np.stack([np.interp(NANOMETRES, nm, column) for column in beam.T])
 

@@ -23,13 +23,7 @@ ALPHA_OPIC = ("s_cone", "m_cone", "l_cone", "rod", "melanopic")
 # rows of `sensitivities`
 DETECTORS = ("photopic", *ALPHA_OPIC, "x", "y", "z")
 # CIE S 026:2018, table 1: alpha-opic efficacy of luminous radiation of D65 [W/lm]
-D65_EFFICACY = {
-    "s_cone": 0.8173e-3,
-    "m_cone": 1.4558e-3,
-    "l_cone": 1.6289e-3,
-    "rod": 1.4497e-3,
-    "melanopic": 1.3262e-3,
-}
+D65_EFFICACY = {"s_cone": 0.8173e-3, "m_cone": 1.4558e-3, "l_cone": 1.6289e-3, "rod": 1.4497e-3, "melanopic": 1.3262e-3}
 
 
 @cache

@@ -14,9 +14,13 @@ from scenes.language.catalogue import gettext
 
 CHECK = f"{RESULTS}/check.json"
 EXPORTS = {  # options of `cfs export`, and the names of their files
-    "gltf": "building.glb", "radiance": "radiance", "mitsuba": "mitsuba",
-    "epjson": "model.epJSON", "honeybee": "model.hbjson", "gbxml": "model.gbxml",
-}  # fmt: skip
+    "gltf": "building.glb",
+    "radiance": "radiance",
+    "mitsuba": "mitsuba",
+    "epjson": "model.epJSON",
+    "honeybee": "model.hbjson",
+    "gbxml": "model.gbxml",
+}
 AS_IN_FILE = "as in the building's file"
 LANGUAGES = ("en", "de", "fr")
 
@@ -205,11 +209,6 @@ def rule_sets() -> Sequence[dict[str, str | bool]]:
 
     rules = [(name, read_rule(name)) for name in rule_names()]
     return [
-        {
-            "name": name,
-            "title": gettext(rule.title),
-            "edition": rule.edition,
-            "glare": "glare" in rule.parts,
-        }
+        {"name": name, "title": gettext(rule.title), "edition": rule.edition, "glare": "glare" in rule.parts}
         for name, rule in rules
     ]

@@ -47,11 +47,18 @@ class Job:
         """What the page shows of it; of one that has ended the last lines."""
         shown = KEPT if self.state == RUNNING else ENDED
         return {
-            "number": self.number, "kind": self.action.kind, "title": self.action.title,
-            "command": self.action.text, "out": self.action.out, "state": self.state,
-            "started": self.started, "ended": self.ended, "code": self.code,
-            "progress": self.progress, "lines": list(self.lines)[-shown:],
-        }  # fmt: skip
+            "number": self.number,
+            "kind": self.action.kind,
+            "title": self.action.title,
+            "command": self.action.text,
+            "out": self.action.out,
+            "state": self.state,
+            "started": self.started,
+            "ended": self.ended,
+            "code": self.code,
+            "progress": self.progress,
+            "lines": list(self.lines)[-shown:],
+        }
 
 
 class Jobs:
@@ -196,10 +203,16 @@ class Jobs:
         environment |= {"PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8"}
         return subprocess.Popen(
             own_python("-m", "scenes.cli", *action.command),
-            cwd=self._project.folder, env=environment, stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, encoding="utf-8",
-            errors="replace", start_new_session=os.name == "posix",
-        )  # fmt: skip
+            cwd=self._project.folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+            start_new_session=os.name == "posix",
+        )
 
     def _take(self, job: Job, line: str, log: Any) -> None:
         """A line of the command: progress, or what it prints."""
@@ -219,10 +232,14 @@ class Jobs:
         job.state = DONE if code == 0 else STOPPED if stopped or code == INTERRUPTED else FAILED
         seconds = round(job.ended - job.started, 1)
         line = {
-            "command": ["cfs", *job.action.command], "kind": job.action.kind,
-            "title": job.action.title, "started": round(job.started), "seconds": seconds,
-            "state": job.state, "code": code,
-        }  # fmt: skip
+            "command": ["cfs", *job.action.command],
+            "kind": job.action.kind,
+            "title": job.action.title,
+            "started": round(job.started),
+            "seconds": seconds,
+            "state": job.state,
+            "code": code,
+        }
         try:
             self._project.record(line)
         except OSError as error:

@@ -86,9 +86,11 @@ def kind_of(path: Path) -> str:
             return "system" if root == "WindowElement" else "building"
         raise DataError(f"is XML with <{root}>; expected a BSDF file or gbXML", file=path)
     kinds = {
-        **dict.fromkeys(BUILDINGS, "building"), **dict.fromkeys(WEATHER, "weather"),
-        **dict.fromkeys(AROUND, "surroundings"), **dict.fromkeys(BESIDE, "beside"),
-    }  # fmt: skip
+        **dict.fromkeys(BUILDINGS, "building"),
+        **dict.fromkeys(WEATHER, "weather"),
+        **dict.fromkeys(AROUND, "surroundings"),
+        **dict.fromkeys(BESIDE, "beside"),
+    }
     if suffix in kinds:
         return kinds[suffix]
     known = ", ".join((*BUILDINGS, *WEATHER, ".xml", *BESIDE, *AROUND))
@@ -225,9 +227,7 @@ class Project:
         elif file.kind == "system":
             systems = study.setdefault("system", [])
             if all(one.get("bsdf") != file.path for one in systems):
-                systems.append(
-                    {"name": free_name(Path(file.path).stem, systems), "bsdf": file.path}
-                )
+                systems.append({"name": free_name(Path(file.path).stem, systems), "bsdf": file.path})
         elif file.kind == "surroundings":
             around = study.setdefault("surroundings", [])
             around += [file.path] if file.path not in around else []
@@ -269,9 +269,7 @@ class Project:
     @staticmethod
     def _building(study: Mapping[str, Any]) -> list[str]:
         """The files of the building that the page shows: those of the first room entry with one."""
-        entry: Mapping[str, Any] = next(
-            (one for one in study.get("room", []) if "building" in one), {}
-        )
+        entry: Mapping[str, Any] = next((one for one in study.get("room", []) if "building" in one), {})
         return [entry["building"], *entry.get("linked", [])] if entry else []
 
     @staticmethod
@@ -462,9 +460,7 @@ class Project:
             if not folder.is_dir() or folder.is_symlink():
                 continue
             pages = {
-                name: f"{RESULTS}/{folder.name}/{file}"
-                for name, file in PAGES.items()
-                if (folder / file).is_file()
+                name: f"{RESULTS}/{folder.name}/{file}" for name, file in PAGES.items() if (folder / file).is_file()
             }
             if pages:
                 time = max((self.folder / page).stat().st_mtime for page in pages.values())
@@ -499,9 +495,13 @@ class Project:
 
 
 PAGES = {  # of a folder of results, by what they are called
-    "report": "report.html", "dossier": "dossier.html", "explorer": "explore/index.html",
-    "table": "results.csv", "check": "check.html", "problems": "problems.csv",
-}  # fmt: skip
+    "report": "report.html",
+    "dossier": "dossier.html",
+    "explorer": "explore/index.html",
+    "table": "results.csv",
+    "check": "check.html",
+    "problems": "problems.csv",
+}
 SYSTEM_KEYS = ("name", "bsdf", "operation", "u_value", "g_value", "see_through")
 CHANGES = {
     "title": Project._change_title,

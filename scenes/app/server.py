@@ -34,15 +34,7 @@ from mitsuba_cfs.errors import CfsError
 from mitsuba_cfs.files import json_text
 from scenes.app import actions
 from scenes.app.jobs import Jobs
-from scenes.app.project import (
-    GAINS,
-    INPUTS,
-    LOADS,
-    RESULTS,
-    MadeSystem,
-    Project,
-    plain_name,
-)
+from scenes.app.project import GAINS, INPUTS, LOADS, RESULTS, MadeSystem, Project, plain_name
 from scenes.explore.folder import script_words
 from scenes.fenestration.library import Sheet, glazing_entry, library, shade_entry, sheets
 from scenes.language.catalogue import gettext, in_language
@@ -53,10 +45,15 @@ from scenes.user_errors import user_message
 
 # Columns of `results.csv`; + where more is better, - where less is
 FIGURES = {
-    "sda300_50": "+", "ase1000_250": "-", "udi_300_3000": "+", "glare_intolerable_h": "-",
-    "operative_max_c": "-", "heating_kwh": "-", "cooling_kwh": "-",
+    "sda300_50": "+",
+    "ase1000_250": "-",
+    "udi_300_3000": "+",
+    "glare_intolerable_h": "-",
+    "operative_max_c": "-",
+    "heating_kwh": "-",
+    "cooling_kwh": "-",
     "lighting_kwh": "-",
-}  # fmt: skip
+}
 
 
 def variants(project: Project, language: str = "en") -> dict[str, Any] | None:
@@ -78,20 +75,26 @@ def variants(project: Project, language: str = "en") -> dict[str, Any] | None:
     return {
         "columns": [
             {
-                "key": key, "label": q.label, "unit": q.unit, "digits": q.digits,
-                "meaning": q.meaning, "better": FIGURES[key],
+                "key": key,
+                "label": q.label,
+                "unit": q.unit,
+                "digits": q.digits,
+                "meaning": q.meaning,
+                "better": FIGURES[key],
             }
             for key, q in zip(shown, named, strict=True)
         ],
         "rows": [
             {
-                "room": case["space"], "system": case["system"], "error": case.get("error", ""),
+                "room": case["space"],
+                "system": case["system"],
+                "error": case.get("error", ""),
                 "values": [_number(case.get(key, "")) for key in shown],
             }
             for case in cases
         ],
         "quick": bool(record.get("quick")),
-    }  # fmt: skip
+    }
 
 
 def _number(text: str) -> float | None:
@@ -166,9 +169,7 @@ SELF_ONLY = (
     "img-src 'self' data:; connect-src 'self'; frame-src 'self'; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'"
 )
-SANDBOXED = (
-    "sandbox allow-scripts allow-popups allow-downloads allow-modals; frame-ancestors 'self'"
-)
+SANDBOXED = "sandbox allow-scripts allow-popups allow-downloads allow-modals; frame-ancestors 'self'"
 JSON = "application/json"
 POLL_S = 20.0  # a request for news is answered at the latest after that
 STEP_S = 0.1  # between two looks for news
@@ -251,12 +252,7 @@ class AppServer:
     """The page, its data and its commands for one project."""
 
     def __init__(
-        self,
-        project: Project,
-        jobs: Jobs,
-        *,
-        language: str = "en",
-        limits: UploadLimits | None = None,
+        self, project: Project, jobs: Jobs, *, language: str = "en", limits: UploadLimits | None = None
     ) -> None:
         """Serve a project."""
         self._project, self._jobs, self._language = project, jobs, language
@@ -349,18 +345,14 @@ class AppServer:
 
     def _facts(self) -> dict[str, Any]:
         study, operation = self._project.study(), self._project.operation()
-        entry: Mapping[str, Any] = next(
-            (one for one in study.get("room", []) if "building" in one), {}
-        )
+        entry: Mapping[str, Any] = next((one for one in study.get("room", []) if "building" in one), {})
         gains = operation.get("gains", {})
         systems = study.get("system", [])
         results, titles = self._project.results(), actions.result_titles(study)
         for result in results:
             result["title"] = _result_title(result["name"], titles)
             pages = [result["pages"].get(name) for name in ("report", "dossier")]
-            result["answers"] = [
-                text for page in pages if page for text in answers(self._project.folder / page)
-            ]
+            result["answers"] = [text for page in pages if page for text in answers(self._project.folder / page)]
         return {
             "name": self._project.folder.name,
             "folder": str(self._project.folder),
@@ -412,10 +404,7 @@ class AppServer:
 
     def _sheets(self, systems: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         """Figures of the systems that are of the library, by their files."""
-        known = {
-            actions.library_file(one.glazing, one.shade): _sheet_facts(one)
-            for one in sheets().values()
-        }
+        known = {actions.library_file(one.glazing, one.shade): _sheet_facts(one) for one in sheets().values()}
         by_name = {}
         for system in systems:
             file = system.get("bsdf") or system.get("operation", "")
@@ -516,9 +505,7 @@ class AppServer:
         return self._facts()
 
     async def _plan(self, request: Request) -> Any:
-        return [
-            {"command": one.text, "kind": one.kind} for one in self._wanted(await _body(request))
-        ]
+        return [{"command": one.text, "kind": one.kind} for one in self._wanted(await _body(request))]
 
     async def _run(self, request: Request) -> Any:
         wanted = await _body(request)
@@ -594,6 +581,8 @@ def _json(value: Any, status: int = 200) -> Response:
 
 def _headers(policy: str) -> dict[str, str]:
     return {
-        "Content-Security-Policy": policy, "X-Content-Type-Options": "nosniff",
-        "Referrer-Policy": "no-referrer", "Cache-Control": "no-store",
-    }  # fmt: skip
+        "Content-Security-Policy": policy,
+        "X-Content-Type-Options": "nosniff",
+        "Referrer-Policy": "no-referrer",
+        "Cache-Control": "no-store",
+    }

@@ -60,12 +60,7 @@ class Calibration:
         """The costs for another picture size: those of pictures grow with the pixels."""
         factor = (pixels / self.picture_size) ** 2
         costs = tuple(
-            replace(
-                c,
-                per_scene=factor * c.per_scene,
-                per_system=factor * c.per_system,
-                per_step=factor * c.per_step,
-            )
+            replace(c, per_scene=factor * c.per_scene, per_system=factor * c.per_system, per_step=factor * c.per_step)
             if c.metric in PICTURED
             else c
             for c in self.costs

@@ -37,14 +37,7 @@ FIELD = 90.0  # [degrees] from the line of sight, that an eye sees
 SKY = ReinhartSky(1)  # directions that stand for the sky
 DARKEST = 3.0  # decades
 LEAST_BEAM = 1e-3  # share: below it there is none
-SCALES = (
-    1.0,
-    1.0,
-    0.5,
-    0.5,
-    0.25,
-    0.5,
-)  # of each trait: a difference that large is as good as another
+SCALES = (1.0, 1.0, 0.5, 0.5, 0.25, 0.5)  # of each trait: a difference that large is as good as another
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,9 +114,7 @@ def hidden_sky(groups: Sequence[WindowGroup], exterior: Surfaces) -> float:
     return float(hidden / whole) if whole > 0 else 0.0
 
 
-def _meets(
-    start: NDArray[np.float64], ways: NDArray[np.float64], triangles: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _meets(start: NDArray[np.float64], ways: NDArray[np.float64], triangles: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Whether rays from a point along `ways` [N, 3] meet any triangle [T, 3, 3]."""
     a, b, c = (triangles[:, i] for i in range(3))
     first, second, to_start = b - a, c - a, start - a
@@ -171,24 +162,16 @@ class MeasuredErrors:
         """The table of a file; `DataError` where it cannot be read."""
         try:
             table = json.loads(path.read_text(encoding="utf-8"))
-            cases = [
-                MeasuredCase(**case | {"traits": Traits(**case["traits"])})
-                for case in table["cases"]
-            ]
+            cases = [MeasuredCase(**case | {"traits": Traits(**case["traits"])}) for case in table["cases"]]
             return cls(table["script"], table["made"], tuple(cases))
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise DataError(
-                f"is no table of measured errors ({reason(error)})", file=path
-            ) from error
+            raise DataError(f"is no table of measured errors ({reason(error)})", file=path) from error
 
     def expected(self, traits: Traits) -> dict[Pair, float]:
         """Expected relative error of DGP of each method and metric."""
         seen, aside = (self._of_hours(replace(traits, sun=sun)) for sun in (1.0, 0.0))
         share = traits.sun
-        return {
-            pair: float(np.sqrt(share * seen[pair] ** 2 + (1 - share) * aside[pair] ** 2))
-            for pair in seen
-        }
+        return {pair: float(np.sqrt(share * seen[pair] ** 2 + (1 - share) * aside[pair] ** 2)) for pair in seen}
 
     def _of_hours(self, traits: Traits) -> dict[Pair, float]:
         """The expected errors of hours that all have the sun in view, or all have not."""
@@ -223,13 +206,10 @@ class MeasuredErrors:
         ]
         nearest = [int(np.argmin(distance)) for distance in each]
         far = max(float(distance.min()) for distance in each)
-        names = dict.fromkeys(
-            f"{self.cases[i].system} {self.cases[i].room}" for i in sorted(set(nearest))
-        )
+        names = dict.fromkeys(f"{self.cases[i].system} {self.cases[i].room}" for i in sorted(set(nearest)))
         words = ", ".join(list(names)[:3]) + (" and others" if len(names) > 3 else "")
         message = (
-            f"errors measured against paths on {self.made} ({self.script}, {len(self.cases)} "
-            f"cases; nearest: {words})"
+            f"errors measured against paths on {self.made} ({self.script}, {len(self.cases)} cases; nearest: {words})"
         )
         return message if far < FAR else f"{message}; NOTHING LIKE IT was measured"
 

@@ -49,9 +49,7 @@ def room_costs(progress: Progress = silent, options: RoomOptions | None = None) 
     weather, system = read_weather(WEATHER), read_system(VENETIAN_BLIND)
     building = shoebox(3.65, 4.6, 3.0)
     space, result = building.spaces[0], []
-    darker = replace(
-        system.visible, transmission_front=0.9 * np.asarray(system.visible.transmission_front)
-    )
+    darker = replace(system.visible, transmission_front=0.9 * np.asarray(system.visible.transmission_front))
     systems = (system, system, replace(system, visible=darker))
     for number, method in enumerate(PHASES):
         chosen = replace(options, method=method)
@@ -60,11 +58,17 @@ def room_costs(progress: Progress = silent, options: RoomOptions | None = None) 
             cold, warm = MatrixCache(folder / "cold"), MatrixCache(folder / "warm")
             timed = [
                 compute_room(
-                    building, space, in_all_windows(space, each), weather, chosen,
-                    skies=skies, cache=cache, pictures=False,
+                    building,
+                    space,
+                    in_all_windows(space, each),
+                    weather,
+                    chosen,
+                    skies=skies,
+                    cache=cache,
+                    pictures=False,
                 ).seconds
                 for each, cache in zip(systems, (cold, warm, warm), strict=True)
-            ]  # fmt: skip
+            ]
         _, first, again = timed  # the very first compiles kernels
         stages = {"daylight": (method, "illuminance")}
         if method == PHASES[-1]:

@@ -99,10 +99,7 @@ def _speed_here() -> Speed:
 def _scaled(cost: Cost, tracing: float, rating: float) -> Cost:
     step = tracing if cost.method == PATHS else rating
     return replace(
-        cost,
-        per_scene=tracing * cost.per_scene,
-        per_system=tracing * cost.per_system,
-        per_step=step * cost.per_step,
+        cost, per_scene=tracing * cost.per_scene, per_system=tracing * cost.per_system, per_step=step * cost.per_step
     )
 
 

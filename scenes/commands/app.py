@@ -12,9 +12,7 @@ from scenes.commands.served_page import port_fault, served_page_options
 
 
 @click.command()
-@click.argument(
-    "project", type=click.Path(file_okay=False, path_type=Path), default=Path("cfs-project")
-)
+@click.argument("project", type=click.Path(file_okay=False, path_type=Path), default=Path("cfs-project"))
 @served_page_options("also of the reports that it asks for")
 def command(project: Path, port: int, language: str, no_browser: bool) -> None:
     """Open a project in a browser: files, rooms, systems, computation, results.
@@ -51,9 +49,13 @@ def command(project: Path, port: int, language: str, no_browser: bool) -> None:
         if not no_browser:
             webbrowser.open(address)
         settings = uvicorn.Config(
-            served.app(number), log_level="warning", access_log=False, lifespan="on",
-            timeout_graceful_shutdown=2, server_header=False,
-        )  # fmt: skip
+            served.app(number),
+            log_level="warning",
+            access_log=False,
+            lifespan="on",
+            timeout_graceful_shutdown=2,
+            server_header=False,
+        )
         try:
             uvicorn.Server(settings).run(sockets=[listening])
         except KeyboardInterrupt:  # uvicorn sends it again once it has ended

@@ -38,38 +38,19 @@ class Number(click.FloatRange):
 
 
 basis_option = click.option(
-    "--basis",
-    type=click.Choice(["full", "half", "quarter"]),
-    default="full",
-    show_default=True,
-    help="Klems basis.",
+    "--basis", type=click.Choice(["full", "half", "quarter"]), default="full", show_default=True, help="Klems basis."
 )
 tensor_tree_option = click.option(
-    "--tensor-tree",
-    type=click.IntRange(1, 6),
-    help="Write a tensor tree of 4^N cells per hemisphere instead.",
+    "--tensor-tree", type=click.IntRange(1, 6), help="Write a tensor tree of 4^N cells per hemisphere instead."
 )
 cull_option = click.option(
-    "--cull",
-    type=Number(0, 1, max_open=True),
-    default=0.9,
-    help="Fraction of the tensor tree's cells to merge.",
+    "--cull", type=Number(0, 1, max_open=True), default=0.9, help="Fraction of the tensor tree's cells to merge."
 )
 
 
 INFO_ANGLES_DEG = (0, 10, 20, 30, 40, 50, 60, 70, 80)
 INFO_SIDES = {"sky": 90.0, "right": 0.0, "ground": -90.0, "left": 180.0}  # where the light is
-SHAPES = (
-    "venetian",
-    "louvre",
-    "perforated",
-    "woven",
-    "pleated",
-    "prism",
-    "radiance",
-    "fabric",
-    "product",
-)
+SHAPES = ("venetian", "louvre", "perforated", "woven", "pleated", "prism", "radiance", "fabric", "product")
 FILE = click.Path(path_type=Path)
 PLACES = ("external", "internal", "integrated")
 
@@ -77,10 +58,7 @@ ANGLES = (Number(), Number())
 LENGTH, SHARE = Number(min=0, min_open=True), Number(0, 1)
 PERIOD = (LENGTH, LENGTH)
 BAND_OPTION = click.option(
-    "--band",
-    default="Visible",
-    show_default=True,
-    help="Spectral band of the BSDF: Visible or Solar; of the file.",
+    "--band", default="Visible", show_default=True, help="Spectral band of the BSDF: Visible or Solar; of the file."
 )
 
 
@@ -165,17 +143,9 @@ def _description(data: BsdfFile) -> list[str]:
 @click.argument("file", type=FILE)
 @click.argument("pairs", required=False, type=click.Choice(["-"]))
 @click.option(
-    "--incident",
-    type=ANGLES,
-    metavar="THETA PHI",
-    help="Direction to the light [degrees]; together with --outgoing.",
+    "--incident", type=ANGLES, metavar="THETA PHI", help="Direction to the light [degrees]; together with --outgoing."
 )
-@click.option(
-    "--outgoing",
-    type=ANGLES,
-    metavar="THETA PHI",
-    help="Direction in which light leaves [degrees].",
-)
+@click.option("--outgoing", type=ANGLES, metavar="THETA PHI", help="Direction in which light leaves [degrees].")
 @BAND_OPTION
 def evaluate(file: Path, pairs: str | None, incident, outgoing, band: str) -> None:
     """Print the BSDF [1/sr] of FILE, angles in Radiance's frame.
@@ -207,11 +177,7 @@ def _angles(lines: list[str]) -> np.ndarray:
         except ValueError:
             row = []
         if len(row) != 4 or not np.isfinite(row).all():
-            raise DataError(
-                f"expected four angles, got {line[:60]!r}",
-                file="standard input",
-                element=f"line {number}",
-            )
+            raise DataError(f"expected four angles, got {line[:60]!r}", file="standard input", element=f"line {number}")
         rows.append(row)
     return np.array(rows)
 
@@ -228,13 +194,7 @@ def _from_radiance(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @command.command()
 @click.argument("file", type=FILE)
-@click.option(
-    "--incident",
-    type=ANGLES,
-    required=True,
-    metavar="THETA PHI",
-    help="Direction to the light [degrees].",
-)
+@click.option("--incident", type=ANGLES, required=True, metavar="THETA PHI", help="Direction to the light [degrees].")
 @BAND_OPTION
 @click.option("--out", type=FILE, required=True, help="PNG, PDF or SVG to write.")
 def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> None:
@@ -269,44 +229,22 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
 @click.option("--openness", type=SHARE, help="Open area fraction of a perforated or woven sheet.")
 @click.option("--geometry", type=FILE, help="Radiance scene of one cell, in genBSDF's frame.")
 @click.option("--period-mm", type=PERIOD, metavar="WIDTH HEIGHT", help="Size of that cell.")
-@click.option(
-    "--tilt-deg",
-    type=Number(-90, 90),
-    default=0.0,
-    help="Slat tilt; positive lowers the exterior edge.",
-)
+@click.option("--tilt-deg", type=Number(-90, 90), default=0.0, help="Slat tilt; positive lowers the exterior edge.")
 @click.option("--radius-mm", type=LENGTH, help="Radius of curvature; default: flat.")
-@click.option(
-    "--thickness-mm", type=Number(min=0), default=0.0, help="Thickness of a slat or sheet."
-)
-@click.option(
-    "--index",
-    type=Number(min=1),
-    help="Refractive index of a prism panel, whose angle is --tilt-deg.",
-)
-@click.option(
-    "--product", type=FILE, help="JSON file of a shade from the IGSDB, for --shape product."
-)
+@click.option("--thickness-mm", type=Number(min=0), default=0.0, help="Thickness of a slat or sheet.")
+@click.option("--index", type=Number(min=1), help="Refractive index of a prism panel, whose angle is --tilt-deg.")
+@click.option("--product", type=FILE, help="JSON file of a shade from the IGSDB, for --shape product.")
 @click.option("--fabrics", type=FILE, help="CSV file of fabrics by EN 14501, for --shape fabric.")
 @click.option("--fabric", help="Name and colour of a fabric, if the file has several.")
 @click.option("--visible", type=SHARE, help="Visible reflectance (Radiance plastic).")
 @click.option("--solar", type=SHARE, help="Solar reflectance; default: the visible one.")
-@click.option(
-    "--specular", type=SHARE, default=0.0, help="Specular reflectance (Radiance plastic)."
-)
-@click.option(
-    "--roughness",
-    type=Number(min=0),
-    default=0.0,
-    help="Roughness of the specular part (Radiance plastic).",
-)
+@click.option("--specular", type=SHARE, default=0.0, help="Specular reflectance (Radiance plastic).")
+@click.option("--roughness", type=Number(min=0), default=0.0, help="Roughness of the specular part (Radiance plastic).")
 @basis_option
 @tensor_tree_option
 @click.option("--isotropic", is_flag=True, help="Tensor tree of rank 3: mean over azimuths.")
 @cull_option
-@click.option(
-    "--paths", type=click.IntRange(min=1), default=32_768, help="Paths for each direction and side."
-)
+@click.option("--paths", type=click.IntRange(min=1), default=32_768, help="Paths for each direction and side.")
 @seed_option
 @click.option("--name", default="", help="Name to write into the file.")
 @click.option("--out", type=FILE, required=True, help="XML file to write.")
@@ -327,9 +265,7 @@ def generate(out: Path, **options) -> None:
 
 @command.command("library")
 @click.option(
-    "--glazing",
-    type=click.Choice(list(GENERIC_GLAZINGS)),
-    help="Reference glazing by name; of the system to write.",
+    "--glazing", type=click.Choice(list(GENERIC_GLAZINGS)), help="Reference glazing by name; of the system to write."
 )
 @click.option("--shade", metavar="NAME", help="Shade of the library; default: none.")
 @seed_option
@@ -356,18 +292,14 @@ def library(glazing: str | None, shade: str | None, seed: int, out: Path | None)
     check_file(out)
     check_file(out.with_suffix(".toml"))
     with ProgressBar() as progress:
-        sheet = entries.write_library_system(
-            glazing or entries.GLAZED, shade or "", out, seed=seed, progress=progress
-        )
+        sheet = entries.write_library_system(glazing or entries.GLAZED, shade or "", out, seed=seed, progress=progress)
     click.echo(f"{out}: {sheet.line}")
 
 
 @command.command()
 @click.argument("layers", nargs=-1, required=True, type=FILE, metavar="OUTER.xml ... INNER.xml")
 @click.option("--name", default="", help="Name to write into the file.")
-@click.option(
-    "--absorptances", type=FILE, help="CSV file of the absorptance of each layer by patch."
-)
+@click.option("--absorptances", type=FILE, help="CSV file of the absorptance of each layer by patch.")
 @click.option("--out", type=FILE, required=True, help="XML file to write.")
 def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, out: Path) -> None:
     """Combine layers, the exterior one first, by Klems matrix algebra.
@@ -403,14 +335,7 @@ def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, out:
 @click.option("--name", default="", help="Name to write into the file; default: the sample's.")
 @click.option("--out", type=FILE, required=True, help="XML file to write.")
 def interpolate(
-    files: tuple[Path, ...],
-    *,
-    normal: str,
-    basis: str,
-    tensor_tree: int | None,
-    cull: float,
-    name: str,
-    out: Path,
+    files: tuple[Path, ...], *, normal: str, basis: str, tensor_tree: int | None, cull: float, name: str, out: Path
 ) -> None:
     """Convert goniophotometer files (pgII text, one or more per incident direction) to a BSDF.
 
@@ -446,9 +371,7 @@ def _interpolated(measured: Sequence[Measurement], means: _Means) -> dict[str, B
     for one in measured:
         if one.bands != bands:
             raise DataError(
-                f"has {', '.join(one.bands)}, {measured[0].path} {', '.join(bands)}",
-                file=one.path,
-                field="colorimetry",
+                f"has {', '.join(one.bands)}, {measured[0].path} {', '.join(bands)}", file=one.path, field="colorimetry"
             )
     blocks: dict[str, dict[str, Any]] = {band: {} for band in bands}
     for block in BLOCKS:
@@ -504,13 +427,9 @@ def _print_shares(patterns: Sequence[Pattern], band: int) -> None:
 
 @command.command("thermal")
 @click.argument("states", nargs=-1, required=True, type=FILE, metavar="STATE.xml ...")
+@click.option("--place", type=click.Choice(PLACES), help="The files are shades alone, at this position.")
 @click.option(
-    "--place", type=click.Choice(PLACES), help="The files are shades alone, at this position."
-)
-@click.option(
-    "--glazing",
-    type=click.Choice(["A", "B", "C", "D"]),
-    help="Reference glazing by name; of EN 14501, with --place.",
+    "--glazing", type=click.Choice(["A", "B", "C", "D"]), help="Reference glazing by name; of EN 14501, with --place."
 )
 @click.option(
     "--kappa",
@@ -522,12 +441,7 @@ def _print_shares(patterns: Sequence[Pattern], band: int) -> None:
 @click.option("--out", type=FILE, help="Write the table as .csv, or as .json with g by patch.")
 @click.option("--toml", type=FILE, help="Write the thermal data of one state for the heat balance.")
 def thermal(
-    states: tuple[Path, ...],
-    place: str | None,
-    glazing: str | None,
-    kappa: float,
-    out: Path | None,
-    toml: Path | None,
+    states: tuple[Path, ...], place: str | None, glazing: str | None, kappa: float, out: Path | None, toml: Path | None
 ) -> None:
     """Print U, g_tot, tau_e, secondary heat and EN 14501 classes of each STATE of a system.
 

@@ -33,14 +33,9 @@ def command(size: int, out: Path | None) -> None:
 
     with ProgressBar() as progress:
         result = calibrated(size, progress=progress)
-    click.echo(
-        f"{result.machine}; pictures of {result.picture_size} x {result.picture_size} pixels"
-    )
+    click.echo(f"{result.machine}; pictures of {result.picture_size} x {result.picture_size} pixels")
     click.echo(f"{'method':14} {'metric':12} {'scene [s]':>10} {'system [s]':>11} {'step [s]':>10}")
     for c in result.costs:
-        click.echo(
-            f"{c.method:14} {c.metric:12} {c.per_scene:10.2f} {c.per_system:11.2f} "
-            f"{c.per_step:10.4f}"
-        )
+        click.echo(f"{c.method:14} {c.metric:12} {c.per_scene:10.2f} {c.per_system:11.2f} {c.per_step:10.4f}")
     result.write(target)
     click.echo(f"results: {target}")

@@ -24,12 +24,7 @@ UNCUT = 100_000  # columns of a table that nobody sees
 
 @click.command()
 @input_options("all", weather="", system=False, glazing=False)
-@click.option(
-    "--csv",
-    "issues",
-    type=click.Path(path_type=Path),
-    help="Also write the problems to a CSV file.",
-)
+@click.option("--csv", "issues", type=click.Path(path_type=Path), help="Also write the problems to a CSV file.")
 @click.option(
     "--fix",
     type=click.Path(path_type=Path, dir_okay=False, allow_dash=True),
@@ -43,8 +38,7 @@ UNCUT = 100_000  # columns of a table that nobody sees
     "--bcf",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.bcfzip",
-    help="Also write a BCF 2.1 file: a topic for each kind of problem, with its elements, for the "
-    "author of the model.",
+    help="Also write a BCF 2.1 file: a topic for each kind of problem, with its elements, for the author of the model.",
 )
 @click.option(
     "--html",
@@ -62,12 +56,7 @@ UNCUT = 100_000  # columns of a table that nobody sees
 )
 @no_cache_option
 def command(
-    issues: Path | None,
-    fix: Path | None,
-    bcf: Path | None,
-    html: Path | None,
-    record: Path | None,
-    **chosen,
+    issues: Path | None, fix: Path | None, bcf: Path | None, html: Path | None, record: Path | None, **chosen
 ) -> None:
     """List rooms, windows and problems of a building model as the simulation reads them.
 
@@ -180,10 +169,16 @@ def _rooms(building: str, spaces: Sequence[Space]) -> Table:
         table.add_column(head, justify="right")
     for space in spaces:
         table.add_row(
-            space.label, space.storey, f"{space.floor_area:.2f}", _number(space.stated_area),
-            f"{space.drawn_volume:.2f}", _number(space.stated_volume), str(len(space.faces)),
-            str(len(space.windows)), f"{sum(w.area for w in space.windows):.2f}",
-        )  # fmt: skip
+            space.label,
+            space.storey,
+            f"{space.floor_area:.2f}",
+            _number(space.stated_area),
+            f"{space.drawn_volume:.2f}",
+            _number(space.stated_volume),
+            str(len(space.faces)),
+            str(len(space.windows)),
+            f"{sum(w.area for w in space.windows):.2f}",
+        )
     return table
 
 

@@ -28,8 +28,12 @@ from scenes.comply.options import ComplyOptions
 from scenes.room.options import RoomOptions
 
 OF_RULES = (  # choices of a run that are the rules' own, or of what a check has not
-    "sensor_spacing", "sensor_height", "sensor_margin", "picture_hours", "picture_count",
-)  # fmt: skip
+    "sensor_spacing",
+    "sensor_height",
+    "sensor_margin",
+    "picture_hours",
+    "picture_count",
+)
 DAYS = ((2, 1), (3, 21))  # between which EN 17037 has the day of the sunlight chosen
 
 
@@ -52,15 +56,23 @@ def list_rules(context: click.Context, _: click.Parameter, value: bool) -> None:
 
 @click.command()
 @click.option(
-    "--list", is_flag=True, is_eager=True, expose_value=False, callback=list_rules,
+    "--list",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=list_rules,
     help="List the rule sets, with the parts of each standard that are included and left out.",
-)  # fmt: skip
+)
 @input_options("all")
 @room_options
 @click.option(
-    "--standard", "standards", multiple=True, required=True, metavar="NAME|FILE.toml",
+    "--standard",
+    "standards",
+    multiple=True,
+    required=True,
+    metavar="NAME|FILE.toml",
     help="Rule set: en17037, leed-v4.1, another of docs/comply.md, or a file; may be repeated.",
-)  # fmt: skip
+)
 @click.option(
     "--closed",
     type=FILE,
@@ -69,11 +81,7 @@ def list_rules(context: click.Context, _: click.Parameter, value: bool) -> None:
 )
 @click.option("--uses", type=FILE, help="TOML file of room uses; see docs/comply.md.")
 @click.option(
-    "--day",
-    default="03-21",
-    show_default=True,
-    metavar="MM-DD",
-    help="Date for exposure to sunlight, 02-01 to 03-21.",
+    "--day", default="03-21", show_default=True, metavar="MM-DD", help="Date for exposure to sunlight, 02-01 to 03-21."
 )
 @click.option(
     "--sun-altitude",
@@ -86,13 +94,7 @@ def list_rules(context: click.Context, _: click.Parameter, value: bool) -> None:
 @directions_option
 @write_ifc_option("a level for each criterion and room")
 def command(
-    *,
-    out: Path,
-    day: str,
-    write_ifc: Path | None,
-    page: Path | None,
-    settings: tuple[str, ...],
-    **chosen,
+    *, out: Path, day: str, write_ifc: Path | None, page: Path | None, settings: tuple[str, ...], **chosen
 ) -> None:
     """Check the rooms of a building against rules of daylight and heat; write a dossier.
 

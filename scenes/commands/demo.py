@@ -12,11 +12,7 @@ from scenes.demo import STUDY
 
 @click.command()
 @click.option(
-    "--out",
-    default="cfs-demo",
-    show_default=True,
-    type=click.Path(path_type=Path),
-    help="Folder of results.",
+    "--out", default="cfs-demo", show_default=True, type=click.Path(path_type=Path), help="Folder of results."
 )
 def command(out: Path) -> None:
     """Compare an office in Chicago with its blind up, down and controlled."""

@@ -38,9 +38,7 @@ _DEFAULT = YearOptions(Path(), Path())
 @grid_option
 @directions_option
 @eye_height_option
-@method_option(
-    METHODS, "path tracing computes single pictures, see cfs picture", default=_DEFAULT.method
-)
+@method_option(METHODS, "path tracing computes single pictures, see cfs picture", default=_DEFAULT.method)
 @click.option(
     "--metric",
     type=click.Choice(METRICS),
@@ -51,13 +49,21 @@ _DEFAULT = YearOptions(Path(), Path())
 @size_option("size", _DEFAULT.size, "as evalglare recommends")
 @samples_option(_DEFAULT.samples, "shared by all hours")
 @click.option(
-    "--memory", "memory_gb", type=click.FloatRange(0.01, 1024), default=_DEFAULT.memory_gb,
-    show_default=True, help="Memory for the matrices of a view [GiB]; larger ones go to disk.",
-)  # fmt: skip
+    "--memory",
+    "memory_gb",
+    type=click.FloatRange(0.01, 1024),
+    default=_DEFAULT.memory_gb,
+    show_default=True,
+    help="Memory for the matrices of a view [GiB]; larger ones go to disk.",
+)
 @click.option(
-    "--occupied", type=click.IntRange(0, 24), nargs=2, default=_DEFAULT.occupied,
-    show_default=True, help="First and last clock hour of use, every day; past midnight too: 18 8.",
-)  # fmt: skip
+    "--occupied",
+    type=click.IntRange(0, 24),
+    nargs=2,
+    default=_DEFAULT.occupied,
+    show_default=True,
+    help="First and last clock hour of use, every day; past midnight too: 18 8.",
+)
 @click.option(
     "--worst",
     type=click.IntRange(0, 100),
@@ -93,13 +99,7 @@ def command(out: Path, page: Path | None, **chosen) -> None:
         chosen |= quick.picks(quick.VIEWS, stated_options())
     page_options = read_page(page, GlareSection, chosen_language())
     named = (chosen["building"], chosen["weather"], chosen["system"])
-    files = (
-        *named,
-        *map(Path, chosen["views"]),
-        *chosen["linked"],
-        *chosen["surroundings"],
-        *page_options.inputs,
-    )
+    files = (*named, *map(Path, chosen["views"]), *chosen["linked"], *chosen["surroundings"], *page_options.inputs)
     options = YearOptions(**with_demo(chosen))
     folder = ResultFolder(out, "dgp", inputs=files)
     read = read_files(options)  # before anything heavy is loaded

@@ -16,11 +16,7 @@ from mitsuba_cfs import llvm
 from mitsuba_cfs.interpreter import own_paths, own_python
 
 PROGRAM = "mitsuba-cfs"
-PEERS = {
-    "pyradiance": "Radiance",
-    "pyenergyplus-lbnl": "EnergyPlus",
-    "pywincalc": "WINDOW",
-}
+PEERS = {"pyradiance": "Radiance", "pyenergyplus-lbnl": "EnergyPlus", "pywincalc": "WINDOW"}
 TIME_LIMIT = 120  # seconds for the self-test; it takes two
 
 
@@ -44,9 +40,8 @@ def self_test() -> str | None:
     command_line = own_python("-m", "scenes.commands.self_test")
     try:
         done = subprocess.run(
-            command_line, env=own_paths(), capture_output=True, text=True, timeout=TIME_LIMIT,
-            check=False,
-        )  # fmt: skip
+            command_line, env=own_paths(), capture_output=True, text=True, timeout=TIME_LIMIT, check=False
+        )
     except subprocess.TimeoutExpired:
         return f"self-test: no result after {TIME_LIMIT} s"
     if done.returncode != 0:

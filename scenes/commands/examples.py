@@ -17,10 +17,7 @@ EXAMPLES = {
         "cfs comply school.ifc --weather city.epw --standard lm83 --closed blind.xml --out dossier",
     ),
     "demo": ("cfs demo", "cfs demo --out somewhere"),
-    "explore": (
-        "cfs explore results",
-        "cfs explore blind-up blind-down --out comparison",
-    ),
+    "explore": ("cfs explore results", "cfs explore blind-up blind-down --out comparison"),
     "doctor": ("cfs doctor",),
     "check": (
         "cfs check house.ifc",
@@ -31,10 +28,7 @@ EXAMPLES = {
         "cfs export house.ifc --radiance house-radiance",
         "cfs export house.ifc --honeybee house.hbjson --glazing 'double low-e'",
     ),
-    "glare": (
-        "cfs glare -d view.hdr",
-        "cfs glare -vta -vv 180 -vh 180 -c check.hdr view.hdr",
-    ),
+    "glare": ("cfs glare -d view.hdr", "cfs glare -vta -vv 180 -vh 180 -c check.hdr view.hdr"),
     "picture": (
         "cfs picture house.ifc --weather city.epw --at '03-21 12:00' --out noon.png",
         "cfs picture scene.rad --weather city.wea --at '12-21 10:00' --view eye.vf --out eye.hdr",
@@ -81,9 +75,7 @@ EXAMPLES = {
     "sky matrix": ("cfs sky matrix city.epw city.smx -m 4",),
     "sky positions": ("cfs sky positions city.epw sun.csv",),
     "sky wea": ("cfs sky wea city.epw city.wea",),
-    "sky measured": (
-        "cfs sky measured roof.csv roof.wea --latitude 48 --longitude 7.8 --timezone 1",
-    ),
+    "sky measured": ("cfs sky measured roof.csv roof.wea --latitude 48 --longitude 7.8 --timezone 1",),
     "sky cie": ("cfs sky cie overcast overcast.smx --horizontal 10000",),
 }
 

@@ -18,15 +18,9 @@ RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 
 @click.command()
 @click.argument("results", type=RESULTS, nargs=-1, required=True, metavar="RESULTS...")
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    help="Write one folder that opens as a file, and exit.",
-)
+@click.option("--out", type=click.Path(path_type=Path), help="Write one folder that opens as a file, and exit.")
 @served_page_options("results of a run state none")
-def command(
-    results: Sequence[Path], out: Path | None, port: int, language: str, no_browser: bool
-) -> None:
+def command(results: Sequence[Path], out: Path | None, port: int, language: str, no_browser: bool) -> None:
     """Show any hour of a run: pictures, glare, plans with sunlit areas, temperatures.
 
     RESULTS are folders of `cfs run --explore`; several are shown side by side.  The page is served
@@ -40,10 +34,7 @@ def command(
     for one in results:
         _print_head(one, several=len(results) > 1)
     if out is not None:
-        with (
-            in_language(language),
-            ResultFolder(out, "explore", inputs=results).replaced() as place,
-        ):
+        with in_language(language), ResultFolder(out, "explore", inputs=results).replaced() as place:
             join_explorers(results, place)
         click.echo(f"explorer: {out / 'index.html'}")
         return

@@ -51,10 +51,7 @@ PATTERNS = {  # of the files that an export writes
 )
 @click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
 @click.option(
-    "--weather",
-    "weather",
-    type=FILE,
-    help="Hourly weather file (EPW); for the ground temperatures of --epjson.",
+    "--weather", "weather", type=FILE, help="Hourly weather file (EPW); for the ground temperatures of --epjson."
 )
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
 @click.option("--honeybee", type=click.Path(path_type=Path), help="Honeybee model (.hbjson).")
@@ -117,11 +114,7 @@ def command(
     head = PrintedHead()
     head(head_of(read, light_only=True).with_assumptions(known.notes()))
     writers = room_writers(
-        known,
-        band.lower(),
-        spacing=sensor_spacing,
-        height=sensor_height,
-        sky_division=int(subdivision),
+        known, band.lower(), spacing=sensor_spacing, height=sensor_height, sky_division=int(subdivision)
     )
     export_folders(read, spaces, writers, folders)
     exported = replace(read, spaces=tuple(spaces))
@@ -224,9 +217,7 @@ def export_files(
     return assumed
 
 
-def _export_rooms(
-    building: Building, spaces: Sequence[Space], place: Path, writers: Sequence[Callable]
-) -> list[str]:
+def _export_rooms(building: Building, spaces: Sequence[Space], place: Path, writers: Sequence[Callable]) -> list[str]:
     """Write a folder for each room that one of the writers has a scene of; their names."""
     from bim.names import folder_names
 

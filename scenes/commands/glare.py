@@ -26,8 +26,12 @@ FLAGS: dict[str, tuple[tuple[type, ...], str, str]] = {
     "-D": ((), "", "One line with more figures."),
     "-V": ((), "", "Only the vertical illuminance."),
     "-v": ((), "", "The version."),
-    "-b": ((float,), "FACTOR", "Threshold: above 100 in cd/m2 (default 2000), else times the "
-           "task's or picture's average (default 5 with a task)."),
+    "-b": (
+        (float,),
+        "FACTOR",
+        "Threshold: above 100 in cd/m2 (default 2000), else times the "
+        "task's or picture's average (default 5 with a task).",
+    ),
     "-t": ((int, int, float), "X Y ANGLE", "Task area: pixel, y from the bottom; opening angle."),
     "-T": ((int, int, float), "X Y ANGLE", "The same; blue in the check picture."),
     "-r": ((float,), "ANGLE", "Search radius (opening angle), default 0.2."),
@@ -54,7 +58,7 @@ FLAGS: dict[str, tuple[tuple[type, ...], str, str]] = {
     "--csv": ((Path,), "FILE", "A table of all pictures, a row each."),
     "--png": ((Path,), "FOLDER", "Falsecolour, tone-mapped and check pictures (.png)."),
     "--scale": ((float, float), "LOW HIGH", "Ends of the falsecolour scale [cd/m2]."),
-}  # fmt: skip
+}
 VIEW_FLAGS = "-vta, -vth, -vtv, -vh DEGREES, -vv DEGREES, -vp, -vd, -vu X Y Z, -vs, -vl FRACTION"
 
 
@@ -98,9 +102,7 @@ def parse(words: tuple[str, ...]) -> Request:
     return request
 
 
-def _values(
-    flag: str, types: tuple[type, ...], names: str, words: tuple[str, ...]
-) -> tuple[Any, ...]:
+def _values(flag: str, types: tuple[type, ...], names: str, words: tuple[str, ...]) -> tuple[Any, ...]:
     if len(words) < len(types):
         raise click.UsageError(f"{flag} needs {names}")
     try:
@@ -194,13 +196,8 @@ class FlagCommand(click.Command):
         formatter.write("\n")
 
 
-@click.command(
-    cls=FlagCommand,
-    context_settings={"ignore_unknown_options": True, "help_option_names": ["--help"]},
-)
-@click.argument(
-    "words", nargs=-1, type=click.UNPROCESSED, metavar="[FLAGS] PICTURE.hdr... FOLDER..."
-)
+@click.command(cls=FlagCommand, context_settings={"ignore_unknown_options": True, "help_option_names": ["--help"]})
+@click.argument("words", nargs=-1, type=click.UNPROCESSED, metavar="[FLAGS] PICTURE.hdr... FOLDER...")
 def command(words: tuple[str, ...]) -> None:
     """Daylight glare probability and other indices of fisheye luminance pictures.
 
@@ -263,13 +260,7 @@ def pictures(paths: list[Path]) -> list[Path]:
 
 
 def _one(
-    path: Path,
-    picture: Picture,
-    geometry: GlareView,
-    options: GlareOptions,
-    request: Request,
-    *,
-    several: bool,
+    path: Path, picture: Picture, geometry: GlareView, options: GlareOptions, request: Request, *, several: bool
 ) -> dict[str, Any] | None:
     """Rate one picture and print it; its row of the table."""
     from mitsuba_cfs.glare import report
@@ -310,9 +301,7 @@ def _view(picture: Picture, request: Request, path: Path) -> View:
     view = parsed_view(request, width, height) or picture.view
     if view is None:
         raise DataError(
-            "no valid view in its header: give one, for example -vta -vh 180 -vv 180",
-            file=path,
-            field="VIEW",
+            "no valid view in its header: give one, for example -vta -vh 180 -vv 180", file=path, field="VIEW"
         )
     if view.kind == "parallel":
         raise DataError("a parallel view has no glare: expected a fisheye", file=path, field="VIEW")
@@ -320,9 +309,7 @@ def _view(picture: Picture, request: Request, path: Path) -> View:
         click.echo(f"warning: {path}: a perspective view in its header", err=True)
         if black_corners(picture.luminance) > 0.7 and "-f" not in request.stated:
             raise DataError(
-                "black corners, but a perspective view: is it a fisheye? (-f goes on)",
-                file=path,
-                field="VIEW",
+                "black corners, but a perspective view: is it a fisheye? (-f goes on)", file=path, field="VIEW"
             )
     _warn_of_crop(view, request, path)
     return view
@@ -340,9 +327,7 @@ def _warn_of_crop(view: View, request: Request, path: Path) -> None:
     narrow = min(view.horizontal_deg, view.vertical_deg) < 180
     if narrow and not {"-i", "-I"} & request.stated.keys():
         click.echo(
-            f"warning: {path}: it shows less than 180 degrees, so its illuminance is too low "
-            "(-i gives it)",
-            err=True,
+            f"warning: {path}: it shows less than 180 degrees, so its illuminance is too low (-i gives it)", err=True
         )
 
 
@@ -426,16 +411,12 @@ def _write_pictures(path: Path, picture: Picture, result: GlareResult, request, 
         pixels = check_radiance(result, uniform, show_task=blue)
         view, about = result.geometry.view, (VERSION,)
         if several or check.is_dir():
-            with ResultFolder(
-                check, "glare", adding=True, among=True, field="-c"
-            ).replaced() as place:
+            with ResultFolder(check, "glare", adding=True, among=True, field="-c").replaced() as place:
                 write_hdr(place / f"{path.stem}_check.hdr", pixels, view, comments=about)
         else:
             write_hdr(check, pixels, view, comments=about)
     if (folder := request.value("--png")) is not None:
-        with ResultFolder(
-            folder, "glare", adding=True, among=True, field="--png"
-        ).replaced() as place:
+        with ResultFolder(folder, "glare", adding=True, among=True, field="--png").replaced() as place:
             _write_png(place, path.stem, picture, result, request.stated.get("--scale"))
 
 
@@ -448,14 +429,12 @@ def _write_png(folder: Path, name: str, picture: Picture, result: GlareResult, l
     valid = in_picture_order(result.geometry.valid)
     colour = picture.pixels if picture.colours == "rgb" else picture.luminance
     drawn.write_falsecolour(
-        folder / f"{name}_falsecolour.png",
-        picture.luminance,
-        title=title,
-        seen=valid,
-        limits=limits,
+        folder / f"{name}_falsecolour.png", picture.luminance, title=title, seen=valid, limits=limits
     )
-    drawn.write_tone_mapped(folder / f"{name}.png", np.where(valid[..., None], colour, 0.0)
-                            if colour.ndim == 3 else np.where(valid, colour, 0.0))  # fmt: skip
+    drawn.write_tone_mapped(
+        folder / f"{name}.png",
+        np.where(valid[..., None], colour, 0.0) if colour.ndim == 3 else np.where(valid, colour, 0.0),
+    )
     drawn.write_check_picture(folder / f"{name}_sources.png", result, title=title)
 
 

@@ -10,21 +10,11 @@ from mitsuba_cfs.files import check_file, write_text
 from mitsuba_cfs.progress import Stage
 from scenes.commands.check import command as check
 from scenes.commands.export import command as export
-from scenes.commands.room_options import (
-    FILE,
-    IFC_FILE,
-    out_folder_option,
-    space_option,
-    u_option,
-)
+from scenes.commands.room_options import FILE, IFC_FILE, out_folder_option, space_option, u_option
 from scenes.result_folder import ResultFolder
 
 out_option = click.option(
-    "-o",
-    "--out",
-    required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="IFC file to write.",
+    "-o", "--out", required=True, type=click.Path(dir_okay=False, path_type=Path), help="IFC file to write."
 )
 
 
@@ -62,11 +52,7 @@ def _renamed(name: str, current: click.Command) -> click.Command:
         return current.callback(**chosen) if current.callback is not None else None
 
     return click.Command(
-        name,
-        params=current.params,
-        callback=callback,
-        help=current.help,
-        short_help=f"Renamed to `cfs {name}`.",
+        name, params=current.params, callback=callback, help=current.help, short_help=f"Renamed to `cfs {name}`."
     )
 
 
@@ -76,9 +62,7 @@ for _name, _current in (("check", check), ("export", export)):
 
 @command.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@click.option(
-    "--window", "windows", multiple=True, metavar="GUID", help="GUID of a window or door."
-)
+@click.option("--window", "windows", multiple=True, metavar="GUID", help="GUID of a window or door.")
 @click.option("--type", "types", multiple=True, metavar="NAME", help="Windows of a type.")
 @space_option("rooms", "its windows")
 @click.option("--storey", "storeys", multiple=True, metavar="NAME", help="Windows of a storey.")
@@ -96,9 +80,7 @@ for _name, _current in (("check", check), ("export", export)):
     help="Every IfcWindow; choose glazed doors and panels by GUID, room, storey or facade.",
 )
 @click.option(
-    "--bsdf",
-    type=FILE,
-    help="BSDF XML file: Klems or tensor tree; U, g and more come from the .toml beside it.",
+    "--bsdf", type=FILE, help="BSDF XML file: Klems or tensor tree; U, g and more come from the .toml beside it."
 )
 @click.option(
     "--g",
@@ -108,9 +90,7 @@ for _name, _current in (("check", check), ("export", export)):
 )
 @u_option
 @click.option("--state", default="", help="Name of the shading state; default: the usual one.")
-@click.option(
-    "--reference", is_flag=True, help="Store a reference to the BSDF file instead of its contents."
-)
+@click.option("--reference", is_flag=True, help="Store a reference to the BSDF file instead of its contents.")
 @out_option
 def attach(
     building: Path,
@@ -133,15 +113,11 @@ def attach(
     check_file(out, inputs=[bsdf, None if g_value is None else Path(g_value)])
     from scenes.fenestration.state_to_attach import state_to_attach
 
-    one, notes = state_to_attach(
-        bsdf, name=state, u_value=u_value, g_value=g_value, copy_bsdf=not reference
-    )
+    one, notes = state_to_attach(bsdf, name=state, u_value=u_value, g_value=g_value, copy_bsdf=not reference)
     from bim.ifc.attach import attach as attach_to_ifc
     from bim.ifc.targets import Targets
 
-    count = attach_to_ifc(
-        building, out, one, Targets(**chosen), bsdf_reference=bsdf if reference else None
-    )
+    count = attach_to_ifc(building, out, one, Targets(**chosen), bsdf_reference=bsdf if reference else None)
     for note in notes:
         click.echo(f"note: {note}")
     click.echo(f"{out}: windows and window types: {count}")
@@ -184,10 +160,7 @@ def correct(building: Path, out: Path) -> None:
     done = corrected(building, out)
     if done.north_deg is not None:
         click.echo(f"north: the model's +y axis points {done.north_deg:g} degrees from north")
-    click.echo(
-        f"spaces outdoors: {done.outdoors}, materials: {done.materials}, "
-        f"elements removed: {done.removed}"
-    )
+    click.echo(f"spaces outdoors: {done.outdoors}, materials: {done.materials}, elements removed: {done.removed}")
     if done.left_file is not None:
         click.echo(f"remain corrections, in {done.left_file}: {', '.join(done.left)}")
     click.echo(out)

@@ -34,11 +34,7 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 @size_option("size", 800, "as evalglare recommends")
 @samples_option(16, "for a single hour")
 @click.option("--tone", is_flag=True, help="Tone-map the PNG instead of writing falsecolour.")
-@click.option(
-    "--colour",
-    is_flag=True,
-    help="Use the colours of the surfaces, white-balanced; the PNG is tone-mapped.",
-)
+@click.option("--colour", is_flag=True, help="Use the colours of the surfaces, white-balanced; the PNG is tone-mapped.")
 @light_options
 @click.option(
     "--out",

@@ -13,15 +13,7 @@ from types import TracebackType
 
 import click
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    SpinnerColumn,
-    TaskID,
-    TaskProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-)
+from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from mitsuba_cfs.files import json_text
 from mitsuba_cfs.interpreter import own_paths, own_python
@@ -56,9 +48,7 @@ class ProgressBar:
             annual_run(..., progress=progress)
     """
 
-    def __init__(
-        self, *, terminal: bool | None = None, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, *, terminal: bool | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         """Draw on a terminal or write lines; by default what stderr is."""
         self._json = os.environ.get("CFS_PROGRESS") == "json"
         self._terminal = sys.stderr.isatty() if terminal is None else terminal
@@ -89,10 +79,7 @@ class ProgressBar:
         return self
 
     def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         if error is None and not self._json:
             self._finish(self._current)
@@ -239,9 +226,7 @@ def compiled_beside() -> Iterator[None]:
         yield
         return
     nowhere = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL}
-    with subprocess.Popen(
-        own_python("-c", COMPILE), env=own_paths(), stderr=subprocess.DEVNULL, **nowhere
-    ) as process:
+    with subprocess.Popen(own_python("-c", COMPILE), env=own_paths(), stderr=subprocess.DEVNULL, **nowhere) as process:
         try:
             yield
         finally:

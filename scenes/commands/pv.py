@@ -26,13 +26,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @input_options("", system=False, glazing=False)
-@click.option(
-    "--study",
-    "study_file",
-    required=True,
-    type=FILE,
-    help="TOML file of the system; see docs/pv.md.",
-)
+@click.option("--study", "study_file", required=True, type=FILE, help="TOML file of the system; see docs/pv.md.")
 @out_folder_option
 @seed_option
 @no_cache_option
@@ -67,16 +61,26 @@ def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
         click.echo(quick_run.NOTE)
     with ProgressBar() as progress:
         result = run_pv(
-            options, files, study, file=study_file, seed=seed, progress=progress,
-            cache=MatrixCache.of_user() if options.cache else None, on_head=head,
+            options,
+            files,
+            study,
+            file=study_file,
+            seed=seed,
+            progress=progress,
+            cache=MatrixCache.of_user() if options.cache else None,
+            on_head=head,
             **(quick_run.PV if quick else {}),
-        )  # fmt: skip
+        )
         progress("results", 0.0)
         record = {
-            "quick": quick, "head": head.record, "building": str(building), "weather": str(weather),
-            "study": study.model_dump(mode="json"), "seed": seed,
+            "quick": quick,
+            "head": head.record,
+            "building": str(building),
+            "weather": str(weather),
+            "study": study.model_dump(mode="json"),
+            "seed": seed,
             "relative_standard_error_of_diffuse": result.irradiance.diffuse_error,
-        }  # fmt: skip
+        }
         _write(result, record, folder)
         progress("results", 1.0)
     for row in result.yield_table().itertuples():
@@ -98,8 +102,7 @@ def _write(result, record: dict[str, Any], results: ResultFolder) -> None:
 
     times = result.weather.times[result.irradiance.steps]
     power = pd.DataFrame(
-        {one.name: one.alternating_current for one in result.yields},
-        index=pd.Index(times, name="time"),
+        {one.name: one.alternating_current for one in result.yields}, index=pd.Index(times, name="time")
     )
     with results.replaced() as folder:
         write_table(result.module_table().round(4), folder / "modules.csv", index=False)

@@ -59,9 +59,7 @@ class BuildingFile(click.Path):
         return path
 
 
-def _first_and_linked(
-    context: click.Context, _: click.Parameter, value: tuple[Path, ...]
-) -> Path | None:
+def _first_and_linked(context: click.Context, _: click.Parameter, value: tuple[Path, ...]) -> Path | None:
     """The first file of a building; further ones, and those of folders, are `linked`."""
     from bim.building_file import building_files, check_building_file
 
@@ -95,9 +93,7 @@ def stated_options() -> set[str]:
     """Names of the parameters of the command under way that do not have their default."""
     context = click.get_current_context()
     return {
-        name
-        for name in context.params
-        if context.get_parameter_source(name) not in (ParameterSource.DEFAULT, None)
+        name for name in context.params if context.get_parameter_source(name) not in (ParameterSource.DEFAULT, None)
     }
 
 
@@ -106,9 +102,7 @@ Option = Callable[[Callable], Callable]
 _GRID = SensorGrid()
 LANGUAGE = "cfs.language"  # where `--language` is kept of a call
 
-out_folder_option = click.option(
-    "--out", required=True, type=click.Path(path_type=Path), help="Folder of results."
-)
+out_folder_option = click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
 join_option = click.option(
     "--join",
     multiple=True,
@@ -178,9 +172,7 @@ albedo_option = click.option(
     metavar="A",
     help="Ground reflectance: a number, 12 by month, 'file' or 'snow' (EPW); default: 0.2.",
 )
-needed_weather_option = click.option(
-    "--weather", required=True, type=FILE, help="Hourly weather file (EPW)."
-)
+needed_weather_option = click.option("--weather", required=True, type=FILE, help="Hourly weather file (EPW).")
 weather_option = click.option(
     "--weather", type=FILE, help="Hourly weather file (EPW); also WEA, required with BUILDING."
 )
@@ -207,9 +199,7 @@ see_through_option = click.option(
     metavar="FILE=KIND",
     help="Whether the transmission peak of a BSDF is 'specular', a 'lobe', or the specular share.",
 )
-u_option = click.option(
-    "--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value of the windows [W/(m2 K)]."
-)
+u_option = click.option("--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value of the windows [W/(m2 K)].")
 eye_height_option = click.option(
     "--eye-height",
     type=click.FloatRange(0.3, 3),
@@ -218,9 +208,7 @@ eye_height_option = click.option(
     help="Height of the eye above the floor [m].",
 )
 grid_option = click.option(
-    "--grid",
-    type=click.FloatRange(0.1, 20),
-    help="Spacing of a grid of eye positions [m]; default: one position.",
+    "--grid", type=click.FloatRange(0.1, 20), help="Spacing of a grid of eye positions [m]; default: one position."
 )
 directions_option = click.option(
     "--directions",
@@ -230,28 +218,40 @@ directions_option = click.option(
     help="View directions per eye position; the first faces the largest window.",
 )
 seed_option = click.option(
-    "--seed",
-    type=click.IntRange(min=0),
-    default=0,
-    show_default=True,
-    help="Seed of the random numbers.",
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random numbers."
 )
 spacing_option = click.option(
-    "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_GRID.spacing,
-    show_default=True, help="Sensor spacing [m].",
-)  # fmt: skip
+    "--spacing",
+    "sensor_spacing",
+    type=click.FloatRange(0.05, 10),
+    default=_GRID.spacing,
+    show_default=True,
+    help="Sensor spacing [m].",
+)
 height_option = click.option(
-    "--height", "sensor_height", type=click.FloatRange(0, 5), default=_GRID.height,
-    show_default=True, help="Height of the work plane above the floor [m].",
-)  # fmt: skip
+    "--height",
+    "sensor_height",
+    type=click.FloatRange(0, 5),
+    default=_GRID.height,
+    show_default=True,
+    help="Height of the work plane above the floor [m].",
+)
 subdivision_option = click.option(
-    "-m", "--subdivision", type=click.Choice([str(mf) for mf in SUBDIVISIONS]), default="1",
-    show_default=True, help="Reinhart subdivision MF: 145, 577, 2305 or 5185 patches.",
-)  # fmt: skip
+    "-m",
+    "--subdivision",
+    type=click.Choice([str(mf) for mf in SUBDIVISIONS]),
+    default="1",
+    show_default=True,
+    help="Reinhart subdivision MF: 145, 577, 2305 or 5185 patches.",
+)
 subdivide_option = click.option(
-    "--subdivide", "window_parts", type=click.IntRange(0, 64), default=0, show_default=True,
+    "--subdivide",
+    "window_parts",
+    type=click.IntRange(0, 64),
+    default=0,
+    show_default=True,
     help="Subgroups of each window group; 0: choose from the surroundings.",
-)  # fmt: skip
+)
 glare_sources_option = click.option(
     "--glare-sources",
     type=click.Choice(GLARE_SOURCES),
@@ -280,14 +280,10 @@ sky_ground_option = click.option(
     show_default=True,
     help="Ground luminance: of a diffusely reflecting plane, or as in gendaylit.",
 )
-annual_glare_option = click.option(
-    "--annual-glare", is_flag=True, help="Compute DGP for every daylight hour."
-)
+annual_glare_option = click.option("--annual-glare", is_flag=True, help="Compute DGP for every daylight hour.")
 
 spectral_option = click.option(
-    "--spectral",
-    is_flag=True,
-    help="Compute melanopic illuminance and colour of the light; see docs/spectral.md.",
+    "--spectral", is_flag=True, help="Compute melanopic illuminance and colour of the light; see docs/spectral.md."
 )
 channels_option = click.option(
     "--channels",
@@ -334,14 +330,16 @@ set_option = click.option(
     help="Set an option of the `[options]` table of study files, such as sensor_samples=4096.",
 )
 no_cache_option = click.option(
-    "--no-cache", "cache", is_flag=True, flag_value=False, default=True,
+    "--no-cache",
+    "cache",
+    is_flag=True,
+    flag_value=False,
+    default=True,
     help="Neither read nor write the cache of buildings and traced matrices.",
-)  # fmt: skip
+)
 
 
-def with_flags(
-    study: Study, surroundings: tuple[Path, ...], offset: tuple[float, float, float] | None
-) -> Study:
+def with_flags(study: Study, surroundings: tuple[Path, ...], offset: tuple[float, float, float] | None) -> Study:
     """A study with the files of `--surroundings` beside those that it names itself."""
     update: dict[str, object] = {"surroundings": (*study.surroundings, *surroundings)}
     if offset is not None:
@@ -377,18 +375,17 @@ def method_option(methods: Sequence[str], what: str, *, default: str | None = No
 def size_option(name: str, default: int, why: str) -> Option:
     """`--size` of pictures into the parameter `name`; `why` it is that by default."""
     return click.option(
-        "--size", name, type=click.IntRange(16, 4096), default=default, show_default=True,
+        "--size",
+        name,
+        type=click.IntRange(16, 4096),
+        default=default,
+        show_default=True,
         help=f"Pixels of a picture's longer side; {why}.",
-    )  # fmt: skip
+    )
 
 
 def input_options(
-    spaces: str,
-    *,
-    several: bool = True,
-    weather: str = "needed",
-    system: bool = True,
-    glazing: bool = True,
+    spaces: str, *, several: bool = True, weather: str = "needed", system: bool = True, glazing: bool = True
 ) -> Option:
     """The argument and the options of every command, named as in `InputOptions`.
 
@@ -401,36 +398,52 @@ def input_options(
     weathers = {"needed": [needed_weather_option], "demo": [weather_option], "": []}
     return _all_of(
         click.argument(
-            "building", type=BUILDING_FILE, required=not demo, nargs=-1,
-            callback=_first_and_linked, metavar="[BUILDING...]" if demo else "BUILDING...",
+            "building",
+            type=BUILDING_FILE,
+            required=not demo,
+            nargs=-1,
+            callback=_first_and_linked,
+            metavar="[BUILDING...]" if demo else "BUILDING...",
         ),
         *weathers[weather],
         *([albedo_option] if weather else []),
         *([system_option] if system else []),
         *([glazing_option, tau_option] if glazing else []),
         *([see_through_option] if weather and system else []),
-        *([] if not spaces else [
-            space_option("spaces", f"default: {spaces}", several=several), join_option,
-            storey_option, furniture_option, surroundings_option, surroundings_offset_option,
-        ]),
+        *(
+            []
+            if not spaces
+            else [
+                space_option("spaces", f"default: {spaces}", several=several),
+                join_option,
+                storey_option,
+                furniture_option,
+                surroundings_option,
+                surroundings_offset_option,
+            ]
+        ),
         aperture_option,
         facade_pane_option,
-    )  # fmt: skip
+    )
 
 
 def light_options(command: Callable) -> Callable:
     """The options that every command which rates glare has."""
-    return _all_of(
-        glare_sources_option, glare_sun_option, sun_option, sky_ground_option, seed_option
-    )(command)
+    return _all_of(glare_sources_option, glare_sun_option, sun_option, sky_ground_option, seed_option)(command)
 
 
 def room_options(command: Callable) -> Callable:
     """The options that `cfs run` and `cfs comply` share beside the inputs."""
     return _all_of(
-        out_folder_option, annual_glare_option, subdivide_option, light_options, set_option,
-        no_cache_option, quick_option, page_option,
-    )(command)  # fmt: skip
+        out_folder_option,
+        annual_glare_option,
+        subdivide_option,
+        light_options,
+        set_option,
+        no_cache_option,
+        quick_option,
+        page_option,
+    )(command)
 
 
 def taken(options: type, chosen: dict[str, Any]) -> dict[str, object]:
@@ -489,11 +502,7 @@ scheduler_option = click.option(
 def samples_option(default: int, why: str) -> Option:
     """`--samples` of pictures; `why` they are that many by default."""
     return click.option(
-        "--samples",
-        type=click.IntRange(1, 4096),
-        default=default,
-        show_default=True,
-        help=f"Paths per pixel; {why}.",
+        "--samples", type=click.IntRange(1, 4096), default=default, show_default=True, help=f"Paths per pixel; {why}."
     )
 
 
@@ -535,9 +544,7 @@ def with_demo(chosen: dict[str, Any]) -> dict[str, Any]:
     building, weather, system = (chosen[name] for name in names)
     if building is not None:
         if weather is None:
-            raise click.UsageError(
-                "--weather is required with BUILDING: give the EPW file of its location"
-            )
+            raise click.UsageError("--weather is required with BUILDING: give the EPW file of its location")
         return chosen
     demo = ["office"]
     demo += ["weather"] * (weather is None) + ["venetian blind"] * (system is None)

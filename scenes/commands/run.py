@@ -54,9 +54,7 @@ class Percentage(click.ParamType):
 
     name = "PERCENT"
 
-    def convert(
-        self, value: str | float, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
+    def convert(self, value: str | float, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """The share, 0 to 1."""
         if isinstance(value, float):
             return value
@@ -84,19 +82,19 @@ class Percentage(click.ParamType):
     metavar="'MM-DD HH[:MM]'",
     help="Hour to render and rate, may be repeated; default: nine hours and the brightest.",
 )
-@size_option(
-    "picture_size", _DEFAULT.outputs.picture_size, "up to ten pictures in each room's report"
-)
+@size_option("picture_size", _DEFAULT.outputs.picture_size, "up to ten pictures in each room's report")
 @spacing_option
 @height_option
 @click.option(
-    "--ach", "infiltration_ach", type=click.FloatRange(0, 50), default=_DEFAULT.infiltration_ach,
-    show_default=True, help="Outdoor air change rate [1/h].",
-)  # fmt: skip
+    "--ach",
+    "infiltration_ach",
+    type=click.FloatRange(0, 50),
+    default=_DEFAULT.infiltration_ach,
+    show_default=True,
+    help="Outdoor air change rate [1/h].",
+)
 @click.option(
-    "--operation",
-    type=FILE,
-    help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
+    "--operation", type=FILE, help="TOML file: shading states and control, gains, set points; see docs/thermal.md."
 )
 @click.option(
     "--inner-glass",
@@ -105,14 +103,14 @@ class Percentage(click.ParamType):
     "computed too, and those open to each other by more than a door are one room.",
 )
 @click.option(
-    "--no-coupled-heat", "coupled_heat", is_flag=True, flag_value=False, default=True,
-    help="Simulate each room alone, with adjacent rooms at its own temperature.",
-)  # fmt: skip
-@click.option(
-    "--no-colour",
+    "--no-coupled-heat",
+    "coupled_heat",
     is_flag=True,
-    help="Omit the colour picture of each room; implied by --quick.",
+    flag_value=False,
+    default=True,
+    help="Simulate each room alone, with adjacent rooms at its own temperature.",
 )
+@click.option("--no-colour", is_flag=True, help="Omit the colour picture of each room; implied by --quick.")
 @explore_option()
 @processes_option
 @scheduler_option
@@ -122,18 +120,9 @@ class Percentage(click.ParamType):
     help="Relative standard error of the sensors' yearly means that is enough, such as 5%: fewer "
     "rays are traced where a first plan shows that these suffice.",
 )
-@click.option(
-    "--netcdf",
-    is_flag=True,
-    help="Also write all results to results.nc, for xarray; see docs/formats.md.",
-)
+@click.option("--netcdf", is_flag=True, help="Also write all results to results.nc, for xarray; see docs/formats.md.")
 def command(
-    out: Path,
-    page: Path | None,
-    settings: tuple[str, ...],
-    processes: int,
-    scheduler: str | None,
-    **chosen,
+    out: Path, page: Path | None, settings: tuple[str, ...], processes: int, scheduler: str | None, **chosen
 ) -> None:
     """Compute daylight, glare, temperatures and comfort of a building's rooms.
 
@@ -157,12 +146,7 @@ def command(
 
 
 def run_to_folder(
-    options: JobOptions,
-    out: Path,
-    page: Path | None = None,
-    *,
-    processes: int = 1,
-    scheduler: str | None = None,
+    options: JobOptions, out: Path, page: Path | None = None, *, processes: int = 1, scheduler: str | None = None
 ) -> None:
     """Run the job with a progress bar, say what comes out room by room, and write its files."""
     from mitsuba_cfs.matrices.cache import default_folder
@@ -194,19 +178,29 @@ def run_to_folder(
     lines, head, plan = _RoomLines(), PrintedHead(), _FirstPlan(folder, page_options.language)
     with ProgressBar() as progress, compiled_beside():
         result = run_job(
-            options, progress, files,
-            on_room=lines.year, on_light=lines.light, on_head=head, on_plan=plan,
+            options,
+            progress,
+            files,
+            on_room=lines.year,
+            on_light=lines.light,
+            on_head=head,
+            on_plan=plan,
             workers=Workers(processes, scheduler) if beside else None,
-        )  # fmt: skip
+        )
         progress("results", 0.0)
         report = partial(write_report, page=page_options)
         explorer = partial(write_explorer, page=page_options) if options.explore else None
         with in_language(page_options.language):
             write_results(
-                result, folder, report, explorer,
-                netcdf=options.netcdf, processes=processes, first_plan=plan.table,
+                result,
+                folder,
+                report,
+                explorer,
+                netcdf=options.netcdf,
+                processes=processes,
+                first_plan=plan.table,
                 progress=progress,
-            )  # fmt: skip
+            )
         progress("results", 1.0)
     head.notes(note for note in result.notes if note != quick_run.NOTE)
     if result.issues:
@@ -249,9 +243,7 @@ class _RoomLines:
     def year(self, room) -> None:
         """Print those of its heat, and of its light where that was not said."""
         light_printed = room.space.guid in self._lit
-        click.echo(
-            f"{room.space.label}: {_heat_figures(room)}" if light_printed else summary_line(room)
-        )
+        click.echo(f"{room.space.label}: {_heat_figures(room)}" if light_printed else summary_line(room))
         if not light_printed:
             _print_grids(room)
 

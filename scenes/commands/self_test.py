@@ -36,9 +36,7 @@ def traced_view_factor(variant: str, *, seed: int = 1) -> tuple[float, int]:
     import mitsuba as mi
 
     to_world = mi.ScalarTransform4f().translate([0, 0, DISTANCE]).scale([SIDE, SIDE, 1])
-    scene = mi.load_dict(
-        {"type": "scene", "square": {"type": "rectangle", "to_world": to_world}}, parallel=False
-    )
+    scene = mi.load_dict({"type": "scene", "square": {"type": "rectangle", "to_world": to_world}}, parallel=False)
     sampler = mi.load_dict({"type": "independent"})
     if variant.startswith("scalar"):
         sampler.seed(seed)

@@ -25,9 +25,14 @@ OUTPUTS = {"0": "visible", "1": "solar"}
 weather_argument = click.argument("weather", type=click.Path(path_type=Path))
 out_argument = click.argument("out", type=click.Path(path_type=Path, dir_okay=False))
 format_option = click.option(
-    "-f", "--format", "kind", type=click.Choice(list(FORMATS)), default="float",
-    show_default=True, help="Number format of the matrix.",
-)  # fmt: skip
+    "-f",
+    "--format",
+    "kind",
+    type=click.Choice(list(FORMATS)),
+    default="float",
+    show_default=True,
+    help="Number format of the matrix.",
+)
 ground_option = click.option(
     "-g",
     "--ground",
@@ -47,26 +52,32 @@ def command() -> None:
 @out_argument
 @subdivision_option
 @click.option(
-    "-O", "--output", type=click.Choice(list(OUTPUTS)), default="0", show_default=True,
+    "-O",
+    "--output",
+    type=click.Choice(list(OUTPUTS)),
+    default="0",
+    show_default=True,
     help="0: visible (radiance times 179 is luminance), 1: solar, both [W/m2/sr].",
-)  # fmt: skip
+)
 @click.option("-d", "--sun-only", "part", flag_value="sun", help="Direct sun only.")
 @click.option("-s", "--sky-only", "part", flag_value="sky", help="The sky without the sun.")
 @click.option(
-    "--part", "part", type=click.Choice(PARTS), default="all", show_default=True,
+    "--part",
+    "part",
+    type=click.Choice(PARTS),
+    default="all",
+    show_default=True,
     help="Parts of the sky; the same as -d and -s.",
-)  # fmt: skip
-@click.option(
-    "-r", "--rotate", type=float, default=0.0, show_default=True,
-    help="Rotate sun and sky [degrees], counter-clockwise seen from above.",
-)  # fmt: skip
-@click.option(
-    "-u",
-    "--sun-up",
-    "only_up",
-    is_flag=True,
-    help="Only time steps with the sun above the horizon.",
 )
+@click.option(
+    "-r",
+    "--rotate",
+    type=float,
+    default=0.0,
+    show_default=True,
+    help="Rotate sun and sky [degrees], counter-clockwise seen from above.",
+)
+@click.option("-u", "--sun-up", "only_up", is_flag=True, help="Only time steps with the sun above the horizon.")
 @click.option(
     "-5",
     "--five-phase",
@@ -74,9 +85,14 @@ def command() -> None:
     help="The sun of each time step as one 0.533 degree disc at the nearest patch (with -m 6).",
 )
 @click.option(
-    "-c", "--color", type=float, nargs=3, default=(1.0, 1.0, 1.0), show_default=True,
+    "-c",
+    "--color",
+    type=float,
+    nargs=3,
+    default=(1.0, 1.0, 1.0),
+    show_default=True,
     help="Red, green and blue of the sky; gendaymtx uses .96 1.004 1.118.",
-)  # fmt: skip
+)
 @click.option(
     "--sun-patches",
     type=click.IntRange(1, 8),
@@ -84,19 +100,27 @@ def command() -> None:
     show_default=True,
     help="Number of nearest patches that share the sun.",
 )
-@click.option(
-    "--measured",
-    is_flag=True,
-    help="Use the illuminances in the file instead of Perez's luminous efficacy.",
-)
+@click.option("--measured", is_flag=True, help="Use the illuminances in the file instead of Perez's luminous efficacy.")
 @ground_option
 @sun_option
 @format_option
 def matrix(
-    weather: Path, out: Path, *, subdivision: str, output: str, part: str, rotate: float,
-    only_up: bool, five_phase: bool, color: tuple[float, float, float], sun_patches: int,
-    measured: bool, ground: float | None, sun_model: str, kind: str,
-) -> None:  # fmt: skip
+    weather: Path,
+    out: Path,
+    *,
+    subdivision: str,
+    output: str,
+    part: str,
+    rotate: float,
+    only_up: bool,
+    five_phase: bool,
+    color: tuple[float, float, float],
+    sun_patches: int,
+    measured: bool,
+    ground: float | None,
+    sun_model: str,
+    kind: str,
+) -> None:
     """Write the Perez sky of WEATHER as a Radiance matrix OUT (.smx): patches x time steps.
 
     Patch 0 is the ground; the others are in the order of gendaymtx, whose options these are.
@@ -193,27 +217,12 @@ def wea(weather: Path, out: Path) -> None:
 @command.command()
 @click.argument("table", type=click.Path(path_type=Path))
 @out_argument
+@click.option("--latitude", type=click.FloatRange(-90, 90), required=True, help="Latitude, north positive [degrees].")
 @click.option(
-    "--latitude",
-    type=click.FloatRange(-90, 90),
-    required=True,
-    help="Latitude, north positive [degrees].",
+    "--longitude", type=click.FloatRange(-180, 180), required=True, help="Longitude, east positive [degrees]."
 )
-@click.option(
-    "--longitude",
-    type=click.FloatRange(-180, 180),
-    required=True,
-    help="Longitude, east positive [degrees].",
-)
-@click.option(
-    "--timezone",
-    type=click.FloatRange(-14, 14),
-    required=True,
-    help="Time zone, hours ahead of UTC.",
-)
-@click.option(
-    "--elevation", type=float, default=0.0, show_default=True, help="Elevation above sea level [m]."
-)
+@click.option("--timezone", type=click.FloatRange(-14, 14), required=True, help="Time zone, hours ahead of UTC.")
+@click.option("--elevation", type=float, default=0.0, show_default=True, help="Elevation above sea level [m].")
 @click.option(
     "--label",
     type=click.Choice(list(LABELS)),
@@ -229,9 +238,16 @@ def wea(weather: Path, out: Path) -> None:
     help="No direct sun below this altitude [degrees].",
 )
 def measured(
-    table: Path, out: Path, *, latitude: float, longitude: float, timezone: float,
-    elevation: float, label: str, least_altitude: float,
-) -> None:  # fmt: skip
+    table: Path,
+    out: Path,
+    *,
+    latitude: float,
+    longitude: float,
+    timezone: float,
+    elevation: float,
+    label: str,
+    least_altitude: float,
+) -> None:
     """Write measured global and diffuse irradiance as a WEA file OUT.
 
     TABLE is a CSV file with the columns time, global_horizontal and diffuse_horizontal [W/m2];
@@ -259,19 +275,39 @@ def measured(
 @click.argument("kind_of_sky", metavar="KIND")
 @out_argument
 @subdivision_option
-@click.option("--horizontal", type=click.FloatRange(min=0), default=10_000.0, show_default=True,
-              help="Diffuse horizontal illuminance [lx].")  # fmt: skip
-@click.option("--altitude", type=click.FloatRange(0, 90), default=45.0, show_default=True,
-              help="Solar altitude [degrees].")  # fmt: skip
-@click.option("--azimuth", type=float, default=180.0, show_default=True,
-              help="Solar azimuth, clockwise from north [degrees].")  # fmt: skip
-@click.option("-g", "--ground", type=click.FloatRange(0, 1), default=0.2, show_default=True,
-              help="Ground reflectance; of the whole ground.")  # fmt: skip
+@click.option(
+    "--horizontal",
+    type=click.FloatRange(min=0),
+    default=10_000.0,
+    show_default=True,
+    help="Diffuse horizontal illuminance [lx].",
+)
+@click.option(
+    "--altitude", type=click.FloatRange(0, 90), default=45.0, show_default=True, help="Solar altitude [degrees]."
+)
+@click.option(
+    "--azimuth", type=float, default=180.0, show_default=True, help="Solar azimuth, clockwise from north [degrees]."
+)
+@click.option(
+    "-g",
+    "--ground",
+    type=click.FloatRange(0, 1),
+    default=0.2,
+    show_default=True,
+    help="Ground reflectance; of the whole ground.",
+)
 @format_option
 def cie(
-    kind_of_sky: str, out: Path, *, subdivision: str, horizontal: float, altitude: float,
-    azimuth: float, ground: float, kind: str,
-) -> None:  # fmt: skip
+    kind_of_sky: str,
+    out: Path,
+    *,
+    subdivision: str,
+    horizontal: float,
+    altitude: float,
+    azimuth: float,
+    ground: float,
+    kind: str,
+) -> None:
     """Write a CIE sky as a Radiance sky vector OUT (patches x 1), without its sun.
 
     KIND: overcast, clear, intermediate, uniform, or 1 to 15 of ISO 15469.

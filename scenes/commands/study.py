@@ -42,14 +42,8 @@ if TYPE_CHECKING:
 @processes_option
 @scheduler_option
 @method_option(["auto"], "auto: chosen by cost and error, instead of the file's")
-@click.option(
-    "--time-budget",
-    metavar="TIME",
-    help="Time limit of the whole study for --method auto: 90s, 20min, 2h.",
-)
-@click.option(
-    "--dgp-error", metavar="PERCENT", help="Relative error limit of DGP for --method auto: 10%."
-)
+@click.option("--time-budget", metavar="TIME", help="Time limit of the whole study for --method auto: 90s, 20min, 2h.")
+@click.option("--dgp-error", metavar="PERCENT", help="Relative error limit of DGP for --method auto: 10%.")
 @explore_option("for at most 12 cases, which open from the marks of the report")
 @write_ifc_option("one property set for each case; for studies of a single IFC file")
 @surroundings_option
@@ -121,20 +115,29 @@ def study_to_folder(
     _print_plan(plan)
     with ProgressBar() as progress, compiled_beside():
         result = run_study(
-            parsed, store, plan=plan, processes=processes, scheduler=scheduler,
-            progress=progress, on_case=_print_case, on_head=head,
-        )  # fmt: skip
+            parsed,
+            store,
+            plan=plan,
+            processes=processes,
+            scheduler=scheduler,
+            progress=progress,
+            on_case=_print_case,
+            on_head=head,
+        )
         nothing = result.failed == len(result.results)
         if explore and not nothing:
             chosen = explorable(result)
             result = with_explorers(
-                result, chosen, store, processes=processes, scheduler=scheduler,
-                progress=progress, on_case=_print_explorer,
-            )  # fmt: skip
+                result,
+                chosen,
+                store,
+                processes=processes,
+                scheduler=scheduler,
+                progress=progress,
+                on_case=_print_explorer,
+            )
     report = None if nothing else lambda path: write_study_report(result, path, page_options)
-    page_of_cases = (
-        partial(write_study_explorer, result, page=page_options) if result.explored else None
-    )
+    page_of_cases = partial(write_study_explorer, result, page=page_options) if result.explored else None
     write_study(parsed, result, store, report, page_of_cases)
     _print_outcome(result, out)
     head.notes(result.notes)
@@ -168,13 +171,7 @@ def _check_explorable(plan: StudyPlan, explore: bool) -> None:
         raise click.UsageError("--explore needs cases by three-phase or five-phase")
 
 
-def _checked(
-    files: tuple[Path, ...],
-    parsed: Study,
-    out: Path,
-    scheduler: str | None,
-    write_ifc: Path | None,
-) -> Store:
+def _checked(files: tuple[Path, ...], parsed: Study, out: Path, scheduler: str | None, write_ifc: Path | None) -> Store:
     """The folder of results; `DataError` for what cannot be, before anything heavy is loaded."""
     from mitsuba_cfs.files import check_file
     from mitsuba_cfs.matrices.cache import default_folder

@@ -32,9 +32,7 @@ from scenes.commands.room_options import (
 @out_folder_option
 @click.option("--figures", is_flag=True, help="Write a figure of each room's year as SVG.")
 @click.option(
-    "--energyplus",
-    is_flag=True,
-    help="Also write the rooms as EnergyPlus input (model.epJSON, schedules.csv).",
+    "--energyplus", is_flag=True, help="Also write the rooms as EnergyPlus input (model.epJSON, schedules.csv)."
 )
 @surroundings_option
 @surroundings_offset_option
@@ -81,8 +79,7 @@ def command(
         rooms, notes = run_study(parsed, progress, files, balanced=balanced, on_head=head)
     in_twin = (f"model.epJSON: {note}." for twin in twins for note in twin.notes)
     notes = (*[quick_run.NOTE] * quick, *notes, *in_twin)
-    record = {"quick": quick, "study": parsed.model_dump(mode="json"), "head": head.record,
-              "notes": list(notes)}  # fmt: skip
+    record = {"quick": quick, "study": parsed.model_dump(mode="json"), "head": head.record, "notes": list(notes)}
     _write(rooms, record, folder, figures=figures, twins=twins)
     for room in rooms:
         summary = room.summary
@@ -130,9 +127,7 @@ def _write(
         if rooms[0].design is not None:
             days = pd.concat([room.design for room in rooms])
             write_table(days.round(3), folder / "design_days.csv", index=False)
-        table = pd.DataFrame(
-            [{"room": r.name, "floor_m2": r.floor_area} | r.summary for r in rooms]
-        )
+        table = pd.DataFrame([{"room": r.name, "floor_m2": r.floor_area} | r.summary for r in rooms])
         write_table(table.round(4), folder / "summary.csv", index=False)
         months = pd.concat({r.name: r.months for r in rooms}, names=["room"])
         write_table(months, folder / "discomfort_by_month.csv")

@@ -65,19 +65,14 @@ def highest(criterion: CriterionTable, met: Sequence[bool | None]) -> str:
     return names[-1] if names else NOT_MET
 
 
-def values_of(
-    rule: RuleTable, findings: Findings, parts: frozenset[str]
-) -> dict[Need, float | None]:
+def values_of(rule: RuleTable, findings: Findings, parts: frozenset[str]) -> dict[Need, float | None]:
     """The values of a rule's needs that look at some parts of the findings."""
     needs = (need for criterion in rule.criterion for need in criterion.needs)
     return {need: need.value(findings) for need in needs if need.parts & parts}
 
 
 def assess_room(
-    rules: Mapping[str, RuleTable],
-    values: Mapping[str, Mapping[Need, float | None]],
-    space: Space,
-    use: RoomUse,
+    rules: Mapping[str, RuleTable], values: Mapping[str, Mapping[Need, float | None]], space: Space, use: RoomUse
 ) -> Iterator[RoomVerdict]:
     """A room against every criterion.
 
@@ -119,9 +114,7 @@ def asked_of(rules: Mapping[str, RuleTable], space: Space, use: RoomUse) -> froz
 
 
 def assess_building(
-    verdicts: Sequence[Sequence[RoomVerdict]],
-    areas: Sequence[float],
-    dwellings: Sequence[str] | None = None,
+    verdicts: Sequence[Sequence[RoomVerdict]], areas: Sequence[float], dwellings: Sequence[str] | None = None
 ) -> list[BuildingVerdict]:
     """All rooms together, criterion by criterion.
 
@@ -140,17 +133,12 @@ def assess_building(
             value = level_value(level, number, used, named)
             values.append(value)
             met.append(_level_met(level, value))
-        rooms.append(
-            BuildingVerdict(rows[0].rule, rows[0].criterion, len(used), tuple(values), tuple(met))
-        )
+        rooms.append(BuildingVerdict(rows[0].rule, rows[0].criterion, len(used), tuple(values), tuple(met)))
     return rooms
 
 
 def level_value(
-    level: LevelTable,
-    number: int,
-    rooms: Sequence[tuple[RoomVerdict, float]],
-    dwellings: Sequence[str],
+    level: LevelTable, number: int, rooms: Sequence[tuple[RoomVerdict, float]], dwellings: Sequence[str]
 ) -> float | None:
     """Quantity of the rooms, with their areas, that a level limits; None if not computed.
 

@@ -15,9 +15,7 @@ DEFAULT_TRANSMITTANCE = 0.05  # diffuse, of a shade of which nothing is known: L
 DEFAULT_NAME = "LM-83's default shade"
 
 
-def open_and_closed(
-    systems: Mapping[str, States], closed: FenestrationSystem | None
-) -> dict[str, States]:
+def open_and_closed(systems: Mapping[str, States], closed: FenestrationSystem | None) -> dict[str, States]:
     """The open and the closed state of each window, by its GUID; equal ones stay the same object.
 
     Open is the first state.  Closed is what is given, else the window's last state, else the
@@ -53,6 +51,10 @@ def diffuse_shade(transmittance: float) -> KlemsBsdf:
     passed = np.full(shape, transmittance / KLEMS_FULL.projected_solid_angles().sum())
     none = np.zeros(shape)
     return KlemsBsdf(
-        KLEMS_FULL, KLEMS_FULL, transmission_front=passed, transmission_back=passed,
-        reflection_front=none, reflection_back=none,
-    )  # fmt: skip
+        KLEMS_FULL,
+        KLEMS_FULL,
+        transmission_front=passed,
+        transmission_back=passed,
+        reflection_front=none,
+        reflection_back=none,
+    )

@@ -83,9 +83,7 @@ def solar_sentences(systems: Mapping[str, States]) -> Iterator[str]:
             yield solar_sentence(system)
             yield from thermal_system(system).notes
         except ThermalInputError as error:
-            yield Note(
-                "{system}: g_tot is unknown: {reason}.", system=system.name, reason=error.message
-            )
+            yield Note("{system}: g_tot is unknown: {reason}.", system=system.name, reason=error.message)
 
 
 def solar_sentence(system: FenestrationSystem) -> str:
@@ -147,9 +145,7 @@ def lights_of(room: RoomInputs, traced: RoomLight, operated: Iterable[int]) -> l
             blinds, closed = year(illuminance(light, state)[own]), sky.whole_year(state).T > 0
             free = np.where(closed, seen[1], seen[0])
         sun = np.sum(direct, axis=0) if direct else np.zeros_like(opened[own])
-        found.append(
-            GridLight(points[own], year(opened[own]), year(sun), factor[own], blinds, closed, free)
-        )
+        found.append(GridLight(points[own], year(opened[own]), year(sun), factor[own], blinds, closed, free))
     return found
 
 
@@ -176,9 +172,13 @@ def seat_glare(
     for number, each in enumerate(views):
         steps = part(progress, number / len(views), (number + 1) / len(views), "annual glare")
         rated = hourly_glare(
-            with_view(light.light, each.view), "DGP", state, hours=lit,
-            options=rating_of(room.options.outputs), progress=steps,
-        )  # fmt: skip
+            with_view(light.light, each.view),
+            "DGP",
+            state,
+            hours=lit,
+            options=rating_of(room.options.outputs),
+            progress=steps,
+        )
         whole = np.zeros(room.skies.hours)
         whole[room.skies.lit[lit]] = rated.dgp
         rows.append(whole[used])
@@ -191,11 +191,7 @@ def seat_glare(
 
 
 def room_heat(
-    room: RoomInputs,
-    light: RoomLight,
-    closed: NDArray[np.bool_] | None,
-    *,
-    progress: Progress = silent,
+    room: RoomInputs, light: RoomLight, closed: NDArray[np.bool_] | None, *, progress: Progress = silent
 ) -> RoomHeat:
     """Operative temperatures of a room that neither heats nor cools.
 
@@ -208,20 +204,11 @@ def room_heat(
     outdoors = seasonal_outdoors(room, light, progress=progress)
     zone = room_zone(room, zone_surfaces(room), outdoors, state, progress=progress)
     thermal, _ = heat_alone(zone, room.weather, room.options.heat_step_s, progress)
-    return RoomHeat(
-        thermal.temperatures["operative_c"].to_numpy(),
-        np.asarray(room.weather.dry_bulb_c),
-        room.occupied,
-    )
+    return RoomHeat(thermal.temperatures["operative_c"].to_numpy(), np.asarray(room.weather.dry_bulb_c), room.occupied)
 
 
 # the parts of a room's light, as the dossier's last line names their seconds
-PARTS = TRACING, SUMS, GLARE, HEAT = (
-    "V and D",
-    "light and blinds of every hour",
-    "glare by pictures",
-    "temperatures",
-)
+PARTS = TRACING, SUMS, GLARE, HEAT = ("V and D", "light and blinds of every hour", "glare by pictures", "temperatures")
 OnHead = Callable[[Head], None]
 LIGHT, RAYS = frozenset({"open", "operated", "glare", "heat"}), frozenset({"view", "sun"})
 
@@ -273,35 +260,37 @@ def check_rooms(
     rooms = []
     for space in spaces:
         if space.guid in lights and space.guid in views:
-            rooms.append(
-                check.room(space, uses[space.guid], lights[space.guid], *views[space.guid])
-            )
+            rooms.append(check.room(space, uses[space.guid], lights[space.guid], *views[space.guid]))
         elif space in dark:
             rooms.append(check.dark_room(space, uses[space.guid]))
     if not rooms:
         raise DataError("none of its rooms could be computed", file=options.building)
     rooms, verdicts = judged(rooms)
     return Compliance(
-        check.building, files.rules, tuple(rooms), tuple(verdicts), check.calendar, files.weather,
-        check.day, tuple(check.assumptions(rooms, left_out(spaces, glazed, dark))),
-        check.head, tuple(dict.fromkeys(notes)),
-        (*building.issues, *view_issues, *issues), check.seconds,
-    )  # fmt: skip
+        check.building,
+        files.rules,
+        tuple(rooms),
+        tuple(verdicts),
+        check.calendar,
+        files.weather,
+        check.day,
+        tuple(check.assumptions(rooms, left_out(spaces, glazed, dark))),
+        check.head,
+        tuple(dict.fromkeys(notes)),
+        (*building.issues, *view_issues, *issues),
+        check.seconds,
+    )
 
 
 class Check:
     """A building on its way through the rules: what its rooms share."""
 
-    def __init__(
-        self, building: Building, options: ComplyOptions, files: ComplyFiles, progress: Progress
-    ) -> None:
+    def __init__(self, building: Building, options: ComplyOptions, files: ComplyFiles, progress: Progress) -> None:
         """From what was read."""
         self.options, self.files, self.progress = options, files, progress
         self.file = options.building or Path(building.name)
         self.parts = frozenset(p for rule in files.rules.values() for p in rule.parts)
-        self.inputs = inputs_of(
-            building, options, files.inputs, rooms="all", states=self._states, fill=self.lit
-        )
+        self.inputs = inputs_of(building, options, files.inputs, rooms="all", states=self._states, fill=self.lit)
         self.systems, self.building = self.inputs.systems, self.inputs.building
         self.shaded = self._shaded(self.inputs.filled)
         extra = [*unused_notes(building), *solar_sentences(self.systems)]
@@ -344,20 +333,13 @@ class Check:
         """The use of each room by GUID."""
         return uses_of_rooms(self.building, spaces, self.files.uses, self.options.linked)
 
-    def views(
-        self, spaces: list[Space]
-    ) -> tuple[dict[str, tuple[ViewOut, SunExposure]], list[Issue]]:
+    def views(self, spaces: list[Space]) -> tuple[dict[str, tuple[ViewOut, SunExposure]], list[Issue]]:
         """View and sunlight of each room by GUID, by rays against the whole building."""
         start, found, issues = time.monotonic(), {}, []
         for number, space in enumerate(spaces):
             self.progress("view and sunlight", number / len(spaces))
             try:
-                view = view_out(
-                    space,
-                    self.outdoors,
-                    eye_height=self.options.eye_height,
-                    hidden=self.hidden,
-                )
+                view = view_out(space, self.outdoors, eye_height=self.options.eye_height, hidden=self.hidden)
             except RoomError as error:
                 values = {"room": space.label, "reason": str(error)}
                 issues.append(Issue("room-not-simulated", space.guid, values, Effect("room")))
@@ -384,11 +366,18 @@ class Check:
             return self._light(space, skies, cache, steps)
 
         results, issues, notes = RoomSeries(
-            self.building, spaces, self.systems, options.room.sampling, cache, compute,
-            moved_lights, options.building,
-            alike=lambda one, other: self._costly(one) == self._costly(other)
-            and self._setups(one) == self._setups(other),
-        ).results(self.progress)  # fmt: skip
+            self.building,
+            spaces,
+            self.systems,
+            options.room.sampling,
+            cache,
+            compute,
+            moved_lights,
+            options.building,
+            alike=lambda one, other: (
+                self._costly(one) == self._costly(other) and self._setups(one) == self._setups(other)
+            ),
+        ).results(self.progress)
         left = time.monotonic() - start - sum(self.seconds.get(name, 0.0) for name in PARTS)
         self._took({"what else light takes": max(left, 0.0)})
         return {result.space.guid: result for result in results}, issues, notes
@@ -411,20 +400,22 @@ class Check:
             if "heat" in rule.parts and rule.fits(self.files.weather)
         }
 
-    def _light(
-        self, space: Space, skies: AnnualSky, cache: MatrixCache | None, progress: Progress
-    ) -> RoomLights:
+    def _light(self, space: Space, skies: AnnualSky, cache: MatrixCache | None, progress: Progress) -> RoomLights:
         """One room's light on all grids, and its glare where that is wanted."""
         rules = self.files.rules
         grids = {name: sensor_grid_of(space, rule.grid) for name, rule in rules.items()}
         distinct = list(dict.fromkeys(grids.values()))
         room = room_inputs(
-            self.building, space, self.systems, self.files.weather, self.options.room,
-            skies=skies, cache=cache, grids=distinct,
-        )  # fmt: skip
-        operated = {
-            distinct.index(grids[name]) for name, rule in rules.items() if "operated" in rule.parts
-        }
+            self.building,
+            space,
+            self.systems,
+            self.files.weather,
+            self.options.room,
+            skies=skies,
+            cache=cache,
+            grids=distinct,
+        )
+        operated = {distinct.index(grids[name]) for name, rule in rules.items() if "operated" in rule.parts}
         if self.moving and self.shaded:
             operated = operated or {0}
         times = StageTimes()
@@ -439,10 +430,14 @@ class Check:
             state = None if closed is None else closed[skies.lit].T.astype(np.int64)
             with times.stage(GLARE):
                 glare = seat_glare(
-                    room, light, state, grid=self.options.grid,
-                    directions=self.options.directions, eye_height=self.options.eye_height,
+                    room,
+                    light,
+                    state,
+                    grid=self.options.grid,
+                    directions=self.options.directions,
+                    eye_height=self.options.eye_height,
                     progress=progress,
-                )  # fmt: skip
+                )
         heats: dict[str, RoomHeat] = {}
         with times.stage(HEAT):
             distinct_setups: list[tuple[OperationTables | None, RoomHeat]] = []
@@ -501,15 +496,10 @@ class Check:
             None if light.free is None else free_shares(light.free[ten]),
         )
 
-    def room(
-        self, space: Space, use: RoomUse, light: RoomLights, view: ViewOut, sun: SunExposure
-    ) -> CheckedRoom:
+    def room(self, space: Space, use: RoomUse, light: RoomLights, view: ViewOut, sun: SunExposure) -> CheckedRoom:
         """A room with windows against all rules."""
         rules, findings = self.files.rules, Findings(self.calendar, view=view, sun=sun)
-        values = {
-            name: {**light.values[name], **values_of(rule, findings, RAYS)}
-            for name, rule in rules.items()
-        }
+        values = {name: {**light.values[name], **values_of(rule, findings, RAYS)} for name, rule in rules.items()}
         verdicts = tuple(assess_room(rules, values, space, use))
         return CheckedRoom(space, use, verdicts, view, sun, light if light.grids else None)
 
@@ -530,9 +520,7 @@ class Check:
         found += dwelling_words(rooms)
         if left:
             names = ", ".join(space.label for space in left)
-            found.append(
-                Note("Not assessed (no window, not regularly occupied): {rooms}.", rooms=names)
-            )
+            found.append(Note("Not assessed (no window, not regularly occupied): {rooms}.", rooms=names))
         found += [
             Note(
                 "{room}: {use}; {source}.",
@@ -551,8 +539,7 @@ class Check:
         if "sun" in self.parts:
             month, day = options.day
             yield Note(
-                "Sunlight is assessed on {day:02d}.{month:02d}. for solar altitudes from "
-                "{altitude:g}° ({source}).",
+                "Sunlight is assessed on {day:02d}.{month:02d}. for solar altitudes from {altitude:g}° ({source}).",
                 day=day,
                 month=month,
                 altitude=files.least_altitude_deg,
@@ -592,10 +579,7 @@ class Check:
             if any("heat" in r.parts and not r.setup for r in self.files.rules.values()):
                 yield Note(template, air_changes=room.infiltration_ach)
         if "open" in self.parts and self.calendar.median_diffuse is None:
-            yield Note(
-                "The daylight factor method is not available: the weather file has no diffuse "
-                "illuminance."
-            )
+            yield Note("The daylight factor method is not available: the weather file has no diffuse illuminance.")
 
 
 def glare_words(options: ComplyOptions, *, shaded: bool) -> str:
@@ -606,8 +590,7 @@ def glare_words(options: ComplyOptions, *, shaded: bool) -> str:
         seats = Note("seats spaced {distance:g} m", distance=options.grid)
     start, end = options.room.occupancy.hours
     return Note(
-        "Glare is rated with {blinds}, {seats}, daily from {start} to {end} o'clock, with pictures "
-        "of {pixels} pixels.",
+        "Glare is rated with {blinds}, {seats}, daily from {start} to {end} o'clock, with pictures of {pixels} pixels.",
         blinds=blinds,
         seats=seats,
         start=start,

@@ -48,10 +48,7 @@ def uses_of_rooms(
         if not use.dwelling and not known.dwellings:
             use = replace(use, dwelling=homes.get(space.guid, ""))
         if use.key == UNKNOWN and use.dwelling and space.windows:
-            source = Note(
-                "in {dwelling}, no information on its use, taken as a habitable room",
-                dwelling=use.dwelling,
-            )
+            source = Note("in {dwelling}, no information on its use, taken as a habitable room", dwelling=use.dwelling)
             use = replace(use, key="living", source=source, assumed=True)
         if use.key == UNKNOWN and not space.windows:
             use = replace(use, occupied=False, source=Note("no window and no use, not occupied"))

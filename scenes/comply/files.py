@@ -41,10 +41,7 @@ def read_files(options: ComplyOptions) -> ComplyFiles:
     if options.building is None or options.weather is None:
         raise ValueError("a check of files needs a building and a weather")
     check_building(options)
-    rules = {
-        Path(name).stem if name[-5:] == ".toml" else name: read_rule(name)
-        for name in options.standards
-    }
+    rules = {Path(name).stem if name[-5:] == ".toml" else name: read_rule(name) for name in options.standards}
     if not rules:
         raise DataError("expected at least one rule", field="--standard")
     inputs = read_inputs(options, light_only=True)
@@ -55,9 +52,7 @@ def read_files(options: ComplyOptions) -> ComplyFiles:
     return ComplyFiles(inputs, rules, uses, closed, altitude, source)
 
 
-def least_altitude(
-    options: ComplyOptions, rules: dict[str, RuleTable], weather: Weather
-) -> tuple[float, str]:
+def least_altitude(options: ComplyOptions, rules: dict[str, RuleTable], weather: Weather) -> tuple[float, str]:
     """Least altitude of the sun [deg] that counts as sunlight, and where it is from."""
     if options.least_altitude_deg is not None:
         return options.least_altitude_deg, Note("given by --sun-altitude")

@@ -137,6 +137,4 @@ def calendar_of(weather: Weather) -> Calendar:
         days.append(sums.groupby(level=0).sum().idxmax())
     diffuse = weather.diffuse_horizontal_illuminance
     median = None if diffuse is None else float(np.median(diffuse[daylight]))
-    return Calendar(
-        daylight, lm83_hours(weather), times, tuple(days), weather.step_h, median or None
-    )
+    return Calendar(daylight, lm83_hours(weather), times, tuple(days), weather.step_h, median or None)

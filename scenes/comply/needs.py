@@ -130,16 +130,10 @@ class HeatNeed(Need):
     @property
     def period(self) -> str:
         """The counted hours in words."""
-        text = (
-            gettext("in all hours of the year")
-            if self.all_hours
-            else gettext("in the hours of use")
-        )
+        text = gettext("in all hours of the year") if self.all_hours else gettext("in the hours of use")
         if self.months is not None:
             first, last = self.months
-            text = gettext(
-                "{period}, months {first} to {last}", period=text, first=first, last=last
-            )
+            text = gettext("{period}, months {first} to {last}", period=text, first=first, last=last)
         if self.hours is not None:
             start, end = self.hours
             text = gettext("{period}, {start} to {end} o'clock", period=text, start=start, end=end)
@@ -188,14 +182,11 @@ class DegreeHours(LimitedNeed):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        text = gettext(
-            "degree hours above {limit}, {period}", limit=self.line.words, period=self.period
-        )
+        text = gettext("degree hours above {limit}, {period}", limit=self.line.words, period=self.period)
         if self.season_from_c is None:
             return text
         return gettext(
-            "{quantity}; between the first and the last day with a running mean outdoors of "
-            "{from_c} °C",
+            "{quantity}; between the first and the last day with a running mean outdoors of {from_c} °C",
             quantity=text,
             from_c=decimal(f"{self.season_from_c:g}"),
         )
@@ -236,9 +227,7 @@ class HoursAbove(LimitedNeed):
             return gettext("hours above {limit}, {period}", **values)
         values["by"] = decimal(f"{self.by_k:g}")
         if self.share:
-            return gettext(
-                "hours per 100 h that are {by} K or more above {limit}, {period}", **values
-            )
+            return gettext("hours per 100 h that are {by} K or more above {limit}, {period}", **values)
         return gettext("hours that are {by} K or more above {limit}, {period}", **values)
 
     def value(self, room: Findings) -> float | None:
@@ -291,9 +280,7 @@ class GreatestExcess(LimitedNeed):
     def words(self) -> str:
         """The quantity in words."""
         return gettext(
-            "greatest excess above {limit} in whole kelvin, {period}",
-            limit=self.line.words,
-            period=self.period,
+            "greatest excess above {limit} in whole kelvin, {period}", limit=self.line.words, period=self.period
         )
 
     def value(self, room: Findings) -> float | None:
@@ -324,8 +311,7 @@ class ComfortShare(HeatNeed):
         """The quantity in words."""
         if self.cold_from_c >= ADAPTIVE_BANDS[self.band][-1]:
             return gettext(
-                "share of the hours of use within the adaptive band {band}, upper limit only",
-                band=self.band,
+                "share of the hours of use within the adaptive band {band}, upper limit only", band=self.band
             )
         if math.isfinite(self.cold_from_c):
             return gettext(
@@ -366,8 +352,7 @@ class ReachedLux(Need):
     def words(self) -> str:
         """The quantity in words."""
         return gettext(
-            "illuminance reached on {area} % of the reference plane in {time} % of the daylight "
-            "hours",
+            "illuminance reached on {area} % of the reference plane in {time} % of the daylight hours",
             area=f"{100 * self.area:g}",
             time=f"{100 * self.time:g}",
         )
@@ -497,10 +482,7 @@ class ViewFree(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return gettext(
-            "share of the hours from 8 to 18 o'clock with an unobstructed view through at least "
-            "one window"
-        )
+        return gettext("share of the hours from 8 to 18 o'clock with an unobstructed view through at least one window")
 
     def value(self, room: Findings) -> float | None:
         """Share, 0 to 1."""
@@ -562,11 +544,7 @@ class SunlightExposure(Need):
         if room.light is None:
             return None
         return annual_sunlight_exposure(
-            room.light.direct,
-            room.ten_hours,
-            step_h=room.step_h,
-            threshold=self.lux,
-            most_hours=self.hours,
+            room.light.direct, room.ten_hours, step_h=room.step_h, threshold=self.lux, most_hours=self.hours
         )
 
 
@@ -615,10 +593,7 @@ class MeanHours(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return gettext(
-            "hours of the year with a mean illuminance of {lux} lx in the room",
-            lux=f"{self.lux:g}",
-        )
+        return gettext("hours of the year with a mean illuminance of {lux} lx in the room", lux=f"{self.lux:g}")
 
     def value(self, room: Findings) -> float | None:
         """Hours."""
@@ -640,9 +615,7 @@ class WorstHours(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return gettext(
-            "hours of the year with {lux} lx at the worst lit point", lux=f"{self.lux:g}"
-        )
+        return gettext("hours of the year with {lux} lx at the worst lit point", lux=f"{self.lux:g}")
 
     def value(self, room: Findings) -> float | None:
         """Hours."""
@@ -666,9 +639,7 @@ class PointHours(Need):
     def words(self) -> str:
         """The quantity in words."""
         return gettext(
-            "share of the area with {lux} lx in {hours} hours of the year",
-            lux=f"{self.lux:g}",
-            hours=f"{self.hours:g}",
+            "share of the area with {lux} lx in {hours} hours of the year", lux=f"{self.lux:g}", hours=f"{self.hours:g}"
         )
 
     def value(self, room: Findings) -> float | None:

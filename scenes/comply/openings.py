@@ -75,8 +75,7 @@ def _opening(window: Window, reveals: FloatArray) -> Opening:
     depth = float((points @ normal).mean())
     middle = [(v.min() + v.max()) / 2 for v in (x, y)]
     centre = middle[0] * along + middle[1] * up + depth * normal
-    recess = _recess(reveals @ along - middle[0], reveals @ up - middle[1],
-                     depth - reveals @ normal, width, height)  # fmt: skip
+    recess = _recess(reveals @ along - middle[0], reveals @ up - middle[1], depth - reveals @ normal, width, height)
     return Opening(window, centre, along, up, width, height, recess)
 
 

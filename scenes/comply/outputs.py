@@ -54,10 +54,7 @@ def answers(result: Compliance) -> tuple[tuple[str, str], ...]:
         for verdict in result.verdicts
         if verdict.rooms and verdict.criterion.over != "no building"
     ]
-    return tuple(
-        (f"{result.rules[one.rule].edition}, {gettext(one.criterion.title)}", text)
-        for one, text in sentences
-    )
+    return tuple((f"{result.rules[one.rule].edition}, {gettext(one.criterion.title)}", text) for one, text in sentences)
 
 
 def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
@@ -78,9 +75,11 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
             ngettext(
                 "{met} of {count} room meets it; not: {rooms}.",
                 "{met} of {count} rooms meet it; not: {rooms}.",
-                len(asked), met=met, rooms=_names(missed),
+                len(asked),
+                met=met,
+                rooms=_names(missed),
             )
-        )  # fmt: skip
+        )
     elif asked and not unknown:
         parts.append(ngettext("The one room meets it.", "All {count} rooms meet it.", len(asked)))
     if unknown and len(unknown) < len(asked):  # else the level says so
@@ -125,18 +124,11 @@ def _view_plans(result: Compliance, room: CheckedRoom) -> Iterator[FloorPlan]:
     angle = room.view.sight_angle_deg
     title = gettext("Horizontal sight angle")
     scale = ColourScale(0, 90, title, "°")
-    text = gettext(
-        "{least} to {most}°.",
-        least=rounded(float(np.min(angle)), 0),
-        most=rounded(float(np.max(angle)), 0),
-    )
+    text = gettext("{least} to {most}°.", least=rounded(float(np.min(angle)), 0), most=rounded(float(np.max(angle)), 0))
     yield plan(frame, angle, scale, title=title, explanation=text)
     layers = room.view.layer_count
     scale = ColourScale(0, 3, gettext("Layers"), "")
-    text = gettext(
-        "Layers (landscape, sky, ground) visible through one opening; 0 where the landscape is not "
-        "visible."
-    )
+    text = gettext("Layers (landscape, sky, ground) visible through one opening; 0 where the landscape is not visible.")
     yield plan(frame, layers, scale, title=gettext("Layers of the view"), explanation=text)
 
 
@@ -179,9 +171,7 @@ def _light_plans(result: Compliance, room: CheckedRoom) -> Iterator[FloorPlan]:
             yield plan(frame, grid.sunlit_hours, scale, title=title, explanation=text)
 
 
-def _asking(
-    result: Compliance, room: CheckedRoom, needs: Sequence[str]
-) -> tuple[str, GridSummary] | None:
+def _asking(result: Compliance, room: CheckedRoom, needs: Sequence[str]) -> tuple[str, GridSummary] | None:
     """Name and grid of the first rule with the first of some needs; None where no rule has any."""
     grids = {} if room.light is None else room.light.grids
     for wanted in needs:
@@ -202,14 +192,9 @@ def _glare_plans(room: CheckedRoom) -> Iterator[FloorPlan]:
     frame = plan_frame(room.space, eyes)
     scale = ColourScale(0.2, 0.6, gettext("Daylight glare probability"), "")
     text = (
-        gettext(
-            "DGP exceeded in 5 % of the hours of use, worst direction of each seat, blinds "
-            "operated."
-        )
+        gettext("DGP exceeded in 5 % of the hours of use, worst direction of each seat, blinds operated.")
         if glare.operated
-        else gettext(
-            "DGP exceeded in 5 % of the hours of use, worst direction of each seat, blinds open."
-        )
+        else gettext("DGP exceeded in 5 % of the hours of use, worst direction of each seat, blinds open.")
     )
     yield plan(frame, worst, scale, title=gettext("Glare"), explanation=text, digits=2)
 
@@ -248,17 +233,17 @@ def sun_bars(result: Compliance, room: CheckedRoom) -> Chart | None:
         hours=rounded(room.sun.hours, 2),
     )
     if more:
-        text += " " + ngettext(
-            "{count} more opening in the table.", "{count} more openings in the table.", more
-        )
+        text += " " + ngettext("{count} more opening in the table.", "{count} more openings in the table.", more)
     return Chart(
-        gettext("Possible sunlight at the openings"), text,
-        gettext("Hour"), "",
+        gettext("Possible sunlight at the openings"),
+        text,
+        gettext("Hour"),
+        "",
         tuple(Tick(100 * (h - FIRST_HOUR) / span, str(h), "") for h in hours),
-        tuple(Tick(100 * (count - i - 0.5) / count, name, "", False)
-              for i, (name, _) in enumerate(rows)),
-        tuple(marks), height=30 + 18 * count,
-    )  # fmt: skip
+        tuple(Tick(100 * (count - i - 0.5) / count, name, "", False) for i, (name, _) in enumerate(rows)),
+        tuple(marks),
+        height=30 + 18 * count,
+    )
 
 
 FILES = page_files("scenes.comply")
@@ -298,28 +283,30 @@ def dossier_html(result: Compliance, *, quick: bool = False, page: PageOptions =
 def _filled(result: Compliance, *, quick: bool, page: PageOptions) -> str:
     rooms = [dossier_room(result, room, i) for i, room in enumerate(result.rooms, 1)]
     style = (SHARED["style.css"], FILES["dossier.css"])
-    return environment(FILES).get_template("dossier.html.j2").render(
-        page=page,
-        title=page.title or result.building.name or gettext("Building"),
-        facts=summary(result) + page.facts,
-        answers=[(title, tied(text)) for title, text in answers(result)],
-        quick=gettext(NOTE) if quick else "",
-        notes=head_lines(result.head, (*([gettext(NOTE)] if quick else []), *result.notes)),
-        assumptions=[translated(text) for text in result.assumptions],
-        rules=[dossier_rule(result, name) for name in result.rules],
-        rooms=rooms,
-        problems=issues_table(result.issues),
-        version=metadata.version("mitsuba-cfs"),
-        seconds=tied(_seconds(result.seconds)),
-        style=Markup("\n".join(style)),
-    )  # fmt: skip
+    return (
+        environment(FILES)
+        .get_template("dossier.html.j2")
+        .render(
+            page=page,
+            title=page.title or result.building.name or gettext("Building"),
+            facts=summary(result) + page.facts,
+            answers=[(title, tied(text)) for title, text in answers(result)],
+            quick=gettext(NOTE) if quick else "",
+            notes=head_lines(result.head, (*([gettext(NOTE)] if quick else []), *result.notes)),
+            assumptions=[translated(text) for text in result.assumptions],
+            rules=[dossier_rule(result, name) for name in result.rules],
+            rooms=rooms,
+            problems=issues_table(result.issues),
+            version=metadata.version("mitsuba-cfs"),
+            seconds=tied(_seconds(result.seconds)),
+            style=Markup("\n".join(style)),
+        )
+    )
 
 
 def _seconds(stages: Mapping[str, float]) -> str:
     """The computing time of each stage."""
-    return ", ".join(
-        f"{stage_words(stage)} {decimal(f'{value:g}')} s" for stage, value in stages.items()
-    )
+    return ", ".join(f"{stage_words(stage)} {decimal(f'{value:g}')} s" for stage, value in stages.items())
 
 
 def dossier_rule(result: Compliance, name: str) -> DossierRule:
@@ -369,9 +356,7 @@ def room_facts(room: CheckedRoom) -> tuple[tuple[str, str], ...]:
             rows.append((gettext("Blinds closed (8 to 18 o'clock)"), ", ".join(shares)))
         for some, every in {grid.view_free: None for grid in grids if grid.view_free}:
             words = gettext(
-                "{some} %, through all windows {every} %",
-                some=rounded(100 * some, 0),
-                every=rounded(100 * every, 0),
+                "{some} %, through all windows {every} %", some=rounded(100 * some, 0), every=rounded(100 * every, 0)
             )
             title = gettext("Unobstructed view through at least one window (8 to 18 o'clock)")
             rows.append((title, words))
@@ -387,10 +372,8 @@ def glare_words(glare: SeatGlare) -> str:
     dgp = rounded(float(glare.not_exceeded().max()), 2)
     if directions > 1:
         return ngettext(
-            "{count} seat, {directions} directions; DGP exceeded in 5 % of the hours: {dgp} at the "
-            "worst",
-            "{count} seats, {directions} directions each; DGP exceeded in 5 % of the hours: {dgp} "
-            "at the worst",
+            "{count} seat, {directions} directions; DGP exceeded in 5 % of the hours: {dgp} at the worst",
+            "{count} seats, {directions} directions each; DGP exceeded in 5 % of the hours: {dgp} at the worst",
             seats,
             directions=directions,
             dgp=dgp,
@@ -422,10 +405,7 @@ def summary(result: Compliance) -> tuple[tuple[str, str], ...]:
     rows = [
         (gettext("Model"), file or building.name),
         (gettext("Weather"), weather.site + (f" ({weather.file.name})" if weather.file else "")),
-        (
-            gettext("Rooms"),
-            gettext("{count} of {all}", count=len(result.rooms), all=len(building.spaces)),
-        ),
+        (gettext("Rooms"), gettext("{count} of {all}", count=len(result.rooms), all=len(building.spaces))),
         (gettext("Rules"), semicolons([rule.edition for rule in result.rules.values()])),
     ]
     if median is not None and any("open" in rule.parts for rule in result.rules.values()):
@@ -467,11 +447,7 @@ MODEL_CHECK = Path(str(files(__package__) / "model.ids"))  # what a check needs 
 
 
 def write_compliance(
-    result: Compliance,
-    folder: ResultFolder,
-    *,
-    quick: bool = False,
-    page: PageOptions = OWN_PAGE,
+    result: Compliance, folder: ResultFolder, *, quick: bool = False, page: PageOptions = OWN_PAGE
 ) -> None:
     """Write all files; earlier results are replaced at the end."""
     with folder.replaced() as place:

@@ -20,9 +20,7 @@ from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 FOLDER = files(__package__) / "rules"
 NOT_MET = N_("not met")
 # How rooms are aggregated over the building; "no building": nothing, and no room misses it
-Over = Literal[
-    "room", "area mean", "each room", "area of rooms", "room of each dwelling", "no building"
-]
+Over = Literal["room", "area mean", "each room", "area of rooms", "room of each dwelling", "no building"]
 
 
 class GridTable(TomlTable):
@@ -126,9 +124,7 @@ class RuleTable(TomlTable):
     @property
     def parts(self) -> frozenset[str]:
         """The parts of `Findings` that the rule needs."""
-        return frozenset(
-            part for one in self.criterion for need in one.needs for part in need.parts
-        )
+        return frozenset(part for one in self.criterion for need in one.needs for part in need.parts)
 
 
 def _named(weather: Weather, words: Iterable[str]) -> bool:
@@ -140,9 +136,7 @@ def _named(weather: Weather, words: Iterable[str]) -> bool:
 
 def rule_names() -> tuple[str, ...]:
     """Names of the rules that come with the program."""
-    return tuple(
-        sorted(Path(str(one)).stem for one in FOLDER.iterdir() if one.name[-5:] == ".toml")
-    )
+    return tuple(sorted(Path(str(one)).stem for one in FOLDER.iterdir() if one.name[-5:] == ".toml"))
 
 
 def read_rule(name: str) -> RuleTable:

@@ -118,9 +118,7 @@ def reference_point(opening: Opening, floor: float) -> FloatArray:
     return point - opening.recess * opening.normal
 
 
-def true_intervals(
-    condition: Callable[[FloatArray], NDArray[np.bool_]], start: float, end: float
-) -> Intervals:
+def true_intervals(condition: Callable[[FloatArray], NDArray[np.bool_]], start: float, end: float) -> Intervals:
     """When a condition of the minutes [N] holds: looked at each minute, its changes then halved.
 
     What comes and goes within one minute is not seen.

@@ -16,19 +16,42 @@ from scenes.language.numbers import MISSING, cell, colon, rounded, semicolons
 from scenes.report.tables import Column, Table
 
 USE_WORDS = {  # of the uses that come with the program
-    "sanitary": N_("sanitary room"), "circulation": N_("circulation"),
-    "technical": N_("technical room"), "storage": N_("storage"), "roof": N_("roof or balcony"),
-    "laboratory": N_("laboratory"), "classroom": N_("classroom"), "nursery": N_("nursery"),
-    "meeting": N_("meeting room"), "consulting": N_("consulting room"),
-    "ward": N_("patient room"), "retail": N_("retail"), "kitchen": N_("kitchen"),
-    "bedroom": N_("bedroom"), "living": N_("living room"), "office": N_("office"),
+    "sanitary": N_("sanitary room"),
+    "circulation": N_("circulation"),
+    "technical": N_("technical room"),
+    "storage": N_("storage"),
+    "roof": N_("roof or balcony"),
+    "laboratory": N_("laboratory"),
+    "classroom": N_("classroom"),
+    "nursery": N_("nursery"),
+    "meeting": N_("meeting room"),
+    "consulting": N_("consulting room"),
+    "ward": N_("patient room"),
+    "retail": N_("retail"),
+    "kitchen": N_("kitchen"),
+    "bedroom": N_("bedroom"),
+    "living": N_("living room"),
+    "office": N_("office"),
     "unknown": N_("use unknown"),
-}  # fmt: skip
+}
 MOST_DIGITS = 5  # behind the decimal point of a value beside its limit
 COLUMNS = (
-    "room", "guid", "use", "floor_area_m2", "rule", "edition", "clause", "criterion", "level",
-    "quantity", "value", "limit", "unit", "met", "asked",
-)  # fmt: skip
+    "room",
+    "guid",
+    "use",
+    "floor_area_m2",
+    "rule",
+    "edition",
+    "clause",
+    "criterion",
+    "level",
+    "quantity",
+    "value",
+    "limit",
+    "unit",
+    "met",
+    "asked",
+)
 
 
 def shown(need: Need, value: float | None) -> str:
@@ -74,16 +97,13 @@ def building_table(result: Compliance, rule: str) -> Table:
         if verdict.rule != rule or not verdict.rooms or verdict.criterion.over == "no building":
             continue
         one = verdict.criterion
-        compared = [
-            _compared(level, value) for level, value in zip(one.level, verdict.values, strict=True)
-        ]
+        compared = [_compared(level, value) for level, value in zip(one.level, verdict.values, strict=True)]
         names = (gettext(level.name) for level in one.level)
         levels = [colon(n, text) for n, (_, text) in zip(names, compared, strict=True)]
         words = ", ".join(dict.fromkeys(what for what, _ in compared))
         rows.append(
-            (gettext(one.title), clause(one), words, semicolons(levels), gettext(verdict.reached),
-             str(verdict.rooms))
-        )  # fmt: skip
+            (gettext(one.title), clause(one), words, semicolons(levels), gettext(verdict.reached), str(verdict.rooms))
+        )
     return Table(gettext("Building"), tuple(columns), tuple(rows))
 
 
@@ -124,9 +144,7 @@ def rooms_table(result: Compliance, rule: str) -> Table:
     rows = [
         (
             room.space.label,
-            use_words(room.use)
-            if room.use.occupied
-            else gettext("{use} (not occupied)", use=use_words(room.use)),
+            use_words(room.use) if room.use.occupied else gettext("{use} (not occupied)", use=use_words(room.use)),
             rounded(room.space.floor_area, 1),
             *(_short(room.verdicts[i].reached) for i in numbers),
         )
@@ -192,8 +210,7 @@ def openings_table(room: CheckedRoom) -> Table | None:
     columns = [_text(gettext("Opening")), *(Column(axis, "m") for axis in "xyz")]
     columns += [Column(gettext("Sunlight"), "h"), _text(gettext("Times (local standard time)"))]
     rows = [
-        (one.name, *(cell(v, 2) for v in one.point), cell(one.hours, 2), spans(one.times))
-        for one in room.sun.openings
+        (one.name, *(cell(v, 2) for v in one.point), cell(one.hours, 2), spans(one.times)) for one in room.sun.openings
     ]
     title = gettext("Sunlight at the reference points of the openings")
     return Table(title, tuple(columns), tuple(rows))
@@ -220,11 +237,22 @@ def _rows(result: Compliance) -> Iterator[tuple[object, ...]]:
                     factor = 100 if need.unit == "%" else 1
                     limit = need.at_least if need.at_least is not None else need.at_most
                     yield (
-                        room.space.label, room.space.guid, room.use.key, room.space.floor_area,
-                        verdict.rule, rule.edition, one.clause, one.key, level.name, need.words,
-                        None if value is None else factor * value, factor * (limit or 0.0),
-                        need.unit, yes_or_no(need.met(value)), yes_or_no(verdict.asked),
-                    )  # fmt: skip
+                        room.space.label,
+                        room.space.guid,
+                        room.use.key,
+                        room.space.floor_area,
+                        verdict.rule,
+                        rule.edition,
+                        one.clause,
+                        one.key,
+                        level.name,
+                        need.words,
+                        None if value is None else factor * value,
+                        factor * (limit or 0.0),
+                        need.unit,
+                        yes_or_no(need.met(value)),
+                        yes_or_no(verdict.asked),
+                    )
 
 
 def _clock(minutes: float) -> str:

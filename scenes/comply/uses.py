@@ -85,12 +85,7 @@ class RoomUses:
             for use in self.uses:
                 word = next((word for word in use.words if _holds(text, word)), None)
                 if word is not None:
-                    source = Note(
-                        "{where} '{text}' contains '{word}'",
-                        where=Note(where),
-                        text=text,
-                        word=word,
-                    )
+                    source = Note("{where} '{text}' contains '{word}'", where=Note(where), text=text, word=word)
                     return RoomUse(use.key, use.occupied, source, where in ("name", "long name"))
         source = Note("no information on its use, taken as regularly occupied")
         return RoomUse(UNKNOWN, True, source, True)
@@ -107,11 +102,7 @@ class RoomUses:
     @staticmethod
     def _texts(space: Space, texts: Sequence[tuple[str, str]]) -> Iterator[tuple[str, str]]:
         yield from texts
-        names = (
-            (N_("type"), space.type_name),
-            (N_("long name"), space.long_name),
-            (N_("name"), space.name),
-        )
+        names = ((N_("type"), space.type_name), (N_("long name"), space.long_name), (N_("name"), space.name))
         yield from ((where, text) for where, text in names if text)
 
 

@@ -42,10 +42,7 @@ class Sight:
         before = np.flatnonzero((one.centre - eyes) @ flat > EDGE)
         half = max(one.width / 2 - EDGE, 0.0)
         z = np.clip(eyes[before, 2], one.sill + EDGE, one.head - EDGE)
-        ends = np.stack(
-            [self._azimuth(one.at(np.full(len(z), x), z) - eyes[before]) for x in (-half, half)],
-            axis=1,
-        )
+        ends = np.stack([self._azimuth(one.at(np.full(len(z), x), z) - eyes[before]) for x in (-half, half)], axis=1)
         low, high = ends.min(axis=1), ends.max(axis=1)
         azimuths = low[:, None] + np.linspace(0, 1, AZIMUTHS) * (high - low)[:, None]
         rows = np.repeat(np.arange(len(before)), AZIMUTHS)
@@ -107,9 +104,7 @@ class Sight:
         flat = self._flat
         return np.arctan2(towards @ np.array([-flat[1], flat[0], 0.0]), towards @ flat)
 
-    def _aimed(
-        self, eyes: FloatArray, azimuths: FloatArray, z: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    def _aimed(self, eyes: FloatArray, azimuths: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Level directions [N, 3] and the points [N, 3] in the glass that they are aimed at."""
         flat = self._flat
         across = np.array([-flat[1], flat[0], 0.0])
@@ -213,9 +208,7 @@ def view_out(
     """
     points, _ = sensor_grid(space, spacing=spacing, height=eye_height, margin=margin)
     room, own = opaque_room(space), outdoors.windows_of(space)
-    openings = [
-        one for one in openings_of(space) if not one.is_horizontal and one.window.guid not in hidden
-    ]
+    openings = [one for one in openings_of(space) if not one.is_horizontal and one.window.guid not in hidden]
     layers = np.zeros((len(points), len(LAYERS)), dtype=bool)
     seen = [np.empty((0, 4))]
     for opening in openings:

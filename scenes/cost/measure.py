@@ -104,9 +104,7 @@ def _measure(
         seconds = [_timed(partial(metric_values, light, metric), clock)[1] for light in lights]
         return Cost(method, metric, 0.0, 0.0, sum(seconds) / sum(STEPS[method]))
     five_phase, needs = method == "five-phase", (metric,)
-    matrices, per_scene = _timed(
-        lambda: phase_matrices(scene, sampling, five_phase=five_phase, needs=needs), clock
-    )
+    matrices, per_scene = _timed(lambda: phase_matrices(scene, sampling, five_phase=five_phase, needs=needs), clock)
 
     def rated(steps: AnnualSky) -> NDArray[np.float64]:
         return metric_values(phase_light(matrices, systems, steps, needs=needs), metric)

@@ -59,9 +59,8 @@ def reference_costs(
     variants.activate()
     sampling = sampling or Sampling()
     return measure(
-        reference_scene(size), reference_system(), reference_sky(sampling), sampling,
-        progress=progress, **options,
-    )  # fmt: skip
+        reference_scene(size), reference_system(), reference_sky(sampling), sampling, progress=progress, **options
+    )
 
 
 def main() -> None:
@@ -82,10 +81,7 @@ def main() -> None:
     )
     print(f"{'method':14} {'metric':12} {'scene [s]':>10} {'system [s]':>10} {'step [s]':>10}")
     for c in costs:
-        print(
-            f"{c.method:14} {c.metric:12} {c.per_scene:10.2f} {c.per_system:10.2f} "
-            f"{c.per_step:10.3f}"
-        )
+        print(f"{c.method:14} {c.metric:12} {c.per_scene:10.2f} {c.per_system:10.2f} {c.per_step:10.3f}")
     if options.json:
         options.json.write_text(json.dumps([c.record() for c in costs], indent=1))
 

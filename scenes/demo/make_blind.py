@@ -44,13 +44,9 @@ PATHS = 262_144  # for each incident patch and side
 
 def main() -> None:
     """Trace the blind, put it before the glazing, write both."""
-    layer = venetian_blind(
-        BLIND, depth=0.080, radius=0.104, spacing=0.072, tilt=np.radians(TILT_DEG)
-    )
+    layer = venetian_blind(BLIND, depth=0.080, radius=0.104, spacing=0.072, tilt=np.radians(TILT_DEG))
     blind = generate_klems(layer, samples=PATHS, seed=1).bsdf[0]
-    panes = {
-        band: [specular_klems(pane, KLEMS_FULL) for pane in pair] for band, pair in PANES.items()
-    }
+    panes = {band: [specular_klems(pane, KLEMS_FULL) for pane in pair] for band, pair in PANES.items()}
     blinds = {band: combine_layers([blind, *pair]) for band, pair in panes.items()}
     name = f"Exterior venetian blind at {TILT_DEG:.0f} degrees, double low-e glazing"
     text = thermal_values(blinds["Solar"], BEFORE_BLIND, BLIND_TOTAL) + BEAM
@@ -61,12 +57,7 @@ def main() -> None:
 
 
 def _write(
-    stem: str,
-    systems: dict[str, LayeredSystem],
-    name: str,
-    thickness: float,
-    emissivity: float,
-    thermal: str,
+    stem: str, systems: dict[str, LayeredSystem], name: str, thickness: float, emissivity: float, thermal: str
 ) -> None:
     """Write a system's XML file, and the `.toml` beside it."""
     file = BsdfFile(

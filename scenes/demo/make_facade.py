@@ -57,13 +57,9 @@ def facade() -> ifcopenshell.file:
         shape = ifcopenshell.api.geometry.add_mesh_representation(
             model, context=body, vertices=[points.tolist()], faces=[CUBE]
         )
-        ifcopenshell.api.geometry.assign_representation(
-            model, product=element, representation=shape
-        )
+        ifcopenshell.api.geometry.assign_representation(model, product=element, representation=shape)
         ifcopenshell.api.geometry.edit_object_placement(model, product=element, matrix=np.eye(4))
-        ifcopenshell.api.spatial.assign_container(
-            model, products=[element], relating_structure=storey
-        )
+        ifcopenshell.api.spatial.assign_container(model, products=[element], relating_structure=storey)
         if of is not None:
             ifcopenshell.api.material.assign_material(model, products=[element], material=of)
 
@@ -126,11 +122,7 @@ def _project(model: ifcopenshell.file) -> tuple[ifcopenshell.entity_instance, ..
     project.UnitsInContext.Units = units  # assigned as a set, in an order of their own
     whole = ifcopenshell.api.context.add_context(model, context_type="Model")
     body = ifcopenshell.api.context.add_context(
-        model,
-        context_type="Model",
-        context_identifier="Body",
-        target_view="MODEL_VIEW",
-        parent=whole,
+        model, context_type="Model", context_identifier="Body", target_view="MODEL_VIEW", parent=whole
     )
     site = create(model, ifc_class="IfcSite", name="Site")
     building = create(model, ifc_class="IfcBuilding", name="Office")

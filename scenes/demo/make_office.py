@@ -140,9 +140,7 @@ class Palette:
 
     def _new_material(self, substance: Substance) -> Entity:
         model = self._model
-        made = ifcopenshell.api.material.add_material(
-            model, name=substance.name, category=substance.category
-        )
+        made = ifcopenshell.api.material.add_material(model, name=substance.name, category=substance.category)
         properties = {
             "Pset_MaterialCommon": {"MassDensity": substance.density},
             "Pset_MaterialThermal": {
@@ -157,9 +155,7 @@ class Palette:
 
     def _new_layer_set(self, name: str) -> Entity:
         model = self._model
-        layers = ifcopenshell.api.material.add_material_set(
-            model, name=name, set_type="IfcMaterialLayerSet"
-        )
+        layers = ifcopenshell.api.material.add_material_set(model, name=name, set_type="IfcMaterialLayerSet")
         for substance, depth in LAYERS[name]:
             layer = ifcopenshell.api.material.add_layer(
                 model, layer_set=layers, material=self.material(substance), name=substance.name
@@ -198,9 +194,8 @@ class Office:
     """One storey being furnished with building elements; all lengths in metres."""
 
     def __init__(
-        self, model: ifcopenshell.file, storey: Entity, body: Entity, axis: Entity,
-        *, palette: Palette | None = None,
-    ) -> None:  # fmt: skip
+        self, model: ifcopenshell.file, storey: Entity, body: Entity, axis: Entity, *, palette: Palette | None = None
+    ) -> None:
         """Add to this storey, with bodies and axes in these contexts; heights from its elevation.
 
         Args: palette: of a storey made before, where there is one.
@@ -218,14 +213,10 @@ class Office:
         self._place(slab, _frame((0.0, 0.0, z), (1.0, 0.0)))
         self._layered(slab, layers, "AXIS3")
         self._pset(
-            slab,
-            "Pset_SlabCommon",
-            {"IsExternal": True, "LoadBearing": True, "ThermalTransmittance": u_value(layers)},
+            slab, "Pset_SlabCommon", {"IsExternal": True, "LoadBearing": True, "ThermalTransmittance": u_value(layers)}
         )
 
-    def wall(
-        self, name: str, layers: str, start: Point, end: Point, height: float, style: str
-    ) -> None:
+    def wall(self, name: str, layers: str, start: Point, end: Point, height: float, style: str) -> None:
         """A wall whose reference line runs from start to end; its layers lie to the left."""
         run = np.subtract(end, start)
         length = float(np.hypot(*run))
@@ -236,23 +227,19 @@ class Office:
         line = ifcopenshell.api.geometry.add_axis_representation(
             self._model, context=self._axis, axis=[(0.0, 0.0), (length, 0.0)]
         )
-        ifcopenshell.api.geometry.assign_representation(
-            self._model, product=wall, representation=line
-        )
+        ifcopenshell.api.geometry.assign_representation(self._model, product=wall, representation=line)
         frame = _frame((*start, 0.0), tuple(run / length))
         self._place(wall, frame)
         self._layered(wall, layers, "AXIS2")
         external = layers == "Outer wall"
         self._pset(
-            wall, "Pset_WallCommon",
-            {"IsExternal": external, "LoadBearing": external,
-             "ThermalTransmittance": u_value(layers)},
-        )  # fmt: skip
+            wall,
+            "Pset_WallCommon",
+            {"IsExternal": external, "LoadBearing": external, "ThermalTransmittance": u_value(layers)},
+        )
         self._walls[name] = (wall, frame, depth)
 
-    def window(
-        self, name: str, wall: str, along: float, sill: float, width: float, height: float
-    ) -> None:
+    def window(self, name: str, wall: str, along: float, sill: float, width: float, height: float) -> None:
         """A window in a wall: frame all round and one pane, behind an inner reveal."""
         opening, frame = self._opening(f"Opening of {name}", wall, along, sill, width, height)
         window = self._element("IfcWindow", name, "WINDOW")
@@ -268,25 +255,29 @@ class Office:
         self._constituents(window, {"Lining": TIMBER, "Glazing": GLASS})
         area_fraction = clear_width * clear_height / (width * height)
         self._pset(
-            window, "Pset_WindowCommon",
-            {"IsExternal": True, "ThermalTransmittance": WINDOW_U,
-             "GlazingAreaFraction": area_fraction},
-        )  # fmt: skip
-        self._pset(
-            window, "Pset_DoorWindowGlazingType",
-            {"GlassLayers": 2, "GlassThickness1": 0.004, "GlassThickness2": 0.004,
-             "FillGas": "Argon", "IsTempered": False, "IsLaminated": False, "IsCoated": True,
-             "VisibleLightTransmittance": GLAZING["visible"],
-             "SolarTransmittance": GLAZING["solar"],
-             "SolarHeatGainTransmittance": GLAZING["g"],
-             "ThermalTransmittanceSummer": GLAZING["u"],
-             "ThermalTransmittanceWinter": GLAZING["u"]},
-        )  # fmt: skip
-        self._quantities(
             window,
-            "Qto_WindowBaseQuantities",
-            {"Width": width, "Height": height, "Area": width * height},
+            "Pset_WindowCommon",
+            {"IsExternal": True, "ThermalTransmittance": WINDOW_U, "GlazingAreaFraction": area_fraction},
         )
+        self._pset(
+            window,
+            "Pset_DoorWindowGlazingType",
+            {
+                "GlassLayers": 2,
+                "GlassThickness1": 0.004,
+                "GlassThickness2": 0.004,
+                "FillGas": "Argon",
+                "IsTempered": False,
+                "IsLaminated": False,
+                "IsCoated": True,
+                "VisibleLightTransmittance": GLAZING["visible"],
+                "SolarTransmittance": GLAZING["solar"],
+                "SolarHeatGainTransmittance": GLAZING["g"],
+                "ThermalTransmittanceSummer": GLAZING["u"],
+                "ThermalTransmittanceWinter": GLAZING["u"],
+            },
+        )
+        self._quantities(window, "Qto_WindowBaseQuantities", {"Width": width, "Height": height, "Area": width * height})
 
     def door(self, name: str, wall: str, along: float, width: float, height: float) -> None:
         """A single-leaf inner door in a wall, its leaf in the middle of the wall."""
@@ -309,19 +300,23 @@ class Office:
             self._model, ifc_class="IfcSpace", name=name, predefined_type="INTERNAL"
         )
         space.LongName = long_name
-        ifcopenshell.api.aggregate.assign_object(
-            self._model, products=[space], relating_object=self._storey
-        )
+        ifcopenshell.api.aggregate.assign_object(self._model, products=[space], relating_object=self._storey)
         self._show(space, [(self._extruded(_rectangle(0, 0, width, depth), height), None)])
         self._place(space, _frame((*low, 0.0), (1.0, 0.0)))
         area = float(width * depth)
         self._pset(space, "Pset_SpaceCommon", {"Reference": "office", "IsExternal": False})
         self._pset(space, "Pset_SpaceOccupancyRequirements", {"OccupancyNumber": 2})
         self._quantities(
-            space, "Qto_SpaceBaseQuantities",
-            {"Height": height, "NetFloorArea": area, "GrossFloorArea": area,
-             "NetVolume": area * height, "NetPerimeter": float(2 * (width + depth))},
-        )  # fmt: skip
+            space,
+            "Qto_SpaceBaseQuantities",
+            {
+                "Height": height,
+                "NetFloorArea": area,
+                "GrossFloorArea": area,
+                "NetVolume": area * height,
+                "NetPerimeter": float(2 * (width + depth)),
+            },
+        )
         return space
 
     def desk(self, name: str, space: Entity, corner: NDArray[np.float64]) -> None:
@@ -329,9 +324,7 @@ class Office:
         desk = ifcopenshell.api.root.create_entity(
             self._model, ifc_class="IfcFurniture", name=name, predefined_type="DESK"
         )
-        ifcopenshell.api.spatial.assign_container(
-            self._model, products=[desk], relating_structure=space
-        )
+        ifcopenshell.api.spatial.assign_container(self._model, products=[desk], relating_structure=space)
         top = self._extruded(_rectangle(0.0, 0.0, 1.6, 0.8), 0.03, z=0.71)
         sides = [self._extruded(_rectangle(x, 0.05, 0.03, 0.7), 0.71) for x in (0.05, 1.52)]
         self._show(desk, [(solid, "Beech desk") for solid in (top, *sides)])
@@ -352,12 +345,8 @@ class Office:
         return opening, frame
 
     def _element(self, ifc_class: str, name: str, kind: str) -> Entity:
-        made = ifcopenshell.api.root.create_entity(
-            self._model, ifc_class=ifc_class, name=name, predefined_type=kind
-        )
-        ifcopenshell.api.spatial.assign_container(
-            self._model, products=[made], relating_structure=self._storey
-        )
+        made = ifcopenshell.api.root.create_entity(self._model, ifc_class=ifc_class, name=name, predefined_type=kind)
+        ifcopenshell.api.spatial.assign_container(self._model, products=[made], relating_structure=self._storey)
         return made
 
     def _place(self, product: Entity, frame: NDArray[np.float64]) -> None:
@@ -367,10 +356,7 @@ class Office:
     def _layered(self, product: Entity, layers: str, direction: str) -> None:
         """The layer set, from the reference line in the positive direction."""
         ifcopenshell.api.material.assign_material(
-            self._model,
-            products=[product],
-            type="IfcMaterialLayerSetUsage",
-            material=self.palette.layer_set(layers),
+            self._model, products=[product], type="IfcMaterialLayerSetUsage", material=self.palette.layer_set(layers)
         )
         usage = product.HasAssociations[0].RelatingMaterial
         usage.LayerSetDirection, usage.DirectionSense = direction, "POSITIVE"
@@ -382,10 +368,7 @@ class Office:
         )
         for name, substance in parts.items():
             ifcopenshell.api.material.add_constituent(
-                self._model,
-                constituent_set=constituents,
-                name=name,
-                material=self.palette.material(substance),
+                self._model, constituent_set=constituents, name=name, material=self.palette.material(substance)
             )
         ifcopenshell.api.material.assign_material(
             self._model, products=[product], type="IfcMaterialConstituentSet", material=constituents
@@ -402,25 +385,17 @@ class Office:
     def _show(self, product: Entity, solids: list[tuple[Entity, str | None]]) -> None:
         """Give a product its body, each solid with its surface style."""
         model = self._model
-        body = model.create_entity(
-            "IfcShapeRepresentation", self._body, "Body", "SweptSolid", [s for s, _ in solids]
-        )
+        body = model.create_entity("IfcShapeRepresentation", self._body, "Body", "SweptSolid", [s for s, _ in solids])
         ifcopenshell.api.geometry.assign_representation(model, product=product, representation=body)
         for solid, style in solids:
             if style is not None:
-                ifcopenshell.api.style.assign_item_style(
-                    model, item=solid, style=self.palette.style(style)
-                )
+                ifcopenshell.api.style.assign_item_style(model, item=solid, style=self.palette.style(style))
 
     def _extruded(self, outline: tuple[Point, ...], height: float, z: float = 0.0) -> Entity:
         """The prism over a horizontal outline, from z upwards."""
-        return self._solid(
-            self._profile(self._polyline(outline)), height, (0.0, 0.0, z), upright=False
-        )
+        return self._solid(self._profile(self._polyline(outline)), height, (0.0, 0.0, z), upright=False)
 
-    def _upright(
-        self, x: float, z: float, width: float, height: float, y: float, depth: float
-    ) -> Entity:
+    def _upright(self, x: float, z: float, width: float, height: float, y: float, depth: float) -> Entity:
         """The box over an upright rectangle of the x-z plane, from y in the direction of +y."""
         profile = self._profile(self._polyline(_rectangle(x, z, width, height)))
         return self._solid(profile, depth, (0.0, y, 0.0), upright=True)
@@ -437,9 +412,7 @@ class Office:
         )
         return self._solid(profile, depth, (0.0, 0.0, 0.0), upright=True)
 
-    def _solid(
-        self, profile: Entity, depth: float, origin: tuple[float, ...], *, upright: bool
-    ) -> Entity:
+    def _solid(self, profile: Entity, depth: float, origin: tuple[float, ...], *, upright: bool) -> Entity:
         """The profile swept along +z, or, put upright (its y up), along +y."""
         make = self._model.create_entity
         axis = (0.0, -1.0, 0.0) if upright else (0.0, 0.0, 1.0)
@@ -456,9 +429,7 @@ class Office:
         return self._model.create_entity("IfcArbitraryClosedProfileDef", "AREA", None, curve)
 
     def _polyline(self, outline: tuple[Point, ...]) -> Entity:
-        points = [
-            self._model.create_entity("IfcCartesianPoint", [float(x), float(y)]) for x, y in outline
-        ]
+        points = [self._model.create_entity("IfcCartesianPoint", [float(x), float(y)]) for x, y in outline]
         return self._model.create_entity("IfcPolyline", [*points, points[0]])
 
 
@@ -507,24 +478,15 @@ def project(model: ifcopenshell.file) -> tuple[ifcopenshell.entity_instance, ...
     project = create(model, ifc_class="IfcProject", name="mitsuba-cfs demo office")
     units = [
         ifcopenshell.api.unit.add_si_unit(model, unit_type=kind)
-        for kind in ("LENGTHUNIT", "AREAUNIT", "VOLUMEUNIT", "PLANEANGLEUNIT",
-                     "THERMODYNAMICTEMPERATUREUNIT")
-    ]  # fmt: skip
+        for kind in ("LENGTHUNIT", "AREAUNIT", "VOLUMEUNIT", "PLANEANGLEUNIT", "THERMODYNAMICTEMPERATUREUNIT")
+    ]
     ifcopenshell.api.unit.assign_unit(model, units=units)
     project.UnitsInContext.Units = units  # assigned as a set, in an order of their own
     add_context = ifcopenshell.api.context.add_context
     whole = add_context(model, context_type="Model")
     plan = add_context(model, context_type="Plan")
-    body = add_context(
-        model,
-        context_type="Model",
-        context_identifier="Body",
-        target_view="MODEL_VIEW",
-        parent=whole,
-    )
-    axis = add_context(
-        model, context_type="Plan", context_identifier="Axis", target_view="GRAPH_VIEW", parent=plan
-    )
+    body = add_context(model, context_type="Model", context_identifier="Body", target_view="MODEL_VIEW", parent=whole)
+    axis = add_context(model, context_type="Plan", context_identifier="Axis", target_view="GRAPH_VIEW", parent=plan)
     ifcopenshell.api.georeference.edit_true_north(model, true_north=TRUE_NORTH_DEG)
     site = create(model, ifc_class="IfcSite", name="Site")
     site.RefLatitude, site.RefLongitude, site.RefElevation = LATITUDE, LONGITUDE, ELEVATION
@@ -540,8 +502,7 @@ def _structure(parts: Office) -> None:
     """Slabs and walls; a wall's reference line is its inner face, its layers go outwards."""
     wall, partition = thickness("Outer wall"), thickness("Partition")
     width = WIDTH_A + partition + WIDTH_B
-    outline = ((-wall, -wall), (width + wall, -wall), (width + wall, DEPTH + wall),
-               (-wall, DEPTH + wall))  # fmt: skip
+    outline = ((-wall, -wall), (width + wall, -wall), (width + wall, DEPTH + wall), (-wall, DEPTH + wall))
     parts.slab("Floor", "Ground floor", outline, -thickness("Ground floor"), "Grey floor")
     parts.slab("Roof", "Roof", outline, HEIGHT, "White ceiling")
     corners = {

@@ -181,10 +181,14 @@ HOURS_A_FILE = 400  # whose codes are loaded together: about a month of daylight
 def view_facts(view: View) -> dict[str, Any]:
     """The projection as the page takes it."""
     return {
-        "kind": view.kind, "direction": view.direction, "up": view.up,
-        "horizontal": view.horizontal_deg, "vertical": view.vertical_deg,
-        "width": view.width, "height": view.height,
-    }  # fmt: skip
+        "kind": view.kind,
+        "direction": view.direction,
+        "up": view.up,
+        "horizontal": view.horizontal_deg,
+        "vertical": view.vertical_deg,
+        "width": view.width,
+        "height": view.height,
+    }
 
 
 def view_arrays(year: PictureYear) -> dict[str, Any]:

@@ -145,9 +145,7 @@ def _named(name: str, entries: Any, field: str) -> Any:
     return entry
 
 
-def write_library_system(
-    glazing: str, shade: str, path: Path, *, seed: int = 0, progress: Progress = silent
-) -> Sheet:
+def write_library_system(glazing: str, shade: str, path: Path, *, seed: int = 0, progress: Progress = silent) -> Sheet:
     """Write the BSDF file of a glazing with a shade ("": none) and the `.toml` beside it.
 
     Raises: `DataError` for names that the library has not, or files that cannot be written.
@@ -170,8 +168,10 @@ def write_library_system(
     title = glass.title if cover is None else f"{cover.title}, {glass.title.lower()}"
     file = BsdfFile(
         {band: combine_layers(panes).bsdf for band, panes in bands.items()},
-        name=title, manufacturer="generic", thickness=_thickness(layers),
-    )  # fmt: skip
+        name=title,
+        manufacturer="generic",
+        thickness=_thickness(layers),
+    )
     write_bsdf_xml(file, path, digits=5)
     write_text(path.with_suffix(".toml"), _beside(glass, cover, layers))
     return sheet_of(path, glazing, shade)
@@ -186,9 +186,14 @@ def sheet_of(path: Path, glazing: str, shade: str) -> Sheet:
     rated = {rating.method: rating for rating in system_ratings(system, heat)}
     nfrc = next(rating for name, rating in rated.items() if name.startswith("NFRC"))
     return Sheet(
-        glazing, shade, float(tau[0]), float(weights @ tau / weights.sum()),
-        float(heat.transmittance[0]), float(nfrc.u_value or np.nan), nfrc.g_value,
-    )  # fmt: skip
+        glazing,
+        shade,
+        float(tau[0]),
+        float(weights @ tau / weights.sum()),
+        float(heat.transmittance[0]),
+        float(nfrc.u_value or np.nan),
+        nfrc.g_value,
+    )
 
 
 def sheets() -> dict[tuple[str, str], Sheet]:
@@ -198,10 +203,7 @@ def sheets() -> dict[tuple[str, str], Sheet]:
     """
     with SHEETS.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    found = (
-        Sheet(row["glazing"], row["shade"], *(float(row[name]) for name in COLUMNS[2:]))
-        for row in rows
-    )
+    found = (Sheet(row["glazing"], row["shade"], *(float(row[name]) for name in COLUMNS[2:])) for row in rows)
     return {(one.glazing, one.shade): one for one in found}
 
 
@@ -223,14 +225,11 @@ def _traced(shade: ShadeEntry, seed: int, progress: Progress) -> KlemsBsdf | Non
     if shade.slats is not None:
         slats = shade.slats
         layer = venetian_blind(
-            grey, depth=slats.depth, spacing=slats.spacing, tilt=np.radians(slats.tilt_deg),
-            radius=slats.radius,
-        )  # fmt: skip
+            grey, depth=slats.depth, spacing=slats.spacing, tilt=np.radians(slats.tilt_deg), radius=slats.radius
+        )
     elif shade.holes is not None:
         holes = shade.holes
-        layer = perforated_screen(
-            grey, spacing=holes.spacing, openness=holes.openness, thickness=holes.thickness
-        )
+        layer = perforated_screen(grey, spacing=holes.spacing, openness=holes.openness, thickness=holes.thickness)
     return generate_klems(layer, samples=PATHS, seed=seed, progress=progress).bsdf[0]
 
 
@@ -246,9 +245,7 @@ def _heat_layer(shade: ShadeEntry) -> dict[str, Any]:
     layer: dict[str, Any] = {"emissivity": list(shade.emissivity), "edges": [EDGE] * 4}
     if shade.slats is not None:
         slats = shade.slats
-        layer["slats"] = {
-            "width": slats.depth, "spacing": slats.spacing, "tilt_deg": slats.tilt_deg,
-        }  # fmt: skip
+        layer["slats"] = {"width": slats.depth, "spacing": slats.spacing, "tilt_deg": slats.tilt_deg}
     else:
         layer["openness"] = shade.openness
     return layer

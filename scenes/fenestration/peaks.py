@@ -19,20 +19,14 @@ LEAST_PEAK = 0.01  # transmittance at normal incidence below which a peak is not
 
 def as_lobes(systems: tuple[States, ...]) -> tuple[States, ...] | None:
     """The systems of window groups [G] with lobes where a peak may be one; None: nowhere."""
-    changed = {
-        id(one): with_see_through(one, 0.0)
-        for states in systems
-        for one in states
-        if is_undecided(one)
-    }
+    changed = {id(one): with_see_through(one, 0.0) for states in systems for one in states if is_undecided(one)}
     if not changed:
         return None
     return tuple(tuple(changed.get(id(one), one) for one in states) for states in systems)
 
 
 def lobe_effect(
-    beam: tuple[NDArray[np.float64], NDArray[np.float64]],
-    lobe: tuple[NDArray[np.float64], NDArray[np.float64]],
+    beam: tuple[NDArray[np.float64], NDArray[np.float64]], lobe: tuple[NDArray[np.float64], NDArray[np.float64]]
 ) -> dict[str, float]:
     """What an undecided peak does to some hours, as columns of a table.
 
@@ -49,9 +43,7 @@ def lobe_effect(
     }
 
 
-def lobe_effect_on_sensors(
-    beam: NDArray[np.float64], lobe: NDArray[np.float64]
-) -> dict[str, float]:
+def lobe_effect_on_sensors(beam: NDArray[np.float64], lobe: NDArray[np.float64]) -> dict[str, float]:
     """What an undecided peak does to the mean illuminance of some hours, as figures.
 
     Args: beam, lobe: illuminance of the sensors [S, n] [lx] with the peak as a beam, as a lobe.
@@ -136,17 +128,12 @@ def peak_note(system: FenestrationSystem) -> tuple[str, ...]:
         return ()
     basis, omega = bsdf.basis_in, bsdf.basis_in.projected_solid_angles()
     beam = through_peak(bsdf.transmission_front, basis, 1.0).transmittance
-    values = {
-        "system": system.name,
-        "peak": float(beam[0]),
-        "file": system.names[0],
-    }
+    values = {"system": system.name, "peak": float(beam[0]), "file": system.names[0]}
     if kind == "stated":
         share = (bsdf.see_through if tree is None else tree.see_through) or 0.0
         if share == 1.0:
             note = Note(
-                "{system}: the transmission peak ({peak:.2f} at normal incidence) passes straight "
-                "on, as stated.",
+                "{system}: the transmission peak ({peak:.2f} at normal incidence) passes straight on, as stated.",
                 **values,
             )
         else:

@@ -13,14 +13,7 @@ from mitsuba_cfs.errors import DataError
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.fenestration.thermal_system import ThermalSystem, checked_system, sun_in_layers
 from thermal.errors import ThermalInputError
-from thermal.ratings import (
-    CLASSES,
-    EUROPEAN,
-    REFERENCE_GLAZINGS,
-    ThermalRating,
-    layered_ratings,
-    shade_ratings,
-)
+from thermal.ratings import CLASSES, EUROPEAN, REFERENCE_GLAZINGS, ThermalRating, layered_ratings, shade_ratings
 
 TITLES = {"g": "class of g_tot", "secondary": "class of q_i", "tau": "class of tau_e"}
 LIGHT = ("tau_UV", "R_a")  # EN 410: UV transmittance, colour rendering index
@@ -133,9 +126,7 @@ def printed(rows: Sequence[dict[str, object]]) -> list[str]:
     for row in rows:
         cells.append([_cell(value) for value in row.values()])
     widths = [max(len(line[i]) for line in cells) for i in range(len(cells[0]))] if cells else []
-    return [
-        "  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in cells
-    ]
+    return ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in cells]
 
 
 def _cell(value: object) -> str:

@@ -40,13 +40,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.notes import Note
 from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS, HONEYBEE_DEFAULT
-from scenes.fenestration.systems import (
-    FenestrationSystem,
-    States,
-    WindowOverrides,
-    system_of,
-    with_see_through,
-)
+from scenes.fenestration.systems import FenestrationSystem, States, WindowOverrides, system_of, with_see_through
 from scenes.fenestration.thermal_file import ThermalFile
 from scenes.language.catalogue import N_
 from thermal.gvalue import TYPICAL_SYSTEMS
@@ -145,19 +139,14 @@ def g_by_patch(table: AngularGValue) -> NDArray[np.float64]:
     if len(table.azimuth) == 1:
         return by_azimuth[0]
     return np.array(
-        [
-            np.interp(p, table.azimuth, column, period=2 * np.pi)
-            for p, column in zip(phi, by_azimuth.T, strict=True)
-        ]
+        [np.interp(p, table.azimuth, column, period=2 * np.pi) for p, column in zip(phi, by_azimuth.T, strict=True)]
     )
 
 
 NAMED = 5  # windows that one sentence names
 
 
-def fill_windows(
-    windows: Iterable[Window], overrides: WindowOverrides, file: Path | None
-) -> dict[str, States]:
+def fill_windows(windows: Iterable[Window], overrides: WindowOverrides, file: Path | None) -> dict[str, States]:
     """The systems by state of each window, by its GUID; windows of the same data share theirs.
 
     Args: file: the IFC file of the windows; None for a box.
@@ -236,9 +225,7 @@ def held_systems(
     return own | result, unfilled
 
 
-def _by_name(
-    windows: list[Window], overrides: WindowOverrides, file: Path | None
-) -> dict[str, States]:
+def _by_name(windows: list[Window], overrides: WindowOverrides, file: Path | None) -> dict[str, States]:
     """The systems of the windows that the user names.
 
     Raises: `DataError` for a name that no window has, or that two systems have.
@@ -281,9 +268,7 @@ def _changed(system: FenestrationSystem, overrides: WindowOverrides) -> Fenestra
     return replace(system, source=source)
 
 
-def window_sources(
-    windows: Iterable[Window], systems: Mapping[str, States]
-) -> list[dict[str, Any]]:
+def window_sources(windows: Iterable[Window], systems: Mapping[str, States]) -> list[dict[str, Any]]:
     """Each system once: its name, its source, and the windows that it fills."""
     result: dict[int, dict[str, Any]] = {}
     for window in windows:
@@ -355,9 +340,7 @@ class StatedValues:
         return f"and its property sets state {' and '.join(needed)}" if needed else ""
 
 
-def stated_systems(
-    held: Held, windows: Iterable[Window], path: Path, overrides: WindowOverrides
-) -> dict[str, States]:
+def stated_systems(held: Held, windows: Iterable[Window], path: Path, overrides: WindowOverrides) -> dict[str, States]:
     """The glazing of each window of which enough is attached or stated, the same ones shared."""
     result: dict[str, States] = {}
     known: dict[StatedValues, States] = {}
@@ -374,9 +357,7 @@ def stated_systems(
     return result
 
 
-def stated_values(
-    held: Held, window: Window, path: Path, overrides: WindowOverrides
-) -> StatedValues:
+def stated_values(held: Held, window: Window, path: Path, overrides: WindowOverrides) -> StatedValues:
     """What the user gives goes before what is attached, and that before what is stated."""
     states = usual_first(held.get(window.guid, ()))
     thermal = held_thermal(states[0]) if states else {}
@@ -448,28 +429,18 @@ def glazing_system(values: StatedValues, file: str, digits: int = 3) -> Fenestra
         template = (
             N_("{system}: no BSDF; modelled as clear single glazing (Roos et al. 2001).")
             if panes == 1
-            else N_(
-                "{system}: no BSDF; modelled as clear glazing with {panes} panes (Roos et al. "
-                "2001)."
-            )
+            else N_("{system}: no BSDF; modelled as clear glazing with {panes} panes (Roos et al. 2001).")
         )
         notes = [Note(template, system=name, panes=panes)]
     else:
         table = values.glass.table
         visible = specular_matrices(table)
         count = len(values.glass.panes)
-        notes = [
-            Note(
-                "{system}: uncoated glass by Fresnel's equations, panes: {count}.",
-                system=name,
-                count=count,
-            )
-        ]
+        notes = [Note("{system}: uncoated glass by Fresnel's equations, panes: {count}.", system=name, count=count)]
     if values.generic:
         notes.append(
             Note(
-                "{system}: the file states no complete glazing data; missing values are those of "
-                "{generic}.",
+                "{system}: the file states no complete glazing data; missing values are those of {generic}.",
                 system=name,
                 generic=values.generic,
             )
@@ -482,9 +453,7 @@ def glazing_system(values: StatedValues, file: str, digits: int = 3) -> Fenestra
         if values.solar is None:
             notes.append(
                 Note(
-                    "{system}: solar transmittance {tau:.2f} from U and g (Arasteh et al. 2009).",
-                    system=name,
-                    tau=tau,
+                    "{system}: solar transmittance {tau:.2f} from U and g (Arasteh et al. 2009).", system=name, tau=tau
                 )
             )
     elif values.glass is not None:
@@ -497,10 +466,17 @@ def glazing_system(values: StatedValues, file: str, digits: int = 3) -> Fenestra
             )
         )
     return FenestrationSystem(
-        name, visible, solar, u_value=values.u_value, g_value=g, shading_position="none",
-        notes=tuple(notes), source=Note("the values stated in {file}", file=file),
-        angular=table, from_values=True,
-    )  # fmt: skip
+        name,
+        visible,
+        solar,
+        u_value=values.u_value,
+        g_value=g,
+        shading_position="none",
+        notes=tuple(notes),
+        source=Note("the values stated in {file}", file=file),
+        angular=table,
+        from_values=True,
+    )
 
 
 def _in_words(values: StatedValues, digits: int) -> str:

@@ -73,12 +73,7 @@ def _given_g(text: str | None) -> AngularGValue | float | None:
 
 
 def _origins(
-    state: ShadingState,
-    beside: ThermalFile,
-    file: str,
-    *,
-    u_value: float | None,
-    g_value: str | None,
+    state: ShadingState, beside: ThermalFile, file: str, *, u_value: float | None, g_value: str | None
 ) -> list[str]:
     """Sources of U, g, closure and position, and the unused values of the file beside the BSDF."""
     notes = []

@@ -10,13 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.bsdf.angular import (
-    AngularTable,
-    check_specular,
-    spectral_tables,
-    specular_matrices,
-    stack_table,
-)
+from mitsuba_cfs.bsdf.angular import AngularTable, check_specular, spectral_tables, specular_matrices, stack_table
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.evaluate import klems_of
 from mitsuba_cfs.bsdf.glazing import Pane
@@ -27,11 +21,7 @@ from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.notes import Note
-from scenes.fenestration.thermal_file import (
-    GlazingLayerTable,
-    ThermalFile,
-    spectral_panes,
-)
+from scenes.fenestration.thermal_file import GlazingLayerTable, ThermalFile, spectral_panes
 from thermal.closure import Closure
 
 Panes = tuple[SpectralPane, ...]
@@ -168,15 +158,7 @@ def system_of(
     *,
     path: Path,
     notes: Sequence[str] = (),
-    **more: float
-    | str
-    | Path
-    | NDArray[np.float64]
-    | Closure
-    | AngularTable
-    | Panes
-    | SpectralFactor
-    | None,
+    **more: float | str | Path | NDArray[np.float64] | Closure | AngularTable | Panes | SpectralFactor | None,
 ) -> FenestrationSystem:
     """The system of BSDF data by band, Klems full or tensor trees.
 
@@ -213,8 +195,7 @@ def _klems(bsdf: Bsdf, path: Path, band: str) -> KlemsBsdf:
     """The band as Klems full matrices with all blocks."""
     if isinstance(bsdf, KlemsBsdf) and {bsdf.basis_in, bsdf.basis_out} != {KLEMS_FULL}:
         raise DataError(
-            f"has {bsdf.basis_out.size}x{bsdf.basis_in.size} patches; "
-            f"the run needs the Klems full basis of 145x145",
+            f"has {bsdf.basis_out.size}x{bsdf.basis_in.size} patches; the run needs the Klems full basis of 145x145",
             file=path,
             field=band,
         )
@@ -238,9 +219,7 @@ def system_of_panes(layers: Sequence[GlazingLayerTable]) -> FenestrationSystem:
     else:
         notes = [
             Note(
-                "{system}: layer {number} has no visible values; its solar values are used.",
-                system=name,
-                number=number,
+                "{system}: layer {number} has no visible values; its solar values are used.", system=name, number=number
             )
             for number, layer in enumerate(layers, start=1)
             if layer.pane is None and layer.visible is None
@@ -248,10 +227,15 @@ def system_of_panes(layers: Sequence[GlazingLayerTable]) -> FenestrationSystem:
         tables = {band: stack_table([_pane(one, band) for one in layers]) for band in BANDS}
     visible, solar = (specular_matrices(tables[band]) for band in BANDS)
     return FenestrationSystem(
-        name, visible, solar, shading_position="none", notes=tuple(notes),
-        angular=tables["Visible"], panes=panes,
+        name,
+        visible,
+        solar,
+        shading_position="none",
+        notes=tuple(notes),
+        angular=tables["Visible"],
+        panes=panes,
         spectrum=SpectralFactor.of_panes(panes) if panes else None,
-    )  # fmt: skip
+    )
 
 
 def _pane(layer: GlazingLayerTable, band: str) -> Pane:
@@ -261,10 +245,7 @@ def _pane(layer: GlazingLayerTable, band: str) -> Pane:
         values = layer.visible
     elif layer.pane is not None and (band == "Visible" or values is None):
         one = spectral_glazing([layer.spectral()])[band]
-        values = tuple(
-            float(value[0])
-            for value in (one.transmittance, one.reflectance_front, one.reflectance_back)
-        )
+        values = tuple(float(value[0]) for value in (one.transmittance, one.reflectance_front, one.reflectance_back))
     tau, front, back = values
     return Pane(_named(layer), tau, front, back, coated=front != back)
 

@@ -100,9 +100,7 @@ class PaneTable(TomlTable):
     def pane(self, folder: Path) -> Pane:
         """The pane as the formulas take it; `ValueError` where its values cannot be."""
         if self.product is not None:
-            return replace(
-                read_pane_file(folder / self.product), turned=self.flipped
-            ).visible_pane()
+            return replace(read_pane_file(folder / self.product), turned=self.flipped).visible_pane()
         front, back = self.reflectance_front, self.reflectance_back
         back = front if back is None else back
         sides = (back, front) if self.flipped else (front, back)
@@ -129,9 +127,7 @@ class AngularData(TomlTable):
 
     @model_validator(mode="after")
     def _is_one(self) -> AngularData:
-        if len(self.model_fields_set) != 1 or not any(
-            (self.table, self.roos, self.pane, self.glazing)
-        ):
+        if len(self.model_fields_set) != 1 or not any((self.table, self.roos, self.pane, self.glazing)):
             raise ValueError("expected one of table, roos, pane and glazing")
         return self
 
@@ -168,9 +164,7 @@ def read_angular_table(path: Path) -> AngularTable:
         raise DataError(str(error), file=path) from error
 
 
-def _columns(
-    path: Path, required: Sequence[str], optional: Sequence[str] = ()
-) -> dict[str, NDArray[np.float64]]:
+def _columns(path: Path, required: Sequence[str], optional: Sequence[str] = ()) -> dict[str, NDArray[np.float64]]:
     """The columns of numbers of a CSV file; `DataError` where one is missing or no number."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
@@ -264,10 +258,7 @@ class GlazingLayerTable(TomlTable):
         given = {name: value for name, value in stated.items() if value is not None}
         if self.slats is not None:
             s = self.slats
-            return venetian_layer(
-                s.width, s.spacing, s.tilt_deg,
-                slat_thickness=s.thickness, edges=self.edges, **given,
-            )  # fmt: skip
+            return venetian_layer(s.width, s.spacing, s.tilt_deg, slat_thickness=s.thickness, edges=self.edges, **given)
         if self.thickness is not None:
             given["thickness"] = self.thickness
         if self.pane is not None:
@@ -275,18 +266,12 @@ class GlazingLayerTable(TomlTable):
         if self.infrared_transmittance is not None and self.openness is None:
             given["infrared_transmittance"] = self.infrared_transmittance
         if self.threads is not None:
-            return woven_layer(
-                self.threads.diameter, self.threads.spacing, edges=self.edges, **given
-            )
+            return woven_layer(self.threads.diameter, self.threads.spacing, edges=self.edges, **given)
         if self.holes is not None:
-            return perforated_layer(
-                self.holes.diameter, self.holes.spacing, edges=self.edges, **given
-            )
+            return perforated_layer(self.holes.diameter, self.holes.spacing, edges=self.edges, **given)
         if self.openness is not None:
             passed = self.infrared_transmittance
-            return sheet_layer(
-                self.openness, edges=self.edges, infrared_transmittance=passed, **given
-            )
+            return sheet_layer(self.openness, edges=self.edges, infrared_transmittance=passed, **given)
         return GlazingLayer(solar=self.solar, **given)
 
     def spectral(self) -> SpectralPane:
@@ -318,13 +303,9 @@ def _listed() -> str:
     return ", ".join(SHADES)
 
 
-def glazing_unit(
-    layers: tuple[GlazingLayerTable, ...], height: float, width: float, tilt_deg: float
-) -> GlazingUnit:
+def glazing_unit(layers: tuple[GlazingLayerTable, ...], height: float, width: float, tilt_deg: float) -> GlazingUnit:
     """The unit of layers from outside to inside; `ThermalInputError` where they are none."""
-    gaps = tuple(
-        GasGap(one.gap.width, tuple(one.gap.gas.items())) for one in layers if one.gap is not None
-    )
+    gaps = tuple(GasGap(one.gap.width, tuple(one.gap.gas.items())) for one in layers if one.gap is not None)
     return GlazingUnit(tuple(one.layer() for one in layers), gaps, height, width, tilt_deg)
 
 
@@ -383,17 +364,20 @@ class ClosureTable(TomlTable):
         if gap is not None:
             gap = Gap(gap.width, tuple(gap.gas.items()), gap.emissivity)
         if self.layers:
-            unit = glazing_unit(
-                self.layers, self.glazing_height, self.glazing_width, self.glazing_tilt_deg
-            )
+            unit = glazing_unit(self.layers, self.glazing_height, self.glazing_width, self.glazing_tilt_deg)
         stated = [OF_MODEL[key] for key in OF_MODEL if getattr(self, key)]
         if self.realised_inner_resistance or self.realised_outer_resistance:
             stated.append("constant")
         more = {} if self.u_slope is None else {"slope": self.u_slope}
         return Closure(
-            self.u_model or [*stated, "typical"][0], gap, self.realised_inner_resistance,
-            self.realised_outer_resistance, surface=self.surface, unit=unit, **more,
-        )  # fmt: skip
+            self.u_model or [*stated, "typical"][0],
+            gap,
+            self.realised_inner_resistance,
+            self.realised_outer_resistance,
+            surface=self.surface,
+            unit=unit,
+            **more,
+        )
 
 
 PEAK_SHARES = {"specular": 1.0, "lobe": 0.0}  # that pass straight on

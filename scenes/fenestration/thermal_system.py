@@ -77,9 +77,7 @@ class ThermalSystem:
     @property
     def named_model(self) -> str:
         """A sentence for results: the window model of the system."""
-        return Note(
-            "{system}: window model {model}.", system=self.fenestration.name, model=self.model
-        )
+        return Note("{system}: window model {model}.", system=self.fenestration.name, model=self.model)
 
 
 @lru_cache(maxsize=32)  # each room of a building asks for it again
@@ -93,15 +91,21 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     weight = solar.basis_in.projected_solid_angles()
     weight = weight / weight.sum()
     back_rho, back_tau = (
-        float(weight @ solar.direct_hemispherical(block))
-        for block in (solar.reflection_back, solar.transmission_back)
+        float(weight @ solar.direct_hemispherical(block)) for block in (solar.reflection_back, solar.transmission_back)
     )
     scatters = scattered_share(solar) >= SHADE_SCATTERS
     window = window_model(
-        tau, rho, incidence, system.shading_position, system.closure or Closure(),
-        absorbed=sun_in_layers, u_value=system.u_value, g_normal=system.g_value,
-        item=system.name, scatters=scatters,
-    )  # fmt: skip
+        tau,
+        rho,
+        incidence,
+        system.shading_position,
+        system.closure or Closure(),
+        absorbed=sun_in_layers,
+        u_value=system.u_value,
+        g_normal=system.g_value,
+        item=system.name,
+        scatters=scatters,
+    )
     data, closure = window.data, window.closure
     by_patch = system.g_by_patch is not None
     g_value = system.g_by_patch if by_patch else data.g_value
@@ -116,15 +120,20 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     if layers is not None and likely is not None:
         used = float(weight @ data.g_value)
         notes.append(_typical_note(system.name, layers, used, likely))
-        by_g = sorted(
-            zip([used, *likely], [layers, *window.likely], strict=True), key=itemgetter(0)
-        )
+        by_g = sorted(zip([used, *likely], [layers, *window.likely], strict=True), key=itemgetter(0))
         extremes = (by_g[0][1], by_g[-1][1])
     return ThermalSystem(
-        fenestration, absorptances, tau, rho, g_value,
-        back_rho, max(1.0 - back_rho - back_tau, 0.0), tuple(notes), _note(model),
+        fenestration,
+        absorptances,
+        tau,
+        rho,
+        g_value,
+        back_rho,
+        max(1.0 - back_rho - back_tau, 0.0),
+        tuple(notes),
+        _note(model),
         extremes,
-    )  # fmt: skip
+    )
 
 
 def with_likely_layers(system: FenestrationSystem, number: int) -> FenestrationSystem:
@@ -140,9 +149,7 @@ def with_likely_layers(system: FenestrationSystem, number: int) -> FenestrationS
     data = ThermalData(u_value, heat.g_value, ())
     g_by_patch, _ = g_of_unit(unit, data, optics, sun_in_layers, system.name)
     closure = Closure("layers", unit=unit)
-    return replace(
-        system, u_value=u_value, g_by_patch=g_by_patch, closure=closure, shading_position=None
-    )
+    return replace(system, u_value=u_value, g_by_patch=g_by_patch, closure=closure, shading_position=None)
 
 
 def _typical_note(name: str, unit: GlazingUnit, used: float, likely: Sequence[float]) -> Note:
@@ -163,16 +170,11 @@ def _typical_note(name: str, unit: GlazingUnit, used: float, likely: Sequence[fl
 
 def _note(of_model: ThermalNote) -> Note:
     """A note of the thermal model as one that a page can translate."""
-    values = {
-        key: _note(value) if isinstance(value, ThermalNote) else value
-        for key, value in of_model.values.items()
-    }
+    values = {key: _note(value) if isinstance(value, ThermalNote) else value for key, value in of_model.values.items()}
     return Note(of_model.template, **values)
 
 
-def _position_note(
-    system: FenestrationSystem, window: WindowModel, scatters: bool
-) -> Iterator[Note]:
+def _position_note(system: FenestrationSystem, window: WindowModel, scatters: bool) -> Iterator[Note]:
     """A sentence where the position of what scatters like a shade is not stated."""
     if window.guessed:
         yield Note(
@@ -215,9 +217,13 @@ def window_optics(system: FenestrationSystem, heat: ThermalSystem) -> WindowOpti
     """
     closure, stated = system.closure, system.u_value is not None  # a stated U is not its panes'
     return WindowOptics(
-        system.solar, system.visible, heat.fenestration, heat.absorptances, heat.back_absorptance,
+        system.solar,
+        system.visible,
+        heat.fenestration,
+        heat.absorptances,
+        heat.back_absorptance,
         None if closure is None or stated else closure.unit,
-    )  # fmt: skip
+    )
 
 
 def checked_system(system: FenestrationSystem, path: Path | None) -> ThermalSystem:

@@ -25,9 +25,7 @@ from scenes.fenestration.systems import FenestrationSystem, NeighbourTilts
 MOST_TILTS = 91  # states of a family
 
 
-def tilt_states(
-    systems: Sequence[FenestrationSystem], step_deg: float
-) -> tuple[FenestrationSystem, ...]:
+def tilt_states(systems: Sequence[FenestrationSystem], step_deg: float) -> tuple[FenestrationSystem, ...]:
     """The states of a blind with tilts in steps between those of its systems.
 
     Args:
@@ -57,9 +55,7 @@ def tilt_states(
     return tuple(states)
 
 
-def between_tilts(
-    low: FenestrationSystem, high: FenestrationSystem, share: float
-) -> FenestrationSystem:
+def between_tilts(low: FenestrationSystem, high: FenestrationSystem, share: float) -> FenestrationSystem:
     """The system between two tilts of a blind; share: of `high`, 0 to 1."""
     tilt = (1 - share) * float(low.tilt_deg or 0.0) + share * float(high.tilt_deg or 0.0)
     nearer = low if share <= 0.5 else high
@@ -87,9 +83,7 @@ def mean_bsdf(low: KlemsBsdf, high: KlemsBsdf, share: float) -> KlemsBsdf:
     """The weighted mean of two BSDF, block by block; share: of `high`."""
     others = high.blocks()
     blocks = {
-        name: (1 - share) * block + share * others[name]
-        for name, block in low.blocks().items()
-        if name in others
+        name: (1 - share) * block + share * others[name] for name, block in low.blocks().items() if name in others
     }
     changed: dict[str, Any] = dict(blocks)
     passed = low.see_through, high.see_through
@@ -123,14 +117,19 @@ def tilt_errors(systems: Sequence[FenestrationSystem]) -> tuple[TiltError, ...]:
         expected = mean_bsdf(low.visible, high.visible, (middle - first) / (last - first))
         errors.append(
             TiltError(
-                middle, last - first,
-                float(np.sqrt(np.average(
-                    (_transmittance(expected) - _transmittance(one.visible)) ** 2,
-                    weights=KLEMS_FULL.projected_solid_angles(),
-                ))),
+                middle,
+                last - first,
+                float(
+                    np.sqrt(
+                        np.average(
+                            (_transmittance(expected) - _transmittance(one.visible)) ** 2,
+                            weights=KLEMS_FULL.projected_solid_angles(),
+                        )
+                    )
+                ),
                 relative_difference(expected, one.visible),
             )
-        )  # fmt: skip
+        )
     return tuple(errors)
 
 

@@ -41,9 +41,7 @@ def month_ticks(times: pd.DatetimeIndex) -> tuple[Tick, ...]:
     if count < 40:
         step = max(1, count // 7)
         return tuple(
-            Tick(
-                100 * (day + 0.5) / count, f"{date.day}", f" {short_month(date.month)}", line=False
-            )
+            Tick(100 * (day + 0.5) / count, f"{date.day}", f" {short_month(date.month)}", line=False)
             for day in range(0, count, step)
             for date in [first + pd.Timedelta(days=day)]
         )
@@ -64,13 +62,7 @@ def hour_ticks() -> tuple[Tick, ...]:
 
 
 def carpet(
-    times: pd.DatetimeIndex,
-    values: ArrayLike,
-    scale: ColourScale,
-    *,
-    title: str,
-    explanation: str,
-    digits: int = 0,
+    times: pd.DatetimeIndex, values: ArrayLike, scale: ColourScale, *, title: str, explanation: str, digits: int = 0
 ) -> Chart:
     """Carpet plot of values [H] in the colours of the scale; NaN is left empty."""
     grid = day_grid(times, values)
@@ -88,12 +80,7 @@ def carpet(
 
 
 def class_carpet(
-    times: pd.DatetimeIndex,
-    classes: ArrayLike,
-    legend: tuple[tuple[str, str], ...],
-    *,
-    title: str,
-    explanation: str,
+    times: pd.DatetimeIndex, classes: ArrayLike, legend: tuple[tuple[str, str], ...], *, title: str, explanation: str
 ) -> Chart:
     """Carpet plot of class numbers [H] with the legend's colours and names; -1 is left empty."""
     grid = day_grid(times, classes)

@@ -88,13 +88,7 @@ def sensor_cells(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def plan(
-    frame: PlanFrame,
-    values: ArrayLike,
-    scale: ColourScale,
-    *,
-    title: str,
-    explanation: str,
-    digits: int = 0,
+    frame: PlanFrame, values: ArrayLike, scale: ColourScale, *, title: str, explanation: str, digits: int = 0
 ) -> FloorPlan:
     """The plan with a value for each sensor [S]."""
     values = np.asarray(values, dtype=float)
@@ -130,8 +124,7 @@ def _cells(frame: PlanFrame, values, scale: ColourScale, digits: int) -> list[st
         text = gettext("no value") if np.isnan(value) else f"{number} {scale.unit}"
         where = decimal(f"x {point[0]:.2f} m, y {point[1]:.2f} m").replace(", y", "; y")
         parts.append(
-            f'<path class="cell" fill="{scale.hex(value)}" d="{rings(cell)}">'
-            f"<title>{text}: {where}</title></path>"
+            f'<path class="cell" fill="{scale.hex(value)}" d="{rings(cell)}"><title>{text}: {where}</title></path>'
         )
         if numbered and not np.isnan(value):
             label = number

@@ -78,11 +78,7 @@ class ColourScale:
     def gradient(self) -> str:
         """The scale as a CSS gradient, low to high."""
         stops = colormaps[self.colours](np.linspace(0, 1, GRADIENT_STOPS), bytes=True)[:, :3]
-        return (
-            "linear-gradient(90deg,"
-            + ",".join(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in stops)
-            + ")"
-        )
+        return "linear-gradient(90deg," + ",".join(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in stops) + ")"
 
     @property
     def ticks(self) -> tuple[Tick, ...]:

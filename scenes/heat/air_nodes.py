@@ -26,8 +26,16 @@ from thermal.ventilation import WindowAiring
 from thermal.zone import Gains, Zone
 
 FloatArray = NDArray[np.float64]
-SUNS = ("absorbed_outer", "absorbed_inner", "inside", "facade", "window_inside", "window_facade",
-        "absorbed_middle", "state")  # fmt: skip
+SUNS = (
+    "absorbed_outer",
+    "absorbed_inner",
+    "inside",
+    "facade",
+    "window_inside",
+    "window_facade",
+    "absorbed_middle",
+    "state",
+)
 
 
 def with_air_nodes(
@@ -48,10 +56,7 @@ def with_air_nodes(
     for room, name in zip(rooms, names, strict=True):
         beside = _beside(room, node_of)
         groups[name].append(_renamed(beside) if room.zone.name in node_of else beside)
-    merged = [
-        _in_alternatives(name, group) if name in nodes.values() else group[0]
-        for name, group in groups.items()
-    ]
+    merged = [_in_alternatives(name, group) if name in nodes.values() else group[0] for name, group in groups.items()]
     place = [order.index(name) for name in names]
     between = np.zeros((len(order), len(order)))
     np.add.at(between, np.ix_(place, place), links)
@@ -97,9 +102,7 @@ def _in_alternatives(name: str, rooms: Sequence[RoomZone]) -> RoomZone:
     conditions = tuple(dict.fromkeys(one for each in choices for one in each.conditions))
     read = tuple(dict.fromkeys(one for each in choices for one in each.read))
     if combinations_of(read) > 2**MOST_CONDITIONS:
-        message = (
-            f"the rules by the temperature of {name} have {combinations_of(read)} combinations"
-        )
+        message = f"the rules by the temperature of {name} have {combinations_of(read)} combinations"
         message = f"{message} of states; at most {2**MOST_CONDITIONS} are computed"
         raise DataError(message, element=name, field="control")
 
@@ -134,8 +137,10 @@ def _merged(name: str, rooms: Sequence[RoomZone]) -> RoomZone:
         space=_space(name, [room.space for room in rooms]),
         room=_thermal_room(name, [room.room for room in rooms]),
         solar=_solar(rooms),
-        gains={key: _total(room.gains[key] for room in rooms if key in room.gains)
-               for key in dict.fromkeys(key for room in rooms for key in room.gains)},
+        gains={
+            key: _total(room.gains[key] for room in rooms if key in room.gains)
+            for key in dict.fromkeys(key for room in rooms for key in room.gains)
+        },
         shading=_shading(rooms),
         lamps=_total(room.lamps for room in rooms),
         occupied=np.any([room.occupied for room in rooms], axis=0),
@@ -143,7 +148,7 @@ def _merged(name: str, rooms: Sequence[RoomZone]) -> RoomZone:
         services=_services([room.services for room in rooms]),
         fenestration=tuple(row for room in rooms for row in room.fenestration),
         states=max((room.states for room in rooms), key=len),
-    )  # fmt: skip
+    )
 
 
 def _total(values: Iterable[Any]) -> Any:  # of numbers or arrays [H]
@@ -153,12 +158,13 @@ def _total(values: Iterable[Any]) -> Any:  # of numbers or arrays [H]
 def _space(name: str, spaces: Sequence[Space]) -> Space:
     return replace(
         spaces[0],
-        guid=name, name=name, long_name="",
+        guid=name,
+        name=name,
+        long_name="",
         faces=tuple(face for space in spaces for face in space.faces),
         windows=tuple(window for space in spaces for window in space.windows),
-        **{key: sum(getattr(space, key) for space in spaces)
-           for key in ("volume", "floor_area", "room_volume")},
-    )  # fmt: skip
+        **{key: sum(getattr(space, key) for space in spaces) for key in ("volume", "floor_area", "room_volume")},
+    )
 
 
 def _thermal_room(name: str, rooms: Sequence[ThermalRoom]) -> ThermalRoom:
@@ -185,28 +191,27 @@ def _zone(name: str, zones: Sequence[Zone]) -> Zone:
         supply = replace(fans[0], ach=mean(z.supply.ach if z.supply else 0.0 for z in zones))
     return replace(
         first,
-        name=name, volume=volume, supply=supply,
+        name=name,
+        volume=volume,
+        supply=supply,
         surfaces=tuple(one for zone in zones for one in zone.surfaces),
         windows=tuple(one for zone in zones for one in zone.windows),
         infiltration_ach=mean(zone.infiltration_ach for zone in zones),
         other_air_ach=mean(zone.other_air_ach for zone in zones),
         air_capacity_factor=mean(zone.air_capacity_factor for zone in zones),
-        gains=Gains(
-            _total(zone.gains.convective for zone in zones),
-            _total(zone.gains.radiant for zone in zones),
+        gains=Gains(_total(zone.gains.convective for zone in zones), _total(zone.gains.radiant for zone in zones)),
+        loads=replace(
+            first.loads,
+            **{key: _total(getattr(zone.loads, key) for zone in zones) for key in ("heating_limit", "cooling_limit")},
         ),
-        loads=replace(first.loads, **{
-            key: _total(getattr(zone.loads, key) for zone in zones)
-            for key in ("heating_limit", "cooling_limit")
-        }),
-        leakage=replace(first.leakage, **{
-            key: _total(getattr(zone.leakage, key) for zone in zones) for key in ("stack", "wind")
-        }),
+        leakage=replace(
+            first.leakage, **{key: _total(getattr(zone.leakage, key) for zone in zones) for key in ("stack", "wind")}
+        ),
         airing=_airing([zone.airing for zone in zones if zone.airing is not None]),
         beside=tuple(one for zone in zones for one in zone.beside),
         bridges=_total(zone.bridges for zone in zones),
         view_factors=_view_factors(zones),
-    )  # fmt: skip
+    )
 
 
 def _airing(openings: Sequence[WindowAiring]) -> WindowAiring | None:
@@ -229,10 +234,9 @@ def _view_factors(zones: Sequence[Zone]) -> FloatArray | None:
     starts = np.cumsum([0, *np.sum(kinds, axis=0)])  # of all surfaces, windows, frames
     factors, done = np.zeros((starts[-1], starts[-1])), np.zeros(3, dtype=int)
     for zone, counts in zip(zones, kinds, strict=True):
-        at = np.concatenate([
-            start + begun + np.arange(count)
-            for start, begun, count in zip(starts, done, counts, strict=False)
-        ])  # fmt: skip
+        at = np.concatenate(
+            [start + begun + np.arange(count) for start, begun, count in zip(starts, done, counts, strict=False)]
+        )
         factors[np.ix_(at, at)] = zone.view_factors
         done += counts
     return factors
@@ -274,7 +278,5 @@ def _shading(rooms: Sequence[RoomZone]) -> ShadingYear:
 
 def _services(services: Sequence[RoomServices]) -> RoomServices:
     return replace(
-        services[0],
-        equipment=_total(one.equipment for one in services),
-        vapour=_total(one.vapour for one in services),
+        services[0], equipment=_total(one.equipment for one in services), vapour=_total(one.vapour for one in services)
     )

@@ -17,18 +17,14 @@ def box_building(box: BoxTable) -> Building:
     """The box of a study as a building."""
     constructions = {
         side: Construction(
-            f"{side} of the study",
-            tuple(MaterialLayer(**layer.model_dump()) for layer in layers),
-            "study file",
+            f"{side} of the study", tuple(MaterialLayer(**layer.model_dump()) for layer in layers), "study file"
         )
         for side, layers in box.construction.items()
     }
     for part in box.roughness:
         if part not in box.specular:
             raise DataError("has no `specular` beside it", field=f"box.roughness.{part}")
-    gloss = {
-        part: lacquer(value, box.roughness.get(part, 0.0)) for part, value in box.specular.items()
-    }
+    gloss = {part: lacquer(value, box.roughness.get(part, 0.0)) for part, value in box.specular.items()}
     try:
         return shoebox(
             box.width,
@@ -47,9 +43,7 @@ def box_building(box: BoxTable) -> Building:
         raise DataError(str(error), field="box") from error
 
 
-def building_or_box(
-    box: BoxTable | None, options: InputOptions, progress: Progress = silent
-) -> Building:
+def building_or_box(box: BoxTable | None, options: InputOptions, progress: Progress = silent) -> Building:
     """The building of the options' file, or a box with its surroundings."""
     if box is None:
         return building_of(options, progress)

@@ -47,18 +47,22 @@ def design_loads(
     cold = float(np.percentile(weather.dry_bulb_c, COLD)) if outdoor_c is None else outdoor_c
     first = np.arange(day_rows)
     used = day_rows * _aired_day(zones, hours, day_rows) + first
-    calm = [
-        replace(of_hours(zone, used, hours), gains=Gains(), loads=_warmest(zone)) for zone in zones
-    ]
+    calm = [replace(of_hours(zone, used, hours), gains=Gains(), loads=_warmest(zone)) for zone in zones]
     dark = [no_sun(day_rows, len(zone.surfaces), len(zone.windows)) for zone in zones]
     moved = [of_hours(one, used, hours) for one in transfers]
     results = simulate_zones(calm, _steady(whole, cold, day_rows), dark, transfers=moved, **options)
     rows = [
-        {"room": r.name, "case": "heating", "day": "", "outdoor_mean_c": cold,
-         "outdoor_extreme_c": cold, "peak_w": r.heating.max() + r.slab.max() + r.coil.max(),
-         "peak_hour": float("nan")}
+        {
+            "room": r.name,
+            "case": "heating",
+            "day": "",
+            "outdoor_mean_c": cold,
+            "outdoor_extreme_c": cold,
+            "peak_w": r.heating.max() + r.slab.max() + r.coil.max(),
+            "peak_hour": float("nan"),
+        }
         for r in results
-    ]  # fmt: skip
+    ]
     best: dict[str, dict[str, Any]] = {}
     for day in _hot_days(rooms, weather, day_rows):
         chosen = day_rows * day + first
@@ -128,9 +132,7 @@ def _unlimited(zone: Zone) -> Zone:
 
 def _warmest(zone: Zone):
     """The zone's plant with its highest heating set point all day, and no cooling."""
-    return replace(
-        zone.loads, heating_c=float(np.max(zone.loads.heating_c)), cooling_c=float("inf")
-    )
+    return replace(zone.loads, heating_c=float(np.max(zone.loads.heating_c)), cooling_c=float("inf"))
 
 
 def _steady(whole: Climate, outdoor_c: float, rows: int) -> Climate:

@@ -34,9 +34,7 @@ def energyplus_twin(study: StudyFile, balanced: BalancedRooms) -> EnergyPlusTwin
         windows = {w.guid: balanced.in_windows[w.guid] for w in room.space.windows}
         for system in (one for states in windows.values() for one in states):
             optics.setdefault(id(system), window_optics(system, thermal_system(system)))
-        of_window = {
-            guid: [optics[id(system)] for system in states] for guid, states in windows.items()
-        }
+        of_window = {guid: [optics[id(system)] for system in states] for guid, states in windows.items()}
         rooms.append(TwinRoom(room.space, room.room, of_window, room.shading.of_windows))
     return EnergyPlusTwin(
         balanced.building,

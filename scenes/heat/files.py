@@ -55,10 +55,7 @@ def read_files(study: StudyFile, file: Path | None = None) -> HeatFiles:
             message = "belongs to an operation file of `cfs run` and `cfs study`"
             raise DataError(message, file=file, field=key)
     by = "[[system]] of the study,"
-    systems = tuple(
-        replace(read_state(table, table.bsdf, by=by), tilt_deg=table.tilt_deg)
-        for table in study.system
-    )
+    systems = tuple(replace(read_state(table, table.bsdf, by=by), tilt_deg=table.tilt_deg) for table in study.system)
     for one, table in zip(systems, study.system, strict=True):
         checked_system(one, table.bsdf or file)
     return HeatFiles(InputFiles(weather, _overrides(study, systems)), systems)
@@ -81,8 +78,7 @@ def _fits_measured(study: StudyFile, weather: Weather, file: Path | None) -> Non
     days = len(weather.times) * weather.step_h / 24.0
     if days < YEAR_DAYS and any(one.envelope.ground is not None for one in study.variants):
         raise DataError(
-            f"the ground follows a year of weather, got {days:.0f} days; state a temperature by "
-            "[[envelope.neighbour]]",
+            f"the ground follows a year of weather, got {days:.0f} days; state a temperature by [[envelope.neighbour]]",
             file=file,
             field="envelope.ground",
         )

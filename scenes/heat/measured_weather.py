@@ -74,27 +74,31 @@ def read_measured(path: Path, table: MeasuredTable) -> Weather:
     values["relative_humidity"] = values["relative_humidity"] / 100.0
     if "pressure_pa" not in values:
         values["pressure_pa"] = np.full(whole, standard_pressure(table.elevation_m))
-        notes.append(
-            Note("{file}: no pressure; that of the standard atmosphere is used.", file=path.name)
-        )
+        notes.append(Note("{file}: no pressure; that of the standard atmosphere is used.", file=path.name))
     if "wind_direction_deg" not in values:
         values["wind_direction_deg"] = np.zeros(whole)
         notes.append(Note("{file}: no wind direction; north is used.", file=path.name))
     given = {key: v for key, v in values.items() if key != "global_horizontal"}
     weather = Weather(
-        path.stem, table.latitude_deg, table.longitude_deg, table.timezone_h, table.elevation_m,
-        step / pd.Timedelta(hours=1), times, albedo=table.albedo, notes=tuple(notes), file=path,
+        path.stem,
+        table.latitude_deg,
+        table.longitude_deg,
+        table.timezone_h,
+        table.elevation_m,
+        step / pd.Timedelta(hours=1),
+        times,
+        albedo=table.albedo,
+        notes=tuple(notes),
+        file=path,
         **({"direct_normal": np.zeros(whole)} | given),
-    )  # fmt: skip
+    )
     return weather if "direct_normal" in values else _with_sun(weather, values, path)
 
 
 def _with_sun(weather: Weather, values: dict[str, FloatArray], path: Path) -> Weather:
     """The weather with its direct sun from global and diffuse."""
     if "global_horizontal" not in values:
-        raise DataError(
-            "name a column for `global_horizontal` or `direct_normal`", file=path, field="columns"
-        )
+        raise DataError("name a column for `global_horizontal` or `direct_normal`", file=path, field="columns")
     sine = sun_directions(weather)[:, 2]
     direct = np.maximum(values["global_horizontal"] - values["diffuse_horizontal"], 0.0)
     up = sine > LOWEST_SUN
@@ -108,9 +112,7 @@ def _times(data: pd.DataFrame, column: str, path: Path) -> pd.DatetimeIndex:
     try:
         times = pd.DatetimeIndex(pd.to_datetime(data[column], format="ISO8601"))
     except (ValueError, TypeError) as error:
-        raise DataError(
-            f"expected times as 2013-08-21T00:10: {error}", file=path, field=column
-        ) from error
+        raise DataError(f"expected times as 2013-08-21T00:10: {error}", file=path, field=column) from error
     if times.tz is not None or times.hasnans:
         raise DataError("expected times without zone, none missing", file=path, field=column)
     return times
@@ -127,9 +129,7 @@ def _step(times: pd.DatetimeIndex, path: Path) -> pd.Timedelta:
     step = pd.Timedelta(gaps[0])
     minute, hour = pd.Timedelta(minutes=1), pd.Timedelta(hours=1)
     if not minute <= step <= hour or hour % step != pd.Timedelta(0):
-        raise DataError(
-            f"expected steps of 1 to 60 minutes that fill an hour, got {step}", file=path
-        )
+        raise DataError(f"expected steps of 1 to 60 minutes that fill an hour, got {step}", file=path)
     return step
 
 

@@ -77,12 +77,7 @@ class RadiantRoom:
 
 
 def radiant_room(
-    space: Space,
-    room: ThermalRoom,
-    *,
-    samples: int = 16384,
-    seed: int = 0,
-    cache: MatrixCache | None = None,
+    space: Space, room: ThermalRoom, *, samples: int = 16384, seed: int = 0, cache: MatrixCache | None = None
 ) -> RadiantRoom | None:
     """Traced view factors of a room, or None where its surfaces do not close it.
 
@@ -95,12 +90,7 @@ def radiant_room(
 
 
 def _view_factors(
-    parts: Surfaces,
-    place: FloatArray,
-    facing: FloatArray,
-    samples: int,
-    seed: int,
-    cache: MatrixCache | None,
+    parts: Surfaces, place: FloatArray, facing: FloatArray, samples: int, seed: int, cache: MatrixCache | None
 ) -> tuple[FloatArray, FloatArray]:
     """View factors [N, N] among the parts and [N] from a person, traced or kept as one matrix."""
     inputs = (parts, place, facing, samples, seed)
@@ -126,9 +116,7 @@ def enclosure(space: Space, room: ThermalRoom) -> Surfaces:
     return Surfaces(triangles, np.zeros(len(triangles)), np.repeat(number, counts))
 
 
-def felt(
-    result: ZoneResult, radiant: RadiantRoom | None, rule: str, floor: int, air_speed: float
-) -> ZoneResult:
+def felt(result: ZoneResult, radiant: RadiantRoom | None, rule: str, floor: int, air_speed: float) -> ZoneResult:
     """The result with the mean radiant and operative temperatures of a rule.
 
     Args:
@@ -148,8 +136,15 @@ def felt(
     return replace(result, mrt_c=mrt, operative_c=operative)
 
 
-DEMAND = ("heating", "cooling", "supply air heating", "slab heating", "slab cooling",
-          "humidification", "dehumidification")  # fmt: skip
+DEMAND = (
+    "heating",
+    "cooling",
+    "supply air heating",
+    "slab heating",
+    "slab cooling",
+    "humidification",
+    "dehumidification",
+)
 MONTHS = pd.RangeIndex(1, 13, name="month")
 
 
@@ -177,9 +172,7 @@ def room_powers(
             strict=True,
         )
     )
-    heat = sum(
-        demand[k] for k in ("heating", "supply air heating", "slab heating", "humidification")
-    )
+    heat = sum(demand[k] for k in ("heating", "supply air heating", "slab heating", "humidification"))
     cold = sum(demand[k] for k in ("cooling", "slab cooling", "dehumidification"))
     heating_final = heat / performance(plant.heating_cop, outdoor)
     electricity = {
@@ -233,11 +226,7 @@ WARM = 26.0  # [degC] operative, above which overheating is counted, ISO 17772, 
 
 
 def hourly_table(
-    result: ZoneResult,
-    shading: ShadingYear,
-    daylight: FloatArray | None,
-    weather: Weather,
-    felt: dict[str, FloatArray],
+    result: ZoneResult, shading: ShadingYear, daylight: FloatArray | None, weather: Weather, felt: dict[str, FloatArray]
 ) -> pd.DataFrame:
     """Temperatures, votes, loads, shading states and heat flows by hour; felt: `felt_by`."""
     table = {
@@ -275,9 +264,7 @@ def comfort_summary(
     before it.
     """
     operative_c, step_h = result.operative_c, weather.step_h
-    band = comfort_by_outdoors(
-        operative_c, weather.dry_bulb_c, "EN 16798-1 III", per_day=weather.per_day
-    )
+    band = comfort_by_outdoors(operative_c, weather.dry_bulb_c, "EN 16798-1 III", per_day=weather.per_day)
     beyond = band.applicable & ~band.comfortable
     steps = {"adaptive_IV_h": np.count_nonzero(beyond & occupied)}
     for name, limit in PMV_CATEGORIES.items():
@@ -306,9 +293,7 @@ def year_summary(
     }
     months = {}
     for band in ADAPTIVE_BANDS:
-        comfort = comfort_by_outdoors(
-            result.operative_c, weather.dry_bulb_c, band, per_day=weather.per_day
-        )
+        comfort = comfort_by_outdoors(result.operative_c, weather.dry_bulb_c, band, per_day=weather.per_day)
         counted = summarise(comfort, occupied, month)
         summary[f"comfortable_h {band}"] = counted.comfortable * weather.step_h
         months[f"{band} [h]"] = _in_hours(counted.discomfort_by_month, weather)
@@ -389,10 +374,14 @@ def run_study(
     notes |= dict.fromkeys(found.notes)
     if study.likely_layers:
         likely = [
-            balance({guid: tuple(with_likely_layers(system, number) for system in states)
-                     for guid, states in in_windows.items()})[0]
+            balance(
+                {
+                    guid: tuple(with_likely_layers(system, number) for system in states)
+                    for guid, states in in_windows.items()
+                }
+            )[0]
             for number in (0, 1)
-        ]  # fmt: skip
+        ]
         notes |= dict.fromkeys(_likely_notes(found, likely))
     years = []
     for room, result, humidity in zip(found.rooms, found.results, found.humidity, strict=True):
@@ -429,19 +418,23 @@ def _traced_rooms(
     for i, space in enumerate(inputs.spaces):
         steps = item(progress, "room", i + 1, len(inputs.spaces), space.label)
         room = room_inputs(
-            inputs.building, space, in_windows, inputs.weather, study.options,
-            operation=study, skies=skies, cache=cache,
+            inputs.building,
+            space,
+            in_windows,
+            inputs.weather,
+            study.options,
+            operation=study,
+            skies=skies,
+            cache=cache,
             together=[one.guid for one in inputs.spaces] if study.couple else (),
-        )  # fmt: skip
+        )
         if space.windows:
             scene, seed = visible_scene(room), study.options.sampling.seed
             leaks = leak_issues(space, scene, seed=seed, cache=cache)
             traced.leaks.extend(map(issue_note, leaks))
         zone, radiant, trace = operated_zone(room, progress=steps), None, study.trace
         if trace.view_factors:
-            radiant = radiant_room(
-                space, zone.room, samples=trace.patch_samples, seed=trace.seed, cache=cache
-            )
+            radiant = radiant_room(space, zone.room, samples=trace.patch_samples, seed=trace.seed, cache=cache)
         traced.rooms.append(zone if radiant is None else zone.with_view_factors(radiant.among))
         traced.radiants[space.guid] = radiant
         steps("heat", 1.0)
@@ -457,10 +450,7 @@ def _likely_notes(assumed: BalancedRooms, likely: Sequence[BalancedRooms]) -> It
         apart = [other.operative_c - result.operative_c for other in others]
         glass = [other.window_inner_c - result.window_inner_c for other in others]
         kwh = assumed.weather.step_h / 1000.0
-        heat, cold = (
-            [getattr(one, key).sum() * kwh for one in (result, *others)]
-            for key in ("heating", "cooling")
-        )
+        heat, cold = ([getattr(one, key).sum() * kwh for one in (result, *others)] for key in ("heating", "cooling"))
         yield Note(
             "{room}: with other likely layers of its windows (RMS) the operative temperature "
             "differs by {operative:.2f} K, the inner face of the windows by {glass:.2f} K; heating "
@@ -517,22 +507,16 @@ def _balanced(
         results += years
         for issues in step_issues(together, years, weather, step_s, **air, **place):
             notes += tuple(map(issue_note, issues))
-        moved += [
-            room.in_alternatives(result.alternative)
-            for room, result in zip(together, years, strict=True)
-        ]
+        moved += [room.in_alternatives(result.alternative) for room, result in zip(together, years, strict=True)]
         moist += room_humidity(together, years, weather, **air)
         if study.design is not None:
             cold = study.design.outdoor_c
-            design.append(
-                design_loads(together, weather, outdoor_c=cold, step_s=step_s, **air, **place)
-            )
+            design.append(design_loads(together, weather, outdoor_c=cold, step_s=step_s, **air, **place))
         progress("heat balance", (number + 1) / len(groups))
     table = pd.concat(design, ignore_index=True) if design else None
     return BalancedRooms(
-        building, moved, weather, in_windows, results, moist, notes, table,
-        **(groups[0][1] if study.couple else {}),
-    )  # fmt: skip
+        building, moved, weather, in_windows, results, moist, notes, table, **(groups[0][1] if study.couple else {})
+    )
 
 
 def _air_nodes(study: StudyFile, building: Building, rooms: Sequence[RoomZone]) -> dict[str, str]:
@@ -555,9 +539,7 @@ def _air_nodes(study: StudyFile, building: Building, rooms: Sequence[RoomZone]) 
     return node_of
 
 
-def _transfers(
-    study: StudyFile, building: Building, names: Mapping[str, str], weather: Weather
-) -> list[AirTransfer]:
+def _transfers(study: StudyFile, building: Building, names: Mapping[str, str], weather: Weather) -> list[AirTransfer]:
     """The air that flows one way between rooms.
 
     Args: names: of the zone of each room, by its GUID.
@@ -581,16 +563,12 @@ def _transfers(
     return transfers
 
 
-def _felt(
-    study: StudyFile, zone: Zone, result: ZoneResult, radiant: RadiantRoom | None
-) -> ZoneResult:
+def _felt(study: StudyFile, zone: Zone, result: ZoneResult, radiant: RadiantRoom | None) -> ZoneResult:
     person = study.comfort
     return felt(result, radiant, person.mean_radiant, _floor(zone), person.air_speed)
 
 
-def _year(
-    study: StudyFile, room: RoomZone, result: ZoneResult, humidity: Humidity, weather: Weather
-) -> ThermalYear:
+def _year(study: StudyFile, room: RoomZone, result: ZoneResult, humidity: Humidity, weather: Weather) -> ThermalYear:
     felt_by_person = felt_by(study.comfort, result, humidity)
     powers = room_powers(room, result, humidity, weather, study.plant)
     area = room.space.floor_area
@@ -599,9 +577,7 @@ def _year(
         result.name,
         area,
         hourly_table(result, room.shading, room.daylight, weather, felt_by_person),
-        summary
-        | comfort_summary(result, felt_by_person["pmv"], weather, room.occupied)
-        | energy_summary(powers, area),
+        summary | comfort_summary(result, felt_by_person["pmv"], weather, room.occupied) | energy_summary(powers, area),
         months,
         powers,
         energy_by_month(powers, area),
@@ -613,9 +589,7 @@ def _floor(zone: Zone) -> int:
     return int(np.argmax([-s.normal[2] * s.area for s in zone.surfaces]))
 
 
-def study_inputs(
-    study: StudyFile, files: HeatFiles | None = None, progress: Progress = silent
-) -> Inputs:
+def study_inputs(study: StudyFile, files: HeatFiles | None = None, progress: Progress = silent) -> Inputs:
     """The inputs of a study: its rooms with all states of their windows."""
     files, options = files or read_files(study), study.inputs
     building = building_or_box(study.box, options, progress)

@@ -22,16 +22,7 @@ from scenes.room.operation import schedules_there
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import SKY_LIGHTS, RoomOptions
 from scenes.room.schedules import OrSchedule, unknown_name
-from scenes.toml_file import (
-    OutdoorTable,
-    Positive,
-    ReadTable,
-    Share,
-    TomlTable,
-    read_options,
-    read_table,
-    validated,
-)
+from scenes.toml_file import OutdoorTable, Positive, ReadTable, Share, TomlTable, read_options, read_table, validated
 
 Part = Literal[BOX_PARTS]  # a side of the box, or all its faces of a kind
 Length = Annotated[Positive, plausible.LENGTH]  # [m]
@@ -82,9 +73,7 @@ class BoxTable(TomlTable):
     reflectance: dict[Part, Share] = Field(default_factory=dict)
     specular: dict[Part, Share] = Field(default_factory=dict)  # of a lacquer at normal incidence
     roughness: dict[Part, Annotated[float, Field(ge=0, le=ROUGHEST)]] = Field(default_factory=dict)
-    adjacency: dict[Part, Literal["outside", "ground", "space", "adiabatic"]] = Field(
-        default_factory=dict
-    )
+    adjacency: dict[Part, Literal["outside", "ground", "space", "adiabatic"]] = Field(default_factory=dict)
     # by side or kind, outermost first
     construction: dict[Part, tuple[LayerTable, ...]] = Field(default_factory=dict)
 
@@ -153,9 +142,7 @@ class StudyFile(OperationTables, ReadTable, OutdoorTable):
     @property
     def options(self) -> RoomOptions:
         """How a room of the study is computed."""
-        return RoomOptions.of(
-            **self.trace.model_dump(exclude={"view_factors"}), heat_step_s=60.0 * self.step_minutes
-        )
+        return RoomOptions.of(**self.trace.model_dump(exclude={"view_factors"}), heat_step_s=60.0 * self.step_minutes)
 
     @model_validator(mode="after")
     def _fits(self) -> StudyFile:
@@ -163,9 +150,7 @@ class StudyFile(OperationTables, ReadTable, OutdoorTable):
             raise ValueError("heat_island: measured weather is taken as it is")
         if (self.building is None) == (self.box is None):
             raise ValueError("give either `building` or `[box]`")
-        for key in (
-            ("spaces", "join", "couple", "air_nodes", "transfer") if self.box is not None else ()
-        ):
+        for key in ("spaces", "join", "couple", "air_nodes", "transfer") if self.box is not None else ():
             if getattr(self, key):
                 raise ValueError(f"{key}: belongs to a `building`; a box is one room")
         for key in ("transfer", "air_nodes"):
@@ -202,8 +187,7 @@ def read_study(path: Path, *, quick: bool = False) -> StudyFile:
     study = schedules_there(validated(StudyFile, read_table(path), path), path)
     here = path.parent
     systems = tuple(
-        s.placed(here).model_copy(update={"bsdf": s.bsdf and _there(here, s.bsdf, path)})
-        for s in study.system
+        s.placed(here).model_copy(update={"bsdf": s.bsdf and _there(here, s.bsdf, path)}) for s in study.system
     )
     around = tuple(_there(here, name, path) for name in study.surroundings)
     files = {"weather": _there(here, study.weather, path), "system": systems}

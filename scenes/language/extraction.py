@@ -21,9 +21,7 @@ from babel.messages.pofile import read_po, write_po
 from scenes.language.catalogue import TRANSLATED
 
 ARGUMENTS = {"gettext": 1, "N_": 1, "Note": 1, "ThermalNote": 1, "ngettext": 2}  # that are messages
-PACKAGES = [
-    Path(__file__).parents[2] / name for name in ("scenes", "bim", "mitsuba_cfs", "thermal")
-]
+PACKAGES = [Path(__file__).parents[2] / name for name in ("scenes", "bim", "mitsuba_cfs", "thermal")]
 HEADER = """\
 # Text of the pages of mitsuba-cfs in {language}, by the English text in the code.
 # `make catalogues` adds what is new in the code; translations are written by hand.
@@ -71,9 +69,7 @@ def extract_table(
         yield 1, "gettext" if isinstance(text, str) else "ngettext", text, []
 
 
-def _texts(
-    value: Any, keys: list[str], whole: list[str], *, taken: bool
-) -> Iterator[str | tuple[str, str]]:
+def _texts(value: Any, keys: list[str], whole: list[str], *, taken: bool) -> Iterator[str | tuple[str, str]]:
     if isinstance(value, str):
         if taken and any(letter.isalpha() for letter in value):
             yield value
@@ -98,9 +94,7 @@ def extracted() -> Catalog:
     catalog = Catalog()
     keywords = {**DEFAULT_KEYWORDS, "Note": None, "ThermalNote": None}
     for package in PACKAGES:
-        for path, _, message, comments, context in extract_from_dir(
-            package, methods, options, keywords=keywords
-        ):
+        for path, _, message, comments, context in extract_from_dir(package, methods, options, keywords=keywords):
             place = f"{package.name}/{Path(path).as_posix()}"
             catalog.add(message, None, [(place, None)], auto_comments=comments, context=context)
     return catalog
@@ -125,9 +119,7 @@ def write(catalog: Catalog, path: Path) -> None:
     """Write a catalogue, its messages in the order of the files that they are in."""
     text = io.BytesIO()
     write_po(text, catalog, width=0, sort_by_file=True, include_lineno=False, omit_header=True)
-    header = HEADER.format(
-        language=catalog.locale.english_name, code=catalog.locale, plural=catalog.plural_forms
-    )
+    header = HEADER.format(language=catalog.locale.english_name, code=catalog.locale, plural=catalog.plural_forms)
     path.write_text(header + text.getvalue().decode().strip() + "\n", encoding="utf-8")
 
 

@@ -94,9 +94,7 @@ def string_power(
     size = max(1, CHUNK // ((EVEN + KNEES * len(NEAR_KNEE)) * irradiance.shape[1]))
     for start in range(0, len(lit), size):
         hours = lit[start : start + size]
-        power[hours] = _maximum(
-            cell, irradiance[hours], temperature[hours], cells, substring, bypass
-        )
+        power[hours] = _maximum(cell, irradiance[hours], temperature[hours], cells, substring, bypass)
     return power
 
 
@@ -105,9 +103,7 @@ def _maximum(cell, irradiance, temperature, cells, substring, bypass) -> NDArray
     current = _candidates(cell_currents(cell, irradiance, temperature)[0], substring)
     rows = np.arange(len(current))
     for _ in range(REFINEMENTS + 1):
-        power = current * string_voltage(
-            cell, current, irradiance, temperature, cells, substring, bypass=bypass
-        )
+        power = current * string_voltage(cell, current, irradiance, temperature, cells, substring, bypass=bypass)
         best = power.argmax(axis=1)
         low = np.where(best > 0, current[rows, np.maximum(best - 1, 0)], 0.0)
         high = current[rows, np.minimum(best + 1, current.shape[1] - 1)]
@@ -120,9 +116,7 @@ def _candidates(photo: NDArray[np.float64], substring: NDArray[np.int64]) -> NDA
 
     Each maximum of the power lies just below the photocurrent that limits some substring.
     """
-    limits = np.stack(
-        [photo[:, substring == number].min(axis=1) for number in np.unique(substring)], axis=1
-    )
+    limits = np.stack([photo[:, substring == number].min(axis=1) for number in np.unique(substring)], axis=1)
     if limits.shape[1] > KNEES:
         limits = np.quantile(limits, np.linspace(0, 1, KNEES), axis=1).T
     near = (limits[:, :, None] * np.array(NEAR_KNEE)).reshape(len(photo), -1)
@@ -145,9 +139,16 @@ def string_voltage(
     table = _diode_table(cell, float(max(photo.max(), current.max())))
     order = np.argsort(substring, kind="stable")
     return _string_voltage(
-        current, photo[:, order], temperature[:, order].astype(float), cells[order],
-        substring[order], table.voltage, table.reach, cell.series, bypass,
-    )  # fmt: skip
+        current,
+        photo[:, order],
+        temperature[:, order].astype(float),
+        cells[order],
+        substring[order],
+        table.voltage,
+        table.reach,
+        cell.series,
+        bypass,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,12 +222,7 @@ class SubsystemYield:
 
 
 def cell_temperatures(
-    irradiance: NDArray[np.floating],
-    weather: Weather,
-    steps: NDArray[np.int64],
-    *,
-    mounting: str,
-    efficiency: float,
+    irradiance: NDArray[np.floating], weather: Weather, steps: NDArray[np.int64], *, mounting: str, efficiency: float
 ) -> NDArray[np.float64]:
     """Cell temperature [S, h] [C] by Faiman's heat balance with PVsyst's coefficients.
 
@@ -242,9 +238,7 @@ def cell_temperatures(
     )
 
 
-def _cell_power(
-    cell: Cell, irradiance: NDArray[np.float64], temperature: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _cell_power(cell: Cell, irradiance: NDArray[np.float64], temperature: NDArray[np.float64]) -> NDArray[np.float64]:
     """Maximum power of one cell by itself, of the shape of its conditions [W]; from a table."""
     light = np.linspace(0.0, max(1.0, irradiance.max()), 101)
     warm = np.linspace(temperature.min() - 1, temperature.max() + 1, 41)
@@ -304,10 +298,6 @@ def subsystem_yields(
         peak = sheet.power * len(subsystem.modules)
         alternating = pvlib.inverter.pvwatts(direct, peak, eta_inv_nom=inverter_efficiency)
         unmatched = float(ideal) * weather.step_h * (1 - other_losses)
-        result.append(
-            SubsystemYield(
-                subsystem.name, len(subsystem.modules), peak, direct, alternating, unmatched
-            )
-        )
+        result.append(SubsystemYield(subsystem.name, len(subsystem.modules), peak, direct, alternating, unmatched))
         progress("yield", (k + 1) / len(subsystems))
     return result

@@ -65,14 +65,10 @@ def cell_irradiance(
     series = three_part(sky_series(weather, "solar"))
     steps = np.flatnonzero(series.diffuse_horizontal + series.direct_normal > 0)
     sky, sun = (
-        series_matrix(
-            series, steps, SUBDIVISION, part, ground_reflectance=weather.albedo, dtype=np.float32
-        )
+        series_matrix(series, steps, SUBDIVISION, part, ground_reflectance=weather.albedo, dtype=np.float32)
         for part in ("sky", "sun")
     )
-    shares = sunlit_shares(
-        surfaces, points, normals, series.sun[steps], edges=edges, seed=seed, progress=progress
-    )
+    shares = sunlit_shares(surfaces, points, normals, series.sun[steps], edges=edges, seed=seed, progress=progress)
     cosine = np.maximum(normals @ series.sun[steps].T, 0.0)
     beam = shares * cosine * series.direct_normal[steps]
     modifier = pvlib.iam.physical(WHOLE_DEGREES)
@@ -80,12 +76,19 @@ def cell_irradiance(
     for before, acceptance in ((0, None), (2, modifier)):
         whole, own = (
             sky_irradiance_matrix(
-                surfaces, points, normals, subdivision=SUBDIVISION, acceptance=acceptance,
-                samples=samples, max_depth=depth, seed=seed, cache=cache,
+                surfaces,
+                points,
+                normals,
+                subdivision=SUBDIVISION,
+                acceptance=acceptance,
+                samples=samples,
+                max_depth=depth,
+                seed=seed,
+                cache=cache,
                 progress=item(progress, "sky irradiance", before + k, 4, whole=True),
             )
             for k, depth in enumerate((16, 1), 1)
-        )  # fmt: skip
+        )
         diffuse = whole.values.astype(np.float32) @ sky
         diffuse += np.maximum(whole.values - own.values, 0.0).astype(np.float32) @ sun
         annual = sky.sum(axis=1, dtype=float)

@@ -44,11 +44,7 @@ class PvModule:
 
 
 def pv_modules(
-    elements: Sequence[Element],
-    guids: frozenset[str],
-    *,
-    substrings: int = 3,
-    along: int = 4,
+    elements: Sequence[Element], guids: frozenset[str], *, substrings: int = 3, along: int = 4
 ) -> list[PvModule]:
     """The modules among a model's elements, in the order of their GUIDs' first appearance.
 
@@ -83,15 +79,19 @@ def _module(parts: Sequence[Element], mesh: RayMesh, substrings: int, along: int
     v = (np.arange(along) + 0.5) / along - 0.5
     strip, place = (one.ravel() for one in np.meshgrid(np.arange(substrings), v, indexing="ij"))
     points = middle + u[strip][:, None] * across + place[:, None] * lengthwise
-    edges = np.broadcast_to(
-        np.stack([across / substrings, lengthwise / along]), (len(points), 2, 3)
-    )
+    edges = np.broadcast_to(np.stack([across / substrings, lengthwise / along]), (len(points), 2, 3))
     ring = np.asarray(shapely.orient_polygons(face.polygon).exterior.coords)[:-1]
     outline = face.plane.to_world(ring)
     return PvModule(
-        first.guid, first.name, outline if side > 0 else outline[::-1], normal,
-        float(face.polygon.area), points + OFF_THE_FACE * normal, edges, strip,
-    )  # fmt: skip
+        first.guid,
+        first.name,
+        outline if side > 0 else outline[::-1],
+        normal,
+        float(face.polygon.area),
+        points + OFF_THE_FACE * normal,
+        edges,
+        strip,
+    )
 
 
 def _is_sheet(triangles: NDArray[np.float64]) -> bool:

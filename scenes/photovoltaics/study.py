@@ -113,9 +113,8 @@ def run_pv(
     """
     queries = [study.module.select, *(table.select for table in study.subsystem)]
     inputs, (selected, *of_subsystems) = outdoor_inputs(
-        options, files, queries, leave_out=study.leave_out,
-        reflectance=study.surroundings, file=file, progress=progress,
-    )  # fmt: skip
+        options, files, queries, leave_out=study.leave_out, reflectance=study.surroundings, file=file, progress=progress
+    )
     building, weather = inputs.building, inputs.weather
     along, substrings = study.module.groups, study.module.substrings
     modules = pv_modules(building.elements, selected, substrings=substrings, along=along)
@@ -129,24 +128,25 @@ def run_pv(
     head = replace(head, model=model, issues=(*building.issues, *issues))
     on_head(head)
     irradiance = cell_irradiance(
-        building.elements, modules, weather, samples=samples, seed=seed, progress=progress,
-        cache=cache,
-    )  # fmt: skip
-    yields = subsystem_yields(
-        modules, subsystems, irradiance, weather, study.module.datasheet(), cell,
-        mounting=study.module.mounting, other_losses=study.other_losses,
-        inverter_efficiency=study.inverter_efficiency, progress=progress,
-    )  # fmt: skip
-    return PvResult(
-        building, tuple(modules), subsystems, irradiance, tuple(yields), weather, head.issues, head
+        building.elements, modules, weather, samples=samples, seed=seed, progress=progress, cache=cache
     )
+    yields = subsystem_yields(
+        modules,
+        subsystems,
+        irradiance,
+        weather,
+        study.module.datasheet(),
+        cell,
+        mounting=study.module.mounting,
+        other_losses=study.other_losses,
+        inverter_efficiency=study.inverter_efficiency,
+        progress=progress,
+    )
+    return PvResult(building, tuple(modules), subsystems, irradiance, tuple(yields), weather, head.issues, head)
 
 
 def _subsystems(
-    study: PvStudy,
-    selected: Sequence[frozenset[str]],
-    modules: Sequence[PvModule],
-    file: Path | None,
+    study: PvStudy, selected: Sequence[frozenset[str]], modules: Sequence[PvModule], file: Path | None
 ) -> tuple[tuple[Subsystem, ...], list[Issue]]:
     """Modules of each stated subsystem; without any, those of each orientation.
 
@@ -192,11 +192,7 @@ def _unalike(modules: Sequence[PvModule]) -> list[Issue]:
     sizes = [round(module.area, 2) for module in modules]
     usual = Counter(sizes).most_common(1)[0][0]
     return [
-        Issue(
-            "module-of-other-size",
-            module.guid,
-            {"module": module.name, "area": module.area, "usual": usual},
-        )
+        Issue("module-of-other-size", module.guid, {"module": module.name, "area": module.area, "usual": usual})
         for module in modules
         if abs(module.area - usual) > 0.05 * usual
     ]

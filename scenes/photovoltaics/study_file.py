@@ -30,9 +30,14 @@ class ModuleTable(TomlTable):
     def datasheet(self) -> Datasheet:
         """The electrical part."""
         return Datasheet(
-            self.short_circuit_current, self.open_circuit_voltage, self.current, self.voltage,
-            self.cells, self.current_coefficient, self.shunt,
-        )  # fmt: skip
+            self.short_circuit_current,
+            self.open_circuit_voltage,
+            self.current,
+            self.voltage,
+            self.cells,
+            self.current_coefficient,
+            self.shunt,
+        )
 
 
 class SubsystemTable(TomlTable):

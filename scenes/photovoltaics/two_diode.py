@@ -109,17 +109,12 @@ def fitted_cell(sheet: Datasheet) -> Cell:
         photo, first, second = currents(series)
         if photo > 0 and first > 0 and second >= 0:
             return Cell(
-                float(photo), float(first), float(second), float(series), sheet.shunt,
-                sheet.current_coefficient,
-            )  # fmt: skip
-    raise DataError(
-        "no two-diode cell has these currents and voltages: check them and the number of cells"
-    )
+                float(photo), float(first), float(second), float(series), sheet.shunt, sheet.current_coefficient
+            )
+    raise DataError("no two-diode cell has these currents and voltages: check them and the number of cells")
 
 
-def cell_currents(
-    cell: Cell, irradiance: ArrayLike, temperature: ArrayLike
-) -> tuple[NDArray[np.float64], ...]:
+def cell_currents(cell: Cell, irradiance: ArrayLike, temperature: ArrayLike) -> tuple[NDArray[np.float64], ...]:
     """I_ph, I_01, I_02 [A] and V_t [V] at irradiance [W/m2] and cell temperature [C]."""
     kelvin = np.asarray(temperature, dtype=float) + ICE
     thermal, reference = BOLTZMANN * kelvin, BOLTZMANN * STANDARD_TEMPERATURE

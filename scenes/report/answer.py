@@ -57,9 +57,7 @@ def rooms_answer(rooms: Sequence[Judged]) -> str:
     if not met:
         head = gettext("No room meets every limit in the table below.")
     else:
-        head = gettext(
-            "{met} of {all} rooms meet every limit in the table below.", met=met, all=len(rooms)
-        )
+        head = gettext("{met} of {all} rooms meet every limit in the table below.", met=met, all=len(rooms))
     if len(failing) <= MOST_NAMED:
         return f"{head} {semicolons([_fails(room, _names) for room in failing])}."
     counts = Counter(card.label for room in failing for card in room.failed)
@@ -80,9 +78,7 @@ def systems_answer(cases: Sequence[Judged], energy_kwh: Sequence[float | None]) 
         return ""
     if len(pairs) == 1:
         return _alone(pairs[0][0])
-    order = sorted(
-        pairs, key=lambda one: (len(one[0].failed), math.inf if one[1] is None else one[1])
-    )
+    order = sorted(pairs, key=lambda one: (len(one[0].failed), math.inf if one[1] is None else one[1]))
     fewest = len(order[0][0].failed)
     best = [case for case, _ in order if len(case.failed) == fewest]
     others = [case for case, _ in order if len(case.failed) > fewest]
@@ -141,8 +137,7 @@ def _best(best: Sequence[Judged], fewest: int) -> str:
     facts = {"names": names, "met": best[0].met, "limits": count}
     if len(best) == 1:
         return gettext(
-            "No system meets all limits. {names} meets the most, {met} of {limits}, and fails "
-            "{failed}.",
+            "No system meets all limits. {names} meets the most, {met} of {limits}, and fails {failed}.",
             **facts,
             failed=_values(best[0].failed),
         )
@@ -162,16 +157,10 @@ def _energy(order: Sequence[tuple[Judged, float | None]], best: Sequence[Judged]
     least, first = min(known, key=known.__getitem__), best[0].name
     facts = {"name": first, "energy": rounded(known[first], 0)}
     if least == first:
-        return [
-            gettext(
-                "{name} needs the least heating, cooling and lighting energy: {energy} kWh a year.",
-                **facts,
-            )
-        ]
+        return [gettext("{name} needs the least heating, cooling and lighting energy: {energy} kWh a year.", **facts)]
     return [
         gettext(
-            "{name} needs {energy} kWh of heating, cooling and lighting a year; the least is "
-            "{lowest} kWh ({least}).",
+            "{name} needs {energy} kWh of heating, cooling and lighting a year; the least is {lowest} kWh ({least}).",
             **facts,
             lowest=rounded(known[least], 0),
             least=least,

@@ -15,9 +15,7 @@ from scenes.report.model3d import checked_model
 DOUBTS = ("loss", "warning", "assumption")
 
 
-def check_record(
-    building: Building, head: Sequence[str], uses: Mapping[str, tuple[str, str, bool]]
-) -> dict[str, Any]:
+def check_record(building: Building, head: Sequence[str], uses: Mapping[str, tuple[str, str, bool]]) -> dict[str, Any]:
     """What `cfs check --json` writes: site, head, rooms, issues, and the 3D model of the viewer.
 
     Args:
@@ -27,10 +25,7 @@ def check_record(
     return {
         "name": building.name,
         "file": "" if building.file is None else building.file.name,
-        "site": {
-            "latitude_deg": building.latitude_deg,
-            "longitude_deg": building.longitude_deg,
-        },
+        "site": {"latitude_deg": building.latitude_deg, "longitude_deg": building.longitude_deg},
         "head": list(map(str, head)),
         "rooms": [_room(space, building.issues, uses) for space in building.spaces],
         "issues": [
@@ -48,9 +43,7 @@ def check_record(
     }
 
 
-def _room(
-    space: Space, issues: Iterable[Issue], uses: Mapping[str, tuple[str, str, bool]]
-) -> dict[str, Any]:
+def _room(space: Space, issues: Iterable[Issue], uses: Mapping[str, tuple[str, str, bool]]) -> dict[str, Any]:
     elements = {space.guid, space.label, space.name, *(w.guid for w in space.windows)}
     elements |= {face.element for face in space.faces if face.element is not None}
     doubts = {issue.severity for issue in issues if issue.where in elements}

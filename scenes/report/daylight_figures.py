@@ -34,24 +34,13 @@ def plans(room: RoomYear, beside: Sequence[RoomYear] = ()) -> tuple[FloorPlan, .
             q = quantity(column)
             values = daylight.sensor_metrics[column].to_numpy(dtype=float)
             scale = ColourScale(0, 100, q.label, "%")
-            pictures.append(
-                plan(frame, values, scale, title=q.label, explanation=_mean(values, "%", q.meaning))
-            )
+            pictures.append(plan(frame, values, scale, title=q.label, explanation=_mean(values, "%", q.meaning)))
     if column := sensor_column(room, "daylight_factor", "df"):
         values = daylight.sensor_metrics[column].to_numpy(dtype=float)
         scale = _from_zero(_of_all(column, room, beside), gettext("Daylight factor"), "%")
         digits = 1 if scale.high > 1 else 2
         text = _mean(values, "%", quantity("daylight_factor").meaning)
-        pictures.append(
-            plan(
-                frame,
-                values,
-                scale,
-                title=gettext("Daylight factor"),
-                explanation=text,
-                digits=digits,
-            )
-        )
+        pictures.append(plan(frame, values, scale, title=gettext("Daylight factor"), explanation=text, digits=digits))
     column = sensor_column(room, "sunlit_hours")
     if column and (every := _of_all(column, room, beside)).any():
         values = daylight.sensor_metrics[column].to_numpy(dtype=float)
@@ -62,9 +51,7 @@ def plans(room: RoomYear, beside: Sequence[RoomYear] = ()) -> tuple[FloorPlan, .
     every = np.concatenate([one.daylight.illuminance.mean(axis=0) for one in (room, *beside)])
     scale = _from_zero(every, gettext("Annual mean illuminance"), "lx")
     text = _mean(values, "lx", quantity("annual_mean").meaning)
-    pictures.append(
-        plan(frame, values, scale, title=gettext("Annual mean illuminance"), explanation=text)
-    )
+    pictures.append(plan(frame, values, scale, title=gettext("Annual mean illuminance"), explanation=text))
     return tuple(pictures)
 
 
@@ -97,13 +84,7 @@ def illuminance_carpet(result: RunResult, room: RoomYear) -> Chart:
             lux=significant(float(np.median(median[lit])), 2),
         )
     values = np.where(lit, median, np.nan)
-    return carpet(
-        result.times,
-        values,
-        scale,
-        title=gettext("Illuminance of the work plane"),
-        explanation=text,
-    )
+    return carpet(result.times, values, scale, title=gettext("Illuminance of the work plane"), explanation=text)
 
 
 def _from_zero(values, label: str, unit: str) -> ColourScale:

@@ -23,9 +23,15 @@ LARGEST_SIDE = 620  # [px] of a picture in the page
 MANY_ROOMS, SIDE_OF_MANY = 10, 240  # beyond so many rooms [px]
 BRIDGE = 4  # slits up to twice as many pixels wide do not split an outline
 COMPASS = (
-    N_("north"), N_("north-east"), N_("east"), N_("south-east"), N_("south"), N_("south-west"),
-    N_("west"), N_("north-west"),
-)  # fmt: skip
+    N_("north"),
+    N_("north-east"),
+    N_("east"),
+    N_("south-east"),
+    N_("south"),
+    N_("south-west"),
+    N_("west"),
+    N_("north-west"),
+)
 OUTLINE = (255, 0, 144)  # of glare sources; occurs in no colour map used here
 
 
@@ -122,9 +128,7 @@ def glare_picture(
         seen[outline(mask)] = OUTLINE
         count = int(glare.get("sources", 0))
         sources = (
-            ngettext("{count} glare source (outlined)", "{count} glare sources (outlined)", count)
-            if count
-            else ""
+            ngettext("{count} glare source (outlined)", "{count} glare sources (outlined)", count) if count else ""
         )
     numbers = f"Ev {significant(glare['ev'], 3)} lx" if "ev" in glare else ""
     brightest = gettext("up to {value} cd/m²", value=significant(float(picture.luminance.max()), 2))
@@ -149,9 +153,7 @@ def sun_words(result: RunResult, hour: int) -> str:
         return gettext("sun below the horizon")
     azimuth = np.degrees(np.arctan2(sun[0], sun[1])) % 360
     return gettext(
-        "solar altitude {altitude}°, azimuth {azimuth}°",
-        altitude=f"{altitude:.0f}",
-        azimuth=f"{azimuth:.0f}",
+        "solar altitude {altitude}°, azimuth {azimuth}°", altitude=f"{altitude:.0f}", azimuth=f"{azimuth:.0f}"
     )
 
 

@@ -24,12 +24,7 @@ PROTECTION = {  # DGP of EN 17037's levels
     "minimum": N_("minimum: at most 0.45"),
     "none": N_("above 0.45"),
 }
-LEVEL_WORDS = {
-    "high": N_("high"),
-    "medium": N_("medium"),
-    "minimum": N_("minimum"),
-    "none": N_("none"),
-}
+LEVEL_WORDS = {"high": N_("high"), "medium": N_("medium"), "minimum": N_("minimum"), "none": N_("none")}
 GOOD, FAIR, POOR, PLAIN = "good", "fair", "poor", "plain"
 GLARE_OF_PICTURES, GLARE_OF_YEAR = "glare of pictures", "glare of the year"
 
@@ -130,12 +125,8 @@ def _spatial_autonomy(room: RoomYear) -> Card | None:
         if value >= 55
         else (POOR, gettext("below 55 % (LM-83)"))
     )
-    words = gettext(
-        "of the work plane has 300 lx of daylight in at least half of the occupied hours"
-    )
-    card = _of_plane(
-        value, gettext("Spatial daylight autonomy"), words, "sda300_50", (grade, verdict)
-    )
+    words = gettext("of the work plane has 300 lx of daylight in at least half of the occupied hours")
+    card = _of_plane(value, gettext("Spatial daylight autonomy"), words, "sda300_50", (grade, verdict))
     own = room_metric(room, "sda300_50_standard_error")
     error = "" if own is None else points_error(own)
     return replace(card, worth=value, error=error)
@@ -152,15 +143,8 @@ def _sunlight(room: RoomYear) -> Card | None:
     value = room_metric(room, "ase")
     if value is None:
         return None
-    grade, verdict = (
-        (GOOD, gettext("at most 10 % (LM-83)"))
-        if value <= 10
-        else (POOR, gettext("above 10 % (LM-83)"))
-    )
-    words = gettext(
-        "of the work plane receives more than 1000 lx of direct sun in more than 250 occupied "
-        "hours a year"
-    )
+    grade, verdict = (GOOD, gettext("at most 10 % (LM-83)")) if value <= 10 else (POOR, gettext("above 10 % (LM-83)"))
+    words = gettext("of the work plane receives more than 1000 lx of direct sun in more than 250 occupied hours a year")
     label = gettext("Annual sunlight exposure")
     return replace(_of_plane(value, label, words, "ase1000_250", (grade, verdict)), worth=-value)
 
@@ -178,16 +162,13 @@ def _autonomy(room: RoomYear) -> Card | None:
         return None
     values = room.daylight.sensor_metrics[column].to_numpy(dtype=float)
     words = gettext(
-        "of the occupied hours have 300 lx of daylight, averaged over the work plane "
-        "(sensors: {least} to {most} %)",
+        "of the occupied hours have 300 lx of daylight, averaged over the work plane (sensors: {least} to {most} %)",
         least=percent(values.min()),
         most=percent(values.max()),
     )
     meaning = quantity("da300").meaning
     mean = float(values.mean())
-    return Card(
-        gettext("Daylight autonomy"), percent(mean), "%", words, meaning=meaning, meter=mean
-    )
+    return Card(gettext("Daylight autonomy"), percent(mean), "%", words, meaning=meaning, meter=mean)
 
 
 def _provision(room: RoomYear) -> Card | None:
@@ -210,9 +191,7 @@ def _provision(room: RoomYear) -> Card | None:
     reached = levels[max(index - 1, 0)]
     limits = {"target": f"{reached.target:g}", "least": f"{reached.minimum:g}"}
     verdict = (
-        gettext("{target} and {least} lx", **limits)
-        if index
-        else gettext("below {target} and {least} lx", **limits)
+        gettext("{target} and {least} lx", **limits) if index else gettext("below {target} and {least} lx", **limits)
     )
     grade = (POOR, FAIR, GOOD, GOOD)[index]
     return Card(
@@ -269,9 +248,7 @@ def _protection(room: RoomYear) -> Card | None:
     return protection_card(protection_level(dgp), noise, words, -hour_not_exceeded(dgp))
 
 
-def protection_card(
-    level: str, noise: float | None, words: str = "", worth: float | None = None
-) -> Card:
+def protection_card(level: str, noise: float | None, words: str = "", worth: float | None = None) -> Card:
     """EN 17037's protection from glare by its level: high, medium, minimum or none.
 
     Args: noise: standard error of an hour's DGP from the tracing; None where it is not known.
@@ -313,9 +290,7 @@ def _warm_hours(room: RoomYear) -> Card | None:
     )
     words += f" {heated(room)}"
     meaning = quantity("operative_c").meaning
-    return Card(
-        gettext("Overheating hours"), rounded(hours, 0), "h", words, meaning=meaning, meter=share
-    )
+    return Card(gettext("Overheating hours"), rounded(hours, 0), "h", words, meaning=meaning, meter=share)
 
 
 def _comfort(room: RoomYear) -> Card | None:
@@ -330,14 +305,11 @@ def _comfort(room: RoomYear) -> Card | None:
     outside = 100 * float((~applicable(comfort))[used].mean())
     if outside > 0.5:
         outdoors = gettext(
-            "{share} % are outside the range of the model and count as uncomfortable",
-            share=percent(outside),
+            "{share} % are outside the range of the model and count as uncomfortable", share=percent(outside)
         )
         words = semicolons([words, outdoors])
     meaning = quantity(widest).meaning
-    return Card(
-        gettext("Adaptive comfort"), percent(value), "%", words, meaning=meaning, meter=value
-    )
+    return Card(gettext("Adaptive comfort"), percent(value), "%", words, meaning=meaning, meter=value)
 
 
 def comfort_columns(comfort: pd.DataFrame) -> list[str]:
@@ -358,5 +330,10 @@ def _peak(room: RoomYear) -> Card | None:
         low=rounded(float(air.min()), 1),
     )
     words += f" {heated(room)}"
-    return Card(gettext("Peak temperature"), rounded(float(np.max(operative)), 1), "°C", words,
-                meaning=quantity("operative_c").meaning)  # fmt: skip
+    return Card(
+        gettext("Peak temperature"),
+        rounded(float(np.max(operative)), 1),
+        "°C",
+        words,
+        meaning=quantity("operative_c").meaning,
+    )

@@ -9,21 +9,14 @@ from scenes.language.catalogue import N_, gettext, translated
 from scenes.language.numbers import rounded, share
 from scenes.results import RunResult
 
-METHODS = {
-    "three-phase": N_("three-phase"),
-    "five-phase": N_("five-phase"),
-    "point-in-time": N_("point-in-time"),
-}
+METHODS = {"three-phase": N_("three-phase"), "five-phase": N_("five-phase"), "point-in-time": N_("point-in-time")}
 MATRICES = N_(
     "Mitsuba 3 traces rays for the view matrix V (light that leaves the window in each direction "
     "and reaches a sensor) and the daylight matrix D (light of each patch of sky and ground that "
     "reaches the window). With the transmission matrix T of the fenestration (from its BSDF) and "
     "the sky vector s of each hour, the illuminance is V T D s."
 )
-SKIES = N_(
-    "Skies follow the Perez all-weather model, from the direct and diffuse irradiance of the "
-    "weather file."
-)
+SKIES = N_("Skies follow the Perez all-weather model, from the direct and diffuse irradiance of the weather file.")
 LIGHT = {  # sentences
     "three-phase": (N_("Three-phase method."), MATRICES, SKIES),
     "five-phase": (
@@ -82,10 +75,7 @@ FREE_RUNNING = N_(
     "A heat balance of the room's surfaces and air every ten minutes, without heating and cooling, "
     "gives the temperatures."
 )
-COMFORT = N_(
-    "Comfort follows from the operative temperature and the running mean of the outdoor "
-    "temperature."
-)
+COMFORT = N_("Comfort follows from the operative temperature and the running mean of the outdoor temperature.")
 
 
 def method_words(result: RunResult) -> list[tuple[str, str]]:
@@ -186,9 +176,7 @@ def _sources(result: RunResult) -> str:
 
 
 def _moved(result: RunResult) -> bool:
-    return any(
-        room.operation is not None and len(room.operation.states) > 1 for room in result.spaces
-    )
+    return any(room.operation is not None and len(room.operation.states) > 1 for room in result.spaces)
 
 
 def _glare(result: RunResult) -> str:
@@ -213,15 +201,9 @@ def _heat(result: RunResult) -> str:
     controlled = any(room.operation is not None for room in result.spaces)
     sentences = [*HEAT, CONTROLLED if controlled else FREE_RUNNING, COMFORT]
     if _coupled(result):
-        sentences.append(
-            N_("The rooms are balanced together: heat flows through the walls between them.")
-        )
+        sentences.append(N_("The rooms are balanced together: heat flows through the walls between them."))
     elif len(result.spaces) > 1:
-        sentences.append(
-            N_("Each room is balanced alone; adjacent rooms are assumed to have its temperature.")
-        )
+        sentences.append(N_("Each room is balanced alone; adjacent rooms are assumed to have its temperature."))
     if _moved(result):
-        sentences.append(
-            N_("The shading state of each hour applies to light, glare and heat alike.")
-        )
+        sentences.append(N_("The shading state of each hour applies to light, glare and heat alike."))
     return " ".join(gettext(sentence) for sentence in sentences)

@@ -24,9 +24,14 @@ from scenes.results import RunResult
 MOST_TRIANGLES = 24_000  # of the surroundings; beyond, the smallest are left out
 KINDS = ("floor", "ceiling", "wall", "door", "frame", "glass", "furniture", "outdoors")
 KIND_OF_FACE = {
-    "floor": "floor", "ceiling": "ceiling", "roof": "ceiling", "wall": "wall", "door": "door",
-    "window frame": "frame", "reveal": "wall",
-}  # fmt: skip
+    "floor": "floor",
+    "ceiling": "ceiling",
+    "roof": "ceiling",
+    "wall": "wall",
+    "door": "door",
+    "window frame": "frame",
+    "reveal": "wall",
+}
 ON_TOP = 0.1  # surroundings that begin at most so far below a storey's top are on it [m]
 TERRAIN = ("IfcSite", "IfcGeographic")
 BESIDE = 1.0  # elements this near belong to the building [m]
@@ -101,9 +106,7 @@ def checked_model(building: Building, before: Building | None = None) -> Model3D
 
 def _cube(middle: NDArray[np.float64], half: float) -> NDArray[np.float64]:
     """Triangles [12, 3, 3] of a cube, normals out."""
-    corners = middle + half * np.array(
-        [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-    )
+    corners = middle + half * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
     return corners[[k for a, b, c, d in quads for k in (a, b, c, a, c, d)]].reshape(-1, 3, 3)
 
@@ -113,9 +116,7 @@ def _arrow(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.fl
     length = NORTH * float((high - low)[:2].max())
     tip = np.array([(low[0] + high[0]) / 2, low[1] - length / 4, low[2]])
     left, right, notch = tip + length * np.array([(-0.25, -1, 0), (0.25, -1, 0), (0, -0.75, 0)])
-    return np.array(
-        [[tip, notch, left], [tip, right, notch]]
-    )  # faces towards the eye are not drawn
+    return np.array([[tip, notch, left], [tip, right, notch]])  # faces towards the eye are not drawn
 
 
 def _model(
@@ -155,22 +156,17 @@ def _model(
     for index, space in enumerate(spaces):
         for kind, triangles, edges in room_batches(space):
             batches.append(
-                {"room": index, "storey": levels[index], "kind": kind, "t": packed(triangles),
-                 "e": packed(edges)}
-            )  # fmt: skip
+                {"room": index, "storey": levels[index], "kind": kind, "t": packed(triangles), "e": packed(edges)}
+            )
     above = (outdoors[:, :, 2].min(axis=1)[:, None] + ON_TOP >= tops).sum(axis=1)
     for level in np.unique(above):
         part = outdoors[above == level]
         edges = outline_edges(part)
-        batches.append(
-            {"room": -1, "storey": int(level), "kind": "outdoors", "t": packed(part),
-             "e": packed(edges)}
-        )  # fmt: skip
+        batches.append({"room": -1, "storey": int(level), "kind": "outdoors", "t": packed(part), "e": packed(edges)})
     for kind, triangles in extra:
         batches.append(
-            {"room": -1, "storey": 0, "kind": kind, "t": packed(triangles),
-             "e": packed(outline_edges(triangles))}
-        )  # fmt: skip
+            {"room": -1, "storey": 0, "kind": kind, "t": packed(triangles), "e": packed(outline_edges(triangles))}
+        )
     cells, owners = [np.empty((0, 4, 3))], []
     for index, places in enumerate(points):
         flat = sensor_cells(places)
@@ -179,22 +175,24 @@ def _model(
         z = np.broadcast_to(places[:, None, 2:3], (*flat.shape[:2], 1))
         cells.append(np.concatenate([flat, z], axis=-1))
         owners += [index] * len(flat)
-    sensors = {
-        "room": owners,
-        "storey": [levels[owner] for owner in owners],
-        "corners": packed(np.concatenate(cells)),
-    }
+    sensors = {"room": owners, "storey": [levels[owner] for owner in owners], "corners": packed(np.concatenate(cells))}
     labels = tuple(space.label for space in spaces)
     whole = tuple(map(tuple, (box - centre).round(3).tolist()))
     return Model3D(
-        tuple(centre), whole, unit, tuple(batches), sensors, layers, labels, names, left_out,
+        tuple(centre),
+        whole,
+        unit,
+        tuple(batches),
+        sensors,
+        layers,
+        labels,
+        names,
+        left_out,
         tuple(dict.fromkeys(kind for kind, _ in extra)),
-    )  # fmt: skip
+    )
 
 
-def cut_to(
-    triangles: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def cut_to(triangles: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
     """The part of the triangles [T, 3, 3] within an upright box."""
     for axis, sign, corner in [(a, s, c) for a in range(3) for s, c in ((1.0, low), (-1.0, high))]:
         if (sign * (triangles[..., axis] - corner[axis]) < 0).any():
@@ -221,9 +219,7 @@ def building_box(building: Building) -> NDArray[np.float64]:
     return box
 
 
-def storey_levels(
-    spaces: Sequence[Space],
-) -> tuple[tuple[str, ...], list[int], NDArray[np.float64]]:
+def storey_levels(spaces: Sequence[Space]) -> tuple[tuple[str, ...], list[int], NDArray[np.float64]]:
     """Storeys, the lowest first: their names, that of each room, and where each ends above [m]."""
     floors: dict[str, float] = {}
     tops: dict[str, float] = {}
@@ -269,9 +265,7 @@ def outline_edges(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
     owner = np.tile(np.arange(len(corners)), 3)
-    keys, inverse, count = np.unique(
-        np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
+    keys, inverse, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
     first, last = np.full(len(keys), -1), np.full(len(keys), -1)
     last[inverse.ravel()] = owner
     first[inverse.ravel()[::-1]] = owner[::-1]

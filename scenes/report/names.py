@@ -15,9 +15,16 @@ PERCENT = "%"
 WITHIN = re.compile(r"^within_(.+)$")
 UDI = re.compile(r"^udi_?(below|under|above|over)?_?(\d+)?_?(?:to_)?(\d+)?(?:_lx)?$")
 ENDINGS = {
-    "_percent": PERCENT, "_pct": PERCENT, "_c": "°C", "_w": "W", "_kwh": "kWh", "_lx": "lx",
-    "_hours": "h", "_h": "h", "_m2": "m²",
-}  # fmt: skip
+    "_percent": PERCENT,
+    "_pct": PERCENT,
+    "_c": "°C",
+    "_w": "W",
+    "_kwh": "kWh",
+    "_lx": "lx",
+    "_hours": "h",
+    "_h": "h",
+    "_m2": "m²",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,21 +138,13 @@ def _useful_illuminance(side: str | None, first: str | None, second: str | None)
         )
     elif first and side in ("below", "under"):
         label = gettext("UDI below {limit} lx", limit=first)
-        meaning = gettext(
-            "Useful daylight illuminance: share of the occupied hours below {limit} lx.",
-            limit=first,
-        )
+        meaning = gettext("Useful daylight illuminance: share of the occupied hours below {limit} lx.", limit=first)
     elif first and side:
         label = gettext("UDI above {limit} lx", limit=first)
-        meaning = gettext(
-            "Useful daylight illuminance: share of the occupied hours above {limit} lx.",
-            limit=first,
-        )
+        meaning = gettext("Useful daylight illuminance: share of the occupied hours above {limit} lx.", limit=first)
     else:
         label = "UDI"
-        meaning = gettext(
-            "Useful daylight illuminance: share of the occupied hours in the useful range."
-        )
+        meaning = gettext("Useful daylight illuminance: share of the occupied hours in the useful range.")
     return Quantity(label, PERCENT, 0, meaning)
 
 
@@ -154,9 +153,7 @@ def _within(limit: str) -> Quantity:
     if limit.isdigit():
         label = gettext("Within the {limit} % limits", limit=limit)
         meaning = gettext(
-            "Share of the occupied hours within the adaptive comfort band for {limit} % "
-            "acceptability.",
-            limit=limit,
+            "Share of the occupied hours within the adaptive comfort band for {limit} % acceptability.", limit=limit
         )
         return Quantity(label, PERCENT, 0, meaning)
     band = limit.replace("_", " ")

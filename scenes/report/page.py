@@ -126,9 +126,7 @@ def _path(result: RunResult, month: int, day: int) -> list[str]:
     if len(on) < 2:
         return []
     steps = np.arange(0, len(on) - 1, 1 / STEPS)
-    sun = np.stack(
-        [np.interp(steps, np.arange(len(on)), axis) for axis in result.sun[on].T], axis=1
-    )
+    sun = np.stack([np.interp(steps, np.arange(len(on)), axis) for axis in result.sun[on].T], axis=1)
     sun /= np.linalg.norm(sun, axis=1, keepdims=True)
     points = [_on_ring(one) for one in sun[sun[:, 2] > 0]]
     if not points:
@@ -182,22 +180,24 @@ def report_html(result: RunResult, page: PageOptions = OWN_PAGE) -> str:
         return _filled(result, page)
 
 
-def write_check(
-    building: Building, head: Sequence[str], path: Path, before: Building | None = None
-) -> None:
+def write_check(building: Building, head: Sequence[str], path: Path, before: Building | None = None) -> None:
     """Write the check of a model as one HTML file: head, 3D model, problems.
 
     Args: head: its first lines; before: the same file without its corrections.
     """
-    text = environment().get_template("check.html.j2").render(
-        page=OWN_PAGE,
-        title=building.name or gettext("Building"),
-        head=head,
-        model=checked_model(building, before),
-        problems=tables.problems_table(building.issues),
-        style=Markup(FILES["style.css"]),
-        scripts=Markup("\n".join(FILES[name] for name in SCRIPTS[:-1])),
-    )  # fmt: skip
+    text = (
+        environment()
+        .get_template("check.html.j2")
+        .render(
+            page=OWN_PAGE,
+            title=building.name or gettext("Building"),
+            head=head,
+            model=checked_model(building, before),
+            problems=tables.problems_table(building.issues),
+            style=Markup(FILES["style.css"]),
+            scripts=Markup("\n".join(FILES[name] for name in SCRIPTS[:-1])),
+        )
+    )
     write_text(path, text)
 
 
@@ -207,32 +207,36 @@ def _filled(result: RunResult, page: PageOptions) -> str:
     model = model3d(result)
     several = len(rooms) > 1
     metrics = room_metrics(result) if several else ()
-    return environment().get_template("report.html.j2").render(
-        page=page,
-        title=page.title or result.building.name or gettext("Building"),
-        result=result,
-        head=head_lines(result.head, result.notes),
-        rooms=rooms,
-        verdict=verdict(result, [room.cards for room in rooms]),
-        model=model,
-        orientation=orientation(result),
-        comparison=comparison(result, rooms),
-        metrics=metrics,
-        storeys=storey_plans(result) if several else (),
-        storey_data=storey_data(metrics, len(rooms)),
-        summary=summary(result) + page.facts,
-        problems=tables.problems_table(result.issues),
-        version=manifest.get("versions", {}).get("mitsuba-cfs", ""),
-        inputs=inputs_table(manifest.get("inputs", {})),
-        options=options_table(manifest),
-        versions=tables.nested_table(gettext("Versions"), manifest.get("versions", {})),
-        rest=tables.nested_table(gettext("Run"), remaining(manifest)),
-        timings=timings_table(result),
-        method=method_words(result),
-        glossary=glossary(),
-        style=Markup(FILES["style.css"]),
-        scripts=Markup("\n".join(FILES[name] for name in SCRIPTS)),
-    )  # fmt: skip
+    return (
+        environment()
+        .get_template("report.html.j2")
+        .render(
+            page=page,
+            title=page.title or result.building.name or gettext("Building"),
+            result=result,
+            head=head_lines(result.head, result.notes),
+            rooms=rooms,
+            verdict=verdict(result, [room.cards for room in rooms]),
+            model=model,
+            orientation=orientation(result),
+            comparison=comparison(result, rooms),
+            metrics=metrics,
+            storeys=storey_plans(result) if several else (),
+            storey_data=storey_data(metrics, len(rooms)),
+            summary=summary(result) + page.facts,
+            problems=tables.problems_table(result.issues),
+            version=manifest.get("versions", {}).get("mitsuba-cfs", ""),
+            inputs=inputs_table(manifest.get("inputs", {})),
+            options=options_table(manifest),
+            versions=tables.nested_table(gettext("Versions"), manifest.get("versions", {})),
+            rest=tables.nested_table(gettext("Run"), remaining(manifest)),
+            timings=timings_table(result),
+            method=method_words(result),
+            glossary=glossary(),
+            style=Markup(FILES["style.css"]),
+            scripts=Markup("\n".join(FILES[name] for name in SCRIPTS)),
+        )
+    )
 
 
 def storey_data(metrics: Sequence[RoomMetric], rooms: int) -> list[dict[str, Any]]:
@@ -241,11 +245,7 @@ def storey_data(metrics: Sequence[RoomMetric], rooms: int) -> list[dict[str, Any
         {
             "unit": metric.scale.unit,
             "rooms": [
-                [
-                    metric.words(i),
-                    metric.scale.hex(metric.values[i]),
-                    metric.scale.ink(metric.values[i]),
-                ]
+                [metric.words(i), metric.scale.hex(metric.values[i]), metric.scale.ink(metric.values[i])]
                 for i in range(rooms)
             ],
         }
@@ -305,12 +305,8 @@ def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
         north, east = building.latitude_deg, building.longitude_deg
         latitude, longitude = rounded(abs(north), 2), rounded(abs(east), 2)
         place = (
-            gettext("{degrees}° N", degrees=latitude)
-            if north >= 0
-            else gettext("{degrees}° S", degrees=latitude),
-            gettext("{degrees}° E", degrees=longitude)
-            if east >= 0
-            else gettext("{degrees}° W", degrees=longitude),
+            gettext("{degrees}° N", degrees=latitude) if north >= 0 else gettext("{degrees}° S", degrees=latitude),
+            gettext("{degrees}° E", degrees=longitude) if east >= 0 else gettext("{degrees}° W", degrees=longitude),
         )
         rows.append((gettext("Location"), semicolons(place)))
     manifest = result.manifest
@@ -427,18 +423,7 @@ def timings_table(result: RunResult) -> tables.Table:
 
 def remaining(manifest: Mapping) -> dict[str, Any]:
     """What the manifest holds besides the parts shown in tables of their own."""
-    shown = (
-        "quick",
-        "inputs",
-        "options",
-        "versions",
-        "fenestration",
-        "seconds",
-        "rooms",
-        "building",
-        "site",
-        "system",
-    )
+    shown = ("quick", "inputs", "options", "versions", "fenestration", "seconds", "rooms", "building", "site", "system")
     return {key: value for key, value in manifest.items() if key not in shown}
 
 

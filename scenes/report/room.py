@@ -15,13 +15,7 @@ from scenes.figures.plan import FloorPlan
 from scenes.figures.scale import ColourScale, round_limits
 from scenes.language.catalogue import N_, gettext, ngettext, translated
 from scenes.language.numbers import percent, rounded, share
-from scenes.report import (
-    daylight_figures,
-    glare_figures,
-    spectral_figures,
-    tables,
-    thermal_figures,
-)
+from scenes.report import daylight_figures, glare_figures, spectral_figures, tables, thermal_figures
 from scenes.report.glare_figures import compass
 from scenes.report.headline import Card, cards, occupied
 from scenes.report.names import quantity
@@ -78,9 +72,7 @@ def state_carpets(result: RunResult, room: RoomYear) -> tuple[Chart, ...]:
     charts = []
     per_day = round(pd.Timedelta(days=1) / (result.times[1] - result.times[0]))
     figures = shading.figures(room.heat.comfort["occupied"].to_numpy(bool), per_day)
-    for number, (group, rule, state) in enumerate(
-        zip(shading.groups, shading.rules, shading.states.T, strict=True)
-    ):
+    for number, (group, rule, state) in enumerate(zip(shading.groups, shading.rules, shading.states.T, strict=True)):
         count = np.bincount(state[lit], minlength=len(ran.states))
         legend = tuple(
             (STATE_COLOURS[i % len(STATE_COLOURS)], f"{name}: {percent(100 * n / lit.sum())} %")
@@ -143,8 +135,7 @@ def loads_chart(room: RoomYear) -> Chart | None:
         top,
         title=gettext("Heating, cooling and electric light by month"),
         explanation=gettext(
-            "Heating and cooling of an ideal system that keeps the set points, and electric light "
-            "dimmed by daylight."
+            "Heating and cooling of an ideal system that keeps the set points, and electric light dimmed by daylight."
         ),
     )
 
@@ -225,9 +216,7 @@ def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
         ),
         error_words=error_words(room),
         glare=glare_figures.gallery(result, room),
-        glare_table=tables.glare_table(result.times, room.glare.pictures)
-        if room.glare.pictures
-        else None,
+        glare_table=tables.glare_table(result.times, room.glare.pictures) if room.glare.pictures else None,
         glare_year=glare_carpet(result, room),
         spectral=spectral_figures.spectral_figures(result, room),
         temperature=thermal_figures.temperature_carpet(result, room),
@@ -268,10 +257,7 @@ def facts(space: Space, template: str = "") -> tuple[tuple[str, str], ...]:
                 area=rounded(glass, 1),
             ),
         ),
-        (
-            gettext("Orientation"),
-            ", ".join(dict.fromkeys(heading(w.normal) for w in space.windows)) or "–",
-        ),
+        (gettext("Orientation"), ", ".join(dict.fromkeys(heading(w.normal) for w in space.windows)) or "–"),
         (gettext("Glass-to-floor ratio"), f"{rounded(100 * glass / space.floor_area, 0)} %"),
     ]
     if space.storey:

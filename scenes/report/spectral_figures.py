@@ -64,9 +64,7 @@ def melanopic_against_glare(room: RoomYear, year: SpectralYear, dgp: NDArray[np.
     enough = np.log(MELANOPIC_BY_DAY)
     marks = (
         ChartMark(line((enough, enough), y_range, x_range, y_range), "limit", "250 lx"),
-        ChartMark(
-            line(x_range, (GLARE_LIMIT,) * 2, x_range, y_range), "limit", f"DGP {GLARE_LIMIT:.2f}"
-        ),
+        ChartMark(line(x_range, (GLARE_LIMIT,) * 2, x_range, y_range), "limit", f"DGP {GLARE_LIMIT:.2f}"),
     )
     ticks = log_values(LOWEST_LX, high)
     at = 100 * (np.log(ticks) - x_range[0]) / (x_range[1] - x_range[0])
@@ -83,9 +81,7 @@ def melanopic_against_glare(room: RoomYear, year: SpectralYear, dgp: NDArray[np.
             "day; below the other the view is without disturbing glare. Both hold in {both} % of "
             "the occupied hours; melanopic light alone in {enough} %, no glare alone in {calm} %.",
             both=percent(100 * np.count_nonzero(both) / count),
-            enough=percent(
-                100 * np.count_nonzero(used & ~calm & (edi >= MELANOPIC_BY_DAY)) / count
-            ),
+            enough=percent(100 * np.count_nonzero(used & ~calm & (edi >= MELANOPIC_BY_DAY)) / count),
             calm=percent(100 * np.count_nonzero(used & calm & (edi < MELANOPIC_BY_DAY)) / count),
         ),
         gettext("Melanopic EDI at the eye [lx]"),
@@ -125,7 +121,9 @@ def _melanopic_carpet(result: RunResult, room: RoomYear, year: SpectralYear) -> 
     summary = year.summary
     scale = ColourScale(25.0, 2500.0, gettext("Melanopic EDI at the eye"), "lx", True, "cividis")
     return carpet(
-        result.times, np.where(edi >= 1.0, edi, np.nan), scale,
+        result.times,
+        np.where(edi >= 1.0, edi, np.nan),
+        scale,
         title=gettext("Melanopic light through the year"),
         explanation=gettext(
             "Melanopic equivalent daylight illuminance at the eye of the view (CIE S 026): at "
@@ -135,4 +133,4 @@ def _melanopic_carpet(result: RunResult, room: RoomYear, year: SpectralYear) -> 
             ratio=significant(summary["melanopic_der"], 3),
             outdoors=significant(summary["outdoor_melanopic_der"], 3),
         ),
-    )  # fmt: skip
+    )

@@ -65,26 +65,11 @@ class StoreyPlan:
 def room_metrics(result: RunResult) -> tuple[RoomMetric, ...]:
     """Every figure that at least one room has."""
     asked: tuple[tuple[ColourScale, int, bool, Callable[[RoomYear], float | None]], ...] = (
-        (
-            _share(gettext("Spatial daylight autonomy")),
-            0,
-            True,
-            lambda room: room_metric(room, "sda"),
-        ),
+        (_share(gettext("Spatial daylight autonomy")), 0, True, lambda room: room_metric(room, "sda")),
         (_share(gettext("Daylight autonomy")), 0, True, _autonomy),
-        (
-            _share(gettext("Annual sunlight exposure")),
-            0,
-            False,
-            lambda room: room_metric(room, "ase"),
-        ),
+        (_share(gettext("Annual sunlight exposure")), 0, False, lambda room: room_metric(room, "ase")),
         (ColourScale(0.2, 0.5, gettext("Highest DGP"), "", colours="inferno"), 2, False, _glare),
-        (
-            _share(gettext("Occupied hours above {limit} °C", limit=f"{WARM_C:.0f}")),
-            0,
-            False,
-            _warm,
-        ),
+        (_share(gettext("Occupied hours above {limit} °C", limit=f"{WARM_C:.0f}")), 0, False, _warm),
         (_temperatures(result), 1, False, _peak),
     )
     metrics = []
@@ -119,10 +104,7 @@ def _storey(name: str, spaces: Sequence[Space], numbers: dict[str, int]) -> Stor
     west, south, east, north = shapely.union_all(outlines).bounds
     width, height = east - west + 2 * MARGIN, north - south + 2 * MARGIN
     box = (west - MARGIN, -(north + MARGIN), width, height)
-    rooms = [
-        _room(space, outline, numbers.get(space.guid))
-        for space, outline in zip(spaces, outlines, strict=True)
-    ]
+    rooms = [_room(space, outline, numbers.get(space.guid)) for space, outline in zip(spaces, outlines, strict=True)]
     view_box = " ".join(f"{UNIT * v:.0f}" for v in box)
     return StoreyPlan(name, view_box, width / height, tuple(rooms))
 

@@ -61,12 +61,8 @@ def glare_table(times: pd.DatetimeIndex, pictures: Iterable[LuminancePicture]) -
     keys = ["dgp", *(key for key in others if key != "dgp")]
     columns = [Column(gettext("Hour"), numeric=False, short=True)]
     columns += [_column(key) for key in keys]
-    columns.insert(
-        2, Column(gettext("Class"), "", gettext("Class of the DGP."), numeric=False, short=True)
-    )
-    columns.append(
-        Column(gettext("Brightest pixel"), "cd/m²", gettext("Highest luminance in the picture."))
-    )
+    columns.insert(2, Column(gettext("Class"), "", gettext("Class of the DGP."), numeric=False, short=True))
+    columns.append(Column(gettext("Brightest pixel"), "cd/m²", gettext("Highest luminance in the picture.")))
     rows = []
     for picture in pictures:
         row = [moment(times[picture.hour])]
@@ -161,11 +157,7 @@ def problems_table(issues: Iterable[Issue]) -> Table:
         Column(gettext("Treatment in the model"), numeric=False),
     )
     rows = tuple(
-        (
-            cell(one.glass, 2) if one.glass else "–",
-            one.first.where,
-            *issue_cells(one.text("command", gettext)),
-        )
+        (cell(one.glass, 2) if one.glass else "–", one.first.where, *issue_cells(one.text("command", gettext)))
         for one in ranked(tuple(issues))
     )
     return Table(gettext("Problems by element"), columns, rows)

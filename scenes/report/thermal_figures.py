@@ -28,9 +28,13 @@ def temperature_carpet(result: RunResult, room: RoomYear) -> Chart:
     low, high = round_limits(values, 8)
     scale = ColourScale(low, high, gettext("Operative temperature"), "°C", colours="cividis")
     return carpet(
-        result.times, values, scale, title=gettext("Operative temperature"), digits=1,
+        result.times,
+        values,
+        scale,
+        title=gettext("Operative temperature"),
+        digits=1,
         explanation=f"{quantity('operative_c').meaning} {heated(room)}",
-    )  # fmt: skip
+    )
 
 
 def comfort_carpet(result: RunResult, room: RoomYear) -> Chart | None:
@@ -45,9 +49,7 @@ def comfort_carpet(result: RunResult, room: RoomYear) -> Chart | None:
     within = comfort[columns[-1]].to_numpy(dtype=bool)
     strict = comfort[columns[0]].to_numpy(dtype=bool)
     classes = np.select(
-        [~occupied(room).to_numpy(), strict, within, ~covered, operative > neutral],
-        [-1, 0, 1, 4, 2],
-        default=3,
+        [~occupied(room).to_numpy(), strict, within, ~covered, operative > neutral], [-1, 0, 1, 4, 2], default=3
     )
     wide, narrow = quantity(columns[-1]).label, quantity(columns[0]).label
     legend = (
@@ -58,9 +60,7 @@ def comfort_carpet(result: RunResult, room: RoomYear) -> Chart | None:
         (UNKNOWN, gettext("Outside the range of the model")),
     )
     share = 100 * np.bincount(classes[classes >= 0], minlength=5) / max((classes >= 0).sum(), 1)
-    names = tuple(
-        (c, f"{n}: {percent(float(s))} %") for (c, n), s in zip(legend, share, strict=True)
-    )
+    names = tuple((c, f"{n}: {percent(float(s))} %") for (c, n), s in zip(legend, share, strict=True))
     used = [i for i in range(5) if share[i] > 0]
     order = np.full(6, -1)
     order[used] = np.arange(len(used))
@@ -84,16 +84,12 @@ def duration_curve(room: RoomYear, beside: Sequence[RoomYear] = ()) -> Chart:
     temperatures = room.heat.temperatures
     hours = len(temperatures) * step_hours(temperatures.index)
     curves = {name: temperatures[name].to_numpy() for name in CURVES if name in temperatures}
-    others = [
-        one.heat.temperatures[n] for one in beside for n in curves if n in one.heat.temperatures
-    ]
+    others = [one.heat.temperatures[n] for one in beside for n in curves if n in one.heat.temperatures]
     y_range = round_limits(np.concatenate([*curves.values(), *others, [WARM_C]]))
     share = np.linspace(0, 1, 241)
     sorted_curves = {name: np.quantile(v, 1 - share) for name, v in curves.items()}
     x_range = (0.0, hours)
-    marks = [
-        ChartMark(line(x_range, (WARM_C, WARM_C), x_range, y_range), "limit", f"{WARM_C:.0f} °C")
-    ]
+    marks = [ChartMark(line(x_range, (WARM_C, WARM_C), x_range, y_range), "limit", f"{WARM_C:.0f} °C")]
     marks += [
         ChartMark(line(share * hours, v, x_range, y_range), CURVES[name], quantity(name).label)
         for name, v in sorted_curves.items()
@@ -116,8 +112,7 @@ def duration_curve(room: RoomYear, beside: Sequence[RoomYear] = ()) -> Chart:
         readout=Readout(
             tuple(gettext("exceeded in {hours} h", hours=rounded(s * hours, 0)) for s in share),
             tuple(
-                (quantity(n).label, tuple(f"{rounded(float(t), 1)} °C" for t in v))
-                for n, v in sorted_curves.items()
+                (quantity(n).label, tuple(f"{rounded(float(t), 1)} °C" for t in v)) for n, v in sorted_curves.items()
             ),
         ),
     )
@@ -131,10 +126,7 @@ def extreme_weeks(room: RoomYear) -> tuple[Chart, ...]:
         return (week(room, temperatures.index[0].normalize(), gettext("Period")),)
     weekly = daily.rolling(7).mean()
     warm, cold = (day - pd.Timedelta(days=6) for day in (weekly.idxmax(), weekly.idxmin()))
-    return (
-        week(room, warm, gettext("Warmest week")),
-        week(room, cold, gettext("Coldest week")),
-    )
+    return (week(room, warm, gettext("Warmest week")), week(room, cold, gettext("Coldest week")))
 
 
 def week(room: RoomYear, start: pd.Timestamp, title: str) -> Chart:
@@ -155,18 +147,10 @@ def week(room: RoomYear, start: pd.Timestamp, title: str) -> Chart:
         for name, v in curves.items()
     ]
     days = [start + pd.Timedelta(days=i) for i in range(7)]
-    ticks = [
-        Tick(100 * (i + 0.5) / 7, f"{d.day}", f" {short_month(d.month)}", False)
-        for i, d in enumerate(days)
-    ]
+    ticks = [Tick(100 * (i + 0.5) / 7, f"{d.day}", f" {short_month(d.month)}", False) for i, d in enumerate(days)]
     last = stop - pd.Timedelta(days=1)
     return Chart(
-        gettext(
-            "{week}: {first} to {last}",
-            week=title,
-            first=day_and_month(start),
-            last=day_and_month(last),
-        ),
+        gettext("{week}: {first} to {last}", week=title, first=day_and_month(start), last=day_and_month(last)),
         gettext("Outdoor and room temperatures.") + f" {heated(room)}",
         gettext("Day"),
         gettext("Temperature [°C]"),
@@ -182,10 +166,7 @@ def _midnights(y_range: tuple[float, float]) -> str:
 
 
 def _readout(names: Sequence[str], curves: dict[str, np.ndarray]) -> Readout:
-    rows = tuple(
-        (quantity(name).label, tuple(f"{rounded(float(t), 1)} °C" for t in v))
-        for name, v in curves.items()
-    )
+    rows = tuple((quantity(name).label, tuple(f"{rounded(float(t), 1)} °C" for t in v)) for name, v in curves.items())
     return Readout(tuple(names), rows)
 
 
@@ -200,16 +181,13 @@ def gains_chart(monthly: pd.DataFrame) -> Chart | None:
     x_range = (0.0, float(len(monthly)))
     marks = []
     if incident:
-        path = "".join(
-            box(i + 0.14, i + 0.86, 0, v, x_range, y_range) for i, v in enumerate(monthly[incident])
-        )
+        path = "".join(box(i + 0.14, i + 0.86, 0, v, x_range, y_range) for i, v in enumerate(monthly[incident]))
         marks.append(ChartMark(path, "incident", quantity(incident).label, filled=True))
     base = np.zeros(len(monthly))
     for number, name in enumerate(parts):
         top = base + monthly[name].to_numpy()
         path = "".join(
-            box(i + 0.2, i + 0.8, a, b, x_range, y_range)
-            for i, (a, b) in enumerate(zip(base, top, strict=True))
+            box(i + 0.2, i + 0.8, a, b, x_range, y_range) for i, (a, b) in enumerate(zip(base, top, strict=True))
         )
         marks.append(ChartMark(path, f"part{min(number, 3)}", quantity(name).label, filled=True))
         base = top
@@ -227,13 +205,7 @@ def gains_chart(monthly: pd.DataFrame) -> Chart | None:
 
 
 def month_chart(
-    monthly: pd.DataFrame,
-    names: Sequence[str],
-    marks: Sequence[ChartMark],
-    top: float,
-    *,
-    title: str,
-    explanation: str,
+    monthly: pd.DataFrame, names: Sequence[str], marks: Sequence[ChartMark], top: float, *, title: str, explanation: str
 ) -> Chart:
     """Marks over months, from 0 to a top [kWh].
 
@@ -243,9 +215,7 @@ def month_chart(
         Tick(100 * (i + 0.5) / len(monthly), name[0], name[1:], False)
         for i, name in enumerate(short_month(m.month) for m in monthly.index)
     )
-    rows = tuple(
-        (quantity(n).label, tuple(f"{rounded(v, 0)} kWh" for v in monthly[n])) for n in names
-    )
+    rows = tuple((quantity(n).label, tuple(f"{rounded(v, 0)} kWh" for v in monthly[n])) for n in names)
     return Chart(
         title,
         explanation,

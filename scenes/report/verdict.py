@@ -10,16 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.language.catalogue import gettext, ngettext
-from scenes.language.numbers import (
-    colon,
-    month_name,
-    percent,
-    rounded,
-    semicolons,
-    share,
-    significant,
-    spoken,
-)
+from scenes.language.numbers import colon, month_name, percent, rounded, semicolons, share, significant, spoken
 from scenes.report.answer import judged, rooms_answer
 from scenes.report.glare_figures import sun_words
 from scenes.report.headline import FAIR, GOOD, POOR, WARM_C, Card, dgp_error, heated, occupied
@@ -82,9 +73,7 @@ def _by_figure(rooms: Sequence[Named]) -> Table:
     rows = []
     judged = [(name, room, card) for name, room, own in rooms for card in own if card.verdict]
     for label in dict.fromkeys(card.label for _, _, card in judged):
-        result = sorted(
-            (one for one in judged if one[2].label == label), key=lambda one: one[2].worth
-        )
+        result = sorted((one for one in judged if one[2].label == label), key=lambda one: one[2].worth)
         counts = Counter((GRADES.index(card.grade), card.verdict) for _, _, card in result)
         meets = semicolons([colon(str(counts[key]), key[1]) for key in sorted(counts)])
         worst = semicolons([colon(name, _value(card)) for name, _, card in result[:WORST]])
@@ -145,9 +134,7 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
         rooms=names[0] if len(names) == 1 else rooms_counted(len(names)),
         building=result.building.name or gettext("the building"),
         weather=result.manifest.get("site") or gettext("weather file"),
-        systems=_systems(systems)
-        or result.manifest.get("system")
-        or gettext("windows as modelled"),
+        systems=_systems(systems) or result.manifest.get("system") or gettext("windows as modelled"),
         method=gettext(METHODS[result.method]),
     )
     sentences = (
@@ -176,9 +163,7 @@ def _glare(result: RunResult) -> str:
     where = f"{room.space.label}, {spoken(result.times[picture.hour])}"
     if glare_class(dgp) == "imperceptible":
         return gettext(
-            "Glare is imperceptible in all pictures; the highest DGP is {dgp} ({where}).",
-            dgp=value,
-            where=where,
+            "Glare is imperceptible in all pictures; the highest DGP is {dgp} ({where}).", dgp=value, where=where
         )
     text = ngettext(
         "The picture shows {glare}: DGP {dgp} ({where}; {sun}). {cause}",
@@ -193,8 +178,7 @@ def _glare(result: RunResult) -> str:
     if room.annual_glare is not None and occupied(room).any():
         year = room.annual_glare["dgp"].fillna(0.0).to_numpy()[occupied(room).to_numpy()]
         text += " " + gettext(
-            "DGP exceeds 0.40 in {share} % of the occupied hours.",
-            share=percent(100 * float((year > 0.40).mean())),
+            "DGP exceeds 0.40 in {share} % of the occupied hours.", share=percent(100 * float((year > 0.40).mean()))
         )
     return text
 
@@ -212,15 +196,11 @@ def _cause(picture: LuminancePicture) -> str:
         parts = _parts(by_sources, by_light)
         if not count:
             return gettext(
-                "Bright areas in view contribute more than the {lux} lx at the eye ({parts}).",
-                lux=lux,
-                parts=parts,
+                "Bright areas in view contribute more than the {lux} lx at the eye ({parts}).", lux=lux, parts=parts
             )
         return ngettext(
-            "{count} bright source in view contributes more than the {lux} lx at the eye "
-            "({parts}).",
-            "{count} bright sources in view contribute more than the {lux} lx at the eye "
-            "({parts}).",
+            "{count} bright source in view contributes more than the {lux} lx at the eye ({parts}).",
+            "{count} bright sources in view contribute more than the {lux} lx at the eye ({parts}).",
             count,
             lux=lux,
             parts=parts,
@@ -249,8 +229,7 @@ def _overheating(result: RunResult) -> str:
         return gettext("Temperatures were not computed.")
     hours = [_warm_hours(room) for room in rooms]
     room, warm = max(  # of rooms too warm in as many hours, the hottest
-        zip(rooms, hours, strict=True),
-        key=lambda one: (one[1].sum(), one[0].heat.operative_c.max()),
+        zip(rooms, hours, strict=True), key=lambda one: (one[1].sum(), one[0].heat.operative_c.max())
     )
     if not warm.any():
         none = gettext("No occupied hour exceeds {limit} °C.", limit=f"{WARM_C:.0f}")
@@ -290,8 +269,7 @@ def _shading(result: RunResult) -> str:
         rows.sort(key=lambda one: -one[1])
         parts = [
             gettext(
-                "{rooms}: the shading is in use in {least} to {most} % of the occupied daylight "
-                "hours, most in {room}.",
+                "{rooms}: the shading is in use in {least} to {most} % of the occupied daylight hours, most in {room}.",
                 rooms=rooms_counted(len(moved)),
                 least=percent(min(drawn)),
                 most=percent(max(drawn)),
@@ -319,9 +297,7 @@ def _drawn(room: RoomYear) -> float:
 def _shading_of(room: RoomYear, drawn: float, cost: tuple[float, float] | None) -> str:
     facts = {"room": room.space.label, "share": percent(drawn)}
     if cost is None:
-        return gettext(
-            "{room}: the shading is in use in {share} % of the occupied daylight hours.", **facts
-        )
+        return gettext("{room}: the shading is in use in {share} % of the occupied daylight hours.", **facts)
     most, least = map(percent, cost)
     if most == least:
         return gettext(

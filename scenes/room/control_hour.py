@@ -120,10 +120,7 @@ class ControlHour:
         return float(self.sensors_lx(states).mean())
 
     def eye_lx(
-        self,
-        states: States,
-        seat: tuple[float, float, float] | None = None,
-        looks_deg: float | None = None,
+        self, states: States, seat: tuple[float, float, float] | None = None, looks_deg: float | None = None
     ) -> float:
         """Vertical illuminance at the eye [lx].
 
@@ -134,10 +131,7 @@ class ControlHour:
         return float(self._year.eye_lx(chosen, (seat, looks_deg))[lit]) if lit >= 0 else 0.0
 
     def dgp(
-        self,
-        states: States,
-        seat: tuple[float, float, float] | None = None,
-        looks_deg: float | None = None,
+        self, states: States, seat: tuple[float, float, float] | None = None, looks_deg: float | None = None
     ) -> float:
         """DGP of the hour's picture; 0 in the dark.
 
@@ -214,11 +208,12 @@ class ControlRun:
         if self._stepped is None:
             tables = year.room.operation
             self._stepped = SteppedZone(
-                year.zone.zone, climate(year.room.weather),
+                year.zone.zone,
+                climate(year.room.weather),
                 year.of_panes(year.combinations),
                 step_s=year.room.options.heat_step_s,
                 options=BalanceOptions(terrain="suburbs" if tables is None else tables.terrain),
-            )  # fmt: skip
+            )
             heat = self._heat_of((0,) * len(year.counts))
             self._stepped.warm_up(0, heat.solar, heat.gains)
             self._felt_before.append(_felt_in(self._stepped))
@@ -257,11 +252,7 @@ def _felt_in(zone: SteppedZone) -> tuple[float, float, float, float]:
 
 
 def controlled_states(
-    room: RoomInputs,
-    light: RoomLight,
-    outdoors: SeasonalOutdoors,
-    *,
-    progress: Progress = silent,
+    room: RoomInputs, light: RoomLight, outdoors: SeasonalOutdoors, *, progress: Progress = silent
 ) -> StateArray:
     """The state of each window group in every hour [H, G], by a function or by plans.
 

@@ -12,39 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods.glare import hourly_glare
-from mitsuba_cfs.methods.light import (
-    SeasonalLight,
-    eye_illuminance,
-    illuminance,
-    with_pictures,
-    with_view,
-)
+from mitsuba_cfs.methods.light import SeasonalLight, eye_illuminance, illuminance, with_pictures, with_view
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.sky.sun import sun_directions
 from scenes.room.glare import rating_of
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
 from scenes.room.operation import OperationHours
-from scenes.room.shading import (
-    MOST_COMBINATIONS,
-    Levels,
-    Seat,
-    group_states,
-    seat_view,
-    shading_states,
-    slat_tilts_deg,
-)
+from scenes.room.shading import MOST_COMBINATIONS, Levels, Seat, group_states, seat_view, shading_states, slat_tilts_deg
 from scenes.room.solar import SeasonalOutdoors, SunByStates, window_irradiance
 from scenes.room.window_sensors import window_beam
-from scenes.room.zone import (
-    RoomZone,
-    ZoneSurfaces,
-    climate,
-    operated,
-    per_window,
-    room_zone,
-    zone_surfaces,
-)
+from scenes.room.zone import RoomZone, ZoneSurfaces, climate, operated, per_window, room_zone, zone_surfaces
 from thermal.climate import Solar
 from thermal.control import profile_angle
 from thermal.zone import Gains
@@ -162,9 +140,7 @@ class ControlYear:
         used = (self.room.occupied[day] | (day == hour)) & (self._lit[day] >= 0)
         return float(self.dgp_of(states, day[used], seat)[0])
 
-    def dgp_of(
-        self, states: tuple[int, ...], hours: NDArray[np.int64], seat: Seat = (None, None)
-    ) -> FloatArray:
+    def dgp_of(self, states: tuple[int, ...], hours: NDArray[np.int64], seat: Seat = (None, None)) -> FloatArray:
         """DGP of a seat in some lit hours of the year [n]."""
         key = seat, states
         if key not in self._glare:
@@ -175,9 +151,12 @@ class ControlYear:
             if seat not in self._pictures:  # V of all patches: combinations are products then
                 self._pictures[seat] = with_pictures(self._view(seat))
             rated[left] = hourly_glare(
-                self._pictures[seat], "DGP", self._rows(states), hours=left,
+                self._pictures[seat],
+                "DGP",
+                self._rows(states),
+                hours=left,
                 options=rating_of(self.room.options.outputs),
-            ).dgp  # fmt: skip
+            ).dgp
         return rated[columns]
 
     @property
@@ -246,9 +225,8 @@ class ControlYear:
     def sun_by_states(self) -> SunByStates:
         """The sun of the zone in combinations of states."""
         return SunByStates(
-            self.room, self.outdoors, self._surfaces.room, self._surfaces.outer,
-            thermals=self._surfaces.thermals,
-        )  # fmt: skip
+            self.room, self.outdoors, self._surfaces.room, self._surfaces.outer, thermals=self._surfaces.thermals
+        )
 
     def work_plane_lx(self, states: tuple[int, ...]) -> FloatArray:
         """Mean illuminance of the work plane in all hours [H] [lx]."""

@@ -46,16 +46,11 @@ def room_daylight(
     progress("daylight", 0.0)
     lights, lit_state, points = light.light, light.states(state), light.scene.points
     traced = picture_light(room, light)
-    lit, noise = illuminance_with_noise(
-        traced, lit_state, progress=part(progress, 0.9, 1.0, "daylight")
-    )
+    lit, noise = illuminance_with_noise(traced, lit_state, progress=part(progress, 0.9, 1.0, "daylight"))
     illuminance = room.skies.whole_year(lit.astype(np.float32)).T
     error = relative_error_of_mean(lit, noise)
     autonomy_noise = daylight_autonomy_noise(
-        illuminance,
-        lm83_hours(room.weather),
-        lambda weights: noise(weights[lights.sky.lit].T),
-        relative_error=error,
+        illuminance, lm83_hours(room.weather), lambda weights: noise(weights[lights.sky.lit].T), relative_error=error
     )
     blurred = None
     if room.options.method == "three-phase" and sunny_hours:
@@ -68,10 +63,14 @@ def room_daylight(
     def metrics_of(sensors: slice) -> tuple[pd.DataFrame, dict[str, float]]:
         sun = None if direct is None else direct[:, sensors]
         table, of_room = daylight_metrics(
-            points[sensors], illuminance[:, sensors], factor[sensors], room.weather, sun,
+            points[sensors],
+            illuminance[:, sensors],
+            factor[sensors],
+            room.weather,
+            sun,
             autonomy_noise=autonomy_noise.part(sensors),
             half=room.skies.once(daylight_hours, room.weather),
-        )  # fmt: skip
+        )
         table["daylight_factor_standard_error"] = 100.0 * factor_error[sensors]
         if blurred is not None:
             table[SUNNY_HOUR_ERROR] = blurred[sensors]
@@ -85,9 +84,7 @@ def room_daylight(
         table, of_grid = metrics_of(slice(first, last))
         table["relative_standard_error"] = error[first:last]
         grids.append(GridDaylight(grid.name, grid.directions, table, of_grid))
-    result = DaylightResult(
-        points[plane], illuminance[:, plane], error[plane], *metrics_of(plane), tuple(grids)
-    )
+    result = DaylightResult(points[plane], illuminance[:, plane], error[plane], *metrics_of(plane), tuple(grids))
     progress("daylight", 1.0)
     return result
 
@@ -120,11 +117,18 @@ def sensor_table(values: NDArray[np.float32], times: pd.DatetimeIndex) -> pd.Dat
 SENSOR_COLUMNS = {  # column of a run: column of the library
     "da300": "daylight_autonomy",
     "cda300": "continuous_daylight_autonomy",
-    **{name: name for name in (
-        "udi_below_100", "udi_100_300", "udi_300_3000", "udi_above_3000", "udi_100_2000",
-        "mean_illuminance_lx",
-    )},
-}  # fmt: skip
+    **{
+        name: name
+        for name in (
+            "udi_below_100",
+            "udi_100_300",
+            "udi_300_3000",
+            "udi_above_3000",
+            "udi_100_2000",
+            "mean_illuminance_lx",
+        )
+    },
+}
 ROOM_COLUMNS = {
     **SENSOR_COLUMNS,
     "sda300_50": "spatial_daylight_autonomy",

@@ -49,10 +49,7 @@ def annual_glare(
 ) -> pd.DataFrame:
     """Glare of every hour with the shading states of that hour [H, G]; NaN in the dark."""
     rows, rating = light.states(state), rating_of(room.options.outputs)
-    rated = hourly_glare(
-        light.light, "DGP", rows, options=rating,
-        progress=part(progress, 0.0, 1.0, "annual glare"),
-    )  # fmt: skip
+    rated = hourly_glare(light.light, "DGP", rows, options=rating, progress=part(progress, 0.0, 1.0, "annual glare"))
     table = np.full((room.skies.hours, len(COLUMNS)), np.nan)
     table[room.skies.lit] = np.stack([getattr(rated, name) for name in COLUMNS.values()], axis=1)
     frame = pd.DataFrame(table, index=room.weather.midpoints, columns=list(COLUMNS))
@@ -77,9 +74,14 @@ def rated_hours(
     if isinstance(source, PhaseLight) and light.inner is None:
         cached = cached_glare(source, room.windows, metric, columns, rating)
     return hourly_glare(
-        source, metric, light.states(state), hours=columns, options=rating, cached=cached,
+        source,
+        metric,
+        light.states(state),
+        hours=columns,
+        options=rating,
+        cached=cached,
         progress=part(progress, 0.0, 1.0, "annual glare"),
-    )  # fmt: skip
+    )
 
 
 def rated_hours_error(
@@ -95,9 +97,13 @@ def rated_hours_error(
     Args: as of `rated_hours`, whose result is `rated`.
     """
     return sunny_hour_dgp_error(
-        light.light, rated.dgp, metric, light.states(state),
-        hours=np.searchsorted(room.skies.lit, hours), options=rating_of(room.options.outputs),
-    )  # fmt: skip
+        light.light,
+        rated.dgp,
+        metric,
+        light.states(state),
+        hours=np.searchsorted(room.skies.lit, hours),
+        options=rating_of(room.options.outputs),
+    )
 
 
 def worst_hours(year: pd.DataFrame, count: int) -> list[int]:
@@ -130,9 +136,15 @@ def cached_glare(
     if cache is None:
         return None
     key = digest(
-        matrices.scene, matrices.sampling, matrices.five_phase,
-        sky.whole, sky.sun, sky.direction, sky.illuminance, *inputs,
-    )  # fmt: skip
+        matrices.scene,
+        matrices.sampling,
+        matrices.five_phase,
+        sky.whole,
+        sky.sun,
+        sky.direction,
+        sky.illuminance,
+        *inputs,
+    )
 
     def entry(state: NDArray[Any]) -> CacheEntry:
         rows = zip(windows.systems, state.tolist(), strict=True)
@@ -149,10 +161,7 @@ def rating_of(outputs: Outputs) -> GlareOptions:
 
 
 def default_hours(
-    times: pd.DatetimeIndex,
-    lit: NDArray[np.int64],
-    eye_illuminance: NDArray[np.float32],
-    count: int,
+    times: pd.DatetimeIndex, lit: NDArray[np.int64], eye_illuminance: NDArray[np.float32], count: int
 ) -> list[int]:
     """The year's brightest hour at the eye, and hours of the equinox and the solstices.
 
@@ -192,15 +201,12 @@ def room_glare(
         hours = default_hours(room.weather.midpoints, room.skies.lit, eye, outputs.picture_count)
     progress("pictures", 0.0)
     columns, rating = np.searchsorted(room.skies.lit, hours), rating_of(outputs)
-    made = rated_pictures(
-        picture_light(room, light), columns, lit_state, options=rating, progress=progress
-    )
+    made = rated_pictures(picture_light(room, light), columns, lit_state, options=rating, progress=progress)
     of_all = {}
     if room.options.method == "three-phase":
         of_all[DGP_SUNNY_HOUR_ERROR] = sunny_hour_dgp_error(
-            light.light, [result.dgp for _, result in made], state=lit_state, hours=columns,
-            options=rating,
-        )  # fmt: skip
+            light.light, [result.dgp for _, result in made], state=lit_state, hours=columns, options=rating
+        )
     pictures = []
     for hour, (luminance, result) in zip(hours, made, strict=True):
         glare = {
@@ -233,12 +239,7 @@ def brightest_picture(glare: GlareResults) -> LuminancePicture:
 
 
 def coloured(
-    room: RoomInputs,
-    light: RoomLight,
-    state: NDArray[np.int64],
-    glare: GlareResults,
-    *,
-    progress: Progress = silent,
+    room: RoomInputs, light: RoomLight, state: NDArray[np.int64], glare: GlareResults, *, progress: Progress = silent
 ) -> GlareResults:
     """The pictures, with the brightest of them in colour too."""
     if not glare.pictures:
@@ -249,11 +250,14 @@ def coloured(
     sampling = room.options.sampling
     sky = annual_sky(room.weather, sampling.subdivision, hours=[hour], **room.options.sky)
     result = with_colour(
-        glare, band_scenes(building, room.space, groups, glare.view),
-        room.windows.optics_by_colour(light.light.systems[: len(groups)]), sky,
-        state=state[hour].tolist(), sampling=sampling,
+        glare,
+        band_scenes(building, room.space, groups, glare.view),
+        room.windows.optics_by_colour(light.light.systems[: len(groups)]),
+        sky,
+        state=state[hour].tolist(),
+        sampling=sampling,
         progress=part(progress, 0.0, 1.0, "colour"),
-    )  # fmt: skip
+    )
     progress("colour", 1.0)
     return result
 
@@ -281,8 +285,5 @@ def with_colour(
     shown = brightest_picture(glare)
     if not bands[0].groups or not has_colour(bands, systems, sky, 0):
         return glare
-    rgb = coloured_picture(
-        shown.luminance, bands, systems, sky, 0,
-        sampling=sampling, state=state, progress=progress,
-    )  # fmt: skip
+    rgb = coloured_picture(shown.luminance, bands, systems, sky, 0, sampling=sampling, state=state, progress=progress)
     return replace(glare, colour=ColourPicture(shown.hour, rgb))

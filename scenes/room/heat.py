@@ -30,13 +30,7 @@ from scenes.results import (
 from scenes.room.operation_tables import ComfortTable, OperationTables
 from scenes.room.zone import RoomZone, balances, coupled, inner_sun_note
 from thermal.balance import ZoneResult
-from thermal.comfort import (
-    comfort_by_outdoors,
-    degree_hours,
-    pmv_ppd,
-    standard_effective_temperature,
-    summarise,
-)
+from thermal.comfort import comfort_by_outdoors, degree_hours, pmv_ppd, standard_effective_temperature, summarise
 from thermal.moisture import Humidity, MoistZone, humidity_ratio, zone_humidity
 from thermal.ventilation import AirTransfer
 from thermal.zone import Zone
@@ -87,9 +81,8 @@ def room_humidity(
             between[:, index[transfer.target], index[transfer.source]] += transfer.flow
     outdoors = outdoor_humidity(weather)
     return zone_humidity(
-        zones, outdoors, weather.dry_bulb_c, weather.pressure_pa, between,
-        row_s=3600.0 * weather.step_h,
-    )  # fmt: skip
+        zones, outdoors, weather.dry_bulb_c, weather.pressure_pa, between, row_s=3600.0 * weather.step_h
+    )
 
 
 def felt_by(person: ComfortTable, result: ZoneResult, humidity: Humidity) -> dict[str, FloatArray]:
@@ -112,12 +105,7 @@ BANDS = {"within_90": "ASHRAE 55 90 %", "within_80": "ASHRAE 55 80 %"}
 def operated_year(room: RoomZone, result: ZoneResult, weather: Weather) -> OperationResult:
     """Shading states and power of heating, cooling and lamps by hour, with their sums."""
     hours = pd.DataFrame(
-        {
-            **room.shading.columns,
-            "heating_w": result.heating,
-            "cooling_w": result.cooling,
-            "lighting_w": room.lamps,
-        },
+        {**room.shading.columns, "heating_w": result.heating, "cooling_w": result.cooling, "lighting_w": room.lamps},
         index=weather.midpoints,
     ).rename_axis("time")
     if room.lamp_lx is not None:
@@ -146,10 +134,7 @@ def _leni(room: RoomZone, weather: Weather) -> dict[str, float]:
 
 
 def thermal_result(
-    room: RoomZone,
-    result: ZoneResult,
-    weather: Weather,
-    felt: dict[str, NDArray[np.float64]],
+    room: RoomZone, result: ZoneResult, weather: Weather, felt: dict[str, NDArray[np.float64]]
 ) -> ThermalResult:
     """Tables of a room's temperatures, solar gains and comfort.
 
@@ -189,9 +174,7 @@ def _comfort(
     table = {"occupied": occupied}
     summary: dict[str, float] = {}
     for name, band in BANDS.items():
-        comfort = comfort_by_outdoors(
-            result.operative_c, weather.dry_bulb_c, band, per_day=weather.per_day
-        )
+        comfort = comfort_by_outdoors(result.operative_c, weather.dry_bulb_c, band, per_day=weather.per_day)
         table.setdefault("running_mean_c", comfort.outdoor_mean_c)
         table.setdefault("comfort_c", (comfort.low_c + comfort.high_c) / 2)
         table.setdefault("applicable", comfort.applicable)
@@ -245,11 +228,7 @@ STEP_FIGURES = {"heating": 2.0, "cooling": 2.0, "heating_w": 20.0, "cooling_w": 
 
 
 def step_issues(
-    rooms: Sequence[RoomZone],
-    results: Iterable[ZoneResult],
-    weather: Weather,
-    step_s: float,
-    **options: Any,
+    rooms: Sequence[RoomZone], results: Iterable[ZoneResult], weather: Weather, step_s: float, **options: Any
 ) -> tuple[tuple[Issue, ...], ...]:
     """For each room an issue where half the time step changes its results by more than 2 %.
 
@@ -313,18 +292,12 @@ def heat_of(
         air_links: air between the rooms [Z, Z] [m3/s]; None: none.
         store: of balances and results on disk; None: in memory.
     """
-    results = balances(
-        rooms, weather, step_s, air_links=air_links, terrain=terrain, progress=progress, store=store
-    )
+    results = balances(rooms, weather, step_s, air_links=air_links, terrain=terrain, progress=progress, store=store)
     passed = iter if store is None else store.each
-    issues = step_issues(
-        rooms, passed(results), weather, step_s, air_links=air_links, terrain=terrain, store=store
-    )
+    issues = step_issues(rooms, passed(results), weather, step_s, air_links=air_links, terrain=terrain, store=store)
     humidities = room_humidity(rooms, passed(results), weather, air_links=air_links)
     heats: list[Heat] = []
-    for room, balance, humidity, found in zip(
-        rooms, passed(results), humidities, issues, strict=True
-    ):
+    for room, balance, humidity, found in zip(rooms, passed(results), humidities, issues, strict=True):
         moved = room.in_alternatives(balance.alternative)
         apart = (moved.shading.states != room.shading.states).any(axis=1)
         if apart.any():
@@ -340,9 +313,7 @@ def heat_of(
     return heats
 
 
-def heat_alone(
-    room: RoomZone, weather: Weather, step_s: float, progress: Progress = silent
-) -> Heat:
+def heat_alone(room: RoomZone, weather: Weather, step_s: float, progress: Progress = silent) -> Heat:
     """The heat of a room whose neighbours have its own temperature."""
     terrain = (room.operation or OperationTables()).terrain
     (heat,) = heat_of([room], weather, step_s, terrain=terrain, progress=progress)
@@ -367,10 +338,7 @@ def coupled_years(
     """
     progress("heat balance", 0.0)
     zones, links, _ = coupled([room.zone for room in rooms], tables.air.door_m3_s)
-    heats = heat_of(
-        zones, weather, step_s, terrain=tables.terrain, air_links=links, progress=progress,
-        store=store,
-    )  # fmt: skip
+    heats = heat_of(zones, weather, step_s, terrain=tables.terrain, air_links=links, progress=progress, store=store)
     progress("heat balance", 1.0)
     years = [room.with_heat(heat) for room, heat in zip(rooms, heats, strict=True)]
     return years, (_coupling_note(zones), *inner_sun_note(zones, weather.step_h))

@@ -15,29 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.defaults import GLASS_REFLECTANCE, ROOM_REFLECTANCE
-from bim.doorways import (
-    THINNEST,
-    light_sources,
-    panes_between,
-    panes_to_windows,
-    reveals_between,
-    wall_depth,
-)
+from bim.doorways import THINNEST, light_sources, panes_between, panes_to_windows, reveals_between, wall_depth
 from bim.model import Building, Element, Face, Space
-from bim.to_tracer import (
-    element_surfaces,
-    exterior_surfaces,
-    furnished_surfaces,
-    window_groups,
-)
+from bim.to_tracer import element_surfaces, exterior_surfaces, furnished_surfaces, window_groups
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.light import SeasonalLight, group_shares
-from mitsuba_cfs.methods.optics import (
-    BsdfOptics,
-    MatrixOptics,
-    SystemOptics,
-    straight_transmittance,
-)
+from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics, SystemOptics, straight_transmittance
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene
 from mitsuba_cfs.notes import Note
@@ -65,9 +48,7 @@ class InnerGlass:
     faces: frozenset[str]  # names of the room's faces that the glass replaces
 
 
-def inner_glass(
-    building: Building, space: Space, systems: Mapping[str, States]
-) -> InnerGlass | None:
+def inner_glass(building: Building, space: Space, systems: Mapping[str, States]) -> InnerGlass | None:
     """Glass and doorways of a room to rooms with daylight; None without any.
 
     The windows of these rooms are in their first state, the glass is a clear pane of its stated
@@ -81,11 +62,7 @@ def inner_glass(
 
 
 def _inner_glass(
-    building: Building,
-    space: Space,
-    systems: Mapping[str, States],
-    away: Mapping[str, int],
-    below: int,
+    building: Building, space: Space, systems: Mapping[str, States], away: Mapping[str, int], below: int
 ) -> InnerGlass | None:
     """Inner glass to rooms fewer than `below` panes away from a window."""
     panes, used = [], []
@@ -100,10 +77,7 @@ def _inner_glass(
             beam = np.diag(optics.transmission)
             named = replace(group, name=f"{group.name}, to {other.label}")
             beyond = AdjacentRoom(
-                scene,
-                tuple(one.transmission for one in through),
-                tuple(map(straight_transmittance, through)),
-                beam,
+                scene, tuple(one.transmission for one in through), tuple(map(straight_transmittance, through)), beam
             )
             panes.append((named, (matrix_optics,), beyond, other.label))
     if not panes:
@@ -115,9 +89,7 @@ def _inner_glass(
     return InnerGlass(furnished_surfaces(rest), *groups, *areas, names)
 
 
-def borrowed_share(
-    space: Space, light: PhaseLight | SeasonalLight, inner: InnerGlass | None
-) -> str:
+def borrowed_share(space: Space, light: PhaseLight | SeasonalLight, inner: InnerGlass | None) -> str:
     """A sentence on the share of the sensors' light over the year that inner glass gives."""
     if inner is None:
         return ""
@@ -163,16 +135,12 @@ def _room_beyond(
     open_ = {back.name for _, back in pairs} | (set() if onward is None else onward.faces)
     opaque = [face for face in room.faces if face.name not in open_]
     glass = [
-        _piece(face, PANE, face.triangles,
-               back.reflectance_visible if back.pane.is_open else GLASS_REFLECTANCE)
+        _piece(face, PANE, face.triangles, back.reflectance_visible if back.pane.is_open else GLASS_REFLECTANCE)
         for face, back in pairs
-    ]  # fmt: skip
+    ]
     reveals = [
         _piece(
-            face,
-            "reveal",
-            reveals_between(face, wall_depth(face, back)).reshape(-1, 3, 3),
-            ROOM_REFLECTANCE["reveal"],
+            face, "reveal", reveals_between(face, wall_depth(face, back)).reshape(-1, 3, 3), ROOM_REFLECTANCE["reveal"]
         )
         for face, back in pairs
         if wall_depth(face, back) > THINNEST

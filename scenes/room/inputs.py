@@ -39,11 +39,7 @@ class FileSensors:
     @classmethod
     def of(cls, building: Building, space: Space) -> FileSensors:
         """The sensors of a room."""
-        fisheyes = [
-            model_view.view
-            for model_view in model_views(building, space)
-            if model_view.view.covers_hemisphere
-        ]
+        fisheyes = [model_view.view for model_view in model_views(building, space) if model_view.view.covers_hemisphere]
         return cls(tuple(model_grids(building, space)), fisheyes[0] if fisheyes else None)
 
 
@@ -100,10 +96,7 @@ class RoomInputs:
         return working_hours(self.weather, *self.options.occupancy.hours)
 
     def shading(
-        self,
-        state: NDArray[np.int64],
-        moved_by: NDArray[np.int64] | None = None,
-        reasons: tuple[str, ...] = (),
+        self, state: NDArray[np.int64], moved_by: NDArray[np.int64] | None = None, reasons: tuple[str, ...] = ()
     ) -> ShadingYear:
         """The year of the control groups, from the states of the window groups [H, G].
 
@@ -115,9 +108,14 @@ class RoomInputs:
             rules = (FUNCTION,) * len(rules)
         seen = [[sight_through(one).is_view for one in self.windows.systems[g]] for g in firsts]
         return ShadingYear(
-            self.control.names, rules, state[:, firsts], self.control.number, moved_by, reasons,
+            self.control.names,
+            rules,
+            state[:, firsts],
+            self.control.number,
+            moved_by,
+            reasons,
             tuple(map(np.array, seen)),
-        )  # fmt: skip
+        )
 
 
 def room_inputs(
@@ -177,13 +175,7 @@ def room_inputs(
     )
 
 
-def skies_for(
-    weather: Weather,
-    sampling: Sampling,
-    cache: MatrixCache | None = None,
-    /,
-    **choices: str,
-) -> AnnualSky:
+def skies_for(weather: Weather, sampling: Sampling, cache: MatrixCache | None = None, /, **choices: str) -> AnnualSky:
     """Sky patches and sun of the year; the same for every room and method.
 
     Args: cache: of the sun's directions; choices: `RoomOptions.sky`.
@@ -192,9 +184,7 @@ def skies_for(
     return annual_sky(weather, sampling.subdivision, solar=True, towards=towards, **choices)
 
 
-def cached_sun_directions(
-    weather: Weather, model: str, cache: MatrixCache | None
-) -> NDArray[np.float64]:
+def cached_sun_directions(weather: Weather, model: str, cache: MatrixCache | None) -> NDArray[np.float64]:
     """Directions to the sun [H, 3] of a weather: `sun_directions`, cached on disk.
 
     The Solar Position Algorithm and its library take half a second, about as long as all else of a
@@ -203,8 +193,9 @@ def cached_sun_directions(
     place = (weather.latitude_deg, weather.longitude_deg, weather.timezone_h, weather.elevation_m)
     air = (weather.pressure_pa, weather.dry_bulb_c)
     times = np.asarray(weather.midpoints.asi8)
-    entry = None if cache is None else cache.entry(
-        "sun directions", *place, weather.turned_deg, model, times, *air,
-        by=sun_directions.__module__,
-    )  # fmt: skip
+    entry = (
+        None
+        if cache is None
+        else cache.entry("sun directions", *place, weather.turned_deg, model, times, *air, by=sun_directions.__module__)
+    )
     return cached_or_computed(entry, lambda: sun_directions(weather, model=model))

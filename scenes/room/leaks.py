@@ -22,21 +22,14 @@ MOST_LOST = 0.01  # greatest share of a sensor's view that is no issue
 
 
 def leak_issues(
-    space: Space,
-    scene: DaylightScene,
-    *,
-    seed: int = 0,
-    cache: MatrixCache | None = None,
-    progress: Progress = silent,
+    space: Space, scene: DaylightScene, *, seed: int = 0, cache: MatrixCache | None = None, progress: Progress = silent
 ) -> tuple[Issue, ...]:
     """An issue if a sensor loses more than 1 % of its view, direct and reflected.
 
     Args: scene: of the room, with its sensors and the eye.
     """
     points, directions = scene.sensors()
-    escape = escaped_view(
-        scene.interior, scene.groups, points, directions, seed=seed, progress=progress, cache=cache
-    )
+    escape = escaped_view(scene.interior, scene.groups, points, directions, seed=seed, progress=progress, cache=cache)
     if not (escape.share - 2 * escape.error > MOST_LOST).any():
         return ()
     return (_issue(space, points, escape),)

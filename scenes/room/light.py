@@ -12,20 +12,10 @@ from bim.model import Building, Space
 from bim.sensors import sensor_grid, view_point
 from bim.to_tracer import exterior_surfaces, furnished_surfaces
 from mitsuba_cfs.images.view import fisheye, fitted
-from mitsuba_cfs.methods.light import (
-    SeasonalLight,
-    eye_illuminance,
-    path_light_of,
-    seasonal_light,
-)
+from mitsuba_cfs.methods.light import SeasonalLight, eye_illuminance, path_light_of, seasonal_light
 from mitsuba_cfs.methods.optics import SystemOptics
 from mitsuba_cfs.methods.phase_light import PhaseLight, phase_light
-from mitsuba_cfs.methods.phase_matrices import (
-    DEFAULT_NEEDS,
-    PhaseMatrices,
-    phase_matrices,
-    with_outdoors,
-)
+from mitsuba_cfs.methods.phase_matrices import DEFAULT_NEEDS, PhaseMatrices, phase_matrices, with_outdoors
 from mitsuba_cfs.methods.point_in_time import PathLight
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, in_shares, part, silent
@@ -61,18 +51,20 @@ class RoomLight:
         return eye_illuminance(self.light, self.states(state)).astype(np.float32)
 
 
-def room_light(
-    room: RoomInputs, *, needs: Sequence[str] = DEFAULT_NEEDS, progress: Progress = silent
-) -> RoomLight:
+def room_light(room: RoomInputs, *, needs: Sequence[str] = DEFAULT_NEEDS, progress: Progress = silent) -> RoomLight:
     """The light of a room's lit hours in every state.
 
     Args: needs: with "DGP" the view's matrices are traced once for all stages that rate hours.
     """
     scene, inner = _scene(room, room.seasons[0].building)
     matrices = phase_matrices(
-        scene, room.options.sampling, five_phase=room.options.method != "three-phase",
-        needs=needs, cache=room.cache, progress=in_shares(progress, TRACED),
-    )  # fmt: skip
+        scene,
+        room.options.sampling,
+        five_phase=room.options.method != "three-phase",
+        needs=needs,
+        cache=room.cache,
+        progress=in_shares(progress, TRACED),
+    )
     seasons, optics = [matrices], [_optics(room, inner)]
     for season in room.seasons[1:]:
         outdoors, glass = _scene(room, season.building)
@@ -83,9 +75,7 @@ def room_light(
     if len(seasons) == 1:
         light = phase_light(matrices, optics[0], room.skies, needs=needs, progress=steps)
     else:
-        light = seasonal_light(
-            seasons, optics, room.skies, room.season, needs=needs, progress=steps
-        )
+        light = seasonal_light(seasons, optics, room.skies, room.season, needs=needs, progress=steps)
     return RoomLight(scene, matrices, light, inner)
 
 
@@ -103,26 +93,24 @@ def _scene(room: RoomInputs, building: Building) -> tuple[DaylightScene, InnerGl
     """The scene of one season, with the glass to other rooms where light passes through it."""
     glass = inner_glass(building, room.space, room.systems) if room.inner_glass else None
     scene = room_scene(
-        building, room.space, room.windows, room.grids, room.options.outputs.picture_size,
-        inner=glass, file_sensors=room.file_sensors,
-    )  # fmt: skip
+        building,
+        room.space,
+        room.windows,
+        room.grids,
+        room.options.outputs.picture_size,
+        inner=glass,
+        file_sensors=room.file_sensors,
+    )
     return with_turned_eyes(scene) if room.turned_eyes else scene, glass
 
 
 def with_turned_eyes(scene: DaylightScene) -> DaylightScene:
     """The scene with sensors at its eye, after all others, that look in `EYE_TURNS`."""
-    position, direction = (
-        np.asarray(a, dtype=float) for a in (scene.eye.position, scene.eye.direction)
-    )
+    position, direction = (np.asarray(a, dtype=float) for a in (scene.eye.position, scene.eye.direction))
     angle = np.radians(EYE_TURNS)
     x, y, z = direction
     turned = np.stack(
-        [
-            np.cos(angle) * x - np.sin(angle) * y,
-            np.sin(angle) * x + np.cos(angle) * y,
-            np.full_like(angle, z),
-        ],
-        axis=1,
+        [np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, np.full_like(angle, z)], axis=1
     )
     points = np.concatenate([scene.points, np.tile(position, (len(angle), 1))])
     return replace(scene, points=points, normals=np.concatenate([scene.normals, turned]))

@@ -64,7 +64,6 @@ def lobe_figures(
     if len(sunny):
         some = sunny[np.unique(np.linspace(0, len(sunny) - 1, LIT).astype(np.int64))]
         figures |= lobe_effect_on_sensors(
-            illuminance(light.light, rows)[:, some],
-            illuminance_with_systems(light.light, lobes, some, rows),
+            illuminance(light.light, rows)[:, some], illuminance_with_systems(light.light, lobes, some, rows)
         )
     return figures

@@ -13,9 +13,7 @@ from scenes.room.operation_tables import OperationTables
 from scenes.room.options import SensorGrid
 
 
-def with_luminaires(
-    tables: OperationTables, space: Space, grid: SensorGrid, *, seed: int = 0
-) -> OperationTables:
+def with_luminaires(tables: OperationTables, space: Space, grid: SensorGrid, *, seed: int = 0) -> OperationTables:
     """The tables with the lamps' power and light in place of the luminaires of the room.
 
     Power is that of the files, light the mean of the work plane's sensors by all luminaires.
@@ -38,17 +36,12 @@ def with_luminaires(
         for k in range(one.number):
             place = np.array(one.position) + k * np.array(one.step)
             if not in_room(space, place[None])[0]:
-                raise DataError(
-                    "is outside the room", element=space.label, field=f"{field}.position"
-                )
+                raise DataError("is outside the room", element=space.label, field=f"{field}.position")
             lamps.append(Luminaire(photometry, tuple(place.tolist()), one.turned_deg))
             watts += power
     points = sensor_grid(space, spacing=grid.spacing, height=grid.height, margin=grid.margin)[0]
     light = lamp_light(space, lamps, points, seed=seed)
     gains = tables.gains.model_copy(
-        update={
-            "lighting_w_m2": watts / space.floor_area, "lighting_full_lx": light.mean,
-            "luminaire": (),
-        }
-    )  # fmt: skip
+        update={"lighting_w_m2": watts / space.floor_area, "lighting_full_lx": light.mean, "luminaire": ()}
+    )
     return tables.model_copy(update={"gains": gains})

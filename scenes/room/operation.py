@@ -25,13 +25,7 @@ from scenes.fenestration.systems import FenestrationSystem, read_system, system_
 from scenes.fenestration.thermal_file import StateTable
 from scenes.fenestration.thermal_system import checked_system
 from scenes.fenestration.tilts import tilt_states
-from scenes.room.operation_tables import (
-    PARTS,
-    GainsTable,
-    OperationTables,
-    RoomsTable,
-    operated_tables,
-)
+from scenes.room.operation_tables import PARTS, GainsTable, OperationTables, RoomsTable, operated_tables
 from scenes.room.options import RoomOptions
 from scenes.room.schedules import WEEK, ScheduleTable, scheduled_fields
 from scenes.room.shading_rules import WEATHER_RULES, ShadingRule
@@ -148,9 +142,7 @@ class OperationHours:
     def _neighbour_air(self, number: int) -> NeighbourAir:
         """The air exchanged with a neighbour."""
         table, place = self.tables.air.neighbour[number], f"air.neighbour.{number}"
-        beyond, share, flow = (
-            self.value(table, key, place) for key in ("temperature_c", "open", "m3_h")
-        )
+        beyond, share, flow = (self.value(table, key, place) for key in ("temperature_c", "open", "m3_h"))
         buoyant = 0.0
         if table.width is not None:
             buoyant = large_opening(table.width, table.height, discharge=table.discharge)
@@ -215,9 +207,7 @@ class OperationHours:
             raise DataError(f"the weather of {self.weather.site} has no {name}", field=place)
         return values
 
-    def states(
-        self, rule: ShadingRule, place: str, count: int, closed: int = 1
-    ) -> NDArray[np.int64]:
+    def states(self, rule: ShadingRule, place: str, count: int, closed: int = 1) -> NDArray[np.int64]:
         """Shading states [H] of a rule by schedule or weather for windows with `count` states.
 
         Args: place: path of the rule's table; closed: the state that a rule by weather closes to.
@@ -374,9 +364,7 @@ def _with_stored_control(tables: OperationTables, path: Path) -> OperationTables
     return tables.model_copy(update={"control": stored_control(file), "control_of": file})
 
 
-def _with_tilts(
-    systems: Sequence[FenestrationSystem], tables: OperationTables
-) -> tuple[FenestrationSystem, ...]:
+def _with_tilts(systems: Sequence[FenestrationSystem], tables: OperationTables) -> tuple[FenestrationSystem, ...]:
     """The states of the tables' systems and of the tilts between them."""
     step = tables.tilt_step_deg
     return tuple(systems) if step is None else tilt_states(systems, step)
@@ -406,9 +394,7 @@ def schedules_there(tables: Tables, path: Path) -> Tables:
             raise DataError(f"no such file: {schedule.csv}", file=path, field=field)
         schedules[name] = schedule.model_copy(update={"csv": csv})
     update = {"schedules": schedules, "gains": _placed(tables.gains, path)}
-    rooms = tuple(
-        one.model_copy(update={"gains": _placed(one.gains, path)}) for one in tables.rooms
-    )
+    rooms = tuple(one.model_copy(update={"gains": _placed(one.gains, path)}) for one in tables.rooms)
     return tables.model_copy(update=update | {"rooms": rooms})
 
 
@@ -436,11 +422,7 @@ def read_state(table: StateTable, path: Path | None, *, by: str = "") -> Fenestr
         system = replace(system_of_panes(table.layers), source=f"{by} layers".strip())
     else:
         system = read_system(
-            path,
-            u_value=table.u_value,
-            g_value=table.g_value,
-            see_through=table.straight_share,
-            by=by,
+            path, u_value=table.u_value, g_value=table.g_value, see_through=table.straight_share, by=by
         )
     if table.layers:  # their U and g come before those of the BSDF's thermal file
         system = replace(system, u_value=table.u_value, g_value=table.g_value, g_by_patch=None)
@@ -510,9 +492,7 @@ def stated_note(building: Building, before: str = "") -> tuple[str, ...]:
         return ()
     values = {"count": count, "all": len(building.spaces), "file": building.file.name}
     if not before:
-        note = Note(
-            "Gains, outdoor air and set points of {count} of {all} rooms are from {file}.", **values
-        )
+        note = Note("Gains, outdoor air and set points of {count} of {all} rooms are from {file}.", **values)
         return (note,)
     note = Note(
         "Gains, outdoor air and set points of {count} of {all} rooms are from {file}; values of "
@@ -527,9 +507,7 @@ ASSUMED = {"gains": ("equipment_w_m2", "persons", "occupied"), "air": ("infiltra
 ASSUMED_OF_ROOMS = "equipment_w_m2", "person_w", "floor_per_person", "occupied", "infiltration_ach"
 
 
-def unstated_note(
-    source: OperationTables | RoomOptions, building: Building, file: str = ""
-) -> tuple[str, ...]:
+def unstated_note(source: OperationTables | RoomOptions, building: Building, file: str = "") -> tuple[str, ...]:
     """A sentence on the gains and leaks that nobody states; empty without any.
 
     Args: source: tables, or the options of rooms without; file: name of the file of the tables.
@@ -565,9 +543,7 @@ def ground_note(tables: OperationTables) -> tuple[str, ...]:
     return (note,)
 
 
-def _entry(
-    tables: OperationTables, building: Building, space: Space, own: dict[str, dict[str, Any]]
-) -> dict[str, Any]:
+def _entry(tables: OperationTables, building: Building, space: Space, own: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """The tables of one room: the building's, then the operation's own, then its `[[rooms]]`."""
     chosen = tables.entry_of(building, space)
     tables_of_room: dict[str, Any] = {"spaces": (space.guid,)}
@@ -621,25 +597,33 @@ def stated_fields(use: StatedUse, space: Space, schedules: _Schedules) -> dict[s
             gains[key] = schedules.value(value, area)
     if use.lighting_w is not None and use.lighting_target_lx is None:
         gains["lighting_dimmed"] = False
-    for key, value in (
-        ("infiltration_ach", use.infiltration_m3_s),
-        ("ventilation_ach", use.ventilation_m3_s),
-    ):
+    for key, value in (("infiltration_ach", use.infiltration_m3_s), ("ventilation_ach", use.ventilation_m3_s)):
         if value is not None:
             air[key] = schedules.value(value, changes)
     for key, schedule in (("heating_c", use.heating_c), ("cooling_c", use.cooling_c)):
         if schedule is not None:
             loads[key] = schedules.name(schedule)
     single = {
-        "gains": (gains, {"person_w": use.person_w, "person_vapour_g_h": use.person_vapour_g_h,
-                          "lighting_target_lx": use.lighting_target_lx,
-                          "radiant_share": use.radiant_share}),
-        "air": (air, {"infiltration_factors": use.infiltration_factors,
-                      "heat_recovery": use.heat_recovery}),
-        "loads": (loads, {"heating_limit_w": use.heating_limit_w,
-                          "cooling_limit_w": use.cooling_limit_w,
-                          "humidify_to": use.humidify_to, "dehumidify_to": use.dehumidify_to}),
-    }  # fmt: skip
+        "gains": (
+            gains,
+            {
+                "person_w": use.person_w,
+                "person_vapour_g_h": use.person_vapour_g_h,
+                "lighting_target_lx": use.lighting_target_lx,
+                "radiant_share": use.radiant_share,
+            },
+        ),
+        "air": (air, {"infiltration_factors": use.infiltration_factors, "heat_recovery": use.heat_recovery}),
+        "loads": (
+            loads,
+            {
+                "heating_limit_w": use.heating_limit_w,
+                "cooling_limit_w": use.cooling_limit_w,
+                "humidify_to": use.humidify_to,
+                "dehumidify_to": use.dehumidify_to,
+            },
+        ),
+    }
     return {
         part: named | {key: value for key, value in plain.items() if value is not None}
         for part, (named, plain) in single.items()

@@ -83,9 +83,7 @@ class LeakageTable(TomlTable):
         """The leakage of the heat balance."""
         if self.area_cm2 is not None:
             return sherman_grimsrud(self.area_cm2, stack=self.stack, wind=self.wind)
-        return aim2(
-            self.coefficient, self.exponent, stack=self.stack, wind=self.wind, shelter=self.shelter
-        )
+        return aim2(self.coefficient, self.exponent, stack=self.stack, wind=self.wind, shelter=self.shelter)
 
 
 class OpenedTable(TomlTable):
@@ -142,9 +140,9 @@ class AirTable(TomlTable):
 
     infiltration_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.5
     # a, b, c, d: infiltration (a + b dT + c v + d v^2); "constant", "doe-2" or "blast"
-    infiltration_factors: Annotated[
-        tuple[Factor, Factor, Factor, Factor], BeforeValidator(_factors)
-    ] = NAMED["constant"]
+    infiltration_factors: Annotated[tuple[Factor, Factor, Factor, Factor], BeforeValidator(_factors)] = NAMED[
+        "constant"
+    ]
     leakage: LeakageTable | None = None  # besides the infiltration
     windows: OpenedTable | None = None
     night_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.0  # by night
@@ -498,9 +496,7 @@ class OperationTables(TomlTable):
         """
         chosen = self.entry_of(building, space)
         tables = self if chosen is None else self.with_rooms(chosen)
-        windows = {
-            name for one in building.spaces for w in one.windows for name in (w.guid, w.name)
-        }
+        windows = {name for one in building.spaces for w in one.windows for name in (w.guid, w.name)}
         for number, group in enumerate(tables.control.group):
             for name in group.windows:
                 if name not in windows:

@@ -121,10 +121,7 @@ class RoomOptions:
 
     def named(self) -> dict[str, Any]:
         """Every option by its name in `NAMES`, in that order."""
-        return {
-            name: getattr(getattr(self, part) if part else self, key)
-            for name, (part, key) in NAMES.items()
-        }
+        return {name: getattr(getattr(self, part) if part else self, key) for name, (part, key) in NAMES.items()}
 
 
 # Options by their name in files, flags and Python: part of `RoomOptions` ("": none), name there
@@ -162,11 +159,15 @@ NAMES = {
 
 # Least and greatest of options that are numbers, and whether they are whole
 LIMITS = (
-    ("sensor_spacing", 1e-3, math.inf, False), ("sensor_height", 0.0, math.inf, False),
-    ("sensor_margin", 0.0, math.inf, False), ("picture_count", 0, math.inf, True),
-    ("picture_size", 1, math.inf, True), ("equipment_w_m2", 0.0, math.inf, False),
-    ("person_w", 0.0, math.inf, False), ("floor_per_person", 1e-3, math.inf, False),
-)  # fmt: skip
+    ("sensor_spacing", 1e-3, math.inf, False),
+    ("sensor_height", 0.0, math.inf, False),
+    ("sensor_margin", 0.0, math.inf, False),
+    ("picture_count", 0, math.inf, True),
+    ("picture_size", 1, math.inf, True),
+    ("equipment_w_m2", 0.0, math.inf, False),
+    ("person_w", 0.0, math.inf, False),
+    ("floor_per_person", 1e-3, math.inf, False),
+)
 SKY_LIGHTS = ("by direction", "hemispherical")
 # Allowed values of the options that are words
 CHOICES = {
@@ -183,6 +184,5 @@ def named_types() -> dict[str, Any]:
     """The type of each option by its name in `NAMES`."""
     type_hints = get_type_hints(RoomOptions)
     return {
-        name: (get_type_hints(type_hints[part]) if part else type_hints)[key]
-        for name, (part, key) in NAMES.items()
+        name: (get_type_hints(type_hints[part]) if part else type_hints)[key] for name, (part, key) in NAMES.items()
     }

@@ -17,9 +17,7 @@ class PictureHourError(CfsError, ValueError):
     """An hour that the year does not contain, or with the sun below the horizon."""
 
 
-def wanted_hours(
-    wanted: tuple[str, ...], times: pd.DatetimeIndex, lit: NDArray[np.int64]
-) -> list[int]:
+def wanted_hours(wanted: tuple[str, ...], times: pd.DatetimeIndex, lit: NDArray[np.int64]) -> list[int]:
     """Indices of the hours of the year that `cfs run --picture` names.
 
     Args:
@@ -69,6 +67,4 @@ def _moment(text: str, flag: str) -> datetime:
             return datetime.strptime(f"2000-{text}", form)  # a leap year
         except ValueError:
             continue
-    raise PictureHourError(
-        f"{flag} {text!r}: expected month, day and hour, as '06-21 12' or '06-21 12:30'"
-    )
+    raise PictureHourError(f"{flag} {text!r}: expected month, day and hour, as '06-21 12' or '06-21 12:30'")

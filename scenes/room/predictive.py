@@ -19,13 +19,7 @@ from scenes.room.operation_tables import OperationTables
 from scenes.room.shading import Seat, view_taken
 from scenes.room.shading_rules import ShadingRule
 from scenes.room.zone import climate
-from thermal.predictive import (
-    Forecast,
-    PredictedHours,
-    PredictedYear,
-    noisy_forecast,
-    predicted_year,
-)
+from thermal.predictive import Forecast, PredictedHours, PredictedYear, noisy_forecast, predicted_year
 from thermal.reduced import ReducedZone, reduced_zone
 
 FloatArray = NDArray[np.float64]
@@ -80,9 +74,7 @@ class Planner:
         groups = np.arange(len(year.counts))
         self._hidden = view_taken(year.room, groups, year.combinations)  # [M]
         self.used = np.flatnonzero((year.present > 0) & (year.lit_hours >= 0))
-        eye = np.stack(
-            [year.room.skies.whole_year(year.eye_lx(one, self._seat)) for one in combinations], 1
-        )
+        eye = np.stack([year.room.skies.whole_year(year.eye_lx(one, self._seat)) for one in combinations], 1)
         by_picture = self._table.glare == "DGP"
         slope, least = LEAST if by_picture else BY_EYE
         self.glare = np.where(eye > 0, slope * eye + least, 0.0)  # [H, M]
@@ -99,9 +91,12 @@ class Planner:
         forecast = Forecast(shift=24 if table.forecast == "yesterday" else 0)
         if table.forecast == "error":
             forecast = noisy_forecast(
-                len(self.glare), table.horizon_h, sun_error=table.sun_error,
-                temperature_error_k=table.temperature_error_k, seed=table.seed,
-            )  # fmt: skip
+                len(self.glare),
+                table.horizon_h,
+                sun_error=table.sun_error,
+                temperature_error_k=table.temperature_error_k,
+                seed=table.seed,
+            )
         penalty = np.zeros_like(self.glare)
         penalty[self.used] = PENALTY * np.maximum(self.glare[self.used] - self._limit, 0.0)
         if of_rated:
@@ -110,13 +105,17 @@ class Planner:
         most = np.maximum(np.array(self._year.counts) - 1, 1)
         penalty += CLOSED * (self._year.combinations / most).mean(axis=1)
         hours = PredictedHours(
-            self._hours.sun, self._hours.daylight, self._hours.lamps, self._hours.dimming,
-            self._hours.internal, penalty, self._year.counts, table.move_wh,
-        )  # fmt: skip
-        weights = table.heating_weight, table.cooling_weight, table.lighting_weight
-        return predicted_year(
-            self.zone, hours, ahead=ahead or table.horizon_h, forecast=forecast, weights=weights
+            self._hours.sun,
+            self._hours.daylight,
+            self._hours.lamps,
+            self._hours.dimming,
+            self._hours.internal,
+            penalty,
+            self._year.counts,
+            table.move_wh,
         )
+        weights = table.heating_weight, table.cooling_weight, table.lighting_weight
+        return predicted_year(self.zone, hours, ahead=ahead or table.horizon_h, forecast=forecast, weights=weights)
 
     def rate(self, states: NDArray[np.int64]) -> int:
         """Rate the glare of the states [H] of occupied hours; returns how many were not known.
@@ -135,16 +134,12 @@ class Planner:
                 least = self.glare[hour, number]
                 self.glare[hour, number], self.rated[hour, number] = value, True
                 if value > self._limit:
-                    same = more_open[
-                        (self.glare[hour, more_open] >= least) & ~self.rated[hour, more_open]
-                    ]
+                    same = more_open[(self.glare[hour, more_open] >= least) & ~self.rated[hour, more_open]]
                     self.glare[hour, same] = np.maximum(self.glare[hour, same], value)
         return len(used)
 
 
-def predicted_hours(
-    year: ControlYear, tables: OperationTables
-) -> tuple[ReducedZone, PredictedHours]:
+def predicted_hours(year: ControlYear, tables: OperationTables) -> tuple[ReducedZone, PredictedHours]:
     """The reduced zone of a room, and what acts on it in each combination of states, no glare."""
     room = year.room
     hours, zone = OperationHours(tables, room.weather), year.zone.zone
@@ -160,16 +155,15 @@ def predicted_hours(
         if solar.absorbed_middle is not None:
             absorbed = absorbed + solar.absorbed_middle * middle
         sun.append(solar.inside.sum(axis=1) + absorbed @ areas)
-        daylight.append(
-            np.zeros(room.skies.hours) if dimming is None else year.work_plane_lx(states)
-        )
-    reduced = reduced_zone(
-        zone, climate(room.weather), solar.facade, windows, terrain=tables.terrain
-    )
+        daylight.append(np.zeros(room.skies.hours) if dimming is None else year.work_plane_lx(states))
+    reduced = reduced_zone(zone, climate(room.weather), solar.facade, windows, terrain=tables.terrain)
     area = room.space.floor_area
     lamps, other = hours.lamps(area), hours.heat(area) + tables.gains.lighting_standby_w_m2 * area
     return reduced, PredictedHours(
-        np.stack(sun, axis=1), np.stack(daylight, axis=1), lamps,
-        dimming, np.broadcast_to(other, lamps.shape).copy(),
+        np.stack(sun, axis=1),
+        np.stack(daylight, axis=1),
+        lamps,
+        dimming,
+        np.broadcast_to(other, lamps.shape).copy(),
         np.zeros((1, 1)),
-    )  # fmt: skip
+    )

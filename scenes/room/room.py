@@ -44,14 +44,7 @@ from scenes.fenestration.systems import States
 from scenes.results import ExploredRoom, GlareResults, RoomYear
 from scenes.room.control_hour import controlled_states
 from scenes.room.daylight import room_daylight
-from scenes.room.glare import (
-    annual_glare,
-    coloured,
-    rated_hours,
-    rated_hours_error,
-    rating_of,
-    room_glare,
-)
+from scenes.room.glare import annual_glare, coloured, rated_hours, rated_hours_error, rating_of, room_glare
 from scenes.room.heat import DaylitRoom, heat_alone
 from scenes.room.inner_glass import borrowed_share
 from scenes.room.inputs import FileSensors, RoomInputs, room_inputs
@@ -61,13 +54,7 @@ from scenes.room.lobes import lobe_figures
 from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
-from scenes.room.shading import (
-    control_signals,
-    predicts,
-    room_conditions,
-    ruled_year,
-    temperature_conditions,
-)
+from scenes.room.shading import control_signals, predicts, room_conditions, ruled_year, temperature_conditions
 from scenes.room.solar import SeasonalOutdoors, seasonal_outdoors
 from scenes.room.spectral import room_spectral
 from scenes.room.zone import (
@@ -181,9 +168,17 @@ def lit_room(
         changes over the year.
     """
     room = inputs_of_room(
-        building, space, systems, weather, options,
-        operation=operation, skies=skies, cache=cache, inner=inner, together=together,
-    )  # fmt: skip
+        building,
+        space,
+        systems,
+        weather,
+        options,
+        operation=operation,
+        skies=skies,
+        cache=cache,
+        inner=inner,
+        together=together,
+    )
     if explore and len(room.seasons) > 1:
         message = "the explorer knows one state of the trees: give them one transmittance"
         raise DataError(message, file=building.file, field="--explore")
@@ -231,9 +226,7 @@ def lit_room(
         as_lobe = lobe_figures(room, light, state, rated=rated, year=year, glare=glare)
     if explore:
         with times.stage("explorer"):
-            explored = explored_room(
-                room, light, state, sensors=len(daylight.points), progress=progress
-            )
+            explored = explored_room(room, light, state, sensors=len(daylight.points), progress=progress)
     if options.outputs.spectral:
         with times.stage("spectral"):
             sensors = len(daylight.points)
@@ -246,10 +239,20 @@ def lit_room(
         if choice is not None:
             zone = replace(zone, alternatives=choice.alternatives)
     return DaylitRoom(
-        space, daylight, glare, zone, times.seconds, year, spectral=spectral, dgp=dgp,
-        dgp_sunny_hour_error=dgp_error, as_lobe=as_lobe, issues=leaks, explored=explored,
+        space,
+        daylight,
+        glare,
+        zone,
+        times.seconds,
+        year,
+        spectral=spectral,
+        dgp=dgp,
+        dgp_sunny_hour_error=dgp_error,
+        as_lobe=as_lobe,
+        issues=leaks,
+        explored=explored,
         borrowed=borrowed_share(space, light.light, light.inner),
-    )  # fmt: skip
+    )
 
 
 def inputs_of_room(
@@ -269,11 +272,19 @@ def inputs_of_room(
     if operation is None:
         systems = {guid: states[:1] for guid, states in systems.items()}
     return room_inputs(
-        building, space, systems, weather, options,
-        operation=None if operation is None else operation.tables, skies=skies, cache=cache,
-        file_sensors=FileSensors.of(building, space), inner_glass=inner,
-        together=together, controller=None if operation is None else operation.controller,
-    )  # fmt: skip
+        building,
+        space,
+        systems,
+        weather,
+        options,
+        operation=None if operation is None else operation.tables,
+        skies=skies,
+        cache=cache,
+        file_sensors=FileSensors.of(building, space),
+        inner_glass=inner,
+        together=together,
+        controller=None if operation is None else operation.controller,
+    )
 
 
 def light_needs(room: RoomInputs, *, annual_glare: bool = False) -> tuple[str, ...]:
@@ -315,9 +326,7 @@ def controlled_zone(
         state = ruled.states[:, room.windows.control]
         if light is not None and reads_work_plane(room):
             daylight = room_daylight(room, light, state, progress=progress)
-        rooms.append(
-            room_zone(room, surfaces, outdoors, state, daylight, ruled=ruled, progress=progress)
-        )
+        rooms.append(room_zone(room, surfaces, outdoors, state, daylight, ruled=ruled, progress=progress))
     if len(rooms) == 1:
         return rooms[0]
     return replace(rooms[0], alternatives=RoomAlternatives(conditions, read, tuple(rooms)))
@@ -335,12 +344,7 @@ LARGEST = 400  # pixels of a side of its pictures
 
 
 def explored_room(
-    room: RoomInputs,
-    room_light: RoomLight,
-    state: NDArray[np.int64],
-    *,
-    sensors: int,
-    progress: Progress = silent,
+    room: RoomInputs, room_light: RoomLight, state: NDArray[np.int64], *, sensors: int, progress: Progress = silent
 ) -> ExploredRoom:
     """Pictures, illuminances and the sun's beam of all lit hours in combinations of states.
 
@@ -358,9 +362,7 @@ def explored_room(
     hours = np.arange(L)
     for j, combination in enumerate(combinations):
         rows = room_light.states(np.tile(combination, (room.skies.hours, 1)))
-        of_groups = [
-            min(k, len(of) - 1) for of, k in zip(light.systems, rows[:, 0].tolist(), strict=True)
-        ]
+        of_groups = [min(k, len(of) - 1) for of, k in zip(light.systems, rows[:, 0].tolist(), strict=True)]
         steps = part(progress, j / J, (j + 1) / J)
         made = pictures_in_state(small, hours, of_groups)
         pictures.append(picture_year(made, seed=light.sampling.seed, progress=steps))

@@ -13,13 +13,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    GetCoreSchemaHandler,
-    PrivateAttr,
-    model_validator,
-)
+from pydantic import AfterValidator, BeforeValidator, GetCoreSchemaHandler, PrivateAttr, model_validator
 from pydantic_core import CoreSchema, core_schema
 
 from bim.use import KINDS, YearSchedule, day_of_year
@@ -40,9 +34,7 @@ def _clock(hours: tuple[int, int]) -> tuple[int, int]:
     """Two clock times for `working_hours`; 22 to 6 is the night."""
     start, end = hours
     if not (0 <= start < CLOCK and 0 <= end <= CLOCK and start != end):
-        raise ValueError(
-            f"expected two different hours, from 0 to 23 and to 0 to 24, got {list(hours)}"
-        )
+        raise ValueError(f"expected two different hours, from 0 to 23 and to 0 to 24, got {list(hours)}")
     return hours
 
 
@@ -71,9 +63,7 @@ def _profile(value: Any) -> Any:
     """A number, 24 numbers, or ranges: all as ranges."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return ({"hours": (0, CLOCK), "value": value},)
-    if not isinstance(value, list | tuple) or any(
-        not isinstance(v, dict | RangeTable | int | float) for v in value
-    ):
+    if not isinstance(value, list | tuple) or any(not isinstance(v, dict | RangeTable | int | float) for v in value):
         raise ValueError(f"expected a number, 24 of them, or ranges of hours, got {value!r}")
     if any(isinstance(v, dict | RangeTable) for v in value):
         return value
@@ -167,14 +157,10 @@ class ScheduleTable(DaysTable):
             open_ &= ~inside
             for kind in np.unique(kinds[inside]):
                 for one in part.day(kind):
-                    values[inside & (kinds == kind) & working_hours(weather, *one.hours)] = (
-                        one.value
-                    )
+                    values[inside & (kinds == kind) & working_hours(weather, *one.hours)] = one.value
         return self.peak * values
 
-    def _of_year(
-        self, days: pd.DatetimeIndex, weekday: NDArray[np.int64], free: NDArray[np.bool_]
-    ) -> FloatArray:
+    def _of_year(self, days: pd.DatetimeIndex, weekday: NDArray[np.int64], free: NDArray[np.bool_]) -> FloatArray:
         """Values [H] of the building file's schedule on the days of a weather."""
         date = 100 * days.month.to_numpy() + days.day.to_numpy()
         numbers = [day_of_year(int(one) // 100, int(one) % 100) for one in np.unique(date)]
@@ -214,9 +200,7 @@ class OrSchedule:
     limits: Limits
     plain: Callable[[Any], Any] | None = None
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """None, a text, or a number within the limits."""
         return core_schema.no_info_plain_validator_function(self._checked)
 

@@ -57,9 +57,7 @@ class OutdoorLight:
     outdoors differ by rounding only. Only sums over rows and columns stay in memory.
     """
 
-    def __init__(
-        self, building: Building, space: Space, sampling: Sampling, cache: MatrixCache | None
-    ) -> None:
+    def __init__(self, building: Building, space: Space, sampling: Sampling, cache: MatrixCache | None) -> None:
         """Matrices are traced at their first use."""
         self.building, self.space, self.sampling, self.cache = building, space, sampling, cache
 
@@ -84,11 +82,7 @@ class OutdoorLight:
             if matrices:
                 matrices.append(with_outdoors(matrices[0], scene))
             else:
-                matrices.append(
-                    phase_matrices(
-                        scene, self.sampling, five_phase=False, needs=(), cache=self.cache
-                    )
-                )
+                matrices.append(phase_matrices(scene, self.sampling, five_phase=False, needs=(), cache=self.cache))
         return np.concatenate([matrix.daylight.values for matrix in matrices])
 
 
@@ -161,10 +155,7 @@ class RoomSeries(Generic[R]):
             return self._in_turn(templates, ahead, progress)
 
     def _in_turn(
-        self,
-        templates: _Templates,
-        ahead: Iterator[tuple[str, R | BaseException]],
-        progress: Progress,
+        self, templates: _Templates, ahead: Iterator[tuple[str, R | BaseException]], progress: Progress
     ) -> tuple[list[R], list[Issue], list[str]]:
         results: list[R] = []
         issues: list[Issue] = []
@@ -207,9 +198,7 @@ class RoomSeries(Generic[R]):
             self.on_room(result)
         return results, issues, notes
 
-    def _ahead(
-        self, templates: _Templates, progress: Progress
-    ) -> Generator[tuple[str, R | BaseException]]:
+    def _ahead(self, templates: _Templates, progress: Progress) -> Generator[tuple[str, R | BaseException]]:
         """Results of rooms that are computed in parallel, as they become ready."""
         if self.parallel is None:
             return
@@ -256,7 +245,5 @@ class _Templates:
         group = self._group[space.guid]
         group[:] = [light for light in group if light.space.guid != space.guid]
         self._template = {
-            guid: twin
-            for guid, twin in self._template.items()
-            if twin is None or twin.guid != space.guid
+            guid: twin for guid, twin in self._template.items() if twin is None or twin.guid != space.guid
         }

@@ -13,13 +13,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.evaluation import GlareOptions
 from mitsuba_cfs.images.view import View, fisheye
 from mitsuba_cfs.methods.glare import hourly_glare
-from mitsuba_cfs.methods.light import (
-    SeasonalLight,
-    direct_sun_by_group,
-    eye_illuminance,
-    illuminance,
-    with_view,
-)
+from mitsuba_cfs.methods.light import SeasonalLight, direct_sun_by_group, eye_illuminance, illuminance, with_view
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.metrics.lm83 import blinds_operated
 from mitsuba_cfs.progress import Progress, part, silent
@@ -112,9 +106,7 @@ def temperature_conditions(room: RoomInputs) -> tuple[RoomCondition, ...]:
     leaves = [leaf for rule in room.control.rules for leaf in rule.leaves]
     for kind in LOAD_RULES:
         needed = f"{kind}_c"
-        if any(leaf.rule == kind for leaf in leaves) and (
-            getattr(room.operation.loads, needed) is None
-        ):
+        if any(leaf.rule == kind for leaf in leaves) and (getattr(room.operation.loads, needed) is None):
             message = f'the rule "{kind}" needs a set point: the room has no ideal {kind}'
             raise DataError(message, element=room.space.label, field=f"loads.{needed}")
     step_h = room.weather.step_h
@@ -166,11 +158,7 @@ def _bounded(room: RoomInputs, conditions: Iterable[Condition]) -> None:
 
 
 def _waiting_rule(
-    room: RoomInputs,
-    c: int,
-    at: tuple[ShadingRule, str],
-    read: tuple[Condition, ...],
-    signals: _Signals,
+    room: RoomInputs, c: int, at: tuple[ShadingRule, str], read: tuple[Condition, ...], signals: _Signals
 ) -> WaitingRule:
     """A rule of control group c, at a place of its file, as a condition that waits."""
     (rule, place), asked, reasons = at, [], tuple(dict.fromkeys(_reasons(at[0])))
@@ -180,9 +168,12 @@ def _waiting_rule(
         asked.append(_by_rule(room, c, signals, {}, reasons, at=at, at_once=place)[0])
     states, levels = np.unique(np.stack(asked), return_inverse=True)
     return WaitingRule(
-        _waiting_name(c, place), read, tuple(states.tolist()), levels.reshape(len(asked), -1),
+        _waiting_name(c, place),
+        read,
+        tuple(states.tolist()),
+        levels.reshape(len(asked), -1),
         *_waits(rule, room.weather.step_h),
-    )  # fmt: skip
+    )
 
 
 def _waiting_name(c: int, place: str) -> str:
@@ -195,9 +186,7 @@ def _parts(rule: ShadingRule, place: str) -> Iterator[tuple[ShadingRule, str]]:
         yield inner, f"{place}.parts.{n}"
 
 
-def _waiting_parts(
-    rule: ShadingRule, place: str, step_h: float
-) -> Iterator[tuple[ShadingRule, str]]:
+def _waiting_parts(rule: ShadingRule, place: str, step_h: float) -> Iterator[tuple[ShadingRule, str]]:
     """The rules that combine or turn conditions of the room, and wait; inner ones first."""
     if rule.rule not in ("any", "all") and not rule.inverse:
         return
@@ -399,9 +388,7 @@ def _moves(states: StateArray) -> NDArray[np.bool_]:
     return np.concatenate([[False], states[1:] != states[:-1]])
 
 
-def _combined(
-    closed: bool, parts: Sequence[tuple[StateArray, StateArray]]
-) -> tuple[StateArray, StateArray]:
+def _combined(closed: bool, parts: Sequence[tuple[StateArray, StateArray]]) -> tuple[StateArray, StateArray]:
     """The most closed, or most open, states of parts [H], and the reason of each move [H].
 
     The part that has the extreme after a move towards it, or before one away from it, moves then.
@@ -446,9 +433,7 @@ class _Signals:
 
     def beam(self, sensor: str) -> FloatArray:
         """The sun's direct irradiance [H, G] [W/m2]."""
-        return self._once(
-            ("beam", sensor), lambda at: window_beam(self._room, shaded=at == "window")
-        )
+        return self._once(("beam", sensor), lambda at: window_beam(self._room, shaded=at == "window"))
 
     def _once(self, key: tuple[str, str], compute: Callable[[str], FloatArray]) -> FloatArray:
         if key not in self._values:
@@ -467,9 +452,7 @@ class _Signals:
         return window_irradiance(self._outdoors, self._room.skies)
 
 
-def _by_cut_off(
-    room: RoomInputs, rule: ShadingRule, groups: NDArray[np.int64], beam: FloatArray
-) -> StateArray:
+def _by_cut_off(room: RoomInputs, rule: ShadingRule, groups: NDArray[np.int64], beam: FloatArray) -> StateArray:
     """The state that stops the sun on all of some window groups [H], each by its profile angle."""
     sun = sun_directions(room.weather)
     each = [
@@ -503,9 +486,7 @@ def group_states(room: RoomInputs, c: int) -> int:
     return max(len(windows.systems[g]) for g in np.flatnonzero(windows.control == c))
 
 
-def _by_sun_depth(
-    room: RoomInputs, rule: ShadingRule, groups: NDArray[np.int64], beam: FloatArray
-) -> StateArray:
+def _by_sun_depth(room: RoomInputs, rule: ShadingRule, groups: NDArray[np.int64], beam: FloatArray) -> StateArray:
     """1 where the sun reaches deeper into the room than a rule allows [H], else 0."""
     sun = sun_directions(room.weather)
     floor = min(face.triangles[..., 2].min() for face in room.space.faces)
@@ -541,17 +522,16 @@ def _by_people(
     return found
 
 
-def _by_direct_sun(
-    room: RoomInputs, light: RoomLight, members: list[int], rule: ShadingRule
-) -> dict[int, StateArray]:
+def _by_direct_sun(room: RoomInputs, light: RoomLight, members: list[int], rule: ShadingRule) -> dict[int, StateArray]:
     """States [H] of control groups by LM-83's rule, or of Lightswitch-2002's active user."""
     through = direct_sun_by_group(light.light)
     if through is None:
         message = f"{rule.behaviour} reads the direct sun, which the three-phase method lacks"
         raise DataError(message, element=room.space.label, field="control.behaviour")
     control, plane = room.windows.control, _plane_sensors(room, light)
-    direct = np.stack([np.sum([through[g][plane] for g in np.flatnonzero(control == c)], axis=0)
-                       for c in members])  # [n, S, L]  # fmt: skip
+    direct = np.stack(
+        [np.sum([through[g][plane] for g in np.flatnonzero(control == c)], axis=0) for c in members]
+    )  # [n, S, L]
     if rule.behaviour == "LM-83":
         lit = blinds_operated(list(direct.transpose(0, 2, 1))).astype(np.int64)
         closed = [room.skies.whole_year(one).astype(np.int64) for one in lit]
@@ -562,9 +542,7 @@ def _by_direct_sun(
     watts = np.where(sky.illuminance > 0, normal / np.maximum(sky.illuminance, 1e-9), 0.0)
     present, rows = _present(room), rows_of_day(room)
     return {
-        c: lightswitch_2002(
-            sky.whole_year(of_group[nearest] * watts), present, rows, closed=_closed(room, c)
-        )
+        c: lightswitch_2002(sky.whole_year(of_group[nearest] * watts), present, rows, closed=_closed(room, c))
         for c, of_group in zip(members, direct, strict=True)
     }
 
@@ -600,13 +578,14 @@ def _by_habit(
 
     level = facade_illuminance(room, "horizontal")[:, 0]
     shares = haldi_robinson_2010(
-        lux, level, _present(room), blinds=len(members), seed=rule.seed,
+        lux,
+        level,
+        _present(room),
+        blinds=len(members),
+        seed=rule.seed,
         substeps=max(round(12 * room.weather.step_h), 1),
-    )  # fmt: skip
-    return {
-        c: np.rint((1.0 - shares[:, n]) * (counts[n] - 1)).astype(np.int64)
-        for n, c in enumerate(members)
-    }
+    )
+    return {c: np.rint((1.0 - shares[:, n]) * (counts[n] - 1)).astype(np.int64) for n, c in enumerate(members)}
 
 
 def _closed(room: RoomInputs, c: int) -> int:
@@ -641,11 +620,7 @@ def _plane_lx(
 
 
 def _take_jointly(
-    room: RoomInputs,
-    light: RoomLight,
-    states: StateArray,
-    joint: NDArray[np.int64],
-    progress: Progress,
+    room: RoomInputs, light: RoomLight, states: StateArray, joint: NDArray[np.int64], progress: Progress
 ) -> None:
     """Set the states [H, N] of control groups to the best combination for all rules of light.
 
@@ -674,9 +649,7 @@ def _take_jointly(
         chosen = states.copy()
         chosen[:, joint] = combinations[number]
         rows = light.states(chosen[:, room.windows.control])
-        steps = part(
-            progress, number / len(combinations), (number + 1) / len(combinations), "glare control"
-        )
+        steps = part(progress, number / len(combinations), (number + 1) / len(combinations), "glare control")
         return np.max([limit(rows, hours, steps) for limit in limits], axis=0)
 
     chosen = by_glare(closure, excess, len(lit))
@@ -684,19 +657,14 @@ def _take_jointly(
 
 
 def _closure(
-    room: RoomInputs,
-    joint: NDArray[np.int64],
-    combinations: StateArray,
-    leaves: Sequence[ShadingRule],
+    room: RoomInputs, joint: NDArray[np.int64], combinations: StateArray, leaves: Sequence[ShadingRule]
 ) -> FloatArray:
     """How closed each combination of states is [M], 0 to 1: the mean, weighted by glass area.
 
     Of each group its number among its states, or the view through that it takes away.
     """
     if any(leaf.prefer == "view" for leaf in leaves):
-        return view_taken(room, joint, combinations) + 1e-3 * _mean_of_groups(
-            room, joint, combinations
-        )
+        return view_taken(room, joint, combinations) + 1e-3 * _mean_of_groups(room, joint, combinations)
     return _mean_of_groups(room, joint, combinations)
 
 
@@ -714,10 +682,7 @@ def view_taken(room: RoomInputs, groups: NDArray[np.int64], combinations: StateA
 
 
 def _mean_of_groups(
-    room: RoomInputs,
-    groups: NDArray[np.int64],
-    combinations: StateArray,
-    values: Sequence[FloatArray] = (),
+    room: RoomInputs, groups: NDArray[np.int64], combinations: StateArray, values: Sequence[FloatArray] = ()
 ) -> FloatArray:
     """Mean over control groups, weighted by glass area, in each combination of states [M].
 

@@ -25,9 +25,11 @@ SCENARIOS = Path(__file__).with_name("control_scenarios.toml")
 # rules that need nothing computed: of the weather, the sun's altitude, the use of the room
 WEATHER_RULES = ("outdoor temperature", "wind", "rain", "day", "night", "occupied", "unoccupied")
 ROOM_RULES = {  # that the heat balance decides, by the quantity of a `RoomCondition`
-    "air temperature": "air", "operative temperature": "operative", "cooling": "cooling",
+    "air temperature": "air",
+    "operative temperature": "operative",
+    "cooling": "cooling",
     "heating": "heating",
-}  # fmt: skip
+}
 LOAD_RULES = ("cooling", "heating")
 # rules of which all groups take a combination of states together
 JOINT_RULES = ("glare", "work plane", "daylight")
@@ -87,11 +89,31 @@ class ShadingRule(TomlTable):
     setpoint: float | None = None  # of the scenario, in the unit that its source has
     setpoint_2: float | None = None
     rule: Literal[
-        "always", "schedule", "irradiance", "illuminance", "glare", "work plane", "daylight",
-        "cut-off", "sun depth", "outdoor temperature", "wind", "rain", "day", "night", "occupied",
-        "unoccupied", "air temperature", "operative temperature", "cooling", "heating", "manual",
-        "any", "all", "predictive",
-    ] = "always"  # fmt: skip
+        "always",
+        "schedule",
+        "irradiance",
+        "illuminance",
+        "glare",
+        "work plane",
+        "daylight",
+        "cut-off",
+        "sun depth",
+        "outdoor temperature",
+        "wind",
+        "rain",
+        "day",
+        "night",
+        "occupied",
+        "unoccupied",
+        "air temperature",
+        "operative temperature",
+        "cooling",
+        "heating",
+        "manual",
+        "any",
+        "all",
+        "predictive",
+    ] = "always"
     parts: tuple[ShadingRule, ...] = ()  # of "any", the most closed state, and "all", the most open
     open_delay_h: Annotated[float, plausible.HOURS] = 0.0  # opens after more light for so long [h]
     hold_h: Annotated[float, plausible.HOURS] = 0.0  # least time between two moves [h]
@@ -126,9 +148,7 @@ class ShadingRule(TomlTable):
     # "irradiance", "illuminance", "cut-off", "sun depth": sun and sky that reach the windows, or
     # those of a weather station on the roof, without surroundings, turned to the facade or level
     sensor: Literal["window", "roof", "horizontal"] = "window"
-    limit_lx: Annotated[Positive, plausible.EYE] = (
-        3473.0  # "glare": vertical illuminance of the eye; sDGP 0.40
-    )
+    limit_lx: Annotated[Positive, plausible.EYE] = 3473.0  # "glare": vertical illuminance of the eye; sDGP 0.40
     limit_dgp: Share | None = None  # "glare": DGP of every hour's picture in place of Ev
     seat: tuple[float, float, float] | None = None  # "glare": the eye [m]; default: the room's view
     looks_deg: float | None = None  # "glare": azimuth of the line of sight from north by east
@@ -146,9 +166,7 @@ class ShadingRule(TomlTable):
     def _of_scenario(cls, table: Any) -> Any:
         name = table.get("scenario") if isinstance(table, dict) else None
         if not name:
-            points = [
-                k for k in ("setpoint", "setpoint_2") if isinstance(table, dict) and k in table
-            ]
+            points = [k for k in ("setpoint", "setpoint_2") if isinstance(table, dict) and k in table]
             if points:
                 raise ValueError(f"{points[0]}: belongs to a `scenario`")
             return table
@@ -161,8 +179,7 @@ class ShadingRule(TomlTable):
         stray = [key for key in table if key in ShadingRule.model_fields and key not in own]
         if whole["rule"] in ("any", "all") and "rule" not in table and stray:
             raise ValueError(
-                f"{stray[0]}: the scenario {name!r} combines rules with keys of their own: state "
-                "its `parts`"
+                f"{stray[0]}: the scenario {name!r} combines rules with keys of their own: state its `parts`"
             )
         return whole
 
@@ -227,8 +244,7 @@ class ShadingRule(TomlTable):
     @property
     def _limits_of_light(self) -> set[str]:
         """The distinct rules of light that it has."""
-        keys = {"rule", "at", "close_above_lx", "target_lx", "limit_lx", "limit_dgp", "seat",
-                "looks_deg"}  # fmt: skip
+        keys = {"rule", "at", "close_above_lx", "target_lx", "limit_lx", "limit_dgp", "seat", "looks_deg"}
         joint = (leaf for leaf in self.leaves if leaf.rule in JOINT_RULES)
         return {leaf.model_dump_json(include=keys) for leaf in joint}
 
@@ -319,10 +335,7 @@ class ControlTable(ShadingRule):
             return None
         for place, rule in self.rules:
             if rule.rule != "predictive":
-                return (
-                    f"{place}.rule",
-                    '"predictive" plans all groups of a room together, and alone',
-                )
+                return (f"{place}.rule", '"predictive" plans all groups of a room together, and alone')
             for key in WAITS:
                 if getattr(rule, key):
                     return f"{place}.{key}", 'the rule "predictive" does not wait: leave it out'

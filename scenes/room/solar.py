@@ -19,12 +19,7 @@ from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.gloss import STEPS, Gloss, pane, pane_shares
 from mitsuba_cfs.methods.light import hours_by_season, in_order_of_hours
-from mitsuba_cfs.methods.phase_matrices import (
-    BATCHES,
-    PhaseMatrices,
-    phase_matrices,
-    with_outdoors,
-)
+from mitsuba_cfs.methods.phase_matrices import BATCHES, PhaseMatrices, phase_matrices, with_outdoors
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -60,16 +55,12 @@ class SeasonalOutdoors:
         """The scene of the first season."""
         return self.scenes[0]
 
-    def by_season(
-        self, of_season: Callable[[PhaseMatrices, FloatArray], FloatArray], sky: FloatArray
-    ) -> FloatArray:
+    def by_season(self, of_season: Callable[[PhaseMatrices, FloatArray], FloatArray], sky: FloatArray) -> FloatArray:
         """Values [.., L] of all lit hours, from the scene and the sky [P, l] of each season."""
         parts = hours_by_season(self.scenes, self.season)
         if len(parts) == 1:
             return of_season(parts[0][0], sky)
-        return in_order_of_hours(
-            [(of_season(scene, sky[:, hours]), hours) for scene, hours in parts]
-        )
+        return in_order_of_hours([(of_season(scene, sky[:, hours]), hours) for scene, hours in parts])
 
 
 SOLAR_CLEAR = 0.80  # solar transmittance of inner glass without a value: 6 mm float, EN 410
@@ -108,9 +99,7 @@ def seasonal_outdoors(
 
     Args: light: whose matrices are used again where both bands have equal reflectances outdoors.
     """
-    first, *others = (
-        exterior_surfaces(season.building, room.space, "solar") for season in room.seasons
-    )
+    first, *others = (exterior_surfaces(season.building, room.space, "solar") for season in room.seasons)
     if (
         light is not None
         and light.inner is None
@@ -132,9 +121,8 @@ def _traced_outdoors(
     scene = DaylightScene(Surfaces.none(), exterior, room.windows.groups)
     steps = part(progress, 0.0, 1.0, "sun")
     matrices = phase_matrices(
-        scene, room.options.sampling, five_phase=False, needs=(), cache=room.cache,
-        scenes=scenes, progress=steps,
-    )  # fmt: skip
+        scene, room.options.sampling, five_phase=False, needs=(), cache=room.cache, scenes=scenes, progress=steps
+    )
     steps("sun", 1.0)
     return matrices
 
@@ -147,10 +135,7 @@ def window_irradiance(outdoors: SeasonalOutdoors, skies: AnnualSky) -> FloatArra
 
 
 def directional_sums(
-    outdoors: SeasonalOutdoors,
-    skies: AnnualSky,
-    shares: FloatArray,
-    sun: NDArray[np.floating] | None = None,
+    outdoors: SeasonalOutdoors, skies: AnnualSky, shares: FloatArray, sun: NDArray[np.floating] | None = None
 ) -> FloatArray:
     """Weighted sums [n, L] [W/m2] over the directions of the groups' irradiance, in lit hours.
 
@@ -205,12 +190,8 @@ def solar_gains(
     kinds, kind = combinations_of(state)
     suns = [by_states.of(combination) for combination in kinds]
     hours = np.arange(len(kind))
-    gains = {
-        name: np.stack([sums[name] for _, sums, _ in suns])[kind, hours] for name in suns[0][1]
-    }
-    beyond = {
-        place: np.stack([passed[place] for *_, passed in suns])[kind, hours] for place in suns[0][2]
-    }
+    gains = {name: np.stack([sums[name] for _, sums, _ in suns])[kind, hours] for name in suns[0][1]}
+    beyond = {place: np.stack([passed[place] for *_, passed in suns])[kind, hours] for place in suns[0][2]}
     of_windows = state[:, room.windows.group]
     return switched([solar for solar, *_ in suns], kind, of_windows), gains, beyond
 
@@ -234,9 +215,7 @@ class SunByStates:
         """Args as of `solar_gains`."""
         steps = part(progress, 0.0, 0.8, "heat")
         self._room, self._outdoors, self._progress = room, outdoors, part(steps, 0.6, 1.0)
-        facade = facade_irradiance(
-            outdoors, outer, len(zone.zone.surfaces), room.skies, progress=part(steps, 0.4, 0.6)
-        )
+        facade = facade_irradiance(outdoors, outer, len(zone.zone.surfaces), room.skies, progress=part(steps, 0.4, 0.6))
         sun = _sun_alone(room) if room.options.sky_light == "hemispherical" else None
         self._zone = ZoneInSun(sunlit_rooms(room, zone), room.windows, thermals, facade, sun)
         self._absorption: dict[bytes, FloatArray] = {}
@@ -247,9 +226,7 @@ class SunByStates:
         windows = self._room.windows
         for g, j in enumerate(state):
             pair = windows.neighbours(g, j)
-            if pair is not None and self._alike(
-                g, j, *pair[:2]
-            ):  # a tilt between two: the mean of the sun in these
+            if pair is not None and self._alike(g, j, *pair[:2]):  # a tilt between two: the mean of the sun in these
                 low, high, share = pair
                 first, second = (self.of([*state[:g], k, *state[g + 1 :]]) for k in (low, high))
                 return _mean_sun(first, second, share)
@@ -310,21 +287,20 @@ def combinations_of(state: NDArray[np.int64]) -> tuple[list[tuple[int, ...]], ND
 
 
 def facade_irradiance(
-    outdoors: SeasonalOutdoors,
-    outer: OuterFaces,
-    surfaces: int,
-    skies: AnnualSky,
-    *,
-    progress: Progress = silent,
+    outdoors: SeasonalOutdoors, outer: OuterFaces, surfaces: int, skies: AnnualSky, *, progress: Progress = silent
 ) -> FloatArray:
     """Irradiance on the outside of a zone's surfaces [H, F] [W/m2]; 0 of those indoors."""
     facade = np.zeros((skies.hours, surfaces))
 
     def of_season(scene: PhaseMatrices, sky: FloatArray) -> FloatArray:
         coefficients = sky_irradiance_matrix(
-            scene.scene.exterior, outer.points, outer.normals,
-            subdivision=scene.sampling.subdivision, progress=progress, **_sampled(outdoors.first),
-        ).values  # [n, P] irradiance per unit radiance of each sky patch [sr]  # fmt: skip
+            scene.scene.exterior,
+            outer.points,
+            outer.normals,
+            subdivision=scene.sampling.subdivision,
+            progress=progress,
+            **_sampled(outdoors.first),
+        ).values  # [n, P] irradiance per unit radiance of each sky patch [sr]
         return coefficients.astype(sky.dtype) @ sky
 
     if len(outer.surfaces):
@@ -343,9 +319,7 @@ def _sampled(scene: PhaseMatrices) -> dict[str, Any]:
     }
 
 
-def _in_states(
-    thermals: Sequence[Sequence[ThermalSystem]], state: Sequence[int]
-) -> list[ThermalSystem]:
+def _in_states(thermals: Sequence[Sequence[ThermalSystem]], state: Sequence[int]) -> list[ThermalSystem]:
     """The thermal data of each group in its state; a group with fewer states is in its last."""
     return [of[min(j, len(of) - 1)] for of, j in zip(thermals, state, strict=True)]
 
@@ -370,8 +344,13 @@ def sunlit_rooms(room: RoomInputs, zone: ThermalRoom) -> SunlitRooms:
     beyond: list[Place | None] = []
     pieces: list[tuple[FloatArray, float, int]] = []  # triangles, reflectance, surface
 
-    def add(triangles: FloatArray, reflectance: float, place: Place | None, of: Gloss | None = None,
-            tau: tuple[float, ...] | None = None) -> None:  # fmt: skip
+    def add(
+        triangles: FloatArray,
+        reflectance: float,
+        place: Place | None,
+        of: Gloss | None = None,
+        tau: tuple[float, ...] | None = None,
+    ) -> None:
         pieces.append((triangles, reflectance, F + len(beyond)))
         gloss.append(of)
         transmittance.append(tau)
@@ -402,9 +381,7 @@ def sunlit_rooms(room: RoomInputs, zone: ThermalRoom) -> SunlitRooms:
             elif one.guid != room.space.guid:
                 add(triangles, face.reflectance("solar"), place, face.gloss)
             else:
-                pieces.append(
-                    (triangles, face.reflectance("solar"), int(zone.surface_of_face[number]))
-                )
+                pieces.append((triangles, face.reflectance("solar"), int(zone.surface_of_face[number])))
         if one.guid != room.space.guid:
             windows = room_windows(one, room.systems)
             for group, states in zip(windows.groups, windows.systems, strict=True):
@@ -444,11 +421,7 @@ def _zone_gloss(interior: Surfaces, numbers: NDArray[np.int64]) -> tuple[Gloss |
 
 
 def _gains_in_states(
-    zone: ZoneInSun,
-    state: Sequence[int],
-    outdoors: SeasonalOutdoors,
-    skies: AnnualSky,
-    absorption: FloatArray | None,
+    zone: ZoneInSun, state: Sequence[int], outdoors: SeasonalOutdoors, skies: AnnualSky, absorption: FloatArray | None
 ) -> tuple[Solar, Gains, SunBeyond]:
     """Solar radiation absorbed by window layers, surfaces and facades, sums, and what goes beyond.
 
@@ -467,8 +440,7 @@ def _gains_in_states(
     T = np.stack([s.solar.transmission_matrix() for s in zone.windows.in_states(state)])
     shares = absorbed_shares(heats, T, area, absorption)
     sums = np.split(
-        directional_sums(outdoors, skies, np.concatenate(shares), zone.sun),
-        np.cumsum([len(s) for s in shares[:-1]]),
+        directional_sums(outdoors, skies, np.concatenate(shares), zone.sun), np.cumsum([len(s) for s in shares[:-1]])
     )
     taken, outer, inner, middle, whole = (rows.T for rows in sums)
     B = len(zone.sunlit.beyond)
@@ -509,10 +481,7 @@ def _sun_alone(room: RoomInputs) -> NDArray[np.floating]:
 
 
 def absorbed_shares(
-    heats: Sequence[ThermalSystem],
-    transmission: FloatArray,
-    area: FloatArray,
-    absorption: FloatArray,
+    heats: Sequence[ThermalSystem], transmission: FloatArray, area: FloatArray, absorption: FloatArray
 ) -> list[FloatArray]:
     """Weights of the groups' irradiance by direction [n, G, K] for `directional_sums`.
 

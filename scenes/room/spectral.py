@@ -33,12 +33,7 @@ LEAST_LX = 1.0  # illuminance at the eye below which colour is not stated
 
 
 def room_spectral(
-    room: RoomInputs,
-    light: RoomLight,
-    state: NDArray[np.int64],
-    sensors: int,
-    *,
-    progress: Progress = silent,
+    room: RoomInputs, light: RoomLight, state: NDArray[np.int64], sensors: int, *, progress: Progress = silent
 ) -> SpectralYear:
     """Alpha-opic quantities and colour of a year with the shading states of each hour [H, G].
 
@@ -54,18 +49,12 @@ def room_spectral(
         Detection(np.eye(channels.count), slice(-1 - len(EYE_TURNS), None)),
     )
     spectral = spectral_light(
-        light.light, factors, channels, wanted, light.states(state), water_cm=water,
-        progress=progress,
-    )  # fmt: skip
+        light.light, factors, channels, wanted, light.states(state), water_cm=water, progress=progress
+    )
     return spectral_year(room, channels, spectral, notes)
 
 
-def spectral_year(
-    room: RoomInputs,
-    channels: Channels,
-    light: SpectralLight,
-    notes: Sequence[str],
-) -> SpectralYear:
+def spectral_year(room: RoomInputs, channels: Channels, light: SpectralLight, notes: Sequence[str]) -> SpectralYear:
     """The results of a year from its light.
 
     Args:
@@ -104,9 +93,7 @@ def spectral_year(
     )
 
 
-def _sensors(
-    photopic: NDArray[np.float32], edi: NDArray[np.float32], occupied: NDArray[np.bool_]
-) -> pd.DataFrame:
+def _sensors(photopic: NDArray[np.float32], edi: NDArray[np.float32], occupied: NDArray[np.bool_]) -> pd.DataFrame:
     """Mean melanopic EDI [lx], DER and share of occupied hours at 250 lx or more, by sensor.
 
     Args: photopic: sum over the hours [S] [lx].
@@ -143,13 +130,13 @@ def _summary(
         temperature, distance = colour_temperature(channels.detection[-3:] @ total)
         index, fidelity = colour_rendering(channels.spectrum(total))
         figures |= {
-            "cct_k": float(temperature), "duv": float(distance),
-            "colour_rendering_index": index, "colour_fidelity_index": fidelity,
-        }  # fmt: skip
+            "cct_k": float(temperature),
+            "duv": float(distance),
+            "colour_rendering_index": index,
+            "colour_fidelity_index": fidelity,
+        }
     horizontal = detected(outdoors)
-    figures["outdoor_melanopic_der"] = float(
-        _ratio(equivalent_daylight(horizontal[MELANOPIC]), horizontal[0])
-    )
+    figures["outdoor_melanopic_der"] = float(_ratio(equivalent_daylight(horizontal[MELANOPIC]), horizontal[0]))
     return figures
 
 

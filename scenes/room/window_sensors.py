@@ -32,9 +32,7 @@ def window_beam(room: RoomInputs, *, shaded: bool) -> FloatArray:
         return beam
     points = np.concatenate(
         [
-            points_on_triangles(
-                np.concatenate([w.triangles for w in group.windows]), even_numbers(SUN_POINTS)
-            )[0]
+            points_on_triangles(np.concatenate([w.triangles for w in group.windows]), even_numbers(SUN_POINTS))[0]
             for group in groups
         ]
     )
@@ -44,9 +42,8 @@ def window_beam(room: RoomInputs, *, shaded: bool) -> FloatArray:
         hours = np.flatnonzero((beam > 0).any(axis=1) & (room.season_of_year == number))
         if len(hours) and len(exterior.triangles):
             lit = sunlit_shares(
-                exterior, points, facing, sun[hours], samples=DISC_RAYS,
-                seed=room.options.sampling.seed,
-            )  # fmt: skip
+                exterior, points, facing, sun[hours], samples=DISC_RAYS, seed=room.options.sampling.seed
+            )
             beam[hours] *= lit.reshape(len(groups), SUN_POINTS, -1).mean(axis=1).T
     return beam
 
@@ -84,7 +81,6 @@ def _sensor_matrix(room: RoomInputs, around: Surfaces, *, horizontal: bool) -> F
     if horizontal:  # one sensor for all
         points, normals = points[:1], np.array([[0.0, 0.0, 1.0]])
     values: FloatArray = sky_irradiance_matrix(
-        around, points, normals,
-        subdivision=sampling.subdivision, seed=sampling.seed, cache=room.cache,
-    ).values  # fmt: skip
+        around, points, normals, subdivision=sampling.subdivision, seed=sampling.seed, cache=room.cache
+    ).values
     return np.tile(values, (len(groups), 1)) if horizontal else values

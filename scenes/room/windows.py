@@ -57,9 +57,7 @@ class RoomWindows:
 
         return [[of(system) for system in states] for states in self.systems]
 
-    def optics_by_colour(
-        self, optics: Sequence[Sequence[SystemOptics]]
-    ) -> list[list[list[SystemOptics]]]:
+    def optics_by_colour(self, optics: Sequence[Sequence[SystemOptics]]) -> list[list[list[SystemOptics]]]:
         """Optics of each group's systems by red, green and blue [3][G][J].
 
         Light of D65 through a system has the colour of its spectrum; neutral where this is not
@@ -87,10 +85,7 @@ class RoomWindows:
         tilts = states[min(state, len(states) - 1)].between
         if tilts is None:
             return None
-        low, high = (
-            next((n for n, one in enumerate(states) if one is tilt), None)
-            for tilt in (tilts.low, tilts.high)
-        )
+        low, high = (next((n for n, one in enumerate(states) if one is tilt), None) for tilt in (tilts.low, tilts.high))
         return None if low is None or high is None else (low, high, tilts.share)
 
     def in_state(self, state: int) -> list[FenestrationSystem]:
@@ -102,9 +97,7 @@ class RoomWindows:
         return [of[min(j, len(of) - 1)] for of, j in zip(self.systems, state, strict=True)]
 
 
-def room_windows(
-    space: Space, systems: Mapping[str, States], control: ControlGroups | None = None
-) -> RoomWindows:
+def room_windows(space: Space, systems: Mapping[str, States], control: ControlGroups | None = None) -> RoomWindows:
     """The windows of a room in groups of one orientation, one system and one control group.
 
     Args: systems: of each window, by its GUID; control: by default a group for each orientation.
@@ -124,9 +117,7 @@ def room_windows(
         windows = tuple(space.windows[w] for w in numbers)
         states = systems[windows[0].guid]
         part_of_space = replace(space, windows=windows)
-        for group, order in zip(
-            window_groups(part_of_space), orientation_groups(part_of_space), strict=True
-        ):
+        for group, order in zip(window_groups(part_of_space), orientation_groups(part_of_space), strict=True):
             name = group.name if len(members) == 1 else f"{group.name}, {states[0].name}"
             parts = _by_control(group, control.number[np.array(numbers)[order]].tolist())
             for part, c in parts:
@@ -147,10 +138,9 @@ def _by_control(group: WindowGroup, numbers: list[int]) -> list[tuple[WindowGrou
     Args: numbers: of the control group of each window of the group.
     """
     return [
-        (replace(group, windows=tuple(w for w, n in zip(group.windows, numbers, strict=True)
-                                      if n == c)), c)
+        (replace(group, windows=tuple(w for w, n in zip(group.windows, numbers, strict=True) if n == c)), c)
         for c in sorted(set(numbers))
-    ]  # fmt: skip
+    ]
 
 
 def in_all_windows(space: Space, *states: FenestrationSystem) -> dict[str, States]:
@@ -173,9 +163,7 @@ def _groups(space: Space, groups: list[WindowGroup]) -> NDArray[np.int64]:
     )
 
 
-SCATTERED = (
-    0.05  # share of the transmitted light outside the straight ray; a system with more has a shade
-)
+SCATTERED = 0.05  # share of the transmitted light outside the straight ray; a system with more has a shade
 
 _log = logging.getLogger(__name__)
 
@@ -186,9 +174,7 @@ def traced_building(building: Building, systems: Mapping[str, States]) -> Buildi
     Args: systems: of each window, by its GUID.
     """
     shades = {id(system): has_shade(system) for states in systems.values() for system in states}
-    shaded = {
-        guid for guid, states in systems.items() if any(shades[id(system)] for system in states)
-    }
+    shaded = {guid for guid, states in systems.items() if any(shades[id(system)] for system in states)}
     building, issues = without_drawn_shades(building, shaded)
     for issue in issues:
         _log.warning("%s", issue_text(issue).line)

@@ -13,13 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from bim.defaults import FILMS
 from bim.model import Building, Face, Space, Window
 from bim.outer_faces import OuterFaces, outer_faces
-from bim.to_thermal import (
-    ThermalRoom,
-    coupled_rooms,
-    door_links,
-    surface_neighbours,
-    thermal_room,
-)
+from bim.to_thermal import ThermalRoom, coupled_rooms, door_links, surface_neighbours, thermal_room
 from mitsuba_cfs.compiled import must_compile
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache, cached_or_computed
@@ -77,9 +71,7 @@ def enveloped(
     surfaces = [
         one
         if one.outside != "outdoor" or own[0].kind == "window frame"
-        else replace(
-            one, absorptance_out=envelope.outside_absorptance, roughness=envelope.outside_roughness
-        )
+        else replace(one, absorptance_out=envelope.outside_absorptance, roughness=envelope.outside_roughness)
         for one, own in zip(room.zone.surfaces, faces, strict=True)
     ]
     try:
@@ -98,9 +90,7 @@ def enveloped(
             for i in _named(table, faces, building, place):
                 surfaces[i] = _next_to(surfaces[i], table, beyond)
     except ThermalInputError as error:
-        raise DataError(
-            error.message, file=building.file, element=space.label, field="envelope"
-        ) from None
+        raise DataError(error.message, file=building.file, element=space.label, field="envelope") from None
     edges = sum(glass_edge(window) for window in space.windows)
     bridges = sum(one.conductance for one in envelope.bridge) + envelope.frame_psi * edges
     if bridges < 0:
@@ -119,9 +109,7 @@ def glass_edge(window: Window) -> float:
     return float(sum(np.linalg.norm(side) for side in edges))
 
 
-def _grounded(
-    surfaces: Sequence[OpaqueSurface], table: GroundTable, weather: Weather
-) -> list[OpaqueSurface]:
+def _grounded(surfaces: Sequence[OpaqueSurface], table: GroundTable, weather: Weather) -> list[OpaqueSurface]:
     """The surfaces, those on the ground with soil and virtual layer (ISO 13370)."""
     days = weather.midpoints
     hours = (days.day_of_year.to_numpy() - 1) * 24.0 + days.hour.to_numpy() + days.minute / 60.0
@@ -147,11 +135,7 @@ def _grounded(
 
 
 def _element(
-    one: OpaqueSurface,
-    floors: Sequence[OpaqueSurface],
-    table: GroundTable,
-    area: float,
-    wind: float,
+    one: OpaqueSurface, floors: Sequence[OpaqueSurface], table: GroundTable, area: float, wind: float
 ) -> GroundElement:
     """The floor or wall by ISO 13370."""
     soil = SOILS[table.soil]
@@ -167,26 +151,33 @@ def _element(
             return basement(footprint, resistance, table.wall_resistance, table.depth)[0]
         return basement(footprint, floor, resistance, table.depth)[1]
     if not is_floor:
-        raise ThermalInputError(
-            "ground", f"{one.name}: a wall below ground needs kind = 'basement' and its depth"
-        )
+        raise ThermalInputError("ground", f"{one.name}: a wall below ground needs kind = 'basement' and its depth")
     if table.kind == "slab":
         vertical = table.edge_lies == "vertical"
         return slab_on_ground(footprint, resistance, edge=table.edge, vertical=vertical)
     if table.kind == "suspended":
         return suspended_floor(
-            footprint, resistance, height=table.height, wall_u=table.wall_u, vents=table.vents,
-            wind=wind, shield=table.shield, ground_resistance=table.below_resistance,
-        )  # fmt: skip
+            footprint,
+            resistance,
+            height=table.height,
+            wall_u=table.wall_u,
+            vents=table.vents,
+            wind=wind,
+            shield=table.shield,
+            ground_resistance=table.below_resistance,
+        )
     return over_unheated_basement(
-        footprint, resistance, depth=table.depth, height=table.height, wall_u=table.wall_u,
-        floor_resistance=table.below_resistance, wall_resistance=table.wall_resistance,
-    )  # fmt: skip
+        footprint,
+        resistance,
+        depth=table.depth,
+        height=table.height,
+        wall_u=table.wall_u,
+        floor_resistance=table.below_resistance,
+        wall_resistance=table.wall_resistance,
+    )
 
 
-def _named(
-    table: NeighbourTable, faces: Sequence[Sequence[Face]], building: Building, place: str
-) -> list[int]:
+def _named(table: NeighbourTable, faces: Sequence[Sequence[Face]], building: Building, place: str) -> list[int]:
     """The surfaces that a neighbour's table names."""
     guids = {building.room(name).space.guid for name in table.spaces}
     named = [
@@ -202,9 +193,7 @@ def _named(
     unknown = sorted(set(table.faces) - known)
     if unknown:
         there = ", ".join(sorted(known))
-        raise DataError(
-            f"no face {unknown[0]!r}; there are {there}", file=building.file, field=f"{place}.faces"
-        )
+        raise DataError(f"no face {unknown[0]!r}; there are {there}", file=building.file, field=f"{place}.faces")
     return named
 
 
@@ -216,9 +205,7 @@ def _next_to(one: OpaqueSurface, table: NeighbourTable, beyond) -> OpaqueSurface
     return replace(one, layers=layers, outside="known", beyond_c=beyond)
 
 
-def _heated(
-    zone: Zone, faces: Sequence[Sequence[Face]], hours: OperationHours, space: Space
-) -> Zone:
+def _heated(zone: Zone, faces: Sequence[Sequence[Face]], hours: OperationHours, space: Space) -> Zone:
     """The zone with the surfaces of its heated slab and of what radiates its loads."""
     loads, names = hours.tables.loads, {}
 
@@ -310,8 +297,7 @@ class RoomZone:
         lit = [room.lamp_lx for room in rooms if room.lamp_lx is not None]
         planes = [room.daylight for room in rooms if room.daylight is not None]
         gains = Gains(
-            chosen([room.zone.gains.convective for room in rooms]),
-            chosen([room.zone.gains.radiant for room in rooms]),
+            chosen([room.zone.gains.convective for room in rooms]), chosen([room.zone.gains.radiant for room in rooms])
         )
         states = chosen([room.shading.states for room in rooms])
         reasons = (*rooms[0].shading.reasons, BY_ROOM)
@@ -325,10 +311,7 @@ class RoomZone:
             lamps=chosen([room.lamps for room in rooms]),
             lamp_lx=chosen(lit) if lit else None,
             daylight=chosen(planes) if planes else None,
-            sun_beyond={
-                place: chosen([room.sun_beyond[place] for room in rooms])
-                for place in self.sun_beyond
-            },
+            sun_beyond={place: chosen([room.sun_beyond[place] for room in rooms]) for place in self.sun_beyond},
             alternatives=None,
         )
 
@@ -351,9 +334,7 @@ class RoomZone:
 BY_ROOM = "the room's temperature or load"  # the reason of a move that the balance decides
 
 
-def _moved_by(
-    years: Sequence[ShadingYear], number: NDArray[np.int64], states: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _moved_by(years: Sequence[ShadingYear], number: NDArray[np.int64], states: NDArray[np.int64]) -> NDArray[np.int64]:
     """The number of the reason of each move [H, N] where the balance chose among years.
 
     Args: number: [H] of the chosen one; states: [H, N] as chosen.
@@ -396,16 +377,20 @@ def balances(
     zones, suns = [r.zone for r in rooms], [per_window(r.solar, r.zone) for r in passed(rooms)]
     row_s, outdoors = 3600.0 * weather.step_h, climate(weather)
     return simulate_zones(
-        zones, outdoors, suns, step_s=min(step_s, row_s), row_s=row_s,
-        air_links=air_links, transfers=transfers, options=BalanceOptions(terrain=terrain),
+        zones,
+        outdoors,
+        suns,
+        step_s=min(step_s, row_s),
+        row_s=row_s,
+        air_links=air_links,
+        transfers=transfers,
+        options=BalanceOptions(terrain=terrain),
         controls=[r.control for r in rooms],
         storage=None if store is None else store.stored,
-    )  # fmt: skip
+    )
 
 
-def coupled(
-    rooms: Sequence[RoomZone], door_m3_s: float
-) -> tuple[list[RoomZone], FloatArray, tuple[str, ...]]:
+def coupled(rooms: Sequence[RoomZone], door_m3_s: float) -> tuple[list[RoomZone], FloatArray, tuple[str, ...]]:
     """The rooms with heat flow through the walls between them; see `coupled_rooms`.
 
     Args: door_m3_s: air each way through every open door between two rooms [m3/s].
@@ -496,9 +481,7 @@ def zone_surfaces(room: RoomInputs) -> ZoneSurfaces:
     gains = internal_gains(space, room.occupied, room.options.occupancy)
     first = systems[0][0].fenestration if systems else None
     try:
-        bare = thermal_room(
-            space, first, infiltration_ach=room.options.infiltration_ach, gains=gains
-        )
+        bare = thermal_room(space, first, infiltration_ach=room.options.infiltration_ach, gains=gains)
     except ThermalInputError as error:
         raise RoomError(f"space {space.label}: {error}") from error
     thermal = replace(bare, zone=_with_states(bare.zone, systems))
@@ -551,13 +534,7 @@ def room_zone(
         lit = lamp_lux(room.operation, room.weather, plane)
         area = room.space.floor_area
         operated_zone, lamps = operated(zone.zone, room.operation, area, room.weather, plane)
-        zone = enveloped(
-            replace(zone, zone=operated_zone),
-            room.building,
-            room.space,
-            room.operation,
-            room.weather,
-        )
+        zone = enveloped(replace(zone, zone=operated_zone), room.building, room.space, room.operation, room.weather)
         services = services_of(room.operation, area, room.weather)
     else:
         services = plain_services(room.space, room.occupied, room.options.occupancy)
@@ -574,16 +551,24 @@ def room_zone(
     if ruled is not None:
         shading = room.shading(state, ruled.moved_by, ruled.reasons)
     solar, gains, beyond = solar_gains(
-        room, outdoors, surfaces.room, surfaces.outer, state,
-        thermals=surfaces.thermals, progress=progress,
-    )  # fmt: skip
+        room, outdoors, surfaces.room, surfaces.outer, state, thermals=surfaces.thermals, progress=progress
+    )
     return RoomZone(
-        room.space, zone, solar, gains, shading, lamps, room.occupied, plane, services,
+        room.space,
+        zone,
+        solar,
+        gains,
+        shading,
+        lamps,
+        room.occupied,
+        plane,
+        services,
         lamp_lx=lit,
         fenestration=tuple(fenestration_table(room.windows, surfaces.thermals)),
         states=tuple(system.name for system in max(room.windows.systems, key=len, default=())),
-        operation=room.operation, sun_beyond=beyond,
-    )  # fmt: skip
+        operation=room.operation,
+        sun_beyond=beyond,
+    )
 
 
 def with_sky_view(
@@ -607,8 +592,7 @@ def with_sky_view(
         inputs, by = (exterior.triangles, points, normals, SKY_SAMPLES, seed), sky_shares.__module__
         entry = cache_entry(cache, "sky shares", *inputs, by=by, stopping=None)
         return cached_or_computed(
-            entry,
-            lambda: sky_shares(exterior, points, normals, samples=SKY_SAMPLES, seed=seed)[:, None],
+            entry, lambda: sky_shares(exterior, points, normals, samples=SKY_SAMPLES, seed=seed)[:, None]
         )[:, 0]
 
     shares = sum(share * sky_view(exterior) for exterior, share in exteriors).tolist()
@@ -640,9 +624,7 @@ def fenestration_table(
                 "g_value": float(heat.g_value[0]),
                 "solar_transmittance": float(heat.transmittance[0]),
                 "solar_reflectance": float(heat.reflectance[0]),
-                "visible_transmittance": float(
-                    visible.direct_hemispherical(visible.transmission_front)[0]
-                ),
+                "visible_transmittance": float(visible.direct_hemispherical(visible.transmission_front)[0]),
             }
 
 
@@ -662,9 +644,7 @@ def per_window(solar: Solar, zone: Zone) -> Solar:
 
 def internal_gains(space: Space, present: NDArray[np.bool_], occupancy: Occupancy) -> Gains:
     """Heat of people and equipment during the occupied hours [H]."""
-    power = space.floor_area * (
-        occupancy.equipment_w_m2 + occupancy.person_w / occupancy.floor_per_person
-    )
+    power = space.floor_area * (occupancy.equipment_w_m2 + occupancy.person_w / occupancy.floor_per_person)
     return Gains((1 - RADIANT_SHARE) * power * present, RADIANT_SHARE * power * present)
 
 
@@ -688,9 +668,7 @@ def services_of(tables: OperationTables, floor_area: float, weather: Weather) ->
     )
 
 
-def lamp_lux(
-    tables: OperationTables, weather: Weather, daylight: FloatArray | None
-) -> FloatArray | None:
+def lamp_lux(tables: OperationTables, weather: Weather, daylight: FloatArray | None) -> FloatArray | None:
     """Light of the lamps on the work plane [H] [lx]; None where nothing says how much it is."""
     gains = tables.gains
     if gains.lighting_full_lx is None:
@@ -703,11 +681,7 @@ def lamp_lux(
 
 
 def operated(
-    zone: Zone,
-    tables: OperationTables,
-    floor_area: float,
-    weather: Weather,
-    daylight: FloatArray | None,
+    zone: Zone, tables: OperationTables, floor_area: float, weather: Weather, daylight: FloatArray | None
 ) -> tuple[Zone, FloatArray]:
     """The zone with the gains, air and set points of the tables, and the lamps' power [H] [W].
 
@@ -723,9 +697,7 @@ def operated(
         zone,
         **hours.outdoor_air(),
         airing=hours.airing(zone.windows, zone.volume),
-        gains=split_gains(
-            hours.heat(floor_area), gains.radiant_share, (lamps, gains.radiant_share)
-        ),
+        gains=split_gains(hours.heat(floor_area), gains.radiant_share, (lamps, gains.radiant_share)),
         loads=hours.loads(),
     )
     return result, lamps

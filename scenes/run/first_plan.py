@@ -34,12 +34,7 @@ from scenes.room.daylight import room_daylight
 from scenes.room.inputs import RoomInputs, skies_for
 from scenes.room.light import RoomLight
 from scenes.room.options import RoomOptions
-from scenes.room.shading import (
-    control_signals,
-    predicts,
-    shading_states,
-    temperature_conditions,
-)
+from scenes.room.shading import control_signals, predicts, shading_states, temperature_conditions
 from scenes.run.options import JobOptions
 from scenes.run.together import traced_together
 
@@ -70,9 +65,13 @@ def plan_options(options: RoomOptions) -> RoomOptions:
     """The options of a first plan."""
     fewer = {name: min(paths, getattr(options.sampling, name)) for name, paths in PATHS.items()}
     return options.changed(
-        method="three-phase", sky_subdivision=1, annual_glare=False, spectral=False,
-        sensor_spacing=max(options.grid.spacing, SPACING), **fewer,
-    )  # fmt: skip
+        method="three-phase",
+        sky_subdivision=1,
+        annual_glare=False,
+        spectral=False,
+        sensor_spacing=max(options.grid.spacing, SPACING),
+        **fewer,
+    )
 
 
 def first_plan(
@@ -119,9 +118,7 @@ def _planned(room: RoomInputs, matrices: PhaseMatrices) -> PlannedRoom:
     return PlannedRoom(room.space, figures, errors, mean_error, unshaded)
 
 
-def _glare_hours(
-    room: RoomInputs, of_room: RoomLight, state: NDArray[np.int64]
-) -> tuple[float, float]:
+def _glare_hours(room: RoomInputs, of_room: RoomLight, state: NDArray[np.int64]) -> tuple[float, float]:
     """Occupied hours with the simplified DGP of the eye above `GLARE`, and their standard error."""
     rows = of_room.states(state)
     eye = eye_illuminance(of_room.light, rows)
@@ -200,9 +197,7 @@ def _head(name: str) -> str:
     return of.label if of.unit in of.label else f"{of.label} [{of.unit}]"
 
 
-def options_for_error(
-    options: RoomOptions, rooms: Sequence[PlannedRoom], error: float
-) -> RoomOptions:
+def options_for_error(options: RoomOptions, rooms: Sequence[PlannedRoom], error: float) -> RoomOptions:
     """The options of a run with as many paths as a stated error of the yearly means needs.
 
     The error of the first plan falls with the root of the paths; the room with the largest decides.
@@ -216,7 +211,9 @@ def options_for_error(
     if not worst > 0:  # a plan without light says nothing
         return options
     share, first = 2 * (worst / error) ** 2, plan_options(options).sampling
-    return options.changed(**{
-        name: min(max(math.ceil(share * getattr(first, name)), 1), getattr(options.sampling, name))
-        for name in PATHS
-    })  # fmt: skip
+    return options.changed(
+        **{
+            name: min(max(math.ceil(share * getattr(first, name)), 1), getattr(options.sampling, name))
+            for name in PATHS
+        }
+    )

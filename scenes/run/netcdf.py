@@ -60,11 +60,7 @@ def year_dataset(result: RunResult) -> Dataset:
         "time": ("time", result.times, {"long_name": "middle of the hour, local standard time"}),
         "room": ("room", names, {"long_name": "folder of the room"}),
         "room_label": ("room", [room.space.label for room in rooms], {"long_name": "room"}),
-        "room_guid": (
-            "room",
-            [room.space.guid for room in rooms],
-            {"long_name": "GUID"},
-        ),
+        "room_guid": ("room", [room.space.guid for room in rooms], {"long_name": "GUID"}),
     }
     manifest = result.manifest
     version = metadata.version("mitsuba-cfs")
@@ -204,15 +200,9 @@ def _years(rooms: Iterable[RoomYear]) -> Variables:
     for room in rooms:
         loads = {} if room.operation is None else room.operation.summary
         spectral = {} if room.spectral is None else room.spectral.summary
-        tables.append(
-            {**room.daylight.room_metrics, **room.heat.comfort_summary, **loads, **spectral}
-        )
+        tables.append({**room.daylight.room_metrics, **room.heat.comfort_summary, **loads, **spectral})
     keys = dict.fromkeys(key for table in tables for key in table)
     return {
-        f"room_{key}": (
-            ("room",),
-            np.array([table.get(key, np.nan) for table in tables], dtype=float),
-            attributes(key),
-        )
+        f"room_{key}": (("room",), np.array([table.get(key, np.nan) for table in tables], dtype=float), attributes(key))
         for key in keys
     }

@@ -16,13 +16,7 @@ import pandas as pd
 
 from bim.names import folder_names
 from bim.report.issue import COLUMNS, issue_rows
-from mitsuba_cfs.files import (
-    check_finite,
-    json_text,
-    without_formulas,
-    write_table,
-    write_text,
-)
+from mitsuba_cfs.files import check_finite, json_text, without_formulas, write_table, write_text
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.progress import Progress, silent
 from scenes.language.catalogue import current_language, in_language
@@ -87,9 +81,7 @@ def write_results(
         raise faults[0] if len(faults) == 1 else ExceptionGroup("no page was written", faults)
 
 
-def _faults(
-    write: Callable[[RunResult, Path], None], result: RunResult, page: Path
-) -> list[Exception]:
+def _faults(write: Callable[[RunResult, Path], None], result: RunResult, page: Path) -> list[Exception]:
     """Write a page; the fault that it was left out for, so that hours of work are not lost to it.
 
     A full disk and the like are no such fault: the earlier results stay then, as for every file.
@@ -107,9 +99,7 @@ def _faults(
     return []
 
 
-def _write_rooms(
-    result: RunResult, places: Sequence[Path], processes: int, progress: Progress
-) -> None:
+def _write_rooms(result: RunResult, places: Sequence[Path], processes: int, progress: Progress) -> None:
     """The files of each room in its folder."""
     rooms = list(zip(result.spaces, places, strict=True))
     tasks = Tasks(

@@ -197,9 +197,13 @@ class RoomWork:
         run = "" if here else _identity(self.options, self.inputs)
         compute = _Here(self) if here else _FromFiles(self.with_heat, self.options, run)
         tasks = Tasks(
-            list(rooms), compute, _failed, key=lambda guid: f"{run}{guid}", scene=lambda guid: guid,
+            list(rooms),
+            compute,
+            _failed,
+            key=lambda guid: f"{run}{guid}",
+            scene=lambda guid: guid,
             needs=Requirements() if here else _requirements(self.inputs),
-        )  # fmt: skip
+        )
         with closing(tasks.results(**asdict(workers))) as results:
             for guid, result in results:
                 yield rooms[guid], result
@@ -239,9 +243,7 @@ class _FromFiles:
 
 
 @lru_cache(maxsize=1)
-def _read(
-    options: JobOptions, run: str
-) -> tuple[Inputs, RoomsTogether, Sequence[Space], AnnualSky]:
+def _read(options: JobOptions, run: str) -> tuple[Inputs, RoomsTogether, Sequence[Space], AnnualSky]:
     inputs, room = read_inputs(options, inner=options.inner_glass), options.room
     if _identity(options, inputs) != run:
         message = "a worker has other input files or another version of the program"
@@ -301,9 +303,8 @@ def run_job(
     if on_head is not None:
         on_head(inputs.head)
     return run_inputs(
-        inputs, options, progress, on_room=on_room, on_light=on_light, on_plan=on_plan,
-        workers=workers, start=start,
-    )  # fmt: skip
+        inputs, options, progress, on_room=on_room, on_light=on_light, on_plan=on_plan, workers=workers, start=start
+    )
 
 
 def run_inputs(
@@ -368,19 +369,12 @@ def run_inputs(
     )
 
 
-def _manifest(
-    options: JobOptions,
-    variant: str,
-    inputs: Inputs,
-    results: Sequence[RoomYear],
-) -> dict[str, Any]:
+def _manifest(options: JobOptions, variant: str, inputs: Inputs, results: Sequence[RoomYear]) -> dict[str, Any]:
     """Inputs, options, versions and seed: the data to reproduce the results."""
     packages = ("mitsuba-cfs", "mitsuba", "drjit", "numpy", "ifcopenshell", "pvlib")
     return {
         "quick": options.quick,
-        "inputs": {
-            name: {"path": str(path), "sha256": sha256(path)} for name, path in inputs.files.items()
-        },
+        "inputs": {name: {"path": str(path), "sha256": sha256(path)} for name, path in inputs.files.items()},
         "building": inputs.building.name,
         "site": inputs.weather.site,
         "weather_notes": list(inputs.weather.notes),
@@ -396,9 +390,6 @@ def _manifest(
         },
         "seed": options.room.sampling.seed,
         "variant": variant,
-        "versions": {
-            "python": platform.python_version(),
-            **{name: metadata.version(name) for name in packages},
-        },
+        "versions": {"python": platform.python_version(), **{name: metadata.version(name) for name in packages}},
         "rooms": {result.space.guid: result.seconds for result in results},
     }

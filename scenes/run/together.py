@@ -40,12 +40,7 @@ class RoomsTogether:
     """
 
     def __init__(
-        self,
-        inputs: Inputs,
-        spaces: Sequence[Space],
-        skies: AnnualSky,
-        options: JobOptions,
-        folder: Path,
+        self, inputs: Inputs, spaces: Sequence[Space], skies: AnnualSky, options: JobOptions, folder: Path
     ) -> None:
         """Of the rooms of a run.
 
@@ -104,9 +99,15 @@ def traced_together(
     for space in spaces:
         try:
             room = inputs_of_room(
-                inputs.building, space, inputs.systems, inputs.weather, options.room,
-                operation=inputs.operation, skies=skies, inner=options.inner_glass,
-            )  # fmt: skip
+                inputs.building,
+                space,
+                inputs.systems,
+                inputs.weather,
+                options.room,
+                operation=inputs.operation,
+                skies=skies,
+                inner=options.inner_glass,
+            )
             rooms.append((room, visible_scene(room)))
         except RoomError:  # the room's stages say so
             continue
@@ -114,13 +115,14 @@ def traced_together(
     first = seasons(inputs.building)[0].building
     glossy = bool(outdoors_of_rooms(first, [room.space for room, _ in rooms]).surfaces.glossy)
     some = [
-        i for i, (room, scene) in enumerate(rooms)
+        i
+        for i, (room, scene) in enumerate(rooms)
         if scene.groups
         and all(windows[window.guid] == 1 for window in room.space.windows)
         and not scene.adjacent
         and len(scene.exterior.triangles)
         and bool(scene.exterior.glossy) == glossy
-    ]  # fmt: skip
+    ]
     found: dict[int, PhaseMatrices] = {}
     if len(some) > 1:
         matrices = matrices_together(

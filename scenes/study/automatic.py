@@ -74,9 +74,14 @@ def choose(demand: Demand, calibration: Calibration) -> MethodChoice:
     """
     seconds = {pair: calibration.seconds(*pair, demand.work) for pair in calibration.pairs()}
     if demand.specular:
-        return _choice(SPECULAR, seconds, demand, "a surface of the room mirrors, which eDGP, sDGP "
-                       "and the phase methods do not cover: full pictures by paths (the mirror "
-                       "itself is not traced: every surface of a room is diffuse)")  # fmt: skip
+        return _choice(
+            SPECULAR,
+            seconds,
+            demand,
+            "a surface of the room mirrors, which eDGP, sDGP "
+            "and the phase methods do not cover: full pictures by paths (the mirror "
+            "itself is not traced: every surface of a room is diffuse)",
+        )
     known = {pair: s for pair, s in seconds.items() if pair in demand.errors}
     near = {pair for pair in known if demand.errors[pair] <= demand.dgp_error}
     quick = {pair for pair in known if known[pair] <= demand.time_budget}
@@ -117,10 +122,7 @@ SHINING = 50.0  # [W/m2] normal to the sun, from which it counts as shining
 
 
 def settled(
-    study: Study,
-    plan: StudyPlan,
-    calibration: Calibration | None = None,
-    measured: MeasuredErrors | None = None,
+    study: Study, plan: StudyPlan, calibration: Calibration | None = None, measured: MeasuredErrors | None = None
 ) -> StudyPlan:
     """The plan with a method for every case; those of rooms with mirrors have their own.
 
@@ -142,12 +144,7 @@ def settled(
         budget = study.auto.time_budget * len(cases) / len(open_cases)
         traits = case_traits(cases, plan)
         demand = Demand(
-            work_of(cases),
-            budget,
-            study.auto.dgp_error,
-            measured.of_all(traits),
-            specular,
-            measured.origin(traits),
+            work_of(cases), budget, study.auto.dgp_error, measured.of_all(traits), specular, measured.origin(traits)
         )
         choice = choose(demand, calibration)
         chosen[specular] = replace(choice, why=f"{choice.why}; {calibration.origin}")
@@ -172,9 +169,7 @@ def work_of(cases: list[Case]) -> Workload:
             weather = case_weather(case)
             used = working_hours(weather, *case.options.occupancy.hours)
             up = is_up(sun_directions(weather))
-            hours[case.inputs.weather] = np.array(
-                [np.count_nonzero(used & up), np.count_nonzero(up)]
-            )
+            hours[case.inputs.weather] = np.array([np.count_nonzero(used & up), np.count_nonzero(up)])
     rated, lit = sum(hours[case.inputs.weather] for case in cases) / (scenes * systems)
     return Workload(scenes, systems, round(rated), round(lit))
 

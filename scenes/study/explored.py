@@ -82,10 +82,7 @@ def explorers(
             yield case, kept
     here = processes == 1 and scheduler is None
     compute = partial(compute_explorer, progress=progress) if here else compute_explorer
-    tasks = Tasks(
-        left, compute, _failed, key=explorer_key, scene=attrgetter("scene"),
-        needs=requirements(left),
-    )  # fmt: skip
+    tasks = Tasks(left, compute, _failed, key=explorer_key, scene=attrgetter("scene"), needs=requirements(left))
     with closing(tasks.results(processes=processes, scheduler=scheduler)) as results:
         for result in results:
             if not result.error:

@@ -20,13 +20,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import sha256
 from mitsuba_cfs.glare.annual import AnnualGlare
-from mitsuba_cfs.glare.classes import (
-    CLASSES,
-    class_hours,
-    hour_not_exceeded,
-    mean_error,
-    protection_level,
-)
+from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, mean_error, protection_level
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.metrics.schedules import working_hours
@@ -56,9 +50,7 @@ OF_READING = ("building", "surroundings", "cache", *OF_ROOM[1:])  # that a build
 ALONE = threading.Lock()  # Dr.Jit has all cores already, and a worker may have several threads
 
 
-def case_inputs(
-    case: Case, building: Building | None = None, spaces: tuple[str, ...] = ()
-) -> Inputs:
+def case_inputs(case: Case, building: Building | None = None, spaces: tuple[str, ...] = ()) -> Inputs:
     """The inputs of a case, from its files.
 
     Args: building: of the case, where it is read already; spaces: other rooms than its own.
@@ -101,10 +93,17 @@ def case_year(inputs: Inputs, case: Case, **chosen: Unpack[RoomChoices]) -> Room
     weather = _file(case, "weather"), case.orientation_deg
     skies = _skies(*weather, options.sampling, *options.sky.items())
     return compute_room(
-        inputs.building, space, inputs.systems, inputs.weather, options,
-        operation=inputs.operation, skies=skies, cache=MatrixCache.of_user(), pictures=False,
+        inputs.building,
+        space,
+        inputs.systems,
+        inputs.weather,
+        options,
+        operation=inputs.operation,
+        skies=skies,
+        cache=MatrixCache.of_user(),
+        pictures=False,
         **chosen,
-    )  # fmt: skip
+    )
 
 
 def compute_case(case: Case, progress: Progress = silent) -> CaseResult:
@@ -198,9 +197,7 @@ def _rated_hours(weather: Weather, options: RoomOptions) -> NDArray[np.int64]:
     return np.flatnonzero(used & is_up(sun_directions(weather, model=options.sun_model)))
 
 
-def glare_figures(
-    dgp: NDArray[np.float64], weather: Weather, occupied: tuple[int, int]
-) -> dict[str, float | str]:
+def glare_figures(dgp: NDArray[np.float64], weather: Weather, occupied: tuple[int, int]) -> dict[str, float | str]:
     """Hours by class, the worst, what 5 % of the hours exceed.
 
     Occupied hours in the dark count as imperceptible.
@@ -256,9 +253,7 @@ def room_figures(room: RoomYear) -> tuple[dict[str, float | str], dict[str, NDAr
         "median_illuminance": np.median(daylight.illuminance, axis=1).astype(np.float32),
     }
     arrays |= {f"sensor/{k}": v.to_numpy() for k, v in daylight.sensor_metrics.items()}
-    arrays |= {
-        f"temperature/{k}": heat.temperatures[k].to_numpy(np.float32) for k in KEPT_TEMPERATURES
-    }
+    arrays |= {f"temperature/{k}": heat.temperatures[k].to_numpy(np.float32) for k in KEPT_TEMPERATURES}
     for name, column in heat.comfort.items():
         flag = column.dtype == bool
         arrays[f"comfort/{name}"] = column.to_numpy(bool if flag else np.float32)
@@ -280,9 +275,7 @@ def heat_figures(temperatures: pd.DataFrame, comfort: pd.DataFrame) -> dict[str,
     return result
 
 
-def straight_view(
-    windows: Sequence[Window], systems: Mapping[str, States], state: NDArray[np.int64]
-) -> float:
+def straight_view(windows: Sequence[Window], systems: Mapping[str, States], state: NDArray[np.int64]) -> float:
     """Visible transmittance straight on at normal incidence [%], mean of windows and hours.
 
     The normal-normal transmittance by which EN 14501 classes the view out; what a system scatters,

@@ -31,12 +31,7 @@ if TYPE_CHECKING:
 
 AUTO = "auto"
 COMPUTED_BY = "scenes.study.one_case"  # the module of a case's results
-OF_BUILDING = (
-    "building",
-    "linked",
-    "corrections",
-    "surroundings",
-)  # names of files that a room is made of
+OF_BUILDING = ("building", "linked", "corrections", "surroundings")  # names of files that a room is made of
 # options that are no files, of the room and of what is in its windows and outdoors
 OF_ROOM = ("spaces", "surroundings_offset", *ReadTable.model_fields)
 OF_CASE = ("u_value", "g_value", "see_through", "albedo")
@@ -169,9 +164,7 @@ def _check_turning(study: Study) -> None:
         raise DataError(message, field="orientations_deg")
 
 
-def _of_space(
-    study: Study, room: RoomTable, space: Space, held: Iterable[Path], read: _Read
-) -> Iterator[Case]:
+def _of_space(study: Study, room: RoomTable, space: Space, held: Iterable[Path], read: _Read) -> Iterator[Case]:
     """Every case of one room.
 
     Args: held: files that the building names.
@@ -189,10 +182,21 @@ def _of_space(
                 chosen |= study.options.model_dump()
                 for name, options, files, control in systems:
                     yield Case(
-                        room.name, room.name if room.box else space.label, name, climate.name,
-                        options, files, room.box, room.specular, angle, RoomOptions.of(**chosen),
-                        program_version(), study.glare, AUTO if method == AUTO else "", control,
-                    )  # fmt: skip
+                        room.name,
+                        room.name if room.box else space.label,
+                        name,
+                        climate.name,
+                        options,
+                        files,
+                        room.box,
+                        room.specular,
+                        angle,
+                        RoomOptions.of(**chosen),
+                        program_version(),
+                        study.glare,
+                        AUTO if method == AUTO else "",
+                        control,
+                    )
 
 
 def _input_files(options: InputOptions, held: Iterable[Path], read: _Read) -> tuple[InputFile, ...]:

@@ -142,10 +142,7 @@ def computed(
     once = list({case.key: case for case in cases}.values())
     here = processes == 1 and scheduler is None
     of_case = partial(compute, progress=progress) if here else compute
-    tasks = Tasks(
-        once, of_case, _failed, key=attrgetter("key"), scene=attrgetter("scene"),
-        needs=requirements(once),
-    )  # fmt: skip
+    tasks = Tasks(once, of_case, _failed, key=attrgetter("key"), scene=attrgetter("scene"), needs=requirements(once))
     return tasks.results(processes=processes, scheduler=scheduler)
 
 

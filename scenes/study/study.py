@@ -91,8 +91,13 @@ class StudyResult:
         for case, result in zip(self.plan.cases, self.results, strict=True):
             _, space = self.plan.rooms[case.scene]
             empty = dict.fromkeys(columns)
-            rows.append(described(case, space) | {"status": _status(result), "error": result.error}
-                        | empty | result.figures | {"key": case.key})  # fmt: skip
+            rows.append(
+                described(case, space)
+                | {"status": _status(result), "error": result.error}
+                | empty
+                | result.figures
+                | {"key": case.key}
+            )
         return rows
 
 
@@ -135,9 +140,7 @@ def run_study(
 
     under_way()
     left = [case for key, case in cases.items() if key not in finished]
-    results_of_left = computed(
-        left, compute, processes=processes, scheduler=scheduler, progress=under_way
-    )
+    results_of_left = computed(left, compute, processes=processes, scheduler=scheduler, progress=under_way)
     with closing(results_of_left):
         for result in results_of_left:
             if not result.error and cases[result.key].control is None:
@@ -176,11 +179,7 @@ def with_explorers(
 
     under_way()
     made = explorers(
-        tuple(chosen.values()),
-        store.explorers(),
-        processes=processes,
-        scheduler=scheduler,
-        progress=under_way,
+        tuple(chosen.values()), store.explorers(), processes=processes, scheduler=scheduler, progress=under_way
     )
     with closing(made):
         for case, explored in made:

@@ -7,15 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    create_model,
-    model_validator,
-)
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, create_model, model_validator
 
 from mitsuba_cfs.errors import DataError
 from scenes import plausible
@@ -146,8 +138,7 @@ class Study(_Table, OutdoorTable):
     climate: Annotated[tuple[ClimateTable, ...], Field(min_length=1)]
     orientations_deg: Annotated[tuple[float, ...], Field(min_length=1)] = (0.0,)  # clockwise
     methods: Annotated[
-        tuple[Literal["three-phase", "five-phase", "point-in-time", "auto"], ...],
-        Field(min_length=1),
+        tuple[Literal["three-phase", "five-phase", "point-in-time", "auto"], ...], Field(min_length=1)
     ] = (RoomOptions().method,)
     glare: Literal["DGP", "eDGP", "sDGP", "none"] = "DGP"  # of every occupied hour with sun
     operation: Path | None = None  # control, gains, air, set points: as for `cfs run`
@@ -186,10 +177,15 @@ class Study(_Table, OutdoorTable):
         return InputOptions(
             None if room is None else room.building,
             None if climate is None else climate.weather,
-            system.bsdf, spaces, u_value=system.u_value, g_value=system.g_value,
-            see_through=peaks, linked=() if room is None else room.linked,
-            operation=system.operation or self.operation, **read_options(*tables),
-        )  # fmt: skip
+            system.bsdf,
+            spaces,
+            u_value=system.u_value,
+            g_value=system.g_value,
+            see_through=peaks,
+            linked=() if room is None else room.linked,
+            operation=system.operation or self.operation,
+            **read_options(*tables),
+        )
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -210,9 +206,7 @@ def _unique(key: str, values) -> None:
         seen.add(value)
 
 
-def read_study(
-    path: str | PathLike[str], *, automatic: bool = False, quick: bool = False, **auto: str
-) -> Study:
+def read_study(path: str | PathLike[str], *, automatic: bool = False, quick: bool = False, **auto: str) -> Study:
     """The study of a TOML file, its paths made absolute and every entry named.
 
     Args:
@@ -265,9 +259,7 @@ def _with_places(study: Study, path: Path) -> Study:
         entries = []
         for number, entry in enumerate(getattr(study, key)):
             named = [name for name in (file, "operation") if name in type(entry).model_fields]
-            update: dict[str, Any] = {
-                n: there(getattr(entry, n), f"{key}.{number}.{n}") for n in named
-            }
+            update: dict[str, Any] = {n: there(getattr(entry, n), f"{key}.{number}.{n}") for n in named}
             if key == "room":
                 field = f"room.{number}.linked"
                 update["linked"] = tuple(there(name, field) for name in entry.linked)

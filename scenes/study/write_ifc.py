@@ -24,11 +24,7 @@ def write_study_ifc(study: StudyResult, out: Path) -> tuple[Issue, ...]:
     A set is named after its case, "CFS results: system, climate, angle, method".
     """
     source = one_building(case.inputs.building for case in study.plan.cases)
-    done = [
-        (case, result)
-        for case, result in zip(study.plan.cases, study.results, strict=True)
-        if not result.error
-    ]
+    done = [(case, result) for case, result in zip(study.plan.cases, study.results, strict=True) if not result.error]
     issues: dict[Issue, None] = {}
     with replacing(out, field="--write-ifc") as part:
         for name, cases in _by_variant(done).items():
@@ -42,9 +38,7 @@ def write_study_ifc(study: StudyResult, out: Path) -> tuple[Issue, ...]:
     return tuple(issues)
 
 
-def _by_variant(
-    done: Sequence[tuple[Case, CaseResult]],
-) -> dict[str, list[tuple[Case, CaseResult]]]:
+def _by_variant(done: Sequence[tuple[Case, CaseResult]]) -> dict[str, list[tuple[Case, CaseResult]]]:
     """The cases of all rooms by what they are besides the room."""
     variants: dict[str, list[tuple[Case, CaseResult]]] = {}
     for case, result in done:

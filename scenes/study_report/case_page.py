@@ -49,9 +49,7 @@ class CasePage:
         return f"case-{self.number}"
 
 
-def case_page(
-    study: StudyResult, number: int, room: RoomYear, beside: Sequence[RoomYear] = ()
-) -> CasePage:
+def case_page(study: StudyResult, number: int, room: RoomYear, beside: Sequence[RoomYear] = ()) -> CasePage:
     """Figures and tables of a case.
 
     Args:
@@ -106,11 +104,7 @@ def method_words(case: Case) -> str:
     method = gettext(METHODS[case.options.method])
     if case.glare == "none":
         return gettext("{method} method, no glare", method=method)
-    return gettext(
-        "{method} method, {glare} of every occupied hour with the sun up",
-        method=method,
-        glare=case.glare,
-    )
+    return gettext("{method} method, {glare} of every occupied hour with the sun up", method=method, glare=case.glare)
 
 
 def room_of(study: StudyResult, case: Case, result: CaseResult) -> RoomYear:
@@ -153,8 +147,9 @@ def glare_map(times: pd.DatetimeIndex, case: Case, result: CaseResult) -> Chart:
         few=rounded(f["glare_intolerable_h"], 0),
         most=rounded(f["dgp_max"], 2),
     )
-    return carpet(times, result.arrays["dgp"], scale, title=gettext("Glare through the year"),
-                  explanation=words, digits=3)  # fmt: skip
+    return carpet(
+        times, result.arrays["dgp"], scale, title=gettext("Glare through the year"), explanation=words, digits=3
+    )
 
 
 def figures_table(result: CaseResult) -> tables.Table:

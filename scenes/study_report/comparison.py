@@ -23,11 +23,26 @@ from scenes.study_report.case_page import case_label, label_of
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a8f98")
 SHAPES = ("round", "square", "diamond", "ring")
 COLUMNS = (
-    "sda300_50", "ase1000_250", "da300", "udi_300_3000", "daylight_factor", "dgp_max",
-    "glare_perceptible_h", "glare_disturbing_h", "glare_intolerable_h", "glare_protection",
-    "straight_view_percent", "comfortable_80_h", "warm_h", "operative_max_c", "heating_kwh",
-    "cooling_kwh", "lighting_kwh", "illuminance_error_mean", "seconds",
-)  # fmt: skip
+    "sda300_50",
+    "ase1000_250",
+    "da300",
+    "udi_300_3000",
+    "daylight_factor",
+    "dgp_max",
+    "glare_perceptible_h",
+    "glare_disturbing_h",
+    "glare_intolerable_h",
+    "glare_protection",
+    "straight_view_percent",
+    "comfortable_80_h",
+    "warm_h",
+    "operative_max_c",
+    "heating_kwh",
+    "cooling_kwh",
+    "lighting_kwh",
+    "illuminance_error_mean",
+    "seconds",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,13 +105,7 @@ def scatter(study: StudyResult) -> Scatter:
         return gettext("{case}: daylight {light} %, overheating {share} %", **values)
 
     dots = tuple(
-        Dot(
-            100 * (a - x0) / (x1 - x0),
-            100 * (b - y0) / (y1 - y0),
-            *looks[case.system],
-            number,
-            words(case, a, b),
-        )
+        Dot(100 * (a - x0) / (x1 - x0), 100 * (b - y0) / (y1 - y0), *looks[case.system], number, words(case, a, b))
         for (number, case, _), a, b in zip(cases, x, y, strict=True)
     )
     return Scatter(
@@ -113,9 +122,7 @@ def scatter(study: StudyResult) -> Scatter:
             "(Pareto front). Click a mark to show its case."
         ),
         gettext("Daylight autonomy (300 lx), mean over the work plane [%]"),
-        gettext("Occupied hours with DGP above 0.40 [%]")
-        if rated
-        else gettext("Occupied hours above 26 °C [%]"),
+        gettext("Occupied hours with DGP above 0.40 [%]") if rated else gettext("Occupied hours above 26 °C [%]"),
         axis_ticks(x0, x1),
         axis_ticks(y0, y1),
         dots,
@@ -127,10 +134,7 @@ def scatter(study: StudyResult) -> Scatter:
 def system_looks(cases: Sequence[tuple[int, Case, CaseResult]]) -> dict[str, tuple[str, str]]:
     """Colour and shape of each system, by its name."""
     names = dict.fromkeys(case.system for _, case, _ in cases)
-    return {
-        name: (COLOURS[i % len(COLOURS)], SHAPES[i // len(COLOURS) % len(SHAPES)])
-        for i, name in enumerate(names)
-    }
+    return {name: (COLOURS[i % len(COLOURS)], SHAPES[i // len(COLOURS) % len(SHAPES)]) for i, name in enumerate(names)}
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
@@ -150,9 +154,7 @@ def bars(study: StudyResult) -> tuple[Bar, ...]:
         if None in hours:
             continue
         shares = tuple((n, 100 * h / sum(hours)) for n, h in zip(CLASSES, hours, strict=True))
-        words = ", ".join(
-            f"{gettext(CLASS_WORDS[name])} {percent(share)} %" for name, share in shares
-        )
+        words = ", ".join(f"{gettext(CLASS_WORDS[name])} {percent(share)} %" for name, share in shares)
         label = case_label(study, case)
         found.append(Bar(number, label, shares, result.figures["da300"], words))
     return tuple(found)
@@ -183,9 +185,7 @@ def comparison_table(study: StudyResult) -> tables.Table:
     rows = []
     for number, case, result in finished(study):
         values = [_shown(c, result.figures.get(c)) for c in columns]
-        method = gettext(METHODS[case.options.method]) + (
-            "" if case.glare == "none" else f", {case.glare}"
-        )
+        method = gettext(METHODS[case.options.method]) + ("" if case.glare == "none" else f", {case.glare}")
         rows.append((str(number), case_label(study, case), method, *values))
     return tables.Table(gettext("All cases"), headings, tuple(rows))
 
@@ -211,12 +211,7 @@ def failures_table(study: StudyResult) -> tables.Table:
 def clock_table(study: StudyResult) -> tables.Table:
     """Time taken by the cases together, stage by stage."""
     stages = ("daylight_s", "glare_s", "thermal_s", "seconds")
-    names = (
-        gettext("Daylight"),
-        gettext("Glare"),
-        gettext("Heat"),
-        gettext("Total, with reading of files"),
-    )
+    names = (gettext("Daylight"), gettext("Glare"), gettext("Heat"), gettext("Total, with reading of files"))
     rows = []
     for stage, name in zip(stages, names, strict=True):
         values = [float(r.figures.get(stage, 0.0)) for r in study.results if not r.error]

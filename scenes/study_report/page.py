@@ -25,14 +25,7 @@ from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import page as run_page
 from scenes.report import tables
-from scenes.report.answer import (
-    Judged,
-    judged,
-    met_cell,
-    rooms_answer,
-    summary_answer,
-    systems_answer,
-)
+from scenes.report.answer import Judged, judged, met_cell, rooms_answer, summary_answer, systems_answer
 from scenes.report.headline import WARM_C, Card, cards, protection_card
 from scenes.report.method import METHODS
 from scenes.report.model3d import ColourLayer, Model3D, colour_bytes, model3d
@@ -78,9 +71,7 @@ def study_verdict(study: StudyResult) -> Verdict:
         "{climates}; fenestration: {systems}.",
         len(cases),
         rooms=named([c.place for c in cases], rooms_counted),
-        climates=named(
-            [c.climate for c in cases], lambda n: ngettext("{count} climate", "{count} climates", n)
-        ),
+        climates=named([c.climate for c in cases], lambda n: ngettext("{count} climate", "{count} climates", n)),
         systems=named([c.system for c in cases], systems_counted),
     )
     result = (
@@ -92,17 +83,11 @@ def study_verdict(study: StudyResult) -> Verdict:
     limited = _limited(study)
     rows = [(case_label(study, case), room, own) for case, room, own, _ in limited]
     return Verdict(
-        question,
-        _answers(study, limited),
-        sentences,
-        limits(rows, gettext("Case")),
-        systems_by_room(study, limited),
+        question, _answers(study, limited), sentences, limits(rows, gettext("Case")), systems_by_room(study, limited)
     )
 
 
-def _extremes(
-    study: StudyResult, value: Callable[[CaseResult], float]
-) -> tuple[tuple[str, float], tuple[str, float]]:
+def _extremes(study: StudyResult, value: Callable[[CaseResult], float]) -> tuple[tuple[str, float], tuple[str, float]]:
     """Name and value of the case with least and of that with most."""
     values = [(case_label(study, case), value(result)) for _, case, result in finished(study)]
     return min(values, key=lambda one: one[1]), max(values, key=lambda one: one[1])
@@ -148,11 +133,7 @@ def _heat(study: StudyResult) -> str:
         return text + " " + gettext("Without heating and cooling.")
     values = {"case": least[0], "energy": rounded(least[1], 0), "parts": _parts(study, least[0])}
     energy = (
-        gettext(
-            "Heating, cooling and lighting energy, unweighted: {energy} kWh a year ({case}; "
-            "{parts}).",
-            **values,
-        )
+        gettext("Heating, cooling and lighting energy, unweighted: {energy} kWh a year ({case}; {parts}).", **values)
         if least[0] == most[0]
         else gettext(
             "Heating, cooling and lighting energy, unweighted: lowest {energy} kWh a year ({case}; "
@@ -215,8 +196,7 @@ def systems_by_room(study: StudyResult, limited: Sequence[Limited]) -> Table | N
         cells.setdefault(place, {})[case.system] = met_cell(one)
     if len(systems) < 2 or len(cells) < 2:
         return None
-    columns = (Column(gettext("Room"), numeric=False),
-               *(Column(name, numeric=False) for name in systems))  # fmt: skip
+    columns = (Column(gettext("Room"), numeric=False), *(Column(name, numeric=False) for name in systems))
     rows = tuple((place, *(own.get(s, "") for s in systems)) for place, own in cells.items())
     return Table(gettext("Limits met by room and system"), columns, rows)
 
@@ -249,9 +229,7 @@ def study_report_html(study: StudyResult, page: PageOptions = OWN_PAGE) -> str:
         return _filled(study, page, done)
 
 
-def _filled(
-    study: StudyResult, page: PageOptions, done: Sequence[tuple[int, Case, CaseResult]]
-) -> str:
+def _filled(study: StudyResult, page: PageOptions, done: Sequence[tuple[int, Case, CaseResult]]) -> str:
     rooms = {number: room_of(study, case, r) for number, case, r in done[:MOST_CASES]}
     every = tuple(rooms.values())
     pages = tuple(case_page(study, number, room, every) for number, room in rooms.items())
@@ -260,36 +238,40 @@ def _filled(
     styles = (run_page.FILES["style.css"], FILES["study.css"])
     scripts = [run_page.FILES[name] for name in run_page.SCRIPTS]
     scripts += [FILES[name] for name in SCRIPTS]
-    return run_page.environment(FILES).get_template("study.html.j2").render(
-        study=study,
-        page=page,
-        title=page.title or study.title or gettext("Study of fenestration systems"),
-        facts=facts(study) + page.facts,
-        verdict=study_verdict(study),
-        explored={number: explorer_link(study, number) for number in study.explored},
-        beside=len(done) if len(done) <= MOST_BESIDE else 1,
-        most_beside=min(len(pages), MOST_BESIDE),
-        scatter=scatter(study),
-        parallel=parallel(study),
-        bars=bars(study),
-        table=comparison_table(study),
-        head=run_page.head_lines(study.head, study.notes),
-        failures=failures_table(study),
-        clock=clock_table(study),
-        choices=tuple(dict.fromkeys(case.chosen for case in study.plan.cases if case.chosen)),
-        pages=pages,
-        left_out=len(done) - len(pages),
-        model=study_model(study),
-        has_outdoors=any(b.elements for b, _ in study.plan.rooms.values()),
-        problems=tables.issues_table(study.issues),
-        inputs=inputs_table(study),
-        mean_error=share(sum(errors) / len(errors) / 100),
-        worst_error=share(worst / 100),
-        version=metadata.version("mitsuba-cfs"),
-        glossary=glossary(),
-        style=Markup("\n".join(styles)),
-        scripts=Markup("\n".join(scripts)),
-    )  # fmt: skip
+    return (
+        run_page.environment(FILES)
+        .get_template("study.html.j2")
+        .render(
+            study=study,
+            page=page,
+            title=page.title or study.title or gettext("Study of fenestration systems"),
+            facts=facts(study) + page.facts,
+            verdict=study_verdict(study),
+            explored={number: explorer_link(study, number) for number in study.explored},
+            beside=len(done) if len(done) <= MOST_BESIDE else 1,
+            most_beside=min(len(pages), MOST_BESIDE),
+            scatter=scatter(study),
+            parallel=parallel(study),
+            bars=bars(study),
+            table=comparison_table(study),
+            head=run_page.head_lines(study.head, study.notes),
+            failures=failures_table(study),
+            clock=clock_table(study),
+            choices=tuple(dict.fromkeys(case.chosen for case in study.plan.cases if case.chosen)),
+            pages=pages,
+            left_out=len(done) - len(pages),
+            model=study_model(study),
+            has_outdoors=any(b.elements for b, _ in study.plan.rooms.values()),
+            problems=tables.issues_table(study.issues),
+            inputs=inputs_table(study),
+            mean_error=share(sum(errors) / len(errors) / 100),
+            worst_error=share(worst / 100),
+            version=metadata.version("mitsuba-cfs"),
+            glossary=glossary(),
+            style=Markup("\n".join(styles)),
+            scripts=Markup("\n".join(scripts)),
+        )
+    )
 
 
 def facts(study: StudyResult) -> tuple[tuple[str, str], ...]:
@@ -498,8 +480,7 @@ def parallel(study: StudyResult) -> Parallel:
         if not np.isnan(values).all():
             columns.append((axis, values))
     axes = tuple(
-        candidate.axis(values, 100.0 * (i + 0.5) / len(columns))
-        for i, (candidate, values) in enumerate(columns)
+        candidate.axis(values, 100.0 * (i + 0.5) / len(columns)) for i, (candidate, values) in enumerate(columns)
     )
     looks = system_looks(cases)
     lines = []
@@ -536,19 +517,31 @@ def _energy(result: CaseResult, space: Space) -> float:
 
 
 CANDIDATES = (
-    _Candidate(N_("Daylight"), N_("daylight autonomy 300 lx"), "%", 0, True,
-           lambda result, _: _figure(result, "da300")),
-    _Candidate(N_("Glare"), N_("occupied hours with DGP above 0.40"), "%", 1, False,
-           lambda result, _: _glare(result)),
-    _Candidate(N_("Comfort"), N_("occupied hours within the 80 % limits"), "%", 0, True,
-           lambda result, _: _comfort(result)),
-    _Candidate(N_("Energy"), N_("heating, cooling and light per floor area"), "kWh/m²", 0, False,
-           _energy),
-    _Candidate(N_("Melanopic light"), N_("occupied hours with 250 lx melanopic EDI"), "%", 0, True,
-           lambda result, _: _figure(result, "melanopic_250_percent")),
-    _Candidate(N_("View"), N_("direct visible transmittance"), "%", 0, True,
-           lambda result, _: _figure(result, "straight_view_percent")),
-)  # fmt: skip
+    _Candidate(
+        N_("Daylight"), N_("daylight autonomy 300 lx"), "%", 0, True, lambda result, _: _figure(result, "da300")
+    ),
+    _Candidate(N_("Glare"), N_("occupied hours with DGP above 0.40"), "%", 1, False, lambda result, _: _glare(result)),
+    _Candidate(
+        N_("Comfort"), N_("occupied hours within the 80 % limits"), "%", 0, True, lambda result, _: _comfort(result)
+    ),
+    _Candidate(N_("Energy"), N_("heating, cooling and light per floor area"), "kWh/m²", 0, False, _energy),
+    _Candidate(
+        N_("Melanopic light"),
+        N_("occupied hours with 250 lx melanopic EDI"),
+        "%",
+        0,
+        True,
+        lambda result, _: _figure(result, "melanopic_250_percent"),
+    ),
+    _Candidate(
+        N_("View"),
+        N_("direct visible transmittance"),
+        "%",
+        0,
+        True,
+        lambda result, _: _figure(result, "straight_view_percent"),
+    ),
+)
 
 
 MOST_EXPLORED = 12  # cases in an explorer: some 5 to 15 MB each

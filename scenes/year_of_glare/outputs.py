@@ -36,9 +36,8 @@ KEPT = "ratings"  # folder of the finished ratings, inside that of the results
 LOWEST, HIGHEST = 0.15, 0.60  # ends of the heat map's scale
 COLOURS = LinearSegmentedColormap.from_list(
     "glare",
-    [(0.0, "#26456e"), (0.42, "#9cc3d5"), (0.444, "#f3e7a1"), (0.555, "#f0b04a"),
-     (0.667, "#d9622b"), (1.0, "#7a1022")],
-)  # fmt: skip
+    [(0.0, "#26456e"), (0.42, "#9cc3d5"), (0.444, "#f3e7a1"), (0.555, "#f0b04a"), (0.667, "#d9622b"), (1.0, "#7a1022")],
+)
 
 
 def write_view(year: GlareYear, rated: ViewYear, folder: Path) -> dict[str, object]:
@@ -68,9 +67,14 @@ def view_row(year: GlareYear, rated: ViewYear) -> dict[str, object]:
     hours, errors = class_hours(dgp), rated.ratings.dgp_standard_error
     x, y, z = view.position
     return {
-        "view": rated.view.name, "x": x, "y": y, "z": z,
-        "direction_x": view.direction[0], "direction_y": view.direction[1],
-        "direction_z": view.direction[2], "hours_of_use": len(dgp),
+        "view": rated.view.name,
+        "x": x,
+        "y": y,
+        "z": z,
+        "direction_x": view.direction[0],
+        "direction_y": view.direction[1],
+        "direction_z": view.direction[2],
+        "hours_of_use": len(dgp),
         **{f"hours_{name}": int(count) for name, count in zip(CLASSES, hours, strict=True)},
         **{f"share_above_{limit:.2f}": exceeded_share(dgp, limit) for limit in LIMITS},
         "dgp_exceeded_in_5_percent": hour_not_exceeded(dgp),
@@ -82,7 +86,7 @@ def view_row(year: GlareYear, rated: ViewYear) -> dict[str, object]:
         "worst_hour": str(rated.ratings.dgp.idxmax()),
         "seconds": round(rated.seconds, 1),
         "VIEW": format_view(view),
-    }  # fmt: skip
+    }
 
 
 def write_heat_map(path: Path, year: GlareYear, rated: ViewYear) -> None:
@@ -97,9 +101,13 @@ def write_heat_map(path: Path, year: GlareYear, rated: ViewYear) -> None:
     axes.set_facecolor("#d8d8d8")
     days = grid.shape[1]
     image = axes.imshow(
-        grid, cmap=COLOURS, norm=Normalize(LOWEST, HIGHEST), aspect="auto",
-        extent=(0, days, 0, 24), interpolation="nearest",
-    )  # fmt: skip
+        grid,
+        cmap=COLOURS,
+        norm=Normalize(LOWEST, HIGHEST),
+        aspect="auto",
+        extent=(0, days, 0, 24),
+        interpolation="nearest",
+    )
     starts = pd.date_range(times[0].normalize(), periods=days, freq="D")
     first = np.flatnonzero(starts.day == 1)
     axes.set_xticks(first, [short_month(starts[d].month) for d in first], ha="left", fontsize=8)

@@ -35,9 +35,7 @@ ALONE = 1.5  # [m] between eyes where there is one
 NEAR = 0.01  # [m] eyes nearer than this are one
 
 
-def write_page(
-    year: GlareYear, table: pd.DataFrame, path: Path, page: PageOptions = OWN_PAGE
-) -> None:
+def write_page(year: GlareYear, table: pd.DataFrame, path: Path, page: PageOptions = OWN_PAGE) -> None:
     """Write the page (HTML, needs nothing else but its pictures' files beside it).
 
     Args: table: a row for each view, as in `views.csv`.
@@ -77,10 +75,7 @@ def _facts(year: GlareYear, table: pd.DataFrame) -> list[tuple[str, str]]:
         (
             gettext("Views"),
             ngettext(
-                "{views}, {count} view point",
-                "{views}, {count} view points",
-                len(_eyes(table)[1]),
-                views=len(table),
+                "{views}, {count} view point", "{views}, {count} view points", len(_eyes(table)[1]), views=len(table)
             ),
         ),
         (
@@ -93,10 +88,7 @@ def _facts(year: GlareYear, table: pd.DataFrame) -> list[tuple[str, str]]:
                 end=end,
             ),
         ),
-        (
-            gettext("Glare metric"),
-            f"{options.metric}, {gettext(METHODS.get(options.method, options.method))}",
-        ),
+        (gettext("Glare metric"), f"{options.metric}, {gettext(METHODS.get(options.method, options.method))}"),
         (gettext("Glare sources"), translated(rating_of(options).rule)),
     ]
 
@@ -148,11 +140,7 @@ def _renamed(table: pd.DataFrame) -> pd.DataFrame:
 
 def _words(row: Any) -> str:
     shares = ", ".join(
-        gettext(
-            "{share} % above {limit}",
-            share=percent(100 * getattr(row, _column(limit))),
-            limit=rounded(limit, 2),
-        )
+        gettext("{share} % above {limit}", share=percent(100 * getattr(row, _column(limit))), limit=rounded(limit, 2))
         for limit in LIMITS
     )
     return gettext(
@@ -237,8 +225,7 @@ def _views(table: pd.DataFrame) -> Table:
             *(percent(100 * row[f"share_above_{limit:.2f}"]) for limit in LIMITS),
             rounded(row["dgp_exceeded_in_5_percent"], 2),
             rounded(row["highest_dgp"], 2),
-            f"{day_and_month(pd.Timestamp(row['worst_hour']), short=True)} "
-            f"{pd.Timestamp(row['worst_hour']):%H:%M}",
+            f"{day_and_month(pd.Timestamp(row['worst_hour']), short=True)} {pd.Timestamp(row['worst_hour']):%H:%M}",
             gettext(LEVEL_WORDS[str(row["protection_en17037"])]),
         )
         for _, row in table.iterrows()
@@ -288,10 +275,7 @@ def _sector(wedge: RoseWedge, length: float, half: float, name: str) -> str:
     """A sector of a circle round the eye."""
     middle = float(np.arctan2(wedge.direction[1], wedge.direction[0]))
     x, y = wedge.position
-    ends = [
-        (x + length * np.cos(angle), y + length * np.sin(angle))
-        for angle in (middle - half, middle + half)
-    ]
+    ends = [(x + length * np.cos(angle), y + length * np.sin(angle)) for angle in (middle - half, middle + half)]
     (x1, y1), (x2, y2) = ends
     r = UNIT * length
     return (

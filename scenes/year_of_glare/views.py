@@ -18,9 +18,7 @@ def chosen_views(building: Building, space: Space, options: YearOptions) -> list
     eyes = rated_views(options)
     if not eyes and options.grid is None and options.directions == 1:
         eyes = held_fisheyes(building, space, options.size)
-    eyes = eyes or eyes_of(
-        space, options.grid, options.directions, options.eye_height, options.size
-    )
+    eyes = eyes or eyes_of(space, options.grid, options.directions, options.eye_height, options.size)
     for each in eyes:
         check_eye(each, space)
     return eyes
@@ -47,9 +45,7 @@ def _check_kind(each: NamedView) -> None:
     """Refuse views whose glare would mean nothing."""
     view = each.view
     if not view.is_fisheye:
-        raise DataError(
-            f"{each.name} is a {view.kind} view: expected a fisheye (-vta or -vth)", field="--view"
-        )
+        raise DataError(f"{each.name} is a {view.kind} view: expected a fisheye (-vta or -vth)", field="--view")
     if not view.covers_hemisphere:
         raise DataError(
             f"{each.name} shows {view.horizontal_deg:g} x {view.vertical_deg:g} degrees: "

@@ -25,12 +25,7 @@ from mitsuba_cfs.methods.glare import bright_hours, glare_with, hourly_glare, ra
 from mitsuba_cfs.methods.light import SeasonalLight, seasonal_light
 from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_light import PhaseLight, phase_light
-from mitsuba_cfs.methods.phase_matrices import (
-    PhaseMatrices,
-    phase_matrices,
-    with_eye,
-    with_outdoors,
-)
+from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, phase_matrices, with_eye, with_outdoors
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.methods.sun_by_patches import sunny_hour_dgp_error
 from mitsuba_cfs.metrics.schedules import working_hours
@@ -79,9 +74,7 @@ class GlareYear:
     digest: str  # of all inputs
     head: Head = NO_HEAD  # what was left out, what was assumed
     notes: tuple[str, ...] = ()  # light that is lost through leaks of the model
-    fenestration: Sequence[
-        dict[str, Any]
-    ] = ()  # system, source and windows of each, see `resolver`
+    fenestration: Sequence[dict[str, Any]] = ()  # system, source and windows of each, see `resolver`
     space: Space | None = None  # the room, for its plan
     scenes: Sequence[DaylightScene] = ()  # of each season; none where it is always the same
     season: NDArray[np.int64] | None = None  # [L] of each hour of the sky
@@ -126,30 +119,33 @@ def read_year(
     variants.activate()
     leaks = tuple(viewed.leaks())
     sampling = sampling_of(options)
-    sky = annual_sky(
-        weather,
-        sampling.subdivision,
-        sun_model=options.sun_model,
-        ground=options.sky_ground,
-    )
+    sky = annual_sky(weather, sampling.subdivision, sun_model=options.sun_model, ground=options.sky_ground)
     progress("inputs", 1.0)
     used = working_hours(weather, *options.occupied)
     return GlareYear(
-        options, viewed.space.label, views, viewed.scene, viewed.optics, weather, sky, used, key,
-        inputs.head, leaks, inputs.sources, viewed.space, viewed.scenes,
-        season_of(viewed.seasons, weather.midpoints[sky.lit].month.to_numpy()), viewed.lobes,
-    )  # fmt: skip
+        options,
+        viewed.space.label,
+        views,
+        viewed.scene,
+        viewed.optics,
+        weather,
+        sky,
+        used,
+        key,
+        inputs.head,
+        leaks,
+        inputs.sources,
+        viewed.space,
+        viewed.scenes,
+        season_of(viewed.seasons, weather.midpoints[sky.lit].month.to_numpy()),
+        viewed.lobes,
+    )
 
 
 def sampling_of(options: YearOptions) -> Sampling:
     """How finely the year is computed."""
     memory = options.memory_gb * 2**30
-    return Sampling(
-        view_samples=options.samples,
-        memory=memory,
-        window_parts=options.window_parts,
-        seed=options.seed,
-    )
+    return Sampling(view_samples=options.samples, memory=memory, window_parts=options.window_parts, seed=options.seed)
 
 
 def rating_of(options: YearOptions) -> GlareOptions:
@@ -157,9 +153,7 @@ def rating_of(options: YearOptions) -> GlareOptions:
     return GlareOptions(grouping=options.glare_sources, sun=options.glare_sun)
 
 
-def rate_views(
-    year: GlareYear, checkpoints: Path, progress: Progress = silent
-) -> Iterator[ViewYear]:
+def rate_views(year: GlareYear, checkpoints: Path, progress: Progress = silent) -> Iterator[ViewYear]:
     """Rate one view after the other; views in the folder `checkpoints` are read from it."""
     options = year.options
     first = phase_matrices(
@@ -181,15 +175,9 @@ def rate_views(
         matrices = [with_eye(season, named.view) for season in seasons]
         light = _light(year, matrices, () if result else (options.metric,), tracing)
         result = result or hourly_glare(
-            light,
-            options.metric,
-            options=rating_of(options),
-            checkpoint=checkpoint,
-            progress=part(steps, 0.3, 1.0),
+            light, options.metric, options=rating_of(options), checkpoint=checkpoint, progress=part(steps, 0.3, 1.0)
         )
-        table = pd.DataFrame(
-            {name: getattr(result, name) for name in FIGURES}, index=times.rename("time")
-        )
+        table = pd.DataFrame({name: getattr(result, name) for name in FIGURES}, index=times.rename("time"))
         shown = _pictures(light, year, result)
         stored = checkpoint.with_suffix(".json")
         effects = _stored_effects(stored)
@@ -200,9 +188,7 @@ def rate_views(
         yield ViewYear(named, table, shown, time.monotonic() - start, effects)
 
 
-def _effects(
-    light: PhaseLight | SeasonalLight, year: GlareYear, result: AnnualGlare
-) -> dict[str, float]:
+def _effects(light: PhaseLight | SeasonalLight, year: GlareYear, result: AnnualGlare) -> dict[str, float]:
     """`ViewYear.effects` of a rated view."""
     metric, rating = year.options.metric, rating_of(year.options)
     error = sunny_hour_dgp_error(light, result.dgp, metric, options=rating)

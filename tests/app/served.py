@@ -46,9 +46,7 @@ class Served:
     ) -> tuple[int, dict[str, str], bytes]:
         """Status, headers and body of an answer to a request with these headers alone."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
-        sent = {"Host": f"127.0.0.1:{self.port}"} | {
-            name.replace("_", "-"): value for name, value in headers.items()
-        }
+        sent = {"Host": f"127.0.0.1:{self.port}"} | {name.replace("_", "-"): value for name, value in headers.items()}
         with closing(connection):
             connection.request(method, path, body, sent)
             answer = connection.getresponse()
@@ -81,9 +79,7 @@ class Served:
 
 
 @contextmanager
-def serving(
-    folder: Path, *, language: str = "en", limits: UploadLimits | None = None
-) -> Iterator[Served]:
+def serving(folder: Path, *, language: str = "en", limits: UploadLimits | None = None) -> Iterator[Served]:
     """A server of a project folder on a free port."""
     project = Project(folder)
     jobs = Jobs(project)
@@ -91,9 +87,7 @@ def serving(
     with socket.socket() as listening:
         listening.bind(("127.0.0.1", 0))
         port = listening.getsockname()[1]
-        settings = uvicorn.Config(
-            served.app(port), log_level="warning", timeout_graceful_shutdown=1
-        )
+        settings = uvicorn.Config(served.app(port), log_level="warning", timeout_graceful_shutdown=1)
         server = uvicorn.Server(settings)
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
         thread.start()

@@ -14,10 +14,7 @@ from tests.app.served import serving
 from tests.devtools import Page, chromium
 from tests.report.test_accessibility import AXE, FAULTS, GRAVE
 
-pytestmark = [
-    pytest.mark.early,
-    pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
-]
+pytestmark = [pytest.mark.early, pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")]
 STEPS = ("files", "building", "systems", "compute", "results")
 DONE_S = 900.0  # for the slow test's commands
 
@@ -79,9 +76,7 @@ def test_the_building_is_seen_and_a_room_is_chosen_in_the_view(browser, served) 
     name = browser.value("document.querySelector('#room h3').textContent")
     assert name in ("A South office", "B East office")
     browser.until(f"{picture} !== {json.dumps(before)}")
-    assert (
-        browser.value("document.querySelector('#room-rows tr.selected').innerText").find(name) > 0
-    )
+    assert browser.value("document.querySelector('#room-rows tr.selected').innerText").find(name) > 0
 
 
 def test_a_room_is_left_out_and_its_use_stated_by_click(browser, served) -> None:
@@ -111,9 +106,7 @@ def test_a_system_of_the_library_is_a_variant_with_its_sheet(browser, served) ->
     served.idle()
     (system,) = served.project.study()["system"]
     states = served.project.states(system["operation"])
-    assert [Path(one).name for one in states] == [
-        "double-low-e.xml", "double-low-e-screen-5-grey.xml",
-    ]  # fmt: skip
+    assert [Path(one).name for one in states] == ["double-low-e.xml", "double-low-e-screen-5-grey.xml"]
     assert browser.value("document.querySelector('#chosen .sheet') !== null")
 
 
@@ -121,9 +114,7 @@ def test_the_commands_are_shown_before_they_run(browser, served) -> None:
     go(browser, "compute")
     browser.click("#compute input[data-key='rule en17037']")
     browser.until("document.querySelectorAll('#plan code').length === 2")
-    run, comply = browser.value(
-        "[...document.querySelectorAll('#plan code')].map((e) => e.textContent)"
-    )
+    run, comply = browser.value("[...document.querySelectorAll('#plan code')].map((e) => e.textContent)")
     assert run.startswith("cfs run inputs/office.ifc --weather ") and "--operation" in run
     assert "--quick" in run and "--out results/report-" in run
     assert comply.startswith("cfs comply ") and "--standard en17037" in comply
@@ -219,9 +210,7 @@ def test_from_drop_to_dossier_without_a_shell(tmp_path) -> None:
 def test_a_variant_is_made_once(tmp_path) -> None:
     """A system of the library that is there already is taken as it is."""
     with serving(tmp_path / "project") as served:
-        write_library_system(
-            "double clear", "", served.project.folder / "inputs" / "double-clear.xml"
-        )
+        write_library_system("double clear", "", served.project.folder / "inputs" / "double-clear.xml")
         assert served.page("POST", "/api/library", {"glazing": "double clear"})[0] == 200
         assert not served.jobs.facts()
         assert served.project.study()["system"][0]["bsdf"] == "inputs/double-clear.xml"

@@ -42,22 +42,33 @@ def project(tmp_path) -> Project:
 
 def test_toml_comes_back_as_it_was() -> None:
     table = {
-        "title": 'A "B" \\ ü\x7f\n', "n": 3, "x": 0.1, "yes": True, "list": [1.0, 2.0], "none": [],
+        "title": 'A "B" \\ ü\x7f\n',
+        "n": 3,
+        "x": 0.1,
+        "yes": True,
+        "list": [1.0, 2.0],
+        "none": [],
         "options": {"a b": 1, "seed": 0},
         "room": [{"name": "r", "spaces": ["1", "2"]}, {"name": "s"}],
         "control": {"rule": "glare", "zone": [{"x": [[0, 1]]}]},
-        "rooms": {"\U0001f600\x7f": "office"}, "radius": float("inf"),
-    }  # fmt: skip
+        "rooms": {"\U0001f600\x7f": "office"},
+        "radius": float("inf"),
+    }
     assert tomllib.loads(toml_text(table)) == table
 
 
 @pytest.mark.parametrize(
     ("text", "name"),
     [
-        ("a.ifc", "a.ifc"), ("../../a.ifc", "a.ifc"), ("C:\\x\\a.ifc", "a.ifc"), ("..", ""),
-        ("a:b?.epw", "a_b_.epw"), (" ü (1).xml ", "ü (1).xml"), (".hidden", "hidden"),
+        ("a.ifc", "a.ifc"),
+        ("../../a.ifc", "a.ifc"),
+        ("C:\\x\\a.ifc", "a.ifc"),
+        ("..", ""),
+        ("a:b?.epw", "a_b_.epw"),
+        (" ü (1).xml ", "ü (1).xml"),
+        (".hidden", "hidden"),
     ],
-)  # fmt: skip
+)
 def test_names_of_files(text, name) -> None:
     assert plain_name(text) == name
 
@@ -78,8 +89,9 @@ def test_several_ifc_files_are_one_building(project) -> None:
     assert project.building() == ["inputs/office.ifc", "inputs/facade.ifc"]
     study = read_study(project.folder / "study.toml")
     assert study.inputs(study.room[0]).building_files == (
-        project.folder / "inputs" / "office.ifc", project.folder / "inputs" / "facade.ifc",
-    )  # fmt: skip
+        project.folder / "inputs" / "office.ifc",
+        project.folder / "inputs" / "facade.ifc",
+    )
     assert study.room[0].linked[0] in study.files
     project.remove("inputs/office.ifc")
     assert project.building() == ["inputs/facade.ifc"]
@@ -151,13 +163,18 @@ def test_uses_and_corrections_are_files_of_the_command_line(project) -> None:
 @pytest.mark.parametrize(
     "wanted",
     [
-        {"title": ""}, {"title": 3}, {"nothing": 1}, {"spaces": "all"},
+        {"title": ""},
+        {"title": 3},
+        {"nothing": 1},
+        {"spaces": "all"},
         {"loads": {"heating_c": "x"}},
-        {"systems": [{"name": "x", "bsdf": "../../etc/passwd"}]}, {"systems": [3]}, {"uses": []},
+        {"systems": [{"name": "x", "bsdf": "../../etc/passwd"}]},
+        {"systems": [3]},
+        {"uses": []},
         {"corrections": {"leave_out": ["x"]}},
     ],
     ids=str,
-)  # fmt: skip
+)
 def test_a_wrong_change_is_refused_and_changes_nothing(project, wanted) -> None:
     before = (project.folder / "study.toml").read_text()
     with pytest.raises(DataError):
@@ -186,9 +203,13 @@ def test_every_command_of_the_page_is_one_of_the_command_line(project, monkeypat
     project.write_study(study)
     monkeypatch.chdir(project.folder)
     every = {
-        "report": True, "annual_glare": True, "explore": True, "compare": True, "language": "de",
+        "report": True,
+        "annual_glare": True,
+        "explore": True,
+        "compare": True,
+        "language": "de",
         "standards": ["en17037", "leed-v4.1"],
-    }  # fmt: skip
+    }
     found = actions.computations(project, every)
     assert [one.kind for one in found] == ["run", "comply"] * 3 + ["study"]
     found += [actions.check(project), *(actions.export(project, form) for form in actions.EXPORTS)]

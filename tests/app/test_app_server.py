@@ -33,13 +33,7 @@ def test_the_address_with_the_token_lets_a_browser_in(served) -> None:
 
 @pytest.mark.parametrize(
     "headers",
-    [
-        {},
-        {"Cookie": "cfs_app_1=x"},
-        {"Host": "cfs.example.org"},
-        {"Host": "127.0.0.1"},
-        {"Host": "127.0.0.1:1"},
-    ],
+    [{}, {"Cookie": "cfs_app_1=x"}, {"Host": "cfs.example.org"}, {"Host": "127.0.0.1"}, {"Host": "127.0.0.1:1"}],
     ids=["nothing", "another cookie", "another name", "no port", "another port"],
 )
 def test_strangers_are_refused(served, headers) -> None:
@@ -49,9 +43,7 @@ def test_strangers_are_refused(served, headers) -> None:
     assert served.ask("GET", "/?token=guess", **headers)[0] == 403
 
 
-@pytest.mark.parametrize(
-    "origin", [None, "null", "http://evil.example", "http://127.0.0.1:1", "https://127.0.0.1"]
-)
+@pytest.mark.parametrize("origin", [None, "null", "http://evil.example", "http://127.0.0.1:1", "https://127.0.0.1"])
 def test_only_the_page_may_change_something(served, origin) -> None:
     headers = {"Cookie": served.cookie, "Content_Type": "application/json"}
     body = b'{"title": "changed"}'
@@ -68,9 +60,7 @@ def test_a_form_of_another_page_is_no_request(served) -> None:
     """A browser sends forms without asking; they cannot have this type of content."""
     own = {"Cookie": served.cookie, "Origin": f"http://127.0.0.1:{served.port}"}
     for kind in ("text/plain", "application/x-www-form-urlencoded"):
-        status, _, body = served.ask(
-            "POST", "/api/run", b'{"check": true}', Content_Type=kind, **own
-        )
+        status, _, body = served.ask("POST", "/api/run", b'{"check": true}', Content_Type=kind, **own)
         assert status == 422 and b"expected a JSON object" in body
 
 
@@ -96,11 +86,19 @@ def test_result_files_have_an_address_of_their_own_and_no_access_to_the_page(ser
 @pytest.mark.parametrize(
     "path",
     [
-        "study.toml", "inputs/office.ifc", "results/../study.toml", "results/%2e%2e/study.toml",
-        "results/..%2fstudy.toml", "..%2f..%2f..%2fetc/passwd", "/etc/passwd", "%2fetc%2fpasswd",
-        "results", "results/link.txt", "results/linked/secret.txt",
+        "study.toml",
+        "inputs/office.ifc",
+        "results/../study.toml",
+        "results/%2e%2e/study.toml",
+        "results/..%2fstudy.toml",
+        "..%2f..%2f..%2fetc/passwd",
+        "/etc/passwd",
+        "%2fetc%2fpasswd",
+        "results",
+        "results/link.txt",
+        "results/linked/secret.txt",
     ],
-)  # fmt: skip
+)
 def test_nothing_but_results_is_read(served, path, tmp_path) -> None:
     folder = served.project.folder
     (folder / "study.toml").write_text("title = 'x'\n")

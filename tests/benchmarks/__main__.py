@@ -66,9 +66,7 @@ def table(result: harness.Comparison) -> str:
     lines = [f"{result.name}: {result.of}"]
     for run in (result.ours, result.peer):
         error = "" if run.error is None else f"   error {run.error:.3g}"
-        lines.append(
-            f"  {run.program:<12} {run.seconds:9.3f} s   processor {run.cpu_seconds:9.3f} s{error}"
-        )
+        lines.append(f"  {run.program:<12} {run.seconds:9.3f} s   processor {run.cpu_seconds:9.3f} s{error}")
     lines.append(f"  ratio {result.ratio:.1f}, in processor time {result.cpu_ratio:.1f}")
     lines += [f"  {result.note}"] if result.note else []
     return "\n".join(lines)

@@ -39,9 +39,7 @@ def write_inputs(folder: Path, spacing: float) -> None:
 def ours(folder: Path) -> NDArray[np.float64]:
     """Illuminance [S, H] from the files, written as a file."""
     transmission = read_bsdf_xml(folder / SYSTEM.name).band("Visible").transmission_matrix()
-    view, daylight, sky = (
-        luminance(read_matrix(folder / f"{name}.mtx"), GREY) for name in ("view", "daylight", "sky")
-    )
+    view, daylight, sky = (luminance(read_matrix(folder / f"{name}.mtx"), GREY) for name in ("view", "daylight", "sky"))
     year = phases.three_phase(view[:, None], [transmission], daylight[None], sky)
     write_matrix(folder / "ours.mtx", year, components=3)
     return year
@@ -81,7 +79,5 @@ def compare(name: str, progress: Progress, *, spacing: float = 0.5) -> Compariso
 BENCHMARKS = {
     "annual-product": lambda progress: compare("annual-product", progress),
     "annual-product-1m": lambda progress: compare("annual-product-1m", progress, spacing=1.0),
-    "annual-product-0.25m": lambda progress: compare(
-        "annual-product-0.25m", progress, spacing=0.25
-    ),
+    "annual-product-0.25m": lambda progress: compare("annual-product-0.25m", progress, spacing=0.25),
 }

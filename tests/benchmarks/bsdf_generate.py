@@ -36,9 +36,7 @@ def blind(width: float | None = None):
     from mitsuba_cfs.bsdf.periodic import plastic
 
     material = plastic("grey", 0.55, specular=0.01, roughness=0.06)
-    return venetian_blind(
-        material, depth=0.08, radius=0.104, spacing=SPACING, tilt=np.radians(45), width=width
-    )
+    return venetian_blind(material, depth=0.08, radius=0.104, spacing=SPACING, tilt=np.radians(45), width=width)
 
 
 def ours(paths: int = PATHS, seed: int = 2) -> KlemsBsdf:
@@ -62,9 +60,7 @@ def genbsdf(samples: int, options: tuple[str, ...], *, levels: int = 0) -> Bsdf:
     from mitsuba_cfs.bsdf.periodic import write_radiance
 
     layer, bottom = blind(WIDTH), (SLATS // 2) * SPACING
-    cell = program.SamplingBox(
-        -WIDTH / 2 - 0.04, -WIDTH / 2 + 0.04, bottom, bottom + SPACING, -layer.thickness, 0
-    )
+    cell = program.SamplingBox(-WIDTH / 2 - 0.04, -WIDTH / 2 + 0.04, bottom, bottom + SPACING, -layer.thickness, 0)
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "blind.rad"
         write_radiance(layer, scene, 1, SLATS)
@@ -104,9 +100,7 @@ def compare(name: str, progress: Progress, *, samples: int, options: tuple[str, 
     progress(name, 0.0)
     found, seconds, processor = timed(ours, repeat=3)
     progress(name, 0.2)
-    peer, peer_seconds, peer_processor = timed(
-        lambda: genbsdf(samples, options), repeat=1, warm=False
-    )
+    peer, peer_seconds, peer_processor = timed(lambda: genbsdf(samples, options), repeat=1, warm=False)
     progress(name, 0.7)
     block = hardest_block(*(relative_values(bsdf) for bsdf in (found, peer, reference())))
     progress(name, 1.0)

@@ -60,9 +60,7 @@ def compare(name: str, progress: Progress) -> Comparison:
     progress(name, 0.0)
     found, seconds, processor = timed(ours, repeat=2)
     progress(name, 0.2)
-    peer, peer_seconds, peer_processor = timed(
-        lambda: genbsdf(SAMPLES, TUNED, levels=LEVELS), repeat=1, warm=False
-    )
+    peer, peer_seconds, peer_processor = timed(lambda: genbsdf(SAMPLES, TUNED, levels=LEVELS), repeat=1, warm=False)
     progress(name, 0.6)
     truth = reference() / reference().mean(axis=1, keepdims=True)
     block = hardest_block(relative_values(found), relative_values(peer), truth)

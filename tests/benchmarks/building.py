@@ -111,9 +111,7 @@ def measure(clock: Clock) -> None:
                     place.update({key: measured for key in place if place[key] is function})
 
 
-def main(
-    building: Path, *, weather: Path, cfs: Path, space: Sequence[str] = (), cached: bool = False
-) -> None:
+def main(building: Path, *, weather: Path, cfs: Path, space: Sequence[str] = (), cached: bool = False) -> None:
     """Print a line for each part."""
     started = time.process_time()
     for name in LOADED:

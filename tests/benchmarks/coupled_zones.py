@@ -52,19 +52,20 @@ def row_of_zones(count: int) -> list[Zone]:
 def energyplus_row(count: int, outputs: dict[str, str]) -> Model:
     """EnergyPlus' model of the same rooms."""
     model = room_model("S", "clear_double", outputs=outputs)
-    for kind in ("Zone", "BuildingSurface:Detailed", "FenestrationSurface:Detailed",
-                 "ZoneInfiltration:DesignFlowRate", "ElectricEquipment", "People"):  # fmt: skip
+    for kind in (
+        "Zone",
+        "BuildingSurface:Detailed",
+        "FenestrationSurface:Detailed",
+        "ZoneInfiltration:DesignFlowRate",
+        "ElectricEquipment",
+        "People",
+    ):
         objects = model[kind]
-        model[kind] = {
-            f"{name} {k}": _moved(entry, k) for k in range(count) for name, entry in objects.items()
-        }
+        model[kind] = {f"{name} {k}": _moved(entry, k) for k in range(count) for name, entry in objects.items()}
     walls = model["BuildingSurface:Detailed"]
     for k in range(count - 1):
         for name, partner in ((f"X4 {k}", f"X0 {k + 1}"), (f"X0 {k + 1}", f"X4 {k}")):
-            walls[name] |= {
-                "outside_boundary_condition": "Surface",
-                "outside_boundary_condition_object": partner,
-            }
+            walls[name] |= {"outside_boundary_condition": "Surface", "outside_boundary_condition_object": partner}
     return model
 
 
@@ -78,9 +79,7 @@ def _moved(entry: dict, k: int) -> dict:
         elif key.endswith("_x_coordinate"):
             moved[key] = value + WIDTH * k
         elif key == "vertices":
-            moved[key] = [
-                v | {"vertex_x_coordinate": v["vertex_x_coordinate"] + WIDTH * k} for v in value
-            ]
+            moved[key] = [v | {"vertex_x_coordinate": v["vertex_x_coordinate"] + WIDTH * k} for v in value]
     return moved
 
 
@@ -91,9 +90,7 @@ def our_year(count: int) -> tuple[Clock, NDArray[np.float64]]:
     sun = facade_sun(sun_steps(weather, STEPS), reference_room.facade_normal("S"))
     solar = reference_room.solar(sun, clear_double(), reference_room.RoomLight())
     zones = row_of_zones(count)
-    found = simulate_zones(
-        zones, reference_room.climate(weather), [solar] * count, step_s=3600.0 / STEPS
-    )
+    found = simulate_zones(zones, reference_room.climate(weather), [solar] * count, step_s=3600.0 / STEPS)
     clock = Clock(time.perf_counter() - wall, time.process_time() - processor)
     return clock, np.stack([one.air_c for one in found], axis=1)
 

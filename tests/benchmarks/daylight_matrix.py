@@ -25,11 +25,8 @@ def shaded() -> Surfaces:
     """A wall to the south-east and an overhang above the window."""
     wall = [(2, -6, 0), (10, -6, 0), (10, -6, 6), (2, -6, 6)]
     overhang = [(0, -1, 2.8), (0, 0, 2.8), (room.WIDTH, 0, 2.8), (room.WIDTH, -1, 2.8)]
-    triangles = [[quad[i] for i in corners] for quad in (wall, overhang) for corners in (
-        (0, 1, 2), (0, 2, 3))]  # fmt: skip
-    return Surfaces(
-        np.array(triangles, dtype=float), np.array([0.4, 0.4, 0.6, 0.6]), np.array([0, 0, 1, 1])
-    )
+    triangles = [[quad[i] for i in corners] for quad in (wall, overhang) for corners in ((0, 1, 2), (0, 2, 3))]
+    return Surfaces(np.array(triangles, dtype=float), np.array([0.4, 0.4, 0.6, 0.6]), np.array([0, 0, 1, 1]))
 
 
 OUTDOORS = {"open": lambda: room.NOTHING, "shaded": shaded}

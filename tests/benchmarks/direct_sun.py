@@ -60,17 +60,13 @@ def klems_blind() -> Blind:
         block = read_bsdf_xml(SYSTEM).band("Visible").filled().transmission_front
         return KlemsScattering(KLEMS_FULL, block, np.zeros(KLEMS_FULL.size))
 
-    return Blind(
-        SYSTEM.name, lambda f: (f / SYSTEM.name).write_bytes(SYSTEM.read_bytes()), scattering
-    )
+    return Blind(SYSTEM.name, lambda f: (f / SYSTEM.name).write_bytes(SYSTEM.read_bytes()), scattering)
 
 
 def tree_blind() -> Blind:
     """The slats of the demo's blind without glazing, traced to a tensor tree."""
     variants.activate()
-    layer = venetian_blind(
-        plastic("slat", 0.55), depth=0.080, radius=0.104, spacing=0.072, tilt=np.radians(45.0)
-    )
+    layer = venetian_blind(plastic("slat", 0.55), depth=0.080, radius=0.104, spacing=0.072, tilt=np.radians(45.0))
     (tree,), _ = generate_tensor_tree(layer, TREE_LEVELS, samples=4096, seed=1)
 
     def scattering():

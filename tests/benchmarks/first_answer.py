@@ -98,10 +98,11 @@ def lines(folder: Path, building: Path, demo: Path) -> Iterator[tuple[str, str, 
     yield "run, house", "result", ["run", building, *of_run, "--quick"]
     of_dgp = ["--weather", weather, "--cfs", bad["bad.xml"], "--out", folder / "dgp"]
     yield "dgp", "mistake", ["dgp", building, *of_dgp]
-    yield "dgp", "result", [
-        "dgp", office, "--weather", weather, "--cfs", system, "--size", "100",
-        "--out", folder / "dgp",
-    ]  # fmt: skip
+    yield (
+        "dgp",
+        "result",
+        ["dgp", office, "--weather", weather, "--cfs", system, "--size", "100", "--out", folder / "dgp"],
+    )
     at = ["--at", "06-21 12:00", "--size", "64", "--out", folder / "picture.png"]
     of_picture = ["--weather", weather, "--cfs", system, *at]
     yield "picture", "mistake", ["picture", building, *of_picture, "--at", "noon"]
@@ -135,9 +136,12 @@ def answer(repository: Path, command: str, kind: str, arguments: list[str]) -> A
         start = time.perf_counter()
         process = subprocess.Popen(
             [sys.executable, "-m", "scenes.cli", *map(str, arguments)],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=repository,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=repository,
             env=environment,
-        )  # fmt: skip
+        )
         if kind == "result":
             line = next((said for said in process.stdout if not said.startswith(NO_RESULT)), "")
             seconds = time.perf_counter() - start
@@ -148,9 +152,7 @@ def answer(repository: Path, command: str, kind: str, arguments: list[str]) -> A
             line = line[0] if line else ""
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return Answer(
-        command, kind, round(seconds, 2), round(processor, 2), process.returncode, line.strip()
-    )
+    return Answer(command, kind, round(seconds, 2), round(processor, 2), process.returncode, line.strip())
 
 
 def main(

@@ -35,9 +35,7 @@ def pictures() -> list[np.ndarray]:
 
 def rated(file: Path, options: str = "") -> float:
     """DGP of a picture by evalglare."""
-    return float(
-        radiance.run(f"evalglare {options} {file.name}", file.parent).split(b":")[1].split()[0]
-    )
+    return float(radiance.run(f"evalglare {options} {file.name}", file.parent).split(b":")[1].split()[0])
 
 
 def compare(name: str, progress: Progress) -> Comparison:

@@ -51,13 +51,10 @@ class BenchmarkYear:
         system = read_bsdf_xml(SYSTEM).band("Visible")
         transmission = [system.transmission_matrix()]
         self.sky, sun = (
-            sky_matrix(weather, SUBDIVISION, parts=parts, sun_up_only=True)[:, ::every]
-            for parts in ("all", "sun")
+            sky_matrix(weather, SUBDIVISION, parts=parts, sun_up_only=True)[:, ::every] for parts in ("all", "sun")
         )
         self.daylight, direct = (
-            daylight_matrix(
-                room.NOTHING, groups, subdivision=SUBDIVISION, samples=1024, max_depth=depth
-            ).values
+            daylight_matrix(room.NOTHING, groups, subdivision=SUBDIVISION, samples=1024, max_depth=depth).values
             for depth in (16, 1)
         )
         luminance = phases.room_side_radiance(transmission, self.daylight, self.sky)
@@ -71,12 +68,7 @@ class BenchmarkYear:
         disc = PictureSun(room.room(), room.NOTHING, groups, [way], view)
         self.three_phase = self.matrices.three_phase(luminance)
         self.five_phase = FivePhasePictures(
-            self.matrices,
-            disc,
-            luminance,
-            direct_luminance,
-            series.sun[hours],
-            series.direct_normal[hours],
+            self.matrices, disc, luminance, direct_luminance, series.sun[hours], series.direct_normal[hours]
         )
 
     def write(self, folder: Path) -> None:
@@ -125,12 +117,7 @@ def compare(name: str, progress: Progress) -> Comparison:
         name,
         f"glare of an hour of the year from matrices, {SIZE} x {SIZE} pixels",
         Run("mitsuba-cfs", "annual_glare", seconds / hours, processor / hours),
-        Run(
-            "Radiance",
-            f"{PRODUCT}; evalglare",
-            peer_seconds / PEER_HOURS,
-            peer_processor / PEER_HOURS,
-        ),
+        Run("Radiance", f"{PRODUCT}; evalglare", peer_seconds / PEER_HOURS, peer_processor / PEER_HOURS),
         note=(
             f"largest difference of DGP {difference:.2g}; an hour by the five-phase method "
             f"{five_seconds / hours:.3f} s, processor {five_processor / hours:.3f} s; "

@@ -80,12 +80,7 @@ class Comparison:
 
     def record(self) -> dict[str, object]:
         """Everything as plain data, with the machine."""
-        return {
-            **asdict(self),
-            "ratio": self.ratio,
-            "cpu_ratio": self.cpu_ratio,
-            "machine": machine(),
-        }
+        return {**asdict(self), "ratio": self.ratio, "cpu_ratio": self.cpu_ratio, "machine": machine()}
 
 
 Benchmark = Callable[[Progress], "Comparison"]
@@ -113,9 +108,7 @@ def machine() -> dict[str, object]:
         "threads": THREADS,
         "load": load,
         "python": platform.python_version(),
-        "versions": {
-            name: importlib.metadata.version(name) for name in ("mitsuba", "drjit", "numpy")
-        },
+        "versions": {name: importlib.metadata.version(name) for name in ("mitsuba", "drjit", "numpy")},
     }
 
 

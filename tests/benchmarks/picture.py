@@ -27,14 +27,7 @@ from scenes.cost import room
 from tests.benchmarks import radiance
 from tests.benchmarks.annual_product import WEATHER
 from tests.benchmarks.harness import Comparison, Run, timed
-from tests.validation.rendered_pictures import (
-    DIRECTION,
-    EYE,
-    PicturedSystem,
-    moments,
-    rendered_room,
-    set_moment,
-)
+from tests.validation.rendered_pictures import DIRECTION, EYE, PicturedSystem, moments, rendered_room, set_moment
 
 SIZE, COARSE = 800, 4  # [px] of the picture; of the squares that errors are of
 MOMENT = 6  # of the validation's twelve: March, early afternoon
@@ -52,9 +45,7 @@ class PictureScene:
 
         fenestration = PicturedSystem("blind", folder)
         moment = moments(read_epw(WEATHER))[MOMENT]
-        self.room = PathTracingScene(
-            room.room(), room.NOTHING, room.window_groups(), [fenestration.system]
-        )
+        self.room = PathTracingScene(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
         self.sky = Sky(moment.patches, moment.sun, moment.sun_luminance)
         self.folder = folder
         set_moment(rendered_room(folder, fenestration), moment)
@@ -103,14 +94,9 @@ def compare(name: str, parameters: str, size: int, progress: Progress) -> Compar
         pictures = [found, *(scene.ours(SIZE, SAMPLES, seed=seed) for seed in range(1, SEEDS))]
         noise = np.std([evaluate(picture, view).dgp for picture in pictures], ddof=1)
         progress(name, 0.3)
-        peer, peer_seconds, peer_processor = timed(
-            lambda: scene.theirs(size, parameters), repeat=1, warm=False
-        )
+        peer, peer_seconds, peer_processor = timed(lambda: scene.theirs(size, parameters), repeat=1, warm=False)
         progress(name, 0.8)
-        note = (
-            f"noise of our DGP {noise:.1g}; errors: ours {scene.errors(found)}; "
-            f"Radiance's {scene.errors(peer)}"
-        )
+        note = f"noise of our DGP {noise:.1g}; errors: ours {scene.errors(found)}; Radiance's {scene.errors(peer)}"
     progress(name, 1.0)
     return Comparison(
         name,

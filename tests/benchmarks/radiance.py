@@ -40,16 +40,18 @@ def run(command: str, folder: Path, stdin: bytes = b"") -> bytes:
     """Standard output of a Radiance command line run in `folder`."""
     done = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {command}"],
-        cwd=folder, input=stdin, capture_output=True, env=environment(), check=False,
-    )  # fmt: skip
+        cwd=folder,
+        input=stdin,
+        capture_output=True,
+        env=environment(),
+        check=False,
+    )
     if done.returncode:
         raise PeerFailed(f"{command}: {done.stderr.decode()[-800:]}")
     return done.stdout
 
 
-def eye_illuminance(
-    folder: Path, scenes: Sequence[str], sky: str, eye: str, bounces: int = 12
-) -> float:
+def eye_illuminance(folder: Path, scenes: Sequence[str], sky: str, eye: str, bounces: int = 12) -> float:
     """Illuminance [lx] at an eye by `rtrace`.
 
     Args: scenes: names of files; sky: arguments of `gendaylit`; eye: its place and direction;

@@ -25,14 +25,7 @@ from scenes.room.room import compute_room
 from scenes.run.options import JobOptions
 
 
-def main(
-    building: Path,
-    *,
-    weather: Path,
-    cfs: Path,
-    space: Sequence[str] = (),
-    results: Path | None = None,
-) -> None:
+def main(building: Path, *, weather: Path, cfs: Path, space: Sequence[str] = (), results: Path | None = None) -> None:
     """Print a line for each room."""
     room = RoomOptions.of(**ROOM, picture_hours=("06-21 12",))
     options = JobOptions(building, weather, cfs, spaces=tuple(space), quick=True, room=room)
@@ -56,9 +49,7 @@ def _timed(inputs, space, room, skies):
 
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         start = time.process_time()
-        result = compute_room(
-            inputs.building, space, inputs.systems, inputs.weather, room, skies=skies
-        )
+        result = compute_room(inputs.building, space, inputs.systems, inputs.weather, room, skies=skies)
         seconds = time.process_time() - start
         kernels = dr.kernel_history([dr.KernelType.JIT])
     return seconds, sum(not kernel["cache_hit"] for kernel in kernels), result

@@ -36,8 +36,15 @@ from bim.ifc.shapes import read_shapes
 STATEMENT = re.compile(rb"#(\d+)\s*=\s*(\w+)\s*\(((?:'(?:[^']|'')*'|[^';])*)\)\s*;")
 REFERENCE = re.compile(rb"'(?:[^']|'')*'|#(\d+)")
 TEXT = re.compile(rb"'(?:[^']|'')*'")
-SHARED = ("IfcProject", "IfcSite", "IfcBuilding", "IfcMaterial", "IfcMaterialLayerSet",
-          "IfcMaterialDefinitionRepresentation", "IfcPresentationStyle")  # fmt: skip
+SHARED = (
+    "IfcProject",
+    "IfcSite",
+    "IfcBuilding",
+    "IfcMaterial",
+    "IfcMaterialLayerSet",
+    "IfcMaterialDefinitionRepresentation",
+    "IfcPresentationStyle",
+)
 NUMBERED = (b"IFCBUILDINGSTOREY", b"IFCSPACE")
 MEGABYTE = 1_000_000
 
@@ -47,8 +54,7 @@ def stacked(path: Path, megabytes: float) -> Iterator[bytes]:
     model, text = ifcopenshell.open(path), path.read_bytes()
     head, _, tail = text.rpartition(b"ENDSEC;")
     yield head
-    shared = {one.id() for kind in SHARED for root in _instances(model, kind)
-              for one in model.traverse(root)}  # fmt: skip
+    shared = {one.id() for kind in SHARED for root in _instances(model, kind) for one in model.traverse(root)}
     shared |= _relations_of(model, shared)
     statements = [
         (int(number), kind.upper(), content)
@@ -64,14 +70,12 @@ def stacked(path: Path, megabytes: float) -> Iterator[bytes]:
         copy += 1
         lines = [
             _copied(statement, copy, pitch, shared, rooted, copy * height)
-            for statement in statements if statement[0] not in raised
-        ]  # fmt: skip
+            for statement in statements
+            if statement[0] not in raised
+        ]
         for index, (number, (beneath, (x, y, z), axes)) in enumerate(raised.items()):
             first = copy * pitch + pitch - 2 * (index + 1)
-            turned = ",".join(
-                f"#{axis if axis in shared else copy * pitch + axis}" if axis else "$"
-                for axis in axes
-            )
+            turned = ",".join(f"#{axis if axis in shared else copy * pitch + axis}" if axis else "$" for axis in axes)
             lines += [
                 f"#{first}=IFCCARTESIANPOINT(({x!r},{y!r},{z + copy * height!r}));\n".encode(),
                 f"#{first + 1}=IFCAXIS2PLACEMENT3D(#{first},{turned});\n".encode(),
@@ -126,9 +130,13 @@ def _height(model: ifcopenshell.file) -> float:
 
 
 def _copied(
-    statement: tuple[int, bytes, bytes], copy: int, pitch: int,
-    shared: Collection[int], rooted: Collection[int], rise: float,
-) -> bytes:  # fmt: skip
+    statement: tuple[int, bytes, bytes],
+    copy: int,
+    pitch: int,
+    shared: Collection[int],
+    rooted: Collection[int],
+    rise: float,
+) -> bytes:
     """A statement of a copy: references, GlobalId, name and elevation are its own."""
     number, kind, content = statement
 
@@ -147,9 +155,7 @@ def _copied(
         content = b",".join((f"'{ifcopenshell.guid.compress(digest)}'".encode(), owner, rest))
     if kind == b"IFCBUILDINGSTOREY":
         rest, _, elevation = content.rpartition(b",")
-        content = rest + (
-            b",$" if elevation.strip() == b"$" else f",{float(elevation) + rise!r}".encode()
-        )
+        content = rest + (b",$" if elevation.strip() == b"$" else f",{float(elevation) + rise!r}".encode())
     return b"#%d=%s(%s);\n" % (number + copy * pitch, kind, content)
 
 
@@ -176,9 +182,7 @@ def check(path: Path, options: list[str]) -> None:
     """Print what `cfs check` needs for a file, and the stages that it reports."""
     started = time.perf_counter()
     command = [sys.executable, "-m", "scenes.cli", "check", str(path), "--no-cache", *options]
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
-    )
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
     assert process.stdout is not None
     head: list[str] = []
     for line in process.stdout:

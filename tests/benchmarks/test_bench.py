@@ -34,9 +34,7 @@ def registry(monkeypatch):
 def test_ratio_is_time_times_squared_error():
     assert comparison().ratio == pytest.approx(40 * 0.2**2 / (2 * 0.1**2))
     assert comparison().cpu_ratio == pytest.approx(30 * 0.2**2 / (3 * 0.1**2))
-    exact = comparison(
-        ours=harness.Run("ours", "f()", 2.0, 3.0), peer=harness.Run("peer", "p", 8.0, 6.0)
-    )
+    exact = comparison(ours=harness.Run("ours", "f()", 2.0, 3.0), peer=harness.Run("peer", "p", 8.0, 6.0))
     assert (exact.ratio, exact.cpu_ratio) == (4, 2)
 
 
@@ -70,9 +68,7 @@ def test_the_peers_processor_time_is_free_of_waiting(monkeypatch):
 
 def test_all_modules_take_part():
     found = harness.benchmarks()
-    assert {"view-matrix", "daylight-matrix-open-c1000", "direct-sun", "annual-product"} <= set(
-        found
-    )
+    assert {"view-matrix", "daylight-matrix-open-c1000", "direct-sun", "annual-product"} <= set(found)
     assert all(callable(benchmark) for benchmark in found.values())
 
 

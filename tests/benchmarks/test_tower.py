@@ -51,8 +51,7 @@ def test_rooms_are_closed_and_border_on_each_other(model, tmp_path):
     assert len(building.spaces) == 2 * ROOMS
     assert [open_edges(space.shell) for space in building.spaces] == [0] * 20
     assert building.account.share_used == pytest.approx(1.0)
-    storeys = [[s for s in building.spaces if s.storey == name] for name in ("Ground floor",
-               "Storey 1")]  # fmt: skip
+    storeys = [[s for s in building.spaces if s.storey == name] for name in ("Ground floor", "Storey 1")]
     for below, above in zip(*storeys, strict=True):
         ceilings = [face for face in below.faces if face.normal[2] > 0.9 and face.area > 1.0]
         assert {face.neighbour for face in ceilings} == {above.guid}

@@ -73,12 +73,8 @@ def tower(rooms: int) -> ifcopenshell.file:
     palette, storeys = None, rooms // ROOMS
     for number in range(storeys):
         if number:
-            storey = ifcopenshell.api.root.create_entity(
-                model, ifc_class="IfcBuildingStorey", name=f"Storey {number}"
-            )
-            ifcopenshell.api.aggregate.assign_object(
-                model, products=[storey], relating_object=building
-            )
+            storey = ifcopenshell.api.root.create_entity(model, ifc_class="IfcBuildingStorey", name=f"Storey {number}")
+            ifcopenshell.api.aggregate.assign_object(model, products=[storey], relating_object=building)
         storey.Elevation = number * (HEIGHT + thickness("Ground floor"))
         place = np.eye(4)
         place[2, 3] = storey.Elevation
@@ -91,8 +87,7 @@ def tower(rooms: int) -> ifcopenshell.file:
 
 def _storey(parts: Office, number: int, *, top: bool) -> None:
     """A storey's slabs, walls, windows, doors and rooms, heights from its floor."""
-    outline = ((-OUTER, -OUTER), (WIDTH + OUTER, -OUTER), (WIDTH + OUTER, LENGTH + OUTER),
-               (-OUTER, LENGTH + OUTER))  # fmt: skip
+    outline = ((-OUTER, -OUTER), (WIDTH + OUTER, -OUTER), (WIDTH + OUTER, LENGTH + OUTER), (-OUTER, LENGTH + OUTER))
     parts.slab("Floor", "Ground floor", outline, -thickness("Ground floor"), "Grey floor")
     if top:
         parts.slab("Roof", "Roof", outline, HEIGHT, "White ceiling")
@@ -114,9 +109,7 @@ def _storey(parts: Office, number: int, *, top: bool) -> None:
     parts.window("Window east", "East wall", LENGTH - low - 1.0, SILL, 1.0, 1.5)
 
 
-def _offices(
-    parts: Office, before: int, side: str, count: int, between: tuple[float, float]
-) -> None:
+def _offices(parts: Office, before: int, side: str, count: int, between: tuple[float, float]) -> None:
     """A row of offices, each with a window and a door to the corridor."""
     width = (WIDTH - (count - 1) * INNER) / count
     for k in range(count):
@@ -143,9 +136,8 @@ def measured(rooms: int, options: list[str], *, of: str = "run") -> Used:
         given = {
             "check": ["check", str(path)],
             "thermal": ["thermal", str(study), *results],
-            "run": ["run", str(path), "--weather", str(WEATHER), "--cfs", str(VENETIAN_BLIND),
-                    *results],
-        }  # fmt: skip
+            "run": ["run", str(path), "--weather", str(WEATHER), "--cfs", str(VENETIAN_BLIND), *results],
+        }
         return _used(rooms, [sys.executable, "-m", "scenes.cli", *given[of], *options], folder)
 
 

@@ -64,9 +64,7 @@ def compare(
     found, seconds, processor = timed(lambda: ours(spacing, groups, samples).values, repeat=5)
     progress(name, 0.2)
     with tempfile.TemporaryDirectory() as folder:
-        peer, peer_seconds, peer_processor = timed(
-            lambda: theirs(spacing, groups, Path(folder)), repeat=2, warm=False
-        )
+        peer, peer_seconds, peer_processor = timed(lambda: theirs(spacing, groups, Path(folder)), repeat=2, warm=False)
     progress(name, 0.6)
     truth = reference(spacing, groups)
     progress(name, 1.0)
@@ -75,13 +73,7 @@ def compare(
         name,
         f"view matrix of {found.shape[0]} sensors, {groups} windows [sr]",
         Run("mitsuba-cfs", call, seconds, processor, rms_error(found, truth)),
-        Run(
-            "Radiance",
-            f"rfluxmtx -I+ {RADIANCE}",
-            peer_seconds,
-            peer_processor,
-            rms_error(peer, truth),
-        ),
+        Run("Radiance", f"rfluxmtx -I+ {RADIANCE}", peer_seconds, peer_processor, rms_error(peer, truth)),
         note=f"root mean square of the entries {np.sqrt(np.mean(truth**2)):.3g}",
     )
 
@@ -90,7 +82,5 @@ BENCHMARKS = {
     "view-matrix": lambda progress: compare("view-matrix", progress),
     "view-matrix-4-windows": lambda progress: compare("view-matrix-4-windows", progress, groups=4),
     "view-matrix-1m": lambda progress: compare("view-matrix-1m", progress, spacing=1.0),
-    "view-matrix-4x-samples": lambda progress: compare(
-        "view-matrix-4x-samples", progress, samples=4 * SAMPLES
-    ),
+    "view-matrix-4x-samples": lambda progress: compare("view-matrix-4x-samples", progress, samples=4 * SAMPLES),
 }

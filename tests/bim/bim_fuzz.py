@@ -11,19 +11,7 @@ import numpy as np
 
 from mitsuba_cfs.errors import DataError
 
-PIECES = (
-    b"-1e999",
-    b"NaN",
-    b"null",
-    b"[]",
-    b"{}",
-    b'""',
-    b"0",
-    b"\xff\xfe",
-    b"<",
-    b"&x;",
-    b"1e300",
-)
+PIECES = (b"-1e999", b"NaN", b"null", b"[]", b"{}", b'""', b"0", b"\xff\xfe", b"<", b"&x;", b"1e300")
 
 
 def mutations(content: bytes, count: int, seed: int = 0) -> Iterator[bytes]:
@@ -43,8 +31,7 @@ def mutations(content: bytes, count: int, seed: int = 0) -> Iterator[bytes]:
                 case 3:
                     spoilt = spoilt[: max(at, 1)]
                 case _:
-                    numbers = [i for i in range(at, min(at + 400, len(spoilt)))
-                               if 48 <= spoilt[i] <= 57]  # fmt: skip
+                    numbers = [i for i in range(at, min(at + 400, len(spoilt))) if 48 <= spoilt[i] <= 57]
                     if numbers:
                         piece = PIECES[int(random.integers(len(PIECES)))]
                         spoilt[numbers[0] : numbers[0] + 1] = piece

@@ -32,11 +32,14 @@ def box_faces(room: str, x0: float, x1: float, depth: float, *, beside: dict[str
             condition = {"type": "Surface", "boundary_condition_objects": pair}
         faces.append(
             {
-                "type": "Face", "identifier": f"{room}_{side}", "properties": _no_properties(),
-                "face_type": kinds.get(side, "Wall"), "boundary_condition": condition,
+                "type": "Face",
+                "identifier": f"{room}_{side}",
+                "properties": _no_properties(),
+                "face_type": kinds.get(side, "Wall"),
+                "boundary_condition": condition,
                 "geometry": {"type": "Face3D", "boundary": [list(p) for p in ring]},
             }
-        )  # fmt: skip
+        )
     return faces
 
 
@@ -47,10 +50,13 @@ def _no_properties() -> dict:
 def opening(name: str, ring: list, **more: Any) -> dict:
     """An aperture or door in a wall."""
     return {
-        "type": "Aperture", "identifier": name, "properties": _no_properties(),
+        "type": "Aperture",
+        "identifier": name,
+        "properties": _no_properties(),
         "geometry": {"type": "Face3D", "boundary": ring},
-        "boundary_condition": {"type": "Outdoors"}, **more,
-    }  # fmt: skip
+        "boundary_condition": {"type": "Outdoors"},
+        **more,
+    }
 
 
 def two_rooms() -> dict:
@@ -61,11 +67,15 @@ def two_rooms() -> dict:
     office[0]["apertures"] = [opening("Window", window)]
     office[0]["apertures"][0]["outdoor_shades"] = [
         {
-            "type": "Shade", "identifier": "Overhang", "properties": _no_properties(),
-            "geometry": {"type": "Face3D", "boundary": [
-                [1.0, 0.0, 2.5], [4.0, 0.0, 2.5], [4.0, -1.0, 2.5], [1.0, -1.0, 2.5]]},
+            "type": "Shade",
+            "identifier": "Overhang",
+            "properties": _no_properties(),
+            "geometry": {
+                "type": "Face3D",
+                "boundary": [[1.0, 0.0, 2.5], [4.0, 0.0, 2.5], [4.0, -1.0, 2.5], [1.0, -1.0, 2.5]],
+            },
         }
-    ]  # fmt: skip
+    ]
     glass_door = [[6.0, 0.0, 0.0], [7.0, 0.0, 0.0], [7.0, 0.0, 2.0], [6.0, 0.0, 2.0]]
     hall[0]["doors"] = [opening("Glass door", glass_door, type="Door", is_glass=True)]
     leaf = [[5.0, 2.0, 0.0], [5.0, 3.0, 0.0], [5.0, 3.0, 2.0], [5.0, 2.0, 2.0]]
@@ -77,22 +87,40 @@ def two_rooms() -> dict:
         for name, faces in (("Office", office), ("Hall", hall))
     ]
     return {
-        "type": "Model", "identifier": "two_rooms", "units": "Meters", "rooms": rooms,
+        "type": "Model",
+        "identifier": "two_rooms",
+        "units": "Meters",
+        "rooms": rooms,
         "properties": {"energy": _energy(), "radiance": _radiance()},
-    }  # fmt: skip
+    }
 
 
 def _energy() -> dict:
     mass = {"type": "EnergyMaterial", "thermal_absorptance": 0.85}
     materials = [
-        mass | {"identifier": "Brick", "thickness": 0.2, "conductivity": 0.9, "density": 1900.0,
-                "specific_heat": 800.0, "solar_absorptance": 0.6, "visible_absorptance": 0.65},
-        mass | {"identifier": "Board", "thickness": 0.0125, "conductivity": 0.25, "density": 900.0,
-                "specific_heat": 1000.0, "solar_absorptance": 0.3, "visible_absorptance": 0.25},
+        mass
+        | {
+            "identifier": "Brick",
+            "thickness": 0.2,
+            "conductivity": 0.9,
+            "density": 1900.0,
+            "specific_heat": 800.0,
+            "solar_absorptance": 0.6,
+            "visible_absorptance": 0.65,
+        },
+        mass
+        | {
+            "identifier": "Board",
+            "thickness": 0.0125,
+            "conductivity": 0.25,
+            "density": 900.0,
+            "specific_heat": 1000.0,
+            "solar_absorptance": 0.3,
+            "visible_absorptance": 0.25,
+        },
         {"type": "EnergyMaterialNoMass", "identifier": "Wool", "r_value": 3.0},
-        {"type": "EnergyWindowMaterialSimpleGlazSys", "identifier": "Unit", "u_factor": 1.1,
-         "shgc": 0.5, "vt": 0.7},
-    ]  # fmt: skip
+        {"type": "EnergyWindowMaterialSimpleGlazSys", "identifier": "Unit", "u_factor": 1.1, "shgc": 0.5, "vt": 0.7},
+    ]
     return {
         "global_construction_set": {
             "type": "GlobalConstructionSet",
@@ -101,28 +129,27 @@ def _energy() -> dict:
             "door_set": {"exterior_glass_construction": "Glazing"},
             "materials": materials,
             "constructions": [
-                {"type": "OpaqueConstructionAbridged", "identifier": "Wall",
-                 "materials": ["Brick", "Wool", "Board"]},
-                {"type": "OpaqueConstructionAbridged", "identifier": "Partition",
-                 "materials": ["Board", "Wool", "Board"]},
-                {"type": "WindowConstructionAbridged", "identifier": "Glazing",
-                 "materials": ["Unit"]},
+                {"type": "OpaqueConstructionAbridged", "identifier": "Wall", "materials": ["Brick", "Wool", "Board"]},
+                {
+                    "type": "OpaqueConstructionAbridged",
+                    "identifier": "Partition",
+                    "materials": ["Board", "Wool", "Board"],
+                },
+                {"type": "WindowConstructionAbridged", "identifier": "Glazing", "materials": ["Unit"]},
             ],
-        },
-    }  # fmt: skip
+        }
+    }
 
 
 def _radiance() -> dict:
     colours = {f"{c}_reflectance": 0.45 for c in "rgb"}
     return {
-        "modifiers": [
-            {"type": "plastic", "identifier": "paint", "specularity": 0.02, **colours},
-        ],
+        "modifiers": [{"type": "plastic", "identifier": "paint", "specularity": 0.02, **colours}],
         "global_modifier_set": {
             "type": "GlobalModifierSet",
             "wall_set": {"exterior_modifier": "paint", "interior_modifier": "paint"},
         },
-    }  # fmt: skip
+    }
 
 
 def used_model() -> dict:
@@ -135,40 +162,63 @@ def used_model() -> dict:
     weekday = day("work", [[0, 0], [8, 30], [18, 0]], [0.1, 1.0, 0.2])
     summer = day("summer", [[0, 0]], [0.5])
     schedules = [
-        {"type": "ScheduleRulesetAbridged", "identifier": "occupied",
-         "day_schedules": [weekday, summer, day("free", [[0, 0]], [0.0])],
-         "default_day_schedule": "free", "holiday_schedule": "free",
-         "schedule_rules": [
-             {"schedule_day": "summer", "apply_monday": True, "start_date": [7, 1],
-              "end_date": [8, 31]},
-             {"schedule_day": "work"} | {f"apply_{d}": True for d in WEEKDAYS}]},
-        {"type": "ScheduleRulesetAbridged", "identifier": "warm",
-         "day_schedules": [day("21", [[0, 0]], [21.0])], "default_day_schedule": "21"},
-        {"type": "ScheduleFixedIntervalAbridged", "identifier": "cool", "timestep": 2,
-         "values": [24.0, 26.0] * 8760},
-    ]  # fmt: skip
+        {
+            "type": "ScheduleRulesetAbridged",
+            "identifier": "occupied",
+            "day_schedules": [weekday, summer, day("free", [[0, 0]], [0.0])],
+            "default_day_schedule": "free",
+            "holiday_schedule": "free",
+            "schedule_rules": [
+                {"schedule_day": "summer", "apply_monday": True, "start_date": [7, 1], "end_date": [8, 31]},
+                {"schedule_day": "work"} | {f"apply_{d}": True for d in WEEKDAYS},
+            ],
+        },
+        {
+            "type": "ScheduleRulesetAbridged",
+            "identifier": "warm",
+            "day_schedules": [day("21", [[0, 0]], [21.0])],
+            "default_day_schedule": "21",
+        },
+        {"type": "ScheduleFixedIntervalAbridged", "identifier": "cool", "timestep": 2, "values": [24.0, 26.0] * 8760},
+    ]
     program = {
-        "type": "ProgramTypeAbridged", "identifier": "Office",
-        "people": {"people_per_area": 0.1, "occupancy_schedule": "occupied",
-                   "latent_fraction": 0.25},
+        "type": "ProgramTypeAbridged",
+        "identifier": "Office",
+        "people": {"people_per_area": 0.1, "occupancy_schedule": "occupied", "latent_fraction": 0.25},
         "lighting": {"watts_per_area": 8.0, "schedule": "occupied", "radiant_fraction": 0.4},
         "electric_equipment": {"watts_per_area": 5.0, "schedule": "occupied"},
         "gas_equipment": {"watts_per_area": 2.0, "schedule": "occupied", "lost_fraction": 0.5},
-        "infiltration": {"flow_per_exterior_area": 3e-4, "schedule": "occupied",
-                         "velocity_coefficient": 0.2, "constant_coefficient": 0.6},
+        "infiltration": {
+            "flow_per_exterior_area": 3e-4,
+            "schedule": "occupied",
+            "velocity_coefficient": 0.2,
+            "constant_coefficient": 0.6,
+        },
         "ventilation": {"flow_per_person": 0.01, "flow_per_area": 1e-4},
         "setpoint": {"heating_schedule": "warm", "cooling_schedule": "cool"},
-    }  # fmt: skip
+    }
     energy = model["properties"]["energy"]
-    energy |= {"schedules": schedules, "program_types": [program],
-               "hvacs": [{"type": "IdealAirSystemAbridged", "identifier": "ideal",
-                          "economizer_type": "NoEconomizer", "sensible_heat_recovery": 0.7,
-                          "heating_limit": 900.0}]}  # fmt: skip
+    energy |= {
+        "schedules": schedules,
+        "program_types": [program],
+        "hvacs": [
+            {
+                "type": "IdealAirSystemAbridged",
+                "identifier": "ideal",
+                "economizer_type": "NoEconomizer",
+                "sensible_heat_recovery": 0.7,
+                "heating_limit": 900.0,
+            }
+        ],
+    }
     for room in model["rooms"]:
         room["properties"]["energy"]["program_type"] = "Office"
     own = model["rooms"][0]["properties"]["energy"]
-    own |= {"hvac": "ideal", "lighting": {"watts_per_area": 3.0, "schedule": "occupied"},
-            "service_hot_water": {"flow_per_area": 0.1}}  # fmt: skip
+    own |= {
+        "hvac": "ideal",
+        "lighting": {"watts_per_area": 3.0, "schedule": "occupied"},
+        "service_hot_water": {"flow_per_area": 0.1},
+    }
     return model
 
 

@@ -45,13 +45,9 @@ class SmallIfc:
         product = ifcopenshell.api.root.create_entity(self.model, ifc_class=ifc_class, name=name)
         self.show(product, [(low, size, style)])
         if ifc_class == "IfcSpace":
-            ifcopenshell.api.aggregate.assign_object(
-                self.model, products=[product], relating_object=self.storey
-            )
+            ifcopenshell.api.aggregate.assign_object(self.model, products=[product], relating_object=self.storey)
         elif ifc_class != "IfcOpeningElement":
-            ifcopenshell.api.spatial.assign_container(
-                self.model, products=[product], relating_structure=self.storey
-            )
+            ifcopenshell.api.spatial.assign_container(self.model, products=[product], relating_structure=self.storey)
         for key, value in attributes.items():
             setattr(product, key, value)
         return product
@@ -64,21 +60,21 @@ class SmallIfc:
             if style is not None:
                 ifcopenshell.api.style.assign_item_style(self.model, item=item, style=style)
             items.append(item)
-        representation = self.model.create_entity(
-            "IfcShapeRepresentation", self.body, "Body", "SweptSolid", items
-        )
+        representation = self.model.create_entity("IfcShapeRepresentation", self.body, "Body", "SweptSolid", items)
         ifcopenshell.api.geometry.edit_object_placement(self.model, product=product)
-        product.Representation = self.model.create_entity(
-            "IfcProductDefinitionShape", Representations=[representation]
-        )
+        product.Representation = self.model.create_entity("IfcProductDefinitionShape", Representations=[representation])
 
     def _solid(self, low, size):
         create, point = self.model.create_entity, self._point
         x, y, z = (float(value) for value in size)
         profile = create(
-            "IfcRectangleProfileDef", "AREA", None,
-            create("IfcAxis2Placement2D", create("IfcCartesianPoint", (x / 2, y / 2))), x, y,
-        )  # fmt: skip
+            "IfcRectangleProfileDef",
+            "AREA",
+            None,
+            create("IfcAxis2Placement2D", create("IfcCartesianPoint", (x / 2, y / 2))),
+            x,
+            y,
+        )
         position = create("IfcAxis2Placement3D", point(low))
         up = create("IfcDirection", (0.0, 0.0, 1.0))
         return create("IfcExtrudedAreaSolid", profile, position, up, z)
@@ -90,8 +86,7 @@ class SmallIfc:
         """A surface style; linear: the grey is a reflection coefficient, not a screen value."""
         style = ifcopenshell.api.style.add_style(self.model, name=name)
         rgb = {"Name": None, "Red": grey, "Green": grey, "Blue": grey}
-        attributes = {"SurfaceColour": rgb, "Transparency": transparency,
-                      "ReflectanceMethod": "MATT"}  # fmt: skip
+        attributes = {"SurfaceColour": rgb, "Transparency": transparency, "ReflectanceMethod": "MATT"}
         if linear:
             attributes["DiffuseColour"] = dict(rgb)
         ifcopenshell.api.style.add_surface_style(
@@ -136,19 +131,14 @@ class SmallIfc:
                 ((left + FRAME, y - 0.01, sill + FRAME), (inner[0], 0.02, inner[1]), pane),
             ],
         )
-        ifcopenshell.api.spatial.assign_container(
-            self.model, products=[window], relating_structure=self.storey
-        )
+        ifcopenshell.api.spatial.assign_container(self.model, products=[window], relating_structure=self.storey)
         if opening is not None:
             ifcopenshell.api.feature.add_filling(self.model, opening=opening, element=window)
         return window
 
 
 def empty_project(
-    schema: str = "IFC4",
-    *,
-    unit: str = "METRE",
-    true_north: tuple[float, float] | None = (0.0, 1.0),
+    schema: str = "IFC4", *, unit: str = "METRE", true_north: tuple[float, float] | None = (0.0, 1.0)
 ) -> SmallIfc:
     """A project with one storey; unit "METRE", "MILLIMETRE" or "wrong": metres said, mm drawn."""
     model = ifcopenshell.file(schema=schema)
@@ -161,9 +151,8 @@ def empty_project(
     if true_north is not None:
         context.TrueNorth = model.create_entity("IfcDirection", true_north)
     body = ifcopenshell.api.context.add_context(
-        model, context_type="Model", context_identifier="Body", target_view="MODEL_VIEW",
-        parent=context,
-    )  # fmt: skip
+        model, context_type="Model", context_identifier="Body", target_view="MODEL_VIEW", parent=context
+    )
     parts = [
         ifcopenshell.api.root.create_entity(model, ifc_class=name, name=name)
         for name in ("IfcSite", "IfcBuilding", "IfcBuildingStorey")
@@ -181,9 +170,7 @@ def _sign(model: ifcopenshell.file) -> None:
     """The author that IFC2X3 demands."""
     person = ifcopenshell.api.owner.add_person(model)
     organisation = ifcopenshell.api.owner.add_organisation(model)
-    ifcopenshell.api.owner.add_person_and_organisation(
-        model, person=person, organisation=organisation
-    )
+    ifcopenshell.api.owner.add_person_and_organisation(model, person=person, organisation=organisation)
     ifcopenshell.api.owner.add_application(model)
 
 
@@ -256,10 +243,7 @@ def box_model(
         small.box("IfcSlab", "roof", (-WALL, -WALL, HEIGHT), outline, small.style("ceiling", 0.8))
     if window:
         for number, place in enumerate(places, 1):
-            small.window(
-                walls["south"], shift=shift, hosted=hosted, glazed=glazed,
-                name=f"W{number}", place=place,
-            )  # fmt: skip
+            small.window(walls["south"], shift=shift, hosted=hosted, glazed=glazed, name=f"W{number}", place=place)
     if space:
         low = (space_inset, space_inset, 0.0)
         size = (WIDTH - 2 * space_inset, DEPTH - 2 * space_inset, space_height)
@@ -272,13 +256,9 @@ def box_model(
 def _upper_storey(small: SmallIfc, grey, outline) -> None:
     """Walls, a window and a roof on top of the room, on a storey of their own."""
     above = HEIGHT + 0.2
-    storey = ifcopenshell.api.root.create_entity(
-        small.model, ifc_class="IfcBuildingStorey", name="attic"
-    )
+    storey = ifcopenshell.api.root.create_entity(small.model, ifc_class="IfcBuildingStorey", name="attic")
     building = small.model.by_type("IfcBuilding")[0]
-    ifcopenshell.api.aggregate.assign_object(
-        small.model, products=[storey], relating_object=building
-    )
+    ifcopenshell.api.aggregate.assign_object(small.model, products=[storey], relating_object=building)
     ifcopenshell.api.geometry.edit_object_placement(small.model, product=storey)
     storey.Elevation = above
     small.storey = storey

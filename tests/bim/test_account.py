@@ -16,17 +16,7 @@ from bim.ifc.building import read_ifc
 from bim.report.issue import Effect, Issue, Phrase
 from bim.report.ranking import ranked
 from scenes.commands.ifc import command
-from tests.bim.small_ifc import (
-    DEPTH,
-    GLASS_AREA,
-    HEIGHT,
-    OPENING,
-    WALL,
-    WIDTH,
-    add_material,
-    box_model,
-    box_room,
-)
+from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, OPENING, WALL, WIDTH, add_material, box_model, box_room
 from tests.issues import of_code
 
 
@@ -39,8 +29,15 @@ def read(tmp_path, small_or_model):
 def account(**changed) -> Account:
     """An account without fault, but for what is changed."""
     storey = StoreyAccount("E0", 4, 4, 20.0, changed.pop("used", 20.0))
-    sound = {"windows_out": 9, "windows_used": 9, "glass_assumed": 0.0, "glass_low": 0.0,
-             "glass_missing": 0.0, "phantom": 0.0, "closed": 0.0}  # fmt: skip
+    sound = {
+        "windows_out": 9,
+        "windows_used": 9,
+        "glass_assumed": 0.0,
+        "glass_low": 0.0,
+        "glass_missing": 0.0,
+        "phantom": 0.0,
+        "closed": 0.0,
+    }
     return Account((storey,), **(sound | changed))
 
 
@@ -108,9 +105,7 @@ def roof_over(material: str, style: str, thickness: float = 0.2):
         ("", "Polycarbonate", 0.2, 1),
     ],
 )
-def test_transparent_roof_is_glass_by_its_names_or_as_thin_as_a_pane(
-    tmp_path, material, style, thickness, panes
-):
+def test_transparent_roof_is_glass_by_its_names_or_as_thin_as_a_pane(tmp_path, material, style, thickness, panes):
     building = read(tmp_path, roof_over(material, style, thickness))
     up = [window for window in building.windows if window.normal[2] > 0.9]
     assert len(up) == panes
@@ -128,14 +123,12 @@ def test_a_clear_sheet_on_a_wall_or_a_pane_is_no_window(tmp_path, on):
     if on == "pane":  # the window's glass is 20 mm thick about the middle of the wall
         small.box("IfcBuildingElementProxy", "film", (1.3, -0.17, 1.0), (0.9, 0.023, 1.0), clear)
     elif on == "wall":
-        small.box("IfcBuildingElementProxy", "banner", (1.0, DEPTH - 0.023, 1.0),
-                  (1.0, 0.023, 1.0), clear)  # fmt: skip
+        small.box("IfcBuildingElementProxy", "banner", (1.0, DEPTH - 0.023, 1.0), (1.0, 0.023, 1.0), clear)
     else:
         opening = small.box("IfcOpeningElement", "hole", (1.0, DEPTH - 0.1, 1.0), (1.0, 0.5, 1.0))
         (wall,) = (w for w in small.model.by_type("IfcWall") if w.Name == "north")
         ifcopenshell.api.feature.add_feature(small.model, feature=opening, element=wall)
-        small.box("IfcBuildingElementProxy", "pane", (1.0, DEPTH + 0.1, 1.0), (1.0, 0.023, 1.0),
-                  clear)  # fmt: skip
+        small.box("IfcBuildingElementProxy", "pane", (1.0, DEPTH + 0.1, 1.0), (1.0, 0.023, 1.0), clear)
     building = read(tmp_path, small)
     assert building.account.glass_used == pytest.approx(glass + (not on) * 1.0, abs=0.01)
     said = [i for i in building.issues if i.values.get("reason") == Phrase("on-another-body")]
@@ -184,8 +177,7 @@ def two_rooms(name: str, material: str, *, floor: bool = False):
     low, size = (0.0, half, 0.0), (WIDTH, 0.1, HEIGHT)
     if floor:
         low, size = (0.0, 0.0, -0.05), (WIDTH, DEPTH, 0.05)
-    wall = small.box("IfcSlab" if floor else "IfcWall", name, low, size,
-                     small.style("clear", 0.9, 0.9))  # fmt: skip
+    wall = small.box("IfcSlab" if floor else "IfcWall", name, low, size, small.style("clear", 0.9, 0.9))
     add_material(small.model, wall, material)
     return small
 
@@ -282,9 +274,7 @@ def test_issues_by_their_glass_and_alike_ones_once():
     first, second, third = ranked([*small, big, room])
     assert (first.first, first.count, first.glass) == (big, 1, 3.0)
     assert second.first is room
-    assert (
-        third.count == 19 and third.text().what == "19 times: wall 0: its body is no closed solid"
-    )
+    assert third.count == 19 and third.text().what == "19 times: wall 0: its body is no closed solid"
 
 
 def roof_opening(beside: str):
@@ -299,12 +289,10 @@ def roof_opening(beside: str):
         "canopy": [("IfcSlab", (-1.0, -1.0, 2 * HEIGHT), (6.0, 8.0, 0.2))],
         "shaft": [
             ("IfcWall", (x, y, HEIGHT + 0.2), (2 * dx + 0.2, 2 * dy + 0.2, 2.5))
-            for x, y, dx, dy in (
-                (0.7, 2.8, 0, 1.3), (2.3, 2.8, 0, 1.3), (0.7, 2.7, 0.8, 0), (0.7, 5.5, 0.8, 0)
-            )
+            for x, y, dx, dy in ((0.7, 2.8, 0, 1.3), (2.3, 2.8, 0, 1.3), (0.7, 2.7, 0.8, 0), (0.7, 5.5, 0.8, 0))
         ],
         "kerb": [("IfcWall", (0.8, 2.8, HEIGHT + 0.2), (0.2, 2.8, 0.4))],
-    }  # fmt: skip
+    }
     for ifc_class, corner, extent in around.get(beside, ()):
         small.box(ifc_class, beside, corner, extent)
     return small
@@ -312,9 +300,15 @@ def roof_opening(beside: str):
 
 @pytest.mark.parametrize(
     ("beside", "reason"),
-    [("nothing", ""), ("kerb", ""), ("name", "called-shaft"), ("stair", "stair-in-opening"),
-     ("canopy", "no-sky-above"), ("shaft", "shaft-above")],
-)  # fmt: skip
+    [
+        ("nothing", ""),
+        ("kerb", ""),
+        ("name", "called-shaft"),
+        ("stair", "stair-in-opening"),
+        ("canopy", "no-sky-above"),
+        ("shaft", "shaft-above"),
+    ],
+)
 def test_an_opening_in_a_slab_is_a_rooflight_only_below_the_open_sky(tmp_path, beside, reason):
     building = read(tmp_path, roof_opening(beside))
     (issue,) = (i for i in building.issues if i.code in ("opening-closed", "opening-glazed"))

@@ -49,10 +49,21 @@ def small(tmp_path, north: tuple[float, float]):
 
 @pytest.mark.parametrize(
     ("facade", "there"),
-    [("S", True), ("s", True), ("N", False), ("E", False), ("W", False), ("SE", False),
-     ("170-190", True), ("180-181", True), ("181-180", True), ("181-179", False),
-     ("0-360", True), ("roof", False)],
-)  # fmt: skip
+    [
+        ("S", True),
+        ("s", True),
+        ("N", False),
+        ("E", False),
+        ("W", False),
+        ("SE", False),
+        ("170-190", True),
+        ("180-181", True),
+        ("181-180", True),
+        ("181-179", False),
+        ("0-360", True),
+        ("roof", False),
+    ],
+)
 def test_a_facade_is_a_sector_of_azimuths(tmp_path, facade, there):
     path, out = small(tmp_path, (0.0, 1.0)), tmp_path / "out.ifc"
     if there:

@@ -27,10 +27,9 @@ def _topics(path) -> dict[str, tuple[ElementTree.Element, ElementTree.Element]]:
         assert ElementTree.fromstring(archive.read("bcf.version")).get("VersionId") == "2.1"
         folders = {name.split("/")[0] for name in archive.namelist() if "/" in name}
         parts = [
-            tuple(ElementTree.fromstring(archive.read(f"{folder}/{name}"))
-                  for name in ("markup.bcf", "viewpoint.bcfv"))
+            tuple(ElementTree.fromstring(archive.read(f"{folder}/{name}")) for name in ("markup.bcf", "viewpoint.bcfv"))
             for folder in folders
-        ]  # fmt: skip
+        ]
         assert all(UUID.fullmatch(folder) for folder in folders)
     return {markup.findtext("Topic/Labels"): (markup, view) for markup, view in parts}
 
@@ -69,9 +68,8 @@ def test_a_material_selects_the_elements_that_have_it(tmp_path):
     small, walls = box_model()
     material = small.model.create_entity("IfcMaterial", Name="Zorblax")
     small.model.create_entity(
-        "IfcRelAssociatesMaterial", "2gRXFgjRn2HPE$YoDLX3FV", None, None, None,
-        [walls["north"]], material,
-    )  # fmt: skip
+        "IfcRelAssociatesMaterial", "2gRXFgjRn2HPE$YoDLX3FV", None, None, None, [walls["north"]], material
+    )
     small.model.write(str(path))
     write_bcf(read_ifc(path), out)
     _, view = _topics(out)["material-unknown"]
@@ -83,9 +81,7 @@ def test_a_leak_is_before_the_camera(tmp_path):
     box_model(space=False, gap=0.4, true_north=(1.0, 0.0))[0].model.write(str(path))
     building = read_ifc(path)
     leaks = of_code(building, "room-leaks")
-    assert len([one for one in ranked(building.issues) if one.first.code == "room-leaks"]) == len(
-        leaks
-    )
+    assert len([one for one in ranked(building.issues) if one.first.code == "room-leaks"]) == len(leaks)
     leak = leaks[0]
     building = replace(building, issues=(leak,))
     write_bcf(building, out)
@@ -103,7 +99,5 @@ def test_a_leak_is_before_the_camera(tmp_path):
 def test_the_command_writes_topics(tmp_path):
     path, out = tmp_path / "m.ifc", tmp_path / "m.bcfzip"
     box_room(doubled_wall=True).write(str(path))
-    result = CliRunner().invoke(
-        command, ["check", str(path), "--bcf", str(out)], catch_exceptions=False
-    )
+    result = CliRunner().invoke(command, ["check", str(path), "--bcf", str(out)], catch_exceptions=False)
     assert f"topics: {len(_topics(out))}" in result.output

@@ -23,9 +23,7 @@ def met(*elements: list[np.ndarray], reach: float = 5.0) -> list[tuple[int, floa
     triangles = [np.concatenate(parts) for parts in elements]
     counts = [len(own) for own in triangles]
     items = np.concatenate([np.repeat(np.arange(len(e)), [len(p) for p in e]) for e in elements])
-    bodies = Bodies(
-        ray_mesh(np.concatenate(triangles)), np.repeat(np.arange(len(counts)), counts), items
-    )
+    bodies = Bodies(ray_mesh(np.concatenate(triangles)), np.repeat(np.arange(len(counts)), counts), items)
     found = bodies.along(START, Y, reach)
     return [(s.element, round(s.start - 1.0, 9), round(s.stop - 1.0, 9)) for s in found]
 
@@ -37,8 +35,7 @@ def test_all_hits_are_those_of_each_triangle():
     for origin, ray in rng.normal(size=(40, 2, 3)):
         ray = ray / np.linalg.norm(ray)
         distance, hit = mesh.all_hits(origin, ray, 2.0)
-        alone = [(ray_mesh(t[None]).first_hits(origin[None], ray[None])[0][0], k)
-                 for k, t in enumerate(triangles)]  # fmt: skip
+        alone = [(ray_mesh(t[None]).first_hits(origin[None], ray[None])[0][0], k) for k, t in enumerate(triangles)]
         expected = sorted((d, k) for d, k in alone if d <= 2.0)
         assert hit.tolist() == [k for _, k in expected]
         assert distance == pytest.approx([d for d, _ in expected])
@@ -59,8 +56,7 @@ def test_a_cavity_within_an_element_is_none_of_it():
     assert met([plate(0.0, 0.1), plate(0.15, 0.3)]) == [(0, 0.0, 0.1), (0, 0.15, 0.3)]
 
 
-@pytest.mark.parametrize("parts", [[(0.0, 0.3), (0.1, 0.2)], [(0.0, 0.2), (0.1, 0.3)],
-                                   [(0.0, 0.3), (0.0, 0.3)]])  # fmt: skip
+@pytest.mark.parametrize("parts", [[(0.0, 0.3), (0.1, 0.2)], [(0.0, 0.2), (0.1, 0.3)], [(0.0, 0.3), (0.0, 0.3)]])
 def test_bodies_within_each_other_are_one(parts):
     both = [plate(*part) for part in parts]
     assert met(both) == met([np.concatenate(both)]) == [(0, 0.0, 0.3)]
@@ -85,16 +81,14 @@ def test_any_boxes_are_the_union_of_their_intervals(seed):
         expected += [(number, begin, end) for begin, end in joined]
     found = met(*elements, reach=9.0)
     assert [e for e, _, _ in sorted(found)] == [e for e, _, _ in expected]
-    assert np.array([f[1:] for f in sorted(found)]) == pytest.approx(
-        np.array([e[1:] for e in expected]))  # fmt: skip
+    assert np.array([f[1:] for f in sorted(found)]) == pytest.approx(np.array([e[1:] for e in expected]))
 
 
 def test_a_body_drawn_inside_out_is_where_it_is():
     turned = plate(0.0, 0.3)[:, ::-1]
     assert met([turned]) == [(0, 0.0, 0.3)]
     # one item of a body that is drawn well and one that is not
-    assert met([np.concatenate([plate(0.0, 0.1), plate(0.2, 0.3)[:, ::-1]])]) == [
-        (0, 0.0, 0.1), (0, 0.2, 0.3)]  # fmt: skip
+    assert met([np.concatenate([plate(0.0, 0.1), plate(0.2, 0.3)[:, ::-1]])]) == [(0, 0.0, 0.1), (0, 0.2, 0.3)]
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])

@@ -61,8 +61,7 @@ def test_the_command_is_that_of_the_open_file(tmp_path):
     for file in (house, city):
         file.touch()
     words = addon.run_command("python -m scenes.cli", str(house), str(city), "out")
-    assert words == ["python", "-m", "scenes.cli", "run", str(house), "--weather", str(city),
-                     "--out", "out", "--quick"]  # fmt: skip
+    assert words == ["python", "-m", "scenes.cli", "run", str(house), "--weather", str(city), "--out", "out", "--quick"]
     more = addon.run_command("cfs", str(house), str(city), "out", quick=False, system="b.xml")
     assert more[-2:] == ["--cfs", "b.xml"]
     with pytest.raises(ValueError, match="save it first"):
@@ -96,26 +95,24 @@ def test_the_program_is_no_setting_of_a_scene(tmp_path, monkeypatch):
     kinds = dict.fromkeys(("PropertyGroup", "AddonPreferences", "Operator", "Panel"), object)
     prop = {f"{kind}Property": dict for kind in ("String", "Bool", "Enum")}
     blender = SimpleNamespace(
-        types=SimpleNamespace(**kinds), props=SimpleNamespace(**prop),
-        path=SimpleNamespace(abspath=str),
-    )  # fmt: skip
+        types=SimpleNamespace(**kinds), props=SimpleNamespace(**prop), path=SimpleNamespace(abspath=str)
+    )
     settings, preferences, run, *_ = addon.add_on_classes(blender)
     assert "program" not in settings.__annotations__ and "program" in preferences.__annotations__
     for name in ("model.ifc", "weather.epw"):
         (tmp_path / name).write_text("")
-    monkeypatch.setattr(addon, "_ifc", lambda: SimpleNamespace(
-        get_path=lambda: str(tmp_path / "model.ifc")))  # fmt: skip
+    monkeypatch.setattr(addon, "_ifc", lambda: SimpleNamespace(get_path=lambda: str(tmp_path / "model.ifc")))
     started = []
     monkeypatch.setattr(addon.subprocess, "Popen", lambda words, **_: started.append(words))
-    scene = SimpleNamespace(
-        program="evil", weather=str(tmp_path / "weather.epw"), system="", results="out", quick=True
-    )
+    scene = SimpleNamespace(program="evil", weather=str(tmp_path / "weather.epw"), system="", results="out", quick=True)
     own = SimpleNamespace(preferences=SimpleNamespace(program="cfs"))
     manager = SimpleNamespace(event_timer_add=lambda *_, **__: 0, modal_handler_add=lambda _: None)
     context = SimpleNamespace(
-        scene=SimpleNamespace(cfs=scene), window=None, window_manager=manager,
+        scene=SimpleNamespace(cfs=scene),
+        window=None,
+        window_manager=manager,
         preferences=SimpleNamespace(addons={preferences.bl_idname: own}),
-    )  # fmt: skip
+    )
     job = run()
     job.execute(context)
     job.log.close()
@@ -132,8 +129,17 @@ def test_the_zip_is_an_extension_of_blender(tmp_path):
         assert set(archive.namelist()) == {"__init__.py", "blender_manifest.toml"}
         manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
         source = archive.read("__init__.py").decode()
-    required = {"schema_version", "id", "version", "name", "tagline", "maintainer", "type",
-                "blender_version_min", "license"}  # fmt: skip
+    required = {
+        "schema_version",
+        "id",
+        "version",
+        "name",
+        "tagline",
+        "maintainer",
+        "type",
+        "blender_version_min",
+        "license",
+    }
     assert required <= set(manifest) and manifest["type"] == "add-on"
     assert len(manifest["tagline"]) <= 64 and not manifest["tagline"].endswith(".")
     compile(source, "__init__.py", "exec")
@@ -153,6 +159,4 @@ def test_a_run_names_the_folder_of_each_room(tmp_path):
         place = tmp_path / str(len(run.spaces))
         write_results(run, ResultFolder(place, "run"))
         values = addon.room_values(str(place), "SDA")
-        assert values == pytest.approx(
-            {room.space.guid: room.daylight.sda for room in run.spaces}, rel=1e-5
-        )
+        assert values == pytest.approx({room.space.guid: room.daylight.sda for room in run.spaces}, rel=1e-5)

@@ -94,9 +94,7 @@ def test_item_that_ends_its_process_costs_no_other_item():
 
 
 def test_process_apart_stays_for_the_next_task():
-    assert answer_apart(number_of_process, limit_s=60) == answer_apart(
-        number_of_process, limit_s=60
-    )
+    assert answer_apart(number_of_process, limit_s=60) == answer_apart(number_of_process, limit_s=60)
     assert answer_apart(number_of_process, limit_s=60) != os.getpid()
 
 

@@ -27,10 +27,13 @@ RINGS = {
 }
 HONEYBEE = [0.01, 0.01, 1.0]  # honeybee-schema's default
 CASES = {
-    "wall, default": (SIDE, None), "wall on its side": (SIDE, [1, 0, 0]),
-    "wall upside down": (SIDE, [0.2, 0.3, -1]), "skylight, default": (ROOF, None),
-    "skylight, north": (ROOF, [0, 1, 0]), "skylight, west": (ROOF, [-1, 0, 0.4]),
-}  # fmt: skip
+    "wall, default": (SIDE, None),
+    "wall on its side": (SIDE, [1, 0, 0]),
+    "wall upside down": (SIDE, [0.2, 0.3, -1]),
+    "skylight, default": (ROOF, None),
+    "skylight, north": (ROOF, [0, 1, 0]),
+    "skylight, west": (ROOF, [-1, 0, 0.4]),
+}
 
 
 def asymmetric() -> KlemsBsdf:
@@ -49,8 +52,7 @@ def folder(tmp_path_factory) -> Path:
 
 def model_with(folder: Path, face: int, up, **more) -> dict:
     model = two_rooms()
-    modifier = {"type": "BSDF", "identifier": "cfs",
-                "bsdf_data": (folder / "blind.xml").read_text()} | more  # fmt: skip
+    modifier = {"type": "BSDF", "identifier": "cfs", "bsdf_data": (folder / "blind.xml").read_text()} | more
     if up is not None:
         modifier["up_orientation"] = up
     model["properties"]["radiance"]["modifiers"].append(modifier)
@@ -128,21 +130,21 @@ def test_an_export_keeps_the_orientation(folder, tmp_path, case):
     before = window_of(path)
     write_honeybee(read_honeybee(path), tmp_path / "again.hbjson")
     after = window_of(tmp_path / "again.hbjson")
-    np.testing.assert_allclose(
-        window_frame(after.normal, after.up), window_frame(before.normal, before.up), atol=1e-5
-    )
+    np.testing.assert_allclose(window_frame(after.normal, after.up), window_frame(before.normal, before.up), atol=1e-5)
 
 
 @pytest.mark.parametrize(
     ("face", "up", "more", "field"),
     [
-        (SIDE, [0, 1, 0], {}, "up_orientation"), (ROOF, [0, 0, 1], {}, "up_orientation"),
-        (SIDE, [0, 0, 0], {}, "up_orientation"), (SIDE, "north", {}, "up_orientation"),
+        (SIDE, [0, 1, 0], {}, "up_orientation"),
+        (ROOF, [0, 0, 1], {}, "up_orientation"),
+        (SIDE, [0, 0, 0], {}, "up_orientation"),
+        (SIDE, "north", {}, "up_orientation"),
         (SIDE, [0, None, 1], {}, "up_orientation"),
         (SIDE, None, {"function_file": "up.cal"}, "function_file"),
         (SIDE, None, {"transform": "-twist 3"}, "transform"),
     ],
-)  # fmt: skip
+)
 def test_an_impossible_up_vector_is_refused_with_its_field(folder, tmp_path, face, up, more, field):
     with pytest.raises(DataError, match=rf"(Glazed|cfs): {field}: "):
         read_honeybee(write(model_with(folder, face, up, **more), tmp_path))
@@ -151,11 +153,9 @@ def test_an_impossible_up_vector_is_refused_with_its_field(folder, tmp_path, fac
 def test_states_with_different_up_vectors_are_refused(folder, tmp_path):
     model = model_with(folder, SIDE, [0, 0, 1])
     modifiers = model["properties"]["radiance"]["modifiers"]
-    turned = json.loads(json.dumps(modifiers[-1])) | {
-        "identifier": "turned", "up_orientation": [1, 0, 0]}  # fmt: skip
+    turned = json.loads(json.dumps(modifiers[-1])) | {"identifier": "turned", "up_orientation": [1, 0, 0]}
     modifiers.append(turned)
     window = model["rooms"][0]["faces"][SIDE]["apertures"][0]
-    window["properties"]["radiance"] |= {
-        "dynamic_group_identifier": "south", "states": [{}, {"modifier": "turned"}]}  # fmt: skip
+    window["properties"]["radiance"] |= {"dynamic_group_identifier": "south", "states": [{}, {"modifier": "turned"}]}
     with pytest.raises(DataError, match="Glazed: states: BSDF turned has another up_orientation"):
         read_honeybee(write(model, tmp_path))

@@ -42,10 +42,14 @@ def _balcony(name: str, *, roof: bool, front: float = 1.0):
 @pytest.mark.parametrize(
     ("name", "roof", "front"),
     [
-        ("Loggia", True, 1.0), ("Balkon", True, 1.0), ("Space 7", True, 1.0),
-        ("Terrasse", False, 1.0), ("Innenhof", False, HEIGHT), ("Space 7", False, HEIGHT),
+        ("Loggia", True, 1.0),
+        ("Balkon", True, 1.0),
+        ("Space 7", True, 1.0),
+        ("Terrasse", False, 1.0),
+        ("Innenhof", False, HEIGHT),
+        ("Space 7", False, HEIGHT),
     ],
-)  # fmt: skip
+)
 def test_spaces_open_to_the_air_are_outdoors_and_windows_look_out(tmp_path, name, roof, front):
     building = _read(_balcony(name, roof=roof, front=front), tmp_path)
     assert [space.name for space in building.spaces] == ["R1"]
@@ -183,8 +187,7 @@ def _with_list(tmp_path, name: str, kind: str, fractions=(None,) * 3):
         ]
         some = create("IfcMaterialConstituentSet", None, None, parts)
     walls["south"].Name = name
-    create("IfcRelAssociatesMaterial", ifcopenshell.guid.new(), None, None, None,
-           [walls["south"]], some)  # fmt: skip
+    create("IfcRelAssociatesMaterial", ifcopenshell.guid.new(), None, None, None, [walls["south"]], some)
     (space,) = _read(small, tmp_path).spaces
     face = next(f for f in space.faces if f.kind == "wall" and f.element == walls["south"].GlobalId)
     return [(one.name, round(one.thickness, 4)) for one in face.construction.layers]

@@ -107,10 +107,7 @@ def gable(body):
     )
 
 
-WHOLE = gable(
-    solid(1, [member(one) for one in COARSE])
-    + solid(2, LINKS) + TERRAIN_CURVE + BOUNDARIES + ADDRESS
-)  # fmt: skip
+WHOLE = gable(solid(1, [member(one) for one in COARSE]) + solid(2, LINKS) + TERRAIN_CURVE + BOUNDARIES + ADDRESS)
 PART = (
     '<core:cityObjectMember><bldg:Building gml:id="block"><bldg:consistsOfBuildingPart>'
     f'<bldg:BuildingPart gml:id="court">{solid(1, [member(one, True) for one in COURT])}'
@@ -162,14 +159,16 @@ def as_city_json(folder):
     coarse = {"type": "Solid", "lod": "1", "boundaries": indexed(COARSE)}
     court = {"type": "Solid", "lod": "1", "boundaries": indexed(COURT)}
     content = {
-        "type": "CityJSON", "version": "2.0", "vertices": vertices,
+        "type": "CityJSON",
+        "version": "2.0",
+        "vertices": vertices,
         "metadata": {"referenceSystem": "https://www.opengis.net/def/crs/EPSG/0/25832"},
         "CityObjects": {
             "gable": {"type": "Building", "geometry": [coarse, fine]},
             "block": {"type": "Building", "children": ["court"]},
             "court": {"type": "BuildingPart", "parents": ["block"], "geometry": [court]},
         },
-    }  # fmt: skip
+    }
     path = folder / "quarter.city.json"
     path.write_text(json.dumps(content))
     return path
@@ -223,9 +222,10 @@ def test_links_that_lead_nowhere_leave_the_next_complete_geometry(tmp_path):
 def test_links_in_a_circle_end(tmp_path):
     circle = (
         '<bldg:lod2MultiSurface><gml:MultiSurface gml:id="m">'
-        + member(GABLE["floor"]) + '<gml:surfaceMember xlink:href="#m"/>' * 3
+        + member(GABLE["floor"])
+        + '<gml:surfaceMember xlink:href="#m"/>' * 3
         + "</gml:MultiSurface></bldg:lod2MultiSurface>"
-    )  # fmt: skip
+    )
     (one,) = read_surroundings(written(tmp_path, model(gable(circle)))).objects
     assert len(one.triangles) == 2
 
@@ -290,11 +290,14 @@ FLOOR = '<gml:posList srsDimension="3">456000.000'
         ("gml:exterior><gml:Lin", "gml:outside><gml:Lin", "is no XML: mismatched tag"),
         ("posList", "coordinates", "gable (from line 4): exterior: expected posList or pos"),
         ("<core:CityModel", '<!DOCTYPE x [<!ENTITY a "b">]><core:CityModel', "declares entities"),
-        ("</gml:boundedBy>", '<gml:Envelope srsName="EPSG:25833"/></gml:boundedBy>',
-         "line 3: srsName: EPSG:25832, EPSG:25833: expected one coordinate system"),
+        (
+            "</gml:boundedBy>",
+            '<gml:Envelope srsName="EPSG:25833"/></gml:boundedBy>',
+            "line 3: srsName: EPSG:25832, EPSG:25833: expected one coordinate system",
+        ),
         ("<gml:name>", "<a>" * 200 + "</a>" * 200 + "<gml:name>", "line 4: elements nested"),
     ],
-)  # fmt: skip
+)
 def test_faults_are_one_line(tmp_path, old, new, said):
     path = written(tmp_path, model(WHOLE, PART).replace(old, new))
     with pytest.raises(DataError) as caught:

@@ -21,9 +21,7 @@ def test_the_matrix_is_that_of_the_two_spaces():
     white = np.array([1 / 3, 1 / 3])
     to_xyz = colour.normalised_primary_matrix(primaries, white)
     assert to_xyz[1] == pytest.approx(LUMINANCE, abs=3e-4)  # which Radiance rounds
-    radiance = colour.RGB_Colourspace(
-        "Radiance", primaries, white, "E", to_xyz, np.linalg.inv(to_xyz)
-    )
+    radiance = colour.RGB_Colourspace("Radiance", primaries, white, "E", to_xyz, np.linalg.inv(to_xyz))
     found = colour.matrix_RGB_to_RGB(colour.RGB_COLOURSPACES["sRGB"], radiance, "Bradford")
     # the white of sRGB has four digits, so that grey is grey to 1.4e-4 only
     assert pytest.approx(found, abs=3e-4) == TO_RADIANCE

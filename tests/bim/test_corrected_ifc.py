@@ -43,9 +43,7 @@ def _model(schema: str, path) -> None:
     small, walls = box_model(schema, doubled_wall=True)
     small.box("IfcSpace", "R2", (10.0, 0.0, 0.0), (3.0, 3.0, 3.0), LongName="Yard")
     for name, material in (("north", "Panel 7"), ("east", "Concrete"), ("west", "Concrete")):
-        sets = ifcopenshell.api.material.add_material_set(
-            small.model, name=name, set_type="IfcMaterialLayerSet"
-        )
+        sets = ifcopenshell.api.material.add_material_set(small.model, name=name, set_type="IfcMaterialLayerSet")
         of = next((m for m in small.model.by_type("IfcMaterial") if m.Name == material), None)
         of = of or ifcopenshell.api.material.add_material(small.model, name=material)
         layer = ifcopenshell.api.material.add_layer(small.model, layer_set=sets, material=of)
@@ -59,10 +57,17 @@ def _model(schema: str, path) -> None:
 def _figures(building) -> list:
     """Rooms, windows, faces with their layers and reflectances, elements outdoors, north."""
     faces = [
-        (f.kind, round(f.area, 6), f.reflectance_visible, f.reflectance_solar, f.gloss,
-         [(x.name, x.thickness, x.conductivity, x.density) for x in f.construction.layers])
-        for space in building.spaces for f in space.faces
-    ]  # fmt: skip
+        (
+            f.kind,
+            round(f.area, 6),
+            f.reflectance_visible,
+            f.reflectance_solar,
+            f.gloss,
+            [(x.name, x.thickness, x.conductivity, x.density) for x in f.construction.layers],
+        )
+        for space in building.spaces
+        for f in space.faces
+    ]
     outside = {(e.name, e.reflectance_visible) for e in building.elements}
     glass = [(w.guid, round(w.area, 6)) for w in building.windows]
     return [faces, outside, glass, np.round(building.from_model, 9).tolist()]
@@ -136,9 +141,7 @@ def test_the_command_says_what_was_written_and_what_remains(tmp_path):
     path, out = tmp_path / "m.ifc", tmp_path / "out.ifc"
     _model("IFC4", path)
     corrections_file(path).write_text(CORRECTIONS)
-    result = CliRunner().invoke(
-        command, ["correct", str(path), "-o", str(out)], catch_exceptions=False
-    )
+    result = CliRunner().invoke(command, ["correct", str(path), "-o", str(out)], catch_exceptions=False)
     assert "points 30 degrees from north" in result.output
     assert "spaces outdoors: 1, materials: 1, elements removed: 2" in result.output
     assert "surroundings, reflectance" in result.output.replace("\n", "")

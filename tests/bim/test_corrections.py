@@ -149,9 +149,8 @@ def test_every_kind_of_selector_leaves_out_the_one_wall(tmp_path, schema, select
     attic = ifcopenshell.api.root.create_entity(model, ifc_class="IfcBuildingStorey", name="Attic")
     ifcopenshell.api.spatial.assign_container(model, products=[wall], relating_structure=attic)
     model.create_entity(
-        "IfcPresentationLayerAssignment", Name="A-EAST",
-        AssignedItems=[wall.Representation.Representations[0]],
-    )  # fmt: skip
+        "IfcPresentationLayerAssignment", Name="A-EAST", AssignedItems=[wall.Representation.Representations[0]]
+    )
     pset = ifcopenshell.api.pset.add_pset(model, product=wall, name="Pset_WallCommon")
     ifcopenshell.api.pset.edit_pset(model, pset=pset, properties={"Reference": "E1"})
     removed = Corrections(leave_out=(select.format(guid=wall.GlobalId),)).removed(model)
@@ -173,13 +172,21 @@ def test_the_draft_has_every_doubt_and_reads_back_as_no_correction(tmp_path) -> 
     lines = []
     for line in draft.read_text("utf-8").splitlines():
         bare = line.strip().removeprefix("# ")
-        starts = ("north =", "[[material]]", "name =", "conductivity =", "density =",
-                  "[[room]]", "select =", "long_name =", "[[glass]]", "area =")  # fmt: skip
+        starts = (
+            "north =",
+            "[[material]]",
+            "name =",
+            "conductivity =",
+            "density =",
+            "[[room]]",
+            "select =",
+            "long_name =",
+            "[[glass]]",
+            "area =",
+        )
         is_entry = line.startswith("    # ") and '"' in bare
         lines.append(bare if bare.startswith(starts) or is_entry else line)
-    draft.write_text(
-        "\n".join(lines).replace(f'"{building.spaces[0].guid}",  # R1', "# R1"), "utf-8"
-    )
+    draft.write_text("\n".join(lines).replace(f'"{building.spaces[0].guid}",  # R1', "# R1"), "utf-8")
     chosen = read_corrections(draft)
     assert chosen.north_deg == 0.0 and chosen.as_drawn == (building.spaces[0].guid,)
     assert [one.name for one in chosen.materials if "Zeug" in one.name] == ['Zeug "7"']
@@ -188,8 +195,7 @@ def test_the_draft_has_every_doubt_and_reads_back_as_no_correction(tmp_path) -> 
 
 
 @pytest.mark.parametrize(
-    ("entry", "code"),
-    [("leave_out", "space-removed"), ("only", "space-removed"), ("outdoors", "space-outdoors")],
+    ("entry", "code"), [("leave_out", "space-removed"), ("only", "space-removed"), ("outdoors", "space-outdoors")]
 )
 def test_a_space_that_the_user_leaves_out_is_not_said_to_lack_geometry(tmp_path, entry, code):
     small, _ = box_model()
@@ -263,9 +269,7 @@ def test_names_are_written_into_the_model(tmp_path):
     (space,) = read_ifc(out).spaces
     assert space.label == "1.03 Kitchen"
     # another entry chooses the space by the name that it has in the file
-    path.with_name("m.corrections.toml").write_text(
-        "as_drawn = ['IfcSpace, Name=\"R1\"']\n" + NAMES, "utf-8"
-    )
+    path.with_name("m.corrections.toml").write_text("as_drawn = ['IfcSpace, Name=\"R1\"']\n" + NAMES, "utf-8")
     assert set(correct(path, tmp_path / "other.ifc").left) == {"as_drawn", "room"}
     (space,) = read_ifc(tmp_path / "other.ifc").spaces
     assert space.label == "1.03 Kitchen"

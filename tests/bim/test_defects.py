@@ -51,16 +51,12 @@ def as_brep(model, product, low, size, *, faces=BOX_FACES, inverted: bool = Fals
     x1, y1, z1 = np.add(low, size)
     outline = ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
     corners = [
-        model.create_entity("IfcCartesianPoint", (float(x), float(y), float(z)))
-        for z in (z0, z1)
-        for x, y in outline
+        model.create_entity("IfcCartesianPoint", (float(x), float(y), float(z))) for z in (z0, z1) for x, y in outline
     ]
     made = []
     for face in faces:
         loop = [corners[k] for k in (face[::-1] if inverted else face)]
-        bound = model.create_entity(
-            "IfcFaceOuterBound", model.create_entity("IfcPolyLoop", loop), True
-        )
+        bound = model.create_entity("IfcFaceOuterBound", model.create_entity("IfcPolyLoop", loop), True)
         made.append(model.create_entity("IfcFace", [bound]))
     representation = product.Representation.Representations[0]
     whole = len(faces) == len(BOX_FACES)
@@ -91,10 +87,17 @@ def test_slit_between_walls_is_named_and_closed(tmp_path, schema, gap, space):
 def test_sound_room_has_no_problem_with_its_walls(tmp_path, schema):
     building = read(tmp_path, box_room(schema))
     assert not set(codes(building)) & {
-        "walls-do-not-meet", "element-without-geometry", "window-without-geometry",
-        "space-without-geometry", "body-not-sound", "space-repaired", "room-not-sound",
-        "glass-out-of-opening", "glass-moved-into-opening", DRAWN_TWICE,
-    }  # fmt: skip
+        "walls-do-not-meet",
+        "element-without-geometry",
+        "window-without-geometry",
+        "space-without-geometry",
+        "body-not-sound",
+        "space-repaired",
+        "room-not-sound",
+        "glass-out-of-opening",
+        "glass-moved-into-opening",
+        DRAWN_TWICE,
+    }
 
 
 # its opening reaches from 0.1 m before the wall to 0.1 m behind it, and the pane lies in its middle
@@ -157,8 +160,9 @@ def test_missing_material_gets_a_stated_default(tmp_path, schema):
 def test_repeated_guid_of_rooms_keeps_both(tmp_path, schema):
     model = box_room(schema)
     one = named(model, "IfcSpace", "R1")
-    small = SmallIfc(model, one.Representation.Representations[0].ContextOfItems,
-                     model.by_type("IfcBuildingStorey")[0], 1.0)  # fmt: skip
+    small = SmallIfc(
+        model, one.Representation.Representations[0].ContextOfItems, model.by_type("IfcBuildingStorey")[0], 1.0
+    )
     small.box("IfcSpace", "R2", (10, 0, 0), (3, 3, 3), GlobalId=one.GlobalId)
     building = read(tmp_path, model)
     assert issue(building, "guid-repeated").values["count"] == 2
@@ -168,8 +172,9 @@ def test_repeated_guid_of_rooms_keeps_both(tmp_path, schema):
 def test_curtain_wall_panels_are_windows_and_its_spandrel_is_not(tmp_path, schema):
     model = box_room(schema, window=False)
     wall = named(model, "IfcWall", "south")
-    small = SmallIfc(model, wall.Representation.Representations[0].ContextOfItems,
-                     model.by_type("IfcBuildingStorey")[0], 1.0)  # fmt: skip
+    small = SmallIfc(
+        model, wall.Representation.Representations[0].ContextOfItems, model.by_type("IfcBuildingStorey")[0], 1.0
+    )
     model.remove(wall)
     curtain = ifcopenshell.api.root.create_entity(model, ifc_class="IfcCurtainWall", name="facade")
     glass, grey = small.style("glass", 0.9, 0.8), small.style("frame", 0.4)

@@ -73,8 +73,10 @@ def test_honeybee_air_boundaries_name_each_other(tmp_path):
     rooms = json.loads((tmp_path / "a.hbjson").read_text())["rooms"]
     air = {
         face["identifier"]: (room["identifier"], face["boundary_condition"])
-        for room in rooms for face in room["faces"] if face["face_type"] == "AirBoundary"
-    }  # fmt: skip
+        for room in rooms
+        for face in room["faces"]
+        if face["face_type"] == "AirBoundary"
+    }
     assert len(air) == 2
     for own, (_, condition) in air.items():
         other, room = condition["boundary_condition_objects"]

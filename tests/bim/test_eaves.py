@@ -27,10 +27,16 @@ def met_behind(normal: np.ndarray, *bodies: np.ndarray) -> tuple[list[int], str]
     """Elements behind a room's face of that normal, and what follows them."""
     room = body(*ROOM)
     around = Surroundings(
-        Bodies(ray_mesh(np.concatenate(bodies)), np.repeat(np.arange(len(bodies)), 12),
-               np.zeros(12 * len(bodies), dtype=int)),
-        ray_mesh(room), np.zeros(12, dtype=int), ("room",), -0.5,
-    )  # fmt: skip
+        Bodies(
+            ray_mesh(np.concatenate(bodies)),
+            np.repeat(np.arange(len(bodies)), 12),
+            np.zeros(12 * len(bodies), dtype=int),
+        ),
+        ray_mesh(room),
+        np.zeros(12, dtype=int),
+        ("room",),
+        -0.5,
+    )
     (facet,) = (f for f in planar_facets(room) if f.plane.normal @ normal > 0.99)
     found = what_lies_beyond(Piece(facet, "room"), around, own=0)
     return [span.element for span in found.spans], found.adjacency

@@ -20,16 +20,7 @@ from bim.leaks import COARSEST, may_enclose
 from bim.report.issue import Phrase
 from bim.shell import enclosed_volume, open_edges
 from bim.solids import solid_of, triangles_of
-from tests.bim.small_ifc import (
-    DEPTH,
-    GLASS_AREA,
-    HEIGHT,
-    WALL,
-    WALLS,
-    WIDTH,
-    box_room,
-    empty_project,
-)
+from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, WALL, WALLS, WIDTH, box_room, empty_project
 from tests.issues import of_code
 
 VOLUME = WIDTH * DEPTH * HEIGHT
@@ -96,11 +87,7 @@ def test_turned_walls_are_widened_along_themselves():
 
 
 def test_touching_parts_ray_from_outside_and_winding_agree():
-    outside, inside, other = (
-        box((0, 0, 0), (9, 9, 9)),
-        box((1, 1, 1), (2, 2, 2)),
-        box((5, 5, 5), (1, 1, 1)),
-    )
+    outside, inside, other = (box((0, 0, 0), (9, 9, 9)), box((1, 1, 1), (2, 2, 2)), box((5, 5, 5), (1, 1, 1)))
     surface = np.concatenate([inside[:, ::-1], outside, other[:, ::-1]])
     labels = touching_parts(surface)
     assert len(np.unique(labels)) == 3

@@ -86,9 +86,10 @@ def test_each_face_keeps_its_area_and_its_own_absorptance():
     found, one = twin()
     for index, surface in enumerate(one.zone.surfaces):
         mine = [
-            entry for name, entry in found.model["BuildingSurface:Detailed"].items()
+            entry
+            for name, entry in found.model["BuildingSurface:Detailed"].items()
             if f"{name}.".startswith(f"Z0 {one.zone.name} S{index}.")
-        ]  # fmt: skip
+        ]
         if not mine:
             assert surface.name.startswith("window frame")
             continue
@@ -106,10 +107,7 @@ def test_each_face_keeps_its_area_and_its_own_absorptance():
 
 def test_the_ground_has_the_balance_s_temperature(tmp_path):
     found, _ = twin()
-    (floor,) = [
-        entry for entry in found.model["BuildingSurface:Detailed"].values()
-        if entry["surface_type"] == "Floor"
-    ]  # fmt: skip
+    (floor,) = [entry for entry in found.model["BuildingSurface:Detailed"].values() if entry["surface_type"] == "Floor"]
     assert floor["outside_boundary_condition"] == "OtherSideCoefficients"
     beyond = found.model["SurfaceProperty:OtherSideCoefficients"]
     (schedule,) = {one["constant_temperature_schedule_name"] for one in beyond.values()}
@@ -147,10 +145,7 @@ def test_two_known_panes_are_written_with_their_gas():
     model: dict = {}
     complex_state(model, "glass", replace(optics(), unit=panes()), panes=True)
     state = model["Construction:ComplexFenestrationState"]["glass"]
-    outer, inner = (
-        model["WindowMaterial:Glazing"][state[key]]
-        for key in ("outside_layer_name", "layer_2_name")
-    )
+    outer, inner = (model["WindowMaterial:Glazing"][state[key]] for key in ("outside_layer_name", "layer_2_name"))
     assert "layer_3_name" not in state
     assert (outer["thickness"], inner["thickness"]) == (0.004, 0.006)
     assert outer["back_side_infrared_hemispherical_emissivity"] == 0.82
@@ -167,10 +162,7 @@ def test_panes_among_states_or_behind_a_shade_are_a_resistance():
     shade = GlazingLayer(0.0005, 0.15, (0.9, 0.9), openings=Openings(top=0.1))
     shaded = GlazingUnit((shade, *panes().layers), (GasGap(0.1), *panes().gaps))
     one = replace(optics(), unit=panes())
-    for name, system, alone in (
-        ("switched", one, False),
-        ("shade", replace(one, unit=shaded), True),
-    ):
+    for name, system, alone in (("switched", one, False), ("shade", replace(one, unit=shaded), True)):
         model: dict = {}
         complex_state(model, name, system, panes=alone)
         assert "layer_4_name" in model["Construction:ComplexFenestrationState"][name]
@@ -220,10 +212,7 @@ def coupled() -> EnergyPlusTwin:
             one.zone.surfaces[one.room.surface_of_face[sides[s]]]
             for s in (side, {"left": "right", "right": "left"}[side])
         )
-        surfaces = tuple(
-            replace(s, outside=other, partner=partner.name) if s is mine else s
-            for s in one.zone.surfaces
-        )
+        surfaces = tuple(replace(s, outside=other, partner=partner.name) if s is mine else s for s in one.zone.surfaces)
         zone = replace(one.zone, name=name, surfaces=surfaces)
         rooms.append(replace(one, room=replace(one.room, zone=zone)))
     air = TwinAir(np.array([[0.0, 0.03], [0.03, 0.0]]))
@@ -237,9 +226,7 @@ def test_the_faces_of_a_shared_wall_name_each_other_and_turn_its_layers_round():
     (a, first), (b, second) = shared.items()
     assert first["outside_boundary_condition_object"] == b
     assert second["outside_boundary_condition_object"] == a
-    there, back = (
-        list(model["Construction"][w["construction_name"]].values()) for w in (first, second)
-    )
+    there, back = (list(model["Construction"][w["construction_name"]].values()) for w in (first, second))
     assert there == back[::-1]
     assert area(first) == pytest.approx(area(second))
     mixing = list(model["ZoneMixing"].values())

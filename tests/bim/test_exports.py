@@ -33,10 +33,7 @@ from scenes.fenestration.systems import WindowOverrides, read_system
 from scenes.fenestration_exports import known_fenestration
 from tests.bim.small_ifc import box_room
 
-WINDOWS = (
-    WindowRectangle(0.5, 0.9, 1.4, 1.5, frame=0.06),
-    WindowRectangle(2.2, 0.9, 1.4, 1.5, frame=0.06),
-)
+WINDOWS = (WindowRectangle(0.5, 0.9, 1.4, 1.5, frame=0.06), WindowRectangle(2.2, 0.9, 1.4, 1.5, frame=0.06))
 
 
 def weather_file() -> Path:
@@ -54,9 +51,7 @@ def run_energyplus(path: Path, folder: Path) -> tuple[str, list[dict[str, str]]]
     api = pytest.importorskip("pyenergyplus.api").EnergyPlusAPI()
     state = api.state_manager.new_state()
     api.runtime.set_console_output_status(state, False)
-    code = api.runtime.run_energyplus(
-        state, ["-d", str(folder), "-r", "-w", str(weather), str(path)]
-    )
+    code = api.runtime.run_energyplus(state, ["-d", str(folder), "-r", "-w", str(weather), str(path)])
     errors = (folder / "eplusout.err").read_text()
     assert code == 0, errors[-2000:]
     with (folder / "eplusout.csv").open(newline="") as stream:
@@ -181,10 +176,7 @@ def test_thin_metal_and_many_layers_run_in_energyplus(tmp_path):
     rooms = []
     for name in ("MAM", "MPM", "M", "PMAPMAPMAPMAP"):
         construction = Construction(name, tuple(THIN[letter] for letter in name))
-        faces = tuple(
-            replace(face, construction=construction) if face.kind == "wall" else face
-            for face in space.faces
-        )
+        faces = tuple(replace(face, construction=construction) if face.kind == "wall" else face for face in space.faces)
         rooms.append(replace(space, guid=name, name=name, faces=faces))
     path = tmp_path / "rooms.epJSON"
     write_epjson(replace(building, spaces=tuple(rooms)), path, ground_c=[9.0] * 12)
@@ -198,9 +190,11 @@ def test_merged_layers_keep_resistance_and_mass():
     assert len(merged) == MOST_LAYERS
 
     def sums(some):
-        return [sum(x.thickness / x.conductivity for x in some),
-                sum(x.thickness * x.density for x in some),
-                sum(x.thickness * x.density * x.heat_capacity for x in some)]  # fmt: skip
+        return [
+            sum(x.thickness / x.conductivity for x in some),
+            sum(x.thickness * x.density for x in some),
+            sum(x.thickness * x.density * x.heat_capacity for x in some),
+        ]
 
     assert sums(merged) == pytest.approx(sums(layers))
 
@@ -241,8 +235,9 @@ def test_a_bsdf_and_its_u_g_and_tau_go_to_honeybee_and_gbxml(tmp_path):
         assert "holds no BSDF: windows of" in note
         assert write(shoebox(4, 5, 3, windows=WINDOWS), tmp_path / f"plain {name}") == ()
     model = json.loads((tmp_path / "a.hbjson").read_text())
-    (material,) = [m for m in model["properties"]["energy"]["materials"]
-                   if m["type"] == "EnergyWindowMaterialSimpleGlazSys"]  # fmt: skip
+    (material,) = [
+        m for m in model["properties"]["energy"]["materials"] if m["type"] == "EnergyWindowMaterialSimpleGlazSys"
+    ]
     stated = [material[key] for key in ("u_factor", "shgc", "vt")]
     values = [first.u_value, first.g_value, first.visible_transmittance]
     assert stated == pytest.approx(values, abs=1e-5)
@@ -250,8 +245,10 @@ def test_a_bsdf_and_its_u_g_and_tau_go_to_honeybee_and_gbxml(tmp_path):
     assert first.bsdf is not None and first.bsdf.bands["Visible"] is not None
     np.testing.assert_allclose(
         window.states[0].bands["Visible"].transmission_front,
-        first.bsdf.bands["Visible"].transmission_front, rtol=1e-5, atol=1e-7,
-    )  # fmt: skip
+        first.bsdf.bands["Visible"].transmission_front,
+        rtol=1e-5,
+        atol=1e-7,
+    )
     window = read_gbxml(tmp_path / "a.gbxml").windows[0]
     found = [window.u_value, window.g_value, window.visible_transmittance]
     assert found == pytest.approx(values, abs=1e-5)
@@ -262,11 +259,7 @@ def test_the_notes_name_windows_whose_further_states_are_not_written(tmp_path):
     spaces = read_ifc(file).spaces
     assert "first shading state" not in " ".join(known_fenestration(spaces, file).notes())
     states = WindowOverrides(2 * (read_system(VENETIAN_BLIND),), light_only=True)
-    assert (
-        known_fenestration(spaces, file, states)
-        .notes()[-1]
-        .endswith(": only the first shading state is written.")
-    )
+    assert known_fenestration(spaces, file, states).notes()[-1].endswith(": only the first shading state is written.")
 
 
 def attached(folder: Path) -> Path:
@@ -287,9 +280,7 @@ def test_an_epjson_names_what_energyplus_is_not_told(tmp_path):
     assert "ground below 20 m2: it takes 18 C" in ground
     sliver = np.array([[[0, 0, 0], [4, 0, 0], [4, 0.004, 0]]], dtype=float)
     narrow = replace(space, faces=(*space.faces, replace(space.faces[0], triangles=sliver)))
-    (lost,) = write_epjson(
-        replace(building, spaces=(narrow,)), tmp_path / "b.epJSON", ground_c=[9.0] * 12
-    )
+    (lost,) = write_epjson(replace(building, spaces=(narrow,)), tmp_path / "b.epJSON", ground_c=[9.0] * 12)
     assert "1 surfaces of 0.008 m2 in all are left out" in lost
 
 

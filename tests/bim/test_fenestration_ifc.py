@@ -29,9 +29,7 @@ BLOCKS = ("transmission_front", "transmission_back", "reflection_front", "reflec
 
 
 def g_table() -> AngularGValue:
-    return AngularGValue(
-        np.radians([0, 31, 87]), np.radians([0, 90]), np.arange(6).reshape(3, 2) / 7
-    )
+    return AngularGValue(np.radians([0, 31, 87]), np.radians([0, 90]), np.arange(6).reshape(3, 2) / 7)
 
 
 def klems(seed: int) -> KlemsBsdf:
@@ -77,12 +75,7 @@ def test_klems_tree_g_and_u_come_back_bit_for_bit(path, tmp_path):
     assert attach(path, out, bare, Targets(every_window=True)) == 1
     attach(out, again, blind, Targets(every_window=True))
     first, second = states_of(again)
-    assert (first.name, first.u_value, second.name, second.u_value) == (
-        "",
-        1.1,
-        "blind 45",
-        0.1 + 0.2,
-    )
+    assert (first.name, first.u_value, second.name, second.u_value) == ("", 1.1, "blind 45", 0.1 + 0.2)
     for band, bsdf in bare.bands.items():
         back = first.bands[band]
         assert back.basis_in == KLEMS_QUARTER and back.basis_out == KLEMS_QUARTER
@@ -168,11 +161,7 @@ def test_damaged_set_is_named(path, tmp_path):
     out = tmp_path / "out.ifc"
     attach(path, out, ShadingState(bands={"Visible": klems(1)}), Targets(every_window=True))
     model = ifcopenshell.open(str(out))
-    values = next(
-        one
-        for one in model.by_type("IfcPropertyListValue")
-        if one.Name == "Transmittance front values"
-    )
+    values = next(one for one in model.by_type("IfcPropertyListValue") if one.Name == "Transmittance front values")
     values.ListValues = values.ListValues[:-1]
     with pytest.raises(DataError, match="BlackBox Model"):
         read_states(model, tmp_path)
@@ -185,9 +174,12 @@ def test_bsdf_by_library_reference(path, tmp_path):
     model = ifcopenshell.open(str(path))
     library = model.create_entity("IfcLibraryReference", Location="system.xml", Name="BSDF")
     model.create_entity(
-        "IfcRelAssociatesLibrary", ifcopenshell.guid.new(), model.by_type("IfcOwnerHistory")[0],
-        RelatedObjects=model.by_type("IfcWindow"), RelatingLibrary=library,
-    )  # fmt: skip
+        "IfcRelAssociatesLibrary",
+        ifcopenshell.guid.new(),
+        model.by_type("IfcOwnerHistory")[0],
+        RelatedObjects=model.by_type("IfcWindow"),
+        RelatingLibrary=library,
+    )
     out = tmp_path / "out.ifc"
     model.write(str(out))
     back = states_of(out)[0].bands["Visible"]
@@ -263,8 +255,9 @@ def test_a_state_of_a_type_is_replaced_without_a_trace(tmp_path):
     model = ifcopenshell.open(str(path))
     (window,) = model.by_type("IfcWindow")
     guid = ifcopenshell.guid.new()
-    kind = model.create_entity("IfcWindowType", guid, Name="fixed", PredefinedType="WINDOW",
-                               PartitioningType="SINGLE_PANEL")  # fmt: skip
+    kind = model.create_entity(
+        "IfcWindowType", guid, Name="fixed", PredefinedType="WINDOW", PartitioningType="SINGLE_PANEL"
+    )
     relation = ifcopenshell.guid.new()
     model.create_entity("IfcRelDefinesByType", relation, RelatedObjects=[window], RelatingType=kind)
     model.write(str(path))

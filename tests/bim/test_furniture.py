@@ -56,9 +56,11 @@ def test_each_piece_stands_in_its_room_with_its_reflectance(path, room):
     building = read_ifc(path, furniture=True)
     found = {piece.name: piece.reflectance_visible for piece in room.furniture}
     assert found == {
-        "Cabinet": pytest.approx(0.3), "Shelf": FURNITURE_REFLECTANCE,
-        "Folding screen": FURNITURE_REFLECTANCE, "Gardine": FURNITURE_REFLECTANCE,
-    }  # fmt: skip
+        "Cabinet": pytest.approx(0.3),
+        "Shelf": FURNITURE_REFLECTANCE,
+        "Folding screen": FURNITURE_REFLECTANCE,
+        "Gardine": FURNITURE_REFLECTANCE,
+    }
     assert not {e.name for e in building.elements} & {*found, "Vorhang", "Bench"}
     (bench,) = of_code(building, "furniture-in-no-room")
     assert bench.values["element"] == "IfcFurniture Bench"

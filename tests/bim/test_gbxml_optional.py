@@ -14,8 +14,18 @@ from mitsuba_cfs.errors import DataError
 
 # Without these there is no geometry: the polygons of surfaces, the unit of their lengths, and
 # the rooms that they name.
-GEOMETRY = {"Coordinate", "CartesianPoint", "PolyLoop", "PlanarGeometry", "AdjacentSpaceId",
-            "Surface", "Space", "Building", "Campus", "gbXML"}  # fmt: skip
+GEOMETRY = {
+    "Coordinate",
+    "CartesianPoint",
+    "PolyLoop",
+    "PlanarGeometry",
+    "AdjacentSpaceId",
+    "Surface",
+    "Space",
+    "Building",
+    "Campus",
+    "gbXML",
+}
 ROOT_ATTRIBUTES = {"areaUnit", "volumeUnit", "temperatureUnit", "version"}
 SPOILT = ("", "x", "-1e30", "NaN", "1e400")
 
@@ -67,10 +77,20 @@ def test_a_missing_or_spoilt_optional_value_refuses_nothing(tmp_path):
 
 @pytest.mark.parametrize(
     ("tag", "text"),
-    [("Latitude", "north"), ("CADModelAzimuth", "east"), ("Area", "big"), ("U-value", "low"),
-     ("SolarHeatGainCoeff", "7"), ("Thickness", "thin"), ("PeopleNumber", "few"),
-     ("ScheduleValue", "often"), ("R-value", "-3"), ("Transmittance", "9"), ("Reflectance", "9")],
-)  # fmt: skip
+    [
+        ("Latitude", "north"),
+        ("CADModelAzimuth", "east"),
+        ("Area", "big"),
+        ("U-value", "low"),
+        ("SolarHeatGainCoeff", "7"),
+        ("Thickness", "thin"),
+        ("PeopleNumber", "few"),
+        ("ScheduleValue", "often"),
+        ("R-value", "-3"),
+        ("Transmittance", "9"),
+        ("Reflectance", "9"),
+    ],
+)
 def test_a_value_that_cannot_be_read_is_an_issue(tmp_path, tag, text):
     root = ElementTree.fromstring(used_gbxml())
     element = next(e for e in root.iter() if e.tag.endswith("}" + tag))
@@ -83,9 +103,16 @@ def test_a_value_that_cannot_be_read_is_an_issue(tmp_path, tag, text):
 
 @pytest.mark.parametrize(
     "words",
-    ['openingType="FixedWindow"', 'windowTypeIdRef="unit"', 'constructionIdRef="wall"',
-     'zoneIdRef="z"', 'areaUnit="SquareMeters"', 'layerIdRef="l1"', 'peopleScheduleIdRef="s"'],
-)  # fmt: skip
+    [
+        'openingType="FixedWindow"',
+        'windowTypeIdRef="unit"',
+        'constructionIdRef="wall"',
+        'zoneIdRef="z"',
+        'areaUnit="SquareMeters"',
+        'layerIdRef="l1"',
+        'peopleScheduleIdRef="s"',
+    ],
+)
 def test_an_attribute_that_cannot_be_read_is_an_issue(tmp_path, words):
     text = used_gbxml()
     assert words in text

@@ -41,8 +41,7 @@ def box(width: float, depth: float, height: float):
     """A room with its low corner in the origin."""
     floor = plane_through(np.zeros(3), np.array([0.0, 0.0, 1.0]))
     outline = shapely.transform(
-        shapely.box(0, 0, width, depth),
-        lambda p: floor.to_plane(np.column_stack([p, np.zeros(len(p))]))[:, :2],
+        shapely.box(0, 0, width, depth), lambda p: floor.to_plane(np.column_stack([p, np.zeros(len(p))]))[:, :2]
     )
     return room_solid("room", "room", prism(outline, floor, 0.0, height))
 
@@ -54,9 +53,8 @@ def test_glass_before_a_wall_that_is_bent_along_a_diagonal_is_all_there(apart):
     for one in own:
         guid = one.aperture.filling.guid
         glass = [
-            p.facet.polygon.area for p in pieces
-            if p.role == "glass" and p.attachment.aperture.filling.guid == guid
-        ]  # fmt: skip
+            p.facet.polygon.area for p in pieces if p.role == "glass" and p.attachment.aperture.filling.guid == guid
+        ]
         assert sum(glass) == pytest.approx((RIGHT - LEFT) * (TOP - SILL), rel=1e-4)
 
 
@@ -185,9 +183,7 @@ def test_a_drawn_frame_without_a_pane_leaves_its_glass_free(hosted, tmp_path):
         small.opening(walls["south"], OPENING)
     inner, look = width - 2 * FRAME, small.style("plain", 0.7)
     sides = [((left, -0.18, sill), (FRAME, 0.06, height)) for left in (x, x + width - FRAME)]
-    ends = [
-        ((x + FRAME, -0.18, low), (inner, 0.06, FRAME)) for low in (sill, sill + height - FRAME)
-    ]
+    ends = [((x + FRAME, -0.18, low), (inner, 0.06, FRAME)) for low in (sill, sill + height - FRAME)]
     small.show(window, [(*box, look) for box in (*sides, *ends)])
     path = tmp_path / "model.ifc"
     small.model.write(str(path))

@@ -50,11 +50,13 @@ def shaded(kind: str, **more: Any) -> Callable:
     def build(folder: Path) -> Building:
         model = two_rooms()
         default = model["properties"]["energy"]["global_construction_set"]
-        glazing = {"type": "WindowConstructionAbridged", "identifier": "inner",
-                   "materials": ["Unit"]}  # fmt: skip
-        default["constructions"][2] = {"type": kind, "identifier": "Glazing",
-                                       "window_construction": glazing,
-                                       "constructions": [glazing, glazing]} | more  # fmt: skip
+        glazing = {"type": "WindowConstructionAbridged", "identifier": "inner", "materials": ["Unit"]}
+        default["constructions"][2] = {
+            "type": kind,
+            "identifier": "Glazing",
+            "window_construction": glazing,
+            "constructions": [glazing, glazing],
+        } | more
         return read_building_file(write(model, folder))
 
     return build
@@ -66,14 +68,19 @@ def whole(kind: str) -> Callable:
     def build(folder: Path) -> Building:
         model = two_rooms()
         default = model["properties"]["energy"]["global_construction_set"]
-        glazing = {"type": "WindowConstruction", "identifier": "Glazing",
-                   "materials": [SIMPLE | {"identifier": "unit"}]}  # fmt: skip
+        glazing = {
+            "type": "WindowConstruction",
+            "identifier": "Glazing",
+            "materials": [SIMPLE | {"identifier": "unit"}],
+        }
         default["constructions"][2] = glazing
         if kind != "WindowConstruction":
             default["constructions"][2] = {
-                "type": kind, "identifier": "Glazing", "window_construction": glazing,
+                "type": kind,
+                "identifier": "Glazing",
+                "window_construction": glazing,
                 "constructions": [glazing, glazing],
-            }  # fmt: skip
+            }
         return read_building_file(write(model, folder))
 
     return build
@@ -130,8 +137,7 @@ def modifier(states: list | None = None, **one: Any) -> Callable:
         window = model["rooms"][0]["faces"][0]["apertures"][0]
         window["properties"]["radiance"] = {"modifier": "subject"}
         if states is not None:
-            window["properties"]["radiance"] |= {"dynamic_group_identifier": "south",
-                                                 "states": states}  # fmt: skip
+            window["properties"]["radiance"] |= {"dynamic_group_identifier": "south", "states": states}
         return read_building_file(write(model, folder))
 
     return build
@@ -220,18 +226,18 @@ def attached(*options: str) -> Callable:
 
 GAS = {"type": "EnergyWindowMaterialGas", "thickness": 0.012}
 HALF_GAP = {"type": "EnergyWindowMaterialGas", "thickness": 0.006}
-WHOLE = {"type": "WindowConstruction", "identifier": "own glazing",
-         "materials": [SIMPLE | {"identifier": "own unit"}]}  # fmt: skip
-MIXTURE = {"type": "EnergyWindowMaterialGasMixture", "thickness": 0.012,
-           "gas_types": ["Argon", "Air"], "gas_fractions": [0.9, 0.1]}  # fmt: skip
+WHOLE = {"type": "WindowConstruction", "identifier": "own glazing", "materials": [SIMPLE | {"identifier": "own unit"}]}
+MIXTURE = {
+    "type": "EnergyWindowMaterialGasMixture",
+    "thickness": 0.012,
+    "gas_types": ["Argon", "Air"],
+    "gas_fractions": [0.9, 0.1],
+}
 CUSTOM = {"type": "EnergyWindowMaterialGasCustom", "thickness": 0.012}
 SHADE = {"type": "EnergyWindowMaterialShade"}
 BLIND = {"type": "EnergyWindowMaterialBlind"}
 FRAME = {"type": "EnergyWindowFrame", "identifier": "frame", "width": 0.05, "conductance": 2.0}
-U, G = (
-    '<U-value unit="WPerSquareMeterK">1.1</U-value>',
-    "<SolarHeatGainCoeff>.5</SolarHeatGainCoeff>",
-)
+U, G = ('<U-value unit="WPerSquareMeterK">1.1</U-value>', "<SolarHeatGainCoeff>.5</SolarHeatGainCoeff>")
 G_60 = '<SolarHeatGainCoeff solarIncidentAngle="60">.3</SolarHeatGainCoeff>'
 VISIBLE = '<Transmittance type="Visible" unit="Fraction">0.7</Transmittance>'
 PANES = '<Glaze id="g"/><Gap id="a"/><Glaze id="h"/>'
@@ -246,8 +252,7 @@ CASES: dict[str, Callable] = {
     "EnergyWindowFrame": construction(SIMPLE, frame=FRAME),
     "dirt_correction": construction(PANE | {"dirt_correction": 0.8}),
     "solar_diffusing": construction(PANE | {"solar_diffusing": True}),
-    **{kind: whole(kind) for kind in ("WindowConstruction", "WindowConstructionShade",
-                                      "WindowConstructionDynamic")},
+    **{kind: whole(kind) for kind in ("WindowConstruction", "WindowConstructionShade", "WindowConstructionDynamic")},
     "WindowConstructionShadeAbridged": shaded("WindowConstructionShadeAbridged"),
     "WindowConstructionDynamicAbridged": shaded("WindowConstructionDynamicAbridged"),
     "Glass": modifier(type="Glass", **CLEAR),
@@ -259,8 +264,7 @@ CASES: dict[str, Callable] = {
     **{kind: modifier(type=kind) for kind in ("Glow", "Light", "Void")},
     "states: Glass": modifier([{}, {"modifier": "other"}], type="Glass", **CLEAR),
     "states: Plastic": modifier([{}, {"modifier": "paint"}], type="Glass", **CLEAR),
-    "states: shades": modifier([{}, {"modifier": "other", "shades": [{"x": 1}]}], type="Glass",
-                               **CLEAR),
+    "states: shades": modifier([{}, {"modifier": "other", "shades": [{"x": 1}]}], type="Glass", **CLEAR),
     "U-value": window_type(U + G + VISIBLE),
     "Transmittance": window_type(U + G + VISIBLE),
     "Glaze with values": window_type(U + G + VISIBLE + PANES),
@@ -274,15 +278,16 @@ CASES: dict[str, Callable] = {
     "Blind": window_type(U + G + VISIBLE + '<Blind id="b"/>'),
     "ShadingCoeff": window_type(U + VISIBLE + "<ShadingCoeff>0.6</ShadingCoeff>"),
     **{one: drawn_shade(one) for one in ("interiorShadeType", "exteriorShadeType")},
-    **{kind: opening(kind) for kind in ("FixedWindow", "OperableWindow", "FixedSkylight",
-                                        "OperableSkylight", "SlidingDoor")},
+    **{
+        kind: opening(kind)
+        for kind in ("FixedWindow", "OperableWindow", "FixedSkylight", "OperableSkylight", "SlidingDoor")
+    },
     "NonSlidingDoor": opening("NonSlidingDoor", of_type=False),
     "NonSlidingDoor with a window type": opening("NonSlidingDoor"),
     "g at several angles": window_type(U + G_60 + G + VISIBLE),
     "g at 60 degrees alone": window_type(U + G_60 + VISIBLE),
     "ConstructionSet": set_of_rooms("energy", {"window_construction": WHOLE}),
-    "ModifierSet": set_of_rooms("radiance", {"window_modifier": {
-        "type": "Glass", "identifier": "own glass"} | CLEAR}),
+    "ModifierSet": set_of_rooms("radiance", {"window_modifier": {"type": "Glass", "identifier": "own glass"} | CLEAR}),
     "two gaps in a row": construction(PANE, GAS, GAS, PANE),
     "blind between panes": construction(PANE, HALF_GAP, BLIND, HALF_GAP, PANE),
     "name not in the file": own_construction("elsewhere"),
@@ -292,25 +297,31 @@ CASES: dict[str, Callable] = {
     "Air": opening("Air"),
     "Pset_WindowCommon": property_set("Pset_WindowCommon", ThermalTransmittance=1.1),
     "Pset_DoorWindowGlazingType": property_set(
-        "Pset_DoorWindowGlazingType", GlassLayers=2, VisibleLightTransmittance=0.7,
-        SolarTransmittance=0.4, SolarHeatGainTransmittance=0.5,
+        "Pset_DoorWindowGlazingType",
+        GlassLayers=2,
+        VisibleLightTransmittance=0.7,
+        SolarTransmittance=0.4,
+        SolarHeatGainTransmittance=0.5,
     ),
-    "ThermalTransmittanceWinter": property_set(
-        "Pset_DoorWindowGlazingType", ThermalTransmittanceWinter=1.1
-    ),
+    "ThermalTransmittanceWinter": property_set("Pset_DoorWindowGlazingType", ThermalTransmittanceWinter=1.1),
     **{
         name: property_set("Pset_DoorWindowGlazingType", **{name: value})
         for name, value in {
-            "FillGas": "Argon", "GlassColor": "grey", "GlassThickness1": 0.006,
-            "ShadingCoefficient": 0.6, "SolarAbsorption": 0.2, "SolarReflectance": 0.2,
-            "ThermalTransmittanceSummer": 1.0, "VisibleLightReflectance": 0.1,
+            "FillGas": "Argon",
+            "GlassColor": "grey",
+            "GlassThickness1": 0.006,
+            "ShadingCoefficient": 0.6,
+            "SolarAbsorption": 0.2,
+            "SolarReflectance": 0.2,
+            "ThermalTransmittanceSummer": 1.0,
+            "VisibleLightReflectance": 0.1,
         }.items()
     },
     "attached BSDF": attached("--bsdf", "{folder}/fabric.xml"),
     "attached BSDF by reference": attached("--bsdf", "{folder}/fabric.xml", "--reference"),
     "attached U and g": attached("--u", "1.1", "--g", "0.4"),
     "attached g by direction": attached("--g", "{folder}/g.csv"),
-}  # fmt: skip
+}
 
 NONE = (None, None, None)  # nothing is known: the run asks for values
 UNIT, STATED = (1.3, 0.4, 0.6), (1.1, 0.5, 0.7)
@@ -318,27 +329,48 @@ UNIT, STATED = (1.3, 0.4, 0.6), (1.1, 0.5, 0.7)
 # are stated; of panes those of honeybee-energy 1.126 (its U and g by another balance, 3 %)
 CLEAR_PANE, TWO_PANES = (5.710, 0.8647, 0.9), (2.721, 0.7729, 0.81458)
 EXPECTED: dict[str, tuple[float | None, ...]] = {
-    "EnergyWindowMaterialSimpleGlazSys": UNIT, "EnergyWindowMaterialGlazing": CLEAR_PANE,
+    "EnergyWindowMaterialSimpleGlazSys": UNIT,
+    "EnergyWindowMaterialGlazing": CLEAR_PANE,
     "EnergyWindowMaterialGas": TWO_PANES,
     "EnergyWindowMaterialGasMixture": (2.578, 0.7736, 0.81458),
-    "EnergyWindowMaterialShade": CLEAR_PANE, "EnergyWindowMaterialBlind": CLEAR_PANE,
-    "EnergyWindowFrame": UNIT, "dirt_correction": (5.710, None, 0.72),
-    "solar_diffusing": CLEAR_PANE, "blind between panes": TWO_PANES, "ConstructionSet": UNIT,
-    "ModifierSet": (1.1, 0.5, 0.5503), "OpaqueConstruction": NONE,
+    "EnergyWindowMaterialShade": CLEAR_PANE,
+    "EnergyWindowMaterialBlind": CLEAR_PANE,
+    "EnergyWindowFrame": UNIT,
+    "dirt_correction": (5.710, None, 0.72),
+    "solar_diffusing": CLEAR_PANE,
+    "blind between panes": TWO_PANES,
+    "ConstructionSet": UNIT,
+    "ModifierSet": (1.1, 0.5, 0.5503),
+    "OpaqueConstruction": NONE,
     "g at 60 degrees alone": (1.1, None, 0.7),
-    **{kind: UNIT for kind in ("WindowConstruction", "WindowConstructionShade",
-                               "WindowConstructionDynamic")},
-    "Glass": (1.1, 0.5, 0.5503), "states: Glass": (1.1, 0.5, 0.5503),
-    "states: Plastic": (1.1, 0.5, 0.5503), "states: shades": (1.1, 0.5, 0.5503),
-    "Glaze alone": NONE, "ShadingCoeff": (1.1, None, 0.7),
-    "Pset_WindowCommon": (1.1, None, None), "ThermalTransmittanceWinter": (1.1, None, None),
+    **{kind: UNIT for kind in ("WindowConstruction", "WindowConstructionShade", "WindowConstructionDynamic")},
+    "Glass": (1.1, 0.5, 0.5503),
+    "states: Glass": (1.1, 0.5, 0.5503),
+    "states: Plastic": (1.1, 0.5, 0.5503),
+    "states: shades": (1.1, 0.5, 0.5503),
+    "Glaze alone": NONE,
+    "ShadingCoeff": (1.1, None, 0.7),
+    "Pset_WindowCommon": (1.1, None, None),
+    "ThermalTransmittanceWinter": (1.1, None, None),
     "Pset_DoorWindowGlazingType": (None, 0.5, 0.7),
-    **{name: NONE for name in ("FillGas", "GlassColor", "GlassThickness1", "ShadingCoefficient",
-                               "SolarAbsorption", "SolarReflectance", "ThermalTransmittanceSummer",
-                               "VisibleLightReflectance")},
-    "attached BSDF": NONE, "attached BSDF by reference": NONE, "attached U and g": NONE,
+    **{
+        name: NONE
+        for name in (
+            "FillGas",
+            "GlassColor",
+            "GlassThickness1",
+            "ShadingCoefficient",
+            "SolarAbsorption",
+            "SolarReflectance",
+            "ThermalTransmittanceSummer",
+            "VisibleLightReflectance",
+        )
+    },
+    "attached BSDF": NONE,
+    "attached BSDF by reference": NONE,
+    "attached U and g": NONE,
     "attached g by direction": NONE,
-}  # fmt: skip
+}
 # U and g at normal incidence of the usual state, and its transmittance at normal incidence
 STATES: dict[str, tuple[float | None, ...]] = {
     "BSDF": (1.1, 0.5, 0.2),

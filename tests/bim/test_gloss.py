@@ -110,10 +110,7 @@ def test_panes_that_a_window_sees_mirror_as_clear_glazing():
     assert sum(len(part.triangles) for part in parts) == 3 * len(opposite.triangles)
     assert {part.reflectance_visible for part in parts if part.gloss is None} == {0.15}
     (issue,) = issues
-    assert (issue.code, issue.values) == (
-        "panes-assumed-mirroring",
-        {"count": 1, "element": "pane"},
-    )
+    assert (issue.code, issue.values) == ("panes-assumed-mirroring", {"count": 1, "element": "pane"})
 
 
 def test_clear_glazing_mirrors_as_two_panes():
@@ -169,8 +166,14 @@ def test_a_study_box_says_specular_and_roughness():
     from scenes.heat.box import box_building
     from scenes.heat.study_file import BoxTable
 
-    table = {"width": 4, "depth": 5, "height": 3, "window": (),
-             "specular": {"floor": 0.05}, "roughness": {"floor": 0.02}}  # fmt: skip
+    table = {
+        "width": 4,
+        "depth": 5,
+        "height": 3,
+        "window": (),
+        "specular": {"floor": 0.05},
+        "roughness": {"floor": 0.02},
+    }
     floor = next(f for f in box_building(BoxTable(**table)).spaces[0].faces if f.kind == "floor")
     assert floor.gloss == lacquer(0.05, 0.02)
     with pytest.raises(DataError, match=r"box\.roughness\.wall: has no `specular` beside it"):

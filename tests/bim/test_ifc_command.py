@@ -22,9 +22,7 @@ def path(tmp_path):
 
 def test_check_shows_rooms_and_issues(path, tmp_path):
     table = tmp_path / "problems.csv"
-    result = CliRunner().invoke(
-        command, ["check", str(path), "--csv", str(table)], catch_exceptions=False
-    )
+    result = CliRunner().invoke(command, ["check", str(path), "--csv", str(table)], catch_exceptions=False)
     assert result.exit_code == 0
     assert "R1 Room" in result.output and "24.00" in result.output and "72.00" in result.output
     assert "is drawn where" in result.output
@@ -45,9 +43,7 @@ def test_check_lists_the_rooms_of_a_zone(tmp_path):
     path = tmp_path / "m.ifc"
     small.model.write(str(path))
     path.with_name("m.corrections.toml").write_text('indoors = ["IfcSpace"]')
-    result = CliRunner().invoke(
-        command, ["check", str(path), "--space", "home 2"], catch_exceptions=False
-    )
+    result = CliRunner().invoke(command, ["check", str(path), "--space", "home 2"], catch_exceptions=False)
     table = [line for line in result.output.splitlines() if line.startswith("│")]
     assert ["R2 Bath" in line for line in table] == [True]
     assert "rooms: 1 (with windows: 0), windows: 0" in result.output

@@ -9,17 +9,7 @@ import re
 import pytest
 
 from bim.report.__main__ import page
-from bim.report.issue import (
-    COLUMNS,
-    Effect,
-    Issue,
-    Phrase,
-    catalogue,
-    issue_rows,
-    issue_text,
-    phrases,
-    templates,
-)
+from bim.report.issue import COLUMNS, Effect, Issue, Phrase, catalogue, issue_rows, issue_text, phrases, templates
 from bim.report.ranking import ranked
 from tests.conftest import REPOSITORY
 from tests.modules import MODULES
@@ -48,10 +38,7 @@ def test_a_template_is_translated_before_it_is_filled():
 
 def test_phrases_within_values_are_translated():
     repaired = Issue("space-repaired", "S", {"room": "R1", "repair": Phrase("holes-capped")})
-    text = issue_text(
-        repaired,
-        fill=lambda one, _, **values: {"holes capped": "Löcher"}.get(one, one).format(**values),
-    )
+    text = issue_text(repaired, fill=lambda one, _, **values: {"holes capped": "Löcher"}.get(one, one).format(**values))
     assert text.effect == "it is repaired: Löcher"
 
 
@@ -78,18 +65,19 @@ def test_issues_are_values():
 def test_rows_have_code_and_severity():
     (row,) = issue_rows([GLASS], "command")
     assert dict(zip(COLUMNS, row, strict=True)) == {
-        "where": "W1", "what": "IfcWindow W1 is glass between the rooms A, B",
+        "where": "W1",
+        "what": "IfcWindow W1 is glass between the rooms A, B",
         "consequence": f"{EFFECT}; --inner-glass lets daylight pass",
-        "code": "glass-between-rooms", "severity": "loss",
-    }  # fmt: skip
+        "code": "glass-between-rooms",
+        "severity": "loss",
+    }
 
 
 def test_issues_of_a_code_are_told_apart_by_the_values_of_its_group():
     low = [
-        Issue("room-too-low", name, {"room": name, "top": 2.0, "area": 1.0, "reason": Phrase(why)},
-              Effect(glass=1.0))
+        Issue("room-too-low", name, {"room": name, "top": 2.0, "area": 1.0, "reason": Phrase(why)}, Effect(glass=1.0))
         for name, why in (("A", "not-covered"), ("B", "not-covered"), ("C", "top-not-level"))
-    ]  # fmt: skip
+    ]
     assert [one.count for one in ranked(low)] == [2, 1]
 
 
@@ -114,8 +102,9 @@ def _strings(tree: ast.Module):
         id(node.body[0].value)
         for node in ast.walk(tree)
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
-        and node.body and isinstance(node.body[0], ast.Expr)
-    }  # fmt: skip
+        and node.body
+        and isinstance(node.body[0], ast.Expr)
+    }
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docs:
             yield node

@@ -87,8 +87,7 @@ def test_rooms_are_joined_by_argument_as_by_the_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("join", "message"),
-    [("South", "with a plus between them"), ("South + Nord", "no room 'Nord'; there are: North,")],
+    ("join", "message"), [("South", "with a plus between them"), ("South + Nord", "no room 'Nord'; there are: North,")]
 )
 def test_a_join_that_names_no_rooms_is_an_error(tmp_path, join, message):
     with pytest.raises(DataError, match=message):
@@ -103,11 +102,12 @@ def test_what_check_says_is_what_the_commands_take(tmp_path, capsys):
     assert cli.run(["check", str(path), "--join", text]) == 0
     assert "rooms: 1 " in capsys.readouterr().out
     out = str(tmp_path / "a.glb")
-    assert cli.run(["export", str(path), "--join", text, "--space", text,
-                    "--gltf", out]) == 0  # fmt: skip
-    for command in (["run", str(path), "--weather", __file__, "--out", out],
-                    ["dgp", str(path), "--out", out],
-                    ["picture", str(path), "--at", "06-21 12:00", "--out", out]):  # fmt: skip
+    assert cli.run(["export", str(path), "--join", text, "--space", text, "--gltf", out]) == 0
+    for command in (
+        ["run", str(path), "--weather", __file__, "--out", out],
+        ["dgp", str(path), "--out", out],
+        ["picture", str(path), "--at", "06-21 12:00", "--out", out],
+    ):
         assert cli.run([*command, "--join", "South", "--help"]) == 0
         assert "--join" in capsys.readouterr().out
 

@@ -81,13 +81,18 @@ def figures(building: Building) -> list[tuple]:
     """What a room is: volume, area, its faces by kind and what is beyond, glass by window."""
     return sorted(
         (
-            space.guid, space.storey, round(space.volume, 4), round(space.floor_area, 4),
-            sorted((f.kind, f.adjacency, round(f.area, 4), f.construction.name,
-                    round(f.construction.resistance, 4)) for f in space.faces),
+            space.guid,
+            space.storey,
+            round(space.volume, 4),
+            round(space.floor_area, 4),
+            sorted(
+                (f.kind, f.adjacency, round(f.area, 4), f.construction.name, round(f.construction.resistance, 4))
+                for f in space.faces
+            ),
             sorted((w.guid, round(w.area, 4), w.u_value) for w in space.windows),
         )
         for space in building.spaces
-    )  # fmt: skip
+    )
 
 
 def read(files: list[Path]) -> Building:
@@ -113,12 +118,16 @@ def on_map(model: ifcopenshell.file, east: float, north: float, height: float, t
     unit = 1.0  # the map is in metres, as the model
     x, y = math.cos(math.radians(turn)), math.sin(math.radians(turn))
     ifcopenshell.api.georeference.edit_georeferencing(
-        model, projected_crs={"Name": "EPSG:25832"},
+        model,
+        projected_crs={"Name": "EPSG:25832"},
         coordinate_operation={
-            "Eastings": east * unit, "Northings": north, "OrthogonalHeight": height,
-            "XAxisAbscissa": x, "XAxisOrdinate": y,
+            "Eastings": east * unit,
+            "Northings": north,
+            "OrthogonalHeight": height,
+            "XAxisAbscissa": x,
+            "XAxisOrdinate": y,
         },
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="module")
@@ -220,9 +229,7 @@ def test_a_window_that_no_relation_joins_to_its_opening_fills_it(tmp_path, file,
     facade.write(str(files[1]))
     parts = read(files)
     assert [w.guid for w in parts.windows] == [w.guid for w in whole.windows]
-    assert sum(w.area for w in parts.windows) == pytest.approx(
-        sum(w.area for w in whole.windows), rel=1e-6
-    )
+    assert sum(w.area for w in parts.windows) == pytest.approx(sum(w.area for w in whole.windows), rel=1e-6)
     assert [w.guid for w in read(files[:1]).windows] != [w.guid for w in whole.windows]
 
 
@@ -242,11 +249,8 @@ def test_folders_and_zips_hold_several_files(tmp_path, file, whole) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
-    [
-        "Duplex_A_20110907.ifc", "AC20-FZK-Haus.ifc", "SampleHouse4_Revit_IFC4.ifc",
-        "ExampleHOM.ifc", "House_Renga.ifc",
-    ],
-)  # fmt: skip
+    ["Duplex_A_20110907.ifc", "AC20-FZK-Haus.ifc", "SampleHouse4_Revit_IFC4.ifc", "ExampleHOM.ifc", "House_Renga.ifc"],
+)
 def test_a_real_building_cut_in_three_is_the_whole(tmp_path, real_data, name) -> None:
     path = real_data / "ifc/buildings" / name
     assert figures(read(write_parts(path, tmp_path))) == figures(read_ifc(path))
@@ -269,8 +273,7 @@ def test_two_doors_before_one_wall_are_told_apart_by_nearness(tmp_path, outer_fi
     (space,) = read_ifc(tmp_path / "porch.ifc").spaces
     guids = {door.Name: door.GlobalId for door in small.model.by_type("IfcDoor")}
     areas = {
-        name: sum(f.area for f in space.faces if f.kind == "door" and f.element == guid)
-        for name, guid in guids.items()
+        name: sum(f.area for f in space.faces if f.kind == "door" and f.element == guid) for name, guid in guids.items()
     }
     assert areas["own"] == pytest.approx(0.8 * 2.1, rel=1e-5)
     assert areas["porch"] == pytest.approx(1.4 * 1.8 - 0.8 * 1.5, rel=1e-5)

@@ -54,9 +54,7 @@ def _walled(tmp_path, *names: str, corrections: str = "", classified: str = ""):
     """A box with a south wall of layers of 0.15 m, read."""
     small, walls = box_model()
     model = small.model
-    layers = ifcopenshell.api.material.add_material_set(
-        model, name="W", set_type="IfcMaterialLayerSet"
-    )
+    layers = ifcopenshell.api.material.add_material_set(model, name="W", set_type="IfcMaterialLayerSet")
     for name in names:
         material = ifcopenshell.api.material.add_material(model, name=name)
         layer = ifcopenshell.api.material.add_layer(model, layer_set=layers, material=material)
@@ -64,9 +62,8 @@ def _walled(tmp_path, *names: str, corrections: str = "", classified: str = ""):
         if classified:
             entry = model.create_entity("IfcClassificationReference", Name=classified)
             model.create_entity(
-                "IfcExternalReferenceRelationship", RelatingReference=entry,
-                RelatedResourceObjects=[material],
-            )  # fmt: skip
+                "IfcExternalReferenceRelationship", RelatingReference=entry, RelatedResourceObjects=[material]
+            )
     ifcopenshell.api.material.assign_material(model, products=[walls["south"]], material=layers)
     path = tmp_path / "m.ifc"
     model.write(str(path))
@@ -93,9 +90,7 @@ def test_classification_comes_before_the_name(tmp_path):
 
 
 def test_corrections_state_conductivity_or_u_by_name(tmp_path):
-    text = (
-        '[[material]]\nname = "wall*"\nconductivity = 0.5\n[[material]]\nname = "Panel"\nu = 0.2\n'
-    )
+    text = '[[material]]\nname = "wall*"\nconductivity = 0.5\n[[material]]\nname = "Panel"\nu = 0.2\n'
     building = _walled(tmp_path, "Wallboard X", "Panel", corrections=text)
     assert _south(building).resistance == pytest.approx(0.15 / 0.5 + 1 / 0.2 - 0.17)
 
@@ -139,8 +134,13 @@ def test_a_body_that_is_an_air_layer_has_its_resistance(tmp_path, thickness):
     )
     create = small.model.create_entity
     materials = create("IfcMaterialList", [create("IfcMaterial", name) for name in ends])
-    create("IfcRelAssociatesMaterial", ifcopenshell.guid.new(), walls["north"].OwnerHistory,
-           RelatedObjects=[walls["north"]], RelatingMaterial=materials)  # fmt: skip
+    create(
+        "IfcRelAssociatesMaterial",
+        ifcopenshell.guid.new(),
+        walls["north"].OwnerHistory,
+        RelatedObjects=[walls["north"]],
+        RelatingMaterial=materials,
+    )
     path = tmp_path / "m.ifc"
     small.model.write(str(path))
     faces = read_ifc(path).spaces[0].faces

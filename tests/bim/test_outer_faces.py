@@ -13,15 +13,13 @@ from thermal.blackbox import Fenestration
 
 
 def slab(
-    guid: str, near: float, far: float, x: tuple[float, float] = (-10.0, 10.0),
-    z: tuple[float, float] = (-10.0, 10.0),
-) -> Element:  # fmt: skip
+    guid: str, near: float, far: float, x: tuple[float, float] = (-10.0, 10.0), z: tuple[float, float] = (-10.0, 10.0)
+) -> Element:
     """A plate of 20 x 20 m, from `near` to `far` south of the front wall's inner face [m]."""
     low, high = np.array([x[0], -far, z[0]]), np.array([x[1], -near, z[1]])
     corner = np.array(np.meshgrid(*np.stack([low, high]).T, indexing="ij")).reshape(3, 8).T
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    triangles = np.array([corner[[q[k] for k in part]] for q in quads
-                          for part in ((0, 1, 2), (0, 2, 3))])  # fmt: skip
+    triangles = np.array([corner[[q[k] for k in part]] for q in quads for part in ((0, 1, 2), (0, 2, 3))])
     return Element(guid, guid, "IfcWall", triangles, 0.3, 0.3)
 
 

@@ -35,9 +35,7 @@ def read(small: SmallIfc, path, **options) -> Building:
     return read_ifc(path / "rooms.ifc", **options)
 
 
-def partition(
-    small: SmallIfc, low: float, thick: float, *places: tuple, beyond: float = 0.1
-) -> None:
+def partition(small: SmallIfc, low: float, thick: float, *places: tuple, beyond: float = 0.1) -> None:
     """A wall across the box with openings that nothing fills, cut so far beyond it [m]."""
     wall = small.box("IfcWall", "partition", (0, low, 0), (WIDTH, thick, HEIGHT))
     for x, sill, width, height in places:

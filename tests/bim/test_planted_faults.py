@@ -69,12 +69,14 @@ def around(folder: Path) -> object:
     footprint = {
         "type": "FeatureCollection",
         "crs": {"properties": {"name": "urn:ogc:def:crs:EPSG::25832"}},
-        "features": [{
-            "type": "Feature", "properties": {"height": 9},
-            "geometry": {"type": "Polygon",
-                         "coordinates": [[[30, 0], [40, 0], [40, 10], [30, 10], [30, 0]]]},
-        }],
-    }  # fmt: skip
+        "features": [
+            {
+                "type": "Feature",
+                "properties": {"height": 9},
+                "geometry": {"type": "Polygon", "coordinates": [[[30, 0], [40, 0], [40, 10], [30, 10], [30, 0]]]},
+            }
+        ],
+    }
     (folder / "a.geojson").write_text(json.dumps(footprint))
     files = [TUTORIALS / "quarter.city.json", TUTORIALS / "horizon.csv", folder / "a.geojson"]
     return bim.with_surroundings(HOUSE, files, offset=(0, 0, 0))
@@ -139,9 +141,8 @@ def test_a_wrong_argument_for_ifcopenshell_is_a_mistake_of_the_program():
     (wall, *_) = box_room().by_type("IfcWall")
     with pytest.raises(TypeError, match="should_skip"):
         Damage().read(
-            ifcopenshell.util.element.get_material, wall, should_skip=True,
-            of=wall, data="material", default=None,
-        )  # fmt: skip
+            ifcopenshell.util.element.get_material, wall, should_skip=True, of=wall, data="material", default=None
+        )
 
 
 @pytest.mark.parametrize(

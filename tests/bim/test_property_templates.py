@@ -55,11 +55,14 @@ def states() -> list[ShadingState]:
     tree = TensorTree(3, np.full(8, 1), rng.random(8))
     return [
         ShadingState(
-            "down", {"Solar": KlemsBsdf(KLEMS_HALF, KLEMS_HALF, block, reflection_back=block)},
-            u_value=1.1, closure=Closure("layers", unit=unit), shading_position="internal",
+            "down",
+            {"Solar": KlemsBsdf(KLEMS_HALF, KLEMS_HALF, block, reflection_back=block)},
+            u_value=1.1,
+            closure=Closure("layers", unit=unit),
+            shading_position="internal",
         ),
         ShadingState("down", {"Visible": TensorTreeBsdf(tree)}, closure=Closure("linear")),
-    ]  # fmt: skip
+    ]
 
 
 @pytest.mark.parametrize(("number", "least"), [(0, 200), (1, 6)])
@@ -112,10 +115,7 @@ def test_the_ids_asks_windows_for_u_and_checks_types_and_ranges(tmp_path):
     for one in root.iterfind(".//ids:specification", NAMES):
         held = one.find(".//ids:property", NAMES)
         classes = [e.get("value") for e in one.iterfind("ids:applicability//xs:enumeration", NAMES)]
-        limits = [
-            (e.tag.partition("}")[2], e.get("value"))
-            for e in held.iterfind("ids:value/xs:restriction/*", NAMES)
-        ]
+        limits = [(e.tag.partition("}")[2], e.get("value")) for e in held.iterfind("ids:value/xs:restriction/*", NAMES)]
         name = held.findtext("ids:baseName/ids:simpleValue", namespaces=NAMES)
         found[name, held.get("cardinality")] = held.get("dataType"), classes, limits
     u_type = "IFCTHERMALTRANSMITTANCEMEASURE"
@@ -123,9 +123,7 @@ def test_the_ids_asks_windows_for_u_and_checks_types_and_ranges(tmp_path):
     kind, classes, limits = found["Shading position", "optional"]
     assert (kind, classes[0], len(classes)) == ("IFCLABEL", "IFCWINDOW", 4)
     assert limits == [("enumeration", p) for p in ("none", "external", "internal", "integrated")]
-    assert found["G-value at normal incidence", "optional"][2] == [
-        ("minInclusive", "0"), ("maxInclusive", "1")
-    ]  # fmt: skip
+    assert found["G-value at normal incidence", "optional"][2] == [("minInclusive", "0"), ("maxInclusive", "1")]
     pattern = root.find(".//ids:propertySet/xs:restriction/xs:pattern", NAMES).get("value")
     assert re.fullmatch(pattern, "BlackBox Model") and re.fullmatch(pattern, "BlackBox Model: a")
     assert not re.fullmatch(pattern, "BlackBox Modelled")
@@ -133,8 +131,15 @@ def test_the_ids_asks_windows_for_u_and_checks_types_and_ranges(tmp_path):
 
 # The children that PSD_IFC4.xsd allows in an element, in its order; "*" where any number may follow
 PSD = {
-    "PropertySetDef": ("IfcVersion", "Name", "Definition", "Applicability", "ApplicableClasses",
-                       "ApplicableTypeValue", "PropertyDefs"),
+    "PropertySetDef": (
+        "IfcVersion",
+        "Name",
+        "Definition",
+        "Applicability",
+        "ApplicableClasses",
+        "ApplicableTypeValue",
+        "PropertyDefs",
+    ),
     "ApplicableClasses": ("ClassName*",),
     "PropertyDefs": ("PropertyDef*",),
     "PropertyDef": ("Name", "Definition", "PropertyType"),
@@ -144,7 +149,7 @@ PSD = {
     "ListValue": ("DataType", "UnitType?"),
     "TypePropertyBoundedValue": ("ValueRangeDef", "DataType", "UnitType?"),
     "ValueRangeDef": ("LowerBoundValue", "UpperBoundValue"),
-}  # fmt: skip
+}
 
 
 def _structured(element: ElementTree.Element) -> None:
@@ -173,9 +178,7 @@ def test_the_psd_has_the_schemas_structure_and_the_librarys_properties(library, 
     assert len(set(guids)) == len(guids)
     places = {ifcopenshell.guid.expand(one.GlobalId) for one in _below(template)}
     assert set(guids) == {place.replace("-", "") for place in places}
-    measures = sorted(
-        one.PrimaryMeasureType for one in library.by_type("IfcSimplePropertyTemplate")
-    )
+    measures = sorted(one.PrimaryMeasureType for one in library.by_type("IfcSimplePropertyTemplate"))
     assert sorted(one.get("type") for one in root.iter("DataType")) == measures
 
 

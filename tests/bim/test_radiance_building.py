@@ -24,8 +24,7 @@ DESK = "\n!genbox plaster desk 1.6 0.8 0.04 | xform -t 1.2 2.6 0.78\n"
 CUPBOARD = "!genbox plaster cupboard 1 0.5 2 | xform -t 0.2 5.4 0.01\n"
 # a wall behind the west wall with 10 cm between them, open to the room by a slit of 1 cm
 LINING = (
-    "carpet polygon lining\n0\n0\n12  0.1 0.01 0  0.1 6 0  0.1 6 3  0.1 0.01 3\n"
-    "void glass screen\n0\n0\n3 .9 .9 .9\n"
+    "carpet polygon lining\n0\n0\n12  0.1 0.01 0  0.1 6 0  0.1 6 3  0.1 0.01 3\nvoid glass screen\n0\n0\n3 .9 .9 .9\n"
 )
 
 
@@ -94,9 +93,7 @@ def test_a_pane_passes_what_radiance_says(office):
     angles = np.arccos(np.linspace(0, 1, len(passed)))
     assert table.transmitted(angles) == pytest.approx(passed, abs=1e-3)
     assert table.reflected("back", angles) == pytest.approx(mirrored, abs=1e-3)
-    assert klems.direct_hemispherical(klems.transmission_front)[0] == pytest.approx(
-        passed[-1], rel=0.01
-    )
+    assert klems.direct_hemispherical(klems.transmission_front)[0] == pytest.approx(passed[-1], rel=0.01)
 
 
 def test_windows_are_of_the_named_material(tmp_path):
@@ -123,9 +120,7 @@ def test_options_of_other_formats_are_refused(tmp_path):
 
 
 def test_a_room_without_its_floor_names_the_surfaces_that_are_not_read(tmp_path):
-    mixed = (
-        "\nvoid mixpict mixed\n7 plaster carpet grey a.hdr b.cal u v\n0\n0\n\nmixed polygon floor"
-    )
+    mixed = "\nvoid mixpict mixed\n7 plaster carpet grey a.hdr b.cal u v\n0\n0\n\nmixed polygon floor"
     path = tmp_path / "scene.rad"
     path.write_text(OFFICE.read_text().replace("\ncarpet polygon floor", mixed))
     with pytest.raises(RoomError, match=r"has no floor; .* 1 of type mixpict \(.*scene\.rad:\d+\)"):
@@ -207,12 +202,11 @@ def test_a_pane_without_a_room_behind_it_is_reported(tmp_path):
 @pytest.mark.parametrize(
     ("material", "code"),
     [
-        ("void BRTDfunc cloth\n10 0 0 0 .3 .3 .3 0 0 0 .\n0\n9 .1 .1 .1 .2 .2 .2 .3 .3 .3\n",
-         "clear-surface-left-out"),
+        ("void BRTDfunc cloth\n10 0 0 0 .3 .3 .3 0 0 0 .\n0\n9 .1 .1 .1 .2 .2 .2 .3 .3 .3\n", "clear-surface-left-out"),
         ("void trans cloth\n0\n0\n7 .8 .8 .8 0 0 .6 .2\n", "trans-as-opaque"),
         ("void light cloth\n0\n0\n3 9 9 9\n", "light-source-dark"),
     ],
-)  # fmt: skip
+)
 def test_materials_that_are_not_simulated_as_they_are_have_an_issue(tmp_path, material, code):
     sheet = pane("sheet", 3.0, material="cloth")
     (issue,) = issue_of(read(tmp_path, "\n" + material + sheet), code)
@@ -277,8 +271,7 @@ def test_light_past_the_rim_of_an_outer_pane_meets_the_inner_one_alone(tmp_path)
     (issue,) = issue_of(building, "glass-beside-panes")
     assert 1 < issue.values["share"] < 10
     phi = np.linspace(0, 2 * np.pi, 720, endpoint=False)
-    inner, both = (PlainGlass(panes).table for panes in (window.glass.panes[-1:],
-                                                         window.glass.panes))  # fmt: skip
+    inner, both = (PlainGlass(panes).table for panes in (window.glass.panes[-1:], window.glass.panes))
     for polar in np.radians([0.0, 45.0, 60.0, 75.0]):
         over = [
             np.clip(gap * np.tan(polar) * np.abs(turn(phi)) - rim, 0, size) / size
@@ -305,10 +298,7 @@ def test_light_past_a_pane_meets_the_fabric_behind_it_alone(tmp_path):
         assert 0.1 * glass.transmitted(polar) * 1.01 < straight < 0.1
 
 
-CLOTH = (
-    "void BRTDfunc cloth\n10 0 0 0 {tau} {tau} {tau} 0 0 0 {file}\n0\n"
-    "9 .4 .4 .4 .1 .1 .1 .02 .02 .02\n"
-)
+CLOTH = "void BRTDfunc cloth\n10 0 0 0 {tau} {tau} {tau} 0 0 0 {file}\n0\n9 .4 .4 .4 .1 .1 .1 .02 .02 .02\n"
 
 
 def test_a_fabric_behind_a_pane_is_a_layer_of_the_window(tmp_path):
@@ -386,8 +376,7 @@ def test_shares_that_a_bsdf_adds_to_its_file(tmp_path, turned):
     blocks = []
     for numbers in ("0", "9 .3 .3 .3 .2 .2 .2 .1 .1 .1"):
         text = OFFICE.read_text().replace(
-            "void glass glazing\n0\n0\n3 .87 .87 .87",
-            f"void BSDF glazing\n6 0 {VENETIAN_BLIND} 0 0 1 .\n0\n{numbers}",
+            "void glass glazing\n0\n0\n3 .87 .87 .87", f"void BSDF glazing\n6 0 {VENETIAN_BLIND} 0 0 1 .\n0\n{numbers}"
         )
         path = tmp_path / "scene.rad"
         path.write_text(text.replace(f"12  {corners}", f"12  {back}") if turned else text)
@@ -463,14 +452,10 @@ def test_a_rough_translucent_panel_scatters_its_beam_in_a_lobe(tmp_path):
 
 
 def test_a_fabric_before_panes_in_a_frame_has_both_as_layers(tmp_path):
-    bar = (
-        "\nplaster polygon bar\n0\n0\n12  1.8 0.02 0.9  2.2 0.02 0.9  2.2 0.02 2.5  1.8 0.02 2.5\n"
-    )
+    bar = "\nplaster polygon bar\n0\n0\n12  1.8 0.02 0.9  2.2 0.02 0.9  2.2 0.02 2.5  1.8 0.02 2.5\n"
     coat = "\nvoid glass coat\n0\n0\n4 1 1 1 1.05\n"
     cloth = "\n" + CLOTH.format(tau="0.1", file=".")
-    layers = "".join(
-        pane(name, y, (0, 4), (0, 3), name) for name, y in (("coat", 0.08), ("cloth", 0.1))
-    )
+    layers = "".join(pane(name, y, (0, 4), (0, 3), name) for name, y in (("coat", 0.08), ("cloth", 0.1)))
     building = read(tmp_path, bar + coat + cloth + layers)
     (window,) = building.windows
     straight = glass_table([(0.87, 1.52), (1.0, 1.05)]).transmittance[0] * 0.1
@@ -492,9 +477,7 @@ def test_a_pane_beside_whose_fabric_light_passes_is_a_window_too(tmp_path, left,
     path.write_text(wide.replace("12  0.6 0 0.9", f"12  {left} 0 0.9") + cloth + sides + blind)
     building = read_building_file(path)
     assert len(building.windows) == panes
-    assert sum(window.area for window in building.windows) == pytest.approx(
-        2.8 * 1.6 + (0.6 - left) * 1.6, abs=0.04
-    )
+    assert sum(window.area for window in building.windows) == pytest.approx(2.8 * 1.6 + (0.6 - left) * 1.6, abs=0.04)
     fronts = [part for part in building.spaces[0].furniture if part.name == "blind"]
     assert len(fronts) == panes - 1
     for front in fronts:  # the cloth's outdoor side, lit by the panes

@@ -37,9 +37,7 @@ def exported(room, folder):
     space = room.spaces[0]
     blind = read_bsdf_xml(VENETIAN_BLIND)
     groups = window_groups(space)
-    files = write_radiance(
-        space, room, folder, filled=[FilledGroup(g, blind) for g in groups], spacing=1.5
-    )
+    files = write_radiance(space, room, folder, filled=[FilledGroup(g, blind) for g in groups], spacing=1.5)
     return files, blind
 
 
@@ -65,9 +63,8 @@ def test_the_script_and_the_makefile_are_sound(room, tmp_path):
     files, _ = exported(room, tmp_path)
     assert subprocess.run(["sh", "-n", str(files.script)], check=False).returncode == 0
     done = subprocess.run(
-        [str(files.script)], capture_output=True, text=True, check=False,
-        env=os.environ | {"PHASES": "4"},
-    )  # fmt: skip
+        [str(files.script)], capture_output=True, text=True, check=False, env=os.environ | {"PHASES": "4"}
+    )
     assert done.returncode == 1 and "PHASES=4: 3 or 5" in done.stderr
     text = (tmp_path / "Makefile").read_text()
     named = re.search(r"SCENE = (.*)", text).group(1).split()

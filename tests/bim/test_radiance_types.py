@@ -24,24 +24,44 @@ OFFICE = (DOCS / "tutorials/office.rad").read_text()
 PANE = "void glass glazing\n0\n0\n3 .87 .87 .87\n"
 SHEET = "12  1 1 1  2 1 1  2 2 1  1 2 1"
 NUMBERS = {
-    "plastic": "5 .5 .5 .5 0 0", "metal": "5 .5 .5 .5 .3 .1", "plastic2": "6 .5 .5 .5 .03 .1 .2",
-    "metal2": "6 .5 .5 .5 .3 .1 .2", "mirror": "3 .8 .8 .8", "trans": "7 .8 .8 .8 0 0 .6 .2",
-    "trans2": "8 .8 .8 .8 0 0 0 .6 .2", "glass": "3 .6 .6 .6", "dielectric": "5 .9 .9 .9 1.5 0",
-    "interface": "8 .9 .9 .9 1.5 .9 .9 .9 1", "light": "3 1 1 1", "glow": "4 1 1 1 0",
-    "illum": "3 1 1 1", "spotlight": "7 1 1 1 60 0 0 -1", "mist": "0",
+    "plastic": "5 .5 .5 .5 0 0",
+    "metal": "5 .5 .5 .5 .3 .1",
+    "plastic2": "6 .5 .5 .5 .03 .1 .2",
+    "metal2": "6 .5 .5 .5 .3 .1 .2",
+    "mirror": "3 .8 .8 .8",
+    "trans": "7 .8 .8 .8 0 0 .6 .2",
+    "trans2": "8 .8 .8 .8 0 0 0 .6 .2",
+    "glass": "3 .6 .6 .6",
+    "dielectric": "5 .9 .9 .9 1.5 0",
+    "interface": "8 .9 .9 .9 1.5 .9 .9 .9 1",
+    "light": "3 1 1 1",
+    "glow": "4 1 1 1 0",
+    "illum": "3 1 1 1",
+    "spotlight": "7 1 1 1 60 0 0 -1",
+    "mist": "0",
     "BRTDfunc": "9 .1 .1 .1 .1 .1 .1 .02 .02 .02",
-}  # fmt: skip
-STRINGS = {"BRTDfunc": "10 0 0 0 .1 .1 .1 0 0 0 .", "BSDF": "6 0 shade.xml 0 0 1 .",
-           "aBSDF": "5 shade.xml 0 0 1 .", "brightfunc": "2 .5+.1*Px .",
-           "colorfunc": "4 .3+.1*Px .4 .3 ."}  # fmt: skip
+}
+STRINGS = {
+    "BRTDfunc": "10 0 0 0 .1 .1 .1 0 0 0 .",
+    "BSDF": "6 0 shade.xml 0 0 1 .",
+    "aBSDF": "5 shade.xml 0 0 1 .",
+    "brightfunc": "2 .5+.1*Px .",
+    "colorfunc": "4 .3+.1*Px .4 .3 .",
+}
 MIXED = {"window": "4 carpet void .5+.1*Px .", "surface": "4 carpet plaster .5+.1*Px ."}
 SHAPES = {
-    "polygon": SHEET, "ring": "8  1 1 1  0 0 1  0 .5", "cylinder": "7  1 1 0  1 1 1  .2",
+    "polygon": SHEET,
+    "ring": "8  1 1 1  0 0 1  0 .5",
+    "cylinder": "7  1 1 0  1 1 1  .2",
     "tube": "7  1 1 0  1 1 1  .2",
-    "cone": "8  1 1 0  1 1 1  .2 .1", "cup": "8  1 1 0  1 1 1  .2 .1",
-    "sphere": "4  1 1 1  .2", "bubble": "4  1 1 1  .2", "source": "4  0 0 1  180",
-    "mesh": "0", "instance": "0",
-}  # fmt: skip
+    "cone": "8  1 1 0  1 1 1  .2 .1",
+    "cup": "8  1 1 0  1 1 1  .2 .1",
+    "sphere": "4  1 1 1  .2",
+    "bubble": "4  1 1 1  .2",
+    "source": "4  0 0 1  180",
+    "mesh": "0",
+    "instance": "0",
+}
 
 TUBE, CONE, BALL = 2 * np.pi * 0.2, np.pi * 0.3 * np.hypot(1, 0.1), 4 * np.pi * 0.2**2
 FACE = 0.0426  # reflectance of a face of glass
@@ -50,19 +70,23 @@ PATTERN = {"brightfunc": 0.5 + 0.1 * 2, "colorfunc": 0.265 * 0.5 + 0.67 * 0.4 + 
 # of a surface its area, or diffuse and specular reflectance; of a window its transmittance at
 # normal incidence, all and straight on
 EXPECTED: dict[tuple[str, str], tuple[float, ...]] = {
-    ("polygon", "surface"): (1.0,), ("ring", "surface"): (np.pi * 0.5**2,),
+    ("polygon", "surface"): (1.0,),
+    ("ring", "surface"): (np.pi * 0.5**2,),
     **{(kind, "surface"): (TUBE,) for kind in ("cylinder", "tube")},
     **{(kind, "surface"): (CONE,) for kind in ("cone", "cup")},
     **{(kind, "surface"): (BALL,) for kind in ("sphere", "bubble")},
-    ("plastic", "surface"): (0.5, 0.0), ("plastic2", "surface"): (0.97 * 0.5, 0.03),
+    ("plastic", "surface"): (0.5, 0.0),
+    ("plastic2", "surface"): (0.97 * 0.5, 0.03),
     **{(kind, "surface"): (0.7 * 0.5, 0.3 * 0.5) for kind in ("metal", "metal2")},
     ("mirror", "surface"): (0.0, 0.8),
     **{(kind, "window"): (0.8 * 0.6, 0.8 * 0.6 * 0.2) for kind in ("trans", "trans2")},
-    ("glass", "window"): (PANE_PASSES, PANE_PASSES), ("BRTDfunc", "window"): (0.12, 0.1),
+    ("glass", "window"): (PANE_PASSES, PANE_PASSES),
+    ("BRTDfunc", "window"): (0.12, 0.1),
     **{(kind, "window"): (0.2, 0.1) for kind in ("BSDF", "aBSDF")},
-    ("mixfunc", "window"): (0.3, 0.3), ("mixfunc", "surface"): (0.65 * 0.25 + 0.35 * 0.7, 0.0),
+    ("mixfunc", "window"): (0.3, 0.3),
+    ("mixfunc", "surface"): (0.65 * 0.25 + 0.35 * 0.7, 0.0),
     **{(kind, "pattern on glass"): (0.917 * 0.87 * mean,) * 2 for kind, mean in PATTERN.items()},
-}  # fmt: skip
+}
 
 
 def rows() -> list[tuple[str, str, str]]:
@@ -92,10 +116,7 @@ def figures(building: Building, use: str) -> list[tuple[float, ...]]:
     name = "floor" if "pattern" in use else "thing"
     parts = [part for part in (*room.furniture, *room.faces) if part.name.startswith(name)]
     areas = [float(triangle_areas(part.triangles).sum()) for part in parts]
-    shares = [
-        (part.reflectance_visible, 0.0 if part.gloss is None else part.gloss.at_normal)
-        for part in parts
-    ]
+    shares = [(part.reflectance_visible, 0.0 if part.gloss is None else part.gloss.at_normal) for part in parts]
     return [(area,) for area in areas] + shares
 
 
@@ -220,8 +241,7 @@ def test_mixtures_that_are_not_computed_are_left_out_with_their_area(tmp_path):
 def test_a_mixture_of_itself_is_refused(tmp_path):
     path = tmp_path / "scene.rad"
     path.write_text(
-        OFFICE + "\nvoid mixfunc a\n4 plaster b .5 .\n0\n0\nvoid alias b a\n"
-        f"a polygon thing\n0\n0\n{SHEET}\n"
+        OFFICE + f"\nvoid mixfunc a\n4 plaster b .5 .\n0\n0\nvoid alias b a\na polygon thing\n0\n0\n{SHEET}\n"
     )
     with pytest.raises(DataError, match="modifies itself"):
         read_building_file(path)

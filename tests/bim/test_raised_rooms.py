@@ -64,10 +64,7 @@ def test_void_above_a_drawn_ceiling_is_not_the_room(tmp_path, short):
 def test_ceiling_that_nobody_drew_is_assumed_where_little_would_be_won(tmp_path):
     building = read(tmp_path, box_model(space_height=2.0)[0])
     assert building.spaces[0].raised == 0.0
-    assert (
-        said(building)
-        == "it is kept as drawn: the 1.00 m above it may be the void of a ceiling that is not drawn"
-    )
+    assert said(building) == "it is kept as drawn: the 1.00 m above it may be the void of a ceiling that is not drawn"
     assert building.account.low == ("R1 Room",)
 
 
@@ -79,14 +76,11 @@ def test_stated_ceiling_is_believed(tmp_path, relation):
         covering = ifcopenshell.api.root.create_entity(small.model, ifc_class="IfcCovering")
         covering.PredefinedType = "CEILING"
         small.model.create_entity(
-            "IfcRelCoversSpaces", GlobalId=ifcopenshell.guid.new(), RelatingSpace=space,
-            RelatedCoverings=[covering],
-        )  # fmt: skip
+            "IfcRelCoversSpaces", GlobalId=ifcopenshell.guid.new(), RelatingSpace=space, RelatedCoverings=[covering]
+        )
     else:
         heights = {"FinishCeilingHeight": LOW, "Height": HEIGHT}
-        quantities = ifcopenshell.api.pset.add_qto(
-            small.model, product=space, name="Qto_SpaceBaseQuantities"
-        )
+        quantities = ifcopenshell.api.pset.add_qto(small.model, product=space, name="Qto_SpaceBaseQuantities")
         ifcopenshell.api.pset.edit_qto(small.model, qto=quantities, properties=heights)
     building = read(tmp_path, small)
     assert building.spaces[0].raised == 0.0
@@ -103,9 +97,7 @@ def test_room_does_not_rise_into_a_storey_whose_rooms_are_not_drawn(tmp_path, he
 def test_hall_whose_high_glass_is_filed_with_the_storey_above_is_raised(tmp_path):
     low, (x, _, width, _) = 1.8, OPENING
     small, _ = box_model(space_height=low, places=((x, 1.9, width, 0.8),))
-    storey = ifcopenshell.api.root.create_entity(
-        small.model, ifc_class="IfcBuildingStorey", name="upper"
-    )
+    storey = ifcopenshell.api.root.create_entity(small.model, ifc_class="IfcBuildingStorey", name="upper")
     ifcopenshell.api.aggregate.assign_object(
         small.model, products=[storey], relating_object=small.model.by_type("IfcBuilding")[0]
     )

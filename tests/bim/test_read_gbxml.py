@@ -44,9 +44,7 @@ def loop(points) -> str:
 def surface(name, kind, points, spaces, inner="", construction="") -> str:
     refers = f' constructionIdRef="{construction}"' if construction else ""
     beside = "".join(f'<AdjacentSpaceId spaceIdRef="{s}"/>' for s in spaces)
-    return (
-        f'<Surface id="{name}" surfaceType="{kind}"{refers}>{beside}{loop(points)}{inner}</Surface>'
-    )
+    return f'<Surface id="{name}" surfaceType="{kind}"{refers}>{beside}{loop(points)}{inner}</Surface>'
 
 
 def two_rooms(azimuth=0.0) -> str:
@@ -60,7 +58,7 @@ def two_rooms(azimuth=0.0) -> str:
             "west": [(x0, 8, 0), (x0, 0, 0), (x0, 0, 3), (x0, 8, 3)],
             "floor": [(x0, 8, 0), (x1, 8, 0), (x1, 0, 0), (x0, 0, 0)],
             "roof": [(x0, 0, 3), (x1, 0, 3), (x1, 8, 3), (x0, 8, 3)],
-        }  # fmt: skip
+        }
 
     office, hall = box(0, 5), box(5, 9)
     office["north"] = [(5, 8, 0), (0, 8, 0), (0, 8, 3), (5, 8, 3)]
@@ -141,9 +139,7 @@ def test_a_wall_between_rooms_is_seen_from_both(building):
 
 def test_level_surfaces_that_are_named_walls_are_floors_and_ceilings(tmp_path):
     """OpenStudio writes adiabatic floors and ceilings as walls."""
-    text = (
-        two_rooms().replace('"SlabOnGrade"', '"InteriorWall"').replace('"Roof"', '"InteriorWall"')
-    )
+    text = two_rooms().replace('"SlabOnGrade"', '"InteriorWall"').replace('"Roof"', '"InteriorWall"')
     found = read_gbxml(written(tmp_path, text))
     assert [s.floor_area for s in found.spaces] == pytest.approx([40, 32])
     kinds = {f.name: (f.kind, f.adjacency) for f in found.spaces[0].faces}
@@ -168,9 +164,7 @@ def test_a_space_without_surfaces_or_area_is_no_room(tmp_path):
 def test_a_thickness_without_unit_has_that_of_the_file(tmp_path, unit, metres):
     """gbXML's schema: lengthUnit is the unit wherever a length states none."""
     text = two_rooms().replace('<Thickness unit="Meters">', "<Thickness>")
-    found = read_gbxml(
-        written(tmp_path, text.replace('lengthUnit="Meters"', f'lengthUnit="{unit}"'))
-    )
+    found = read_gbxml(written(tmp_path, text.replace('lengthUnit="Meters"', f'lengthUnit="{unit}"')))
     south = next(f for f in found.spaces[0].faces if f.name == "Office-south")
     assert south.construction.layers[0].thickness == pytest.approx(metres)
 
@@ -201,9 +195,7 @@ def test_north_is_turned(tmp_path):
 
 
 def test_turning_north_keeps_lengths_and_heights(tmp_path):
-    straight, turned = (
-        read_gbxml(written(tmp_path, two_rooms(azimuth=azimuth))).spaces[0] for azimuth in (0, 30)
-    )
+    straight, turned = (read_gbxml(written(tmp_path, two_rooms(azimuth=azimuth))).spaces[0] for azimuth in (0, 30))
     assert turned.volume == pytest.approx(straight.volume)
     for before, after in zip(straight.faces, turned.faces, strict=True):
         assert after.area == pytest.approx(before.area)
@@ -230,16 +222,19 @@ def test_air_between_rooms_is_joined(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("<Coordinate>0.9</Coordinate>", "<Coordinate>low</Coordinate>",
-         "Opening window: Coordinate: expected a number, got 'low'"),
+        (
+            "<Coordinate>0.9</Coordinate>",
+            "<Coordinate>low</Coordinate>",
+            "Opening window: Coordinate: expected a number, got 'low'",
+        ),
         ('spaceIdRef="Hall"', 'spaceIdRef="Attic"', ": AdjacentSpaceId: no Space 'Attic'"),
         ('lengthUnit="Meters"', 'lengthUnit="Ells"', "gbXML: lengthUnit: 'Ells'"),
         ("gbXML", "cityXML", "expected gbXML, got cityXML"),
         ("</Campus>", "", "is no XML: mismatched tag"),
-        ('<gbXML', '<!DOCTYPE x [<!ENTITY a "b">]><gbXML', "declares entities"),
-        ('<gbXML', '<!DOCTYPE x [<!ENTITY a SYSTEM "/etc/passwd">]><gbXML', "declares entities"),
+        ("<gbXML", '<!DOCTYPE x [<!ENTITY a "b">]><gbXML', "declares entities"),
+        ("<gbXML", '<!DOCTYPE x [<!ENTITY a SYSTEM "/etc/passwd">]><gbXML', "declares entities"),
     ],
-)  # fmt: skip
+)
 def test_faults_are_one_line_with_element_and_field(tmp_path, old, new, said):
     path = written(tmp_path, two_rooms().replace(old, new))
     with pytest.raises(DataError) as caught:
@@ -259,13 +254,10 @@ def test_faults_are_one_line_with_element_and_field(tmp_path, old, new, said):
         ('areaUnit="SquareMeters"', 'areaUnit="Acres"', "gbXML", "'Acres'"),
         ("<Latitude>50", "<Latitude>north", "Latitude", "expected a number"),
         ('unit="WPerSquareMeterK">1.1', 'unit="y">1.1', "WindowType unit", "unit 'y'"),
-        ('type="IntVis" unit="Fraction">0.6', 'type="IntVis" unit="Fraction">six',
-         "Reflectance", "got 'six'"),
+        ('type="IntVis" unit="Fraction">0.6', 'type="IntVis" unit="Fraction">six', "Reflectance", "got 'six'"),
     ],
-)  # fmt: skip
-def test_a_value_that_cannot_be_read_is_an_issue_and_refuses_no_file(
-    tmp_path, old, new, where, reason
-):
+)
+def test_a_value_that_cannot_be_read_is_an_issue_and_refuses_no_file(tmp_path, old, new, where, reason):
     text = two_rooms()
     assert old in text
     building = read_gbxml(written(tmp_path, text.replace(old, new)))
@@ -298,22 +290,46 @@ def test_random_bytes_give_one_line(tmp_path):
 
 
 NIST = {  # to SI; NIST SP 811, appendix B
-    "Yards": 0.9144, "Feet": 0.3048, "Inches": 0.0254, "Miles": 1609.344, "Kilometers": 1000.0,
-    "Centimeters": 0.01, "Millimeters": 0.001,
-    "SquareYards": 0.8361274, "SquareFeet": 0.09290304, "SquareInches": 6.4516e-4,
-    "SquareMiles": 2.589988e6, "SquareKilometers": 1e6, "SquareCentimeters": 1e-4,
+    "Yards": 0.9144,
+    "Feet": 0.3048,
+    "Inches": 0.0254,
+    "Miles": 1609.344,
+    "Kilometers": 1000.0,
+    "Centimeters": 0.01,
+    "Millimeters": 0.001,
+    "SquareYards": 0.8361274,
+    "SquareFeet": 0.09290304,
+    "SquareInches": 6.4516e-4,
+    "SquareMiles": 2.589988e6,
+    "SquareKilometers": 1e6,
+    "SquareCentimeters": 1e-4,
     "SquareMillimeters": 1e-6,
-    "CubicYards": 0.7645549, "CubicFeet": 0.02831685, "CubicInches": 1.638706e-5,
-    "CubicMiles": 4.168182e9, "CubicKilometers": 1e9, "CubicCentimeters": 1e-6,
+    "CubicYards": 0.7645549,
+    "CubicFeet": 0.02831685,
+    "CubicInches": 1.638706e-5,
+    "CubicMiles": 4.168182e9,
+    "CubicKilometers": 1e9,
+    "CubicCentimeters": 1e-6,
     "CubicMillimeters": 1e-9,
-    "WattPerSquareFoot": 10.76391, "CFMPerSquareFoot": 5.08e-3, "LPerSecPerSquareM": 1e-3,
+    "WattPerSquareFoot": 10.76391,
+    "CFMPerSquareFoot": 5.08e-3,
+    "LPerSecPerSquareM": 1e-3,
     "CubicMPerHourPerSquareM": 2.777778e-4,
-    "LPerSec": 1e-3, "CFM": 4.719474e-4, "CubicMPerHr": 2.777778e-4,
-    "LPerSecPerPerson": 1e-3, "CFMPerPerson": 4.719474e-4,
-    "BtuPerHourSquareFtF": 5.678263, "HrSquareFtFPerBTU": 0.1761102, "BtuPerHourFtF": 1.730735,
-    "WPerCmC": 100.0, "LbsPerCubicFt": 16.01846, "LbsPerCubicIn": 27679.90,
-    "GramsPerCubicCm": 1000.0, "BTUPerLbF": 4186.8, "BtuPerHourPerson": 0.2930711,
-}  # fmt: skip
+    "LPerSec": 1e-3,
+    "CFM": 4.719474e-4,
+    "CubicMPerHr": 2.777778e-4,
+    "LPerSecPerPerson": 1e-3,
+    "CFMPerPerson": 4.719474e-4,
+    "BtuPerHourSquareFtF": 5.678263,
+    "HrSquareFtFPerBTU": 0.1761102,
+    "BtuPerHourFtF": 1.730735,
+    "WPerCmC": 100.0,
+    "LbsPerCubicFt": 16.01846,
+    "LbsPerCubicIn": 27679.90,
+    "GramsPerCubicCm": 1000.0,
+    "BTUPerLbF": 4186.8,
+    "BtuPerHourPerson": 0.2930711,
+}
 
 
 def test_every_unit_has_the_factor_of_the_tables():
@@ -341,20 +357,33 @@ CONSTRUCTION = '<LayerId layerIdRef="l1"/>'
     [
         ('<Reflectance type="IntSolar">0.4</Reflectance>', None, 0.4, None, None),
         ('<Absorptance type="IntSolar">0.3</Absorptance>', None, 0.7, None, None),
-        ('<Reflectance type="IntSolar">0.4</Reflectance>'
-         '<Absorptance type="IntSolar">0.3</Absorptance>', None, 0.4, None, None),
+        (
+            '<Reflectance type="IntSolar">0.4</Reflectance><Absorptance type="IntSolar">0.3</Absorptance>',
+            None,
+            0.4,
+            None,
+            None,
+        ),
         ('<Reflectance type="IntVisible" unit="Percent">45</Reflectance>', 0.45, None, None, None),
         ('<Reflectance type="IntVis">1</Reflectance>', 1.0, None, None, None),
-        ('<Reflectance type="ExtVisible">0.2</Reflectance><Emittance type="IntIR">0.5</Emittance>',
-         None, None, 0.2, 0.5),
-        ('<Reflectance type="IntVisible" incidentAngle="60">0.9</Reflectance>'
-         '<Reflectance type="IntVisible" incidentAngle="0.0">0.3</Reflectance>',
-         0.3, None, None, None),
+        (
+            '<Reflectance type="ExtVisible">0.2</Reflectance><Emittance type="IntIR">0.5</Emittance>',
+            None,
+            None,
+            0.2,
+            0.5,
+        ),
+        (
+            '<Reflectance type="IntVisible" incidentAngle="60">0.9</Reflectance>'
+            '<Reflectance type="IntVisible" incidentAngle="0.0">0.3</Reflectance>',
+            0.3,
+            None,
+            None,
+            None,
+        ),
     ],
-)  # fmt: skip
-def test_the_finish_of_a_construction_is_what_it_states(
-    tmp_path, stated, visible, solar, outer, emissivity
-):
+)
+def test_the_finish_of_a_construction_is_what_it_states(tmp_path, stated, visible, solar, outer, emissivity):
     start, end = MATERIALS.index(" <Reflectance"), MATERIALS.index("</Construction>")
     text = two_rooms().replace(MATERIALS[start:end], stated)
     finish = Constructions(read_document(written(tmp_path, text))).finish("wall")
@@ -380,10 +409,12 @@ def test_a_share_that_cannot_be_is_an_issue(tmp_path, stated, words):
 def test_a_construction_that_is_not_there_is_one_issue(tmp_path):
     """Every wall refers to it; the file's elevation is in its own unit, its name may be missing."""
     found = changed(
-        tmp_path, ('constructionIdRef="wall"', 'constructionIdRef="none"'),
+        tmp_path,
+        ('constructionIdRef="wall"', 'constructionIdRef="none"'),
         ("<Longitude>", "<Elevation>100</Elevation><Longitude>"),
-        ("<Name>Two rooms</Name>", ""), ('lengthUnit="Meters"', 'lengthUnit="Feet"'),
-    )  # fmt: skip
+        ("<Name>Two rooms</Name>", ""),
+        ('lengthUnit="Meters"', 'lengthUnit="Feet"'),
+    )
     missing = [one for one in found.issues if "no Construction 'none'" in str(one)]
     assert len(missing) == 1
     assert found.elevation == pytest.approx(30.48) and found.name == "c"
@@ -410,17 +441,19 @@ def test_openings_without_a_polygon_or_of_air(tmp_path):
 
 def test_surfaces_that_transmit_light_are_named(tmp_path):
     """A wall whose construction has a transmittance; a window in a shade."""
-    glass = (
-        '<Construction id="glass"><Transmittance type="Visible">0.6</Transmittance></Construction>'
-    )
+    glass = '<Construction id="glass"><Transmittance type="Visible">0.6</Transmittance></Construction>'
     ring = loop([(2, 0, 2.5), (3, 0, 2.5), (3, -1, 2.5)])
     pane = f'<Opening id="pane" openingType="FixedWindow">{ring}</Opening>'
     shade = '<Surface id="Overhang" surfaceType="Shade">'
     found = changed(
-        tmp_path, ("</gbXML>", f"{glass}</gbXML>"), (shade, shade + pane),
-        ('id="Office-north" surfaceType="ExteriorWall" constructionIdRef="wall"',
-         'id="Office-north" surfaceType="ExteriorWall" constructionIdRef="glass"'),
-    )  # fmt: skip
+        tmp_path,
+        ("</gbXML>", f"{glass}</gbXML>"),
+        (shade, shade + pane),
+        (
+            'id="Office-north" surfaceType="ExteriorWall" constructionIdRef="wall"',
+            'id="Office-north" surfaceType="ExteriorWall" constructionIdRef="glass"',
+        ),
+    )
     said = [(one.where, one.values["material"]) for one in of_code(found, "shade-taken-as-opaque")]
     assert said == [("Office-north", "glass"), ("Overhang", "pane")]
 

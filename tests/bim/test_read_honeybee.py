@@ -122,9 +122,16 @@ def test_panes_and_gaps_give_u_and_g(tmp_path):
     simpler balance: 3 %.  A coating counts where it faces the gap, and not where it faces outdoors.
     """
     model = two_rooms()
-    pane = {"type": "EnergyWindowMaterialGlazing", "identifier": "Clear", "thickness": 0.006,
-            "solar_transmittance": 0.77, "solar_reflectance": 0.07, "visible_transmittance": 0.88,
-            "visible_reflectance": 0.08, "conductivity": 1.0}  # fmt: skip
+    pane = {
+        "type": "EnergyWindowMaterialGlazing",
+        "identifier": "Clear",
+        "thickness": 0.006,
+        "solar_transmittance": 0.77,
+        "solar_reflectance": 0.07,
+        "visible_transmittance": 0.88,
+        "visible_reflectance": 0.08,
+        "conductivity": 1.0,
+    }
     gap = {"type": "EnergyWindowMaterialGas", "identifier": "Gap", "thickness": 0.0127}
     default = model["properties"]["energy"]["global_construction_set"]
     default["materials"] += [pane, gap]
@@ -155,10 +162,16 @@ def used_rooms() -> dict:
     sensors = [{"pos": [1, 1, 0.8], "dir": [0, 0, 1]}] * 7
     radiance["sensor_grids"] = [{"identifier": "desks", "sensors": sensors}]
     radiance["views"] = [
-        {"identifier": "desk", "position": [200, 300, 120], "direction": [0, -1, 0],
-         "view_type": "a", "h_size": 180, "v_size": 180},
+        {
+            "identifier": "desk",
+            "position": [200, 300, 120],
+            "direction": [0, -1, 0],
+            "view_type": "a",
+            "h_size": 180,
+            "v_size": 180,
+        },
         {"identifier": "nowhere", "position": [1, None, "x"]},
-    ]  # fmt: skip
+    ]
     states = [{"modifier": "a"}, {"modifier": "b"}]
     shade = model["rooms"][0]["faces"][0]["apertures"][0]["outdoor_shades"][0]
     shade["properties"]["radiance"]["states"] = states
@@ -187,13 +200,15 @@ def test_states_of_glass_are_states_of_the_window(tmp_path):
     model = two_rooms()
     modifiers = model["properties"]["radiance"]["modifiers"]
     for name, t in (("clear", 0.9), ("dark", 0.2)):
-        modifiers.append({"type": "Glass", "identifier": name, "refraction_index": 1.52}
-                         | {f"{c}_transmissivity": t for c in "rgb"})  # fmt: skip
+        modifiers.append(
+            {"type": "Glass", "identifier": name, "refraction_index": 1.52} | {f"{c}_transmissivity": t for c in "rgb"}
+        )
     window = model["rooms"][0]["faces"][0]["apertures"][0]
     window["properties"]["radiance"] = {
-        "modifier": "clear", "dynamic_group_identifier": "south",
+        "modifier": "clear",
+        "dynamic_group_identifier": "south",
         "states": [{}, {"modifier": "dark"}, {"modifier": "paint"}],
-    }  # fmt: skip
+    }
     building = read_honeybee(write(model, tmp_path))
     (found,) = building.space("Office").windows
     assert [state.name for state in found.states] == ["", "dark"]
@@ -212,8 +227,14 @@ def test_states_of_glass_are_states_of_the_window(tmp_path):
 def test_u_is_of_nfrcs_winter_and_g_of_its_summer(tmp_path):
     """NFRC 100: -18 and 21 degC, 5.5 m/s; NFRC 200: 32 and 24 degC, 2.75 m/s, 783 W/m2."""
     model = two_rooms()
-    pane = {"type": "EnergyWindowMaterialGlazing", "identifier": "Clear", "thickness": 0.006,
-            "solar_transmittance": 0.6, "solar_reflectance": 0.1, "conductivity": 1.0}  # fmt: skip
+    pane = {
+        "type": "EnergyWindowMaterialGlazing",
+        "identifier": "Clear",
+        "thickness": 0.006,
+        "solar_transmittance": 0.6,
+        "solar_reflectance": 0.1,
+        "conductivity": 1.0,
+    }
     default = model["properties"]["energy"]["global_construction_set"]
     default["materials"] += [pane]
     default["constructions"][2]["materials"] = ["Clear"]
@@ -229,9 +250,7 @@ def test_u_is_of_nfrcs_winter_and_g_of_its_summer(tmp_path):
 def test_the_glass_of_a_modifier_goes_before_the_construction(tmp_path):
     model = two_rooms()
     glass = {f"{c}_transmissivity": 0.6975761815 for c in "rgb"}
-    model["properties"]["radiance"]["modifiers"].append(
-        {"type": "Glass", "identifier": "glass 0.64", **glass}
-    )
+    model["properties"]["radiance"]["modifiers"].append({"type": "Glass", "identifier": "glass 0.64", **glass})
     window = model["rooms"][0]["faces"][0]["apertures"][0]
     window["properties"]["radiance"] = {"modifier": "glass 0.64"}
     (found,) = read_honeybee(write(model, tmp_path)).space("Office").windows
@@ -244,23 +263,32 @@ def test_the_glass_of_a_modifier_goes_before_the_construction(tmp_path):
     [
         (lambda m: m["rooms"][0]["faces"][2].pop("face_type"), "Office_north: face_type"),
         (lambda m: m["rooms"][0]["faces"][0]["geometry"]["boundary"].pop(), None),
-        (lambda m: m["rooms"][1]["faces"][1]["geometry"].update(boundary=[[0, 0, 0]]),
-         "Hall_east: geometry.boundary"),
-        (lambda m: m["rooms"][0]["faces"][0]["geometry"]["boundary"][0].__setitem__(0, "x"),
-         "Office_south: geometry.boundary.0.0"),
+        (lambda m: m["rooms"][1]["faces"][1]["geometry"].update(boundary=[[0, 0, 0]]), "Hall_east: geometry.boundary"),
+        (
+            lambda m: m["rooms"][0]["faces"][0]["geometry"]["boundary"][0].__setitem__(0, "x"),
+            "Office_south: geometry.boundary.0.0",
+        ),
         (lambda m: m.update(units="Parsecs"), "two_rooms: units"),
         (lambda m: m.update(type="Room"), "type: expected a honeybee Model"),
-        (lambda m: m["properties"]["energy"]["global_construction_set"]["materials"][0].update(
-            density=-1), "Brick: density: expected a number of at least"),
-        (lambda m: m["properties"]["energy"]["global_construction_set"]["constructions"][0].update(
-            materials=["Straw"]), "Wall: materials: no material 'Straw'"),
-        (lambda m: m["properties"]["energy"]["global_construction_set"]["constructions"][0].update(
-            materials=[{"type": "EnergyMaterialNoMass", "r_value": 1.0}]),
-         "Wall: materials: expected materials with an identifier"),
-        (lambda m: m["properties"]["radiance"]["modifiers"][0].update(r_reflectance="red"),
-         "paint: r_reflectance"),
+        (
+            lambda m: m["properties"]["energy"]["global_construction_set"]["materials"][0].update(density=-1),
+            "Brick: density: expected a number of at least",
+        ),
+        (
+            lambda m: m["properties"]["energy"]["global_construction_set"]["constructions"][0].update(
+                materials=["Straw"]
+            ),
+            "Wall: materials: no material 'Straw'",
+        ),
+        (
+            lambda m: m["properties"]["energy"]["global_construction_set"]["constructions"][0].update(
+                materials=[{"type": "EnergyMaterialNoMass", "r_value": 1.0}]
+            ),
+            "Wall: materials: expected materials with an identifier",
+        ),
+        (lambda m: m["properties"]["radiance"]["modifiers"][0].update(r_reflectance="red"), "paint: r_reflectance"),
     ],
-)  # fmt: skip
+)
 def test_faults_are_one_line_with_object_and_field(tmp_path, change, said):
     model = two_rooms()
     change(model)
@@ -290,9 +318,7 @@ def test_a_bsdf_comes_along(tmp_path):
     (found,) = read_honeybee(write(model, tmp_path)).space("Office").windows
     (state,) = found.states
     assert state.u_value == 1.1 and state.g_normal == 0.5
-    np.testing.assert_allclose(
-        state.bands["Visible"].transmission_front, clear.transmission_front, atol=1e-4
-    )
+    np.testing.assert_allclose(state.bands["Visible"].transmission_front, clear.transmission_front, atol=1e-4)
 
 
 def test_the_suffix_leads_to_it(tmp_path):
@@ -328,21 +354,24 @@ def _other_side(model):
 def _green_roof(model):
     energy = model["properties"]["energy"]["global_construction_set"]
     energy["materials"].append(
-        {"type": "EnergyMaterialVegetation", "identifier": "green", "thickness": 0.1,
-         "conductivity": 0.35, "density": 1100, "specific_heat": 1200,
-         "soil_solar_absorptance": 0.8}
-    )  # fmt: skip
-    roof = {"type": "OpaqueConstructionAbridged", "identifier": "roof",
-            "materials": ["green", "Wool"]}  # fmt: skip
+        {
+            "type": "EnergyMaterialVegetation",
+            "identifier": "green",
+            "thickness": 0.1,
+            "conductivity": 0.35,
+            "density": 1100,
+            "specific_heat": 1200,
+            "soil_solar_absorptance": 0.8,
+        }
+    )
+    roof = {"type": "OpaqueConstructionAbridged", "identifier": "roof", "materials": ["green", "Wool"]}
     energy["constructions"].append(roof)
     model["rooms"][0]["faces"][5]["properties"]["energy"]["construction"] = "roof"
 
 
 def _trans_wall(model):
     trans = {"type": "Trans", "identifier": "tr", "transmitted_diff": 0.5}
-    model["properties"]["radiance"]["modifiers"].append(
-        trans | {f"{c}_reflectance": 0.5 for c in "rgb"}
-    )
+    model["properties"]["radiance"]["modifiers"].append(trans | {f"{c}_reflectance": 0.5 for c in "rgb"})
     model["rooms"][0]["faces"][2]["properties"]["radiance"]["modifier"] = "tr"
 
 
@@ -396,11 +425,8 @@ def test_an_object_in_place_of_a_name_is_read(tmp_path):
     """Files that are not abridged have it; two of one name are refused."""
     model = two_rooms()
     window = model["rooms"][0]["faces"][0]["apertures"][0]["properties"]
-    unit = {"type": "EnergyWindowMaterialSimpleGlazSys", "identifier": "dark", "u_factor": 2.0,
-            "shgc": 0.3, "vt": 0.25}  # fmt: skip
-    window["energy"]["construction"] = {
-        "type": "WindowConstruction", "identifier": "dark", "materials": [unit]
-    }  # fmt: skip
+    unit = {"type": "EnergyWindowMaterialSimpleGlazSys", "identifier": "dark", "u_factor": 2.0, "shgc": 0.3, "vt": 0.25}
+    window["energy"]["construction"] = {"type": "WindowConstruction", "identifier": "dark", "materials": [unit]}
     found = read_honeybee(write(model, tmp_path)).space("Office").windows[0]
     assert (found.u_value, found.g_value, found.visible_transmittance) == (2.0, 0.3, 0.25)
     window["energy"]["construction"]["identifier"] = "Glazing"
@@ -412,9 +438,8 @@ def test_states_of_a_construction_may_be_named(tmp_path):
     model = two_rooms()
     energy = model["properties"]["energy"]
     energy["constructions"] = [
-        {"type": "WindowConstructionDynamicAbridged", "identifier": "dynamic",
-         "constructions": ["Glazing", "Glazing"]}
-    ]  # fmt: skip
+        {"type": "WindowConstructionDynamicAbridged", "identifier": "dynamic", "constructions": ["Glazing", "Glazing"]}
+    ]
     window = model["rooms"][0]["faces"][0]["apertures"][0]["properties"]
     window["energy"]["construction"] = "dynamic"
     found = read_honeybee(write(model, tmp_path)).space("Office").windows[0]

@@ -75,9 +75,15 @@ def test_a_wall_whose_layers_are_bodies_that_touch_ends_outdoors(tmp_path, ends)
 
 @pytest.mark.parametrize(
     ("schema", "named_by"),
-    [("IFC4", "aspects"), ("IFC4X3", "aspects"), ("IFC4", "styles"),
-     ("IFC4", "contradicting aspects"), ("IFC4", "list"), ("IFC2X3", "list")],
-)  # fmt: skip
+    [
+        ("IFC4", "aspects"),
+        ("IFC4X3", "aspects"),
+        ("IFC4", "styles"),
+        ("IFC4", "contradicting aspects"),
+        ("IFC4", "list"),
+        ("IFC2X3", "list"),
+    ],
+)
 def test_a_wall_of_a_body_for_each_layer_has_the_material_of_each(tmp_path, schema, named_by):
     """Constituents or a list of materials; aspects or styles say which body is of which."""
     small, walls = box_model(schema)
@@ -87,8 +93,9 @@ def test_a_wall_of_a_body_for_each_layer_has_the_material_of_each(tmp_path, sche
     if named_by != "aspects":
         named = {name: small.style(name, 0.5) for name in ends}
     at = pairwise([0.0, *ends.values()])
-    layers = [((x, y + depth - b, z), (width, b - a, height), named[name])
-              for name, (a, b) in zip(ends, at, strict=True)]  # fmt: skip
+    layers = [
+        ((x, y + depth - b, z), (width, b - a, height), named[name]) for name, (a, b) in zip(ends, at, strict=True)
+    ]
     small.show(walls["north"], layers)
     create = small.model.create_entity
     (body,) = walls["north"].Representation.Representations
@@ -103,9 +110,13 @@ def test_a_wall_of_a_body_for_each_layer_has_the_material_of_each(tmp_path, sche
         for name, item in zip(order, body.Items, strict=True):
             shown = create("IfcShapeRepresentation", small.body, "Body", "SweptSolid", [item])
             create("IfcShapeAspect", [shown], name, None, None, walls["north"].Representation)
-    create("IfcRelAssociatesMaterial", ifcopenshell.guid.new(),
-           walls["north"].OwnerHistory, RelatedObjects=[walls["north"]],
-           RelatingMaterial=made)  # fmt: skip
+    create(
+        "IfcRelAssociatesMaterial",
+        ifcopenshell.guid.new(),
+        walls["north"].OwnerHistory,
+        RelatedObjects=[walls["north"]],
+        RelatingMaterial=made,
+    )
     building = read(tmp_path, small.model)
     (space,) = building.spaces
     north = next(face for face in space.faces if face.normal[1] > 0.9 and face.kind == "wall")
@@ -138,16 +149,13 @@ def test_faces_know_what_lies_beyond_and_how_they_reflect(tmp_path):
     walls = [face for face in space.faces if face.kind == "wall"]
     assert len(walls) == 4 and all(face.adjacency == "outside" for face in walls)
     reflectances = {kind: round(face.reflectance_visible, 3) for kind, face in by_kind.items()}
-    assert reflectances == {
-        "floor": 0.3, "roof": 0.8, "wall": 0.5, "reveal": 0.5, "window frame": 0.7,
-    }  # fmt: skip
+    assert reflectances == {"floor": 0.3, "roof": 0.8, "wall": 0.5, "reveal": 0.5, "window frame": 0.7}
     south = next(face for face in walls if face.normal[1] < -0.9)
     assert south.construction.thickness == pytest.approx(0.3, abs=1e-3)
 
 
 @pytest.mark.parametrize(
-    ("true_north", "normal"),
-    [((0.0, 1.0), (0, -1)), ((1.0, 0.0), (1, 0)), ((-1.0, 1.0), (-(0.5**0.5), -(0.5**0.5)))],
+    ("true_north", "normal"), [((0.0, 1.0), (0, -1)), ((1.0, 0.0), (1, 0)), ((-1.0, 1.0), (-(0.5**0.5), -(0.5**0.5)))]
 )
 def test_true_north_turns_the_south_window(tmp_path, true_north, normal):
     # north along the model's +x: the model's -y then lies to the east
@@ -212,8 +220,7 @@ def test_defects_of_elements_do_not_open_the_room(tmp_path, defect):
 
 
 @pytest.mark.parametrize(
-    ("defect", "code"),
-    [({"doubled_wall": True}, "element-drawn-twice"), ({"slab_as_wall": True}, "wall-lies-flat")],
+    ("defect", "code"), [({"doubled_wall": True}, "element-drawn-twice"), ({"slab_as_wall": True}, "wall-lies-flat")]
 )
 def test_defects_of_elements_are_named(tmp_path, defect, code):
     sound, faulty = read(tmp_path, box_room()), read(tmp_path, box_room(**defect))

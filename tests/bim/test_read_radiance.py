@@ -31,11 +31,7 @@ def area(things):
 def of_own(scene):
     """Sorted corners of every polygon, with name and material."""
     return [
-        (
-            thing.name,
-            thing.material.name,
-            np.unique(thing.triangles.reshape(-1, 3).round(6), axis=0),
-        )
+        (thing.name, thing.material.name, np.unique(thing.triangles.reshape(-1, 3).round(6), axis=0))
         for thing in scene.objects
     ]
 
@@ -132,8 +128,7 @@ def _same_corners(ours, theirs):
         match = [
             other
             for other in left
-            if np.allclose(_vector(other), vector, atol=1e-5)
-            and np.allclose(_middle(other), _middle(mine), atol=1e-5)
+            if np.allclose(_vector(other), vector, atol=1e-5) and np.allclose(_middle(other), _middle(mine), atol=1e-5)
         ]
         assert match, mine.name
         left = [other for other in left if other is not match[0]]
@@ -154,14 +149,12 @@ def _middle(thing):
         ("plastic m\n0\n0\n5 .5 .4 .3 .1 .05", {"diffuse": 0.9 * 0.42, "mirrored": 0.1}),
         ("plastic m\n0\n0\n5 .5 .5 .5 .2 .6", {"diffuse": 0.6, "mirrored": 0.0}),
         ("metal m\n0\n0\n5 .5 .5 .5 .8 .05", {"diffuse": 0.1, "mirrored": 0.4}),
-        ("trans m\n0\n0\n7 .8 .8 .8 .1 0 .5 .25",
-         {"diffuse": 0.36, "transmitted": 0.27, "straight": 0.09}),
+        ("trans m\n0\n0\n7 .8 .8 .8 .1 0 .5 .25", {"diffuse": 0.36, "transmitted": 0.27, "straight": 0.09}),
         ("mirror m\n0\n0\n3 .9 .9 .9", {"mirrored": 0.9}),
-        ("glass m\n0\n0\n3 .9 .9 .9",
-         {"transmissivity": 0.9, "index": 1.52, "mirrored": 0.04258 * (1 + 0.9 * 0.8252)}),
+        ("glass m\n0\n0\n3 .9 .9 .9", {"transmissivity": 0.9, "index": 1.52, "mirrored": 0.04258 * (1 + 0.9 * 0.8252)}),
         ("dielectric m\n0\n0\n5 .9 .9 .9 1.33 0", {"transmissivity": 0.9, "index": 1.33}),
     ],
-)  # fmt: skip
+)
 def test_materials_reflect_and_pass_by_their_formulas(tmp_path, material, expected):
     text = f"void {material}\n{SQUARE.replace('grey', 'm')}"
     found = read_radiance(write(tmp_path, text)).objects[0].material
@@ -170,9 +163,7 @@ def test_materials_reflect_and_pass_by_their_formulas(tmp_path, material, expect
     assert values == pytest.approx(expected, rel=2e-3)
 
 
-@pytest.mark.parametrize(
-    "material", ["BSDF m\n6 0.1 blind.xml 0 0 1 .\n0\n0", "aBSDF m\n5 blind.xml 0 0 1 .\n0\n0"]
-)
+@pytest.mark.parametrize("material", ["BSDF m\n6 0.1 blind.xml 0 0 1 .\n0\n0", "aBSDF m\n5 blind.xml 0 0 1 .\n0\n0"])
 def test_a_bsdf_names_its_file(tmp_path, material):
     text = f"void {material}\n{SQUARE.replace('grey', 'm')}"
     (thing,) = read_radiance(write(tmp_path, text)).objects
@@ -198,8 +189,7 @@ def test_the_last_definition_before_a_surface_counts_and_an_alias_leads_on(tmp_p
 def test_an_alias_has_the_patterns_that_it_names_or_inherits_those_of_the_material(tmp_path):
     half = "void brightfunc half\n2 .5 .\n0\n0\n"
     text = half + GREY + GREY.replace("void plastic grey", "half plastic dim")
-    for modifier, name, reference in (("half", "one", "grey"), ("void", "two", "dim"),
-                                      ("inherit", "three", "dim")):  # fmt: skip
+    for modifier, name, reference in (("half", "one", "grey"), ("void", "two", "dim"), ("inherit", "three", "dim")):
         text += f"{modifier} alias {name} {reference}\n" + SQUARE.replace("grey", name)
     diffuse = [one.material.diffuse for one in read_radiance(write(tmp_path, text)).objects]
     assert diffuse == pytest.approx([0.25, 0.5, 0.25])
@@ -230,9 +220,10 @@ def test_what_is_not_used_is_named_once_with_its_count(tmp_path):
     scene = read_radiance(write(tmp_path, text))
     assert len(scene.objects) == 2
     assert [(issue.code, issue.values["type"]) for issue in scene.issues] == [
-        ("material-patterns-left-out", ""), ("primitives-not-read", "source"),
+        ("material-patterns-left-out", ""),
+        ("primitives-not-read", "source"),
         ("surfaces-not-read", "mixfunc"),
-    ]  # fmt: skip
+    ]
     last = scene.issues[2].values
     assert (last["count"], last["first"]) == (3, "square")
 
@@ -286,8 +277,13 @@ def box(folder):
     pane = "pane polygon p\n0\n0\n12 1 0 1  3 0 1  3 0 2  1 0 2\n"
     hole = "1 0 1  1 0 2  3 0 2  3 0 1  1 0 1"
     wall = f"grey polygon w\n0\n0\n30 0 0 0  4 0 0  4 0 3  0 0 3  0 0 0  {hole}\n"
-    sides = ["0 0 0 0 6 0 4 6 0 4 0 0", "0 0 3 4 0 3 4 6 3 0 6 3", "0 6 0 0 6 3 4 6 3 4 6 0",
-             "0 0 0 0 0 3 0 6 3 0 6 0", "4 0 0 4 6 0 4 6 3 4 0 3"]  # fmt: skip
+    sides = [
+        "0 0 0 0 6 0 4 6 0 4 0 0",
+        "0 0 3 4 0 3 4 6 3 0 6 3",
+        "0 6 0 0 6 3 4 6 3 4 6 0",
+        "0 0 0 0 0 3 0 6 3 0 6 0",
+        "4 0 0 4 6 0 4 6 3 4 0 3",
+    ]
     text = GREY + "void glass pane\n0\n0\n3 .9 .9 .9\n" + wall + pane
     text += "".join(f"grey polygon s{i}\n0\n0\n12 {side}\n" for i, side in enumerate(sides))
     return write(folder, text)

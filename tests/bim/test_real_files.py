@@ -52,10 +52,7 @@ def test_true_north_of_the_fzk_house(real_data):
     # TrueNorth (0.766, 0.643) lies 50 degrees clockwise from the model's +y: a facade towards the
     # model's -y has azimuth 180 - 50 = 130 degrees, and the others follow at right angles
     building = read_ifc(real_data / "ifc/buildings/AC20-FZK-Haus.ifc")
-    azimuths = {
-        round(float(np.degrees(np.arctan2(w.normal[0], w.normal[1])))) % 360
-        for w in building.windows
-    }
+    azimuths = {round(float(np.degrees(np.arctan2(w.normal[0], w.normal[1])))) % 360 for w in building.windows}
     assert azimuths == {130, 220, 310, 40}
 
 
@@ -92,14 +89,10 @@ def test_exported_rooms_are_dark_but_for_their_windows(real_data, tmp_path, radi
         black = path.read_text().replace("glow", "plastic").replace("4 1 1 1 0", "5 0 0 0 0 0")
         (tmp_path / f"shut_{path.name}").write_text(black)
     shut = run(
-        "oconv materials.rad room.rad shut_*.rad white.rad > shut.oct && " + TRACE.format("shut"),
-        tmp_path, radiance,
-    )  # fmt: skip
+        "oconv materials.rad room.rad shut_*.rad white.rad > shut.oct && " + TRACE.format("shut"), tmp_path, radiance
+    )
     assert np.all(np.array(shut.split(), dtype=float) == 0.0)
-    lit = run(
-        "oconv materials.rad room.rad white.rad > open.oct && " + TRACE.format("open"),
-        tmp_path, radiance,
-    )  # fmt: skip
+    lit = run("oconv materials.rad room.rad white.rad > open.oct && " + TRACE.format("open"), tmp_path, radiance)
     irradiance = np.array(lit.split(), dtype=float).reshape(-1, 3)[:, 0]
     faces = np.concatenate([face.triangles for face in space.faces])
     ours = np.pi * sky_share(faces, np.loadtxt(files.sensors)[:, :3])

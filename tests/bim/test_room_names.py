@@ -33,11 +33,18 @@ ROOMS = (
 @pytest.mark.parametrize(
     ("wanted", "guid"),
     [
-        ("01", "0aB"), ("Wohnzimmer", "0aB"), ("01 Wohnzimmer", "0aB"), ("0aB", "0aB"),
-        ("wohnzimmer", "0aB"), ("01  WOHNZIMMER ", "0aB"), ("03 bad", "2eF"),
-        ("lab", "3gH"), ("big laboratory", "4iJ"), ("5kL", "5kL"),
+        ("01", "0aB"),
+        ("Wohnzimmer", "0aB"),
+        ("01 Wohnzimmer", "0aB"),
+        ("0aB", "0aB"),
+        ("wohnzimmer", "0aB"),
+        ("01  WOHNZIMMER ", "0aB"),
+        ("03 bad", "2eF"),
+        ("lab", "3gH"),
+        ("big laboratory", "4iJ"),
+        ("5kL", "5kL"),
     ],
-)  # fmt: skip
+)
 def test_a_room_is_found_by_what_people_call_it(wanted, guid):
     assert item_named(ROOMS, wanted, "space").guid == guid
 
@@ -53,11 +60,16 @@ def test_a_name_of_several_lists_them_so_that_one_can_be_chosen():
 @pytest.mark.parametrize(
     ("name", "long_name", "label"),
     [
-        ("1 - Living room", "Living room", "1 - Living room"), ("101", "101 Office", "101 Office"),
-        ("1", "Living room", "1 Living room"), ("lab", "Lab", "lab Lab"), ("", "Bad", "Bad"),
-        ("Bad", "Bad", "Bad"), ("Bath 1", "1 Bath", "Bath 1 1 Bath"), ("", "", "guid"),
+        ("1 - Living room", "Living room", "1 - Living room"),
+        ("101", "101 Office", "101 Office"),
+        ("1", "Living room", "1 Living room"),
+        ("lab", "Lab", "lab Lab"),
+        ("", "Bad", "Bad"),
+        ("Bad", "Bad", "Bad"),
+        ("Bath 1", "1 Bath", "Bath 1 1 Bath"),
+        ("", "", "guid"),
     ],
-)  # fmt: skip
+)
 def test_a_label_says_each_name_once(name, long_name, label):
     assert label_of(name, long_name, "guid") == label
 

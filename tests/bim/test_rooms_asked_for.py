@@ -35,9 +35,8 @@ def test_a_wrong_name_is_refused_before_geometry(wrong) -> None:
 
 @pytest.mark.parametrize(
     "room",
-    ["A", "south  OFFICE", "20B6FKss9Pix5t4FsUrS_W", "A South office", "A + B", "office",
-     "20B6FKss9Pix5t4FsUrS_W-581"],
-)  # fmt: skip
+    ["A", "south  OFFICE", "20B6FKss9Pix5t4FsUrS_W", "A South office", "A + B", "office", "20B6FKss9Pix5t4FsUrS_W-581"],
+)
 @pytest.mark.usefixtures("no_geometry")
 def test_a_name_like_one_of_the_file_is_decided_by_its_rooms(room) -> None:
     with pytest.raises(_Read):

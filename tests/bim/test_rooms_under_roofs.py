@@ -21,9 +21,7 @@ DORMER = body((-0.5, -0.5, 3.2), (4.5, 6.5, 3.4))
 
 def _cut(*roofs: np.ndarray) -> tuple[SpaceRecord, list]:
     solid = solid_of(ROOM)
-    record = SpaceRecord(
-        room_solid("r", "r", solid.manifold), "r", "", "", 72.0, None, None, step_id=1
-    )
+    record = SpaceRecord(room_solid("r", "r", solid.manifold), "r", "", "", 72.0, None, None, step_id=1)
     lids = [
         Shape("g", i, "IfcRoof", "", mesh, (), np.full(len(mesh), -1), np.zeros(len(mesh), int))
         for i, mesh in enumerate(roofs)

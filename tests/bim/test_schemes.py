@@ -93,9 +93,7 @@ def test_heat_capacity_in_kilojoules_is_taken_as_such_and_named(tmp_path):
     model = small.model
     values = {"SpecificHeatCapacity": 0.92, "MassDensity": 1500.0, "ThermalConductivity": 0.7}
     singles = [
-        model.create_entity(
-            "IfcPropertySingleValue", name, None, model.create_entity("IfcReal", value)
-        )
+        model.create_entity("IfcPropertySingleValue", name, None, model.create_entity("IfcReal", value))
         for name, value in values.items()
     ]
     (material,) = model.by_type("IfcMaterial")

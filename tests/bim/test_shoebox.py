@@ -35,8 +35,7 @@ def test_a_shell_without_one_face_is_seen_as_open():
 
 
 @pytest.mark.parametrize(
-    ("facing_deg", "normal"),
-    [(180, (0, -1, 0)), (90, (1, 0, 0)), (0, (0, 1, 0)), (225, (-(0.5**0.5), -(0.5**0.5), 0))],
+    ("facing_deg", "normal"), [(180, (0, -1, 0)), (90, (1, 0, 0)), (0, (0, 1, 0)), (225, (-(0.5**0.5), -(0.5**0.5), 0))]
 )
 def test_front_window_faces_the_azimuth(facing_deg, normal):
     window = shoebox(facing_deg=facing_deg).windows[0]
@@ -77,11 +76,7 @@ def test_surfaces_for_the_tracer_keep_the_order_of_faces():
 
 @pytest.mark.parametrize(
     "window",
-    [
-        WindowRectangle(3.5, 1, 1, 1),
-        WindowRectangle(0.5, 1, 1, 1, "floor"),
-        WindowRectangle(0.5, 1, 1, 1, frame=0.5),
-    ],
+    [WindowRectangle(3.5, 1, 1, 1), WindowRectangle(0.5, 1, 1, 1, "floor"), WindowRectangle(0.5, 1, 1, 1, frame=0.5)],
 )
 def test_impossible_windows_are_refused(window):
     with pytest.raises(ValueError, match="window"):

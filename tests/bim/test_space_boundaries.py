@@ -36,12 +36,15 @@ def boundary(model, space, element, width, height, *, hole, beyond, curve="IfcPo
     inner = [ring(*OPENING[2:])] if hole else []
     surface = create("IfcCurveBoundedPlane", plane, ring(width, height), inner)
     create(
-        "IfcRelSpaceBoundary", GlobalId=ifcopenshell.guid.new(),
-        Name="2ndLevel" if level == 2 else "1stLevel", RelatingSpace=space,
+        "IfcRelSpaceBoundary",
+        GlobalId=ifcopenshell.guid.new(),
+        Name="2ndLevel" if level == 2 else "1stLevel",
+        RelatingSpace=space,
         RelatedBuildingElement=element,
         ConnectionGeometry=create("IfcConnectionSurfaceGeometry", surface),
-        PhysicalOrVirtualBoundary="PHYSICAL", InternalOrExternalBoundary=beyond,
-    )  # fmt: skip
+        PhysicalOrVirtualBoundary="PHYSICAL",
+        InternalOrExternalBoundary=beyond,
+    )
 
 
 def issues(tmp_path, changed=None, schema="IFC4", **how) -> list[Issue]:
@@ -68,18 +71,12 @@ def test_boundaries_that_agree_are_counted(tmp_path, curve, schema, hole):
 
 
 def test_each_difference_is_named(tmp_path):
-    changed = {
-        "north": (WIDTH, 0.8 * HEIGHT, False, "EXTERNAL"),
-        "west": (DEPTH, HEIGHT, False, "INTERNAL"),
-    }
+    changed = {"north": (WIDTH, 0.8 * HEIGHT, False, "EXTERNAL"), "west": (DEPTH, HEIGHT, False, "INTERNAL")}
     head, *rest = issues(tmp_path, changed)
     assert head.values["agreeing"] == 3
     north, west = sorted(rest, key=lambda issue: issue.code)
     area = WIDTH * HEIGHT
-    assert [i.code for i in (north, west)] == [
-        "boundary-area-differs",
-        "boundary-neighbour-differs",
-    ]
+    assert [i.code for i in (north, west)] == ["boundary-area-differs", "boundary-neighbour-differs"]
     assert (north.values["element"], north.values["room"]) == ("IfcWall north", "R1 Room")
     areas = [north.values[name] for name in ("stated", "net", "gross")]
     assert areas == pytest.approx([0.8 * area, area, area])

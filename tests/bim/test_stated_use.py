@@ -181,17 +181,14 @@ def test_spaces_and_zones_of_gbxml_state_their_use(tmp_path):
     ("old", "new", "where", "reason", "lost"),
     [
         ("WattPerSquareFoot", "Candles", "Space Office", "unit 'Candles'", "lighting_w"),
-        ('weekScheduleIdRef="w2"', 'weekScheduleIdRef="w9"', "YearSchedule y2", "no WeekSchedule",
-         "persons"),
+        ('weekScheduleIdRef="w2"', 'weekScheduleIdRef="w9"', "YearSchedule y2", "no WeekSchedule", "persons"),
         ('dayType="Weekday"', 'dayType="Payday"', "WeekSchedule w", "'Payday'", None),
         ("2019-07-01", "2019-02-31", "YearSchedule y2", "expected YYYY-MM-DD", None),
         ('unit="F"', 'unit="Re"', "Zone z", "temperature unit 'Re'", "cooling_c"),
         ("<ScheduleValue>21</ScheduleValue>", "", "DaySchedule warm", "holds 0", "heating_c"),
     ],
-)  # fmt: skip
-def test_a_use_that_cannot_be_read_is_an_issue_and_the_rest_is_used(
-    tmp_path, old, new, where, reason, lost
-):
+)
+def test_a_use_that_cannot_be_read_is_an_issue_and_the_rest_is_used(tmp_path, old, new, where, reason, lost):
     path = tmp_path / "used.xml"
     text = used_gbxml()
     assert old in text
@@ -260,9 +257,7 @@ def test_air_changes_of_gbxml_are_of_the_rooms_volume(tmp_path, changes):
     assert use.ventilation_m3_s.peak == pytest.approx(changes * 120.0 / 3600.0)
 
 
-@pytest.mark.parametrize(
-    ("unit", "area"), [("SquareMPerPerson", 10.0), ("SquareFtPerPerson", 0.9290304)]
-)
+@pytest.mark.parametrize(("unit", "area"), [("SquareMPerPerson", 10.0), ("SquareFtPerPerson", 0.9290304)])
 def test_the_floor_of_a_person_has_a_unit(tmp_path, unit, area):
     """10 square feet are 0.929 m2."""
     path = tmp_path / "used.xml"
@@ -273,9 +268,7 @@ def test_the_floor_of_a_person_has_a_unit(tmp_path, unit, area):
     assert use.persons.peak == pytest.approx(space.floor_area / area)
 
 
-@pytest.mark.parametrize(
-    ("unit", "text"), [("C", "25"), ("F", "77"), ("K", "298.15"), ("R", "536.67")]
-)
+@pytest.mark.parametrize(("unit", "text"), [("C", "25"), ("F", "77"), ("K", "298.15"), ("R", "536.67")])
 def test_a_design_temperature_has_a_unit(tmp_path, unit, text):
     path = tmp_path / "used.xml"
     path.write_text(used_gbxml().replace('unit="F">77', f'unit="{unit}">{text}'))
@@ -283,9 +276,7 @@ def test_a_design_temperature_has_a_unit(tmp_path, unit, text):
     assert use.cooling_c.values == pytest.approx(25.0)
 
 
-@pytest.mark.parametrize(
-    ("kinds", "is_split"), [("Total", False), ("Total Sensible", True), ("Sensible", True)]
-)
+@pytest.mark.parametrize(("kinds", "is_split"), [("Total", False), ("Total Sensible", True), ("Sensible", True)])
 def test_heat_of_people_that_is_not_split_is_named(tmp_path, kinds, is_split):
     path, text = tmp_path / "used.xml", used_gbxml()
     for kind in {"Total", "Sensible"} - set(kinds.split()):

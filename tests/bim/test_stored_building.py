@@ -98,9 +98,7 @@ def test_a_file_that_changes_while_it_is_read_is_not_stored(office, cache, monke
     assert not list(cache.folder.glob("building-*"))
 
 
-def test_a_building_that_lacks_what_a_process_did_not_finish_is_not_stored(
-    office, cache, monkeypatch
-) -> None:
+def test_a_building_that_lacks_what_a_process_did_not_finish_is_not_stored(office, cache, monkeypatch) -> None:
     read = bim.building_file._read_ifc
 
     def interrupted(path, options, progress):

@@ -27,13 +27,10 @@ def test_the_next_storeys_are_kept_with_their_openings(model_text):
     model = ifcopenshell.file.from_string(model_text)
     walls = len(model.by_type("IfcWall"))
     (issue,) = keep_storeys(model, ["storey  3"], "tower.ifc", Damage())
-    assert {storey_of(space) for space in model.by_type("IfcSpace")} == {
-        "Storey 2", "Storey 3", "Storey 4",
-    }  # fmt: skip
+    assert {storey_of(space) for space in model.by_type("IfcSpace")} == {"Storey 2", "Storey 3", "Storey 4"}
     assert len(model.by_type("IfcSpace")) == 30
     assert len(model.by_type("IfcWall")) == walls * 3 // STOREYS
-    assert all(relation.RelatedOpeningElement for wall in model.by_type("IfcWall")
-               for relation in wall.HasOpenings)  # fmt: skip
+    assert all(relation.RelatedOpeningElement for wall in model.by_type("IfcWall") for relation in wall.HasOpenings)
     assert all(window.FillsVoids for window in model.by_type("IfcWindow"))
     assert issue.values["spaces"] == 20
     assert issue.values["storeys"] == ("Storey 3",)
@@ -42,10 +39,8 @@ def test_the_next_storeys_are_kept_with_their_openings(model_text):
 
 def test_a_wall_of_the_ground_storey_that_reaches_up_is_kept_with_its_window(model_text):
     model = ifcopenshell.file.from_string(model_text)
-    wall = next(one for one in model.by_type("IfcWall") if storey_of(one) == "Storey 0"
-                or one.Name == "South wall")  # fmt: skip
-    body = next(r for r in wall.Representation.Representations
-                if r.RepresentationIdentifier == "Body")  # fmt: skip
+    wall = next(one for one in model.by_type("IfcWall") if storey_of(one) == "Storey 0" or one.Name == "South wall")
+    body = next(r for r in wall.Representation.Representations if r.RepresentationIdentifier == "Body")
     solid = body.Items[0]
     while not solid.is_a("IfcExtrudedAreaSolid"):
         solid = solid.FirstOperand
@@ -65,9 +60,7 @@ def test_windows_of_a_whole_without_a_body_are_decided_by_their_opening(model_te
         wall.Representation = None
     windows = len(model.by_type("IfcWindow"))
     keep_storeys(model, ["Storey 3"], "tower.ifc", Damage())
-    assert {storey_of(one) for one in model.by_type("IfcWindow")} == {
-        "Storey 2", "Storey 3", "Storey 4",
-    }  # fmt: skip
+    assert {storey_of(one) for one in model.by_type("IfcWindow")} == {"Storey 2", "Storey 3", "Storey 4"}
     assert len(model.by_type("IfcWindow")) == windows * 3 // STOREYS
     assert all(window.FillsVoids for window in model.by_type("IfcWindow"))
 

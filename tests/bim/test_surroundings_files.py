@@ -13,12 +13,7 @@ from bim.ifc.building import read_ifc
 from bim.model import Georeference, crs_name, local_metres
 from bim.shell import enclosed_volume
 from bim.shoebox import WindowRectangle, shoebox
-from bim.surroundings.placement import (
-    horizon_wall,
-    read_horizon,
-    read_surroundings,
-    with_surroundings,
-)
+from bim.surroundings.placement import horizon_wall, read_horizon, read_surroundings, with_surroundings
 from mitsuba_cfs.errors import DataError
 from tests.bim.bim_fuzz import mutations, refusals
 from tests.bim.small_ifc import box_room
@@ -36,16 +31,7 @@ def house():
 def block(low, high) -> tuple[list, list]:
     """Vertices and boundaries of a box as a Solid of CityJSON."""
     (a, b, c), (d, e, f) = low, high
-    vertices = [
-        [a, b, c],
-        [d, b, c],
-        [d, e, c],
-        [a, e, c],
-        [a, b, f],
-        [d, b, f],
-        [d, e, f],
-        [a, e, f],
-    ]
+    vertices = [[a, b, c], [d, b, c], [d, e, c], [a, e, c], [a, b, f], [d, b, f], [d, e, f], [a, e, f]]
     faces = [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
     return vertices, [[[face] for face in faces]]
 
@@ -63,11 +49,13 @@ def city(blocks: dict[str, tuple], crs="https://www.opengis.net/def/crs/EPSG/0/2
         objects[name] = {"type": "Building", "geometry": [coarse, fine]}
     corner = np.min(vertices, axis=0)
     return {
-        "type": "CityJSON", "version": "2.0", "metadata": {"referenceSystem": crs},
+        "type": "CityJSON",
+        "version": "2.0",
+        "metadata": {"referenceSystem": crs},
         "transform": {"scale": [0.001] * 3, "translate": corner.tolist()},
         "vertices": np.rint((np.array(vertices) - corner) * 1000).astype(int).tolist(),
         "CityObjects": objects,
-    }  # fmt: skip
+    }
 
 
 def written(folder, content, name):
@@ -89,8 +77,12 @@ def test_a_quarter_stands_where_the_map_conversion_says(house, tmp_path):
     to_world[:3, :3] = turn
     to_world[:3, 3] = -turn @ [456000.0, 5430000.0, 110.0]
     house = replace(house, georeference=Georeference("EPSG:25832", to_world))
-    quarter = city({"tower": ((456000, 5430010, 110), (456020, 5430030, 140)),
-                    "itself": ((456000, 5430000, 110), (456009, 5430006, 113))})  # fmt: skip
+    quarter = city(
+        {
+            "tower": ((456000, 5430010, 110), (456020, 5430030, 140)),
+            "itself": ((456000, 5430000, 110), (456009, 5430006, 113)),
+        }
+    )
     found = with_surroundings(house, [written(tmp_path, quarter, "quarter.city.json")])
     low, high = bounds(found, "tower")
     np.testing.assert_allclose(low, [10, -20, 0], atol=2e-3)
@@ -99,8 +91,7 @@ def test_a_quarter_stands_where_the_map_conversion_says(house, tmp_path):
 
 def test_the_building_itself_is_left_out(house, tmp_path):
     low = house.spaces[0].shell.reshape(-1, 3).min(axis=0)
-    quarter = city({"itself": (low.tolist(), np.add(low, (4, 5, 3)).tolist()),
-                    "other": ((20, 0, 0), (30, 10, 9))})  # fmt: skip
+    quarter = city({"itself": (low.tolist(), np.add(low, (4, 5, 3)).tolist()), "other": ((20, 0, 0), (30, 10, 9))})
     path = written(tmp_path, quarter, "quarter.city.json")
     found = with_surroundings(house, [path], offset=(0, 0, 0))
     assert [element.name for element in found.elements] == ["other"]
@@ -126,9 +117,10 @@ def test_footprints_stand_by_latitude_and_longitude(house, tmp_path):
     lon, lat = 8 + 1 / 60, 50 + 1 / 60
     ring = [[lon, lat], [lon + 1e-4, lat], [lon + 1e-4, lat + 1e-4], [lon, lat + 1e-4], [lon, lat]]
     feature = {
-        "type": "Feature", "properties": {"building:levels": "4", "name": "block"},
+        "type": "Feature",
+        "properties": {"building:levels": "4", "name": "block"},
         "geometry": {"type": "Polygon", "coordinates": [ring]},
-    }  # fmt: skip
+    }
     collection = {"type": "FeatureCollection", "features": [feature]}
     found = with_surroundings(house, [written(tmp_path, collection, "q.geojson")])
     low, high = bounds(found, "block")
@@ -203,26 +195,44 @@ def test_what_cannot_be_placed_is_refused(house, tmp_path):
     [
         ("a.city.json", {"type": "City"}, "type: expected CityJSON"),
         ("a.city.json", {"type": "CityJSON", "vertices": [[1, 2]]}, "vertices: expected triples"),
-        ("a.city.json", {"type": "CityJSON", "vertices": [], "CityObjects": {"h": {"geometry": [
-            {"type": "MultiSurface", "lod": 2, "boundaries": [[[0, 1, 9]]]}]}}},
-         "h: boundaries: expected lists"),
-        ("a.city.json", {"type": "CityJSON", "vertices": [[1, 2, 1e305]]},
-         "vertices: expected finite numbers"),
-        ("a.geojson", {"type": "FeatureCollection", "features": [
-            {"properties": {"height": 9}, "geometry": {"type": "Polygon", "coordinates": [
-                [[0, 0], [1e305, 0], [1e305, 1], [0, 0]]]}}]},
-         "feature 0: geometry.coordinates: is no polygon"),
-        ("a.geojson", {"type": "FeatureCollection", "features": []},
-         "properties: no polygon states a height"),
-        ("a.geojson", {"type": "FeatureCollection", "features": [
-            {"properties": {"height": "tall"}, "geometry": None}]},
-         "feature 0: height: expected metres, got 'tall'"),
-        ("a.gltf", {"buffers": [{"uri": "../../etc/passwd"}]},
-         "buffers.uri: ../../etc/passwd: files beside a mesh are not read"),
+        (
+            "a.city.json",
+            {
+                "type": "CityJSON",
+                "vertices": [],
+                "CityObjects": {"h": {"geometry": [{"type": "MultiSurface", "lod": 2, "boundaries": [[[0, 1, 9]]]}]}},
+            },
+            "h: boundaries: expected lists",
+        ),
+        ("a.city.json", {"type": "CityJSON", "vertices": [[1, 2, 1e305]]}, "vertices: expected finite numbers"),
+        (
+            "a.geojson",
+            {
+                "type": "FeatureCollection",
+                "features": [
+                    {
+                        "properties": {"height": 9},
+                        "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [1e305, 0], [1e305, 1], [0, 0]]]},
+                    }
+                ],
+            },
+            "feature 0: geometry.coordinates: is no polygon",
+        ),
+        ("a.geojson", {"type": "FeatureCollection", "features": []}, "properties: no polygon states a height"),
+        (
+            "a.geojson",
+            {"type": "FeatureCollection", "features": [{"properties": {"height": "tall"}, "geometry": None}]},
+            "feature 0: height: expected metres, got 'tall'",
+        ),
+        (
+            "a.gltf",
+            {"buffers": [{"uri": "../../etc/passwd"}]},
+            "buffers.uri: ../../etc/passwd: files beside a mesh are not read",
+        ),
         ("a.dwg", {}, "surroundings: expected a file of"),
         ("horizon.json", {"outputs": {}}, "expected outputs.horizon_profile"),
     ],
-)  # fmt: skip
+)
 def test_faults_are_one_line(house, tmp_path, name, content, said):
     path = written(tmp_path, content, name)
     with pytest.raises(DataError) as caught:
@@ -236,8 +246,11 @@ def test_random_bytes_give_one_line(tmp_path, suffix):
     if suffix == "city.json":
         whole = json.dumps(city({"a": ((0, 0, 0), (9, 9, 9))})).encode()
     elif suffix == "geojson":
-        feature = {"type": "Feature", "properties": {"height": 9.0},
-                   "geometry": {"type": "Polygon", "coordinates": [ring]}}  # fmt: skip
+        feature = {
+            "type": "Feature",
+            "properties": {"height": 9.0},
+            "geometry": {"type": "Polygon", "coordinates": [ring]},
+        }
         whole = json.dumps({"type": "FeatureCollection", "features": [feature] * 3}).encode()
     else:
         whole = trimesh.creation.box((1, 2, 3)).export(file_type=suffix)
@@ -274,8 +287,11 @@ def test_a_quarter_around_a_real_house(real_data, tmp_path, kind):
     low, high = (lon, lat + north), (lon + east, lat + north + north / 3)
     if kind == "geojson":
         ring = [low, (high[0], low[1]), high, (low[0], high[1]), low]
-        feature = {"type": "Feature", "properties": {"height": 9.0, "name": "block"},
-                   "geometry": {"type": "Polygon", "coordinates": [ring]}}  # fmt: skip
+        feature = {
+            "type": "Feature",
+            "properties": {"height": 9.0, "name": "block"},
+            "geometry": {"type": "Polygon", "coordinates": [ring]},
+        }
         content = {"type": "FeatureCollection", "features": [feature]}
     else:
         pyproj = pytest.importorskip("pyproj")

@@ -30,8 +30,9 @@ def test_shifted_rooms_are_one_and_turned_rooms_are_not():
     turned = shoebox(windows=(ONE,), recess=0.2, facing_deg=90).spaces[0]
     groups = template_rooms([room, turned, above])
     assert [[space is one for space in (room, turned, above)] for (one, *_) in groups] == [
-        [True, False, False], [False, True, False],
-    ]  # fmt: skip
+        [True, False, False],
+        [False, True, False],
+    ]
     assert groups[0] == (room, above)
 
 

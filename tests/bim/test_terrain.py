@@ -111,9 +111,7 @@ def test_a_bad_grid_is_one_line(house, tmp_path, text, said):
     assert said in str(caught.value) and "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "text", ["1 2 3\n", "0 0 1\n1 0 1\n0.3 1 1\n1 1 1\n0 1.7 2\n", "0 0 1\n" * 4, "a b c\n" * 4]
-)
+@pytest.mark.parametrize("text", ["1 2 3\n", "0 0 1\n1 0 1\n0.3 1 1\n1 1 1\n0 1.7 2\n", "0 0 1\n" * 4, "a b c\n" * 4])
 def test_a_bad_list_is_one_line(tmp_path, text):
     with pytest.raises(DataError, match=r"hill\.xyz") as caught:
         read_surroundings(written(tmp_path, text, "hill.xyz"))

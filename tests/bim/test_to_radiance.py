@@ -18,10 +18,7 @@ from bim.shoebox import WindowRectangle, shoebox
 from bim.to_radiance import identifier, write_radiance
 from tests.bim.small_ifc import box_room
 
-WINDOWS = (
-    WindowRectangle(0.5, 0.9, 3.0, 1.5, frame=0.08),
-    WindowRectangle(1.0, 1.0, 1.0, 2.0, "ceiling"),
-)
+WINDOWS = (WindowRectangle(0.5, 0.9, 3.0, 1.5, frame=0.08), WindowRectangle(1.0, 1.0, 1.0, 2.0, "ceiling"))
 # no sharing of values between sensors; every ray counts, however dim
 TRACE = "rtrace -h -I -ab 1 -aa 0 -ad 50000 -lw 1e-9 {0}.oct < sensors.pts"
 SKY_ALL_ROUND = "void glow white 0 0 4 1 1 1 0\nwhite source all 0 0 4 0 0 1 360\n"
@@ -38,9 +35,7 @@ def radiance() -> dict[str, str]:
 
 
 def run(command: str, folder: Path, environment: dict[str, str]) -> bytes:
-    done = subprocess.run(
-        ["bash", "-c", command], cwd=folder, env=environment, capture_output=True, check=False
-    )
+    done = subprocess.run(["bash", "-c", command], cwd=folder, env=environment, capture_output=True, check=False)
     assert done.returncode == 0, done.stderr.decode()
     assert b"fatal" not in done.stderr and b"error" not in done.stderr, done.stderr.decode()
     return done.stdout
@@ -49,9 +44,7 @@ def run(command: str, folder: Path, environment: dict[str, str]) -> bytes:
 def matrix(data: bytes) -> np.ndarray:
     """First channel of a Radiance matrix of floats or doubles [rows, columns]."""
     head, body = data.split(b"\n\n", 1)
-    size = [
-        int(re.search(rb"%s=\s*(\d+)" % key, head)[1]) for key in (b"NROWS", b"NCOLS", b"NCOMP")
-    ]
+    size = [int(re.search(rb"%s=\s*(\d+)" % key, head)[1]) for key in (b"NROWS", b"NCOLS", b"NCOMP")]
     dtype = np.float64 if b"FORMAT=double" in head else np.float32
     return np.frombuffer(body, dtype)[: np.prod(size)].reshape(size)[..., 0].astype(float)
 
@@ -83,14 +76,10 @@ def test_room_is_dark_but_for_its_windows(tmp_path, radiance):
         black = path.read_text().replace("glow", "plastic").replace("4 1 1 1 0", "5 0 0 0 0 0")
         (tmp_path / f"shut_{path.name}").write_text(black)
     shut = run(
-        "oconv materials.rad room.rad shut_*.rad white.rad > shut.oct && " + TRACE.format("shut"),
-        tmp_path, radiance,
-    )  # fmt: skip
+        "oconv materials.rad room.rad shut_*.rad white.rad > shut.oct && " + TRACE.format("shut"), tmp_path, radiance
+    )
     assert np.all(np.array(shut.split(), dtype=float) == 0.0)
-    lit = run(
-        "oconv materials.rad room.rad white.rad > open.oct && " + TRACE.format("open"),
-        tmp_path, radiance,
-    )  # fmt: skip
+    lit = run("oconv materials.rad room.rad white.rad > open.oct && " + TRACE.format("open"), tmp_path, radiance)
     irradiance = np.array(lit.split(), dtype=float).reshape(-1, 3)[:, 0]
     points = np.loadtxt(files.sensors)[:, :3]
     faces = np.concatenate([face.triangles for face in space.faces])
@@ -109,8 +98,9 @@ def test_rfluxmtx_takes_the_files_and_finds_the_form_factor(tmp_path, radiance):
     view = run(
         "oconv materials.rad room.rad > room.oct && rfluxmtx -fad -I+ -ab 1 -ad 200000 -lw 1e-9 "
         f"-y {len(points)} - windows_S.rad -i room.oct < sensors.pts",
-        tmp_path, radiance,
-    )  # fmt: skip
+        tmp_path,
+        radiance,
+    )
     sums = matrix(view).sum(axis=1)
     exact = np.pi * np.array([window_factor(p, 0.58, 3.42, 0.98, 2.32) for p in points])
     # Radiance seeds by the clock: the darker of the two sensors spread by 0.39 % over 12 runs
@@ -141,8 +131,9 @@ def test_daylight_matrix_of_an_unobstructed_window_sees_everything(tmp_path, rad
         daylight = run(
             f"oconv materials.rad outdoors.rad > outdoors.oct && rfluxmtx -ffd -ab 1 -ad 16 -c 200 "
             f"{name.name} sky.rad -i outdoors.oct",
-            tmp_path, radiance,
-        )  # fmt: skip
+            tmp_path,
+            radiance,
+        )
         rows = matrix(daylight)
         assert rows.shape == (145, 146)
         # each row is the share of rays that reach ground and sky: all of them
@@ -158,8 +149,9 @@ def test_rays_of_the_daylight_matrix_go_outdoors(tmp_path, radiance):
     daylight = run(
         "oconv materials.rad outdoors.rad > outdoors.oct && rfluxmtx -ffd -ab 1 -ad 16 -c 200 "
         "windows_S.rad sky.rad -i outdoors.oct",
-        tmp_path, radiance,
-    )  # fmt: skip
+        tmp_path,
+        radiance,
+    )
     # the black screen stops all but rays that run along it, some of the outermost Klems ring
     assert matrix(daylight).sum(axis=1).max() < 0.2
 

@@ -110,17 +110,20 @@ def test_a_crown_without_leaves_in_some_months_and_bigger_leaves_far_away(tmp_pa
     assert crown_elements(crown(tmp_path), (1.0,) * 12, "g", 5.0) == []
     (far,) = crown_elements(crown(tmp_path), clear, "g", 90.0)
     assert len(far.triangles) == pytest.approx(len(layer.triangles) / 9, rel=0.01)
-    sizes = [np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=1).sum()
-             for t in (far.triangles, layer.triangles)]  # fmt: skip
+    sizes = [
+        np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=1).sum()
+        for t in (far.triangles, layer.triangles)
+    ]
     assert sizes[0] == pytest.approx(sizes[1])
 
 
 def test_points_of_a_map_are_trees(house, tmp_path):
-    point = {"type": "Feature", "geometry": {"type": "Point", "coordinates": [8.001, 50.0]},
-             "properties": FIELDS | {"name": "elm"}}  # fmt: skip
-    path = listed(
-        tmp_path, json.dumps({"type": "FeatureCollection", "features": [point]}), "a.geojson"
-    )
+    point = {
+        "type": "Feature",
+        "geometry": {"type": "Point", "coordinates": [8.001, 50.0]},
+        "properties": FIELDS | {"name": "elm"},
+    }
+    path = listed(tmp_path, json.dumps({"type": "FeatureCollection", "features": [point]}), "a.geojson")
     found = with_surroundings(house, [path])
     corners = np.concatenate([e.triangles.reshape(-1, 3) for e in found.elements])
     middle, half = (corners.min(0) + corners.max(0)) / 2, np.ptp(corners, axis=0) / 2
@@ -176,9 +179,25 @@ def test_a_bad_list_is_one_line(house, tmp_path, text, said):
 
 
 VALUES = (
-    None, -1, 0, 3, 40, 1e6, float("nan"), "", "deciduous", True, [], [8, 50], [8, 50, 1],
-    [0.5] * 12, [0.5, "x"], {}, [float("inf"), 5], 10**40,
-)  # fmt: skip
+    None,
+    -1,
+    0,
+    3,
+    40,
+    1e6,
+    float("nan"),
+    "",
+    "deciduous",
+    True,
+    [],
+    [8, 50],
+    [8, 50, 1],
+    [0.5] * 12,
+    [0.5, "x"],
+    {},
+    [float("inf"), 5],
+    10**40,
+)
 KEYS = ("at", "name", "height", "crown_radius", "crown_base", "transmittance")
 
 
@@ -189,9 +208,7 @@ def test_any_fields_are_a_tree_or_refused(tmp_path):
         chosen = {str(k): VALUES[rng.integers(len(VALUES))] for k in rng.choice(KEYS, 2)}
         place = {"type": "Point", "coordinates": chosen.get("at", [8, 50])}
         point = {"type": "Feature", "properties": FIELDS | chosen, "geometry": place}
-        path = listed(
-            tmp_path, json.dumps({"type": "FeatureCollection", "features": [point]}), "a.geojson"
-        )
+        path = listed(tmp_path, json.dumps({"type": "FeatureCollection", "features": [point]}), "a.geojson")
         try:
             read += np.isfinite(read_surroundings(path).objects[0].triangles).all()
         except DataError as error:
@@ -200,8 +217,6 @@ def test_any_fields_are_a_tree_or_refused(tmp_path):
 
 
 def test_the_same_tree_has_the_same_leaves_and_another_has_others(tmp_path):
-    one, again, other = (
-        crown_elements(crown(tmp_path), WINTER, guid, 5.0)[0].triangles for guid in "aab"
-    )
+    one, again, other = (crown_elements(crown(tmp_path), WINTER, guid, 5.0)[0].triangles for guid in "aab")
     assert np.array_equal(one, again) and not np.array_equal(one, other)
     assert replace(crown(tmp_path), name="x").foliage == (0.2,) * 12

@@ -53,22 +53,23 @@ def test_the_sky_behind_a_crown_is_that_behind_mist(variant, tmp_path, stated):
         leaves = crown_elements(crown, (stated,) * 12, f"tree-{number}", 2.0)
         black = element_surfaces(replace(one, reflectance_visible=0.0) for one in leaves)
         matrix = sky_irradiance_matrix(
-            black, PLACES, towards, subdivision=1, samples=20_000, max_depth=4,
-            stopping=Stopping(batches=2), seed=1,
-        )  # fmt: skip
+            black, PLACES, towards, subdivision=1, samples=20_000, max_depth=4, stopping=Stopping(batches=2), seed=1
+        )
         found.append(matrix.values[:, 1:].sum(axis=1))  # the first patch is the ground
     scene, octree = tmp_path / "scene.rad", tmp_path / "scene.oct"
     scene.write_text(SCENE.format(k=k))
     env = environment()
-    octree.write_bytes(
-        subprocess.run(["oconv", str(scene)], env=env, capture_output=True, check=True).stdout
-    )
+    octree.write_bytes(subprocess.run(["oconv", str(scene)], env=env, capture_output=True, check=True).stdout)
     rows = np.column_stack([PLACES, towards])
     words = "rtrace -h -I -ab 1 -ad 65536 -lw 1e-7 -as 0 -aa 0".split()
     said = subprocess.run(
-        [*words, str(octree)], input="\n".join(" ".join(map(str, row)) for row in rows),
-        env=env, capture_output=True, check=True, text=True,
-    ).stdout  # fmt: skip
+        [*words, str(octree)],
+        input="\n".join(" ".join(map(str, row)) for row in rows),
+        env=env,
+        capture_output=True,
+        check=True,
+        text=True,
+    ).stdout
     theirs = np.array([line.split() for line in said.splitlines() if line.strip()], dtype=float)
     free = np.pi / 2
     print(stated, np.mean(found, axis=0) / theirs[:, 0])

@@ -44,10 +44,9 @@ LATIN = "Büro".encode("latin-1")
     [
         ("model.hbjson", b'{"type": "Model",\n"identifier": "' + LATIN + b'"}'),
         ("model.gbxml", b"<gbXML>\n<Campus><Name>" + LATIN + b"</Name></Campus></gbXML>"),
-        ("model.xml", b'<?xml version="1.0" encoding="UTF-8"?><gbXML>\n<Campus id="' + LATIN
-         + b'"/></gbXML>'),
+        ("model.xml", b'<?xml version="1.0" encoding="UTF-8"?><gbXML>\n<Campus id="' + LATIN + b'"/></gbXML>'),
     ],
-)  # fmt: skip
+)
 def test_latin_1_bytes_give_one_line_with_the_remedy(tmp_path, name, content) -> None:
     path = tmp_path / name
     path.write_bytes(content)
@@ -66,9 +65,14 @@ def test_latin_1_is_read_where_it_is_declared_or_does_no_harm(tmp_path) -> None:
     names = {f.construction.name for f in read_building_file(tmp_path / "a.gbxml").spaces[0].faces}
     assert "Büro" in names
     (tmp_path / "a.rad").write_bytes(
-        b"# " + LATIN + b"\nvoid plastic " + LATIN + b"\n0\n0\n5 .5 .5 .5 0 0\n" + LATIN
+        b"# "
+        + LATIN
+        + b"\nvoid plastic "
+        + LATIN
+        + b"\n0\n0\n5 .5 .5 .5 0 0\n"
+        + LATIN
         + b" polygon p\n0\n0\n9 0 0 0 1 0 0 0 1 0\n"
-    )  # fmt: skip
+    )
     assert len(read_radiance(tmp_path / "a.rad").objects) == 1
     weather = next(FOLDER.glob("*.epw")).read_text().replace("Chicago", "Büro", 1)
     (tmp_path / "a.epw").write_bytes(weather.encode("latin-1"))

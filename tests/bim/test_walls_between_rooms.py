@@ -19,10 +19,16 @@ def between(begins: float, *bodies: np.ndarray) -> Beyond:
     own, other = body(*ROOM), body((0.0, -4.0, 0.0), (4.0, -begins, 2.7))
     counts = [len(one) for one in bodies]
     around = Surroundings(
-        Bodies(ray_mesh(np.concatenate(bodies)), np.repeat(np.arange(len(counts)), counts),
-               np.zeros(sum(counts), dtype=int)),
-        ray_mesh(np.concatenate([own, other])), np.repeat([0, 1], 12), ("own", "other"), -0.5,
-    )  # fmt: skip
+        Bodies(
+            ray_mesh(np.concatenate(bodies)),
+            np.repeat(np.arange(len(counts)), counts),
+            np.zeros(sum(counts), dtype=int),
+        ),
+        ray_mesh(np.concatenate([own, other])),
+        np.repeat([0, 1], 12),
+        ("own", "other"),
+        -0.5,
+    )
     (facet,) = (f for f in planar_facets(own) if f.plane.normal @ SOUTH > 0.99)
     return what_lies_beyond(Piece(facet, "room"), around, own=0)
 
@@ -93,16 +99,10 @@ def test_where_a_stair_stands_against_most_of_a_wall_the_rest_says_what_follows(
 
 
 def test_layers_of_two_elements_that_touch_are_both_met():
-    first, second = (
-        body((-1.0, -0.1, -0.2), (5.0, 0.0, 4.0)),
-        body((-1.0, -0.3, -0.2), (5.0, -0.1, 4.0)),
-    )
+    first, second = (body((-1.0, -0.1, -0.2), (5.0, 0.0, 4.0)), body((-1.0, -0.3, -0.2), (5.0, -0.1, 4.0)))
     for bodies in ((first, second), (second, first)):
         spans = between(0.3, *bodies).spans
-        assert [(s.start, s.stop) for s in spans] == [
-            pytest.approx((0.0, 0.1)),
-            pytest.approx((0.1, 0.3)),
-        ]
+        assert [(s.start, s.stop) for s in spans] == [pytest.approx((0.0, 0.1)), pytest.approx((0.1, 0.3))]
 
 
 def behind(outline: shapely.Polygon, wall: np.ndarray) -> Beyond:
@@ -110,8 +110,11 @@ def behind(outline: shapely.Polygon, wall: np.ndarray) -> Beyond:
     none = np.zeros(0, dtype=int)
     around = Surroundings(
         Bodies(ray_mesh(wall), np.zeros(12, dtype=int), np.zeros(12, dtype=int)),
-        ray_mesh(np.empty((0, 3, 3))), none, (), -0.5,
-    )  # fmt: skip
+        ray_mesh(np.empty((0, 3, 3))),
+        none,
+        (),
+        -0.5,
+    )
     facet = Facet(plane_through(np.zeros(3), SOUTH), outline)
     return what_lies_beyond(Piece(facet, "room"), around, own=0)
 

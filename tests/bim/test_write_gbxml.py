@@ -16,16 +16,17 @@ from bim.shoebox import WindowRectangle, shoebox
 @pytest.mark.parametrize("recess", [0.0, 0.2])
 @pytest.mark.parametrize("frame", [0.0, 0.1])
 def test_a_room_comes_back(tmp_path, recess, frame):
-    windows = [WindowRectangle(0.5, 0.9, 3.0, 1.5, frame=frame),
-               WindowRectangle(1.0, 1.0, 1.0, 2.0, "ceiling", frame=frame)]  # fmt: skip
-    box = shoebox(4, 5, 3, windows=windows, recess=recess, latitude_deg=50.0, longitude_deg=8.0,
-                  reflectance_solar={"floor": 0.35})  # fmt: skip
+    windows = [
+        WindowRectangle(0.5, 0.9, 3.0, 1.5, frame=frame),
+        WindowRectangle(1.0, 1.0, 1.0, 2.0, "ceiling", frame=frame),
+    ]
+    box = shoebox(
+        4, 5, 3, windows=windows, recess=recess, latitude_deg=50.0, longitude_deg=8.0, reflectance_solar={"floor": 0.35}
+    )
     (room,) = box.spaces
     glass = tuple(replace(w, visible_transmittance=0.7) for w in room.windows)
     box = replace(box, spaces=(replace(room, windows=glass),))
-    write_gbxml(
-        box, tmp_path / "box.gbxml", glazing={glass[0].guid: ExportedGlazing(1.1, 0.5, 0.7)}
-    )
+    write_gbxml(box, tmp_path / "box.gbxml", glazing={glass[0].guid: ExportedGlazing(1.1, 0.5, 0.7)})
     found = read_gbxml(tmp_path / "box.gbxml")
     (space,), (own,) = found.spaces, box.spaces
     assert (found.latitude_deg, found.longitude_deg) == (50.0, 8.0)

@@ -22,15 +22,13 @@ WALL = np.array([[[0, -5, 0], [6, -5, 0], [6, -5, 4]]], float)
 @pytest.mark.parametrize("recess", [0.0, 0.2])
 @pytest.mark.parametrize("frame", [0.0, 0.1])
 def test_a_room_comes_back(tmp_path, recess, frame):
-    windows = [WindowRectangle(0.5, 0.9, 3.0, 1.5, frame=frame),
-               WindowRectangle(1.0, 1.0, 1.0, 2.0, "ceiling", frame=frame)]  # fmt: skip
+    windows = [
+        WindowRectangle(0.5, 0.9, 3.0, 1.5, frame=frame),
+        WindowRectangle(1.0, 1.0, 1.0, 2.0, "ceiling", frame=frame),
+    ]
     wall = Element("wall", "wall", "IfcWall", WALL, 0.4, 0.4)
-    box = shoebox(
-        4, 5, 3, windows=windows, recess=recess, elements=(wall,), reflectance_solar={"floor": 0.35}
-    )
-    write_honeybee(
-        box, tmp_path / "box.hbjson", glazing={"room-window-0": ExportedGlazing(1.1, 0.5)}
-    )
+    box = shoebox(4, 5, 3, windows=windows, recess=recess, elements=(wall,), reflectance_solar={"floor": 0.35})
+    write_honeybee(box, tmp_path / "box.hbjson", glazing={"room-window-0": ExportedGlazing(1.1, 0.5)})
     (space,), (own,) = read_honeybee(tmp_path / "box.hbjson").spaces, box.spaces
     assert space.volume == pytest.approx(own.volume, rel=1e-5)
     assert space.floor_area == pytest.approx(own.floor_area, rel=1e-5)

@@ -39,9 +39,7 @@ def building(tmp_path_factory) -> Building:
 def test_zones_have_their_rooms_and_those_of_zones_in_them(building) -> None:
     guids = {space.guid for space in building.spaces}
     assert len(guids) == 2
-    assert [(zone.name, zone.kind) for zone in building.zones] == [
-        ("Dwelling 1", "Apartment"), ("House", ""),
-    ]  # fmt: skip
+    assert [(zone.name, zone.kind) for zone in building.zones] == [("Dwelling 1", "Apartment"), ("House", "")]
     assert [set(zone.rooms) for zone in building.zones] == [guids, guids]
 
 

@@ -10,13 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.angular import (
-    AngularTable,
-    check_specular,
-    glass_table,
-    roos_table,
-    stack_table,
-)
+from mitsuba_cfs.bsdf.angular import AngularTable, check_specular, glass_table, roos_table, stack_table
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, pane_values, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.errors import DataError
@@ -32,8 +26,7 @@ def klems_of(table: AngularTable) -> KlemsBsdf:
     omega = KLEMS_FULL.projected_solid_angles()
     tau = table.patch_means(KLEMS_FULL)
     front, back = (
-        table.patch_means(KLEMS_FULL, values, 1.0)
-        for values in (table.reflectance_front, table.reflectance_back)
+        table.patch_means(KLEMS_FULL, values, 1.0) for values in (table.reflectance_front, table.reflectance_back)
     )
     through, front, back = (np.diag(values / omega) for values in (tau, front, back))
     return KlemsBsdf(KLEMS_FULL, KLEMS_FULL, through, through, front, back)
@@ -82,10 +75,7 @@ def test_glass_passes_fresnels_shares_and_absorbs_along_its_way():
 
 
 def test_a_turned_stack_reflects_its_other_side():
-    a, b = (
-        stack_table([COATED, FLOAT]),
-        stack_table([FLOAT, Pane("coated", 0.61, 0.12, 0.08, coated=True)]),
-    )
+    a, b = (stack_table([COATED, FLOAT]), stack_table([FLOAT, Pane("coated", 0.61, 0.12, 0.08, coated=True)]))
     assert a.transmitted(THETA) == pytest.approx(b.transmitted(THETA), abs=1e-9)
     assert a.reflected("front", THETA) == pytest.approx(b.reflected("back", THETA), abs=1e-9)
     assert abs(a.reflected("front", 0.0) - a.reflected("back", 0.0)) > 0.01
@@ -219,17 +209,13 @@ def test_light_that_meets_two_systems_is_their_mean_by_share():
     """Shares 0, 1/4 and 1 of tables of 0.8 and 0.4; the back stays that of the first."""
     theta = np.radians([0.0, 30.0, 60.0])
     one, other = (
-        AngularTable(theta, *(np.full(3, value) for value in values))
-        for values in ((0.8, 0.1, 0.15), (0.4, 0.5, 0.55))
+        AngularTable(theta, *(np.full(3, value) for value in values)) for values in ((0.8, 0.1, 0.15), (0.4, 0.5, 0.55))
     )
     mixed = one.mixed(other, np.array([0.0, 0.25, 1.0]))
     assert mixed.transmittance == pytest.approx([0.8, 0.7, 0.4])
     assert mixed.reflectance_front == pytest.approx([0.1, 0.2, 0.5])
     assert mixed.reflectance_back == pytest.approx([0.15] * 3)
-    assert (
-        AngularTable(theta, one.transmittance).mixed(other, np.zeros(3)).reflected("front", 0.0)
-        is None
-    )
+    assert AngularTable(theta, one.transmittance).mixed(other, np.zeros(3)).reflected("front", 0.0) is None
 
 
 def test_a_table_may_end_at_or_before_grazing():

@@ -31,17 +31,13 @@ def test_two_diffusers_are_the_geometric_series(tmp_path, capsys):
     inner = diffuser(tmp_path / "inner.xml", KLEMS_FULL, 0.4, 0.2)
     out, table = tmp_path / "both.xml", tmp_path / "absorbed.csv"
     names = [str(p) for p in (outer, inner)]
-    assert (
-        cli.run(["bsdf", "combine", *names, "--out", str(out), "--absorptances", str(table)]) == 0
-    )
+    assert cli.run(["bsdf", "combine", *names, "--out", str(out), "--absorptances", str(table)]) == 0
     expected = 0.3 * 0.4 / (1 - 0.5 * 0.2)
     assert f"{expected:.4f}" in capsys.readouterr().out
     file = read_bsdf_xml(out)
     assert list(file.bands) == ["Visible"] and file.thickness == pytest.approx(0.02)
     system = file.band("Visible")
-    np.testing.assert_allclose(
-        system.direct_hemispherical(system.transmission_front), expected, rtol=1e-5
-    )
+    np.testing.assert_allclose(system.direct_hemispherical(system.transmission_front), expected, rtol=1e-5)
     absorbed = pd.read_csv(table)
     front = absorbed[(absorbed.side == "front") & (absorbed.patch == 7)].set_index("layer")
     forward = 0.3 / (1 - 0.5 * 0.2)  # in the gap, towards the room

@@ -22,9 +22,7 @@ POLYGON = " a polygon p 0 0 9 0 0 0 1 0 0 0 1 0"
 
 def run(*arguments: object, text: str | None = None):
     """Result of `cfs bsdf ...`; errors come through."""
-    return CliRunner().invoke(
-        command, [str(a) for a in arguments], input=text, catch_exceptions=False
-    )
+    return CliRunner().invoke(command, [str(a) for a in arguments], input=text, catch_exceptions=False)
 
 
 @pytest.fixture
@@ -81,10 +79,7 @@ def test_info_of_an_even_sheet(shade):
 
 def test_a_missing_band_is_stated_wherever_its_values_are_printed(tmp_path, dummy_back):
     """tau_e and g_tot of a file with a Visible band alone are those of light."""
-    assert (
-        "note: no Solar band: results use the Visible band instead"
-        in run("info", dummy_back).stdout
-    )
+    assert "note: no Solar band: results use the Visible band instead" in run("info", dummy_back).stdout
     flat = np.full((145, 145), 0.3 / np.pi)
     shade = tmp_path / "shade.xml"
     write_bsdf_xml(BsdfFile({"Visible": KlemsBsdf(KLEMS_FULL, KLEMS_FULL, *4 * [flat])}), shade)
@@ -157,8 +152,7 @@ def test_generate_writes_a_file_that_reads(variant, tmp_path):
     assert "standard error" in text
     file = read_bsdf_xml(out)
     visible, solar = (
-        file.band(band).direct_hemispherical(file.band(band).reflection_front)
-        for band in ("Visible", "Solar")
+        file.band(band).direct_hemispherical(file.band(band).reflection_front) for band in ("Visible", "Solar")
     )
     assert (visible > solar).all()
     assert file.thickness == pytest.approx(0.08 * np.cos(np.radians(30)))

@@ -97,9 +97,7 @@ print(json.dumps([front.transmittance.direct_direct, front.reflectance.direct_di
 def test_visible_values_are_those_of_window(real_data, name):
     """WINDOW's engine with its own EN 410 tables, in a process of its own (it may crash)."""
     path = real_data / "bsdf/products_spectral" / name
-    answer = subprocess.run(
-        [sys.executable, "-c", ENGINE, str(path)], capture_output=True, text=True, timeout=60
-    )
+    answer = subprocess.run([sys.executable, "-c", ENGINE, str(path)], capture_output=True, text=True, timeout=60)
     transmittance, reflectance = json.loads(answer.stdout)
     nm, tau, front, _ = spectral_file(path)
     # the engine takes V(lambda) D65 from ISO 9050's table, rounded to four digits

@@ -5,14 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.evaluate import (
-    BLOCKS,
-    _block,
-    bsdf_values,
-    direct_hemispherical,
-    klems_of,
-    tree_position,
-)
+from mitsuba_cfs.bsdf.evaluate import BLOCKS, _block, bsdf_values, direct_hemispherical, klems_of, tree_position
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_HALF, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_merge import merged_tree
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf, morton
@@ -24,9 +17,7 @@ from scenes.demo import VENETIAN_BLIND
 def test_a_klems_matrix_comes_back(name) -> None:
     """The blind is the same from neither side nor turned: every convention is in its numbers."""
     bsdf = read_bsdf_xml(VENETIAN_BLIND).band("Visible").filled()
-    np.testing.assert_allclose(
-        _block(bsdf, bsdf, name, KLEMS_FULL, 2), getattr(bsdf, name), rtol=1e-9, atol=1e-12
-    )
+    np.testing.assert_allclose(_block(bsdf, bsdf, name, KLEMS_FULL, 2), getattr(bsdf, name), rtol=1e-9, atol=1e-12)
 
 
 def test_energy_is_that_of_the_tree() -> None:
@@ -117,9 +108,7 @@ def test_an_isotropic_tree_goes_by_the_sine_of_incidence_in_its_first_half():
     """(1 - sin(theta)) / 2, below 1/2 at normal incidence; outgoing light turned by the azimuth."""
     tree = TensorTree(3, np.zeros(1, dtype=np.int64), np.ones(1))
     theta, phi = np.radians([0.0, 30.0, 90.0]), np.radians(70.0)
-    incident = np.stack(
-        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1
-    )
+    incident = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
     at = tree_position(tree, incident, -incident)
     np.testing.assert_allclose(at[:, 0], [0.5, 0.25, 0.0], atol=2e-6)
     assert at[0, 0] < 0.5

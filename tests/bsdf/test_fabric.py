@@ -87,10 +87,7 @@ def test_a_table_of_a_data_sheet(table):
     assert white.thickness == 5e-4
     assert black.emissivity == (0.85, 0.85) and black.infrared_transmittance is None
     assert "rho_e back is not stated: as in front" in black.notes
-    assert notes == (
-        "columns not read: Weight [g/m²]",
-        "without a unit, shares of 1 as no value is above it: ε, ε'",
-    )
+    assert notes == ("columns not read: Weight [g/m²]", "without a unit, shares of 1 as no value is above it: ε, ε'")
 
 
 def test_shares_percents_and_spellings_say_the_same(table):

@@ -34,9 +34,7 @@ def test_black_flat_slats_let_through_what_passes_between(variant):
     layer = venetian_blind(plastic("black", 0.0), depth=depth, spacing=spacing, tilt=tilt)
     result = generate_klems(layer, KLEMS_QUARTER, samples=4096, seed=1)
     patch = np.repeat(np.arange(41), 20_000)
-    theta, phi = KLEMS_QUARTER.angles_within(
-        patch, *np.random.default_rng(1).uniform(size=(2, len(patch)))
-    )
+    theta, phi = KLEMS_QUARTER.angles_within(patch, *np.random.default_rng(1).uniform(size=(2, len(patch))))
     y, z = -np.sin(theta) * np.sin(phi), np.cos(theta)  # towards the light, outdoors
     covered = depth * np.abs(-np.sin(tilt) - np.cos(tilt) * y / z)
     passed = np.maximum(0, 1 - covered / spacing).reshape(41, -1).mean(axis=1)
@@ -52,10 +50,7 @@ def test_white_slats_lose_nothing(variant):
     layer = venetian_blind(plastic("white", 1.0), **BLIND, tilt=np.radians(20))
     result = generate_klems(layer, KLEMS_QUARTER, samples=2048)
     for side in ("front", "back"):
-        total = sum(
-            hemispherical(result.bsdf[0], f"{kind}_{side}")
-            for kind in ("transmission", "reflection")
-        )
+        total = sum(hemispherical(result.bsdf[0], f"{kind}_{side}") for kind in ("transmission", "reflection"))
         np.testing.assert_allclose(total, 1, atol=1e-6)
 
 
@@ -103,9 +98,7 @@ def test_channels_are_traced_at_once(variant):
         difference = hemispherical(result.bsdf[channel], "reflection_front") - hemispherical(
             single.bsdf[0], "reflection_front"
         )
-        spread = np.hypot(
-            sigma(result, "reflection_front", channel), sigma(single, "reflection_front")
-        )
+        spread = np.hypot(sigma(result, "reflection_front", channel), sigma(single, "reflection_front"))
         assert np.abs(difference / spread).max() < 5  # 41 directions
     bright, dark = (hemispherical(b, "reflection_front") for b in result.bsdf[::-1])
     assert (bright > 1.5 * dark).all()
@@ -113,21 +106,15 @@ def test_channels_are_traced_at_once(variant):
 
 def test_vertical_louvres_are_a_turned_blind(variant):
     options = {"depth": 0.08, "spacing": 0.06, "tilt": 0.5}
-    flat = generate_klems(
-        venetian_blind(plastic("grey", 0.5), **options), KLEMS_QUARTER, samples=4096, seed=7
-    )
-    upright = generate_klems(
-        vertical_louvre(plastic("grey", 0.5), **options), KLEMS_QUARTER, samples=4096, seed=8
-    )
+    flat = generate_klems(venetian_blind(plastic("grey", 0.5), **options), KLEMS_QUARTER, samples=4096, seed=7)
+    upright = generate_klems(vertical_louvre(plastic("grey", 0.5), **options), KLEMS_QUARTER, samples=4096, seed=8)
     theta, phi = KLEMS_QUARTER.centres()
     # exterior edge down -> exterior edge right: the sun from above (270) -> from the left (180)
     turned = KLEMS_QUARTER.index(theta, phi - np.pi / 2)
     difference = hemispherical(upright.bsdf[0], "transmission_front")[turned] - hemispherical(
         flat.bsdf[0], "transmission_front"
     )
-    spread = np.hypot(
-        sigma(upright, "transmission_front")[turned], sigma(flat, "transmission_front")
-    )
+    spread = np.hypot(sigma(upright, "transmission_front")[turned], sigma(flat, "transmission_front"))
     assert (np.abs(difference) < 6 * spread + 1e-4).all()
     assert np.abs(difference).max() < 0.02
 
@@ -154,9 +141,7 @@ def blind_and_genbsdf(variant):
     return ours, read_bsdf_xml(REFERENCE / "tilt45.xml").band("Visible")
 
 
-@pytest.mark.parametrize(
-    "name", ["transmission_front", "transmission_back", "reflection_front", "reflection_back"]
-)
+@pytest.mark.parametrize("name", ["transmission_front", "transmission_back", "reflection_front", "reflection_back"])
 def test_blind_is_that_of_genbsdf(blind_and_genbsdf, name):
     ours, theirs = blind_and_genbsdf
     value, reference = getattr(ours.bsdf[0], name), getattr(theirs, name)
@@ -200,23 +185,16 @@ class Centres:
         return tuple(gather(part, patch) for part in self.parts)
 
 
-@pytest.mark.parametrize(
-    "reflectance, tilt_deg, depth, spacing", [(0.1, 45, 0.016, 0.012), (0.2, 30, 0.018, 0.014)]
-)
-def test_flat_diffuse_slats_are_those_of_window(
-    variant, real_data, reflectance, tilt_deg, depth, spacing
-):
+@pytest.mark.parametrize("reflectance, tilt_deg, depth, spacing", [(0.1, 45, 0.016, 0.012), (0.2, 30, 0.018, 0.014)])
+def test_flat_diffuse_slats_are_those_of_window(variant, real_data, reflectance, tilt_deg, depth, spacing):
     """WINDOW's engine: Windows-CalcEngine's own test values (`VenetianDirectionalMatrix`)."""
     from mitsuba_cfs.bsdf.generate import TracedLayer
     from mitsuba_cfs.bsdf.traced_klems import TracedBasis
 
-    layer = venetian_blind(
-        plastic("slat", reflectance), depth=depth, spacing=spacing, tilt=np.radians(tilt_deg)
-    )
+    layer = venetian_blind(plastic("slat", reflectance), depth=depth, spacing=spacing, tilt=np.radians(tilt_deg))
     (sums,), paths = generate.trace_bins(
-        TracedLayer(layer), Centres(KLEMS_QUARTER), 41, TracedBasis(KLEMS_QUARTER), 41,
-        rows=1, samples=16_384, seed=1,
-    )  # fmt: skip
+        TracedLayer(layer), Centres(KLEMS_QUARTER), 41, TracedBasis(KLEMS_QUARTER), 41, rows=1, samples=16_384, seed=1
+    )
     shares = sums[0].sum(axis=-1) / paths  # [side in, patch in, side out]
     case = f"T=0_R={reflectance}_Slat={tilt_deg}_nSegments=5_Rise=0.csv"
     area = KLEMS_QUARTER.projected_solid_angles()

@@ -71,9 +71,7 @@ def test_reciprocal_means_use_both_ways_and_keep_totals():
 @pytest.fixture(scope="module")
 def trees(variant):
     """The blind as matrices and as a tree of 1024 cells a hemisphere, only noise merged."""
-    layer = venetian_blind(
-        plastic("grey", 0.55), depth=0.08, radius=0.104, spacing=0.072, tilt=np.radians(45)
-    )
+    layer = venetian_blind(plastic("grey", 0.55), depth=0.08, radius=0.104, spacing=0.072, tilt=np.radians(45))
     matrices = generate_klems(layer, KLEMS_QUARTER, samples=16_384, seed=1).bsdf[0]
     (tree,), bound = generate_tensor_tree(layer, 5, samples=8192, cull=0.0, seed=2)
     assert bound == 0
@@ -86,9 +84,7 @@ def test_tree_and_matrix_scatter_the_same(trees, kind, side):
     """Hemispherical values averaged over each Klems patch."""
     matrices, tree = trees
     patch = np.repeat(np.arange(41), 2000)
-    theta, phi = KLEMS_QUARTER.angles_within(
-        patch, *np.random.default_rng(3).uniform(size=(2, len(patch)))
-    )
+    theta, phi = KLEMS_QUARTER.angles_within(patch, *np.random.default_rng(3).uniform(size=(2, len(patch))))
     z = np.cos(theta) * (1 if side == "front" else -1)
     incident = np.stack([np.sin(theta) * np.cos(phi), -np.sin(theta) * np.sin(phi), z], -1)
     block = f"{kind}_{side}"

@@ -89,9 +89,14 @@ def test_coated_pane_keeps_its_normal_values_and_energy():
 
 @pytest.mark.parametrize(
     ("u", "g", "expected"),
-    [(1.0, 0.1, 0.04104), (1.2, 0.5, 0.418463), (5.8, 0.5, 0.33666), (5.8, 0.82, 0.764253),
-     (3.95, 0.5, (0.418463 + 0.33666) / 2)],
-)  # fmt: skip
+    [
+        (1.0, 0.1, 0.04104),
+        (1.2, 0.5, 0.418463),
+        (5.8, 0.5, 0.33666),
+        (5.8, 0.82, 0.764253),
+        (3.95, 0.5, (0.418463 + 0.33666) / 2),
+    ],
+)
 def test_solar_transmittance_is_that_of_the_polynomials(u, g, expected) -> None:
     assert solar_transmittance(u, g) == pytest.approx(expected, abs=2e-6)
 
@@ -136,9 +141,11 @@ def test_visible_reflectances_by_the_polynomials_of_the_source() -> None:
 
 def test_transmittance_at_the_ends_of_its_ranges() -> None:
     for u, g, by_hand in (
-        (5.8, 0.72, 0.939998 * 0.72**2 + 0.20332 * 0.72), (5.8, 0.73, 1.30415 * 0.73 - 0.30515),
-        (1.2, 0.15, 0.4104 * 0.15), (1.2, 0.16, 0.085775 * 0.16**2 + 0.963954 * 0.16 - 0.084958),
-    ):  # fmt: skip
+        (5.8, 0.72, 0.939998 * 0.72**2 + 0.20332 * 0.72),
+        (5.8, 0.73, 1.30415 * 0.73 - 0.30515),
+        (1.2, 0.15, 0.4104 * 0.15),
+        (1.2, 0.16, 0.085775 * 0.16**2 + 0.963954 * 0.16 - 0.084958),
+    ):
         assert solar_transmittance(u, g) == pytest.approx(by_hand)
     assert solar_transmittance(5.8, 1.0) <= 1.0
 

@@ -8,14 +8,7 @@ import bsdf_radiance as radiance
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.klems import (
-    KLEMS_FULL,
-    KLEMS_HALF,
-    KLEMS_QUARTER,
-    STANDARD_BASES,
-    KlemsBasis,
-    KlemsBsdf,
-)
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER, STANDARD_BASES, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.directions import incident_azimuth, outgoing_azimuth
 from tests.conftest import OWN_BLIND
@@ -106,12 +99,7 @@ def evaluate(system: KlemsBsdf, incident, outgoing):
         [front & ~reflected, ~front & ~reflected, front & reflected, ~front & reflected],
         [
             getattr(system, name)[patch_out, patch_in]
-            for name in (
-                "transmission_front",
-                "transmission_back",
-                "reflection_front",
-                "reflection_back",
-            )
+            for name in ("transmission_front", "transmission_back", "reflection_front", "reflection_back")
         ],
     )
 

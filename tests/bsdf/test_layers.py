@@ -27,12 +27,7 @@ def diffuser(transmittance, reflectance_front, reflectance_back, basis=KLEMS_QUA
     """A sheet that scatters evenly: three constant values."""
     flat = np.full((basis.size, basis.size), 1 / np.pi)
     return KlemsBsdf(
-        basis,
-        basis,
-        transmittance * flat,
-        transmittance * flat,
-        reflectance_front * flat,
-        reflectance_back * flat,
+        basis, basis, transmittance * flat, transmittance * flat, reflectance_front * flat, reflectance_back * flat
     )
 
 
@@ -98,9 +93,7 @@ def test_uncoated_glass_is_fresnel():
     np.testing.assert_allclose(tau + rho, 1, atol=1e-9)
     assert tau[0] == pytest.approx(1 - reflectance, abs=1e-12)
     # two polarisations at 60 degrees: r = 0.176572, 0.001802 -> 2 r / (1 + r) each, by hand
-    assert rho[2] == pytest.approx(
-        0.5 * (2 * 0.176572 / 1.176572 + 2 * 0.001802 / 1.001802), abs=1e-4
-    )
+    assert rho[2] == pytest.approx(0.5 * (2 * 0.176572 / 1.176572 + 2 * 0.001802 / 1.001802), abs=1e-4)
     assert rho[3] > 0.99
 
 
@@ -233,15 +226,12 @@ def test_coated_panes_by_the_shapes_of_window_4():
         found = coated_values(normal, 0.1, 0.2, np.radians(60.0))
         expected = (normal * t, 0.1 * (1 - r) + r, 0.2 * (1 - r) + r)
         assert [float(value) for value in found] == pytest.approx(expected)
-        np.testing.assert_allclose(
-            [float(value) for value in coated_values(normal, 0.1, 0.2, 0.0)], [normal, 0.1, 0.2]
-        )
+        np.testing.assert_allclose([float(value) for value in coated_values(normal, 0.1, 0.2, 0.0)], [normal, 0.1, 0.2])
     assert coated_values(0.7, 0.1, 0.2, np.radians(89.999))[0] == pytest.approx(0.0, abs=1e-3)
 
 
 def test_shares_of_a_pane_that_cannot_be():
-    for values in ((-0.1, 0.1, 0.1), (0.5, -0.1, -0.1), (0.5, 0.1, -0.1), (0.9, 0.11, 0.11),
-                   (0.9, 0.05, 0.11)):  # fmt: skip
+    for values in ((-0.1, 0.1, 0.1), (0.5, -0.1, -0.1), (0.5, 0.1, -0.1), (0.9, 0.11, 0.11), (0.9, 0.05, 0.11)):
         with pytest.raises(ValueError, match="expected shares of 1"):
             Pane("p", *values, coated=True)
     Pane("p", 0.9, 0.1, 0.05, coated=True)

@@ -61,9 +61,7 @@ def test_the_lobe_comes_back_between_the_measured_directions(tmp_path, form):
         ((0, 90, 180, 270), "anisotropic"),
     ],
 )
-def test_the_azimuths_say_the_symmetry_and_shares_lie_linearly_between(
-    tmp_path, azimuths, symmetry
-):
+def test_the_azimuths_say_the_symmetry_and_shares_lie_linearly_between(tmp_path, azimuths, symmetry):
     # brighter for light from above and below, so that an exchange of axes is seen
     def upright(incident, outgoing):
         return even(incident, outgoing) * (1 + incident[..., 1] ** 2)
@@ -94,9 +92,7 @@ def test_the_azimuths_say_the_symmetry_and_shares_lie_linearly_between(
     ],
     ids=["quarter", "mirror", "full"],
 )
-def test_patches_are_means_of_the_lobe_and_half_the_step_is_a_quarter_of_the_error(
-    tmp_path, basis, block, points
-):
+def test_patches_are_means_of_the_lobe_and_half_the_step_is_a_quarter_of_the_error(tmp_path, basis, block, points):
     exact, found = patch_means(gaussian, basis, points=(6, 12)), []
     for step in (8, 4):
         paths = measured_files(tmp_path, gaussian, outgoing_step_deg=step)

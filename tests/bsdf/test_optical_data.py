@@ -19,10 +19,7 @@ from tests.bim.bim_fuzz import changed
 def point(results, wavelengths, polar=8.0, emergence="hemispherical"):
     """A data point as the schema has it; a polar angle of None is light from everywhere."""
     return {
-        "incidence": {
-            "direction": "hemispherical" if polar is None else {"polar": polar},
-            "wavelengths": wavelengths,
-        },
+        "incidence": {"direction": "hemispherical" if polar is None else {"polar": polar}, "wavelengths": wavelengths},
         "emergence": {"direction": emergence},
         "results": results,
     }
@@ -32,10 +29,7 @@ def document(rows, *, emissivity=(0.84, 0.1), visible=(0.8, 0.08, 0.12), **igsdb
     """Optical data of both surfaces: the non-prime one, often outdoors, is the front."""
     blocks = []
     for surface, column, own in (("prime", 3, 1), ("nonPrime", 2, 0)):
-        points = [
-            point({"transmittance": row[1], "reflectance": row[column]}, {"wavelength": row[0]})
-            for row in rows
-        ]
+        points = [point({"transmittance": row[1], "reflectance": row[column]}, {"wavelength": row[0]}) for row in rows]
         results = {"transmittance": visible[0], "reflectance": visible[1 + own]}
         points.append(point(results, {"integral": "visible"}))
         results = {"transmittance": 0.0, "absorptanceEmittance": emissivity[own]}
@@ -63,9 +57,7 @@ def test_a_pane_is_that_of_the_igsdbs_own_file(real_data, tmp_path, name):
         "marketingName": product.name,
     }
     visible = product.visible or (pane.transmittance, pane.reflectance_front, pane.reflectance_back)
-    content = document(
-        product.spectrum.tolist(), emissivity=product.emissivity, visible=visible, **igsdb
-    )
+    content = document(product.spectrum.tolist(), emissivity=product.emissivity, visible=visible, **igsdb)
     found = read_pane_file(written(tmp_path, content))
     np.testing.assert_allclose(found.spectrum, product.spectrum, rtol=1e-12)
     for field in ("name", "coated", "emissivity", "conductivity", "visible"):
@@ -74,8 +66,9 @@ def test_a_pane_is_that_of_the_igsdbs_own_file(real_data, tmp_path, name):
     assert found.visible == pytest.approx(visible)
     np.testing.assert_allclose(
         read_spectral_pane(tmp_path / "optical.json").reflectance_back,
-        read_spectral_pane(product.path).reflectance_back, rtol=1e-12,
-    )  # fmt: skip
+        read_spectral_pane(product.path).reflectance_back,
+        rtol=1e-12,
+    )
 
 
 def test_numbers_with_uncertainty_text_and_noise_below_nothing_are_read(tmp_path):
@@ -139,14 +132,16 @@ FIRST = ("data", 0, "dataPoints", 0)
         ((*FIRST, "emergence"), None, "data point 1.*direction"),
         ((*FIRST, "results", "transmittance"), "much", "transmittance.*much"),
         ((*FIRST, "results", "transmittance"), 80, "80 is no share"),
-        (("data", 1, "dataPoints", 0, "results"), {"reflectance": 0.9, "transmittance": 0.5},
-         "reaches 1.4"),
-        (("data", 0, "dataPoints", 1, "incidence", "wavelengths"), {"wavelength": 300},
-         "otherwise than data 1, data point 1"),
+        (("data", 1, "dataPoints", 0, "results"), {"reflectance": 0.9, "transmittance": 0.5}, "reaches 1.4"),
+        (
+            ("data", 0, "dataPoints", 1, "incidence", "wavelengths"),
+            {"wavelength": 300},
+            "otherwise than data 1, data point 1",
+        ),
         (("serverSpecific",), {"igsdb": {"physicalProperties": {"thickness": "x"}}}, "thickness"),
         (("components",), [], "components.*expected one"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_pane_is_named(tmp_path, path, value, words):
     with pytest.raises(DataError, match=words) as caught:
         read_pane_file(written(tmp_path, changed(document(ROWS), *path, value=value)))
@@ -158,13 +153,16 @@ def test_what_is_no_pane_is_named(tmp_path, path, value, words):
     [
         ([point({"transmittance": 0.5}, {"wavelength": 500})], "500 nm.*reflectance"),
         ([point({"transmittance": 0.6}, {"integral": "solar"})], "near normal"),
-        ([point({"transmittance": 0.6, "reflectance": 0.1}, {"wavelength": 500}, 60.0)],
-         "near normal"),
-        ([point({"transmittance": 0.6, "reflectance": 0.1}, {"wavelength": 500}),
-          point({"transmittance": 0.2}, {"wavelength": 500}, emergence={"polar": 8})],
-         "scatters 0.40"),
+        ([point({"transmittance": 0.6, "reflectance": 0.1}, {"wavelength": 500}, 60.0)], "near normal"),
+        (
+            [
+                point({"transmittance": 0.6, "reflectance": 0.1}, {"wavelength": 500}),
+                point({"transmittance": 0.2}, {"wavelength": 500}, emergence={"polar": 8}),
+            ],
+            "scatters 0.40",
+        ),
     ],
-)  # fmt: skip
+)
 def test_points_that_make_no_pane_are_named(tmp_path, points, words):
     with pytest.raises(DataError, match=words):
         read_pane_file(written(tmp_path, {"data": [{"dataPoints": points}]}))

@@ -18,30 +18,47 @@ OPTICS = (
     + "".join(f"{1000 * nm:g} {t} {f} {b}\n" for nm, t, f, b in ROWS)
 )
 PRODUCT = {
-    "type": "monolithic", "name": "Clear", "coated_side": "neither",
-    "measured_data": {"thickness": 6.0, "conductivity": 1.0, "emissivity_front": 0.84,
-                      "emissivity_back": 0.84, "tir_front": 0.0, "is_specular": True},
-    "spectral_data": {"spectral_data": [
-        {"wavelength": nm, "T": t, "Rf": f, "Rb": b} for nm, t, f, b in ROWS]},
+    "type": "monolithic",
+    "name": "Clear",
+    "coated_side": "neither",
+    "measured_data": {
+        "thickness": 6.0,
+        "conductivity": 1.0,
+        "emissivity_front": 0.84,
+        "emissivity_back": 0.84,
+        "tir_front": 0.0,
+        "is_specular": True,
+    },
+    "spectral_data": {"spectral_data": [{"wavelength": nm, "T": t, "Rf": f, "Rb": b} for nm, t, f, b in ROWS]},
     "integrated_results_summary": [{"tfvis": 0.8, "rfvis": 0.08, "rbvis": 0.09}],
-}  # fmt: skip
+}
 LAYERS = {
     "layers": [
-        {"product_type": "glazing", "coated_side": "front", "flipped": False,
-         "spectral_data": {str(1000 * row[0]): row[1:] for row in ROWS}}
+        {
+            "product_type": "glazing",
+            "coated_side": "front",
+            "flipped": False,
+            "spectral_data": {str(1000 * row[0]): row[1:] for row in ROWS},
+        }
     ]
-}  # fmt: skip
+}
 OPTICAL = {
     "data": [
-        {"componentCharacteristics": {"surface": side},
-         "dataPoints": [
-            {"incidence": {"direction": {"polar": 8}, "wavelengths": {"wavelength": 1000 * nm}},
-             "emergence": {"direction": "hemispherical"},
-             "results": {"transmittance": t, "reflectance": f}} for nm, t, f, _ in ROWS]}
+        {
+            "componentCharacteristics": {"surface": side},
+            "dataPoints": [
+                {
+                    "incidence": {"direction": {"polar": 8}, "wavelengths": {"wavelength": 1000 * nm}},
+                    "emergence": {"direction": "hemispherical"},
+                    "results": {"transmittance": t, "reflectance": f},
+                }
+                for nm, t, f, _ in ROWS
+            ],
+        }
         for side in ("prime", "nonPrime")
     ],
     "serverSpecific": {"igsdb": {"physicalProperties": {"thickness": 4}}},
-}  # fmt: skip
+}
 FILES = {
     "optical data": (read_pane_file, OPTICAL),
     "optics": (read_pane_file, OPTICS),

@@ -30,13 +30,7 @@ from mitsuba_cfs.glare.sun_disc import spread_sun_dgp
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from scenes.fenestration.peaks import peak_note
 from scenes.fenestration.resolver import fill_windows
-from scenes.fenestration.systems import (
-    FenestrationSystem,
-    WindowOverrides,
-    read_system,
-    system_of,
-    with_see_through,
-)
+from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system, system_of, with_see_through
 from scenes.head import system_notes
 from scenes.input_files import overrides_of, peak_share
 from scenes.input_options import InputOptions
@@ -56,9 +50,7 @@ def lobe(width: float, samples: int = 400) -> np.ndarray:
     for k, way in enumerate(KLEMS_FULL.outgoing_directions()):
         side = np.cross(way, [0, 1, 0] if abs(way[1]) < 0.9 else [1, 0, 0])
         side /= np.linalg.norm(side)
-        out = way + r[:, None] * (
-            np.cos(azimuth)[:, None] * side + np.sin(azimuth)[:, None] * np.cross(way, side)
-        )
+        out = way + r[:, None] * (np.cos(azimuth)[:, None] * side + np.sin(azimuth)[:, None] * np.cross(way, side))
         out = out[out[:, 2] * way[2] > 0]
         out /= np.linalg.norm(out, axis=1)[:, None]
         nearest = np.argmax(out @ KLEMS_FULL.outgoing_directions().T, axis=1)
@@ -181,8 +173,7 @@ def test_the_head_names_glass_and_lobes(tmp_path):
 def test_the_user_says_what_the_peak_of_a_bsdf_between_panes_is(tmp_path):
     """By the name of its file, by the name of the system, or in the file's table."""
     write_bsdf_xml(
-        BsdfFile({"Visible": KlemsBsdf(KLEMS_FULL, KLEMS_FULL, np.diag(PASSED / OMEGA) + 0.05)}),
-        tmp_path / "shade.xml",
+        BsdfFile({"Visible": KlemsBsdf(KLEMS_FULL, KLEMS_FULL, np.diag(PASSED / OMEGA) + 0.05)}), tmp_path / "shade.xml"
     )
     scene = tmp_path / "scene.rad"
     shade = "void BSDF shade\n6 0 shade.xml 0 0 1 .\n0\n0\n\nshade polygon sheet\n0\n0\n12 "

@@ -36,9 +36,7 @@ def matrix_values(klems: KlemsBsdf, incident, outgoing):
     o = klems.basis_out.index(np.arccos(abs(outgoing[:, 2])), outgoing_azimuth(outgoing))
     kind = np.where(incident[:, 2] * outgoing[:, 2] > 0, "reflection", "transmission")
     side = np.where(incident[:, 2] > 0, "front", "back")
-    return np.array(
-        [getattr(klems, f"{k}_{s}")[a, b] for k, s, a, b in zip(kind, side, o, i, strict=True)]
-    )
+    return np.array([getattr(klems, f"{k}_{s}")[a, b] for k, s, a, b in zip(kind, side, o, i, strict=True)])
 
 
 @pytest.mark.parametrize("mode", ["Radiance", "Importance"])
@@ -78,9 +76,7 @@ def bin_probabilities(bsdf, klems, si_for, mode, basis_change):
     x, y, z = np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)
     half = np.stack([x, -y, z] if incident else [-x, y, z], -1)
     centres = np.concatenate([half, half * [1, 1, -1]])
-    pdf = np.array(
-        bsdf.pdf(context(mode), si_for(len(centres)), to_mitsuba(centres @ basis_change.T))
-    )
+    pdf = np.array(bsdf.pdf(context(mode), si_for(len(centres)), to_mitsuba(centres @ basis_change.T)))
     area = np.tile(np.repeat(basis.projected_solid_angles() / 4, 4), 2)
     return pdf / abs(centres[:, 2]) * area
 
@@ -105,13 +101,9 @@ def test_samples_follow_the_pdf(variant, mode, side, tilt_deg):
     inside = np.isclose(np.array(pdf), np.array(sample.pdf), rtol=1e-4)
     assert inside.mean() > 1 - 5e-4  # the rest fell on a patch's border in float32
     np.testing.assert_allclose(
-        np.array(weight).ravel()[inside],
-        (np.array(value).ravel() / np.array(pdf))[inside],
-        rtol=1e-4,
+        np.array(weight).ravel()[inside], (np.array(value).ravel() / np.array(pdf))[inside], rtol=1e-4
     )
-    expected = count * bin_probabilities(
-        bsdf, klems, lambda n: interaction(np.tile(wi, (n, 1)))[0], mode, basis_change
-    )
+    expected = count * bin_probabilities(bsdf, klems, lambda n: interaction(np.tile(wi, (n, 1)))[0], mode, basis_change)
     cells = bins(klems, wo @ basis_change, incident=mode == "Radiance")
     observed = np.bincount(cells, minlength=len(expected))
     assert expected.sum() == pytest.approx(count, rel=1e-4)
@@ -130,9 +122,7 @@ def test_weight_is_what_the_direction_scatters(variant):
     patch = klems.basis_in.index(np.arccos(incident[:, 2]), incident_azimuth(incident))
     both = klems.reflection_front + klems.transmission_front
     _, weight = load(klems).sample(context("Importance"), si, mi.Float(0.4), mi.Point2f(0.5, 0.5))
-    assert np.array(weight).ravel()[0] == pytest.approx(
-        klems.direct_hemispherical(both)[patch][0], rel=1e-5
-    )
+    assert np.array(weight).ravel()[0] == pytest.approx(klems.direct_hemispherical(both)[patch][0], rel=1e-5)
 
 
 def test_a_context_of_one_kind_samples_only_that_kind(variant):
@@ -175,16 +165,10 @@ def test_scalar_variant_gives_the_same(variant):
             sample, weight = bsdf.sample(ctx, si, mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
             value, pdf = bsdf.eval_pdf(ctx, si, to_mitsuba(wo))
             results[name] = np.stack(
-                [
-                    *np.array(sample.wo),
-                    *map(np.ravel, map(np.array, (sample.pdf, weight, value, pdf))),
-                ],
-                axis=1,
+                [*np.array(sample.wo), *map(np.ravel, map(np.array, (sample.pdf, weight, value, pdf)))], axis=1
             )
     variants.activate("llvm_ad_mono")
-    same = np.isclose(results["llvm_ad_mono"], results["scalar_rgb"], rtol=1e-3, atol=1e-4).all(
-        axis=1
-    )
+    same = np.isclose(results["llvm_ad_mono"], results["scalar_rgb"], rtol=1e-3, atol=1e-4).all(axis=1)
     assert same.mean() > 0.985  # the others lie on a border of patches
 
 
@@ -193,9 +177,7 @@ def test_path_integrator_sees_what_three_phases_compute(variant):
     klems, sky = asymmetric(seed=9), np.array([2.0, 0.3])  # radiance above, below the horizon
     point = np.array([0.4, 1.2, 0.0])
     # the 2 x 2 window is sampled 4e6 times on either side: 0.1 % each (one sigma)
-    assert traced_irradiance(klems, sky, point) == pytest.approx(
-        three_phase_irradiance(klems, sky, point), rel=4e-3
-    )
+    assert traced_irradiance(klems, sky, point) == pytest.approx(three_phase_irradiance(klems, sky, point), rel=4e-3)
 
 
 def traced_irradiance(klems, sky, point):
@@ -221,11 +203,7 @@ def traced_irradiance(klems, sky, point):
         {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": 4},
-            "sky": {
-                "type": "envmap",
-                "bitmap": mi.Bitmap(image.astype(np.float32)),
-                "to_world": turn,
-            },
+            "sky": {"type": "envmap", "bitmap": mi.Bitmap(image.astype(np.float32)), "to_world": turn},
             "window": window,
             "meter": meter,
             **{
@@ -245,9 +223,7 @@ def three_phase_irradiance(klems, sky, point):
     u = generator.uniform(size=(2, 41, 4000))
     theta, phi = basis.angles_within(np.arange(41)[:, None], *u)
     frame = window_frame([0, -1, 0])
-    to_sky = np.stack(
-        [np.sin(theta) * np.cos(phi), -np.sin(theta) * np.sin(phi), np.cos(theta)], -1
-    )
+    to_sky = np.stack([np.sin(theta) * np.cos(phi), -np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
     daylight = np.where((to_sky @ frame)[..., 2] > 0, *sky).mean(axis=1)
     room = klems.transmission_matrix() @ daylight
     on_window = generator.uniform([-1, 0, 0], [1, 0, 2], (4_000_000, 3))

@@ -10,14 +10,7 @@ from test_plugin import asymmetric
 from test_tensor_tree import random_tree
 
 from mitsuba_cfs import variants
-from mitsuba_cfs.bsdf.colour import (
-    RGB_TO_XYZ,
-    WAVELENGTHS_NM,
-    WHITE,
-    leaf_means,
-    primary_spectra,
-    relative_rgb,
-)
+from mitsuba_cfs.bsdf.colour import RGB_TO_XYZ, WAVELENGTHS_NM, WHITE, leaf_means, primary_spectra, relative_rgb
 from mitsuba_cfs.bsdf.evaluate import bsdf_values
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
@@ -174,8 +167,7 @@ def test_means_over_leaves_are_those_of_the_dense_grid(rank):
     assert not np.array_equal(tree.depths, other.depths)
     fine = other.sample_grid().ravel()
     leaf = tree.leaf(
-        (np.stack(np.indices((1 << other.depth,) * rank), -1).reshape(-1, rank) + 0.5)
-        / (1 << other.depth)
+        (np.stack(np.indices((1 << other.depth,) * rank), -1).reshape(-1, rank) + 0.5) / (1 << other.depth)
     )
     expected = np.bincount(leaf, fine) / np.bincount(leaf)
     np.testing.assert_allclose(leaf_means(tree, other), expected, rtol=1e-9)

@@ -44,9 +44,7 @@ def test_glass_lets_the_view_through_undisturbed(variant, real_data, name, mode)
     transmitted = direct_hemispherical(file, "transmission_back", local)[0]
     reflected = direct_hemispherical(file, "reflection_back", local)[0]
     share = transmitted / (transmitted + reflected)
-    assert straight.mean() == pytest.approx(
-        share, abs=4 * np.sqrt(share * (1 - share) / 20_000) + 0.02
-    )
+    assert straight.mean() == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 20_000) + 0.02)
     np.testing.assert_allclose(weight, transmitted + reflected, rtol=0.02)
     transmits = np.array(sample.wo)[2] > 0
     assert (transmits & ~straight).mean() < 0.02  # next to nothing of it is scattered
@@ -74,10 +72,7 @@ def test_a_blind_keeps_all_it_lets_through(variant, real_data, mode):
     u = np.random.default_rng(4).uniform(size=(3, len(wi))).astype(np.float32)
     import mitsuba as mi
 
-    results = [
-        load(path, peak).sample(context(mode), si, mi.Float(u[0]), mi.Point2f(u[1:]))
-        for peak in (False, True)
-    ]
+    results = [load(path, peak).sample(context(mode), si, mi.Float(u[0]), mi.Point2f(u[1:])) for peak in (False, True)]
     whole, parts = (np.array(weight).ravel() for _, weight in results)
     np.testing.assert_allclose(parts, whole, rtol=1e-3, atol=1e-5)
     straight = nulls(results[1][0])
@@ -89,8 +84,7 @@ def test_eval_leaves_the_beam_out(variant, real_data):
     path, wi = real_data / "bsdf" / KLEMS_GLASS, random_directions(2000, 5)
     si, _ = interaction(wi)
     values = [
-        np.array(load(path, peak).eval(context("Radiance"), si, to_mitsuba(-wi))).ravel()
-        for peak in (False, True)
+        np.array(load(path, peak).eval(context("Radiance"), si, to_mitsuba(-wi))).ravel() for peak in (False, True)
     ]
     assert (values[1] < 0.02 * values[0]).all()
 
@@ -108,9 +102,7 @@ def isotropic_glass(straight: float = 0.8, diffuse: float = 0.05, depth: int = 5
     cells = 1 << depth
     grid = np.full((cells,) * 3, diffuse / np.pi)
     for cell in range(cells // 2):
-        grid[cell, cells - 1 - cell, cells // 2 - 1 : cells // 2 + 1] += (
-            straight * cells**2 / np.pi / 2
-        )
+        grid[cell, cells - 1 - cell, cells // 2 - 1 : cells // 2 + 1] += straight * cells**2 / np.pi / 2
     return tree_of(grid)
 
 
@@ -208,9 +200,7 @@ def test_the_beam_is_that_of_the_side_the_light_comes_from(variant, mode, side):
 
     from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 
-    pane = TensorTreeBsdf(
-        transmission_front=isotropic_glass(0.8), transmission_back=isotropic_glass(0.3)
-    )
+    pane = TensorTreeBsdf(transmission_front=isotropic_glass(0.8), transmission_back=isotropic_glass(0.3))
     bsdf = mi.load_dict(tensor_tree_plugin(pane, up=UP, peak=True))
     # in mode Radiance the light goes to where `wi` points, in mode Importance it comes from there
     straight = 0.8 if (side > 0) == (mode == "Importance") else 0.3
@@ -227,8 +217,7 @@ def test_an_isotropic_blind_keeps_all_it_lets_through(variant, real_data):
     si, _ = interaction(wi)
     u = np.random.default_rng(4).uniform(size=(3, len(wi))).astype(np.float32)
     whole, parts = (
-        load(path, peak).sample(context("Importance"), si, mi.Float(u[0]), mi.Point2f(u[1:]))
-        for peak in (False, True)
+        load(path, peak).sample(context("Importance"), si, mi.Float(u[0]), mi.Point2f(u[1:])) for peak in (False, True)
     )
     np.testing.assert_allclose(np.array(parts[1]), np.array(whole[1]), rtol=1e-3, atol=1e-5)
     assert 0.02 < nulls(parts[0]).mean() < 0.6

@@ -19,10 +19,7 @@ INDEX = 1.5
 @pytest.fixture(scope="module")
 def slab(variant):
     return generate_klems(
-        prism_panel(INDEX, pitch=0.01, angle=0.0, thickness=0.004),
-        KLEMS_QUARTER,
-        samples=8192,
-        seed=1,
+        prism_panel(INDEX, pitch=0.01, angle=0.0, thickness=0.004), KLEMS_QUARTER, samples=8192, seed=1
     ).bsdf[0]
 
 
@@ -88,9 +85,7 @@ def test_a_prism_bends_as_snell_says(variant):
     assert abs(out[0]) < 1e-9
 
 
-def clear_pane(
-    index: float, thickness: float, period: tuple[float, float], *, channels: int = 1
-) -> PeriodicLayer:
+def clear_pane(index: float, thickness: float, period: tuple[float, float], *, channels: int = 1) -> PeriodicLayer:
     """A pane of clear glass on a cell of any size: its two faces."""
     width, height = period
     outside = np.array([[0, 0, 0], [width, 0, 0], [width, height, 0], [0, height, 0]], dtype=float)
@@ -104,12 +99,8 @@ def test_a_blind_before_glass_traced_at_once_and_by_layer_algebra(variant):
     """A grey blind 5 mm before a clear pane: one tracing, or two and matrix algebra."""
     blind = venetian_blind(plastic("grey", 0.5), depth=0.03, spacing=0.025, tilt=np.radians(35))
     pane = clear_pane(INDEX, 0.004, blind.period)
-    at_once = generate_klems(
-        stacked([blind, pane], [0.005]), KLEMS_FULL, samples=16_384, seed=4
-    ).bsdf[0]
-    parts = [
-        generate_klems(part, KLEMS_FULL, samples=16_384, seed=5).bsdf[0] for part in (blind, pane)
-    ]
+    at_once = generate_klems(stacked([blind, pane], [0.005]), KLEMS_FULL, samples=16_384, seed=4).bsdf[0]
+    parts = [generate_klems(part, KLEMS_FULL, samples=16_384, seed=5).bsdf[0] for part in (blind, pane)]
     by_algebra = combine_layers(parts).bsdf
     for name, block in at_once.blocks().items():
         found = by_algebra.direct_hemispherical(getattr(by_algebra, name))

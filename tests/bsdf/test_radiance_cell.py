@@ -30,11 +30,13 @@ CELLS = {
     "slats before glass": PLASTIC + "a" + SLAT + "void glass g\n0\n0\n3 .6 .6 .6\ng" + SHEET,
     "glass askew": "void glass g\n0\n0\n4 .8 .8 .8 1.6\ng" + SLAT,
     "metal": "void metal a\n0\n0\n5 .7 .7 .7 .6 .1\na" + SLAT,
-    "mirror, alias and tube": "void mirror m\n0\n0\n3 .8 .8 .8\nvoid alias n m\nn" + SLAT + PLASTIC
+    "mirror, alias and tube": "void mirror m\n0\n0\n3 .8 .8 .8\nvoid alias n m\nn"
+    + SLAT
+    + PLASTIC
     + "a tube t\n0\n0\n7 0 .016 -.01 .05 .016 -.01 .003\n",
     "xform and genbox": PLASTIC + "!genbox a b .05 .008 .002 | xform -rx 20 -t 0 .01 -.01\n",
     "pattern": "void brightfunc f\n2 .5 .\n0\n0\nf plastic a\n0\n0\n5 .8 .8 .8 0 0\na" + SLAT,
-}  # fmt: skip
+}
 
 
 def traced_by_radiance(folder, seed: int = 1, rays: int = 60_000) -> tuple[float, float]:
@@ -45,13 +47,11 @@ def traced_by_radiance(folder, seed: int = 1, rays: int = 60_000) -> tuple[float
     )
     u = np.random.default_rng(seed).uniform(size=(4, rays))
     sine = np.sin(CAP) * np.sqrt(u[0])
-    towards = [sine * np.cos(2 * np.pi * u[1]), sine * np.sin(2 * np.pi * u[1]),
-               -np.sqrt(1 - sine**2)]  # fmt: skip
+    towards = [sine * np.cos(2 * np.pi * u[1]), sine * np.sin(2 * np.pi * u[1]), -np.sqrt(1 - sine**2)]
     starts = [PERIOD[0] * u[2], PERIOD[1] * u[3], np.full(rays, 1e-3)]
     text = "\n".join(" ".join(f"{x:.8g}" for x in row) for row in np.stack([*starts, *towards], 1))
     command = (
-        "oconv tile.rad > tile.oct && "
-        "rtrace -h -ab 12 -ad 1 -as 0 -aa 0 -lw 1e-6 -lr -24 -ss 1 -st 0 -n 1 tile.oct"
+        "oconv tile.rad > tile.oct && rtrace -h -ab 12 -ad 1 -as 0 -aa 0 -lw 1e-6 -lr -24 -ss 1 -st 0 -n 1 tile.oct"
     )
     out = np.array(run(command, folder, text.encode()).split(), dtype=float).reshape(-1, 3)
     values = out @ [0.265, 0.670, 0.065]

@@ -54,9 +54,7 @@ def test_a_thick_woven_sheet_cuts_off(variant):
     layer = woven_screen(BLACK, spacing=spacing, openness=openness, thickness=thickness)
     bsdf = generate_klems(layer, KLEMS_QUARTER, samples=8192, seed=2).bsdf[0]
     patch = np.repeat(np.arange(41), 20_000)
-    theta, phi = KLEMS_QUARTER.angles_within(
-        patch, *np.random.default_rng(3).uniform(size=(2, len(patch)))
-    )
+    theta, phi = KLEMS_QUARTER.angles_within(patch, *np.random.default_rng(3).uniform(size=(2, len(patch))))
     hole, run = spacing * np.sqrt(openness), thickness * np.tan(theta)
     passed = np.maximum(1 - run * abs(np.cos(phi)) / hole, 0)
     passed = openness * passed * np.maximum(1 - run * abs(np.sin(phi)) / hole, 0)

@@ -24,26 +24,35 @@ SPECTRUM = [{"wavelength": w, "T": 0.0, "Rf": 0.2, "Rb": 0.8} for w in (0.3, 0.5
 SIZES = {
     "venetian": {"slat_width": 16.0, "slat_spacing": 12.0, "slat_tilt": 30.0, "slat_curvature": 0},
     "woven": {"thread_diameter": 0.4, "thread_spacing": 1.0, "shade_thickness": 0.8},
-    "perforated-screen": {
-        "dimension_x": 0.25, "spacing_x": 1.0, "spacing_y": 1.0, "perforation_type": "Circular",
-    },
-}  # fmt: skip
+    "perforated-screen": {"dimension_x": 0.25, "spacing_x": 1.0, "spacing_y": 1.0, "perforation_type": "Circular"},
+}
 
 
 def product(kind):
     """An IGSDB product as the database's version 2 writes shades."""
     material = {
-        "name": "Sheet", "type": "material",
-        "measured_data": {"thickness": 0.2, "conductivity": 160.0, "emissivity_front": 0.9,
-                          "emissivity_back": 0.8, "tir_front": 0.0, "is_specular": True},
+        "name": "Sheet",
+        "type": "material",
+        "measured_data": {
+            "thickness": 0.2,
+            "conductivity": 160.0,
+            "emissivity_front": 0.9,
+            "emissivity_back": 0.8,
+            "tir_front": 0.0,
+            "is_specular": True,
+        },
         "spectral_data": {"spectral_data": copy.deepcopy(SPECTRUM)},
         "integrated_results_summary": [{"calculation_standard_name": "NFRC"}],
-    }  # fmt: skip
+    }
     part = {"child_product": material, "extra_data": {"geometry": dict(SIZES[kind])}}
     return {
-        "name": "Shade", "manufacturer_name": "Maker", "type": "shading", "subtype": kind,
-        "measured_data": {"is_specular": False}, "composition": [part],
-    }  # fmt: skip
+        "name": "Shade",
+        "manufacturer_name": "Maker",
+        "type": "shading",
+        "subtype": kind,
+        "measured_data": {"is_specular": False},
+        "composition": [part],
+    }
 
 
 def written(tmp_path, content):
@@ -95,10 +104,7 @@ def test_black_round_threads_pass_what_lies_between_them(variant):
 def test_each_side_of_round_threads_shows_its_own_colour(variant, tmp_path):
     layer = read_shade_file(written(tmp_path, product("woven"))).layer()
     bsdf = generate_klems(layer, KLEMS_QUARTER, samples=8192, seed=3).bsdf[0]
-    front, back = (
-        bsdf.direct_hemispherical(block)[0]
-        for block in (bsdf.reflection_front, bsdf.reflection_back)
-    )
+    front, back = (bsdf.direct_hemispherical(block)[0] for block in (bsdf.reflection_front, bsdf.reflection_back))
     # 0.64 of the light meets a thread; of a white one's 0.8 some goes on into the room
     assert 0.07 < front < 0.64 * 0.2 and 0.30 < back < 0.64 * 0.8
 
@@ -135,9 +141,15 @@ def test_blinds_are_those_of_windows_engine(variant, real_data, tmp_path, name, 
     )
     engine = system.optical_method_results("PHOTOPIC").system_results
     sums, paths = generate.trace_bins(
-        TracedLayer(read_shade_file(path).layer()), Centres(KLEMS_QUARTER), 41,
-        TracedBasis(KLEMS_QUARTER), 41, rows=1, samples=16_384, seed=1,
-    )  # fmt: skip
+        TracedLayer(read_shade_file(path).layer()),
+        Centres(KLEMS_QUARTER),
+        41,
+        TracedBasis(KLEMS_QUARTER),
+        41,
+        rows=1,
+        samples=16_384,
+        seed=1,
+    )
     shares = sums[0][0].sum(axis=-1) / paths  # [side in, patch in, side out]
     area = KLEMS_QUARTER.projected_solid_angles()
     pairs = {

@@ -50,7 +50,11 @@ def test_colour_of_glass_as_seen() -> None:
     assert own[0] > 1.5 > 1 > own[1] and own @ RGB_TO_XYZ[1] == pytest.approx(1.0)
     # by the same path as light: a tinted system passes the tint times the visible band
     table = AngularTable(ANGLES, np.full(len(ANGLES), 0.2))
-    system = BsdfOptics(specular_matrices(replace(table, reflectance_front=np.zeros(len(ANGLES)),
-        reflectance_back=np.zeros(len(ANGLES)))), angular=table)  # fmt: skip
+    system = BsdfOptics(
+        specular_matrices(
+            replace(table, reflectance_front=np.zeros(len(ANGLES)), reflectance_back=np.zeros(len(ANGLES)))
+        ),
+        angular=table,
+    )
     passed = system.tinted(ANGLES, np.full(len(ANGLES), own[0])).transmission
     assert np.diag(passed) == pytest.approx(own[0] * np.diag(system.transmission), rel=1e-3)

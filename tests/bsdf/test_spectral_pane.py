@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.bsdf.glazing import Pane, pane_values
-from mitsuba_cfs.bsdf.spectral_pane import (
-    SpectralPane,
-    read_spectral_pane,
-    solar_average,
-    spectral_glazing,
-)
+from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, read_spectral_pane, solar_average, spectral_glazing
 from mitsuba_cfs.errors import DataError
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
 from thermal.iso15099 import NFRC, iso15099_g_values, iso15099_u_value, unit_balance
@@ -121,10 +116,7 @@ def test_u_and_shgc_are_those_of_windows_engine(real_data, names):
         )
 
     panes = [read_spectral_pane(path) for path in files]
-    layers = [
-        GlazingLayer(p.thickness, p.conductivity, p.emissivity, p.infrared_transmittance)
-        for p in panes
-    ]
+    layers = [GlazingLayer(p.thickness, p.conductivity, p.emissivity, p.infrared_transmittance) for p in panes]
     unit = GlazingUnit(tuple(layers), (GasGap(0.0127),) * (len(files) - 1), height=1.0)
     band = spectral_glazing(panes, spectrum=sun)["Solar"]
     g = iso15099_g_values(unit, NFRC[1], band.transmittance, band.absorptance)[0]

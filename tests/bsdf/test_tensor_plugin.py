@@ -11,12 +11,7 @@ from test_tensor_tree import random_tree
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.evaluate import bsdf_values, incident_disk, outgoing_disk
 from mitsuba_cfs.bsdf.tensor_sampling import sampling_tree
-from mitsuba_cfs.bsdf.tensor_tree import (
-    TensorTree,
-    TensorTreeBsdf,
-    disk_to_square,
-    square_to_disk,
-)
+from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf, disk_to_square, square_to_disk
 
 MODES = ("Radiance", "Importance")
 LEVELS = 3
@@ -158,9 +153,7 @@ def test_scalar_variant_gives_the_same(variant):
     count, data = 200, system(4)
     wi, u = random_directions(count, 5), np.random.default_rng(7).uniform(size=(count, 3))
     bsdf = load(data)
-    sample, weight = bsdf.sample(
-        context("Radiance"), interaction(wi)[0], mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T)
-    )
+    sample, weight = bsdf.sample(context("Radiance"), interaction(wi)[0], mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
     vector = np.stack([*np.array(sample.wo), np.array(sample.pdf), np.array(weight).ravel()], 1)
     variants.activate("scalar_rgb")
     try:

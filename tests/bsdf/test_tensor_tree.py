@@ -8,12 +8,7 @@ import pytest
 
 from mitsuba_cfs.bsdf.evaluate import bsdf_values, direct_hemispherical
 from mitsuba_cfs.bsdf.tensor_text import format_tree
-from mitsuba_cfs.bsdf.tensor_tree import (
-    TensorTree,
-    TensorTreeBsdf,
-    disk_to_square,
-    square_to_disk,
-)
+from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf, disk_to_square, square_to_disk
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 
 FILES = (
@@ -142,9 +137,7 @@ def test_random_trees_on_all_sides_are_those_of_radiance(tmp_path, rank):
     write_bsdf_xml(BsdfFile({"Visible": system}), path, digits=9)
     incident, outgoing = radiance.random_directions(10_000, seed=2)
     theirs = radiance.query(path, incident, outgoing)
-    ours = bsdf_values(
-        radiance.perturbed(system), radiance.to_window(incident), radiance.to_window(outgoing)
-    )
+    ours = bsdf_values(radiance.perturbed(system), radiance.to_window(incident), radiance.to_window(outgoing))
     assert share_off(ours, theirs, incident) <= 2e-4
 
 
@@ -166,7 +159,6 @@ def test_hemispherical_values_are_those_of_radiance(request, tmp_path, name):
     for side, chosen in (("front", front), ("back", ~front)):
         if chosen.any():
             ours[chosen] = sum(
-                direct_hemispherical(system, f"{kind}_{side}", local[chosen])
-                for kind in ("transmission", "reflection")
+                direct_hemispherical(system, f"{kind}_{side}", local[chosen]) for kind in ("transmission", "reflection")
             )
     np.testing.assert_allclose(ours, theirs, atol=1e-3)

@@ -93,8 +93,7 @@ def test_a_matrix_of_far_too_many_numbers_is_refused_before_they_are_read(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("tag", "text", "expected"),
-    [("Thickness", "-0.003", "of at least 0"), ("EmissivityFront", "8.4", "from 0 to 1")],
+    ("tag", "text", "expected"), [("Thickness", "-0.003", "of at least 0"), ("EmissivityFront", "8.4", "from 0 to 1")]
 )
 def test_impossible_descriptions_are_refused(tmp_path, tag, text, expected):
     path = tmp_path / "system.xml"
@@ -134,9 +133,7 @@ def test_a_tree_is_turned_and_summed_once(monkeypatch):
     """All that a plugin needs of a file: each tree's way back once, its hemisphere once."""
     calls = []
     work = TensorTree._reversed_isotropic
-    monkeypatch.setattr(
-        TensorTree, "_reversed_isotropic", lambda tree: calls.append(tree) or work(tree)
-    )
+    monkeypatch.setattr(TensorTree, "_reversed_isotropic", lambda tree: calls.append(tree) or work(tree))
     tree = dense(3)
     bsdf = TensorTreeBsdf(transmission_front=tree)
     plugin_trees(bsdf, True)

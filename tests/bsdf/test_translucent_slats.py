@@ -28,8 +28,7 @@ def radiosity(transmittance, reflectance, depth, spacing, strips):
     def seen(a, b):
         """Share of what each strip between points `a` sends that arrives between points `b`."""
         (a0, a1), (b0, b1) = (
-            (p[:-1][:, None], p[1:][:, None]) if p is a else (p[:-1][None], p[1:][None])
-            for p in (a, b)
+            (p[:-1][:, None], p[1:][:, None]) if p is a else (p[:-1][None], p[1:][None]) for p in (a, b)
         )
 
         def distance(p, q):
@@ -45,10 +44,7 @@ def radiosity(transmittance, reflectance, depth, spacing, strips):
     lit = np.full(strips, np.sin(TILT))  # the upper faces, whole: the next slat shades nothing
     one = np.eye(strips)
     exchange = np.block(
-        [
-            [one - transmittance * down, -reflectance * up],
-            [-reflectance * down, one - transmittance * up],
-        ]
+        [[one - transmittance * down, -reflectance * up], [-reflectance * down, one - transmittance * up]]
     )
     leaving = np.linalg.solve(exchange, np.concatenate([reflectance * lit, transmittance * lit]))
     flow = leaving * depth / strips / spacing
@@ -83,9 +79,8 @@ def test_traced_slats_are_those_of_radiosity(variant, transmittance, reflectance
     slat = SlatMaterial("slat", (reflectance,), (reflectance,), transmittance=(transmittance,))
     layer = venetian_blind(slat, depth=depth, spacing=spacing, tilt=TILT)
     (sums,), paths = trace_bins(
-        TracedLayer(layer), Normal(), 1, TracedBasis(KLEMS_QUARTER), 41,
-        rows=1, samples=1 << 18, seed=1,
-    )  # fmt: skip
+        TracedLayer(layer), Normal(), 1, TracedBasis(KLEMS_QUARTER), 41, rows=1, samples=1 << 18, seed=1
+    )
     shares = sums[0, :, 0].sum(axis=-1) / paths  # [side in, side out]
     direct, through, back = radiosity(transmittance, reflectance, depth, spacing, strips=100)
     # 5 sigma of a share of 0.5 in 262 144 paths

@@ -109,23 +109,14 @@ BROKEN = {
     "one value more": (lambda t: t.replace("<ScatteringData>", "<ScatteringData>1,", 1), "1682"),
     "wrong basis": (lambda t: t.replace("LBNL/Klems Quarter</Col", "LBNL/Klems Full</Col"), "145"),
     "unknown basis": (lambda t: t.replace("LBNL/Klems Quarter</Row", "mine</Row"), "mine"),
-    "not finite": (
-        lambda t: t.replace("<ScatteringData>", "<ScatteringData>nan, ", 1),
-        "not finite",
-    ),
+    "not finite": (lambda t: t.replace("<ScatteringData>", "<ScatteringData>nan, ", 1), "not finite"),
     "not a number": (lambda t: t.replace("<ScatteringData>", "<ScatteringData>x", 1), "number"),
-    "gains energy": (
-        lambda t: t.replace("<ScatteringData>\n0", "<ScatteringData>\n1000", 1),
-        "scatters",
-    ),
+    "gains energy": (lambda t: t.replace("<ScatteringData>\n0", "<ScatteringData>\n1000", 1), "scatters"),
     "structure": (lambda t: t.replace(">Columns<", ">Heaps<"), "Heaps"),
     "no basis": (lambda t: t.replace("ColumnAngleBasis", "Kolumn"), "ColumnAngleBasis"),
     "unit": (lambda t: t.replace('unit="meter"', 'unit="ell"'), "ell"),
     "bounds": (lambda t: t.replace("<UpperTheta>27<", "<UpperTheta>99<"), "theta bounds"),
-    "bounds off by little": (
-        lambda t: t.replace("<UpperTheta>27<", "<UpperTheta>27.01<"),
-        "theta bounds disagree",
-    ),
+    "bounds off by little": (lambda t: t.replace("<UpperTheta>27<", "<UpperTheta>27.01<"), "theta bounds disagree"),
     "no data": (lambda t: t.replace("WavelengthDataBlock", "Block"), "no scattering data"),
 }
 
@@ -186,22 +177,13 @@ def test_entities_are_refused(text, tmp_path, encoding):
     start = text.index("<WindowElement")
     bomb = '<!DOCTYPE WindowElement [<!ENTITY a "0.1 0.1"><!ENTITY b "&a;&a;">]>'
     path = tmp_path / "bomb.xml"
-    path.write_bytes(
-        (f'<?xml version="1.0" encoding="{encoding}"?>{bomb}' + text[start:]).encode(encoding)
-    )
+    path.write_bytes((f'<?xml version="1.0" encoding="{encoding}"?>{bomb}' + text[start:]).encode(encoding))
     with pytest.raises(DataError, match="declares entities"):
         read_bsdf_xml(path)
 
 
 @pytest.mark.parametrize(
-    ("unit", "metres"),
-    [
-        ("meter", 1.0),
-        ("foot", 0.3048),
-        ("inch", 0.0254),
-        ("centimeter", 0.01),
-        ("millimeter", 1e-3),
-    ],
+    ("unit", "metres"), [("meter", 1.0), ("foot", 0.3048), ("inch", 0.0254), ("centimeter", 0.01), ("millimeter", 1e-3)]
 )
 def test_lengths_are_metres(text, tmp_path, unit, metres):
     changed = text.replace('<Thickness unit="meter">0.024<', f'<Thickness unit="{unit}">0.5<')
@@ -210,8 +192,7 @@ def test_lengths_are_metres(text, tmp_path, unit, metres):
 
 
 @pytest.mark.parametrize(
-    ("field", "value", "message"),
-    [("Thickness", -0.5, "of at least 0"), ("EmissivityFront", 8.4, "from 0 to 1")],
+    ("field", "value", "message"), [("Thickness", -0.5, "of at least 0"), ("EmissivityFront", 8.4, "from 0 to 1")]
 )
 def test_a_number_beyond_its_bounds_is_refused_with_them(text, tmp_path, field, value, message):
     changed = re.sub(f"(<{field}[^>]*>)[^<]*<", rf"\g<1>{value}<", text)
@@ -221,8 +202,7 @@ def test_a_number_beyond_its_bounds_is_refused_with_them(text, tmp_path, field, 
 
 
 @pytest.mark.parametrize(
-    ("element", "expected"),
-    [("", "Other"), ("<DeviceType/>", "Other"), ("<DeviceType>Shade</DeviceType>", "Shade")],
+    ("element", "expected"), [("", "Other"), ("<DeviceType/>", "Other"), ("<DeviceType>Shade</DeviceType>", "Shade")]
 )
 def test_the_type_of_a_device_is_other_where_none_is_stated(text, tmp_path, element, expected):
     changed = re.sub("<DeviceType>[^<]*</DeviceType>", element, text)

@@ -53,9 +53,13 @@ def misses(rooms):
 def test_one_sunny_room_is_enough_for_its_dwelling(calendar):
     """A has a sunny living room and a dark bedroom, B two dark rooms and a sunny kitchen."""
     rooms, verdicts = checked(
-        calendar, ("A1", "living", "A", 3.2), ("A2", "bedroom", "A", 0.0),
-        ("B1", "living", "B", 1.4), ("B2", "bedroom", "B", 0.2), ("B3", "kitchen", "B", 5.0),
-    )  # fmt: skip
+        calendar,
+        ("A1", "living", "A", 3.2),
+        ("A2", "bedroom", "A", 0.0),
+        ("B1", "living", "B", 1.4),
+        ("B2", "bedroom", "B", 0.2),
+        ("B3", "kitchen", "B", 5.0),
+    )
     verdict = of_building(verdicts, "sunlight_dwellings")
     assert verdict.values == pytest.approx([0.5, 0.5, 0.0])
     assert verdict.rooms == 4 and verdict.reached == NOT_MET
@@ -67,12 +71,8 @@ def test_one_sunny_room_is_enough_for_its_dwelling(calendar):
 
 def test_rooms_of_no_dwelling_are_asked_one_by_one(calendar):
     """A pass for a whole house by its one sunny room would be ours, not the file's."""
-    rooms, verdicts = checked(
-        calendar, ("1", "living", "", 4.5), ("2", "bedroom", "", 1.0), ("3", "bedroom", "A", 2.0)
-    )
-    assert of_building(verdicts, "sunlight_dwellings").values == pytest.approx(
-        [2 / 3, 1 / 3, 1 / 3]
-    )
+    rooms, verdicts = checked(calendar, ("1", "living", "", 4.5), ("2", "bedroom", "", 1.0), ("3", "bedroom", "A", 2.0))
+    assert of_building(verdicts, "sunlight_dwellings").values == pytest.approx([2 / 3, 1 / 3, 1 / 3])
     assert [bool(text) for text in misses(rooms).values()] == [False, True, False]
     named, alone = dwelling_words(rooms)
     assert "dwellings are A (3)" in named and "--uses" in named
@@ -81,15 +81,15 @@ def test_rooms_of_no_dwelling_are_asked_one_by_one(calendar):
 
 def test_offices_have_hours_and_miss_nothing_wards_are_asked_each(calendar):
     rooms, verdicts = checked(
-        calendar, ("office", "office", "", 0.0), ("lit", "office", "", 4.0),
-        ("ward", "ward", "", 1.0), ("play", "nursery", "", 2.0),
-    )  # fmt: skip
+        calendar,
+        ("office", "office", "", 0.0),
+        ("lit", "office", "", 4.0),
+        ("ward", "ward", "", 1.0),
+        ("play", "nursery", "", 2.0),
+    )
     found = misses(rooms)
     assert not found["office"] and not found["lit"] and not found["play"] and found["ward"]
-    levels = [
-        {v.criterion.key: v.reached for v in room.verdicts if "sunlight" in v.criterion.key}
-        for room in rooms
-    ]
+    levels = [{v.criterion.key: v.reached for v in room.verdicts if "sunlight" in v.criterion.key} for room in rooms]
     assert [one["sunlight"] for one in levels] == [NOT_MET, "high", NOT_FOR_IT, NOT_FOR_IT]
     assert [one["sunlight_wards"] for one in levels][2:] == [NOT_MET, "minimum"]
     assert of_building(verdicts, "sunlight_wards").values[0] == pytest.approx(0.5)
@@ -104,9 +104,7 @@ def _zoned(*zones: SpaceGroup) -> Building:
 
 
 def test_zones_of_the_model_are_dwellings():
-    named = _zoned(
-        SpaceGroup("Wohnung 2", "", ("a", "b")), SpaceGroup("Heizkreis", "", ("a", "b", "c"))
-    )
+    named = _zoned(SpaceGroup("Wohnung 2", "", ("a", "b")), SpaceGroup("Heizkreis", "", ("a", "b", "c")))
     assert dwellings_of(named) == {"a": "Wohnung 2", "b": "Wohnung 2"}
     plain = _zoned(SpaceGroup("Top 1", "", ("a",)), SpaceGroup("HVAC 1", "", ("a", "b")))
     assert dwellings_of(plain) == {"a": "Top 1"}

@@ -48,9 +48,14 @@ def test_seats_and_blinds(variant):
     clear = FenestrationSystem("clear", klems, klems, source="made")
     systems = open_and_closed({w.guid: (clear,) for w in space.windows}, None)
     options = RoomOptions.of(
-        sky_subdivision=1, sensor_samples=256, patch_samples=128, sun_points=16, picture_size=48,
-        picture_samples=4, sensor_spacing=1.5,
-    )  # fmt: skip
+        sky_subdivision=1,
+        sensor_samples=256,
+        patch_samples=128,
+        sun_points=16,
+        picture_size=48,
+        picture_samples=4,
+        sensor_spacing=1.5,
+    )
     skies = skies_for(weather, options.sampling)
     skies = skies.part(np.arange(0, len(skies.lit), EVERY))
     room = room_inputs(building, space, systems, weather, options, skies=skies)

@@ -36,14 +36,11 @@ def test_degree_hours_of_use_and_of_all_hours(calendar):
     assert need.value(Findings(calendar)) is None
 
 
-@pytest.mark.parametrize(
-    ("operative", "inside"), [(27.3, "I"), (27.5, "II"), (28.5, "III"), (29.5, ""), (22.5, "I")]
-)
+@pytest.mark.parametrize(("operative", "inside"), [(27.3, "I"), (27.5, "II"), (28.5, "III"), (29.5, ""), (22.5, "I")])
 def test_bands_of_the_categories(calendar, operative, inside):
     """20 °C outdoors: 0.33 x 20 + 18.8 = 25.4 °C; +2 -3, +3 -4, +4 -5 K."""
     needs = {
-        name: ComfortShare(what="comfort", band=f"EN 16798-1 {name}", at_least=0.95)
-        for name in ("I", "II", "III")
+        name: ComfortShare(what="comfort", band=f"EN 16798-1 {name}", at_least=0.95) for name in ("I", "II", "III")
     }
     found = Findings(calendar, heat=heat(operative))
     met = [name for name, need in needs.items() if need.value(found) == 1.0]

@@ -64,9 +64,7 @@ def test_closed_is_what_is_given_else_held_else_default():
 def test_grids_of_rules():
     """LM-83's is 0.6 m wide and high; EN 17037's has whole cells no wider than p."""
     space = shoebox(4.0, 6.0).spaces[0]
-    assert sensor_grid_of(space, read_rule("lm83").grid) == SensorGrid(
-        spacing=0.6, height=0.76, margin=0.0
-    )
+    assert sensor_grid_of(space, read_rule("lm83").grid) == SensorGrid(spacing=0.6, height=0.76, margin=0.0)
     grid = sensor_grid_of(space, read_rule("en17037").grid)  # a plane of 3 x 5 m
     p = 0.5 * 5 ** np.log10(5.0)
     assert grid.spacing == pytest.approx(5.0 / 4) and 5.0 / 4 <= p < 5.0 / 3
@@ -80,15 +78,15 @@ def room(variant):
     sides = [WindowRectangle(1.5, 0.9, 2.0, 1.8, side=side) for side in ("left", "right")]
     building = shoebox(windows=sides)
     space = building.spaces[0]
-    options = RoomOptions.of(
-        sky_subdivision=1, sensor_samples=1024, patch_samples=256, sun_points=64
-    )
+    options = RoomOptions.of(sky_subdivision=1, sensor_samples=1024, patch_samples=256, sun_points=64)
     skies = skies_for(weather, options.sampling)
     skies = skies.part(np.arange(0, len(skies.lit), EVERY))
     systems = open_and_closed({w.guid: (glazing(),) for w in space.windows}, None)
     same = {w.guid: systems[space.windows[0].guid] for w in space.windows}
-    grids = [sensor_grid_of(space, GridTable(height=0.76, margin=0.3, spacing=1.5)),
-             sensor_grid_of(space, GridTable(height=0.85, margin=0.5, spacing=1.0))]  # fmt: skip
+    grids = [
+        sensor_grid_of(space, GridTable(height=0.76, margin=0.3, spacing=1.5)),
+        sensor_grid_of(space, GridTable(height=0.85, margin=0.5, spacing=1.0)),
+    ]
     return room_inputs(building, space, same, weather, options, skies=skies, grids=grids)
 
 

@@ -79,14 +79,7 @@ def options(tmp_path_factory) -> ComplyOptions:
 
 def files_of(options: ComplyOptions, **more) -> ComplyFiles:
     rules = {"rays": read_rule(options.standards[0])}
-    found = ComplyFiles(
-        InputFiles(read_weather(WEATHER)),
-        rules,
-        read_uses(),
-        None,
-        13.0,
-        "assumed: as you like",
-    )
+    found = ComplyFiles(InputFiles(read_weather(WEATHER)), rules, read_uses(), None, 13.0, "assumed: as you like")
     return replace(found, **more)
 
 
@@ -104,10 +97,7 @@ def result(options):
 
 
 def verdicts(result):
-    return {
-        room.space.name: {v.criterion.key: v.reached for v in room.verdicts}
-        for room in result.rooms
-    }
+    return {room.space.name: {v.criterion.key: v.reached for v in room.verdicts} for room in result.rooms}
 
 
 def test_the_masthead_has_the_median_of_daylight_where_a_rule_judges_daylight(result):
@@ -136,9 +126,16 @@ def test_assumptions_name_what_was_assumed(result):
 
 def test_the_dossier_says_all(result):
     html = dossier_html(result)
-    for wanted in ("&lt;House&gt;", "2026 &lt;draft&gt;", "clause 7.1", "View &amp; distance",
-                   "≥\xa075\xa0%", "Meeting room", "mine",
-                   "Sunlight at the reference points of the openings"):  # fmt: skip
+    for wanted in (
+        "&lt;House&gt;",
+        "2026 &lt;draft&gt;",
+        "clause 7.1",
+        "View &amp; distance",
+        "≥\xa075\xa0%",
+        "Meeting room",
+        "mine",
+        "Sunlight at the reference points of the openings",
+    ):
         assert wanted in html
     assert "<script" not in html and "http:" not in html.replace("http://www.w3.org", "")
 
@@ -173,10 +170,9 @@ def test_a_dossier_with_a_title_and_without_its_rooms(result):
 
 def test_a_room_says_what_it_misses(result):
     """The sentence of its BCF topic; rooms that miss nothing have none."""
-    sections = dict(zip(
-        ("south", "north", "hatch", "dark"),
-        dossier_html(result).split('<section id="room-')[1:], strict=True,
-    ))  # fmt: skip
+    sections = dict(
+        zip(("south", "north", "hatch", "dark"), dossier_html(result).split('<section id="room-')[1:], strict=True)
+    )
     assert "Not met:" not in sections["south"] and "Not met:" not in sections["north"]
     assert "rays, Sun (clause 7.2)" in sections["dark"]
     assert "0.00 h, required ≥ 1.5 h for met" in sections["dark"].replace("\xa0", " ")
@@ -206,9 +202,7 @@ def test_a_room_says_how_glare_was_rated(result):
     dgp = np.full((4, 1000), 0.3)
     dgp[2, :60] = 0.46
     found = glare_words(SeatGlare(eyes, eyes, dgp, operated=True))
-    assert found == (
-        "2 seats, 2 directions each; DGP exceeded in 5 % of the hours: 0.46 at the worst"
-    )
+    assert found == ("2 seats, 2 directions each; DGP exceeded in 5 % of the hours: 0.46 at the worst")
     one = glare_words(SeatGlare(eyes[:1], eyes[:1], dgp[:1], operated=True))
     assert one == "1 seat; DGP exceeded in 5 % of the hours: 0.30"
 
@@ -228,12 +222,12 @@ def test_each_quantity_of_the_light_has_one_plan(result):
     light = RoomLights(room.space, dict(zip(names, grids, strict=True)), {})
     found = {one.title: one for one in plans(lit, replace(room, view=None, light=light))}
     assert list(found) == [
-        "Illuminance in half of the daylight hours", "Daylight factor", "Daylight autonomy",
+        "Illuminance in half of the daylight hours",
+        "Daylight factor",
+        "Daylight autonomy",
         "Sunlit hours",
-    ]  # fmt: skip
-    assert (
-        "Grid of en17037, 0.85 m" in found["Illuminance in half of the daylight hours"].explanation
-    )
+    ]
+    assert "Grid of en17037, 0.85 m" in found["Illuminance in half of the daylight hours"].explanation
     assert "222" in found["Illuminance in half of the daylight hours"].body
     autonomy = found["Daylight autonomy"].explanation  # of sDA before BREEAM's hours
     assert "Grid of lm83" in autonomy and "blinds operated" in autonomy
@@ -292,10 +286,9 @@ def found_again(bcf: Path, file: Path) -> dict[str, tuple[str, np.ndarray]]:
             title = markup.find("Topic").findtext("Title")
             assert title.startswith(f"{space.Name}")
             eye, direction = (
-                np.array([float(shown.find(f"PerspectiveCamera/{what}/{axis}").text)
-                          for axis in "XYZ"])
+                np.array([float(shown.find(f"PerspectiveCamera/{what}/{axis}").text) for axis in "XYZ"])
                 for what in ("CameraViewPoint", "CameraDirection")
-            )  # fmt: skip
+            )
             corners = ifcopenshell.geom.create_shape(settings, space).geometry.verts
             corners = np.reshape(corners, (-1, 3))
             assert np.all(corners.min(axis=0) < eye) and np.all(eye < corners.max(axis=0)), title

@@ -36,9 +36,7 @@ def reached(name, findings, use):
 
 
 def year(calendar, operative, outdoor=10.0, occupied=True):
-    arrays = (
-        np.broadcast_to(np.asarray(v, dtype=float), 8760).copy() for v in (operative, outdoor)
-    )
+    arrays = (np.broadcast_to(np.asarray(v, dtype=float), 8760).copy() for v in (operative, outdoor))
     used = np.broadcast_to(np.asarray(occupied), 8760).copy()
     return Findings(calendar, heat=RoomHeat(*arrays, used))
 
@@ -111,8 +109,7 @@ def test_verdicts_of_tm52_as_another_program_published_them(room):
     *figures, failing = room.split()
     rule, figures = read_rule("tm52"), [float(one) for one in figures]
     needs = rule.criterion[0].level[0].needs
-    beyond = [str(n) for n, (v, one) in enumerate(zip(figures, needs, strict=True), 1)
-              if v > one.at_most]  # fmt: skip
+    beyond = [str(n) for n, (v, one) in enumerate(zip(figures, needs, strict=True), 1) if v > one.at_most]
     assert ("".join(beyond) or "-") == failing
     values = {"tm52": dict(zip(needs, figures, strict=True))}
     use = RoomUse("office", True, "")
@@ -191,9 +188,14 @@ def test_passivhaus_counts_a_tenth_of_the_year(calendar):
 
 @pytest.mark.parametrize(
     ("operative", "alpha", "beta"),
-    [(25.9, "class B", "class B"), (27.3, "class B", "class D"), (28.3, "class C", NOT_MET),
-     (29.3, "class D", NOT_MET), (29.5, NOT_MET, NOT_MET)],
-)  # fmt: skip
+    [
+        (25.9, "class B", "class B"),
+        (27.3, "class B", "class D"),
+        (28.3, "class C", NOT_MET),
+        (29.3, "class D", NOT_MET),
+        (29.5, NOT_MET, NOT_MET),
+    ],
+)
 def test_classes_of_isso_74(calendar, operative, alpha, beta):
     """At 20 °C outdoors 18.8 + 6.6 + 2, 3, 4 = 27.4, 28.4, 29.4 °C; type beta 26, 27, 28 °C."""
     found = reached("isso74", year(calendar, operative, 20.0), "office")
@@ -216,9 +218,7 @@ def test_every_rule_says_what_it_has_and_gives_no_verdict_without_its_conditions
         assert set(found.values()) == {NOT_COMPUTED}
 
 
-@pytest.mark.parametrize(
-    ("site", "region"), [("Rostock", "a"), ("Potsdam", "b"), ("Mannheim", "c")]
-)
+@pytest.mark.parametrize(("site", "region"), [("Rostock", "a"), ("Potsdam", "b"), ("Mannheim", "c")])
 def test_regions_of_din_4108_2(calendar, site, region):
     """1,200 K h above 25, 26, 27 °C in dwellings by the region of the weather."""
     weather = SimpleNamespace(site=f"{site}, DEU", file=None)
@@ -228,8 +228,7 @@ def test_regions_of_din_4108_2(calendar, site, region):
     above = {"a": 25, "b": 26, "c": 27}[region]
     found = year(calendar, np.where(HOUR < 400, above + 3.0, 20.0))
     assert need.value(found) == pytest.approx(1200.0) and need.met(need.value(found))
-    half = RoomHeat(*(np.repeat(v, 2) for v in (
-        found.heat.operative_c, found.heat.outdoor_c, found.heat.occupied)))  # fmt: skip
+    half = RoomHeat(*(np.repeat(v, 2) for v in (found.heat.operative_c, found.heat.outdoor_c, found.heat.occupied)))
     times = calendar.times.repeat(2)
     shorter = Findings(replace(calendar, step_h=0.5, times=times), heat=half)
     assert need.value(shorter) == pytest.approx(1200.0)
@@ -238,9 +237,7 @@ def test_regions_of_din_4108_2(calendar, site, region):
 def test_table_of_a_rule_without_verdict_has_its_quantities_and_limits(calendar):
     rule, findings = read_rule("tm59"), Findings(calendar)
     values = {"tm59": values_of(rule, findings, rule.parts)}
-    verdicts = assess_room(
-        {"tm59": rule}, values, shoebox().spaces[0], RoomUse("bedroom", True, "")
-    )
+    verdicts = assess_room({"tm59": rule}, values, shoebox().spaces[0], RoomUse("bedroom", True, ""))
     result, room = SimpleNamespace(rules={"tm59": rule}), SimpleNamespace(verdicts=verdicts)
     rows = room_table(result, room, "tm59").rows
     assert [row[-1] for row in rows] == [NOT_COMPUTED] * 2

@@ -99,8 +99,7 @@ def test_rooflights_have_a_table_of_their_own(calendar):
 
 
 @pytest.mark.parametrize(
-    ("hours", "level"),
-    [(1.49, NOT_MET), (1.5, "minimum"), (2.99, "minimum"), (3.0, "medium"), (4.0, "high")],
+    ("hours", "level"), [(1.49, NOT_MET), (1.5, "minimum"), (2.99, "minimum"), (3.0, "medium"), (4.0, "high")]
 )
 def test_levels_of_sunlight(calendar, hours, level):
     sun = SunExposure((), ((600.0, 600.0 + 60 * hours),))

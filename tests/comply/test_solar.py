@@ -33,9 +33,7 @@ def test_the_shipped_blind_by_its_file():
 def test_layers_are_rated_by_the_standard(shade):
     """Where the layers are known the line is `cfs bsdf thermal`'s row of ISO 52022-3."""
     shade.with_suffix(".toml").write_text(LAYERS)
-    rows = {
-        row["method"]: row for row in rated_state(shade, place=None, glazing=None, kappa=0.4).rows()
-    }
+    rows = {row["method"]: row for row in rated_state(shade, place=None, glazing=None, kappa=0.4).rows()}
     wanted = rows["ISO 52022-3, reference"]
     text = solar_sentence(read_system(shade))
     assert f"g_tot {wanted['g_tot']:.2f} at normal incidence (ISO 52022-3, reference)" in text
@@ -52,6 +50,4 @@ def test_each_state_has_one_sentence_and_the_default_shade_none():
     assumed = [text for text in texts if "no U-value given" in text]
     assert len(assumed) == 1 and assumed[0].startswith("other: ")
     shaded = open_and_closed({"north": (other,)}, None)
-    assert (
-        len(shaded["north"]) == 2 and sum("g_tot" in text for text in solar_sentences(shaded)) == 1
-    )
+    assert len(shaded["north"]) == 2 and sum("g_tot" in text for text in solar_sentences(shaded)) == 1

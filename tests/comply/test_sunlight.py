@@ -29,10 +29,13 @@ def seconds_of_sun(weather, day, condition):
     times = pd.date_range(pd.Timestamp(weather.midpoints[0].year, *day), periods=86400, freq="s")
     utc = (times - pd.Timedelta(hours=weather.timezone_h)).tz_localize("UTC")
     sun = solarposition.get_solarposition(
-        utc, weather.latitude_deg, weather.longitude_deg, weather.elevation_m,
+        utc,
+        weather.latitude_deg,
+        weather.longitude_deg,
+        weather.elevation_m,
         pressure=float(np.mean(weather.pressure_pa)),
         temperature=float(np.mean(weather.dry_bulb_c)),
-    )  # fmt: skip
+    )
     altitude, azimuth = sun["apparent_elevation"].to_numpy(), sun["azimuth"].to_numpy()
     return np.count_nonzero((altitude >= LEAST) & condition(altitude, azimuth)) / 3600
 

@@ -49,8 +49,7 @@ def test_what_the_file_says_goes_before_names():
 
 def test_a_mapping_file_goes_before_all(tmp_path):
     path = tmp_path / "uses.toml"
-    path.write_text('[rooms]\n"1.01" = "ward"\n[[use]]\nkey = "vault"\noccupied = false\n'
-                    'words = ["gold"]\n')  # fmt: skip
+    path.write_text('[rooms]\n"1.01" = "ward"\n[[use]]\nkey = "vault"\noccupied = false\nwords = ["gold"]\n')
     found = use("Büro", [("ObjectType", "Office")], file=path)
     assert (found.key, found.occupied, found.assumed) == ("ward", True, False)
     assert "uses.toml" in found.source

@@ -18,15 +18,7 @@ from bim.model import Element
 from mitsuba_cfs.errors import DataError
 from scenes.cli import cfs
 from scenes.explore.case_files import read_data
-from scenes.explore.folder import (
-    copy_explorer,
-    explorer_of,
-    join_explorers,
-    packed,
-    server,
-    write_data,
-    write_explorer,
-)
+from scenes.explore.folder import copy_explorer, explorer_of, join_explorers, packed, server, write_data, write_explorer
 from scenes.report import write_report
 from scenes.result_folder import ResultFolder
 from scenes.run.outputs import write_results
@@ -112,9 +104,7 @@ def test_a_page_refused_by_the_disk_keeps_the_earlier_results(tmp_path) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", str(page))
 
     with pytest.raises(DataError, match="the disk is full"):
-        write_results(
-            explored_run(step=400, size=32), ResultFolder(tmp_path / "out", "run"), refused
-        )
+        write_results(explored_run(step=400, size=32), ResultFolder(tmp_path / "out", "run"), refused)
     assert not (tmp_path / "out").exists()
 
 
@@ -204,12 +194,7 @@ def _link(file: Path) -> None:
     file.symlink_to(outside)
 
 
-DAMAGES = {
-    Path.unlink: "No such file",
-    _emptied: "is empty",
-    _script: "is no data of an explorer",
-    _link: "link",
-}
+DAMAGES = {Path.unlink: "No such file", _emptied: "is empty", _script: "is no data of an explorer", _link: "link"}
 
 
 @pytest.mark.parametrize(("damage", "words"), DAMAGES.items())

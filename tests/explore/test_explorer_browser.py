@@ -11,10 +11,7 @@ from scenes.explore.folder import write_explorer
 from tests.devtools import Page, chromium
 from tests.explore.synthetic import explored_run
 
-pytestmark = [
-    pytest.mark.early,
-    pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
-]
+pytestmark = [pytest.mark.early, pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")]
 
 
 @pytest.fixture(scope="module")

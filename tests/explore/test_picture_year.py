@@ -46,18 +46,14 @@ def test_pictures_come_back(pictures, year) -> None:
 def test_pictures_whose_patches_hold_the_sun_have_no_disc() -> None:
     year = picture_year(made_up())
     assert year.discs == ((),) * 9
-    assert year.check is not None and year.check.compressed_dgp == pytest.approx(
-        year.check.dgp, abs=0.002
-    )
+    assert year.check is not None and year.check.compressed_dgp == pytest.approx(year.check.dgp, abs=0.002)
 
 
 def test_illuminance_at_the_eye_is_kept(pictures, year) -> None:
     weight = in_picture_order(GlareView(VIEW).projected).ravel()[pictures.pixels]
     for hour in range(0, pictures.hours, 13):
         # 0.2 %: what the levels of the beam and its faint pixels may change
-        assert year.values(hour) @ weight == pytest.approx(
-            _whole(pictures, hour) @ weight, rel=2e-3
-        )
+        assert year.values(hour) @ weight == pytest.approx(_whole(pictures, hour) @ weight, rel=2e-3)
 
 
 def test_the_glare_is_that_of_the_pictures(pictures, year) -> None:

@@ -34,8 +34,7 @@ DRAWN = """(() => {
 def _drawn(tmp_path: Path, blockers: list[float], through: float) -> dict[str, int]:
     page_file = tmp_path / "page.html"
     page_file.write_text(
-        f"<!doctype html><body data-ready=yes><script>const cfs = {{}};</script>"
-        f"<script>{SCRIPT.read_text()}</script>"
+        f"<!doctype html><body data-ready=yes><script>const cfs = {{}};</script><script>{SCRIPT.read_text()}</script>"
     )
     with Page(tmp_path) as page:
         page.open(page_file.as_uri())

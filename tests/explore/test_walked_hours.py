@@ -40,9 +40,7 @@ def test_every_state_is_walked_and_agrees(run, folder, tmp_path) -> None:
 
 def test_sizes_are_those_on_disk_and_the_command_prints_both(run, folder, capsys) -> None:
     total = sum(file.stat().st_size for file in (folder / "data").iterdir()) / 1e6
-    assert sizes(folder) == [
-        f"{run.spaces[0].space.label}: {SIZE} x {SIZE} pixels, 2 states, {total:.1f} MB on disk"
-    ]
+    assert sizes(folder) == [f"{run.spaces[0].space.label}: {SIZE} x {SIZE} pixels, 2 states, {total:.1f} MB on disk"]
     main(folder)
     lines = capsys.readouterr().out.splitlines()
     assert sum("a full hour: median" in line for line in lines) == 2

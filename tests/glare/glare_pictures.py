@@ -88,9 +88,7 @@ def _scattered(view):
     picture = room(view, 30)
     for _ in range(45):
         towards = random.normal(size=3) + np.array([0, 1.2, 0])
-        picture = disc(
-            view, picture, towards, random.uniform(0.01, 0.06), 10 ** random.uniform(3, 6)
-        )
+        picture = disc(view, picture, towards, random.uniform(0.01, 0.06), 10 ** random.uniform(3, 6))
     return picture
 
 

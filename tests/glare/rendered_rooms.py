@@ -73,9 +73,7 @@ class Renderer:
     def run(self, program: str, *arguments: object, given: str | None = None) -> bytes:
         command = [self.programs / program, *map(str, arguments)]
         data = None if given is None else given.encode()
-        done = subprocess.run(
-            command, input=data, capture_output=True, cwd=self.folder, env=self.environment
-        )
+        done = subprocess.run(command, input=data, capture_output=True, cwd=self.folder, env=self.environment)
         assert done.returncode == 0, done.stderr
         return done.stdout
 

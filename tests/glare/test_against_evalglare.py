@@ -65,9 +65,7 @@ def assert_agree(result: GlareResult, verdict) -> None:
         return
     found = result.sources
     height = result.geometry.view.height
-    ours = np.stack(
-        [found.pixels, found.x, height - found.y, found.luminance, found.solid_angle], 1
-    )
+    ours = np.stack([found.pixels, found.x, height - found.y, found.luminance, found.solid_angle], 1)
     theirs = verdict.sources
     assert np.allclose(ours[:, :4], theirs[:, 1:5], rtol=RELATIVE, atol=DECIMALS)
     assert np.allclose(ours[:, 4], theirs[:, 5], rtol=RELATIVE, atol=2e-10)

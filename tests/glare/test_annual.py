@@ -11,12 +11,7 @@ from scipy import sparse
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare import annual
-from mitsuba_cfs.glare.annual import (
-    PictureMatrix,
-    ThreePhasePictures,
-    annual_glare,
-    full_picture,
-)
+from mitsuba_cfs.glare.annual import PictureMatrix, ThreePhasePictures, annual_glare, full_picture
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.images.view import fisheye, pixel_directions
 from tests.trace import rooms

@@ -10,13 +10,7 @@ from scipy.stats import f
 
 from mitsuba_cfs.glare import annual
 from mitsuba_cfs.glare.annual import annual_glare
-from mitsuba_cfs.glare.dgp_error import (
-    STUDENT,
-    dgp_error,
-    dgp_errors,
-    hours_by_halves,
-    random_signs,
-)
+from mitsuba_cfs.glare.dgp_error import STUDENT, dgp_error, dgp_errors, hours_by_halves, random_signs
 from mitsuba_cfs.glare.evaluation import GlareOptions, evaluate
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods import glare as method_glare
@@ -44,9 +38,7 @@ def test_errors_of_all_hours_follow_those_of_some() -> None:
     dgp = random.random(4000)
     hours = hours_by_halves(dgp)
     truth = 0.001 + 0.01 * dgp
-    found = [
-        dgp_errors(dgp, hours, np.abs(random.normal(0, truth[hours]))) ** 2 for _ in range(400)
-    ]
+    found = [dgp_errors(dgp, hours, np.abs(random.normal(0, truth[hours]))) ** 2 for _ in range(400)]
     middle = (dgp > 0.1) & (dgp < 0.9)
     mean = np.sqrt(np.mean(found, axis=0))
     # 400 times: the mean square is good to 7 %, and the means over neighbours bend by 2 %
@@ -105,9 +97,7 @@ def test_the_error_of_a_year_is_half_of_what_its_half_pictures_differ(monkeypatc
 
 def test_the_error_of_a_shown_picture_is_that_of_its_halves(monkeypatch) -> None:
     light = SimpleNamespace(
-        scene=SimpleNamespace(eye=VIEW),
-        systems=[[None]],
-        sky=SimpleNamespace(lit=np.zeros(1, dtype=int), hours=1),
+        scene=SimpleNamespace(eye=VIEW), systems=[[None]], sky=SimpleNamespace(lit=np.zeros(1, dtype=int), hours=1)
     )
     one_sign(monkeypatch)
     made = [(np.array([0]), Rated())]
@@ -149,8 +139,10 @@ def test_a_dgp_at_its_limit_has_the_error_of_what_is_beyond_it() -> None:
     assert rated.dgp == 1.0 < rated.unlimited_dgp
     found = dgp_error(
         lambda some: evaluate(some.reshape(48, 48), VIEW).unlimited_dgp,
-        bright, 0.1 * bright, np.ones((2, 48 * 48), dtype=np.float32),
-    )  # fmt: skip
+        bright,
+        0.1 * bright,
+        np.ones((2, 48 * 48), dtype=np.float32),
+    )
     assert found > 0.1
 
 

@@ -7,11 +7,7 @@ import pytest
 from glare_pictures import AHEAD, PICTURES, VIEWS, disc, room, window
 
 from mitsuba_cfs.glare.areas import Zones
-from mitsuba_cfs.glare.evaluation import (
-    GlareOptions,
-    Task,
-    evaluate,
-)
+from mitsuba_cfs.glare.evaluation import GlareOptions, Task, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order, in_scan_order
 from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View, parse_view

@@ -11,11 +11,7 @@ import pytest
 from scipy import sparse
 
 from mitsuba_cfs.images.view import fisheye
-from mitsuba_cfs.methods.phase_matrices import (
-    few_pictures,
-    view_of_light,
-    with_view_matrices,
-)
+from mitsuba_cfs.methods.phase_matrices import few_pictures, view_of_light, with_view_matrices
 from mitsuba_cfs.methods.subdivision import Parts
 from tests.glare.test_outdoor_pictures import sky
 from tests.trace import rooms
@@ -184,9 +180,7 @@ def test_sunlit_elements_are_found_again_under_any_light(tmp_path, elements_trac
     found.append(matrices_of("DGP", cache=kept).view)
     assert len(elements_traced) == 1
     assert len(list(tmp_path.glob("view-sunlit-*"))) == 1
-    alone = [view_of_light(matrices_of(), luminance(number)) for number in (1, 2, 2)] + [
-        matrices_of("DGP").view
-    ]
+    alone = [view_of_light(matrices_of(), luminance(number)) for number in (1, 2, 2)] + [matrices_of("DGP").view]
     for one, other in zip(found, alone, strict=True):
         pairs = list(zip(arrays(one), arrays(other), strict=True))
         assert len(pairs) > 30 and one.sunlit.mean.near.nnz > 0 and one.sunlit.close.any()
@@ -225,9 +219,7 @@ def _changed(name: str, scene: Any, sampling: Any) -> Any:
     return replace(scene, **scenes.get(name, {})), replace(sampling, **samplings.get(name, {}))
 
 
-@pytest.mark.parametrize(
-    "name", ["geometry", "reflectance", "window", "size", "eye", "seed", "paths"]
-)
+@pytest.mark.parametrize("name", ["geometry", "reflectance", "window", "size", "eye", "seed", "paths"])
 def test_elements_of_another_view_are_not_taken(tmp_path, elements_traced, name) -> None:
     from mitsuba_cfs.matrices.cache import MatrixCache
 

@@ -72,9 +72,7 @@ def test_half_of_a_disc_behind_an_edge_is_missing():
     far, high = edge + 30 * across, np.array([0, 0, 30])
     wall = rooms.quad(edge - high, far - high, far + high, edge + high)
     whole = eye_illuminance(sun_picture(clear(), SUN, scale=0.0))
-    half = eye_illuminance(
-        sun_picture(clear(), SUN, scale=0.0, exterior=rooms.surfaces([(wall, 0.2)]))
-    )
+    half = eye_illuminance(sun_picture(clear(), SUN, scale=0.0, exterior=rooms.surfaces([(wall, 0.2)])))
     assert half / whole == pytest.approx(0.5, abs=0.03)  # rows of 20 pieces: half of one, 2.5 %
 
 
@@ -119,8 +117,9 @@ def test_an_edge_cuts_the_source_and_leaves_its_luminance():
     assert away == pytest.approx(0.2665 * 4 / (3 * np.pi), rel=0.02)  # centroid of half a disc
     assert disc.direction @ across < 0
     nearer = EYE + 10 * SUN
-    whole = rooms.quad(*(nearer + 5 * (a * across + np.array([0, 0, b]))
-                         for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))))  # fmt: skip
+    whole = rooms.quad(
+        *(nearer + 5 * (a * across + np.array([0, 0, b])) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
+    )
     assert source(clear(), exterior=rooms.surfaces([(whole, 0.2)])) is None
 
 
@@ -145,17 +144,13 @@ def test_paths_see_the_same_disc():
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     room, groups = rooms.test_room()
-    lit = PathTracingScene(
-        room, rooms.NOTHING, groups, [PathOptics(None, AngularBeam(np.full(16, 0.8)))]
-    )
+    lit = PathTracingScene(room, rooms.NOTHING, groups, [PathOptics(None, AngularBeam(np.full(16, 0.8)))])
     sky = Sky(np.full(146, 1000.0), SUN, LUX[0] / SUN_SOLID_ANGLE)
     (disc,) = discs_seen(lit, sky, VIEW)
     assert disc.luminance == pytest.approx(source(clear()).luminance, rel=1e-5)
     assert disc.solid_angle == pytest.approx(source(clear()).solid_angle, rel=1e-5)
     view = fisheye(EYE, (0.0, -1.0, 0.0), 100)
-    bare, whole = (
-        point_in_time_picture(lit, sky, view, samples=2, disc=disc) for disc in (False, True)
-    )
+    bare, whole = (point_in_time_picture(lit, sky, view, samples=2, disc=disc) for disc in (False, True))
     np.testing.assert_allclose(with_discs(bare, lit, sky, view), whole, rtol=1e-6)
     assert whole.max() > 100 * bare.max()
 
@@ -168,9 +163,7 @@ def test_the_beam_falls_on_the_floor_where_the_window_lets_it():
     point = EYE + directions * t[..., None]
     floor = down & (np.abs(point[..., 0] - 1.825) < 1.82) & (point[..., 1] > 0.01)
     x, _, z = np.moveaxis(point - HIGH * (point[..., 1] / HIGH[1])[..., None], -1, 0)
-    inside = np.minimum(
-        np.minimum(x - rooms.X0, rooms.X1 - x), np.minimum(z - rooms.Z0, rooms.Z1 - z)
-    )
+    inside = np.minimum(np.minimum(x - rooms.X0, rooms.X1 - x), np.minimum(z - rooms.Z0, rooms.Z1 - z))
     expected = 0.34 / np.pi * 0.8 * LUX[0] * HIGH[2]
     # the half-shadow of 2 m is 2 cm wide, a pixel on the floor up to 5 cm long; half of either
     clear_of_edges = np.abs(inside) > 0.04
@@ -207,12 +200,10 @@ def five_phase(system, transmission, sky, sun, lux, *, view=VIEW, samples=32, ob
     exterior: Surfaces = obstacle or rooms.NOTHING
     whole, direct = sky
     daylight = [
-        daylight_matrix(exterior, groups, subdivision=1, samples=4096, max_depth=depth).values
-        for depth in (16, 1)
+        daylight_matrix(exterior, groups, subdivision=1, samples=4096, max_depth=depth).values for depth in (16, 1)
     ]
     luminance, direct_luminance = (
-        phases.room_side_radiance([transmission], d, s[:, None])
-        for d, s in zip(daylight, sky, strict=True)
+        phases.room_side_radiance([transmission], d, s[:, None]) for d, s in zip(daylight, sky, strict=True)
     )
     matrices = view_matrices(room, groups, view, samples=samples)
     found = PictureSun(room, exterior, groups, [system], view)
@@ -285,9 +276,7 @@ def test_pictures_are_rated_as_traced_ones(kind, obstructed):
     found = annual_glare(pictures)
     room, groups = rooms.test_room()
     traced = PathTracingScene(room, obstacle or rooms.NOTHING, groups, [system])
-    picture = point_in_time_picture(
-        traced, Sky(sky, HIGH, lux[0] / SUN_SOLID_ANGLE), VIEW, samples=128
-    )
+    picture = point_in_time_picture(traced, Sky(sky, HIGH, lux[0] / SUN_SOLID_ANGLE), VIEW, samples=128)
     truth = evaluate(picture, VIEW)
     # 128 paths in each of 31,400 pixels: noise of E_v below 0.5 %
     assert found.Ev[0] == pytest.approx(truth.Ev, rel=0.01)

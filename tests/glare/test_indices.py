@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.glare import classes, indices
-from mitsuba_cfs.glare.position_index import (
-    guth_index,
-    iwata_index,
-    kim_index,
-    position_index,
-    view_angles,
-)
+from mitsuba_cfs.glare.position_index import guth_index, iwata_index, kim_index, position_index, view_angles
 from mitsuba_cfs.images.view import fisheye, frame
 
 ONE = (np.array([1e4]), np.array([0.01]), np.array([2.0]))  # L, omega, P
@@ -145,15 +139,16 @@ def test_each_index_by_hand():
         (indices.discomfort_glare_rating(*ONE, 3.0), 0.5 * 1e4 * Q / (2 * 3**0.44)),
         (indices.discomfort_glare_rating(*none, 3.0), 0.0),
         (indices.modified_dgi(*ONE, 2 * math.pi), dgi),
-        (indices.daylight_glare_index([1e4], [0.01], [3.0], 100),
-         10 * math.log10(0.478 * 1e4**1.6 * (0.01 / 9) ** 0.8 / 170)),
+        (
+            indices.daylight_glare_index([1e4], [0.01], [3.0], 100),
+            10 * math.log10(0.478 * 1e4**1.6 * (0.01 / 9) ** 0.8 / 170),
+        ),
         # E_v = 10 pi: 8; sum L omega/P^2 = 1e4 * 0.01 / 4 = 25 over 0.25: 16
         (indices.experimental_ugr(*ONE, 0.25, 10 * math.pi), 24.0),
         (indices.experimental_ugr([1e4], [0.02], [3.0], 1.0, math.pi), 8 * math.log10(200 / 9)),
         (indices.experimental_ugr(*none, 2.5, 10 * math.pi), 0.0),
         (indices.visual_comfort_probability(19.9), 100.0),
-        (indices.visual_comfort_probability(20.0),
-         50 * math.erf((6.374 - 1.3227 * math.log(20)) / math.sqrt(2)) + 50),
+        (indices.visual_comfort_probability(20.0), 50 * math.erf((6.374 - 1.3227 * math.log(20)) / math.sqrt(2)) + 50),
         (indices.visual_comfort_probability(750.5), 0.0),
         (indices.cie_veiling_luminance([2.7], np.radians([3.0]))[0], 3.0),
         (indices._ratio(0.5, 0.0), inf),
@@ -162,7 +157,7 @@ def test_each_index_by_hand():
         (indices._log10(0.0), -inf),
         (indices._log10(0.1), -1.0),
         (indices._log10(-1.0), nan),
-    ):  # fmt: skip
+    ):
         assert value == pytest.approx(by_hand, rel=1e-9, abs=1e-12, nan_ok=True)
     with pytest.raises(ValueError, match="age"):
         indices.age_factor(150.0)
@@ -186,9 +181,7 @@ def test_position_indices_by_hand():
     aside = [math.sin(0.3), math.cos(0.3), 0.0]
     sigma, tau, below = view_angles([above, aside, [0, 1, 0], [1, 0, 0], [0, 0, -1]], view)
     assert sigma == pytest.approx([0.3, 0.3, 0.0, math.pi / 2, math.pi / 2])
-    assert tau[:2] == pytest.approx([0.0, math.pi / 2]) and tau[3:] == pytest.approx(
-        [math.pi / 2, math.pi]
-    )
+    assert tau[:2] == pytest.approx([0.0, math.pi / 2]) and tau[3:] == pytest.approx([math.pi / 2, math.pi])
     assert list(below) == [False, False, False, False, True]
     assert view_angles([[0, 1, 0.5]], view)[2] == [False]
     assert position_index([above], view, model="kim") == pytest.approx(kim_index(0.3, 0.0))

@@ -29,10 +29,7 @@ def street() -> Surfaces:
     """Ground before the house and its wall, a facade across the street, a wall in the sun."""
     return rooms.surfaces(
         [
-            (
-                rooms.quad((-9, -9, -0.5), (12, -9, -0.5), (12, -0.2, -0.5), (-9, -0.2, -0.5)),
-                GROUND,
-            ),
+            (rooms.quad((-9, -9, -0.5), (12, -9, -0.5), (12, -0.2, -0.5), (-9, -0.2, -0.5)), GROUND),
             (rooms.quad((-9, -9, -0.5), (-9, -9, 4), (12, -9, 4), (12, -9, -0.5)), FACADE),
             (rooms.quad((-9, 0.02, -0.5), (12, 0.02, -0.5), (12, 0.02, 4), (-9, 0.02, 4)), 0.1),
             (rooms.quad((6, -9, -0.5), (6, -9, 3), (6, -1, 3), (6, -1, -0.5)), FACADE),
@@ -42,9 +39,7 @@ def street() -> Surfaces:
 
 def sky(hours=1):
     """A clear sky, the sun in the south-west."""
-    sun = direction(
-        np.radians(np.linspace(40, 55, hours)), np.radians(np.linspace(215, 230, hours))
-    )
+    sun = direction(np.radians(np.linspace(40, 55, hours)), np.radians(np.linspace(215, 230, hours)))
     return given_sky(sun, np.full(hours, 800.0), np.full(hours, 90.0), day_of_year=172)
 
 
@@ -128,9 +123,7 @@ def test_a_facade_in_the_shade_has_the_suns_light_from_the_ground():
     pane = np.asarray(VIEW.position) - towards * (VIEW.position[1] / towards[..., 1])[..., None]
     facade &= (np.abs(pane[..., 0] - 1.8) < 1.2) & (towards[..., 1] < -0.1)
     assert np.count_nonzero(facade) > 40
-    assert found[0][facade].mean() == pytest.approx(
-        coarse(paths, np.mean)[0][facade].mean(), rel=0.03
-    )
+    assert found[0][facade].mean() == pytest.approx(coarse(paths, np.mean)[0][facade].mean(), rel=0.03)
 
 
 def test_the_beam_that_the_room_reflects_has_the_suns_own_angle():

@@ -26,8 +26,6 @@ def test_what_stands_outdoors_is_lit_by_the_sky_and_not_by_the_sun_alone():
     sky = Sky(np.full(146, 2000.0), (0.0, 0.5, 0.5), 0.0)
     view = fisheye((1.8, 2.0, 1.2), (0.0, -1.0, 0.0), 100)
     picture = evaluate(point_in_time_picture(room, sky, view, samples=8), view)
-    sensor = point_in_time(
-        room, sky, [view.position], [view.direction], samples=8192, stopping=Stopping(batches=8)
-    )
+    sensor = point_in_time(room, sky, [view.position], [view.direction], samples=8192, stopping=Stopping(batches=8))
     # noise of both below 0.4 %; pixels of 1.8 degrees show the window's edges to 1 %
     assert picture.Ev == pytest.approx(sensor.values[0], rel=0.025)

@@ -44,9 +44,7 @@ def test_a_direct_view_leaves_out_what_the_room_reflects_twice(variant, scale, s
     scene = DaylightScene(room, rooms.NOTHING, groups, view=VIEW)
     traced = phase_matrices(scene, Sampling(view_samples=4), needs=["DGP", "eDGP"])
     luminance = np.ones((1, 145, 1))
-    whole, part = (
-        m.three_phase(luminance).values(np.array([0])) for m in (traced.view, traced.direct_view)
-    )
+    whole, part = (m.three_phase(luminance).values(np.array([0])) for m in (traced.view, traced.direct_view))
     assert np.all(part <= whole * (1 + 1e-5))
     if same:
         assert part == pytest.approx(whole, abs=1e-6)
@@ -64,16 +62,12 @@ def place(variant):
 
     scene = reference_scene(96)
     scene = replace(scene, points=scene.points[::20], normals=scene.normals[::20])
-    sampling = Sampling(
-        view_samples=8, picture_samples=8, sensor_samples=4096, hour_samples=4096,
-        patch_samples=1024,
-    )  # fmt: skip
+    sampling = Sampling(view_samples=8, picture_samples=8, sensor_samples=4096, hour_samples=4096, patch_samples=1024)
     return scene, reference_system(), reference_sky(sampling, 2), sampling
 
 
 @pytest.mark.parametrize(
-    "metric",
-    ["eDGP", "illuminance", *(pytest.param(m, marks=pytest.mark.slow) for m in ("DGP", "sDGP"))],
+    "metric", ["eDGP", "illuminance", *(pytest.param(m, marks=pytest.mark.slow) for m in ("DGP", "sDGP"))]
 )
 def test_the_methods_agree_on_every_metric_behind_a_blind(place, metric):
     from mitsuba_cfs.methods import METHODS

@@ -78,9 +78,7 @@ def test_a_hidden_sun_has_no_image() -> None:
 def test_a_fine_picture_with_the_image_in_its_pixels_is_rated_the_same(tmp_path, evalglare) -> None:
     """evalglare of the middle 80 degrees in pixels of 0.04 degrees, 13 across the image."""
     around, size = (black_room(None)[0], facade(mirror(0.05))), 2000
-    fine = shown(
-        size, around, replace(fisheye(EYE, AHEAD, size), horizontal_deg=80, vertical_deg=80)
-    )
+    fine = shown(size, around, replace(fisheye(EYE, AHEAD, size), horizontal_deg=80, vertical_deg=80))
     values = np.full((1, len(fine.pixels)), GREY)
     fine.add_disc(values, SUN[None], LUX)
     picture = np.zeros(size * size, dtype=np.float32)

@@ -42,9 +42,7 @@ def test_what_cannot_be_is_told_in_a_line(tmp_path):
         write_exr(tmp_path / "none" / "a.exr", np.ones((3, 3)), View("angular"))
 
 
-@pytest.mark.skipif(
-    not hasattr(os, "sched_setaffinity"), reason="a process chooses its cores on Linux alone"
-)
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="a process chooses its cores on Linux alone")
 def test_a_process_with_one_core_writes_and_reads_too(tmp_path):
     """Mitsuba's OpenEXR waits for a second thread: `cfs picture` stood for ever on one core."""
     code = (
@@ -58,7 +56,5 @@ def test_a_process_with_one_core_writes_and_reads_too(tmp_path):
         "print(read_exr(sys.argv[1])[0].shape)\n"
     )
     line = [sys.executable, "-c", code, str(tmp_path / "a.exr")]
-    done = subprocess.run(
-        line, capture_output=True, text=True, timeout=60, check=True, cwd=REPOSITORY
-    )
+    done = subprocess.run(line, capture_output=True, text=True, timeout=60, check=True, cwd=REPOSITORY)
     assert done.stdout.split() == ["(40,", "30)"]

@@ -151,14 +151,9 @@ def test_the_smallest_picture_has_one_pixel():
 
 def test_a_picture_has_so_many_pixels_along_its_longer_side():
     """By the tangent of half the angle in perspective, by the angle in an angular view."""
-    for kind, longer, shorter, ratio in (
-        ("v", 90, 60, np.tan(np.radians(30))), ("a", 180, 120, 120 / 180),
-    ):  # fmt: skip
+    for kind, longer, shorter, ratio in (("v", 90, 60, np.tan(np.radians(30))), ("a", 180, 120, 120 / 180)):
         text = f"-vt{kind} -vp 0 0 0 -vd 0 1 0 -vu 0 0 1 -vh {{}} -vv {{}}"
-        wide, high = (
-            fitted(parse_view(text.format(*pair)), 300)
-            for pair in ((longer, shorter), (shorter, longer))
-        )
+        wide, high = (fitted(parse_view(text.format(*pair)), 300) for pair in ((longer, shorter), (shorter, longer)))
         assert (wide.width, wide.height) == (300, round(300 * ratio))
         assert (high.width, high.height) == (wide.height, wide.width)
 

@@ -12,15 +12,7 @@ from babel.messages.pofile import read_po
 
 from mitsuba_cfs.notes import Note
 from scenes.language import catalogue
-from scenes.language.catalogue import (
-    TRANSLATED,
-    decimal,
-    gettext,
-    in_language,
-    messages,
-    ngettext,
-    translated,
-)
+from scenes.language.catalogue import TRANSLATED, decimal, gettext, in_language, messages, ngettext, translated
 from scenes.language.extraction import ARGUMENTS, PACKAGES, extracted, write
 from scenes.language.numbers import colon, day_and_month, month_name, rounded, short_month
 from tests.modules import MODULES
@@ -33,9 +25,12 @@ TIGHT = re.compile(r"[^\s;!?:\u00a0\u202f](?:[;!?](?=\s|$)|:(?=\s|$))|[ ][;!?:](
 # A number before the noun that it counts; in "1 of 3" and "1 more" no noun follows
 COUNTED = re.compile(r"\{count\} (?!of|more|computed|found)[a-z]")
 SEVERAL = (  # beginnings of messages that one of a thing never has
-    "The GlobalId is used {count} times", "{count} times: ", "{count} small elements are too many",
-    "The heat of the {count} rooms", "The file has {count} second-level space boundaries",
-)  # fmt: skip
+    "The GlobalId is used {count} times",
+    "{count} times: ",
+    "{count} small elements are too many",
+    "The heat of the {count} rooms",
+    "The file has {count} second-level space boundaries",
+)
 
 
 @pytest.fixture(scope="module")
@@ -119,35 +114,46 @@ def test_a_catalogue_is_written_as_it_was_read(program, language, tmp_path) -> N
 def test_numbers_dates_and_plurals_follow_the_language() -> None:
     def shown() -> tuple[str, ...]:
         return (
-            rounded(1234.5, 1), decimal("0.5"), short_month(3), month_name(3),
+            rounded(1234.5, 1),
+            decimal("0.5"),
+            short_month(3),
+            month_name(3),
             ngettext("{count} room", "{count} rooms", 1),
-            ngettext("{count} room", "{count} rooms", 1200), colon("a", "b"),
+            ngettext("{count} room", "{count} rooms", 1200),
+            colon("a", "b"),
             gettext("UDI below {limit} lx", limit=0.5),
-        )  # fmt: skip
+        )
 
-    assert shown() == (
-        "1\u202f234.5", "0.5", "Mar", "March", "1 room", "1\u202f200 rooms", "a: b",
-        "UDI below 0.5 lx",
-    )  # fmt: skip
+    assert shown() == ("1\u202f234.5", "0.5", "Mar", "March", "1 room", "1\u202f200 rooms", "a: b", "UDI below 0.5 lx")
     with in_language("de"):
         assert shown() == (
-            "1\u202f234,5", "0,5", "Mär", "März", "1 Raum", "1\u202f200 Räume", "a: b",
+            "1\u202f234,5",
+            "0,5",
+            "Mär",
+            "März",
+            "1 Raum",
+            "1\u202f200 Räume",
+            "a: b",
             "UDI unter 0,5 lx",
-        )  # fmt: skip
+        )
         with pytest.raises(KeyError):
             gettext("{axis}: lower limit", other=1)
     with in_language("fr"):
         assert shown() == (
-            "1\u202f234,5", "0,5", "mars", "mars", "1 local", "1\u202f200 locaux",
-            "a\u00a0: b", "UDI sous 0,5 lx",
-        )  # fmt: skip
+            "1\u202f234,5",
+            "0,5",
+            "mars",
+            "mars",
+            "1 local",
+            "1\u202f200 locaux",
+            "a\u00a0: b",
+            "UDI sous 0,5 lx",
+        )
         assert ngettext("{count} room", "{count} rooms", 0) == "0 local"  # French has one for none
     assert gettext("Glare") == "Glare"
 
 
-@pytest.mark.parametrize(
-    ("language", "words"), [("en", "21 March"), ("de", "21. März"), ("fr", "21 mars")]
-)
+@pytest.mark.parametrize(("language", "words"), [("en", "21 March"), ("de", "21. März"), ("fr", "21 mars")])
 def test_a_date_has_the_order_of_its_language(language, words) -> None:
     import pandas as pd
 

@@ -92,11 +92,21 @@ def run():
     """A run with an account, notes, and every issue that there is."""
     result = run_result(picture_size=48, pictures=2)
     account = Account(
-        (StoreyAccount("EG", 3, 5, 20.0, 15.5), StoreyAccount("", 0, 0, 2.5, 0.0)), 9, 7,
-        glass_assumed=4.2, glass_low=1.5, glass_missing=0.5, phantom=3.1, closed=1.1,
-        overlapping=("1.01 / 1.02",), low=("1.03",), missing=("1.04", "1.05"), leaking=("1.06",),
-        raised=("1.07",), shut_in=0.6,
-    )  # fmt: skip
+        (StoreyAccount("EG", 3, 5, 20.0, 15.5), StoreyAccount("", 0, 0, 2.5, 0.0)),
+        9,
+        7,
+        glass_assumed=4.2,
+        glass_low=1.5,
+        glass_missing=0.5,
+        phantom=3.1,
+        closed=1.1,
+        overlapping=("1.01 / 1.02",),
+        low=("1.03",),
+        missing=("1.04", "1.05"),
+        leaking=("1.06",),
+        raised=("1.07",),
+        shut_in=0.6,
+    )
     return replace(result, building=replace(result.building, account=account), issues=every_issue())
 
 
@@ -104,14 +114,11 @@ def dossier(language: str) -> str:
     """View and sunlight by EN 17037, and every other rule with what it has in words."""
     rule = read_rule("en17037")
     keys = ("view_out", "sunlight_dwellings", "sunlight_wards", "sunlight")
-    rule = rule.model_copy(
-        update={"criterion": tuple(one for one in rule.criterion if one.key in keys)}
-    )
+    rule = rule.model_copy(update={"criterion": tuple(one for one in rule.criterion if one.key in keys)})
     options = ComplyOptions(None, WEATHER, standards=("en17037",))
     files = ComplyFiles(
-        InputFiles(read_weather(WEATHER)), {"en17037": rule}, read_uses(), None, 13.0,
-        Note("given by --sun-altitude"),
-    )  # fmt: skip
+        InputFiles(read_weather(WEATHER)), {"en17037": rule}, read_uses(), None, 13.0, Note("given by --sun-altitude")
+    )
     south, north = shoebox(name="Office south"), shoebox(name="Store north", facing_deg=0)
     building = replace(south, name="<House>", spaces=(*south.spaces, *north.spaces))
     result = replace(check_rooms(building, options, files), issues=every_issue())
@@ -166,16 +173,20 @@ def test_an_explorer(language, tmp_path) -> None:
     words = re.search(r'id="words">(.*?)</script>', page, re.DOTALL)[1]
     for script in tmp_path.glob("*.js"):
         for message in re.findall(r'gettext\(\s*"([^"]+)"', script.read_text("utf-8")):
-            assert f'"{message.replace("<", chr(92) + "u003c")}"' in page.encode().decode(
-                "unicode_escape", errors="ignore"
-            ) or message.encode("unicode_escape").decode() in words, message  # fmt: skip
+            assert (
+                f'"{message.replace("<", chr(92) + "u003c")}"'
+                in page.encode().decode("unicode_escape", errors="ignore")
+                or message.encode("unicode_escape").decode() in words
+            ), message
 
 
 def test_a_note_in_another_language_keeps_what_is_a_name() -> None:
     note = Note(
         "{windows}: {system}, from {source}.",
-        windows=Note("Window {names}", names="A"), system="the blind", source="--cfs blind.xml",
-    )  # fmt: skip
+        windows=Note("Window {names}", names="A"),
+        system="the blind",
+        source="--cfs blind.xml",
+    )
     assert note == "Window A: the blind, from --cfs blind.xml."
     with in_language("de"):
         assert translated(note) == "Fenster A: the blind, aus --cfs blind.xml."

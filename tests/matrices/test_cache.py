@@ -84,9 +84,7 @@ def test_a_damaged_file_is_ignored_and_written_anew(cache, damage):
     data = bytearray(entry.path.read_bytes())
     middle = len(data) // 2
     data[middle] ^= 0xFF
-    entry.path.write_bytes(
-        {"short": data[:middle], "empty": b"", "bits": data, "text": b"no zip"}[damage]
-    )
+    entry.path.write_bytes({"short": data[:middle], "empty": b"", "bits": data, "text": b"no zip"}[damage])
     assert entry.load() is None
     again = accumulate(batches([]), entry=entry)
     assert np.array_equal(whole.values, again.values)
@@ -180,9 +178,7 @@ def test_view_and_daylight_matrices_come_from_the_cache(variant, cache):
 
     def both(samples: int):
         view = view_matrix(room, groups, [[1, 1, 1]], [[0, 0, 1]], samples=samples, cache=cache)
-        daylight = daylight_matrix(
-            rooms.NOTHING, groups, subdivision=1, samples=samples, cache=cache
-        )
+        daylight = daylight_matrix(rooms.NOTHING, groups, subdivision=1, samples=samples, cache=cache)
         return view, daylight
 
     first, second = both(64), both(64)
@@ -206,9 +202,17 @@ def test_the_sun_and_what_is_absorbed_come_from_the_cache(variant, cache, monkey
     def both(tau: float, reflectance: float):
         way = scattering.KlemsScattering(KLEMS_FULL, np.zeros((K, K)), np.full(K, tau))
         sun = direct.direct_sun_matrix(
-            room, rooms.NOTHING, groups, [way], [[1.8, 1, 0.8]], [[0, 0, 1]], suns=[[0, -1, 0.6]],
-            window_points=16, stopping=few, cache=cache,
-        )  # fmt: skip
+            room,
+            rooms.NOTHING,
+            groups,
+            [way],
+            [[1.8, 1, 0.8]],
+            [[0, 0, 1]],
+            suns=[[0, -1, 0.6]],
+            window_points=16,
+            stopping=few,
+            cache=cache,
+        )
         absorbed = adjacent.absorption_matrix(
             room, groups, window_reflectance=[reflectance], samples=16, stopping=few, cache=cache
         )
@@ -223,9 +227,15 @@ def test_the_sun_and_what_is_absorbed_come_from_the_cache(variant, cache, monkey
     assert other[0] == pytest.approx(first[0] * 1.2) and not np.array_equal(other[1], first[1])
     with pytest.raises(ValueError, match="needs a `key`"):
         direct.direct_sun_matrix(
-            room, rooms.NOTHING, groups, [scattering.PluginScattering(None)],
-            [[1.8, 1, 0.8]], [[0, 0, 1]], suns=[[0, -1, 0.6]], cache=cache,
-        )  # fmt: skip
+            room,
+            rooms.NOTHING,
+            groups,
+            [scattering.PluginScattering(None)],
+            [[1.8, 1, 0.8]],
+            [[0, 0, 1]],
+            suns=[[0, -1, 0.6]],
+            cache=cache,
+        )
 
 
 def _must_not_trace(scene):

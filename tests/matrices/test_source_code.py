@@ -32,9 +32,18 @@ def test_imports_are_followed_wherever_they_stand(tmp_path):
     for name in ("thermal.d", "scenes.g", "scenes.h", "scenes.unused"):
         write(tmp_path, name, "import os")
     assert import_closure(("scenes.a",), tmp_path) == {
-        "scenes", "scenes.a", "scenes.b", "scenes.g", "scenes.h", "thermal", "thermal.d",
-        "bim", "bim.c", "bim.c.e", "numpy",
-    }  # fmt: skip
+        "scenes",
+        "scenes.a",
+        "scenes.b",
+        "scenes.g",
+        "scenes.h",
+        "thermal",
+        "thermal.d",
+        "bim",
+        "bim.c",
+        "bim.c.e",
+        "numpy",
+    }
     with pytest.raises(ValueError, match=r"no module scenes\.nowhere"):
         import_closure(("scenes.nowhere",), tmp_path)
 
@@ -95,16 +104,21 @@ def unchanged(copy) -> dict[tuple[str, ...], str]:
 
 @pytest.mark.parametrize(
     "file",
-    ["scenes/heat/box.py", "mitsuba_cfs/methods/phase_light.py", "scenes/room/heat.py",
-     "thermal/step.py", "bim/ifc/shapes.py", "mitsuba_cfs/bsdf/tensor_tree.py"],
-)  # fmt: skip
+    [
+        "scenes/heat/box.py",
+        "mitsuba_cfs/methods/phase_light.py",
+        "scenes/room/heat.py",
+        "thermal/step.py",
+        "bim/ifc/shapes.py",
+        "mitsuba_cfs/bsdf/tensor_tree.py",
+    ],
+)
 def test_a_case_hangs_on_what_was_forgotten_once(copy, unchanged, file):
     assert hash_after_a_change_of(copy, file, CASE) != unchanged[CASE]
 
 
 @pytest.mark.parametrize("modules", [CASE, YEAR])
-@pytest.mark.parametrize("file", ["scenes/report/page.py", "scenes/study_report/page.py",
-                                  "scenes/commands/run.py"])  # fmt: skip
+@pytest.mark.parametrize("file", ["scenes/report/page.py", "scenes/study_report/page.py", "scenes/commands/run.py"])
 def test_reports_and_commands_do_not_count(copy, unchanged, modules, file):
     assert hash_after_a_change_of(copy, file, modules) == unchanged[modules]
 

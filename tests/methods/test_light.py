@@ -34,9 +34,16 @@ from tests.trace import rooms
 pytestmark = pytest.mark.usefixtures("variant")
 
 FEW = Sampling(
-    sensor_samples=64, patch_samples=64, sun_points=16, view_samples=1, outdoor_samples=1,
-    hour_samples=16, picture_samples=1, subdivision=1, window_parts=1,
-)  # fmt: skip
+    sensor_samples=64,
+    patch_samples=64,
+    sun_points=16,
+    view_samples=1,
+    outdoor_samples=1,
+    hour_samples=16,
+    picture_samples=1,
+    subdivision=1,
+    window_parts=1,
+)
 SKY = given_sky([[0.0, -0.8, 0.6]], [800.0], [90.0], 1, day_of_year=172)
 VIEW = fisheye((1.8, 2.5, 1.2), (0.5, -1.0, 0.0), 24)
 POINTS, UP = np.array([[1.8, 1.0, 0.8], [1.8, 3.0, 0.8]]), np.tile([0.0, 0.0, 1.0], (2, 1))
@@ -57,10 +64,13 @@ def test_without_a_view_the_eye_and_its_glare_are_refused(method) -> None:
     light = daylight(scene(view=None), glass(), SKY, method=method, sampling=FEW)
     assert illuminance(light).shape == (2, 1)
     calls = (
-        eye_illuminance, hourly_glare, lambda one: hourly_glare(one, "sDGP"),
-        lambda one: hourly_glare(one, "eDGP"), lambda one: pictures(one, [0]),
+        eye_illuminance,
+        hourly_glare,
+        lambda one: hourly_glare(one, "sDGP"),
+        lambda one: hourly_glare(one, "eDGP"),
+        lambda one: pictures(one, [0]),
         lambda one: rated_pictures(one, [0]),
-    )  # fmt: skip
+    )
     for call in calls:
         with pytest.raises(ValueError, match="no view"):
             call(light)
@@ -113,8 +123,7 @@ def test_three_phases_say_how_far_their_blurred_sun_is_off() -> None:
 
 def test_three_phases_say_how_far_their_dgp_is_off() -> None:
     light, sharp = (
-        daylight(scene(), glass(), SKY, method=method, sampling=FEW)
-        for method in ("three-phase", "five-phase")
+        daylight(scene(), glass(), SKY, method=method, sampling=FEW) for method in ("three-phase", "five-phase")
     )
     blurred, at_sun = (hourly_glare(one).dgp for one in (light, sharp))
     off = abs(blurred - at_sun)[0]
@@ -126,9 +135,12 @@ def test_three_phases_say_how_far_their_dgp_is_off() -> None:
 @pytest.mark.parametrize("method", ["three-phase", "five-phase", "point-in-time"])
 def test_the_noise_of_all_hours_is_the_error_of_their_mean(method) -> None:
     days = given_sky(
-        [[0.0, -0.8, 0.6], [0.6, -0.5, 0.62], [0.0, -0.6, 0.8]], [800.0, 300.0, 0.0],
-        [90.0, 120.0, 60.0], 1, day_of_year=172,
-    )  # fmt: skip
+        [[0.0, -0.8, 0.6], [0.6, -0.5, 0.62], [0.0, -0.6, 0.8]],
+        [800.0, 300.0, 0.0],
+        [90.0, 120.0, 60.0],
+        1,
+        day_of_year=172,
+    )
     light = daylight(scene(), glass(), days, method=method, sampling=FEW)
     lux, noise = illuminance_with_noise(light)
     whole = noise(np.ones_like(lux)).standard_error()
@@ -143,9 +155,7 @@ def test_the_noise_of_all_hours_is_the_error_of_their_mean(method) -> None:
 
 
 def test_each_hour_of_path_tracing_has_the_error_of_its_spread_over_seeds() -> None:
-    days = given_sky(
-        [[0.0, -0.8, 0.6], [0.0, -0.6, 0.8]], [800.0, 0.0], [90.0, 60.0], 1, day_of_year=172
-    )
+    days = given_sky([[0.0, -0.8, 0.6], [0.0, -0.6, 0.8]], [800.0, 0.0], [90.0, 60.0], 1, day_of_year=172)
     values, stated = [], []
     for seed in range(60):
         sampling = replace(FEW, seed=seed)
@@ -162,9 +172,15 @@ def test_each_hour_of_path_tracing_has_the_error_of_its_spread_over_seeds() -> N
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("sensor_samples", -1), ("patch_samples", 0), ("subdivision", 0), ("seed", -1),
-     ("window_parts", -2), ("memory", -1.0)],
-)  # fmt: skip
+    [
+        ("sensor_samples", -1),
+        ("patch_samples", 0),
+        ("subdivision", 0),
+        ("seed", -1),
+        ("window_parts", -2),
+        ("memory", -1.0),
+    ],
+)
 def test_a_sampling_that_cannot_be_is_refused(name, value) -> None:
     with pytest.raises(ValueError, match=name):
         Sampling(**{name: value})
@@ -219,9 +235,8 @@ def test_states_of_all_hours_are_those_of_the_lit_hours() -> None:
 def test_other_systems_take_the_reflected_sun_of_the_light(monkeypatch) -> None:
     """It depends on the outdoors alone, and was traced again for each system."""
     sky = given_sky(
-        [[0.0, -0.8, 0.6], [0.3, -0.7, 0.6], [0.0, 0.6, 0.8]], [800.0, 0.0, 800.0], [90.0] * 3, 1,
-        day_of_year=172,
-    )  # fmt: skip
+        [[0.0, -0.8, 0.6], [0.3, -0.7, 0.6], [0.0, 0.6, 0.8]], [800.0, 0.0, 800.0], [90.0] * 3, 1, day_of_year=172
+    )
     light = daylight(scene(), glass(), sky, sampling=FEW)
     hours, other = np.array([0, 1, 2]), [[AngularOptics([0.0, 0.4, 0.4])]]
     expected = illuminance(daylight(light.scene, other, sky, sampling=FEW))
@@ -236,9 +251,7 @@ def test_other_systems_take_the_reflected_sun_of_the_light(monkeypatch) -> None:
 
 
 def test_other_systems_keep_each_hours_state() -> None:
-    sky = given_sky(
-        [[0.0, -0.8, 0.6], [0.3, -0.7, 0.6]], [800.0] * 2, [90.0] * 2, 1, day_of_year=172
-    )
+    sky = given_sky([[0.0, -0.8, 0.6], [0.3, -0.7, 0.6]], [800.0] * 2, [90.0] * 2, 1, day_of_year=172)
     one, other = (
         [[AngularOptics([0.0, first, first]), AngularOptics([0.0, second, second])]]
         for first, second in ((0.7, 0.3), (0.5, 0.1))

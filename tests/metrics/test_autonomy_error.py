@@ -31,9 +31,8 @@ def test_the_error_of_da_is_its_spread() -> None:
     random = np.random.default_rng(1)
     spread = np.std([daylight_autonomy(lux * f, hours)[0] for f in random.normal(1, 0.02, 400)])
     noise = daylight_autonomy_noise(
-        lux, hours, lambda weights: shared((0.02 * (weights * lux).sum(axis=0)) ** 2),
-        relative_error=np.array([0.02]),
-    )  # fmt: skip
+        lux, hours, lambda weights: shared((0.02 * (weights * lux).sum(axis=0)) ** 2), relative_error=np.array([0.02])
+    )
     assert noise.standard_error()[0] == pytest.approx(0.3 * 0.02, rel=0.02)
     assert noise.own[0] < 1e-3 * noise.shared[0]  # what the hours have alone
     assert spread == pytest.approx(0.3 * 0.02, rel=0.15)  # 400 trials: 3.5 %
@@ -46,9 +45,11 @@ def test_the_noise_of_each_hour_alone_moves_da_too() -> None:
     trials = [lux * random.normal(1, 0.05, lux.shape) for _ in range(400)]
     spread = np.std([daylight_autonomy(trial, hours)[0] for trial in trials])
     noise = daylight_autonomy_noise(
-        lux, hours, lambda weights: own((0.05**2 * (weights * lux) ** 2).sum(axis=0)),
+        lux,
+        hours,
+        lambda weights: own((0.05**2 * (weights * lux) ** 2).sum(axis=0)),
         relative_error=np.array([0.05 / np.sqrt(7500)]),
-    )  # fmt: skip
+    )
     assert noise.standard_error()[0] == pytest.approx(spread, rel=0.15)
 
 
@@ -104,9 +105,7 @@ def test_the_last_group_closes_of_equals_and_two_percent_may_stay_lit() -> None:
     direct[0, 0, 0] = 1500.0  # one point: 2 %, all stay open
     direct[0, 1, :2] = 1500.0  # two: the only group with sun closes
     direct[:, 2, 0], direct[:, 2, 1] = (600.0, 400.0), 1500.0  # both have the second point
-    direct[0, 3, 0] = direct[1, 3, 1] = direct[1, 3, 2] = (
-        1500.0  # the first alone leaves its one point
-    )
+    direct[0, 3, 0] = direct[1, 3, 1] = direct[1, 3, 2] = 1500.0  # the first alone leaves its one point
     closed = blinds_operated(direct)
     np.testing.assert_array_equal(closed[:, 0], [False, False])
     np.testing.assert_array_equal(closed[:, 1], [True, False])
@@ -145,11 +144,9 @@ def test_limits_hold_as_the_standard_says() -> None:
     year[:250, 0], year[:, 1], year[:, 2] = 2e3, 2e3, 900.0
     exposed = annual_sunlight_exposure(year, np.ones(251, dtype=bool), areas=[1.0, 2.0, 5.0])
     assert exposed == 0.25
-    bins = useful_daylight_illuminance([[99.0], [100.0], [300.0], [3000.0], [3001.0]],
-                                       np.ones(5, dtype=bool))  # fmt: skip
+    bins = useful_daylight_illuminance([[99.0], [100.0], [300.0], [3000.0], [3001.0]], np.ones(5, dtype=bool))
     np.testing.assert_allclose(bins[:, 0], [0.2, 0.2, 0.4, 0.2])
-    older = useful_daylight_illuminance([[500.0], [2000.0], [2001.0]], np.ones(3, dtype=bool),
-                                        UDI_LIMITS_2005)  # fmt: skip
+    older = useful_daylight_illuminance([[500.0], [2000.0], [2001.0]], np.ones(3, dtype=bool), UDI_LIMITS_2005)
     np.testing.assert_allclose(older[:, 0] * 3, [0.0, 0.0, 2.0, 1.0])
     part = continuous_daylight_autonomy([[150.0], [600.0]], np.ones(2, dtype=bool))
     assert part == pytest.approx(0.75)
@@ -169,11 +166,14 @@ def test_weights_and_limits_that_cannot_be() -> None:
         with pytest.raises(ValueError, match="rising positive"):
             useful_daylight_illuminance(*one, limits)
     for lux, hours, words in (
-        ([1.0], [True], "expected illuminance"), ([[1.0]], [True, True], "expected illuminance"),
-        ([[1.0]], [1.0], "expected illuminance"), ([[1.0]], [False], "no time step"),
-        ([[-1.0]], [True], "not negative"), ([[np.inf]], [True], "finite"),
+        ([1.0], [True], "expected illuminance"),
+        ([[1.0]], [True, True], "expected illuminance"),
+        ([[1.0]], [1.0], "expected illuminance"),
+        ([[1.0]], [False], "no time step"),
+        ([[-1.0]], [True], "not negative"),
+        ([[np.inf]], [True], "finite"),
         ([[np.nan]], [True], "finite"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(ValueError, match=words):
             daylight_autonomy(np.array(lux), np.array(hours))
     assert daylight_autonomy(np.array([[300]]), one[1]) == 1.0  # whole numbers

@@ -81,9 +81,7 @@ def test_daylight_hours_of_a_dark_year_follow_the_sun():
 
 def test_whole_year():
     mask = np.array([False, True, False, True])
-    np.testing.assert_array_equal(
-        schedules.whole_year([[1.0, 2], [3, 4]], mask), [[0, 0], [1, 2], [0, 0], [3, 4]]
-    )
+    np.testing.assert_array_equal(schedules.whole_year([[1.0, 2], [3, 4]], mask), [[0, 0], [1, 2], [0, 0], [3, 4]])
     with pytest.raises(ValueError, match="mask of 1"):
         schedules.whole_year([[1.0]], mask)
 
@@ -109,9 +107,7 @@ def test_only_scheduled_hours_count():
 
 def test_useful_daylight_bins_and_their_edges():
     values = np.array([0, 99.9, 100, 299, 300, 2000, 2001, 3000, 3001, 9999.0])[:, None]
-    np.testing.assert_allclose(
-        autonomy.useful_daylight_illuminance(values, ALL)[:, 0], [0.2, 0.2, 0.4, 0.2]
-    )
+    np.testing.assert_allclose(autonomy.useful_daylight_illuminance(values, ALL)[:, 0], [0.2, 0.2, 0.4, 0.2])
     old = autonomy.useful_daylight_illuminance(values, ALL, autonomy.UDI_LIMITS_2005)[:, 0]
     np.testing.assert_allclose(old, [0.2, 0.2, 0.2, 0.4])
     rng = np.random.default_rng(1)
@@ -221,9 +217,7 @@ def test_reached_on_area_and_in_time():
     column = np.array([5.0, 1, 3, 2])
     for time, expected in ((0.5, 3), (0.51, 2), (1.0, 1), (0.0, 5)):
         assert en17037.exceeded(column, time) == expected
-    assert (
-        en17037.median_diffuse(np.array([1.0, 2, 9, 50]), np.array([True, True, True, False])) == 2
-    )
+    assert en17037.median_diffuse(np.array([1.0, 2, 9, 50]), np.array([True, True, True, False])) == 2
 
 
 # --- rooms ------------------------------------------------------------------------------------
@@ -305,18 +299,28 @@ def test_figures_of_a_room_by_hand():
     assert list(table["daylight_autonomy"]) == [0.0, 100.0]
     assert list(table["continuous_daylight_autonomy"]) == [50.0, 100.0]
     for name, values in (
-        ("udi_below_100", [0, 0]), ("udi_100_300", [100, 0]), ("udi_300_3000", [0, 0]),
-        ("udi_above_3000", [0, 100]), ("udi_100_2000", [100, 0]), ("sunlit_hours", [0, 3650]),
+        ("udi_below_100", [0, 0]),
+        ("udi_100_300", [100, 0]),
+        ("udi_300_3000", [0, 0]),
+        ("udi_above_3000", [0, 100]),
+        ("udi_100_2000", [100, 0]),
+        ("sunlit_hours", [0, 3650]),
         ("mean_illuminance_lx", [150, 5000]),
-    ):  # fmt: skip
+    ):
         assert list(table[name]) == pytest.approx(values), name
     figures = room.of_room()
     for name, value in (
-        ("daylight_autonomy", 75.0), ("continuous_daylight_autonomy", 87.5),
-        ("udi_100_300", 25.0), ("udi_above_3000", 75.0), ("udi_below_100", 0.0),
-        ("udi_300_3000", 0.0), ("udi_100_2000", 25.0), ("mean_illuminance_lx", 3787.5),
-        ("spatial_daylight_autonomy", 75.0), ("annual_sunlight_exposure", 75.0),
-    ):  # fmt: skip
+        ("daylight_autonomy", 75.0),
+        ("continuous_daylight_autonomy", 87.5),
+        ("udi_100_300", 25.0),
+        ("udi_above_3000", 75.0),
+        ("udi_below_100", 0.0),
+        ("udi_300_3000", 0.0),
+        ("udi_100_2000", 25.0),
+        ("mean_illuminance_lx", 3787.5),
+        ("spatial_daylight_autonomy", 75.0),
+        ("annual_sunlight_exposure", 75.0),
+    ):
         assert figures[name] == pytest.approx(value), name
     dark = room_metrics(lux, weather)
     assert dark.annual_sunlight_exposure is None and dark.sunlit_hours is None

@@ -15,8 +15,5 @@ def test_median_diffuse_illuminance_of_reykjavik(real_data):
     """
     weather = read_epw(real_data / "epw" / "ISL_Reykjavik.040300_IWEC.epw")
     hours = daylight_hours(weather)
-    for diffuse in (
-        sky_series(weather).diffuse_horizontal,
-        weather.diffuse_horizontal_illuminance,
-    ):
+    for diffuse in (sky_series(weather).diffuse_horizontal, weather.diffuse_horizontal_illuminance):
         assert abs(en17037.median_diffuse(diffuse, hours) - 11_500) <= 50

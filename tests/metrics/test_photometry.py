@@ -25,8 +25,34 @@ def ies(c, gamma, values, *, lumens=-1.0, factor=1.0, watts=20.0, kind=1) -> str
 
 def ldt(symmetry, planes, gamma, values, *, lumens=1000.0, watts=20.0) -> str:
     step = 360.0 / planes
-    head = ["maker", 2, symmetry, planes, step, len(gamma), 5, "report", "Downlight", "1", "x.ldt",
-            "date", 100, 0, 0, 80, 0, 0, 0, 0, 0, 100, 100, 1.0, 0, 1]  # fmt: skip
+    head = [
+        "maker",
+        2,
+        symmetry,
+        planes,
+        step,
+        len(gamma),
+        5,
+        "report",
+        "Downlight",
+        "1",
+        "x.ldt",
+        "date",
+        100,
+        0,
+        0,
+        80,
+        0,
+        0,
+        0,
+        0,
+        0,
+        100,
+        100,
+        1.0,
+        0,
+        1,
+    ]
     lamps = [1, "LED", lumens, "830", "80", watts]
     ratios = [0.5] * 10
     c = [step * n for n in range(planes)]
@@ -52,9 +78,7 @@ def test_a_cosine_has_its_flux_in_both_formats(tmp_path) -> None:
         assert one.intensity([np.sqrt(0.75), 0, -0.5]) == pytest.approx(500.0)
         assert one.intensity([0, 0, 1.0]) == 0.0
     doubled = ies([0.0], GAMMA, [row], factor=2.0)
-    assert read_photometry(written(tmp_path, "b.ies", doubled)).lumens == pytest.approx(
-        2 * np.pi * 1000.0, rel=0.005
-    )
+    assert read_photometry(written(tmp_path, "b.ies", doubled)).lumens == pytest.approx(2 * np.pi * 1000.0, rel=0.005)
 
 
 def test_planes_are_completed_by_symmetry(tmp_path) -> None:
@@ -63,9 +87,7 @@ def test_planes_are_completed_by_symmetry(tmp_path) -> None:
 
     def at(photometry, c_deg):
         c, g = np.radians(c_deg), np.radians(40.0)
-        return float(
-            photometry.intensity([np.sin(g) * np.cos(c), np.sin(g) * np.sin(c), -np.cos(g)])
-        )
+        return float(photometry.intensity([np.sin(g) * np.cos(c), np.sin(g) * np.sin(c), -np.cos(g)]))
 
     quarter = [down * (100 + c) for c in (0.0, 45.0, 90.0)]
     full = np.cos(np.radians(40.0))
@@ -115,9 +137,7 @@ def test_direct_light_is_that_of_a_point(tmp_path) -> None:
 def test_a_cube_of_even_reflectance_keeps_its_flux(tmp_path) -> None:
     """A point in the middle of a cube: E of each face is flux / (6 A (1 - rho))."""
     rho, side = 0.6, 3.0
-    cube = shoebox(
-        side, side, side, windows=(), reflectance={"wall": rho, "floor": rho, "ceiling": rho}
-    ).spaces[0]
+    cube = shoebox(side, side, side, windows=(), reflectance={"wall": rho, "floor": rho, "ceiling": rho}).spaces[0]
     photometry = isotropic(tmp_path)
     middle = (np.arange(12) + 0.5) * side / 12
     points = np.array([(x, y, 1e-3) for x in middle for y in middle])
@@ -143,11 +163,7 @@ def test_a_cube_of_even_reflectance_keeps_its_flux(tmp_path) -> None:
         ("a.ies", ies([], GAMMA, [np.ones(19)]), "0 horizontal angles"),
         ("a.ldt", "maker\n1\n", "ends before line 3"),
         ("a.ldt", ldt(0, 8, GAMMA, np.ones(19)), "ends before line"),
-        (
-            "a.ldt",
-            ldt(1, 8, GAMMA, np.ones(19)).replace("\n0\n1\n1\nLED", "\n0\n2\n1\nLED"),
-            "2 sets",
-        ),
+        ("a.ldt", ldt(1, 8, GAMMA, np.ones(19)).replace("\n0\n1\n1\nLED", "\n0\n2\n1\nLED"), "2 sets"),
         ("a.ldt", ldt(7, 8, GAMMA, np.ones(19)), "symmetry 7"),
         ("a.uld", "", "as .ies or .ldt"),
     ],

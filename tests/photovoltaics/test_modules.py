@@ -22,8 +22,19 @@ FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (
 def box(guid: str, low, high, *, reflectance: float = 0.0) -> Element:
     """A closed box along the axes."""
     (x0, y0, z0), (x1, y1, z1) = low, high
-    p = np.array([[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0],
-                  [x0, y0, z1], [x1, y0, z1], [x1, y1, z1], [x0, y1, z1]], dtype=float)  # fmt: skip
+    p = np.array(
+        [
+            [x0, y0, z0],
+            [x1, y0, z0],
+            [x1, y1, z0],
+            [x0, y1, z0],
+            [x0, y0, z1],
+            [x1, y0, z1],
+            [x1, y1, z1],
+            [x0, y1, z1],
+        ],
+        dtype=float,
+    )
     triangles = [[p[f[0]], p[f[i]], p[f[i + 1]]] for f in FACES for i in (1, 2)]
     return Element(guid, guid, "IfcSolarDevice", np.array(triangles), reflectance, reflectance)
 
@@ -101,10 +112,16 @@ def test_free_upright_modules_have_the_sky_that_pvlib_gives_tilted_planes(varian
     for number, module in enumerate(modules):
         azimuth = module.azimuth_deg
         sky = irradiance.perez(
-            90.0, azimuth, diffuse, direct, SOLAR_CONSTANT * eccentricity(days),
-            np.degrees(zenith), np.degrees(np.arctan2(sun[:, 0], sun[:, 1])), air_mass(zenith),
+            90.0,
+            azimuth,
+            diffuse,
+            direct,
+            SOLAR_CONSTANT * eccentricity(days),
+            np.degrees(zenith),
+            np.degrees(np.arctan2(sun[:, 0], sun[:, 1])),
+            air_mass(zenith),
             model="allsitescomposite1990",
-        )  # fmt: skip
+        )
         beam = direct * np.maximum(sun @ module.normal, 0.0)
         ours = found.plain[found.module == number].mean(axis=0)
         assert abs((ours - beam - ground - sky).sum()) < 0.02 * diffuse.sum()
@@ -119,9 +136,9 @@ def test_shade_of_a_black_fin_is_sharp_and_reflections_count(variant, two_days):
     modules = pv_modules([flat], frozenset({"m"}))
     series = sky_series(two_days, "solar")
     dark, bright = (
-        cell_irradiance([flat, Element(**{**_fields(south), "reflectance_solar": r})], modules,
-                        two_days) for r in (0.0, 0.8)
-    )  # fmt: skip
+        cell_irradiance([flat, Element(**{**_fields(south), "reflectance_solar": r})], modules, two_days)
+        for r in (0.0, 0.8)
+    )
     sun = series.sun[dark.steps]
     hidden = (sun[:, 1] < -0.05) & (sun[:, 2] > 0.05)
     assert hidden.sum() > 8

@@ -9,13 +9,7 @@ import pvlib
 import pytest
 
 from scenes.photovoltaics.energy import diode_voltage, string_power, string_voltage
-from scenes.photovoltaics.two_diode import (
-    BOLTZMANN,
-    ICE,
-    Datasheet,
-    cell_currents,
-    fitted_cell,
-)
+from scenes.photovoltaics.two_diode import BOLTZMANN, ICE, Datasheet, cell_currents, fitted_cell
 
 SHEET = Datasheet(9.2, 39.5, 8.7, 32.0, 60, 0.0005)
 

@@ -106,11 +106,21 @@ def inspect(page: str, folder: Path, *flags: str, width: int = 1400, use: str = 
     watched = watched.replace("</body>", INSPECT.replace("//USE//", use) + "</body>")
     file.write_text(watched, encoding="utf-8")
     command = [
-        chromium(), "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run",
-        "--disable-background-networking", "--disable-component-update", "--disable-sync",
-        f"--user-data-dir={folder / 'profile'}", f"--window-size={width},1000",
-        "--virtual-time-budget=8000", *flags, "--dump-dom", file.as_uri(),
-    ]  # fmt: skip
+        chromium(),
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--no-first-run",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        f"--user-data-dir={folder / 'profile'}",
+        f"--window-size={width},1000",
+        "--virtual-time-budget=8000",
+        *flags,
+        "--dump-dom",
+        file.as_uri(),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     found = re.search(r'<pre id="inspection">(.*?)</pre>', done.stdout, re.DOTALL)
     if not found:

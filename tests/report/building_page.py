@@ -28,9 +28,8 @@ def building(rooms: int, *, picture_size: int = 320, pictures: int = 4) -> RunRe
         room, storey = run.spaces[i % 2], i // ON_A_STOREY
         offset = np.array([20.0 * (i % ON_A_STOREY // 2), 0.0, 3.2 * storey])
         space = replace(
-            moved(room.space, list(offset)), guid=f"guid-{i}", name=f"{i + 1:03d}",
-            storey=f"Storey {storey}",
-        )  # fmt: skip
+            moved(room.space, list(offset)), guid=f"guid-{i}", name=f"{i + 1:03d}", storey=f"Storey {storey}"
+        )
         daylight = replace(room.daylight, points=room.daylight.points + offset)
         found.append(replace(room, space=space, daylight=daylight))
     spaces = tuple(room.space for room in found)
@@ -44,10 +43,7 @@ SEEN = """(() => {
 })()"""
 
 
-READY = (
-    "performance.getEntriesByName('first-contentful-paint').length"
-    " && document.readyState === 'complete'"
-)
+READY = "performance.getEntriesByName('first-contentful-paint').length && document.readyState === 'complete'"
 
 
 def seen(file: Path, folder: Path) -> tuple[float, float, float]:
@@ -58,9 +54,7 @@ def seen(file: Path, folder: Path) -> tuple[float, float, float]:
         for _ in range(3):
             page.open("about:blank", ready="true")
             page.open(file.as_uri(), ready=READY)
-            metrics = {
-                m["name"]: m["value"] for m in page.send("Performance.getMetrics")["metrics"]
-            }
+            metrics = {m["name"]: m["value"] for m in page.send("Performance.getMetrics")["metrics"]}
             found.append((*page.value(SEEN), metrics["TaskDuration"]))
     return tuple(np.min(found, axis=0))
 

@@ -35,13 +35,18 @@ def run_result(*, picture_size: int = 320, pictures: int = 4) -> RunResult:
     sun = sun_directions(times)
     building = two_rooms()
     rooms = tuple(
-        space_result(space, times, sun, picture_size, pictures, seed=i)
-        for i, space in enumerate(building.spaces)
+        space_result(space, times, sun, picture_size, pictures, seed=i) for i, space in enumerate(building.spaces)
     )
     return RunResult(
-        building, times, sun, rooms, issues(), manifest(),
-        ("The venetian blind stays at 45° all year; it is not moved.",), "five-phase",
-    )  # fmt: skip
+        building,
+        times,
+        sun,
+        rooms,
+        issues(),
+        manifest(),
+        ("The venetian blind stays at 45° all year; it is not moved.",),
+        "five-phase",
+    )
 
 
 def two_rooms() -> Building:
@@ -117,17 +122,20 @@ def operation_result(times, beam, daylight) -> OperationResult:
     used = (hour >= 7) & (hour < 19)
     lamps = 200 * used * np.clip(1 - daylight.illuminance.mean(axis=1) / 500, 0, 1)
     hours = pd.DataFrame(
-        {"shading_state": np.digitize(beam, [0.2, 0.5]),
-         "heating_w": 900 * np.clip(winter, 0, 1) * used,
-         "cooling_w": 700 * np.clip(-winter, 0, 1) * used, "lighting_w": lamps}, index=times,
-    )  # fmt: skip
+        {
+            "shading_state": np.digitize(beam, [0.2, 0.5]),
+            "heating_w": 900 * np.clip(winter, 0, 1) * used,
+            "cooling_w": 700 * np.clip(-winter, 0, 1) * used,
+            "lighting_w": lamps,
+        },
+        index=times,
+    )
     summary = {f"{n}_kwh": float(hours[f"{n}_w"].sum() / 1e3) for n in ("heating", "cooling")}
     summary |= {"lighting_kwh": float(lamps.sum() / 1e3), "peak_heating_w": 900.0}
     states = hours["shading_state"].to_numpy()[:, None]
     shading = ShadingYear(
-        ("S",), ("irradiance",), states, np.zeros(1, dtype=np.int64),
-        views=(np.array([True, False]),),
-    )  # fmt: skip
+        ("S",), ("irradiance",), states, np.zeros(1, dtype=np.int64), views=(np.array([True, False]),)
+    )
     return OperationResult(("open", "slats 40°", "closed <70°>"), hours, summary, shading)
 
 
@@ -150,7 +158,9 @@ def daylight_result(space: Space, outside, beam, rng) -> DaylightResult:
     share = lambda condition: 100 * condition[used].mean(axis=0)  # noqa: E731
     metrics = pd.DataFrame(
         {
-            "x": points[:, 0], "y": points[:, 1], "z": points[:, 2],
+            "x": points[:, 0],
+            "y": points[:, 1],
+            "z": points[:, 2],
             "da300": share(light >= 300),
             "cda300": 100 * np.minimum(light[used] / 300, 1).mean(axis=0),
             "udi_below_100": share(light < 100),
@@ -160,7 +170,7 @@ def daylight_result(space: Space, outside, beam, rng) -> DaylightResult:
             "sunlit_hours": 800.0 * np.exp(-depth / 1.2),
             "daylight_factor": 100 * factor,
         }
-    )  # fmt: skip
+    )
     direct = light * (beam[:, None] > 0.25)
     room = {
         "sda300_50": float((metrics["da300"] >= 50).mean() * 100),
@@ -182,9 +192,16 @@ def glare_results(space: Space, hours, illuminance, size: int) -> GlareResults:
         luminance, mask = fisheye_luminance(space, view, 9000.0 / (1 + rank), seed=int(hour))
         ev = float(illuminance[hour].mean() * 0.7)
         dgp = float(np.clip(5.87e-5 * ev + 0.22 - 0.02 * rank, 0.18, 1.0))
-        glare = {"dgp": dgp, "ev": ev, "dgi": 19.2 - rank, "ugr": 21.7 - rank, "vcp": 43.0,
-                 "cgi": 24.1 - rank, "sources": float(3 - min(rank, 2)),
-                 "dgp_standard_error": 2e-5}  # fmt: skip
+        glare = {
+            "dgp": dgp,
+            "ev": ev,
+            "dgi": 19.2 - rank,
+            "ugr": 21.7 - rank,
+            "vcp": 43.0,
+            "cgi": 24.1 - rank,
+            "sources": float(3 - min(rank, 2)),
+            "dgp_standard_error": 2e-5,
+        }
         pictures.append(LuminancePicture(int(hour), luminance, glare, mask))
     shown = max(pictures, key=lambda picture: picture.glare["ev"], default=None)
     colour = None if shown is None else ColourPicture(shown.hour, warm(shown.luminance))
@@ -207,11 +224,7 @@ def fisheye_luminance(space: Space, view: View, sky: float, seed: int):
     for window in space.windows:
         low, high = (f(window.triangles.reshape(-1, 3), axis=0) for f in (np.min, np.max))
         facing = directions @ window.normal
-        t = (
-            (window.centre - view.position)
-            @ window.normal
-            / np.where(facing > 0.01, facing, np.nan)
-        )
+        t = (window.centre - view.position) @ window.normal / np.where(facing > 0.01, facing, np.nan)
         hit = np.asarray(view.position) + t[..., None] * directions
         inside = np.all((hit >= low - 1e-3) & (hit <= high + 1e-3), axis=-1)
         slat = np.mod(hit[..., 2], 0.08) < 0.05
@@ -237,34 +250,59 @@ def thermal_result(space: Space, times, beam, cloud, rng) -> ThermalResult:
     occupied = (hour >= 8) & (hour < 18) & (times.day_of_week.to_numpy() < 5)
     off = np.abs(operative - comfort_c)
     comfort = pd.DataFrame(
-        {"occupied": occupied, "running_mean_c": running, "comfort_c": comfort_c,
-         "applicable": covered, "within_80": (off <= 3.5) & covered,
-         "within_90": (off <= 2.5) & covered}, index=times,
-    )  # fmt: skip
+        {
+            "occupied": occupied,
+            "running_mean_c": running,
+            "comfort_c": comfort_c,
+            "applicable": covered,
+            "within_80": (off <= 3.5) & covered,
+            "within_90": (off <= 2.5) & covered,
+        },
+        index=times,
+    )
     temperatures = pd.DataFrame(
-        {"outdoor_c": outdoor, "air_c": air, "mrt_c": radiant, "operative_c": operative,
-         "floor_c": radiant - 0.3, "ceiling_c": radiant + 0.4}, index=times,
-    )  # fmt: skip
+        {
+            "outdoor_c": outdoor,
+            "air_c": air,
+            "mrt_c": radiant,
+            "operative_c": operative,
+            "floor_c": radiant - 0.3,
+            "ceiling_c": radiant + 0.4,
+        },
+        index=times,
+    )
     gains = pd.DataFrame(
-        {"incident_w": incident, "transmitted_w": 0.21 * incident,
-         "absorbed_outer_w": 0.28 * incident,
-         "absorbed_inner_w": 0.11 * incident, "absorbed_room_w": 0.18 * incident}, index=times,
-    )  # fmt: skip
+        {
+            "incident_w": incident,
+            "transmitted_w": 0.21 * incident,
+            "absorbed_outer_w": 0.28 * incident,
+            "absorbed_inner_w": 0.11 * incident,
+            "absorbed_room_w": 0.18 * incident,
+        },
+        index=times,
+    )
     used = comfort[occupied]
-    summary = {"within_80": 100 * used.within_80.mean(), "within_90": 100 * used.within_90.mean(),
-               "too_warm_hours": 210.0, "outside_the_model_hours": 1092.0}  # fmt: skip
-    fenestration = {"system": "Venetian blind <45>", "u_value": 1.27, "g_value": 0.314,
-                    "visible_transmittance": 0.187,
-                    "solar_transmittance": 0.121, "solar_reflectance": 0.402}  # fmt: skip
+    summary = {
+        "within_80": 100 * used.within_80.mean(),
+        "within_90": 100 * used.within_90.mean(),
+        "too_warm_hours": 210.0,
+        "outside_the_model_hours": 1092.0,
+    }
+    fenestration = {
+        "system": "Venetian blind <45>",
+        "u_value": 1.27,
+        "g_value": 0.314,
+        "visible_transmittance": 0.187,
+        "solar_transmittance": 0.121,
+        "solar_reflectance": 0.402,
+    }
     return ThermalResult(temperatures, gains, comfort, summary, (fenestration,))
 
 
 def issues() -> tuple[Issue, ...]:
     """Faults as the IFC reader reports them."""
     return (
-        Issue(
-            "construction-assumed", "2O2Fr$t4X7Zf8NOew3FLOH", {"room": "Office <blank>", "count": 2}
-        ),
+        Issue("construction-assumed", "2O2Fr$t4X7Zf8NOew3FLOH", {"room": "Office <blank>", "count": 2}),
         Issue("site-without-position", "office.ifc"),
     )
 

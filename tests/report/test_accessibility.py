@@ -95,9 +95,7 @@ def test_no_page_has_a_serious_fault(pages, tmp_path, flags) -> None:
 def test_a_planted_fault_is_seen(pages, tmp_path) -> None:
     text = pages["report"].read_text(encoding="utf-8")
     file = tmp_path / "planted.html"
-    file.write_text(
-        text.replace("<main", '<button></button><p style="color:#ccc">faint words</p><main', 1)
-    )
+    file.write_text(text.replace("<main", '<button></button><p style="color:#ccc">faint words</p><main', 1))
     with Page(tmp_path) as page:
         found = {fault[1] for fault in faults(page, file) if fault[0] in GRAVE}
     assert {"button-name", "color-contrast"} <= found

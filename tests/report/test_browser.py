@@ -8,10 +8,7 @@ from scenes.report.page import report_html
 from tests.report.browser import chromium, inspect
 from tests.report.synthetic import run_result
 
-pytestmark = [
-    pytest.mark.early,
-    pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
-]
+pytestmark = [pytest.mark.early, pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")]
 WITHOUT_WEBGL = ("--disable-3d-apis",)
 
 
@@ -52,7 +49,7 @@ def test_page_works_in_a_browser(page, tmp_path, width, flags) -> None:
         (".x-ticks i {", ".x-ticks span { left: 0 !important; } .x-ticks i {", "overlaps"),
         ("max-width: 1180px; margin: 0 auto;", "min-width: 1500px;", "scroll"),
     ],
-)  # fmt: skip
+)
 def test_planted_fault_is_seen(page, tmp_path, planted, instead, key) -> None:
     assert planted in page
     found = inspect_or_fault(page.replace(planted, instead), tmp_path)

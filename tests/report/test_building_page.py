@@ -13,10 +13,7 @@ from scenes.report.page import report_html
 from tests.devtools import Page, chromium
 from tests.report.building_page import building
 
-pytestmark = [
-    pytest.mark.early,
-    pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
-]
+pytestmark = [pytest.mark.early, pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")]
 ROOMS = 12
 DRAWN = """[...document.querySelectorAll("section.room")]
   .filter((s) => s.checkVisibility() && s.querySelector(".cards")
@@ -56,8 +53,7 @@ def test_rooms_are_drawn_where_they_are_looked_at(browser) -> None:
 
 def test_a_storey_is_chosen_and_what_is_above_lifted(browser) -> None:
     choose = (
-        "(() => {{ const e = document.getElementById('viewer-{0}'); {1};"
-        "e.dispatchEvent(new Event('change')); }})()"
+        "(() => {{ const e = document.getElementById('viewer-{0}'); {1};e.dispatchEvent(new Event('change')); }})()"
     )
     picture = (
         "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() =>"

@@ -17,14 +17,7 @@ from bim.shoebox import WindowRectangle, shoebox
 from scenes.figures.carpet import carpet, class_carpet, day_grid, month_ticks
 from scenes.figures.chart import BOX, box, line
 from scenes.figures.plan import plan, plan_frame, window_from_above
-from scenes.figures.scale import (
-    ColourScale,
-    log_values,
-    plain,
-    relative_luminance,
-    round_limits,
-    round_values,
-)
+from scenes.figures.scale import ColourScale, log_values, plain, relative_luminance, round_limits, round_values
 from scenes.language.numbers import percent
 from scenes.report.glare_figures import luminance_scale, outline
 from scenes.report.model3d import building_box, model3d, outline_edges
@@ -53,9 +46,7 @@ def test_limits_hold_all_values_at_ticks_of_the_axis(values) -> None:
 def test_numbers_can_be_read_on_every_colour(name) -> None:
     scale = ColourScale(0, 1, "x", "", colours=name)
     for value in np.linspace(0, 1, 201):
-        light = sorted(
-            [relative_luminance(scale.rgba([value])[0]), float(scale.ink(value) == "#fff")]
-        )
+        light = sorted([relative_luminance(scale.rgba([value])[0]), float(scale.ink(value) == "#fff")])
         # black and white meet at sqrt(21) = 4.58 to 1; WCAG 2.2 asks for 4.5
         assert (light[1] + 0.05) / (light[0] + 0.05) >= 4.5
 
@@ -122,9 +113,7 @@ def test_classes_have_the_colours_of_the_legend() -> None:
 def test_paths_scale_and_break() -> None:
     assert line([0, 5, 10], [1, 2, 3], (0, 10), (1, 3)) == "M0.0 1000.0L500.0 500.0L1000.0 0.0"
     assert line([0, 5, 10], [1, np.nan, 3], (0, 10), (1, 3)) == "M0.0 1000.0M1000.0 0.0"
-    assert box(1, 2, 0, 5, (0, 4), (0, 10)) == (
-        "M250.0 1000.0L500.0 1000.0L500.0 500.0L250.0 500.0Z"
-    )
+    assert box(1, 2, 0, 5, (0, 4), (0, 10)) == ("M250.0 1000.0L500.0 1000.0L500.0 500.0L250.0 500.0Z")
     assert BOX == 1000.0
 
 
@@ -140,12 +129,8 @@ def test_plan_shows_outline_recess_windows_and_cells(facing) -> None:
         turned = np.roll(space.windows[0].triangles, turn, axis=1)
         ends = window_from_above(replace(space.windows[0], triangles=turned))
         assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(3.0)
-    assert shapely.union_all(shapely.polygons(frame.cells)).area == pytest.approx(
-        0.25 * len(points), rel=1e-6
-    )
-    drawn = plan(
-        frame, np.arange(len(points)), ColourScale(0, 100, "x", "%"), title="", explanation=""
-    )
+    assert shapely.union_all(shapely.polygons(frame.cells)).area == pytest.approx(0.25 * len(points), rel=1e-6)
+    drawn = plan(frame, np.arange(len(points)), ColourScale(0, 100, "x", "%"), title="", explanation="")
     assert drawn.body.count('class="cell"') == len(points)
     assert drawn.body.count('class="window"') == 1
     with pytest.raises(ValueError, match="values for"):
@@ -170,20 +155,18 @@ def test_box_has_twelve_edges_and_a_square_four() -> None:
 def test_a_building_is_its_rooms_and_what_touches_them() -> None:
     """The attic above the room and the roof on it, not the terrain, nor a tree 5 m away."""
     parts = (
-        ("IfcWall", [0, 0, 3.2], [4, 6, 6]), ("IfcRoof", [-0.5, -0.5, 6], [4.5, 6.5, 7]),
+        ("IfcWall", [0, 0, 3.2], [4, 6, 6]),
+        ("IfcRoof", [-0.5, -0.5, 6], [4.5, 6.5, 7]),
         ("IfcSite", [-50, -50, -1], [50, 50, 0]),
         ("IfcBuildingElementProxy", [9, 0, 0], [10, 1, 9]),
-    )  # fmt: skip
+    )
     elements = tuple(
-        Element(f"{i}", kind, kind, slab(low, high), 0.3, 0.3)
-        for i, (kind, low, high) in enumerate(parts)
+        Element(f"{i}", kind, kind, slab(low, high), 0.3, 0.3) for i, (kind, low, high) in enumerate(parts)
     )
     box = building_box(shoebox(4.0, 6.0, 3.0, elements=elements))
     np.testing.assert_allclose(box, [[-0.5, -0.5, 0], [4.5, 6.5, 7]], atol=1e-9)
     model = model3d(run_result(picture_size=32, pictures=1))
-    rooms = np.concatenate(
-        [s.shell for s in run_result(picture_size=32, pictures=1).building.spaces]
-    ).reshape(-1, 3)
+    rooms = np.concatenate([s.shell for s in run_result(picture_size=32, pictures=1).building.spaces]).reshape(-1, 3)
     low, high = (np.array(corner) + model.centre for corner in model.whole)
     assert np.all(low <= rooms.min(axis=0) + 1e-3) and np.all(high >= rooms.max(axis=0) - 1e-3)
 
@@ -201,9 +184,7 @@ def test_mesh_keeps_positions_to_a_step_and_every_sensor() -> None:
     assert len(points) == len(expected)
     # half a step each way, in every coordinate; compared as sets, for faces are regrouped
     for axis in range(3):
-        np.testing.assert_allclose(
-            np.sort(points[:, axis]), np.sort(expected[:, axis]), atol=0.51 * model.unit
-        )
+        np.testing.assert_allclose(np.sort(points[:, axis]), np.sort(expected[:, axis]), atol=0.51 * model.unit)
     assert model.unit < 0.001
     sensors = sum(len(room.daylight.points) for room in result.spaces)
     assert len(model.sensors["room"]) == sensors
@@ -250,9 +231,11 @@ def test_each_group_of_windows_has_its_carpet_of_states() -> None:
     assert [chart.title for chart in state_carpets(result, room)] == ["Shading state"]
     states = room.operation.shading.states
     shading = replace(
-        room.operation.shading, groups=("S", "door"), rules=("irradiance", "any"),
+        room.operation.shading,
+        groups=("S", "door"),
+        rules=("irradiance", "any"),
         states=np.column_stack([states, 2 - states]),
-    )  # fmt: skip
+    )
     two = replace(room, operation=replace(room.operation, shading=shading))
     south, door = state_carpets(result, two)
     assert (south.title, door.title) == ("Shading state: S", "Shading state: door")

@@ -39,13 +39,25 @@ def table() -> pd.DataFrame:
             much = 0.5 * max(-way[1], 0) * (1.0 if y < 2 else 0.3) + 0.01 * e
             protection = "none" if much > 0.2 else "minimum" if much > 0.1 else "high"
             rows.append(
-                {"view": f"eye{e + 1:03d}_{d + 1}", "x": x, "y": y, "z": 1.2,
-                 "direction_x": way[0], "direction_y": way[1], "direction_z": 0.0,
-                 "hours_of_use": 3650, "share_above_0.35": much, "share_above_0.40": 0.6 * much,
-                 "share_above_0.45": 0.3 * much, "dgp_exceeded_in_5_percent": 0.3 + much / 2,
-                 "protection_en17037": protection, "highest_dgp": 0.3 + much,
-                 "worst_hour": "2017-12-21 12:30:00", "dgp_sunny_hour_error": 0.0}
-            )  # fmt: skip
+                {
+                    "view": f"eye{e + 1:03d}_{d + 1}",
+                    "x": x,
+                    "y": y,
+                    "z": 1.2,
+                    "direction_x": way[0],
+                    "direction_y": way[1],
+                    "direction_z": 0.0,
+                    "hours_of_use": 3650,
+                    "share_above_0.35": much,
+                    "share_above_0.40": 0.6 * much,
+                    "share_above_0.45": 0.3 * much,
+                    "dgp_exceeded_in_5_percent": 0.3 + much / 2,
+                    "protection_en17037": protection,
+                    "highest_dgp": 0.3 + much,
+                    "worst_hour": "2017-12-21 12:30:00",
+                    "dgp_sunny_hour_error": 0.0,
+                }
+            )
     return pd.DataFrame(rows)
 
 
@@ -53,10 +65,14 @@ def write_glare_page(path: Path, page: PageOptions = OWN_PAGE) -> None:
     """The page of these views."""
     options = YearOptions("office.ifc", "city.epw", grid=2.0, directions=DIRECTIONS)
     year = SimpleNamespace(
-        options=options, room="101 <Open> office", space=two_rooms().spaces[0],
-        weather=SimpleNamespace(site="Lyon"), notes=("A note & more.",), head=NO_HEAD,
+        options=options,
+        room="101 <Open> office",
+        space=two_rooms().spaces[0],
+        weather=SimpleNamespace(site="Lyon"),
+        notes=("A note & more.",),
+        head=NO_HEAD,
         fenestration=({"system": "Blind at 45", "source": "blind.xml", "windows": ["W"]},),
-    )  # fmt: skip
+    )
     write_page(year, table(), path, page)
 
 
@@ -108,8 +124,7 @@ def test_the_page_opens_without_a_fault(page, tmp_path) -> None:
     with Page(tmp_path) as browser:
         browser.open(page.as_uri(), ready="document.readyState === 'complete'")
         boxes = browser.value(
-            "[...document.querySelectorAll('.rose .reach')]"
-            ".map((e) => e.getBoundingClientRect().width)"
+            "[...document.querySelectorAll('.rose .reach')].map((e) => e.getBoundingClientRect().width)"
         )
         assert len(boxes) == 4 * DIRECTIONS and min(boxes) > 10
         assert browser.value("document.documentElement.scrollWidth") <= 1400
@@ -138,15 +153,15 @@ def captions(monkeypatch, draw) -> str:
         ("fr", ("mars", "0,45", "heures", "éblouissement", "protection")),
     ],
 )
-def test_captions_in_pictures_are_in_the_language_of_the_page(
-    tmp_path, monkeypatch, language, words
-) -> None:
+def test_captions_in_pictures_are_in_the_language_of_the_page(tmp_path, monkeypatch, language, words) -> None:
     times = pd.date_range("2017-01-01 00:30", periods=8760, freq="h")
     dgp = pd.Series(0.2, index=times)
     year = SimpleNamespace(
-        options=YearOptions("office.ifc", "city.epw"), room="office",
-        weather=SimpleNamespace(midpoints=times), sky=SimpleNamespace(lit=np.arange(8760)),
-    )  # fmt: skip
+        options=YearOptions("office.ifc", "city.epw"),
+        room="office",
+        weather=SimpleNamespace(midpoints=times),
+        sky=SimpleNamespace(lit=np.arange(8760)),
+    )
     rated = SimpleNamespace(ratings=SimpleNamespace(dgp=dgp), view=SimpleNamespace(name="seat"))
     luminance = np.full((40, 40), 100.0)
     luminance[18:22, 18:22] = 1e5

@@ -22,16 +22,23 @@ from tests.report.synthetic import run_result
 
 LANGUAGES = TRANSLATED
 EVERYTHING = Account(  # that can be said of a model which is usable with care
-    (StoreyAccount("EG", 3, 5, 20.0, 15.5), StoreyAccount("OG", 0, 0, 2.5, 0.0)), 9, 7,
-    glass_assumed=4.2, glass_low=1.5, glass_missing=0.5, phantom=3.1, closed=1.1,
-    overlapping=("1.01 / 1.02",), low=("1.03",), missing=("1.04", "1.05"), leaking=("1.06",),
-    raised=("1.07",), shut_in=0.6,
-)  # fmt: skip
-ENGLISH = re.compile(
-    r"\b(of|that|none|the|rooms?|glass|windows?|spaces|usable|with|used|pairs|closed)\b"
+    (StoreyAccount("EG", 3, 5, 20.0, 15.5), StoreyAccount("OG", 0, 0, 2.5, 0.0)),
+    9,
+    7,
+    glass_assumed=4.2,
+    glass_low=1.5,
+    glass_missing=0.5,
+    phantom=3.1,
+    closed=1.1,
+    overlapping=("1.01 / 1.02",),
+    low=("1.03",),
+    missing=("1.04", "1.05"),
+    leaking=("1.06",),
+    raised=("1.07",),
+    shut_in=0.6,
 )
-BLIND = Account((StoreyAccount("EG", 0, 2, 0.0, 0.0),), 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0,
-                cut_off=True)  # fmt: skip
+ENGLISH = re.compile(r"\b(of|that|none|the|rooms?|glass|windows?|spaces|usable|with|used|pairs|closed)\b")
+BLIND = Account((StoreyAccount("EG", 0, 2, 0.0, 0.0),), 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, cut_off=True)
 MARK = re.compile(r"‹[^‹›]*›")
 # What a page shows that is no text of its own: names of the run's rooms, files, systems and states,
 # symbols and units, and what the program notes in English
@@ -60,14 +67,12 @@ class _Marked(NullTranslations):
 def result():
     """Two rooms, one with all there can be, on two storeys; nothing of the English notes."""
     run = run_result(picture_size=48, pictures=2)
-    spaces = tuple(
-        replace(room, space=replace(room.space, storey=f"Storey {i}"))
-        for i, room in enumerate(run.spaces)
-    )
+    spaces = tuple(replace(room, space=replace(room.space, storey=f"Storey {i}")) for i, room in enumerate(run.spaces))
     manifest = {k: v for k, v in run.manifest.items() if k != "options"}
     manifest |= {"quick": True, "options": {"seed": 3}}
-    return replace(run, spaces=spaces, notes=(), manifest=manifest,
-                   building=replace(run.building, issues=()), issues=())  # fmt: skip
+    return replace(
+        run, spaces=spaces, notes=(), manifest=manifest, building=replace(run.building, issues=()), issues=()
+    )
 
 
 @pytest.fixture(scope="module")
@@ -160,12 +165,7 @@ def test_longer_words_fit(result, tmp_path, language, width) -> None:
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize(
     "account",
-    [
-        EVERYTHING,
-        BLIND,
-        replace(EVERYTHING, from_geometry=True),
-        replace(BLIND, storeys=(), from_geometry=True),
-    ],
+    [EVERYTHING, BLIND, replace(EVERYTHING, from_geometry=True), replace(BLIND, storeys=(), from_geometry=True)],
     ids=["all", "none", "found", "nothing"],
 )
 def test_the_account_of_the_model_is_in_the_pages_language(result, language, account) -> None:

@@ -83,8 +83,7 @@ def test_months_add_up_to_the_year_at_any_step(room) -> None:
 def test_stack_of_gains_leaves_out_what_is_counted_already(room) -> None:
     chart = gains_chart(tables.monthly_gains(room.heat.gains))
     labels = [mark.label for mark in chart.marks]
-    assert labels == ["Incident on the glass", "Transmitted", "Absorbed, outer layer",
-                      "Absorbed, inner layer"]  # fmt: skip
+    assert labels == ["Incident on the glass", "Transmitted", "Absorbed, outer layer", "Absorbed, inner layer"]
 
 
 def test_duration_curve_crosses_at_the_counted_hours(room) -> None:

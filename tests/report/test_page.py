@@ -75,12 +75,8 @@ def test_key_numbers_are_those_of_the_result(result, page) -> None:
         operative = room.heat.temperatures["operative_c"]
         occupied = room.heat.comfort["occupied"]
         worst = max(picture.glare["dgp"] for picture in room.glare.pictures)
-        cards = dict(
-            re.findall(r'">([^<>]+)</abbr></h3>\s*<p class="value"><b>([^<]+)</b>', section)
-        )
-        assert (
-            cards["Spatial daylight autonomy"] == f"{room.daylight.room_metrics['sda300_50']:.0f}"
-        )
+        cards = dict(re.findall(r'">([^<>]+)</abbr></h3>\s*<p class="value"><b>([^<]+)</b>', section))
+        assert cards["Spatial daylight autonomy"] == f"{room.daylight.room_metrics['sda300_50']:.0f}"
         assert cards["Highest glare"] == f"{worst:.2f}"
         assert cards["Peak temperature"] == f"{operative.max():.1f}"
         warm = int(((operative > 26) & occupied).sum())
@@ -160,14 +156,23 @@ def test_report_of_little(result) -> None:
     )
     metrics = pd.DataFrame({"x": [1.0], "y": [-2.0], "z": [0.8], "daylight_factor": [np.nan]})
     daylight = replace(
-        room.daylight, points=room.daylight.points[:1], sensor_metrics=metrics, room_metrics={},
-        illuminance=np.zeros((480, 1), np.float32), relative_error=np.zeros(1),
-    )  # fmt: skip
+        room.daylight,
+        points=room.daylight.points[:1],
+        sensor_metrics=metrics,
+        room_metrics={},
+        illuminance=np.zeros((480, 1), np.float32),
+        relative_error=np.zeros(1),
+    )
     few = replace(room, heat=thermal, daylight=daylight, glare=GlareResults(room.glare.view, ()))
     small = replace(
-        result, times=result.times[hours], sun=result.sun[hours], spaces=(few,), issues=(),
-        notes=(), manifest={"inputs": {"weather": "a.epw"}},
-    )  # fmt: skip
+        result,
+        times=result.times[hours],
+        sun=result.sun[hours],
+        spaces=(few,),
+        issues=(),
+        notes=(),
+        manifest={"inputs": {"weather": "a.epw"}},
+    )
     page = report_html(small)
     assert "No luminance picture was requested." in page
     assert not re.search(r"\bnan\b", page[: page.rindex("<script>")], re.IGNORECASE)

@@ -12,14 +12,7 @@ from PIL import Image
 from mitsuba_cfs.errors import DataError
 from scenes.cli import run
 from scenes.demo import OFFICE, STUDY, WEATHER
-from scenes.page_options import (
-    LOGO_BYTES,
-    DossierSection,
-    PageOptions,
-    RunSection,
-    StudySection,
-    read_page,
-)
+from scenes.page_options import LOGO_BYTES, DossierSection, PageOptions, RunSection, StudySection, read_page
 from scenes.report.page import report_html
 from scenes.study_report.page import study_report_html
 from tests.report.browser import chromium, inspect
@@ -28,12 +21,19 @@ from tests.report.test_study_report import study
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><rect width="9" height="9"/></svg>'
 HEADINGS = {  # of the sections that a run's report can do without
-    "verdict": "Verdict", "rooms": "Overview of the rooms", "daylight": "Daylight",
-    "glare": "Glare", "operation": "Operation", "temperatures": "Temperatures and comfort",
-    "glazing": "Glazing and shading", "model": "3D model",
-    "problems": "Problems in the building model", "method": "Method",
-    "inputs": "Inputs and versions", "glossary": "Glossary",
-}  # fmt: skip
+    "verdict": "Verdict",
+    "rooms": "Overview of the rooms",
+    "daylight": "Daylight",
+    "glare": "Glare",
+    "operation": "Operation",
+    "temperatures": "Temperatures and comfort",
+    "glazing": "Glazing and shading",
+    "model": "3D model",
+    "problems": "Problems in the building model",
+    "method": "Method",
+    "inputs": "Inputs and versions",
+    "glossary": "Glossary",
+}
 
 
 def picture(kind: str, size: tuple[int, int] = (4, 3)) -> bytes:
@@ -100,8 +100,9 @@ def test_a_study_without_a_section(name) -> None:
 
 
 @pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
-@pytest.mark.parametrize("make", [lambda o: report_html(run_result(picture_size=96), o),
-                                  lambda o: study_report_html(study(), o)])  # fmt: skip
+@pytest.mark.parametrize(
+    "make", [lambda o: report_html(run_result(picture_size=96), o), lambda o: study_report_html(study(), o)]
+)
 def test_a_page_without_its_sections_has_no_fault_in_a_browser(make, tmp_path) -> None:
     left_out = ("verdict", "comparison", "rooms", "model")
     found = inspect(make(PageOptions(logo=LOGO, left_out=left_out)), tmp_path, use="")
@@ -143,13 +144,10 @@ def test_what_is_wrong_is_one_line(tmp_path, text, words) -> None:
 
 
 @pytest.mark.parametrize(
-    ("sections", "other", "near"),
-    [(StudySection, "comparson", "comparison"), (DossierSection, "source", "sources")],
+    ("sections", "other", "near"), [(StudySection, "comparson", "comparison"), (DossierSection, "source", "sources")]
 )
 def test_each_page_has_its_own_sections(tmp_path, sections, other, near) -> None:
-    assert read_page(page_file(tmp_path, f"[sections]\n{near} = false"), sections).left_out == (
-        near,
-    )
+    assert read_page(page_file(tmp_path, f"[sections]\n{near} = false"), sections).left_out == (near,)
     with pytest.raises(DataError, match=f"sections.{other}: no such key; did you mean {near}?"):
         read_page(page_file(tmp_path, f"[sections]\n{other} = false"), sections)
 

@@ -49,8 +49,7 @@ def test_better_is_above_on_every_axis(found) -> None:
 
 def test_a_figure_that_no_case_has_is_no_axis(found) -> None:
     bare = [
-        replace(r, figures={k: v for k, v in r.figures.items() if k != "straight_view_percent"})
-        for r in found.results
+        replace(r, figures={k: v for k, v in r.figures.items() if k != "straight_view_percent"}) for r in found.results
     ]
     names = [axis.name for axis in parallel(replace(found, results=tuple(bare))).axes]
     assert "View" not in names and "Comfort" in names
@@ -90,15 +89,12 @@ def page(found, tmp_path_factory):
 
 
 def _inside(page: Page) -> list[str]:
-    return page.value(
-        "[...document.querySelectorAll('a.line:not(.out)')].map((l) => l.dataset.case)"
-    )
+    return page.value("[...document.querySelectorAll('a.line:not(.out)')].map((l) => l.dataset.case)")
 
 
 def _shown(page: Page) -> list[str]:
     return page.value(
-        "[...document.querySelectorAll('section.case')].filter((s) => !s.hidden)"
-        ".map((s) => s.dataset.case)"
+        "[...document.querySelectorAll('section.case')].filter((s) => !s.hidden).map((s) => s.dataset.case)"
     )
 
 

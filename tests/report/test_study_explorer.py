@@ -13,12 +13,7 @@ from scenes.explore.case_files import CASE, read_data
 from scenes.explore.folder import write_rooms
 from scenes.study.explored import ExploredCase
 from scenes.study.study import StudyResult
-from scenes.study_report.page import (
-    MOST_EXPLORED,
-    explorable,
-    study_report_html,
-    write_study_explorer,
-)
+from scenes.study_report.page import MOST_EXPLORED, explorable, study_report_html, write_study_explorer
 from tests.devtools import Page, chromium
 from tests.explore.synthetic import explored_run
 from tests.report.test_study_report import study

@@ -75,16 +75,21 @@ def study(systems: int = 2, failed: bool = True) -> StudyResult:
     for room in run.spaces:
         for number in range(systems):
             case = Case(
-                room="house.ifc", space_name=room.space.name, system=f"system <{number}>",
-                climate="Lyon", inputs=replace(NOWHERE, spaces=(room.space.guid,)), box=None,
-                files=(InputFile("building", NOWHERE.building, "0"),), specular=False,
-                orientation_deg=0.0, options=OPTIONS, program="", glare="DGP",
-            )  # fmt: skip
-            heat = room.heat
-            dim = replace(
-                room.daylight,
-                room_metrics=room.daylight.room_metrics | {"da300": 70.0 - 9 * number},
+                room="house.ifc",
+                space_name=room.space.name,
+                system=f"system <{number}>",
+                climate="Lyon",
+                inputs=replace(NOWHERE, spaces=(room.space.guid,)),
+                box=None,
+                files=(InputFile("building", NOWHERE.building, "0"),),
+                specular=False,
+                orientation_deg=0.0,
+                options=OPTIONS,
+                program="",
+                glare="DGP",
             )
+            heat = room.heat
+            dim = replace(room.daylight, room_metrics=room.daylight.room_metrics | {"da300": 70.0 - 9 * number})
             figures, arrays = room_figures(replace(room, heat=heat, daylight=dim))
             used = arrays["comfort/occupied"]
             dgp = 0.3 + 0.2 * np.random.default_rng(number).random(int(used.sum()))
@@ -124,10 +129,17 @@ def test_nothing_is_fetched_and_all_is_escaped(page):
 
 def test_all_that_a_reader_asks_for_is_there(page):
     for words in (
-        "Daylight and glare", "Glare classes of the occupied hours", "Glare through the year",
-        "Adaptive comfort", "Temperature duration", "Relative standard error", "five-phase, DGP",
-        "broken.xml: has &lt;no&gt; band", "faces without construction: 2", "UDI 300",
-    ):  # fmt: skip
+        "Daylight and glare",
+        "Glare classes of the occupied hours",
+        "Glare through the year",
+        "Adaptive comfort",
+        "Temperature duration",
+        "Relative standard error",
+        "five-phase, DGP",
+        "broken.xml: has &lt;no&gt; band",
+        "faces without construction: 2",
+        "UDI 300",
+    ):
         assert words in page, words
     assert page.count('<section class="case"') == 4 and len(page) < 5e6
 
@@ -152,9 +164,7 @@ def test_cases_share_their_scales():
     bright = replace(dim, daylight=light)
     alone, shared, other = plans(dim), plans(dim, (dim, bright)), plans(bright, (dim, bright))
     for title in ("Daylight factor", "Annual mean illuminance"):
-        first, second, third = (
-            next(p.scale.high for p in some if p.title == title) for some in (alone, shared, other)
-        )
+        first, second, third = (next(p.scale.high for p in some if p.title == title) for some in (alone, shared, other))
         assert first < second == third, title
 
 

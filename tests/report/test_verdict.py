@@ -36,13 +36,8 @@ def _with_glare(result, **changed: float):
 def test_glare_names_its_hour_its_sun_and_its_cause(result) -> None:
     # 5.87e-5 of 5,000 lx are 0.29; the sources add 0.05
     text = said(_with_glare(result, dgp=0.50, ev=5000.0, dgp_standard_error=0.0012), "Glare")
-    assert (
-        "The picture shows intolerable glare: DGP 0.50 ± 0.001" in text and "solar altitude" in text
-    )
-    assert (
-        "5\u202f000 lx at the eye contribute more than 2 bright sources in view (86 to 14 %)"
-        in text
-    )
+    assert "The picture shows intolerable glare: DGP 0.50 ± 0.001" in text and "solar altitude" in text
+    assert "5\u202f000 lx at the eye contribute more than 2 bright sources in view (86 to 14 %)" in text
     text = said(_with_glare(result, dgp=0.42, ev=1000.0, sources=3), "Glare")
     assert "disturbing" in text and "3 bright sources in view contribute more" in text
     text = said(_with_glare(result, dgp=0.30), "Glare")
@@ -62,9 +57,7 @@ def test_warmth_counts_the_hours_of_the_warmest_room(result) -> None:
     room = result.spaces[0]
     cold = room.heat.temperatures.assign(operative_c=20.0)
     one = replace(room, heat=replace(room.heat, temperatures=cold))
-    assert said(replace(result, spaces=(one,)), "Overheating").startswith(
-        "No occupied hour exceeds 26"
-    )
+    assert said(replace(result, spaces=(one,)), "Overheating").startswith("No occupied hour exceeds 26")
 
 
 def test_of_rooms_warm_in_every_hour_the_hottest_is_named(result) -> None:
@@ -105,8 +98,7 @@ def test_many_rooms_stay_on_one_page_with_the_worst_of_each_figure() -> None:
     every = [cards(run, room) for room in run.spaces]
     found = verdict(run, every)
     shown, folded = found.limits.shown, found.limits.folded
-    judged = [(room, card) for room, own in zip(run.spaces, every, strict=True) for card in own
-              if card.verdict]  # fmt: skip
+    judged = [(room, card) for room, own in zip(run.spaces, every, strict=True) for card in own if card.verdict]
     assert len(folded.rows) == len(judged) > 250
     labels = list(dict.fromkeys(card.label for _, card in judged))
     assert [row[0] for row in shown.rows] == labels

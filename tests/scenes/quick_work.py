@@ -37,15 +37,19 @@ def _run_job(_options, *_others, **_more):
 def _thermal(_study, *_others, **_options):
     hours = pd.DataFrame({"air_c": np.linspace(15.0, 30.0, 8760)})
     summary = dict.fromkeys(
-        ("operative_min_c", "operative_max_c", "heat_kwh", "cold_kwh",
-         "comfortable_h ASHRAE 55 80 %", "occupied_h"), 1.0,
-    )  # fmt: skip
+        ("operative_min_c", "operative_max_c", "heat_kwh", "cold_kwh", "comfortable_h ASHRAE 55 80 %", "occupied_h"),
+        1.0,
+    )
     room = SimpleNamespace(
-        name="A", floor_area=10.0, hours=hours, summary=summary,
-        months=pd.DataFrame({"discomfort": np.zeros(12)}), design=None,
+        name="A",
+        floor_area=10.0,
+        hours=hours,
+        summary=summary,
+        months=pd.DataFrame({"discomfort": np.zeros(12)}),
+        design=None,
         powers=pd.DataFrame({"heat": np.zeros(8760)}),
         energy=pd.DataFrame({"heat [kWh]": np.zeros(12)}),
-    )  # fmt: skip
+    )
     return (room,), ()
 
 
@@ -59,9 +63,8 @@ def _compliance(options, *_others):
     weather, building = read_weather(options.weather), read_building(options.building)
     rooms = tuple(_checked(space) for space in building.spaces)
     return Compliance(
-        building, {}, rooms, (), calendar_of(weather), weather, sun_day(weather, 3, 21, 11.0),
-        (), NO_HEAD, (), (), {},
-    )  # fmt: skip
+        building, {}, rooms, (), calendar_of(weather), weather, sun_day(weather, 3, 21, 11.0), (), NO_HEAD, (), (), {}
+    )
 
 
 def _checked(space):
@@ -73,15 +76,24 @@ def _checked(space):
 
 def _pv(_options, files, _study, **_others):
     yields = pd.DataFrame(
-        {"subsystem": ["roof"], "modules": [1], "peak_kw": [1.0], "yield_kwh": [900.0],
-         "kwh_per_kw": [900.0], "mismatch_loss": [0.01]}
-    )  # fmt: skip
+        {
+            "subsystem": ["roof"],
+            "modules": [1],
+            "peak_kw": [1.0],
+            "yield_kwh": [900.0],
+            "kwh_per_kw": [900.0],
+            "mismatch_loss": [0.01],
+        }
+    )
     steps = np.arange(100)
     return SimpleNamespace(
-        weather=files.weather, irradiance=SimpleNamespace(steps=steps, diffuse_error=0.01),
-        yields=(SimpleNamespace(name="roof", alternating_current=np.ones(100)),), issues=(),
-        yield_table=lambda: yields, module_table=lambda: yields,
-    )  # fmt: skip
+        weather=files.weather,
+        irradiance=SimpleNamespace(steps=steps, diffuse_error=0.01),
+        yields=(SimpleNamespace(name="roof", alternating_current=np.ones(100)),),
+        issues=(),
+        yield_table=lambda: yields,
+        module_table=lambda: yields,
+    )
 
 
 def _read_year(options, *_others):
@@ -108,9 +120,7 @@ def _rate_views(year, kept, _progress):
     picture = np.full((64, 64), 500.0, np.float32)
     rated = evaluate(picture, year.views[0].view)
     worst = year.sky.lit[0 if year.options.seed == 0 else 1]  # other hours with another seed
-    yield ViewYear(
-        year.views[0], ratings, {year.weather.midpoints[worst]: (picture, rated)}, 1.0, {}
-    )
+    yield ViewYear(year.views[0], ratings, {year.weather.midpoints[worst]: (picture, rated)}, 1.0, {})
 
 
 def _room_picture(_options, *_others):
@@ -171,11 +181,17 @@ def quick_work(give: Callable[[object, str, object], object] = setattr, among: s
     Args: among: only for modules that this command needs; the others load for long.
     """
     needs = {
-        "run": "scenes.run", "demo": "scenes.study", "thermal": "scenes.heat.study",
-        "pv": "photovol", "comply": "scenes.comply",
-        "dgp": "year_of_glare", "picture": "view_picture", "calibrate": "calibration",
-        "bsdf": "bsdf_generation", "study": "scenes.study",
-    }  # fmt: skip
+        "run": "scenes.run",
+        "demo": "scenes.study",
+        "thermal": "scenes.heat.study",
+        "pv": "photovol",
+        "comply": "scenes.comply",
+        "dgp": "year_of_glare",
+        "picture": "view_picture",
+        "calibrate": "calibration",
+        "bsdf": "bsdf_generation",
+        "study": "scenes.study",
+    }
     for name, function in WORK.items():
         if among and needs.get(among, "none") not in name:
             continue

@@ -70,14 +70,9 @@ def radiance_year(name: str, folder: Path) -> Year:
     total = 0.0
     for part, window in files.windows.items():
         room, outdoors = (f"{files.materials.name} {f.name}" for f in (files.room, files.outdoors))
+        radiance.run(f"rfluxmtx -faf -I+ {RAYS} -y {count} - {window.name} {room} > {part}.vmx", folder, sensors)
         radiance.run(
-            f"rfluxmtx -faf -I+ {RAYS} -y {count} - {window.name} {room} > {part}.vmx",
-            folder,
-            sensors,
-        )
-        radiance.run(
-            f"rfluxmtx -ff -n 2 -ab 4 -ad 1 -lw 1e-6 -c 10000 {window.name} {files.sky.name} "
-            f"{outdoors} > {part}.dmx",
+            f"rfluxmtx -ff -n 2 -ab 4 -ad 1 -lw 1e-6 -c 10000 {window.name} {files.sky.name} {outdoors} > {part}.dmx",
             folder,
         )
         command = f"dctimestep -of {part}.vmx {VENETIAN_BLIND} {part}.dmx sky.smx"

@@ -134,7 +134,12 @@ def trial(number: int, earlier_of: Callable[[str], Earlier]) -> Trial:
 
 def _started(module: str, place: Place, environment: dict[str, str]) -> subprocess.Popen:
     return subprocess.Popen(
-        [sys.executable, "-m", module, *place.words], cwd=REPOSITORY, env=environment,
-        text=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL,
+        [sys.executable, "-m", module, *place.words],
+        cwd=REPOSITORY,
+        env=environment,
+        text=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        stdin=subprocess.DEVNULL,
         preexec_fn=default_signals,
-    )  # fmt: skip
+    )

@@ -20,20 +20,33 @@ from scenes.room.options import RoomOptions
 
 HOURS = (2122, 4092, 4096, 8460)  # March 30 10 h, June 20 12 h and 16 h, December 19 12 h
 SMALL = RoomOptions.of(
-    sensor_spacing=1.0, sensor_samples=8192, patch_samples=4096, sun_points=512,
-    path_samples=16384, picture_size=96, picture_samples=8, sky_subdivision=1,
-)  # fmt: skip
+    sensor_spacing=1.0,
+    sensor_samples=8192,
+    patch_samples=4096,
+    sun_points=512,
+    path_samples=16384,
+    picture_size=96,
+    picture_samples=8,
+    sky_subdivision=1,
+)
 # Few rays and pictures, and a room with a window in each of two opposite walls
 FEW = SMALL.changed(
-    sensor_samples=256, patch_samples=256, sun_points=16, picture_size=32, picture_samples=2,
-    picture_count=1, heat_step_s=3600.0,
-)  # fmt: skip
+    sensor_samples=256,
+    patch_samples=256,
+    sun_points=16,
+    picture_size=32,
+    picture_samples=2,
+    picture_count=1,
+    heat_step_s=3600.0,
+)
 OPENING = {"x": 0.5, "sill": 0.9, "width": 2.0, "height": 1.5}
 TWO = shoebox(
-    3.0, 4.0, 2.8,
+    3.0,
+    4.0,
+    2.8,
     windows=(WindowRectangle(**OPENING), WindowRectangle(**OPENING, side="back")),
     reflectance={"wall": 0.3, "floor": 0.1, "ceiling": 0.4},
-)  # fmt: skip
+)
 
 
 @pytest.fixture(scope="session")
@@ -81,7 +94,10 @@ def only(skies: AnnualSky, hours: tuple[int, ...]) -> AnnualSky:
 
 
 BOX = shoebox(
-    3.0, 4.0, 2.8, windows=(WindowRectangle(0.5, 0.9, 2.0, 1.5),),
+    3.0,
+    4.0,
+    2.8,
+    windows=(WindowRectangle(0.5, 0.9, 2.0, 1.5),),
     reflectance={"wall": 0.3, "floor": 0.1, "ceiling": 0.4},
-)  # fmt: skip
+)
 ROOM = BOX.spaces[0]

@@ -13,8 +13,11 @@ from scenes.room.zone import RoomAlternatives, balances, coupled
 from tests.scenes.test_coupled_heat import lit, two_boxes
 from thermal.control import RoomCondition, by_threshold
 
-TABLES = {"loads": {"heating_c": 22.0, "cooling_c": 25.0}, "gains": {"equipment_w_m2": 5.0},
-          "air": {"infiltration_ach": 0.3}}  # fmt: skip
+TABLES = {
+    "loads": {"heating_c": 22.0, "cooling_c": 25.0},
+    "gains": {"equipment_w_m2": 5.0},
+    "air": {"infiltration_ach": 0.3},
+}
 
 
 def _rooms(weather, skies, *, equal: bool):
@@ -22,8 +25,7 @@ def _rooms(weather, skies, *, equal: bool):
     west, east = two_boxes()
     if equal:
         faces = tuple(
-            replace(face, adjacency="outside") if round(face.normal[0], 3) == -1.0 else face
-            for face in west.faces
+            replace(face, adjacency="outside") if round(face.normal[0], 3) == -1.0 else face for face in west.faces
         )
         west = replace(west, faces=faces)
     rooms = [lit(space, TABLES, weather, skies).zone for space in (west, east)]
@@ -114,9 +116,7 @@ def test_shading_by_temperature_follows_that_of_the_air_node(variant, weather, s
         np.testing.assert_allclose(chosen.solar.facade[25:, here], expected, rtol=1e-6)
 
 
-def test_more_conditions_in_an_air_node_than_can_be_computed_are_refused(
-    variant, weather, skies
-) -> None:
+def test_more_conditions_in_an_air_node_than_can_be_computed_are_refused(variant, weather, skies) -> None:
     rooms, links = _rooms(weather, skies, equal=False)
     limits = [RoomCondition(float(t), float(t)) for t in range(22, 27)]
     message = "Dwelling have 32 combinations of states; at most 16"

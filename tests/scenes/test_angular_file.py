@@ -22,10 +22,12 @@ TABLE = "theta_deg,transmittance\n" + "\n".join(
     f"{d},{roos_table(UNIT).transmitted(np.radians(d)):.5f}" for d in range(0, 91, 5)
 )
 PRODUCT = {
-    "type": "glazing", "name": "a pane", "coated_side": "Neither",
+    "type": "glazing",
+    "name": "a pane",
+    "coated_side": "Neither",
     "measured_data": {"is_specular": True},
     "integrated_results_summary": [{"tfvis": 0.88, "rfvis": 0.08, "rbvis": 0.08}],
-}  # fmt: skip
+}
 ROOS = "[angular.roos]\ntransmittance = 0.7\nreflectance_front = 0.12\nreflectance_back = 0.13"
 FLOAT = Pane("a pane", 0.88, 0.08, 0.08)
 
@@ -45,11 +47,7 @@ def system(folder, toml: str, glass=UNIT):
         ('[angular]\ntable = "glass.csv"', UNIT, roos_table(UNIT)),
         (ROOS, UNIT, roos_table(UNIT)),
         ('[[angular.pane]]\nproduct = "pane.json"', FLOAT, stack_table([FLOAT])),
-        (
-            "[[angular.pane]]\ntransmittance = 0.88\nreflectance_front = 0.08",
-            FLOAT,
-            stack_table([FLOAT]),
-        ),
+        ("[[angular.pane]]\ntransmittance = 0.88\nreflectance_front = 0.08", FLOAT, stack_table([FLOAT])),
     ],
 )
 def test_a_system_has_the_function_that_stands_beside_it(tmp_path, toml, glass, expected):
@@ -96,10 +94,7 @@ def test_layers_of_a_glazing_system_are_read(tmp_path, real_data):
         ("[angular]", "expected one of table, roos, pane and glazing"),
         ('[[angular.pane]]\nproduct = "glass.csv"', "is no spectral row"),
         ("[[angular.pane]]\ncoated = true", "either product or transmittance"),
-        (
-            "[[angular.pane]]\ntransmittance = 0.3\nreflectance_front = 0.1",
-            "not the same system",
-        ),
+        ("[[angular.pane]]\ntransmittance = 0.3\nreflectance_front = 0.1", "not the same system"),
         (ROOS.replace("0.7", "0.95"), "expected shares of 1"),
     ],
 )
@@ -129,10 +124,7 @@ def test_reflectances_of_a_table_are_read(tmp_path):
 
 
 def test_a_stated_pane_may_be_turned(tmp_path):
-    toml = (
-        "[[angular.pane]]\ntransmittance = 0.7\nreflectance_front = 0.10\n"
-        "reflectance_back = 0.15\nflipped = true"
-    )
+    toml = "[[angular.pane]]\ntransmittance = 0.7\nreflectance_front = 0.10\nreflectance_back = 0.15\nflipped = true"
     glass = Pane("coated", 0.7, 0.15, 0.10, coated=True)
     found = system(tmp_path, toml, glass).angular
     assert found.reflected("front", 0.0) == pytest.approx(0.15, abs=2e-3)

@@ -48,9 +48,13 @@ def bands(variant):
     points = np.array([[2.0, y, 0.8] for y in (0.8, 2.0, 4.0)])
     position, direction = view_point(space)
     scene = DaylightScene(
-        interior_surfaces(space, "visible"), Surfaces.none(), windows.groups, points,
-        np.tile([0.0, 0.0, 1.0], (3, 1)), fisheye(position, direction, 100),
-    )  # fmt: skip
+        interior_surfaces(space, "visible"),
+        Surfaces.none(),
+        windows.groups,
+        points,
+        np.tile([0.0, 0.0, 1.0], (3, 1)),
+        fisheye(position, direction, 100),
+    )
     sky, sun = ReinhartSky(4), np.array([0.55, -0.65, 0.52])
     sun /= np.linalg.norm(sun)
     diffuse = np.full((sky.size, 1), 3000.0)
@@ -69,9 +73,7 @@ def test_each_band_has_its_own_system_in_light_and_in_glare(bands):
 
     scene, windows, hour = bands
     assert len(windows.groups) == 3 and [len(states) for states in windows.systems] == [1, 1, 1]
-    few = Sampling(
-        sensor_samples=32_768, patch_samples=4_096, hour_samples=131_072, picture_samples=48
-    )
+    few = Sampling(sensor_samples=32_768, patch_samples=4_096, hour_samples=131_072, picture_samples=48)
     optics = windows.optics()
     found = phase_light(phase_matrices(scene, few), optics, hour)
     paths = PathLight(scene, optics, hour, few)

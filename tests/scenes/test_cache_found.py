@@ -50,10 +50,18 @@ def study_arguments(folder: Path) -> list[str]:
 
 
 OF_A_RUN = {
-    "absorption-matrix", "cell-daylight", "daylight-matrix", "direct-sun", "escape",
-    "sky-irradiance", "straight-view", "view-matrix", "view-pictures", "view-sunlit",
+    "absorption-matrix",
+    "cell-daylight",
+    "daylight-matrix",
+    "direct-sun",
+    "escape",
+    "sky-irradiance",
+    "straight-view",
+    "view-matrix",
+    "view-pictures",
+    "view-sunlit",
     "window-exchange",
-}  # fmt: skip
+}
 COMMANDS = {
     "run": (run_arguments, OF_A_RUN),
     "thermal": (thermal_arguments, {"absorption-matrix", "daylight-matrix", "sky-irradiance"}),
@@ -63,9 +71,7 @@ COMMANDS = {
 
 
 # quick: a run keeps what the others do, and they find by the same cache
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=() if n == "run" else pytest.mark.slow) for n in COMMANDS]
-)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n == "run" else pytest.mark.slow) for n in COMMANDS])
 def test_the_second_time_everything_is_found(tmp_path, name):
     """In another folder of results, with other hash seeds; a kept file that is written anew would
     be another file (inode), for it is replaced as a whole."""
@@ -76,8 +82,12 @@ def test_the_second_time_everything_is_found(tmp_path, name):
         environment = os.environ | {"CFS_CACHE": str(cache), "PYTHONHASHSEED": seed}
         done = subprocess.run(
             [sys.executable, "-m", "scenes.cli", *command, "--out", str(tmp_path / f"out{seed}")],
-            cwd=REPOSITORY, env=environment, capture_output=True, text=True, check=False,
-        )  # fmt: skip
+            cwd=REPOSITORY,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         assert done.returncode == 0, done.stdout + done.stderr
         kept.append({path.name: path.stat().st_ino for path in cache.glob("*.npz")})
     labels = {file.rpartition("-")[0] for file in kept[0]}

@@ -70,14 +70,7 @@ class Place:
         self.write("heat.toml", text)
         return "heat.toml"
 
-    def study(
-        self,
-        more: str = "",
-        *,
-        room: str = "house.ifc",
-        weather: object = WEATHER,
-        system: str = "",
-    ) -> str:
+    def study(self, more: str = "", *, room: str = "house.ifc", weather: object = WEATHER, system: str = "") -> str:
         """A study file of `cfs study`."""
         self.write(
             "study.toml",
@@ -175,22 +168,14 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
     "thermal, room": (lambda p: ["thermal", p.heat('spaces = [""]'), "--out", "out"], "spaces: "),
     "thermal, folder": (lambda p: ["thermal", p.heat(), "--out", p.folder], "--out: "),
     "study, weather": (lambda p: ["study", p.study(weather="short.epw"), "--out", "out"], SHORT),
-    "study, head": (
-        lambda p: ["study", p.study(room="word.ifc"), "--out", "out"],
-        "word.ifc: not an IFC file",
-    ),
+    "study, head": (lambda p: ["study", p.study(room="word.ifc"), "--out", "out"], "word.ifc: not an IFC file"),
     "study, g": (lambda p: ["study", p.study(system="g_value = 0.01"), "--out", "out"], FLOOR),
     "study, occupied": (
         lambda p: ["study", p.study("[options]\noccupied = [8, 8]"), "--out", "out"],
         f"options.occupied: {HOURS}",
     ),
     "study, operation": (
-        lambda p: [
-            "study",
-            p.study(f"[options]\nseed = 1\n[auto]\ntime_budget = '{_night(p)}'"),
-            "--out",
-            "out",
-        ],
+        lambda p: ["study", p.study(f"[options]\nseed = 1\n[auto]\ntime_budget = '{_night(p)}'"), "--out", "out"],
         "auto.time_budget: expected a time",
     ),
     "study, --dgp-error": (
@@ -208,10 +193,7 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
         lambda p: _pv_file(p, f"[module]{MODULE}cell = 60"),
         "pv.toml: module.cell: no such key; did you mean cells? (and 1 more)",
     ),
-    "pv, datasheet": (
-        lambda p: _pv_file(p, f"[module]{MODULE}cells = 6"),
-        "pv.toml: module: no two-diode cell",
-    ),
+    "pv, datasheet": (lambda p: _pv_file(p, f"[module]{MODULE}cells = 6"), "pv.toml: module: no two-diode cell"),
     "pv, folder": (lambda p: [*_pv(), "--out", p.folder], "--out: "),
     "dgp, head": (lambda p: _dgp(building="word.ifc"), "word.ifc: not an IFC file"),
     "dgp, weather": (lambda p: _dgp("--weather", "short.epw"), SHORT),
@@ -251,10 +233,7 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
         lambda p: ["ifc", "attach", "house.ifc", "--all", "--bsdf", "bad.xml", "-o", "b.ifc"],
         "bad.xml: is not well-formed",
     ),
-    "export, --gltf": (
-        lambda p: ["export", "house.ifc", "--gltf", "none/a.glb"],
-        "no such folder",
-    ),
+    "export, --gltf": (lambda p: ["export", "house.ifc", "--gltf", "none/a.glb"], "no such folder"),
 }
 
 
@@ -305,9 +284,7 @@ def _loaded(words: list[str], folder: Path) -> set[str]:
         f"    cli.run({words!r})\n"
         "finally:\n    print('\\n' + json.dumps(sorted(sys.modules)))\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=folder
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=folder)
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 
@@ -329,9 +306,17 @@ def test_help_loads_nothing_heavy(words: list[str], tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["run, night", "run, BSDF", "thermal, g", "study, g", "pv, datasheet", "dgp, BSDF",
-     "picture, BSDF", "ifc attach, BSDF"],
-)  # fmt: skip
+    [
+        "run, night",
+        "run, BSDF",
+        "thermal, g",
+        "study, g",
+        "pv, datasheet",
+        "dgp, BSDF",
+        "picture, BSDF",
+        "ifc attach, BSDF",
+    ],
+)
 def test_a_mistake_is_found_before_anything_heavy_is_loaded(name: str, tmp_path: Path) -> None:
     words = [str(word) for word in MISTAKES[name][0](Place(tmp_path))]
     assert not set(HEAVY) & _loaded(words, tmp_path)

@@ -43,9 +43,7 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], object]],
 
     def run(action: Callable[[], object]) -> int:
         monkeypatch.setattr(cli.LazyGroup, "list_commands", lambda *_: ["fail"])
-        monkeypatch.setattr(
-            cli.LazyGroup, "get_command", lambda *_: click.Command("fail", callback=action)
-        )
+        monkeypatch.setattr(cli.LazyGroup, "get_command", lambda *_: click.Command("fail", callback=action))
         return cli.run(["fail"])
 
     return run
@@ -144,14 +142,11 @@ def test_help_needs_no_heavy_imports() -> None:
 def test_threads_of_blas_do_not_wait_busily() -> None:
     """OpenBLAS is told before NumPy is loaded, and what the user says of it stays."""
     program = "import os, sys; from scenes import cli; print('numpy' in sys.modules); " + (
-        "import atexit; atexit.register(lambda: print(os.environ['OPENBLAS_THREAD_TIMEOUT'])); "
-        "cli.main(['--version'])"
+        "import atexit; atexit.register(lambda: print(os.environ['OPENBLAS_THREAD_TIMEOUT'])); cli.main(['--version'])"
     )
     for given, expected in (({}, "4"), ({"OPENBLAS_THREAD_TIMEOUT": "9"}, "9")):
         environment = {k: v for k, v in os.environ.items() if k not in cli.BLAS_WAIT} | given
-        done = subprocess.run(
-            [sys.executable, "-c", program], env=environment, capture_output=True, text=True
-        )
+        done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
         said = done.stdout.split()
         assert (said[0], said[-1]) == ("False", expected)
 
@@ -211,9 +206,8 @@ def test_progress_of_a_stage_that_failed_is_not_reported_as_done(capsys) -> None
 @pytest.mark.parametrize("name", [*cli.FOREIGN, cli.FILES, "__del__"])
 @pytest.mark.parametrize(
     ("number", "raised"),
-    [(signal.SIGTERM, cli.Terminated), (signal.SIGHUP, cli.Terminated),
-     (signal.SIGINT, KeyboardInterrupt)],
-)  # fmt: skip
+    [(signal.SIGTERM, cli.Terminated), (signal.SIGHUP, cli.Terminated), (signal.SIGINT, KeyboardInterrupt)],
+)
 def test_no_signal_ends_a_call_of_a_library(name, number, raised):
     """IfcOpenShell answers an exception in its calls with `SystemError`, Python's `__del__` with
     a printed traceback: the signal comes once they have returned."""
@@ -278,9 +272,13 @@ def test_a_signal_while_an_error_is_printed_has_its_exit_code(name, code):
         "cli.main(['glare', 'nowhere.hdr'])\n"
     )
     process = subprocess.run(
-        [sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True,
-        check=False, preexec_fn=default_signals,
-    )  # fmt: skip
+        [sys.executable, "-c", program],
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=default_signals,
+    )
     assert process.returncode == code and "Traceback" not in process.stderr
     assert process.stderr.splitlines()[-1] == ("interrupted" if code == 130 else "terminated")
 
@@ -306,7 +304,11 @@ def test_a_second_signal_does_not_end_the_cleaning_up():
         "cli.main([])\n"
     )
     process = subprocess.run(
-        [sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True,
-        check=False, preexec_fn=default_signals,
-    )  # fmt: skip
+        [sys.executable, "-c", program],
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=default_signals,
+    )
     assert (process.returncode, process.stdout, process.stderr) == (130, "cleaned up\n", "")

@@ -35,9 +35,15 @@ def inputs(variant, glass, milk, blind, weather, skies):
     def of(function, control: dict | None = None, few_hours: bool = True, **tables) -> RoomInputs:
         operation = OperationTables.model_validate({"control": control or {}, **tables})
         return room_inputs(
-            TWO, TWO.spaces[0], in_all_windows(TWO.spaces[0], glass, milk, blind), weather, FEW,
-            operation=operation, skies=skies if few_hours else None, controller=function,
-        )  # fmt: skip
+            TWO,
+            TWO.spaces[0],
+            in_all_windows(TWO.spaces[0], glass, milk, blind),
+            weather,
+            FEW,
+            operation=operation,
+            skies=skies if few_hours else None,
+            controller=function,
+        )
 
     return of
 
@@ -115,9 +121,15 @@ def test_temperatures_so_far_are_those_of_the_result(glass, milk, blind, weather
     space = TWO.spaces[0]
     operation = Operation(Path("own.toml"), OperationTables.model_validate(LAMPS), ())
     year = compute_room(
-        TWO, space, in_all_windows(space, glass, milk, blind), weather, FEW,
-        operation=operation.controlled_by(own), skies=skies, pictures=False,
-    )  # fmt: skip
+        TWO,
+        space,
+        in_all_windows(space, glass, milk, blind),
+        weather,
+        FEW,
+        operation=operation.controlled_by(own),
+        skies=skies,
+        pictures=False,
+    )
     states = year.operation.shading.states
     assert year.operation.shading.rules == ("function",) * 2
     assert 100 < np.count_nonzero(states[:, 0]) < 8000
@@ -134,9 +146,15 @@ def test_a_rule_by_temperature_is_a_function_too(glass, milk, blind, weather, sk
     for controller in (None, ControlHour.by_rules):
         operation = Operation(Path("own.toml"), tables, (), controller)
         year = compute_room(
-            TWO, space, in_all_windows(space, glass, milk, blind), weather, FEW,
-            operation=operation, skies=skies, pictures=False,
-        )  # fmt: skip
+            TWO,
+            space,
+            in_all_windows(space, glass, milk, blind),
+            weather,
+            FEW,
+            operation=operation,
+            skies=skies,
+            pictures=False,
+        )
         found.append(year.operation.shading.states[480:])
     assert found[0].any() and not found[0].all()
     assert np.count_nonzero(found[0] != found[1]) == 0
@@ -156,10 +174,7 @@ def test_what_is_no_state_is_refused_with_its_hour(inputs, states, words) -> Non
         states_of(inputs(lambda hour: states))
 
 
-BOX = {
-    "width": 3.0, "depth": 4.0, "height": 2.8,
-    "window": [{"x": 0.5, "sill": 0.9, "width": 2.0, "height": 1.5}],
-}  # fmt: skip
+BOX = {"width": 3.0, "depth": 4.0, "height": 2.8, "window": [{"x": 0.5, "sill": 0.9, "width": 2.0, "height": 1.5}]}
 
 
 def test_a_study_takes_functions_and_computes_them_anew(variant, tmp_path) -> None:
@@ -175,19 +190,19 @@ def test_a_study_takes_functions_and_computes_them_anew(variant, tmp_path) -> No
     study = cfs.Study.model_validate(
         {
             "room": [{"name": "cell", "box": BOX}],
-            "system": [
-                {"name": "own", "operation": file, "control": closed},
-                {"name": "file", "operation": file},
-            ],
+            "system": [{"name": "own", "operation": file, "control": closed}, {"name": "file", "operation": file}],
             "climate": [{"name": "Chicago", "weather": WEATHER}],
             "methods": ["three-phase"],
             "glare": "none",
             "options": {
-                "sensor_spacing": 1.0, "sensor_samples": 256, "patch_samples": 256,
-                "sky_subdivision": 1, "heat_step_s": 3600.0,
+                "sensor_spacing": 1.0,
+                "sensor_samples": 256,
+                "patch_samples": 256,
+                "sky_subdivision": 1,
+                "heat_step_s": 3600.0,
             },
         }
-    )  # fmt: skip
+    )
     first = cfs.run_study(study, tmp_path / "out")
     assert not first.first_error and len(calls) == 8760
     light = dict(zip(first.table["system"], first.table["da300"], strict=True))
@@ -215,10 +230,15 @@ def unequal(glass, milk, blind, weather, skies):
         south, north = TWO.spaces[0].windows
         tables = {"control": {"groups": "room", **control}, "loads": {"heating_c": 20.0}}
         return room_inputs(
-            TWO, TWO.spaces[0], {south.guid: (glass, milk, blind), north.guid: (glass, milk)},
-            weather, FEW, operation=OperationTables.model_validate(tables), skies=skies,
+            TWO,
+            TWO.spaces[0],
+            {south.guid: (glass, milk, blind), north.guid: (glass, milk)},
+            weather,
+            FEW,
+            operation=OperationTables.model_validate(tables),
+            skies=skies,
             controller=function,
-        )  # fmt: skip
+        )
 
     return of
 

@@ -59,9 +59,7 @@ def lit(space: Space, tables: dict, weather, skies) -> DaylitRoom:
 def test_heat_flows_through_the_wall_as_its_resistance_says(variant, weather, skies) -> None:
     """Steady: the warm room's heat is A dT / R of the shared wall, and nothing else."""
     hours = len(weather.dry_bulb_c)
-    cold = replace(
-        weather, dry_bulb_c=np.zeros(hours), horizontal_infrared=np.full(hours, 315.6),
-    )  # fmt: skip
+    cold = replace(weather, dry_bulb_c=np.zeros(hours), horizontal_infrared=np.full(hours, 315.6))
     spaces = two_boxes()
     rooms = [lit(s, {"loads": WARM} if s.name == "w" else {}, cold, skies) for s in spaces]
     for room in rooms:
@@ -69,10 +67,7 @@ def test_heat_flows_through_the_wall_as_its_resistance_says(variant, weather, sk
             getattr(room.zone.solar, name)[:] = 0.0
     found, said = coupled_years(rooms, cold, 3600.0, OperationTables())
     warm, between = found[0], f"wall {_shared(rooms[0])} (e)_c"
-    through = (
-        warm.heat.temperatures[between]
-        - found[1].heat.temperatures[f"wall {_shared(rooms[1])} (w)_c"]
-    )
+    through = warm.heat.temperatures[between] - found[1].heat.temperatures[f"wall {_shared(rooms[1])} (w)_c"]
     wall = rooms[0].zone.zone.surfaces[_shared(rooms[0]) - 1]
     expected = wall.area * through / sum(layer.resistance for layer in wall.layers)
     late = slice(4000, 8000)
@@ -157,10 +152,13 @@ def test_a_run_has_the_temperatures_of_a_coupled_study(variant, weather, blind, 
     options = JobOptions(OFFICE, WEATHER, cache=False, room=room)
     heard: list[str] = []
     found, issues, notes = rooms.computed_rooms(
-        inputs, skies, options, silent,
+        inputs,
+        skies,
+        options,
+        silent,
         on_light=lambda room: heard.append(f"light of {room.space.name}"),
         on_room=lambda room: heard.append(room.space.name),
-    )  # fmt: skip
+    )
     names = [space.name for space in building.spaces]
     assert heard == [f"light of {name}" for name in names] + names and not issues
     assert "it flows through 18.0 m2" in notes[-1]

@@ -15,12 +15,8 @@ from scenes.run.outputs import csv_text
 TIMES = pd.date_range("2021-01-01 00:30", periods=6, freq="h", name="time")
 VALUES = [0.0, -1234567.0, 1.5e-7, np.nan, 1e30, 20.12345678]
 TABLES = {
-    "hours": pd.DataFrame(
-        {"operative_c": VALUES, "in use": [True, False] * 3, "state": range(6)}, index=TIMES
-    ),
-    "words": pd.DataFrame(
-        {"where": ["a", "b,c", 'd"e', "f\ng", "", None], "glass": np.float32(VALUES)}
-    ),
+    "hours": pd.DataFrame({"operative_c": VALUES, "in use": [True, False] * 3, "state": range(6)}, index=TIMES),
+    "words": pd.DataFrame({"where": ["a", "b,c", 'd"e', "f\ng", "", None], "glass": np.float32(VALUES)}),
     "one row": pd.DataFrame([{"sda": 55.0, "name, unit": "x", "none": None}]),
     "objects": pd.DataFrame({"dgp": pd.Series([0.123456789, None], dtype=object)}),
     "named": pd.DataFrame({"x": [1.0]}, index=pd.Index(["A, B"], name="room")),

@@ -33,13 +33,7 @@ def test_the_series_are_drawn_with_the_measurement_in_them(tmp_path):
 
     hours = [f"03-25 {hour:02d}:30" for hour in range(8, 18)]
     light = (np.arange(10) * 100.0).tolist()
-    names = (
-        "slats",
-        "three-phase",
-        "five-phase, Klems",
-        "point in time, Klems",
-        "two-phase, Klems",
-    )
+    names = ("slats", "three-phase", "five-phase, Klems", "point in time, Klems", "two-phase, Klems")
     result = {"times": hours, "series": dict.fromkeys(names, light)}
     systems = dict.fromkeys(("glass", "5 degrees", "40 degrees", "70 degrees"), result)
     daylight_methods.write_series(systems, tmp_path / "light.png")
@@ -69,8 +63,7 @@ def test_the_measurement_has_the_sun_as_a_source_whatever_the_pixels():
     case = GlareCase("glass", empty(), cfs.BsdfOptics(glass_klems()), sky, ("09-07 15:30",))
     sampling = cfs.Sampling(picture_samples=4)
     apart, in_pixels = (
-        [measured(scene, one, sampling)[0][0] for scene in scenes]
-        for one in (case, replace(case, sun="pixels"))
+        [measured(scene, one, sampling)[0][0] for scene in scenes] for one in (case, replace(case, sun="pixels"))
     )
     assert 0.3 < apart[0] < 0.95
     assert abs(apart[1] - apart[0]) < 0.01

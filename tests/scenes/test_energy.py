@@ -41,11 +41,16 @@ def room_of(zone: Zone, **services) -> RoomZone:
     given = {"equipment": np.full(HOURS, 7.0), "vapour": np.zeros(HOURS)} | services
     dark = no_sun(HOURS, len(zone.surfaces), 0)
     return RoomZone(
-        SimpleNamespace(floor_area=FLOOR), SimpleNamespace(zone=zone),
-        replace(dark, state=np.zeros((HOURS, 0), dtype=np.int64)), {},
+        SimpleNamespace(floor_area=FLOOR),
+        SimpleNamespace(zone=zone),
+        replace(dark, state=np.zeros((HOURS, 0), dtype=np.int64)),
+        {},
         np.zeros(HOURS, dtype=np.int64),
-        np.full(HOURS, 11.0), np.ones(HOURS, dtype=bool), None, RoomServices(**given),
-    )  # fmt: skip
+        np.full(HOURS, 11.0),
+        np.ones(HOURS, dtype=bool),
+        None,
+        RoomServices(**given),
+    )
 
 
 def zone_of(name: str, layers: tuple[Layer, ...], outside: str, **changes) -> Zone:
@@ -60,12 +65,18 @@ def test_design_loads_are_those_of_steady_rooms(weather) -> None:
     """UA dT without gains, limit and set-back, to the end of a heavy wall's warm-up; the gains."""
     hour = np.arange(HOURS) % 24
     lossy = zone_of(
-        "lossy", HEAVY, "outdoor", bridges=10.0, infiltration_ach=0.5,
-        supply=SupplyAir(1.0, recovery=0.8), gains=Gains(500.0, 100.0),
+        "lossy",
+        HEAVY,
+        "outdoor",
+        bridges=10.0,
+        infiltration_ach=0.5,
+        supply=SupplyAir(1.0, recovery=0.8),
+        gains=Gains(500.0, 100.0),
         loads=IdealLoads(np.where(hour < 6, 16.0, 21.0), 40.0, heating_limit=100.0),
-    )  # fmt: skip
-    sealed = zone_of("sealed", (PLASTER,), "adiabatic", gains=Gains(400.0, 0.0),
-                     loads=IdealLoads(15.0, 26.0, cooling_limit=50.0))  # fmt: skip
+    )
+    sealed = zone_of(
+        "sealed", (PLASTER,), "adiabatic", gains=Gains(400.0, 0.0), loads=IdealLoads(15.0, 26.0, cooling_limit=50.0)
+    )
     rooms = [room_of(lossy), room_of(sealed)]
     table = design_loads(rooms, weather, outdoor_c=COLD, step_s=3600.0)
     found = table.set_index(["room", "case"])
@@ -88,8 +99,7 @@ def test_design_loads_are_those_of_steady_rooms(weather) -> None:
 def test_cold_day_has_the_air_of_a_working_day(weather) -> None:
     """The year may begin with a holiday, without a fan; the load to be met is a working day's."""
     ach = np.repeat(np.where(np.arange(365) % 7 == 0, 0.0, 1.0), 24)
-    zone = zone_of("office", (PLASTER,), "adiabatic", supply=SupplyAir(ach),
-                   loads=IdealLoads(20.0, 30.0))  # fmt: skip
+    zone = zone_of("office", (PLASTER,), "adiabatic", supply=SupplyAir(ach), loads=IdealLoads(20.0, 30.0))
     table = design_loads([room_of(zone)], weather, outdoor_c=COLD, step_s=3600.0)
     density = weather.pressure_pa.mean() / (287.055 * (COLD + 273.15))
     expected = density * AIR_HEAT * VOLUME / 3600.0 * 32.0
@@ -136,8 +146,10 @@ def test_final_and_primary_energy(weather) -> None:
 
 
 def test_air_between_rooms_carries_vapour_one_way(weather) -> None:
-    rooms = [room_of(zone_of("a", HEAVY, "outdoor"), vapour=np.full(HOURS, 1e-4)),
-             room_of(zone_of("b", HEAVY, "outdoor"))]  # fmt: skip
+    rooms = [
+        room_of(zone_of("a", HEAVY, "outdoor"), vapour=np.full(HOURS, 1e-4)),
+        room_of(zone_of("b", HEAVY, "outdoor")),
+    ]
     one = np.ones(HOURS)
     air = SimpleNamespace(air_c=20.0 * one, outdoor_air=0.02 * one)
     moved = [AirTransfer("a", "b", 0.02)]

@@ -41,27 +41,26 @@ def test_a_room_has_their_sun_in_layers_and_surfaces():
     walls = len(zone.surfaces)
     ours = np.ones((3, 1))
     solar = Solar(ours, ours, np.ones((3, walls)), np.ones((3, walls)), window_inside=ours)
-    room = RoomZone(
-        None, SimpleNamespace(zone=zone), solar, {"incident_w": ours[:, 0]},
-        None, None, None, None, None,
-    )  # fmt: skip
+    room = RoomZone(None, SimpleNamespace(zone=zone), solar, {"incident_w": ours[:, 0]}, None, None, None, None, None)
     outdoor = [k for k, s in enumerate(zone.surfaces) if s.outside == "outdoor"]
     window, area = zone.windows[0], zone.windows[0].area
     resistance = window.states[0].layer_resistance.at([25.0, 27.5, 10.0], [10.0, 5.0, 10.0])
-    theirs = pd.DataFrame({
-        f"Z0 W0:{INCIDENT}": np.array([60.0, 100.0, 0.0]) / area,
-        f"Z0 W0:{SUN}": [30.0, 50.0, 0.0],
-        f"Z0 W0:{LAYER.format(1)}": [6.0, 10.0, 0.0],
-        f"Z0 W0:{LAYER.format(2)}": [2.0, 4.0, 0.0],
-        f"Z0 W0:{INSIDE_FACE}": [30.0, 30.0, 15.0],
-        f"Z0 W0:{OUTSIDE_FACE}": [20.0, 25.0, 5.0],
-        f"Z0 W0:{CONVECTED}": [-5.0, -5.0, 9.0],
-        f"Z0 W0:{RADIATED}": [-3.0, -1.0, 9.0],
-        f"Z0 S0:{ABSORBED}": [7.0, 8.0, 4.0],
-        f"Z0 S{outdoor[0]}.0:{INCIDENT}": [10.0, 20.0, 0.0],
-        f"Z0 S{outdoor[0]}.1:{INCIDENT}": [30.0, 40.0, 0.0],
-        f"Z01 S0:{ABSORBED}": [1e6, 1e6, 1e6],  # another room's
-    })  # fmt: skip
+    theirs = pd.DataFrame(
+        {
+            f"Z0 W0:{INCIDENT}": np.array([60.0, 100.0, 0.0]) / area,
+            f"Z0 W0:{SUN}": [30.0, 50.0, 0.0],
+            f"Z0 W0:{LAYER.format(1)}": [6.0, 10.0, 0.0],
+            f"Z0 W0:{LAYER.format(2)}": [2.0, 4.0, 0.0],
+            f"Z0 W0:{INSIDE_FACE}": [30.0, 30.0, 15.0],
+            f"Z0 W0:{OUTSIDE_FACE}": [20.0, 25.0, 5.0],
+            f"Z0 W0:{CONVECTED}": [-5.0, -5.0, 9.0],
+            f"Z0 W0:{RADIATED}": [-3.0, -1.0, 9.0],
+            f"Z0 S0:{ABSORBED}": [7.0, 8.0, 4.0],
+            f"Z0 S{outdoor[0]}.0:{INCIDENT}": [10.0, 20.0, 0.0],
+            f"Z0 S{outdoor[0]}.1:{INCIDENT}": [30.0, 40.0, 0.0],
+            f"Z01 S0:{ABSORBED}": [1e6, 1e6, 1e6],  # another room's
+        }
+    )
     found = with_their_sun("Z0", room, theirs)
     got = found.solar
     np.testing.assert_allclose(got.absorbed_outer[:, 0], np.array([6.0, 10.0, 0.0]) / area)
@@ -79,9 +78,7 @@ def test_a_room_has_their_sun_in_layers_and_surfaces():
 
 def test_their_share_of_the_sky_is_the_mean_of_a_surface_s_parts():
     (zone,) = row_of_zones(1)
-    room = RoomZone(
-        None, SimpleNamespace(zone=zone), None, {}, None, None, None, None, None
-    )  # fmt: skip
+    room = RoomZone(None, SimpleNamespace(zone=zone), None, {}, None, None, None, None, None)
     (at,) = [k for k, s in enumerate(zone.surfaces) if s.outside == "outdoor"][:1]
     half = 0.5 * (1.0 + zone.surfaces[at].normal[2])
     listed = (

@@ -44,10 +44,7 @@ def test_other_directions_are_refused() -> None:
 
 def test_panes_send_light_straight_on_and_shades_to_all_sides() -> None:
     angles = np.radians([0.0, 45.0, 90.0])
-    optics = Optics(
-        angles, None, np.array([0.5, 0.4, 0.0]), np.full(3, 0.2), angles, np.zeros((2, 3)), None,
-        BACK,
-    )  # fmt: skip
+    optics = Optics(angles, None, np.array([0.5, 0.4, 0.0]), np.full(3, 0.2), angles, np.zeros((2, 3)), None, BACK)
     panes, shade = (traced_system(n, optics).solar for n in ("dgu", "ext_shade"))
     # means over patches: five degrees of the first
     assert panes.transmission_front[0, 0] == pytest.approx(0.5 / OMEGA[0], rel=5e-3)
@@ -67,17 +64,13 @@ def test_shades_outside_meet_their_bars_with_traced_sun(reference_data, real_dat
 
 
 @pytest.mark.slow
-def test_glass_meets_its_bar_where_it_passes_the_sky_as_energyplus(
-    reference_data, real_data
-) -> None:
+def test_glass_meets_its_bar_where_it_passes_the_sky_as_energyplus(reference_data, real_data) -> None:
     """Air within 0.2 K (chapter 4's bar), south, Frankfurt; by its own angles it is further off."""
     reference = reference_data / "energyplus"
     if not (reference / "ep_Frankfurt.parquet").is_file():
         pytest.skip("EnergyPlus' hours (../shared/reference/energyplus) are not here")
     case = reference, real_data / "epw", ["Frankfurt"], ["S"], ["dgu"]
-    own, theirs = (
-        np.sqrt(compare(*case, one_diffuse=one)["air square"].item()) for one in (False, True)
-    )
+    own, theirs = (np.sqrt(compare(*case, one_diffuse=one)["air square"].item()) for one in (False, True))
     # 0.158: `sky_light` spreads this light indoors as a diffuse window does, as EnergyPlus
     assert theirs < 0.2
     assert theirs < 0.7 * own

@@ -24,10 +24,12 @@ from thermal.ground import SOILS, Footprint, basement, slab_on_ground
 from thermal.zone import Zone
 
 BOX = shoebox(
-    4.0, 5.0, 3.0,
+    4.0,
+    5.0,
+    3.0,
     windows=(WindowRectangle(0.5, 1.0, 3.0, 1.5, frame=0.1),),
     adjacency={"floor": "ground", "back": "ground", "left": "space"},
-)  # fmt: skip
+)
 
 
 @pytest.fixture(scope="module")
@@ -131,9 +133,7 @@ otherwise = 15
 
 
 def test_cooled_ceiling_is_the_rooms_own(weather) -> None:
-    zone = zone_of(
-        "[loads]\ncooling_c = 24\ncooling_radiant = 0.6\ncooling_faces = ['ceiling']\n", weather
-    )
+    zone = zone_of("[loads]\ncooling_c = 24\ncooling_radiant = 0.6\ncooling_faces = ['ceiling']\n", weather)
     ceiling = zone.surfaces[zone.index_of(zone.loads.cooling_surface)]
     assert ceiling.normal[2] > 0.9 and zone.loads.heating_surface == ""
 

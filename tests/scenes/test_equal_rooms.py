@@ -24,9 +24,7 @@ def moved(building: Building, offset: tuple[float, float, float], name: str):
     """The building's room somewhere else, under another name."""
     space = building.spaces[0]
     faces = tuple(replace(f, triangles=f.triangles + offset) for f in space.faces)
-    windows = tuple(
-        replace(w, triangles=w.triangles + offset, guid=f"{w.guid}-{name}") for w in space.windows
-    )
+    windows = tuple(replace(w, triangles=w.triangles + offset, guid=f"{w.guid}-{name}") for w in space.windows)
     return replace(space, faces=faces, windows=windows, guid=f"{name}-guid", name=name)
 
 
@@ -35,9 +33,7 @@ def seen_alike(building: Building, *rooms: Space) -> bool:
     return one.same(other)
 
 
-def test_an_equal_room_has_the_results_of_its_template(
-    variant, weather, skies, glass, blind
-) -> None:
+def test_an_equal_room_has_the_results_of_its_template(variant, weather, skies, glass, blind) -> None:
     """Shifted, the room is computed anew to the same numbers; what shades one alone tells them."""
     twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
     building = replace(BOX, spaces=(ROOM, twin))
@@ -51,8 +47,7 @@ def test_an_equal_room_has_the_results_of_its_template(
 
     options = SMALL.changed(sensor_samples=2048)
     one, other = (
-        compute_room(building, s, systems, weather, options, skies=skies, pictures=False)
-        for s in (ROOM, twin)
+        compute_room(building, s, systems, weather, options, skies=skies, pictures=False) for s in (ROOM, twin)
     )
     given = moved_result(one, twin)
     assert given.template == "room" and given.space is twin
@@ -79,9 +74,8 @@ def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeyp
 
     monkeypatch.setattr(run, "lit_room", noted)
     room = RoomOptions.of(
-        method="three-phase", sky_subdivision=1, sensor_spacing=2.0,
-        sensor_samples=1024, patch_samples=1024,
-    )  # fmt: skip
+        method="three-phase", sky_subdivision=1, sensor_spacing=2.0, sensor_samples=1024, patch_samples=1024
+    )
     options = JobOptions(Path(), Path(), cache=False, room=room)
     inputs = run.Inputs(building, spaces, weather, systems, None)
     results, issues, notes = run.computed_rooms(inputs, skies, options, silent)

@@ -17,10 +17,7 @@ OUTSIDE = {
     "under the floor": "-vp 2 3 -0.1 -vd 0 -1 0",
     "in the window's frame": "-vp 0.55 -0.15 1.2 -vd 0 1 0",
 }
-KINDS = {
-    "fisheye": "-vta -vh 180 -vv 180",
-    "perspective": "-vtv -vh 60 -vv 60",
-}
+KINDS = {"fisheye": "-vta -vh 180 -vv 180", "perspective": "-vtv -vh 60 -vv 60"}
 
 
 @pytest.fixture

@@ -49,8 +49,7 @@ def test_every_command_that_writes_is_in_the_list() -> None:
         command = cli.cfs.get_command(context, name)
         inner = getattr(command, "commands", None)
         leaves |= {name} if inner is None else {f"{name} {one}" for one in inner}
-    listed = {next((leaf for leaf in leaves if f"{job} ".startswith(f"{leaf} ")), job)
-              for job in JOBS}  # fmt: skip
+    listed = {next((leaf for leaf in leaves if f"{job} ".startswith(f"{leaf} ")), job) for job in JOBS}
     assert listed | WRITES_NOTHING | SERVES | EARLIER_NAMES == leaves
 
 
@@ -110,9 +109,13 @@ def test_a_read_only_disk_is_found_before_the_work(name, place, small_disk, caps
     subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
     here.job = Job(lambda *_: words, folder=here.job.folder)
     begun = []
-    for module in ("scenes.run.run.run_job", "scenes.heat.study.run_study",
-                   "scenes.study.study.run_study", "scenes.year_of_glare.year.read_year",
-                   "scenes.calibration.measure.calibrated"):  # fmt: skip
+    for module in (
+        "scenes.run.run.run_job",
+        "scenes.heat.study.run_study",
+        "scenes.study.study.run_study",
+        "scenes.year_of_glare.year.read_year",
+        "scenes.calibration.measure.calibrated",
+    ):
         monkeypatch.setattr(module, lambda *_a, **_k: begun.append(1))
     try:
         refused(here, capsys, "read-only")
@@ -134,10 +137,12 @@ def start(place: Place, **options) -> subprocess.Popen:
     """`cfs` with quick work in a process of its own, its signals as they are at first."""
     return subprocess.Popen(
         [sys.executable, "-m", "tests.scenes.quick_work", *place.words],
-        cwd=REPOSITORY, text=True, stderr=subprocess.PIPE,
+        cwd=REPOSITORY,
+        text=True,
+        stderr=subprocess.PIPE,
         preexec_fn=default_signals,
         **({"stdout": subprocess.PIPE} | options),
-    )  # fmt: skip
+    )
 
 
 def stopped(place: Place, number: int, announce: Path) -> tuple[int, str]:
@@ -198,9 +203,8 @@ def test_closed_pipes_do_not_stop_the_work(name, place):
     command = [sys.executable, "-m", "tests.scenes.quick_work", *here.words]
     for closed in (">&-", "2>&-", ">&- 2>&- <&-"):
         process = subprocess.run(
-            ["bash", "-c", f'"$@" {closed}', "-", *command],
-            cwd=REPOSITORY, capture_output=True, text=True, check=False,
-        )  # fmt: skip
+            ["bash", "-c", f'"$@" {closed}', "-", *command], cwd=REPOSITORY, capture_output=True, text=True, check=False
+        )
         assert process.returncode == 0, process.stderr
         assert "NoneType" not in process.stderr and "Traceback" not in process.stderr
         assert not here.temporaries()
@@ -210,16 +214,18 @@ def test_standard_output_on_a_full_disk_is_one_line():
     with open("/dev/full", "w") as full:
         process = subprocess.run(
             [sys.executable, "-m", "scenes.cli", "--help"],
-            cwd=REPOSITORY, stdout=full, stderr=subprocess.PIPE, text=True, check=False,
-        )  # fmt: skip
+            cwd=REPOSITORY,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
     assert process.returncode == 1
     assert process.stderr.splitlines() == ["error: standard output: the disk is full"]
 
 
 @pytest.mark.parametrize("name", ["thermal", pytest.param("study", marks=pytest.mark.slow)])
-def test_the_second_of_two_runs_into_a_folder_is_refused_before_its_work(
-    name, place, tmp_path, capsys, monkeypatch
-):
+def test_the_second_of_two_runs_into_a_folder_is_refused_before_its_work(name, place, tmp_path, capsys, monkeypatch):
     here, announce = place(name), tmp_path / "stopped"
     process = start(here, env={**os.environ, STOP: str(announce)})
     end = time.monotonic() + 120
@@ -253,9 +259,12 @@ def test_a_kill_leaves_no_folder_that_the_next_run_does_not_remove(tmp_path, mon
         "    time.sleep(60)\n"
     )
     process = subprocess.Popen(
-        [sys.executable, "-c", program], cwd=REPOSITORY, text=True, stdout=subprocess.PIPE,
+        [sys.executable, "-c", program],
+        cwd=REPOSITORY,
+        text=True,
+        stdout=subprocess.PIPE,
         env={**os.environ, "TMPDIR": str(tmp_path)},
-    )  # fmt: skip
+    )
     folder = Path(process.stdout.readline().strip())
     assert folder.parent == tmp_path and folder.stat().st_mode & 0o077 == 0
     with scratch_folder():

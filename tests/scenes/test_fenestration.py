@@ -29,21 +29,12 @@ from tests.bim.honeybee_models import two_rooms, write
 from tests.bim.small_ifc import box_room
 from tests.conftest import REPOSITORY
 from tests.images.exr_reader import read_exr
-from tests.scenes.fenestration_models import (
-    COMMON,
-    GLAZING,
-    STATED,
-    grey,
-    once,
-    room,
-    with_attached,
-)
+from tests.scenes.fenestration_models import COMMON, GLAZING, STATED, grey, once, room, with_attached
 from thermal.ratings import REFERENCE_GLAZINGS
 
 pytestmark = pytest.mark.early
 
-TINY = ["--quick", "--size", "64", "--picture", "06-21 12", "--spacing", "2",
-        "--method", "three-phase"]  # fmt: skip
+TINY = ["--quick", "--size", "64", "--picture", "06-21 12", "--spacing", "2", "--method", "three-phase"]
 YEAR = ["--quick", "--size", "64", "--metric", "sDGP", "--method", "three-phase"]
 
 
@@ -56,8 +47,7 @@ def filled(path: Path, given: WindowOverrides | None = None) -> FenestrationSyst
 def normal(system: FenestrationSystem) -> tuple[float, float]:
     """Visible and solar transmittance at normal incidence."""
     return tuple(
-        float(band.direct_hemispherical(band.transmission_front)[0])
-        for band in (system.visible, system.solar)
+        float(band.direct_hemispherical(band.transmission_front)[0]) for band in (system.visible, system.solar)
     )
 
 
@@ -104,8 +94,7 @@ def test_u_and_g_of_the_flags_go_before_those_of_the_file(tmp_path) -> None:
 
 def test_attached_u_and_g_without_a_bsdf_go_before_the_stated_ones(tmp_path) -> None:
     path = room(tmp_path / "room.ifc", STATED)
-    assert run(["ifc", "attach", str(path), "--all", "--u", "0.7", "--g", "0.48",
-                "-o", str(path)]) == 0  # fmt: skip
+    assert run(["ifc", "attach", str(path), "--all", "--u", "0.7", "--g", "0.48", "-o", str(path)]) == 0
     system = filled(path)
     assert (system.u_value, system.g_value) == (0.7, 0.48)
     assert normal(system) == pytest.approx((0.7, 0.42), rel=2e-4)
@@ -190,18 +179,17 @@ def test_a_command_without_a_system_says_what_to_give(tmp_path, capsys, command)
 @pytest.mark.parametrize(
     ("rung", "command"),
     [("attached", command) for command in COMMANDS]
-    + [
-        pytest.param("stated", command, marks=() if command == "thermal" else pytest.mark.slow)
-        for command in COMMANDS
-    ],
+    + [pytest.param("stated", command, marks=() if command == "thermal" else pytest.mark.slow) for command in COMMANDS],
 )
 def test_a_command_takes_what_the_model_holds_and_says_so(tmp_path, capsys, command, rung) -> None:
     path = room(tmp_path / "room.ifc", STATED)
     if rung == "attached":
         with_attached(path, 0.3, u_value=1.1, g_normal=0.4)
     assert run(words_of(command, path, tmp_path)) == 0
-    expected = {"attached": "what is attached to the window itself in room.ifc",
-                "stated": "the values stated in room.ifc"}[rung]  # fmt: skip
+    expected = {
+        "attached": "what is attached to the window itself in room.ifc",
+        "stated": "the values stated in room.ifc",
+    }[rung]
     said = capsys.readouterr().out
     if command != "study":
         assert expected in " ".join(said.split())
@@ -229,9 +217,7 @@ def test_run_and_study_on_the_same_attached_data_agree(tmp_path) -> None:
 def test_a_demo_file_is_taken_only_without_a_building_and_is_said(tmp_path, capsys) -> None:
     call = ["picture", "--at", "06-21 12:00", "--size", "16", "--samples", "1"]
     assert run([*call, "--out", str(tmp_path / "a.hdr")]) == 0
-    assert (
-        "no BUILDING given: the demo's office, weather, venetian blind" in capsys.readouterr().out
-    )
+    assert "no BUILDING given: the demo's office, weather, venetian blind" in capsys.readouterr().out
     assert run([*call, str(OFFICE), "--out", str(tmp_path / "b.hdr")]) == 2
     said = capsys.readouterr().err.strip()
     assert "--weather is required" in said and "\n" not in said
@@ -258,8 +244,11 @@ def two_systems(tmp_path) -> Path:
 def test_windows_of_one_room_may_have_different_systems(two_systems, tmp_path, capsys) -> None:
     """The eye's illuminance lies between those of either system in all windows."""
     means = {}
-    for name, more in {"two": [], "bright": ["--cfs", tmp_path / "0.xml"],
-                       "dark": ["--cfs", tmp_path / "1.xml"]}.items():  # fmt: skip
+    for name, more in {
+        "two": [],
+        "bright": ["--cfs", tmp_path / "0.xml"],
+        "dark": ["--cfs", tmp_path / "1.xml"],
+    }.items():
         out = tmp_path / name
         words = ["dgp", two_systems, "--weather", WEATHER, "--out", out, *more]
         assert run([str(word) for word in (*words, *YEAR)]) == 0
@@ -274,8 +263,22 @@ def test_windows_of_one_room_may_have_different_systems(two_systems, tmp_path, c
 def test_a_picture_shows_each_windows_own_system(two_systems, tmp_path) -> None:
     out = tmp_path / "a.exr"
     view = "-vtv -vp 2 5 1.6 -vd 0 -1 0 -vh 50 -vv 30"
-    words = ["picture", two_systems, "--weather", WEATHER, "--at", "06-21 12:00", "--size", "64",
-             "--samples", "16", "--view", view, "--out", out]  # fmt: skip
+    words = [
+        "picture",
+        two_systems,
+        "--weather",
+        WEATHER,
+        "--at",
+        "06-21 12:00",
+        "--size",
+        "64",
+        "--samples",
+        "16",
+        "--view",
+        view,
+        "--out",
+        out,
+    ]
     assert run([str(word) for word in words]) == 0
     luminance, _ = read_exr(out)
     middle = luminance[luminance.shape[0] // 2]
@@ -289,8 +292,9 @@ def test_a_study_takes_each_windows_own_system_as_a_run_does(two_systems, tmp_pa
     assert run(words_of("study", two_systems, tmp_path)) == 0
     one = pd.read_csv(tmp_path / "run" / "temperatures.csv")["operative_c"]
     other = pd.read_csv(tmp_path / "study" / "results.csv").iloc[0]
-    used = one[[8 <= hour < 18 for hour in pd.to_datetime(
-        pd.read_csv(tmp_path / "run" / "temperatures.csv")["time"]).dt.hour]]  # fmt: skip
+    used = one[
+        [8 <= hour < 18 for hour in pd.to_datetime(pd.read_csv(tmp_path / "run" / "temperatures.csv")["time"]).dt.hour]
+    ]
     assert other["operative_max_c"] == pytest.approx(used.max(), rel=1e-5)
     da = pd.read_csv(tmp_path / "run" / "room_metrics.csv")["da300"].iloc[0]
     assert other["da300"] == pytest.approx(da, rel=1e-5)
@@ -306,17 +310,7 @@ def test_a_change_of_a_file_that_the_model_names_changes_the_years_key(tmp_path)
     for share in (0.3, 0.4):
         write_bsdf_xml(BsdfFile({"Visible": grey(share)}, "pane"), file)
         if not path.exists():
-            words = [
-                "ifc",
-                "attach",
-                room(path),
-                "--all",
-                "--bsdf",
-                file,
-                "--reference",
-                "-o",
-                path,
-            ]
+            words = ["ifc", "attach", room(path), "--all", "--bsdf", file, "--reference", "-o", path]
             assert run([str(word) for word in words]) == 0
         keys.append(read_year(YearOptions(path, WEATHER)).digest)
     assert keys[0] != keys[1]
@@ -402,8 +396,7 @@ def test_a_tinted_pane_of_a_honeybee_model_falls_with_the_angle_as_fresnel_says(
     """By hand: through tinted glass the way is longer askew; Radiance's `glass`, n = 1.52."""
     path = tinted_honeybee(tmp_path)
     windows = read_building_file(path).space("Office").windows
-    (system,) = {id(s[0]): s[0] for s in fill_windows(windows, WindowOverrides(), path).values()}\
-        .values()  # fmt: skip
+    (system,) = {id(s[0]): s[0] for s in fill_windows(windows, WindowOverrides(), path).values()}.values()
     assert (system.u_value, system.g_value) == (1.1, 0.5)
     for degrees in (0.0, 40.0, 60.0, 75.0):
         theta = np.radians(degrees)
@@ -425,8 +418,7 @@ def test_u_and_g_given_for_a_radiance_scene_make_its_solar_transmittance(tmp_pat
     sun = system.solar.direct_hemispherical(system.solar.transmission_front)[0]
     assert sun == pytest.approx(solar_transmittance(1.1, 0.4), rel=1e-3) and sun < 0.4 < light
     assert system.name == "glazing, U 1.1, g 0.4, visible transmittance 0.799"
-    twin = replace(windows[0], guid="twin", glass=PlainGlass(((0.8701, 1.52),)),
-                   visible_transmittance=0.79868)  # fmt: skip
+    twin = replace(windows[0], guid="twin", glass=PlainGlass(((0.8701, 1.52),)), visible_transmittance=0.79868)
     names = [one[0].name for one in fill_windows([windows[0], twin], given, scene).values()]
     assert len(set(names)) == 2  # values that differ beyond three digits
     alone = fill_windows(windows, WindowOverrides(), scene)[windows[0].guid][0]
@@ -450,9 +442,7 @@ def test_a_generic_glazing_fills_windows_whose_file_states_nothing(tmp_path, nam
     assert any(name in str(note) for note in system.notes)
 
 
-def test_a_visible_transmittance_of_the_user_fills_windows_of_a_light_only_command(
-    tmp_path,
-) -> None:
+def test_a_visible_transmittance_of_the_user_fills_windows_of_a_light_only_command(tmp_path) -> None:
     path = tmp_path / "room.ifc"
     box_room("IFC4").write(str(path))
     overrides = WindowOverrides(visible=0.55, light_only=True)
@@ -469,9 +459,9 @@ def test_an_hbjson_without_glazing_has_the_default_pane_of_honeybee(tmp_path) ->
             for aperture in face.get("apertures", ()):
                 aperture["properties"] = {"type": "AperturePropertiesAbridged"}
     path = write(model, tmp_path)
-    (system, *_) = {id(s): s for (s,) in fill_windows(
-        read_building_file(path).windows, WindowOverrides(), path
-    ).values()}.values()  # fmt: skip
+    (system, *_) = {
+        id(s): s for (s,) in fill_windows(read_building_file(path).windows, WindowOverrides(), path).values()
+    }.values()
     assert normal_transmittance(system.visible) == pytest.approx(0.64, abs=2e-3)
     assert any("honeybee's default pane" in str(note) for note in system.notes)
 

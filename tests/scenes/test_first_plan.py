@@ -18,15 +18,7 @@ from scenes.inputs import Inputs
 from scenes.result_folder import FolderMark, ResultFolder
 from scenes.room.options import RoomOptions
 from scenes.run import run, together
-from scenes.run.first_plan import (
-    COLUMNS,
-    PlannedRoom,
-    first_plan,
-    options_for_error,
-    plan_lines,
-    plan_page,
-    plan_table,
-)
+from scenes.run.first_plan import COLUMNS, PlannedRoom, first_plan, options_for_error, plan_lines, plan_page, plan_table
 from scenes.run.options import JobOptions
 from scenes.run.run import run_inputs
 from tests.scenes.small_box import BOX
@@ -36,9 +28,16 @@ from tests.trace.rooms import quad
 
 WALL = quad((-20, -9, 0), (30, -9, 0), (30, -9, 9), (-20, -9, 9))
 FEW = RoomOptions.of(
-    sky_subdivision=1, sensor_spacing=1.0, sensor_samples=512, patch_samples=256, sun_points=32,
-    picture_size=64, picture_count=1, picture_samples=1, heat_step_s=3600.0,
-)  # fmt: skip
+    sky_subdivision=1,
+    sensor_spacing=1.0,
+    sensor_samples=512,
+    patch_samples=256,
+    sun_points=32,
+    picture_size=64,
+    picture_count=1,
+    picture_samples=1,
+    heat_step_s=3600.0,
+)
 
 
 @pytest.fixture
@@ -102,9 +101,8 @@ def test_rooms_of_equal_shape_are_not_traced_ahead(two_rooms, tmp_path, monkeypa
     twin = moved(replace(BOX, spaces=(near,)), (20.0, 0.0, 0.0), "twin")
     traced: list[list[str]] = []
     monkeypatch.setattr(
-        together, "traced_together",
-        lambda inputs, spaces, *_, **__: traced.append([space.name for space in spaces]),
-    )  # fmt: skip
+        together, "traced_together", lambda inputs, spaces, *_, **__: traced.append([space.name for space in spaces])
+    )
     rooms = together.RoomsTogether(inputs, [near, far, twin], None, options, tmp_path)
     assert rooms.cache_for(twin, silent) is None and not traced
     assert rooms.cache_for(near, silent) is not None and traced == [["near", "far"]]

@@ -11,17 +11,7 @@ import pytest
 from scenes import cli
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.result_folder import MARK
-from tests.scenes.writing_jobs import (
-    FILES,
-    FOLDERS,
-    JOBS,
-    OWN,
-    PV_STUDY,
-    Place,
-    heavy_ones_slow,
-    refused,
-    to_folder,
-)
+from tests.scenes.writing_jobs import FILES, FOLDERS, JOBS, OWN, PV_STUDY, Place, heavy_ones_slow, refused, to_folder
 
 pytestmark = [pytest.mark.early, pytest.mark.usefixtures("own_cache")]
 
@@ -144,8 +134,7 @@ def test_a_file_for_a_folder_and_a_folder_for_a_file_are_refused(name, place, ca
     ],
 )
 def test_an_input_is_no_output(words, tmp_path, monkeypatch, capsys):
-    for source, name in ((OFFICE, "office.ifc"), (WEATHER, "weather.epw"),
-                         (VENETIAN_BLIND, "blind.xml")):  # fmt: skip
+    for source, name in ((OFFICE, "office.ifc"), (WEATHER, "weather.epw"), (VENETIAN_BLIND, "blind.xml")):
         shutil.copy(source, tmp_path / name)
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     monkeypatch.chdir(tmp_path)

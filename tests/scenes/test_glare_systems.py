@@ -56,9 +56,7 @@ def test_paths_draw_what_the_system_gives(closed_blind):
     si.sh_frame = mi.Frame3f(mi.Vector3f(1, 0, 0), mi.Vector3f(0, 0, 1), mi.Vector3f(0, -1, 0))
     si.wi = mi.Vector3f(0.2, 0.3, -float(np.sqrt(1 - 0.13)))  # seen from the room
     random = np.random.default_rng(5).random((3, POINTS)).astype(np.float32)
-    _, weight = system.bsdf.sample(
-        mi.BSDFContext(), si, mi.Float(random[0]), mi.Point2f(random[1], random[2])
-    )
+    _, weight = system.bsdf.sample(mi.BSDFContext(), si, mi.Float(random[0]), mi.Point2f(random[1], random[2]))
     drawn = float(np.mean(weight[0].numpy()))
     total = 0.0
     for side in (1.0, -1.0):

@@ -56,12 +56,7 @@ def test_views_are_rated_and_written_and_a_second_run_takes_them_up(year, tmp_pa
     read = pd.read_parquet(folder / "eye001_1.parquet")
     assert np.array_equal(read.dgp.to_numpy(), towards)
     assert table.hours_of_use.tolist() == [3650, 3650]
-    assert {p.suffix for p in folder.iterdir() if p.is_file()} == {
-        ".png",
-        ".parquet",
-        ".csv",
-        ".json",
-    }
+    assert {p.suffix for p in folder.iterdir() if p.is_file()} == {".png", ".parquet", ".csv", ".json"}
 
     def never(*_arguments, **_options):
         raise AssertionError("rated again")

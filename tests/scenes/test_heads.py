@@ -33,9 +33,19 @@ from tests.report.test_study_report import study as study_result
 
 # types of modifiers that are not read: more than a head lists of other kinds of issues
 UNREAD = (
-    "prism1", "prism2", "mist", "transfunc", "transdata", "plasfunc", "plasdata", "metfunc",
-    "metdata", "ashik2", "antimatter", "WGMDfunc",
-)  # fmt: skip
+    "prism1",
+    "prism2",
+    "mist",
+    "transfunc",
+    "transdata",
+    "plasfunc",
+    "plasdata",
+    "metfunc",
+    "metdata",
+    "ashik2",
+    "antimatter",
+    "WGMDfunc",
+)
 STOP = "stopped before anything is traced"
 RAD = REPOSITORY / "docs/tutorials/office.rad"
 STUDY = f"""
@@ -95,12 +105,8 @@ def rad(folder: Path) -> Path:
     return path
 
 
-FORMATS: dict[str, Callable[[Path], Path]] = {
-    "ifc": ifc, "hbjson": hbjson, "gbxml": gbxml, "rad": rad,
-}  # fmt: skip
-MODULES = {
-    "ifc": "IfcSlab", "hbjson": "Overhang", "gbxml": "name=Overhang", "rad": "name=/ground.*/",
-}  # fmt: skip
+FORMATS: dict[str, Callable[[Path], Path]] = {"ifc": ifc, "hbjson": hbjson, "gbxml": gbxml, "rad": rad}
+MODULES = {"ifc": "IfcSlab", "hbjson": "Overhang", "gbxml": "name=Overhang", "rad": "name=/ground.*/"}
 
 
 def _from(folder: Path, text: str, *values: object) -> Path:
@@ -116,16 +122,14 @@ def words(command: str, path: Path, folder: Path) -> list[object]:
     return {
         "run": ["run", path, *weather, *system, *out],
         "dgp": ["dgp", path, *weather, *system, *out],
-        "picture": ["picture", path, *weather, *system, "--at", "06-21 12", "--out",
-                    folder / "a.png"],
+        "picture": ["picture", path, *weather, *system, "--at", "06-21 12", "--out", folder / "a.png"],
         "comply": ["comply", path, *weather, *system, "--standard", "en17037", *out],
         "thermal": ["thermal", _from(folder, HEAT, path), *out],
         "study": ["study", _from(folder, STUDY, path), *out],
-        "pv": ["pv", path, *weather, *out, "--study",
-               _from(folder, PV, MODULES[path.suffix[1:]])],
+        "pv": ["pv", path, *weather, *out, "--study", _from(folder, PV, MODULES[path.suffix[1:]])],
         "check": ["check", path],
         "export": ["export", path, "--gltf", folder / "a.glb"],
-    }[command]  # fmt: skip
+    }[command]
 
 
 @pytest.fixture
@@ -136,11 +140,14 @@ def stopped(monkeypatch: pytest.MonkeyPatch) -> None:
         raise DataError(STOP)
 
     for name in (
-        "scenes.run.run.run_inputs", "scenes.year_of_glare.year.viewed_room",
-        "scenes.view_picture.viewed_room", "scenes.comply.comply.view_out",
-        "scenes.heat.study.skies_for", "scenes.study.study.computed",
+        "scenes.run.run.run_inputs",
+        "scenes.year_of_glare.year.viewed_room",
+        "scenes.view_picture.viewed_room",
+        "scenes.comply.comply.view_out",
+        "scenes.heat.study.skies_for",
+        "scenes.study.study.computed",
         "scenes.photovoltaics.study.cell_irradiance",
-    ):  # fmt: skip
+    ):
         monkeypatch.setattr(name, stop)
 
 
@@ -178,9 +185,7 @@ def test_a_window_that_nothing_fills_ends_every_command(
 
 
 @pytest.mark.parametrize("name", ["check", "export"])
-def test_the_earlier_names_lead_to_the_commands(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_earlier_names_lead_to_the_commands(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     call = [str(word) for word in words(name, ifc(tmp_path), tmp_path)]
     assert cli.run(call) == 0
     now = capsys.readouterr()
@@ -207,9 +212,7 @@ def test_panes_before_dark_rooms_mirror(tmp_path: Path) -> None:
     """They are no windows of the room, and no light passes them."""
     path = tmp_path / "house.rad"
     pane = "0 0 12  -2 -8 0  6 -8 0  6 -8 6  -2 -8 6"
-    path.write_text(
-        RAD.read_text() + f"\nvoid glass across\n0\n0\n3 .8 .8 .8\nacross polygon p\n{pane}\n"
-    )
+    path.write_text(RAD.read_text() + f"\nvoid glass across\n0\n0\n3 .8 .8 .8\nacross polygon p\n{pane}\n")
     code = "clear-surface-left-out"
     assert [issue for issue in read_building_file(path).issues if issue.code == code]
     options = InputOptions(path, None, facade_panes=("across",))
@@ -220,9 +223,7 @@ def test_panes_before_dark_rooms_mirror(tmp_path: Path) -> None:
     assert not [issue for issue in building.issues if issue.code == code]
 
 
-def test_the_explorer_shows_the_head_of_its_run(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_explorer_shows_the_head_of_its_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     results = tmp_path / "results"
     write_explorer(explored_run(), results / "explore")
     head = head_of(read_building_file(ifc(tmp_path)))
@@ -256,13 +257,10 @@ def test_the_pages_show_the_head_in_their_language(tmp_path: Path, language: str
 
 def test_a_head_names_all_that_is_left_out(tmp_path):
     things = [
-        f"void {kind} odd_{kind} 0 0 0\n"
-        f"odd_{kind} polygon chip_{kind} 0 0 9 1 3 1 1.01 3 1 1 3 1.01"
-        for kind in UNREAD
+        f"void {kind} odd_{kind} 0 0 0\nodd_{kind} polygon chip_{kind} 0 0 9 1 3 1 1.01 3 1 1 3 1.01" for kind in UNREAD
     ]
     panes = [
-        f"void dielectric clear_{n} 0 0 5 1 1 1 1.5 0\n"
-        f"clear_{n} polygon gem_{n} 0 0 9 2 3 1 2.01 3 1 2 3 1.01"
+        f"void dielectric clear_{n} 0 0 5 1 1 1 1.5 0\nclear_{n} polygon gem_{n} 0 0 9 2 3 1 2.01 3 1 2 3 1.01"
         for n in range(2)
     ]
     scene = tmp_path / "chips.rad"
@@ -270,9 +268,7 @@ def test_a_head_names_all_that_is_left_out(tmp_path):
     lines = head_of(read_building_file(scene)).lines
     for kind in UNREAD:
         (line,) = (line for line in lines if f"of type {kind}:" in line)
-        assert line.startswith(
-            f"left out: 1 surface, less than 0.1 m2, has a modifier of type {kind}"
-        )
+        assert line.startswith(f"left out: 1 surface, less than 0.1 m2, has a modifier of type {kind}")
     assert [any(f"gem_{n}" in line for line in lines) for n in range(2)] == [True, True]
     assert not [line for line in lines if " 0.0 m2" in line or "problem" in line]
 

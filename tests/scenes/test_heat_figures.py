@@ -23,13 +23,14 @@ def year_of(step_h: float):
     temperatures = ("air_c", "mrt_c", "operative_c", "outdoor_c")
     hours = {name: 20.0 + (i + 1) * swing for i, name in enumerate(temperatures)}
     hours |= {f"{name.replace(' ', '_')}_w": np.zeros(rows) for name in TERMS}
-    hours |= {"glass_sun_w": np.full(rows, 100.0), "windows_w": np.full(rows, -140.0),
-              "ideal_loads_w": np.full(rows, 40.0)}  # fmt: skip
+    hours |= {
+        "glass_sun_w": np.full(rows, 100.0),
+        "windows_w": np.full(rows, -140.0),
+        "ideal_loads_w": np.full(rows, 40.0),
+    }
     energy = {f"{name} [kWh/m2]": np.arange(12.0) for name in (*DEMANDS, *ELECTRICITY)}
     energy["electricity fans [kWh/m2]"] = np.zeros(12)
-    return SimpleNamespace(
-        name="A", hours=pd.DataFrame(hours, times), energy=pd.DataFrame(energy, range(1, 13))
-    )
+    return SimpleNamespace(name="A", hours=pd.DataFrame(hours, times), energy=pd.DataFrame(energy, range(1, 13)))
 
 
 @pytest.mark.parametrize("step_h", [1.0, 0.5])

@@ -58,10 +58,11 @@ def test_a_case_of_a_study_and_a_study_of_heat_have_the_same_air(street, operati
     held = case_inputs(case).weather
     np.testing.assert_allclose(held.dry_bulb_c, street.dry_bulb_c)
     table = {
-        "weather": WEATHER, "system": [{"bsdf": VENETIAN_BLIND}],
+        "weather": WEATHER,
+        "system": [{"bsdf": VENETIAN_BLIND}],
         "box": {"width": 4, "depth": 5, "height": 3, "window": []},
         "heat_island": {"sky_view": 0.5, "vegetation": 0.1, "hourly_shares": NIGHT},
-    }  # fmt: skip
+    }
     heat = heat_files(StudyFile.model_validate(table)).weather
     np.testing.assert_array_equal(heat.dry_bulb_c, street.dry_bulb_c)
 

@@ -45,9 +45,7 @@ def test_an_example_has_the_commands_own_options(name: str, line: str) -> None:
     for parameter in command.params:
         given = values.get(parameter.name)
         is_given = isinstance(given, str | tuple | list) and bool(given)
-        if is_given and isinstance(
-            parameter.type, (click.Choice, click.IntRange, click.FloatRange)
-        ):
+        if is_given and isinstance(parameter.type, (click.Choice, click.IntRange, click.FloatRange)):
             parameter.type_cast_value(context, given)
         if parameter.required and "--list" not in words:
             assert is_given, parameter.name

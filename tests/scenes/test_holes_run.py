@@ -40,9 +40,7 @@ def test_a_run_says_that_a_room_is_open(tmp_path, holed, capsys):
 
 
 @pytest.mark.parametrize(
-    "command",
-    [["picture", "--at", "06-21 12:00", "--size", "32"], ["dgp", *FEW_RAYS]],
-    ids=lambda words: words[0],
+    "command", [["picture", "--at", "06-21 12:00", "--size", "32"], ["dgp", *FEW_RAYS]], ids=lambda words: words[0]
 )
 def test_other_commands_that_trace_say_so_too(tmp_path, holed, capsys, command):
     out = tmp_path / ("out.png" if command[0] == "picture" else "out")

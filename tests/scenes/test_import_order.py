@@ -9,10 +9,7 @@ import pytest
 from mitsuba_cfs.source_code import import_closure
 
 SCENES = Path(__file__).parents[2] / "scenes"
-LATER = {
-    "fenestration": ("scenes.room", "scenes.run"),
-    "room": ("scenes.run",),
-}
+LATER = {"fenestration": ("scenes.room", "scenes.run"), "room": ("scenes.run",)}
 
 
 def modules(package: str) -> tuple[str, ...]:
@@ -23,6 +20,4 @@ def modules(package: str) -> tuple[str, ...]:
 def test_no_module_imports_what_stands_on_it(package: str) -> None:
     assert len(modules(package)) > 3
     found = import_closure(modules(package))
-    assert not [
-        name for name in found if f"{name}.".startswith(tuple(f"{n}." for n in LATER[package]))
-    ]
+    assert not [name for name in found if f"{name}.".startswith(tuple(f"{n}." for n in LATER[package]))]

@@ -46,20 +46,22 @@ def glazed_partition(small: SmallIfc, name: str, low: float) -> None:
     grey = small.style("partition", 0.5)
     wall = small.box("IfcWall", "partition", (0, low, 0), (WIDTH, THICK, HEIGHT), grey)
     x, sill, width, height = PLACE
-    opening = small.box(
-        "IfcOpeningElement", "hole", (x, low - 0.1, sill), (width, THICK + 0.2, height)
-    )
+    opening = small.box("IfcOpeningElement", "hole", (x, low - 0.1, sill), (width, THICK + 0.2, height))
     ifcopenshell.api.feature.add_feature(small.model, feature=opening, element=wall)
     glass, frame, y = small.style("inner", 0.9, 0.8), small.style("sash", 0.7), low + THICK / 2
-    window = small.box("IfcWindow", name, (x + FRAME, y - 0.01, sill + FRAME),
-                       (width - 2 * FRAME, 0.02, height - 2 * FRAME), glass)  # fmt: skip
-    small.show(window, [
-        ((x, y - 0.03, sill), (FRAME, 0.06, height), frame),
-        ((x + width - FRAME, y - 0.03, sill), (FRAME, 0.06, height), frame),
-        ((x + FRAME, y - 0.03, sill), (width - 2 * FRAME, 0.06, FRAME), frame),
-        ((x + FRAME, y - 0.03, sill + height - FRAME), (width - 2 * FRAME, 0.06, FRAME), frame),
-        ((x + FRAME, y - 0.01, sill + FRAME), (width - 2 * FRAME, 0.02, height - 2 * FRAME), glass),
-    ])  # fmt: skip
+    window = small.box(
+        "IfcWindow", name, (x + FRAME, y - 0.01, sill + FRAME), (width - 2 * FRAME, 0.02, height - 2 * FRAME), glass
+    )
+    small.show(
+        window,
+        [
+            ((x, y - 0.03, sill), (FRAME, 0.06, height), frame),
+            ((x + width - FRAME, y - 0.03, sill), (FRAME, 0.06, height), frame),
+            ((x + FRAME, y - 0.03, sill), (width - 2 * FRAME, 0.06, FRAME), frame),
+            ((x + FRAME, y - 0.03, sill + height - FRAME), (width - 2 * FRAME, 0.06, FRAME), frame),
+            ((x + FRAME, y - 0.01, sill + FRAME), (width - 2 * FRAME, 0.02, height - 2 * FRAME), glass),
+        ],
+    )
     ifcopenshell.api.feature.add_filling(small.model, opening=opening, element=window)
 
 
@@ -201,13 +203,22 @@ def test_light_through_a_doorway_is_that_of_paths_in_both_rooms(doorway: Path) -
 
 
 @pytest.mark.slow
-def test_run_computes_a_room_without_windows_and_says_what_it_borrows(
-    two_rooms: Path, tmp_path: Path
-) -> None:
+def test_run_computes_a_room_without_windows_and_says_what_it_borrows(two_rooms: Path, tmp_path: Path) -> None:
     from scenes.cli import cfs
 
-    call = ["run", str(two_rooms), "--weather", str(WEATHER), "--cfs", str(VENETIAN_BLIND),
-            "--quick", "--size", "32", "--space", "dark"]  # fmt: skip
+    call = [
+        "run",
+        str(two_rooms),
+        "--weather",
+        str(WEATHER),
+        "--cfs",
+        str(VENETIAN_BLIND),
+        "--quick",
+        "--size",
+        "32",
+        "--space",
+        "dark",
+    ]
     without = CliRunner().invoke(cfs, [*call, "--out", str(tmp_path / "closed")])
     assert without.exit_code != 0 and "has no window" in str(without.exception)
     result = CliRunner().invoke(cfs, [*call, "--inner-glass", "--out", str(tmp_path / "open")])

@@ -30,9 +30,7 @@ def zones():
     guids = [space.guid for space in building.spaces]
     return {
         among: [
-            operated_zone(
-                room_inputs(building, space, systems, weather, SMALL, skies=skies, together=among)
-            )
+            operated_zone(room_inputs(building, space, systems, weather, SMALL, skies=skies, together=among))
             for space in building.spaces
         ]
         for among in ((), tuple(guids))
@@ -77,23 +75,17 @@ def test_a_doorway_lets_all_of_it_through(variant, zones) -> None:
     spaces = [
         replace(
             space,
-            faces=tuple(
-                f if f.pane is None else replace(f, pane=replace(f.pane, is_open=True))
-                for f in space.faces
-            ),
+            faces=tuple(f if f.pane is None else replace(f, pane=replace(f.pane, is_open=True)) for f in space.faces),
         )
         for space in building.spaces
     ]
     building = replace(building, spaces=tuple(spaces))
     systems = in_all_windows(spaces[0], read_system(VENETIAN_BLIND))
-    room = room_inputs(
-        building, spaces[0], systems, weather, SMALL, together=[s.guid for s in spaces]
-    )
+    room = room_inputs(building, spaces[0], systems, weather, SMALL, together=[s.guid for s in spaces])
     opened = operated_zone(room)
     panes = [i for i, face in enumerate(spaces[0].faces) if face.pane is not None]
     assert all(not opened.sun_beyond[spaces[0].guid, i].any() for i in panes)
     passed = [
-        sum(v.sum() for (guid, _), v in zone.sun_beyond.items() if guid == spaces[1].guid)
-        for zone in (front, opened)
+        sum(v.sum() for (guid, _), v in zone.sun_beyond.items() if guid == spaces[1].guid) for zone in (front, opened)
     ]
     assert passed[1] == pytest.approx(passed[0] / 0.75, rel=0.12)  # diffuse transmittance of glass

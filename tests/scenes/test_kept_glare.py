@@ -23,9 +23,14 @@ from scenes.room.options import RoomOptions
 
 EVERY = 211  # hour with the sun up
 OPTIONS = RoomOptions.of(
-    sky_subdivision=1, sensor_samples=64, patch_samples=128, sun_points=16, picture_size=48,
-    picture_samples=4, sensor_spacing=1.5,
-)  # fmt: skip
+    sky_subdivision=1,
+    sensor_samples=64,
+    patch_samples=128,
+    sun_points=16,
+    picture_size=48,
+    picture_samples=4,
+    sensor_spacing=1.5,
+)
 
 
 def pane(transmittance: float) -> FenestrationSystem:
@@ -44,9 +49,7 @@ def rated(skies, folder: Path, states, state=0, width: float = 2.0) -> AnnualGla
     building = shoebox(3.0, 4.0, windows=[WindowRectangle(0.5, 0.8, width, 1.8)])
     (space,) = building.spaces
     systems = {window.guid: tuple(states) for window in space.windows}
-    room = room_inputs(
-        building, space, systems, read_epw(WEATHER), OPTIONS, skies=skies, cache=MatrixCache(folder)
-    )
+    room = room_inputs(building, space, systems, read_epw(WEATHER), OPTIONS, skies=skies, cache=MatrixCache(folder))
     of_hours = np.broadcast_to(state, skies.hours)[:, None]
     return rated_hours(room, room_light(room), of_hours, "DGP", skies.lit)
 

@@ -12,10 +12,16 @@ from scenes.room.zone import operated
 from tests.thermal.rooms import box
 
 GAINS = {
-    "lighting_w_m2": 10.0, "lighting_target_lx": 500.0, "lighting_least_light": 0.2,
-    "lighting_least_power": 0.3, "lighting_sensor_factor": 0.8, "lighting_standby_w_m2": 0.5,
-    "equipment_w_m2": 0.0, "persons": 0.0, "occupied": [8, 18],
-}  # fmt: skip
+    "lighting_w_m2": 10.0,
+    "lighting_target_lx": 500.0,
+    "lighting_least_light": 0.2,
+    "lighting_least_power": 0.3,
+    "lighting_sensor_factor": 0.8,
+    "lighting_standby_w_m2": 0.5,
+    "equipment_w_m2": 0.0,
+    "persons": 0.0,
+    "occupied": [8, 18],
+}
 
 
 @pytest.mark.parametrize(("off", "bright"), [(False, 0.3), (True, 0.0)])

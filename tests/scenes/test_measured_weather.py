@@ -20,9 +20,13 @@ from scenes.heat.measured_weather import MeasuredTable, read_measured
 from scenes.heat.study_file import StudyFile
 
 COLUMNS = {
-    "dry_bulb_c": "T", "diffuse_horizontal": "D", "global_horizontal": "G",
-    "horizontal_infrared": "L", "relative_humidity": "RH", "wind_speed": "v",
-}  # fmt: skip
+    "dry_bulb_c": "T",
+    "diffuse_horizontal": "D",
+    "global_horizontal": "G",
+    "horizontal_infrared": "L",
+    "relative_humidity": "RH",
+    "wind_speed": "v",
+}
 PLACE = {"latitude_deg": 47.874, "longitude_deg": 11.728, "timezone_h": 1.0, "elevation_m": 680.0}
 
 
@@ -35,8 +39,7 @@ def frame(minutes: int = 10, days: float = 2.5, start: str = "2014-04-09T18:00")
     count = round(days * 24 * 60 / minutes)
     step = pd.Timedelta(minutes=minutes)
     times = pd.date_range(pd.Timestamp(start) + step, periods=count, freq=step)
-    place = Weather("x", 47.874, 11.728, 1.0, 680.0, minutes / 60.0, times,
-                    np.zeros(count), np.zeros(count))  # fmt: skip
+    place = Weather("x", 47.874, 11.728, 1.0, 680.0, minutes / 60.0, times, np.zeros(count), np.zeros(count))
     up = np.clip(sun_directions(place)[:, 2], 0.0, None)
     return pd.DataFrame(
         {
@@ -78,8 +81,7 @@ def test_measured_direct_normal_is_taken_as_it_is(tmp_path) -> None:
     data = frame(60)
     data["B"] = 123.0
     columns = {k: v for k, v in COLUMNS.items() if k != "global_horizontal"}
-    weather = read_measured(written(tmp_path, data),
-                            table_of(columns=columns | {"direct_normal": "B"}))  # fmt: skip
+    weather = read_measured(written(tmp_path, data), table_of(columns=columns | {"direct_normal": "B"}))
     assert set(weather.direct_normal) == {123.0}
 
 
@@ -160,19 +162,17 @@ def test_energyplus_is_not_given_measured_weather(tmp_path) -> None:
     with pytest.raises(DataError, match="EnergyPlus needs an EPW file") as found:
         check_twin(study)
     assert found.value.file == study.weather and found.value.field == "measured"
-    check_twin(
-        SimpleNamespace(
-            measured=None, heat_island=None, air_nodes=(), weather=tmp_path / "city.epw"
-        )
-    )
+    check_twin(SimpleNamespace(measured=None, heat_island=None, air_nodes=(), weather=tmp_path / "city.epw"))
 
 
 def test_a_few_days_say_nothing_of_the_ground(tmp_path) -> None:
     path = written(tmp_path, frame(60))
     table = {
-        "weather": path, "measured": PLACE | {"columns": COLUMNS},
+        "weather": path,
+        "measured": PLACE | {"columns": COLUMNS},
         "box": {"width": 4, "depth": 5, "height": 3, "window": []},
-        "system": [{"bsdf": VENETIAN_BLIND}], "envelope": {"ground": {"perimeter": 9}},
-    }  # fmt: skip
+        "system": [{"bsdf": VENETIAN_BLIND}],
+        "envelope": {"ground": {"perimeter": 9}},
+    }
     with pytest.raises(DataError, match="the ground follows a year of weather, got 2 days"):
         read_files(StudyFile.model_validate(table), tmp_path / "study.toml")

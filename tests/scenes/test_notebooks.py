@@ -20,8 +20,7 @@ SHOWN = {
     "control": ("By use", "straight_view_percent"),
 }
 WITH_CLIENT = pytest.mark.skipif(
-    importlib.util.find_spec("nbclient") is None or importlib.util.find_spec("ipykernel") is None,
-    reason="no nbclient",
+    importlib.util.find_spec("nbclient") is None or importlib.util.find_spec("ipykernel") is None, reason="no nbclient"
 )
 
 

@@ -77,9 +77,7 @@ def test_light_needs_a_wea_and_heat_an_epw(tmp_path, capsys):
         assert cli.run([*call, file, "--out", str(tmp_path / "a.png")]) == 0
         shown[file] = capsys.readouterr().out
     assert "city.wea states no dew point: that of Radiance's programs, 11.0" in shown[str(wea)]
-    values = [
-        float(re.search(r"Ev ([\d,]+) lx", text)[1].replace(",", "")) for text in shown.values()
-    ]
+    values = [float(re.search(r"Ev ([\d,]+) lx", text)[1].replace(",", "")) for text in shown.values()]
     assert values[0] == pytest.approx(values[1], rel=0.05) and values[0] != values[1]
     run = ["run", "--weather", str(wea), "--out", str(tmp_path / "out"), str(OFFICE)]
     assert cli.run(run) != 0

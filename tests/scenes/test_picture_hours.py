@@ -18,9 +18,7 @@ def test_an_hour_is_said_with_or_without_minutes(text: str) -> None:
     assert wanted_hours((text,), YEAR, np.array([NOON])) == [NOON]
 
 
-@pytest.mark.parametrize(
-    "text", ["noon", "06-31 12", "06-21", "06-21 24", "06-21T12", "06-21 12:60"]
-)
+@pytest.mark.parametrize("text", ["noon", "06-31 12", "06-21", "06-21 24", "06-21T12", "06-21 12:60"])
 def test_what_is_no_hour_is_refused_by_its_flag(text: str) -> None:
     with pytest.raises(PictureHourError, match=f"--at '{text}': expected month, day and hour"):
         hour_of(text, YEAR, "--at")

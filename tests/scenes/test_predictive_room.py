@@ -22,10 +22,7 @@ from scenes.room.windows import in_all_windows
 from tests.scenes.small_box import HOURS
 from tests.scenes.test_control_function import FEW, TWO
 
-TABLES = {
-    "gains": {"lighting_w_m2": 10.0, "occupied": [0, 24]},
-    "loads": {"heating_c": 20.0, "cooling_c": 26.0},
-}
+TABLES = {"gains": {"lighting_w_m2": 10.0, "occupied": [0, 24]}, "loads": {"heating_c": 20.0, "cooling_c": 26.0}}
 
 
 @pytest.fixture(scope="module")
@@ -35,10 +32,15 @@ def of(variant, glass, milk, blind, weather, skies):
     def year(limit: float, controller=None, **predictive) -> ControlYear:
         control = {"rule": "predictive", "limit_dgp": limit, "predictive": predictive}
         room = room_inputs(
-            TWO, TWO.spaces[0], in_all_windows(TWO.spaces[0], glass, milk, blind), weather, FEW,
+            TWO,
+            TWO.spaces[0],
+            in_all_windows(TWO.spaces[0], glass, milk, blind),
+            weather,
+            FEW,
             operation=OperationTables.model_validate({"control": control} | TABLES),
-            skies=skies, controller=controller,
-        )  # fmt: skip
+            skies=skies,
+            controller=controller,
+        )
         light = room_light(room)
         return ControlYear(room, light, seasonal_outdoors(room, light))
 

@@ -78,9 +78,7 @@ def test_rooms_on_a_terminal_say_which_and_how_long(drawn: ProgressBar) -> None:
             steps("daylight", 0.5)
             clock.now += 80.0
             steps("daylight", 1.0)
-        assert bars(progress) == [
-            ("sky", 1.0), ("room 3 of 6, about 4 min left", 2 / 6), ("R3: daylight", 1.0)
-        ]  # fmt: skip
+        assert bars(progress) == [("sky", 1.0), ("room 3 of 6, about 4 min left", 2 / 6), ("R3: daylight", 1.0)]
         progress("results", 0.0)
         assert bars(progress) == [("sky", 1.0), ("6 rooms", 1.0), ("results", 0.0)]
 
@@ -158,9 +156,16 @@ def test_time_left_is_that_of_the_items_before() -> None:
 
 @pytest.mark.parametrize(
     ("seconds", "words"),
-    [(None, ""), (0.0, "about 10 s left"), (44.0, "about 40 s left"), (250.0, "about 4 min left"),
-     (5600.0, "about 93 min left"), (8000.0, "about 2 h left"), (9000.0, "about 2.5 h left")],
-)  # fmt: skip
+    [
+        (None, ""),
+        (0.0, "about 10 s left"),
+        (44.0, "about 40 s left"),
+        (250.0, "about 4 min left"),
+        (5600.0, "about 93 min left"),
+        (8000.0, "about 2 h left"),
+        (9000.0, "about 2.5 h left"),
+    ],
+)
 def test_time_left_in_words(seconds: float | None, words: str) -> None:
     assert spoken_left(seconds) == words
 

@@ -12,10 +12,16 @@ from scenes.provision_levels import level_number, provision_levels
 @pytest.mark.parametrize(
     ("lower", "upper", "number"),
     [
-        (99, 9000, 0), (100, 299, 0), (100, 300, 1), (299, 9000, 1), (300, 500, 2),
-        (499, 9000, 2), (500, 749, 2), (500, 750, 3),
+        (99, 9000, 0),
+        (100, 299, 0),
+        (100, 300, 1),
+        (299, 9000, 1),
+        (300, 500, 2),
+        (499, 9000, 2),
+        (500, 749, 2),
+        (500, 750, 3),
     ],
-)  # fmt: skip
+)
 def test_levels_of_table_a1(lower, upper, number):
     assert level_number(DaylightProvision(upper, lower)) == number
 

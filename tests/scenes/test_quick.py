@@ -115,9 +115,7 @@ def test_without_quick_nothing_is_chosen(chosen: list) -> None:
     assert chosen == [JobOptions(OFFICE, WEATHER, VENETIAN_BLIND)]
 
 
-@pytest.mark.parametrize(
-    ("words", "colour"), [([], True), (["--no-colour"], False), (["--quick"], False)]
-)
+@pytest.mark.parametrize(("words", "colour"), [([], True), (["--no-colour"], False), (["--quick"], False)])
 def test_a_quick_run_has_no_picture_in_colour(chosen: list, words: list[str], colour: bool) -> None:
     run([*RUN, *words])
     assert [options.colour for options in chosen] == [colour]
@@ -166,9 +164,7 @@ def test_one_picture_is_the_brightest_hours() -> None:
 @pytest.fixture
 def three_rooms(monkeypatch: pytest.MonkeyPatch, no_pictures: None) -> SimpleNamespace:
     """Rooms of which the third equals the first, each computed by a stub."""
-    rooms = [
-        SimpleNamespace(guid=g, label=g.upper(), template="", windows=()) for g in ("a", "b", "c")
-    ]
+    rooms = [SimpleNamespace(guid=g, label=g.upper(), template="", windows=()) for g in ("a", "b", "c")]
     a, b, c = rooms
     for module in (rooms_of_a_run, rooms_together):
         monkeypatch.setattr(module, "template_rooms", lambda spaces: [(a, c), (b,)])
@@ -179,9 +175,8 @@ def three_rooms(monkeypatch: pytest.MonkeyPatch, no_pictures: None) -> SimpleNam
 def test_each_room_is_told_when_it_is_computed_in_their_order(three_rooms, monkeypatch) -> None:
     said: list[str] = []
     monkeypatch.setattr(
-        rooms, "compute_room",
-        lambda building, space, *_, **__: said.append(f"computed {space.guid}") or space,
-    )  # fmt: skip
+        rooms, "compute_room", lambda building, space, *_, **__: said.append(f"computed {space.guid}") or space
+    )
     told = lambda room: said.append(f"told {room.guid}")  # noqa: E731
     options = replace(JobOptions(OFFICE, WEATHER), cache=False, coupled_heat=False)
     results, _, _ = rooms.computed_rooms(three_rooms, None, options, lambda *_: None, on_room=told)
@@ -192,9 +187,8 @@ def test_each_room_is_told_when_it_is_computed_in_their_order(three_rooms, monke
 def test_progress_counts_the_rooms(three_rooms, monkeypatch) -> None:
     seen = []
     monkeypatch.setattr(
-        rooms, "compute_room",
-        lambda building, space, *_, progress, **__: progress("light", 0.5) or space,
-    )  # fmt: skip
+        rooms, "compute_room", lambda building, space, *_, progress, **__: progress("light", 0.5) or space
+    )
     options = replace(JobOptions(OFFICE, WEATHER), cache=False, coupled_heat=False)
     progress = lambda stage, _: seen.append((stage.number, stage.total, stage))  # noqa: E731
     rooms.computed_rooms(three_rooms, None, options, progress, on_room=lambda room: None)

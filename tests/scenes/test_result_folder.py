@@ -141,9 +141,7 @@ def test_a_kill_between_two_files_is_made_good_by_the_next_run(tmp_path, moves):
     out = tmp_path / "out"
     write(out, a="1", b="1", c="1")
     (out / "mine").write_text("mine")
-    done = subprocess.run(
-        [sys.executable, "-c", CUT, str(out), str(moves)], cwd=REPOSITORY, check=False
-    )
+    done = subprocess.run([sys.executable, "-c", CUT, str(out), str(moves)], cwd=REPOSITORY, check=False)
     old = {"a": "1", "b": "1", "c": "1", "mine": "mine"}
     new = {"b": "2", "c": "2", "d": "2", "mine": "mine"}
     assert (done.returncode == -9) == (moves < 5)
@@ -237,16 +235,14 @@ def test_matrices_on_a_full_disk_are_one_error_and_no_bus_error(tmp_path):
         "_storage((4096, 1024), True, Path(sys.argv[1]))[:] = 1\n"
     )
     mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=1m", "none", str(tmp_path)],
-        capture_output=True, check=False,
-    )  # fmt: skip
+        ["mount", "-t", "tmpfs", "-o", "size=1m", "none", str(tmp_path)], capture_output=True, check=False
+    )
     if mounted.returncode:
         pytest.skip("no disk can be mounted here")
     try:
         done = subprocess.run(
-            [sys.executable, "-c", code, str(tmp_path)],
-            cwd=REPOSITORY, capture_output=True, text=True, check=False,
-        )  # fmt: skip
+            [sys.executable, "-c", code, str(tmp_path)], cwd=REPOSITORY, capture_output=True, text=True, check=False
+        )
     finally:
         subprocess.run(["umount", "-l", str(tmp_path)], check=False)
     assert done.returncode == 1 and "the disk is full" in done.stderr, done

@@ -48,15 +48,17 @@ def coloured(room: Space, weather, states, hour: int = 4116, state: int = 0) -> 
     windows = room_windows(room, in_all_windows(room, *states))
     building = replace(BOX, spaces=(room,))
     return with_colour(
-        pictures(), band_scenes(building, room, windows.groups, VIEW),
-        windows.optics_by_colour(windows.optics()), annual_sky(weather, 1, hours=[hour]),
-        state=[state] * len(windows.groups), sampling=SMALL.sampling, progress=lambda *_: None,
-    )  # fmt: skip
+        pictures(),
+        band_scenes(building, room, windows.groups, VIEW),
+        windows.optics_by_colour(windows.optics()),
+        annual_sky(weather, 1, hours=[hour]),
+        state=[state] * len(windows.groups),
+        sampling=SMALL.sampling,
+        progress=lambda *_: None,
+    )
 
 
-def test_the_brightest_picture_keeps_its_luminance_and_gets_the_rooms_colours(
-    variant, weather, glass
-) -> None:
+def test_the_brightest_picture_keeps_its_luminance_and_gets_the_rooms_colours(variant, weather, glass) -> None:
     found = coloured(painted(ROOM), weather, (glass,))
     assert found.pictures and found.colour is not None
     assert found.colour.hour == brightest_picture(found).hour == 4116
@@ -69,9 +71,7 @@ def test_the_brightest_picture_keeps_its_luminance_and_gets_the_rooms_colours(
 
 def test_the_hours_shading_state_holds(variant, weather, glass, milk) -> None:
     """Through glass the sky is blue beside the ground; what scatters mixes both."""
-    clear_view, mixed = (
-        coloured(ROOM, weather, (glass, milk), state=state).colour.radiance for state in (0, 1)
-    )
+    clear_view, mixed = (coloured(ROOM, weather, (glass, milk), state=state).colour.radiance for state in (0, 1))
     window = slice(12, 20), slice(12, 20)
     blue = [(p[..., 2] / p[..., 0])[window] for p in (clear_view, mixed)]
     assert np.ptp(blue[0]) > 1.5 * np.ptp(blue[1])

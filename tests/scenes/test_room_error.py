@@ -24,19 +24,14 @@ from scenes.run import run as job
 from scenes.run.options import JobOptions
 from scenes.study import store as schedule
 
-OPTIONS = JobOptions(
-    OFFICE, WEATHER, cache=False, room=RoomOptions.of(sky_subdivision=1), coupled_heat=False
-)
+OPTIONS = JobOptions(OFFICE, WEATHER, cache=False, room=RoomOptions.of(sky_subdivision=1), coupled_heat=False)
 
 
 def box(name: str, height: float) -> Space:
     """A room with a low window, as high as that [m]."""
     window = WindowRectangle(0.5, 0.1, 2.0, 0.4)
     (space,) = shoebox(3.0, 4.0, height, windows=(window,), name=name).spaces
-    return replace(
-        space, guid=name,
-        windows=tuple(replace(w, guid=f"{name} {w.guid}") for w in space.windows),
-    )  # fmt: skip
+    return replace(space, guid=name, windows=tuple(replace(w, guid=f"{name} {w.guid}") for w in space.windows))
 
 
 def inputs_of(*spaces: Space) -> job.Inputs:
@@ -89,8 +84,7 @@ def no_variant(*_, **__) -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "kind", "word"),
-    [(shape_bug, ValueError, "broadcast"), (no_variant, DataError, "no longer")],
+    ("fault", "kind", "word"), [(shape_bug, ValueError, "broadcast"), (no_variant, DataError, "no longer")]
 )
 def test_a_fault_of_the_program_is_no_news_about_a_room(
     variant, monkeypatch, fault: Callable, kind: type[Exception], word: str

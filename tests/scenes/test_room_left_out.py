@@ -31,9 +31,7 @@ def outdoors(tmp_path):
 def commands(path, folder):
     system, weather = ["--cfs", VENETIAN_BLIND], ["--weather", WEATHER]
     thermal, study = folder / "thermal.toml", folder / "study.toml"
-    thermal.write_text(
-        f'weather = "{WEATHER}"\nbuilding = "{path}"\n[[system]]\nbsdf = "{VENETIAN_BLIND}"\n'
-    )
+    thermal.write_text(f'weather = "{WEATHER}"\nbuilding = "{path}"\n[[system]]\nbsdf = "{VENETIAN_BLIND}"\n')
     study.write_text(
         f'[[room]]\nname = "r"\nbuilding = "{path}"\n[[system]]\nbsdf = "{VENETIAN_BLIND}"\n'
         f'[[climate]]\nweather = "{WEATHER}"\n'
@@ -93,9 +91,7 @@ def test_the_tables_of_check_are_whole_when_piped(tmp_path, capsys):
         assert all(cell in said for cell in row[:3])  # not code and severity
 
 
-@pytest.mark.parametrize(
-    "command", [["run"], ["comply", "--standard", "en17037"], ["dgp"]], ids=lambda words: words[0]
-)
+@pytest.mark.parametrize("command", [["run"], ["comply", "--standard", "en17037"], ["dgp"]], ids=lambda words: words[0])
 def test_a_model_without_windows_whose_file_is_cut_off(command, tmp_path, capsys):
     """What is missing may stand in the part that is lost: that is said, not that there is none."""
     small = empty_project()

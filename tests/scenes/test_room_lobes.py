@@ -14,9 +14,8 @@ from scenes.room.windows import in_all_windows
 from tests.scenes.small_box import BOX, ROOM, SMALL
 
 FEW = SMALL.changed(
-    sensor_samples=256, patch_samples=64, sun_points=16, picture_size=32, picture_samples=2,
-    picture_count=2,
-)  # fmt: skip
+    sensor_samples=256, patch_samples=64, sun_points=16, picture_size=32, picture_samples=2, picture_count=2
+)
 
 
 @pytest.mark.parametrize("rated", [False, True])
@@ -30,8 +29,7 @@ def test_the_lobe_of_a_room_is_the_room_with_a_lobe(variant, blind, weather, ski
     effect = beam.as_lobe
     assert not lobe.as_lobe  # its peak is stated
     values = [
-        room.dgp.dgp if rated else np.array([p.glare["dgp"] for p in room.glare.pictures])
-        for room in (beam, lobe)
+        room.dgp.dgp if rated else np.array([p.glare["dgp"] for p in room.glare.pictures]) for room in (beam, lobe)
     ]
     most = np.argmax(np.abs(values[1] - values[0]))
     assert effect["dgp_as_beam"] == pytest.approx(values[0][most], rel=1e-6)
@@ -49,9 +47,8 @@ def test_the_lobe_of_a_room_is_the_room_with_a_lobe(variant, blind, weather, ski
 def test_three_phase_figures_of_a_room_hold_the_blurred_sun(variant, glass, weather, skies) -> None:
     options = FEW.changed(method="three-phase")
     room = lit_room(
-        BOX, ROOM, in_all_windows(ROOM, glass), weather, options, skies=skies, pictures=False,
-        rate=("DGP", skies.lit),
-    )  # fmt: skip
+        BOX, ROOM, in_all_windows(ROOM, glass), weather, options, skies=skies, pictures=False, rate=("DGP", skies.lit)
+    )
     figures = method_figures(room)
     assert figures["sunny_hour_error_max"] >= figures["sunny_hour_error_mean"] > 5
     assert figures["dgp_sunny_hour_error"] > 0.001

@@ -37,9 +37,15 @@ pytestmark = pytest.mark.early
 
 SCENES = Path(__file__).parents[2] / "scenes"
 SAMPLING = {
-    "sensor_spacing": 1.0, "sensor_samples": 1024, "patch_samples": 512, "sun_points": 128,
-    "sky_subdivision": 1, "picture_size": 64, "picture_samples": 2, "seed": 3,
-}  # fmt: skip
+    "sensor_spacing": 1.0,
+    "sensor_samples": 1024,
+    "patch_samples": 512,
+    "sun_points": 128,
+    "sky_subdivision": 1,
+    "picture_size": 64,
+    "picture_samples": 2,
+    "seed": 3,
+}
 TABLES = """
 [gains]
 lighting_w_m2 = 10
@@ -59,9 +65,7 @@ def weather() -> Weather:
     return read_epw(WEATHER)
 
 
-@pytest.mark.parametrize(
-    "method", ["three-phase", pytest.param("five-phase", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("method", ["three-phase", pytest.param("five-phase", marks=pytest.mark.slow)])
 def test_three_commands_give_the_same_numbers(variant, tmp_path, method) -> None:
     """A room of the demo's office with lamps that daylight dims: bit for bit."""
     operation, thermal, grid = (tmp_path / name for name in ("o.toml", "t.toml", "s.toml"))
@@ -78,11 +82,13 @@ def test_three_commands_give_the_same_numbers(variant, tmp_path, method) -> None
         f"[options]\n{TRACE}\nspectral = true\nchannels = 3\n"
     )
     options = JobOptions(
-        OFFICE, WEATHER, VENETIAN_BLIND, ("A",), operation=operation,
-        room=RoomOptions.of(
-            method=method, picture_hours=("06-21 12",), spectral=True, channels=3, **SAMPLING
-        ),
-    )  # fmt: skip
+        OFFICE,
+        WEATHER,
+        VENETIAN_BLIND,
+        ("A",),
+        operation=operation,
+        room=RoomOptions.of(method=method, picture_hours=("06-21 12",), spectral=True, channels=3, **SAMPLING),
+    )
     (room,) = run_job(options).spaces
     (year,), _ = run_study(read_study(thermal), silent)
     (case,) = plan_of(read_grid(grid)).cases
@@ -149,18 +155,21 @@ def test_states_switch_in_the_same_hours(variant, tmp_path, weather, rule) -> No
     for name in ("open", "shut"):
         (tmp_path / f"{name}.xml").write_bytes(VENETIAN_BLIND.read_bytes())
     (tmp_path / "o.toml").write_text(text)
-    (tmp_path / "t.toml").write_text(
-        f'weather = "{WEATHER}"\n{BOX}{text}[trace]\nview_factors = false\n{TRACE}\n'
-    )
+    (tmp_path / "t.toml").write_text(f'weather = "{WEATHER}"\n{BOX}{text}[trace]\nview_factors = false\n{TRACE}\n')
     study, operation = read_study(tmp_path / "t.toml"), read_operation(tmp_path / "o.toml")
     (year,), _ = run_study(study, silent)
     inputs = study_inputs(study)
     building, (space,) = inputs.building, inputs.spaces
     found = compute_room(
-        building, space, in_all_windows(space, *operation.systems), weather,
-        RoomOptions.of(**SAMPLING), operation=operation, pictures=False,
+        building,
+        space,
+        in_all_windows(space, *operation.systems),
+        weather,
+        RoomOptions.of(**SAMPLING),
+        operation=operation,
+        pictures=False,
         cache=MatrixCache.of_user(),
-    )  # fmt: skip
+    )
     ran = found.operation.hours
     assert 0 < ran["shading_state"].mean() < 1
     for name in ("shading_state", "heating_w", "cooling_w"):
@@ -198,10 +207,7 @@ def test_a_room_without_windows_has_a_zone_in_the_dark(variant, weather) -> None
 
 
 def office(
-    building: Building,
-    weather: Weather,
-    options: RoomOptions,
-    tables: OperationTables | None = None,
+    building: Building, weather: Weather, options: RoomOptions, tables: OperationTables | None = None
 ) -> RoomInputs:
     """The building's only room with the demo's blind."""
     (space,) = building.spaces

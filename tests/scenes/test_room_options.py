@@ -7,15 +7,7 @@ from dataclasses import fields
 import pytest
 
 from mitsuba_cfs.methods.scene import Sampling
-from scenes.room.options import (
-    CHOICES,
-    NAMES,
-    Occupancy,
-    Outputs,
-    RoomOptions,
-    SensorGrid,
-    named_types,
-)
+from scenes.room.options import CHOICES, NAMES, Occupancy, Outputs, RoomOptions, SensorGrid, named_types
 
 # of `Sampling`, and no choice of a user: they follow from others, or from the machine
 FOLLOW = {("sampling", "picture_samples"), ("sampling", "outdoor_samples"), ("sampling", "memory")}

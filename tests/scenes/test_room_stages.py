@@ -18,9 +18,14 @@ from scenes.room.windows import in_all_windows
 from tests.scenes.small_box import BOX, ROOM, SMALL
 
 FEW = SMALL.changed(
-    sensor_samples=256, patch_samples=64, sun_points=16, picture_size=32, picture_samples=2,
-    picture_count=1, heat_step_s=3600.0,
-)  # fmt: skip
+    sensor_samples=256,
+    patch_samples=64,
+    sun_points=16,
+    picture_size=32,
+    picture_samples=2,
+    picture_count=1,
+    heat_step_s=3600.0,
+)
 WALL = np.array([[[-9, -6, 0], [12, -6, 0], [12, -6, 9]]], dtype=float)
 
 
@@ -40,9 +45,14 @@ def inputs(variant, glass, weather, skies):
         opposite = Element("w", "wall", "IfcWall", WALL, visible, solar)
         operation = None if tables is None else OperationTables.model_validate(tables)
         return room_inputs(
-            replace(BOX, elements=(opposite,)), ROOM, in_all_windows(ROOM, glass), weather, FEW,
-            operation=operation, skies=skies,
-        )  # fmt: skip
+            replace(BOX, elements=(opposite,)),
+            ROOM,
+            in_all_windows(ROOM, glass),
+            weather,
+            FEW,
+            operation=operation,
+            skies=skies,
+        )
 
     return of
 
@@ -59,9 +69,7 @@ def test_heat_without_a_reader_of_daylight_traces_no_light(inputs, monkeypatch, 
 
 
 @pytest.mark.parametrize(
-    "tables",
-    [{"gains": {"lighting_w_m2": 8}}, {"control": {"rule": "glare"}}],
-    ids=["dimmed lamps", "glare"],
+    "tables", [{"gains": {"lighting_w_m2": 8}}, {"control": {"rule": "glare"}}], ids=["dimmed lamps", "glare"]
 )
 def test_lamps_and_glare_read_the_light(inputs, monkeypatch, tables) -> None:
     monkeypatch.setattr(page, "room_light", computed)

@@ -53,10 +53,16 @@ def named(spaces: list[Space], fails: str = "", alike: bool = True) -> tuple[Roo
         return f"here {space.name}"
 
     return RoomSeries(
-        replace(BOX, spaces=tuple(spaces)), spaces, {}, SMALL.sampling, None, here,
+        replace(BOX, spaces=tuple(spaces)),
+        spaces,
+        {},
+        SMALL.sampling,
+        None,
+        here,
         lambda result, space: f"{space.name} like {result}",
-        alike=lambda one, other: alike, parallel=parallel,
-    ), asked  # fmt: skip
+        alike=lambda one, other: alike,
+        parallel=parallel,
+    ), asked
 
 
 @pytest.fixture(autouse=True)
@@ -146,17 +152,20 @@ def test_two_processes_give_what_one_gives(variant, weather, glass, monkeypatch)
     building: Building = replace(BOX, spaces=tuple(spaces))
     systems = {w.guid: (glass,) for s in spaces for w in s.windows}
     room = RoomOptions.of(
-        sky_subdivision=1, sensor_spacing=1.0, sensor_samples=512, patch_samples=256,
-        picture_size=64, picture_count=1, picture_samples=1,
-    )  # fmt: skip
+        sky_subdivision=1,
+        sensor_spacing=1.0,
+        sensor_samples=512,
+        patch_samples=256,
+        picture_size=64,
+        picture_count=1,
+        picture_samples=1,
+    )
     inputs = Inputs(building, spaces, weather, systems, None)
     options = JobOptions(Path(__file__), Path(__file__), cache=False, room=room)
     told: list[SimpleNamespace] = []
     one = run_inputs(inputs, options)
     two = run_inputs(inputs, options, workers=Workers(2), on_light=told.append)
-    assert [r.space.name for r in two.spaces] == [r.space.name for r in told] == [
-        "room", "deep", "shallow",
-    ]  # fmt: skip
+    assert [r.space.name for r in two.spaces] == [r.space.name for r in told] == ["room", "deep", "shallow"]
     for mine, theirs in zip(one.spaces, two.spaces, strict=True):
         np.testing.assert_array_equal(mine.daylight.illuminance, theirs.daylight.illuminance)
         np.testing.assert_array_equal(mine.heat.air_c, theirs.heat.air_c)
@@ -173,9 +182,14 @@ def test_workers_of_a_cluster_give_what_one_process_gives(variant, tmp_path_fact
     from tests.scenes.test_study_cluster import Cluster
 
     room = RoomOptions.of(
-        sky_subdivision=1, sensor_spacing=1.0, sensor_samples=512, patch_samples=256,
-        picture_size=64, picture_count=1, picture_samples=1,
-    )  # fmt: skip
+        sky_subdivision=1,
+        sensor_spacing=1.0,
+        sensor_samples=512,
+        patch_samples=256,
+        picture_size=64,
+        picture_count=1,
+        picture_samples=1,
+    )
     building = REPOSITORY / "docs" / "tutorials" / "two_rooms.hbjson"
     options = JobOptions(building, WEATHER, VENETIAN_BLIND, cache=False, room=room)
     cluster = Cluster(tmp_path_factory.mktemp("dask"), 2)
@@ -248,13 +262,7 @@ def said_of(item: str, error: BaseException) -> str:
 
 def test_a_process_that_ends_takes_no_other_task_with_it(tmp_path):
     """One killed for memory is done again; one that aborts alone too has failed; others go on."""
-    items = [
-        "slow:1",
-        f"once:{tmp_path / 'told'}",
-        "slow:2",
-        "always:",
-        *(f"n:{i}" for i in range(9)),
-    ]
+    items = ["slow:1", f"once:{tmp_path / 'told'}", "slow:2", "always:", *(f"n:{i}" for i in range(9))]
     tasks = Tasks(items, ends_its_process, said_of, key=str, scene=str)
     results = list(tasks.results(processes=2))
     failed = [one for one in results if "failed" in one]

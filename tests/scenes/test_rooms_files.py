@@ -19,9 +19,11 @@ def test_files_of_rooms_beside_each_other(processes, tmp_path, monkeypatch):
     result, told = run_result(picture_size=60, pictures=1), []
     for name, count in (("one", 1), ("some", processes)):
         outputs.write_results(
-            result, ResultFolder(tmp_path / name, "run"),
-            processes=count, progress=lambda stage, share: told.append((stage, share)),
-        )  # fmt: skip
+            result,
+            ResultFolder(tmp_path / name, "run"),
+            processes=count,
+            progress=lambda stage, share: told.append((stage, share)),
+        )
     assert told == 2 * [("results", 1 / 3), ("results", 2 / 3)]
     one, some = (_files(tmp_path / name) for name in ("one", "some"))
     assert len(one) > 20
@@ -39,9 +41,8 @@ def test_a_room_that_cannot_be_written_ends_the_writing(processes, tmp_path, mon
     second = replace(second, glare=replace(second.glare, pictures=(picture,)))
     with pytest.raises(ValueError, match="cannot hold negative"):
         outputs.write_results(
-            replace(result, spaces=(first, second)),
-            ResultFolder(tmp_path / "out", "run"), processes=processes,
-        )  # fmt: skip
+            replace(result, spaces=(first, second)), ResultFolder(tmp_path / "out", "run"), processes=processes
+        )
     assert list(tmp_path.iterdir()) == []
 
 

@@ -25,13 +25,17 @@ from scenes.room.room import compute_room
 from scenes.room.windows import in_all_windows
 from tests.scenes.small_box import BOX, ROOM, SMALL
 
-OF_A_ROOM = (
-    RoomLight, PhaseMatrices, PhaseLight, PathLight, ReflectedSun,
-)  # fmt: skip
+OF_A_ROOM = (RoomLight, PhaseMatrices, PhaseLight, PathLight, ReflectedSun)
 FEW = SMALL.changed(
-    sensor_samples=256, patch_samples=64, sun_points=16, picture_size=32, picture_samples=2,
-    path_samples=16, picture_count=1, heat_step_s=3600.0,
-)  # fmt: skip
+    sensor_samples=256,
+    patch_samples=64,
+    sun_points=16,
+    picture_size=32,
+    picture_samples=2,
+    path_samples=16,
+    picture_count=1,
+    heat_step_s=3600.0,
+)
 
 
 @pytest.fixture

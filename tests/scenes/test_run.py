@@ -27,12 +27,7 @@ NETCDF = find_spec("xarray") is not None and find_spec("h5netcdf") is not None
 
 def call(out, *options, building=OFFICE, weather=WEATHER, system=SYSTEM) -> int:
     """Exit code of `cfs run`."""
-    return run(
-        [
-            "run",
-            *map(str, [building, "--weather", weather, "--cfs", system, "--out", out, *options]),
-        ]
-    )
+    return run(["run", *map(str, [building, "--weather", weather, "--cfs", system, "--out", out, *options])])
 
 
 @pytest.fixture(scope="module")
@@ -45,11 +40,20 @@ def results(tmp_path_factory) -> Path:
 
 def test_files_of_a_run(results):
     assert {path.name for path in results.iterdir()} == {
-        "report.html", "run.json", "cfs-results.json", "problems.csv",
-        "illuminance.parquet", "daylight_metrics.csv",
-        "room_metrics.csv", "dgp.csv", "temperatures.csv", "comfort.csv",
-        "view_06-21_12h.hdr", "view_06-21_12h.png", *["results.nc"] * NETCDF,
-    }  # fmt: skip
+        "report.html",
+        "run.json",
+        "cfs-results.json",
+        "problems.csv",
+        "illuminance.parquet",
+        "daylight_metrics.csv",
+        "room_metrics.csv",
+        "dgp.csv",
+        "temperatures.csv",
+        "comfort.csv",
+        "view_06-21_12h.hdr",
+        "view_06-21_12h.png",
+        *["results.nc"] * NETCDF,
+    }
     illuminance = pd.read_parquet(results / "illuminance.parquet")
     metrics = pd.read_csv(results / "daylight_metrics.csv")
     assert illuminance.shape == (8760, len(metrics))
@@ -64,9 +68,7 @@ def test_files_of_a_run(results):
 def test_a_quick_run_says_so_at_the_head_of_its_results(results):
     assert next(iter(json.loads((results / "run.json").read_text()).items())) == ("quick", True)
     report = (results / "report.html").read_text()
-    words = re.sub(
-        r"<[^>]*>", "", report[: report.index("<main")]
-    )  # options have a tag of their own
+    words = re.sub(r"<[^>]*>", "", report[: report.index("<main")])  # options have a tag of their own
     assert NOTE in words
 
 
@@ -184,26 +186,30 @@ def without_line(text: str, number: int) -> str:
 BAD = {
     "not an IFC": ("building", OFFICE, lambda text: "hello", ("bad", "IFC")),
     "IFC without spaces": (
-        "building", OFFICE, lambda text: text.replace("IFCSPACE(", "IFCBUILDINGELEMENTPROXY("),
+        "building",
+        OFFICE,
+        lambda text: text.replace("IFCSPACE(", "IFCBUILDINGELEMENTPROXY("),
         ("bad",),
     ),
     "short EPW": ("weather", WEATHER, lambda text: text[: len(text) // 2], ("bad",)),
     "EPW with a missing hour": ("weather", WEATHER, lambda t: without_line(t, 4000), ("bad",)),
-    "EPW with a word for a number": (
-        "weather", WEATHER, lambda t: with_field(t, 4000, 14, "noon"), ("bad",),
-    ),
+    "EPW with a word for a number": ("weather", WEATHER, lambda t: with_field(t, 4000, 14, "noon"), ("bad",)),
     "truncated BSDF": ("system", SYSTEM, lambda text: text[:20000], ("bad",)),
     "BSDF that makes light": (
-        "system", SYSTEM,
+        "system",
+        SYSTEM,
         lambda t: t.replace("<ScatteringData>", "<ScatteringData>\n 9999, ", 1).replace(
             "</ScatteringData>", "</ScatteringData>", 1
         ),
         ("bad",),
     ),
     "BSDF of another basis": (
-        "system", SYSTEM, lambda text: text.replace("LBNL/Klems Full", "LBNL/Klems Half"), ("bad",),
+        "system",
+        SYSTEM,
+        lambda text: text.replace("LBNL/Klems Full", "LBNL/Klems Half"),
+        ("bad",),
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("fault", BAD)

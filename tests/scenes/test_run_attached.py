@@ -26,9 +26,18 @@ from scenes.run.options import JobOptions
 pytestmark = pytest.mark.early
 
 QUICK = [
-    "--quick", "--size", "64", "--picture", "06-21 12", "--spacing", "2", "--space", "A",
-    "--method", "three-phase",
-]  # fmt: skip
+    "--quick",
+    "--size",
+    "64",
+    "--picture",
+    "06-21 12",
+    "--spacing",
+    "2",
+    "--space",
+    "A",
+    "--method",
+    "three-phase",
+]
 TABLES = ("daylight_metrics.csv", "room_metrics.csv", "dgp.csv", "temperatures.csv", "comfort.csv")
 
 
@@ -95,9 +104,7 @@ def test_windows_without_data_are_named(tmp_path, blind, capsys) -> None:
     assert job(bare, tmp_path / "out") == 1
     error = capsys.readouterr().err.strip().splitlines()[-1]
     assert error.startswith("error") and "window" in error and "--cfs" in error
-    assert (
-        run(["ifc", "attach", str(bare), "-o", str(tmp_path / "u.ifc"), "--all", "--u", "1"]) == 0
-    )
+    assert run(["ifc", "attach", str(bare), "-o", str(tmp_path / "u.ifc"), "--all", "--u", "1"]) == 0
     assert job(tmp_path / "u.ifc", tmp_path / "out") == 1
     assert "has no BSDF" in capsys.readouterr().err
     assert job(bare, tmp_path / "out", "--u", "1.1") == 1
@@ -109,17 +116,14 @@ def test_operation_through_the_command(tmp_path, blind, capsys) -> None:
     """States of the IFC's windows, closed by the clock; heated, cooled and lit."""
     with_data = tmp_path / "states.ifc"
     attach(OFFICE, tmp_path / "one.ifc", "--all", "--bsdf", blind, "--u", "1.4", "--state", "up")
-    attach(tmp_path / "one.ifc", with_data, "--all", "--bsdf", blind, "--u", "0.9",
-           "--state", "down")  # fmt: skip
+    attach(tmp_path / "one.ifc", with_data, "--all", "--bsdf", blind, "--u", "0.9", "--state", "down")
     operation = tmp_path / "operation.toml"
     closed = ", ".join("1" if 10 <= hour < 16 else "0" for hour in range(24))
     operation.write_text(
         f'[control]\nrule = "schedule"\nschedule = [{closed}]\n'
         "[loads]\nheating_c = 20\ncooling_c = 26\n[gains]\nlighting_w_m2 = 8\n"
     )
-    assert (
-        job(with_data, tmp_path / "out", "--operation", operation, "--method", "three-phase") == 0
-    )
+    assert job(with_data, tmp_path / "out", "--operation", operation, "--method", "three-phase") == 0
     hours = pd.read_csv(tmp_path / "out" / "operation.csv", index_col="time", parse_dates=True)
     assert hours["shading_state"].groupby(hours.index.hour).first().tolist() == [
         int(10 <= hour < 16) for hour in range(24)
@@ -165,9 +169,12 @@ def test_the_module_runs_as_a_program() -> None:
     import sys
 
     done = subprocess.run(
-        [sys.executable, "-m", "scenes.cli", "--version"], capture_output=True, text=True,
-        check=False, cwd=Path(str(files("scenes"))).parent,
-    )  # fmt: skip
+        [sys.executable, "-m", "scenes.cli", "--version"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=Path(str(files("scenes"))).parent,
+    )
     assert done.returncode == 0 and done.stdout.startswith("cfs ")
 
 
@@ -188,9 +195,7 @@ def both(blind: Path, tmp_path: Path, *options):
     with_data = tmp_path / "with_data.ifc"
     attach(OFFICE, with_data, "--all", "--bsdf", blind, *options)
     for building, system in ((OFFICE, blind), (with_data, None)):
-        inputs = read_inputs(
-            JobOptions(building=building, weather=WEATHER, system=system, spaces=("A",))
-        )
+        inputs = read_inputs(JobOptions(building=building, weather=WEATHER, system=system, spaces=("A",)))
         (found,) = inputs.used_systems
         yield thermal_system(found)
 
@@ -210,8 +215,7 @@ def test_the_toml_beside_the_bsdf_is_attached_bit_for_bit(tmp_path, blind, toml,
     options = ["--reference"] if reference else []
     file, attached = both(blind, tmp_path, *options)
     # dataclasses of arrays and numbers: the digest is of every bit; the names are the windows'
-    bare = [replace(one, fenestration=replace(one.fenestration, name=""), notes=())
-            for one in (file, attached)]  # fmt: skip
+    bare = [replace(one, fenestration=replace(one.fenestration, name=""), notes=()) for one in (file, attached)]
     assert digest(bare[0]) == digest(bare[1])
 
 

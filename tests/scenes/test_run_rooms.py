@@ -45,9 +45,15 @@ def through_glass(variant, weather, skies, glass) -> np.ndarray:
 def light(method: str, system: FenestrationSystem, weather, skies, **more) -> np.ndarray:
     """Illuminance [hours, S] by a method."""
     result = compute_room(
-        BOX, ROOM, in_all_windows(ROOM, system), weather, replace(SMALL, method=method),
-        skies=skies, pictures=False, **more,
-    )  # fmt: skip
+        BOX,
+        ROOM,
+        in_all_windows(ROOM, system),
+        weather,
+        replace(SMALL, method=method),
+        skies=skies,
+        pictures=False,
+        **more,
+    )
     print(method, result.daylight.relative_error)
     return result.daylight.illuminance[list(HOURS)]
 
@@ -68,9 +74,7 @@ def test_three_phase_blurs_the_sun_through_glass(through_glass, weather, skies, 
     assert five.min() >= 0
 
 
-def test_kept_matrices_serve_other_systems(
-    through_glass, tmp_path, weather, skies, blind, glass
-) -> None:
+def test_kept_matrices_serve_other_systems(through_glass, tmp_path, weather, skies, blind, glass) -> None:
     cache = MatrixCache(tmp_path)
     light("five-phase", blind, weather, skies, cache=cache)
     traced = {path.name for path in tmp_path.iterdir()}
@@ -110,10 +114,7 @@ def test_a_view_is_kept_as_well(tmp_path, variant, monkeypatch, weather, skies, 
 @pytest.mark.slow  # quick: test_bands_of_panes.py
 def test_windows_with_their_own_systems(variant, weather, skies, blind, glass) -> None:
     """Two windows in one wall, one system each: the light of each alone adds up."""
-    both = shoebox(
-        3.0, 4.0, 2.8,
-        windows=(WindowRectangle(0.2, 0.9, 1.2, 1.5), WindowRectangle(1.6, 0.9, 1.2, 1.5)),
-    )  # fmt: skip
+    both = shoebox(3.0, 4.0, 2.8, windows=(WindowRectangle(0.2, 0.9, 1.2, 1.5), WindowRectangle(1.6, 0.9, 1.2, 1.5)))
     space = both.spaces[0]
     left, right = (window.guid for window in space.windows)
     dark = clear("dark", 1e-9)
@@ -160,9 +161,7 @@ def operation_file(folder: Path, text: str) -> Path:
     return path
 
 
-def test_states_switch_light_and_heat_together(
-    variant, tmp_path, weather, skies, blind, glass
-) -> None:
+def test_states_switch_light_and_heat_together(variant, tmp_path, weather, skies, blind, glass) -> None:
     """Glass in the morning, blind from noon: each hour has the light and the gains of its state."""
     day = ", ".join("0" if hour < 12 else "1" for hour in range(24))
     operation = read_operation(operation_file(tmp_path, OPERATION.format(day)))
@@ -171,16 +170,13 @@ def test_states_switch_light_and_heat_together(
 
     def run(*states: FenestrationSystem, operation=None):
         return compute_room(
-            BOX, ROOM, in_all_windows(ROOM, *states), weather, options, operation=operation,
-            skies=skies, pictures=False,
-        )  # fmt: skip
+            BOX, ROOM, in_all_windows(ROOM, *states), weather, options, operation=operation, skies=skies, pictures=False
+        )
 
     opened, shut, switched = run(glass), run(blind), run(glass, blind, operation=operation)
     for hour in HOURS:
         one = opened if hour % 24 < 12 else shut
-        np.testing.assert_allclose(
-            switched.daylight.illuminance[hour], one.daylight.illuminance[hour], rtol=1e-5
-        )
+        np.testing.assert_allclose(switched.daylight.illuminance[hour], one.daylight.illuminance[hour], rtol=1e-5)
         gains = switched.heat.gains.iloc[hour], one.heat.gains.iloc[hour]
         assert gains[0].to_numpy() == pytest.approx(gains[1].to_numpy(), rel=1e-6)
     ran = switched.operation

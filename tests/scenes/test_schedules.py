@@ -29,9 +29,7 @@ def weather() -> Weather:
 
 def hours_of(schedule: dict, weather: Weather, **more) -> np.ndarray:
     """The year [H] of infiltration by a schedule."""
-    tables = OperationTables.model_validate(
-        {"air": {"infiltration_ach": "x"}, "schedules": {"x": schedule}} | more
-    )
+    tables = OperationTables.model_validate({"air": {"infiltration_ach": "x"}, "schedules": {"x": schedule}} | more)
     return OperationHours(tables, weather).outdoor_air()["infiltration_ach"]
 
 
@@ -76,10 +74,7 @@ def test_a_column_of_a_file_is_a_schedule(tmp_path, weather) -> None:
     rows = "\n".join(f"{hour},{value}" for hour, value in enumerate(values))
     (tmp_path / "use.csv").write_text(f"hour,share\n{rows}\n")
     path = tmp_path / "o.toml"
-    path.write_text(
-        '[gains]\noccupied = "used"\npersons = 3\n'
-        '[schedules.used]\ncsv = "use.csv"\ncolumn = "share"\n'
-    )
+    path.write_text('[gains]\noccupied = "used"\npersons = 3\n[schedules.used]\ncsv = "use.csv"\ncolumn = "share"\n')
     operation = read_operation(path)
     assert operation.files == (tmp_path / "use.csv",)
     hours = OperationHours(operation.tables, weather)
@@ -125,10 +120,7 @@ def test_rooms_and_types_are_operated_otherwise(weather) -> None:
     hall = replace(space, guid="hall", name="hall", type_name="hall")
     building = replace(building, spaces=(space, hall))
     tables = OperationTables.model_validate(
-        {
-            "loads": {"heating_c": 20.0, "cooling_c": 26.0},
-            "rooms": [{"types": ["hall"], "loads": {"heating_c": 16.0}}],
-        }
+        {"loads": {"heating_c": 20.0, "cooling_c": 26.0}, "rooms": [{"types": ["hall"], "loads": {"heating_c": 16.0}}]}
     )
     found = [tables.of_room(building, one).loads for one in (space, hall)]
     assert [(one.heating_c, one.cooling_c) for one in found] == [(20.0, 26.0), (16.0, 26.0)]
@@ -142,56 +134,41 @@ def test_rooms_and_types_are_operated_otherwise(weather) -> None:
 
 def test_states_follow_a_schedule_and_must_be_there(weather) -> None:
     tables = OperationTables.model_validate(
-        {
-            "control": {"rule": "schedule", "schedule": "blind"},
-            "schedules": {"blind": {"weekday": WORK, "weekend": 2}},
-        }
+        {"control": {"rule": "schedule", "schedule": "blind"}, "schedules": {"blind": {"weekday": WORK, "weekend": 2}}}
     )
     states = OperationHours(tables, weather).states(tables.control, "control", 3).reshape(365, 24)
     assert set(states[0]) == {2} and np.flatnonzero(states[1]).tolist() == list(range(8, 18))
     assert tables.control_fault(3) is None
-    assert tables.control_fault(2) == (
-        "control.schedule",
-        "'blind' has state 2: the windows have 2, from 0",
-    )
+    assert tables.control_fault(2) == ("control.schedule", "'blind' has state 2: the windows have 2, from 0")
     with pytest.raises(DataError, match=r"control.schedule: schedule 'blind': a state outside 0"):
         OperationHours(tables, weather).states(tables.control, "control", 2)
-    half = tables.model_copy(update={"schedules": {"blind": tables.schedules["blind"].model_copy(
-        update={"peak": 0.5})}})  # fmt: skip
+    half = tables.model_copy(
+        update={"schedules": {"blind": tables.schedules["blind"].model_copy(update={"peak": 0.5})}}
+    )
     assert half.control_fault(3)[1].startswith("'blind' has state 0.5")
 
 
 FAULTS = {
-    "loads.heating_c: schedule 'x': expected -30 to 60 C": (
-        '[loads]\nheating_c = "x"\n[schedules.x]\nweekday = 293\n'
-    ),
+    "loads.heating_c: schedule 'x': expected -30 to 60 C": ('[loads]\nheating_c = "x"\n[schedules.x]\nweekday = 293\n'),
     "loads: the heating set point lies above": (
         '[loads]\nheating_c = "x"\ncooling_c = 24\n[schedules.x]\nweekday = 20\nweekend = 25\n'
     ),
     "loads.heating_c: no schedule 'offise'; did you mean 'office'?": (
         '[loads]\nheating_c = "offise"\n[schedules.office]\nweekday = 20\n'
     ),
-    "rooms.0.air.night_ach: no schedule 'y'": (
-        '[[rooms]]\nspaces = ["a"]\n[rooms.air]\nnight_ach = "y"\n'
-    ),
-    "schedules.x.weekday: expected 24 values, one an hour, got 23": (
-        f"[schedules.x]\nweekday = {[1] * 23}\n"
-    ),
+    "rooms.0.air.night_ach: no schedule 'y'": ('[[rooms]]\nspaces = ["a"]\n[rooms.air]\nnight_ach = "y"\n'),
+    "schedules.x.weekday: expected 24 values, one an hour, got 23": (f"[schedules.x]\nweekday = {[1] * 23}\n"),
     "schedules.x.weekday.0.hours: expected two different hours": (
         "[schedules.x]\nweekday = [{ hours = [8, 8], value = 1 }]\n"
     ),
     "schedules.x.holidays.0: expected a day as MM-DD, got '25.12.'": (
         '[schedules.x]\nweekday = 1\nholidays = ["25.12."]\n'
     ),
-    "schedules.x.holidays.0: expected a day as MM-DD, got '5'": (
-        '[schedules.x]\nweekday = 1\nholidays = ["5"]\n'
-    ),
+    "schedules.x.holidays.0: expected a day as MM-DD, got '5'": ('[schedules.x]\nweekday = 1\nholidays = ["5"]\n'),
     "schedules.x.wekday: no such key; did you mean weekday?": "[schedules.x]\nwekday = 1\n",
     "schedules.x: give either `weekday` or `csv`": "[schedules.x]\nweekend = 1\n",
-    "schedules.x.csv: no such file: none.csv": (
-        '[schedules.x]\ncsv = "none.csv"\ncolumn = "a"\n'
-    ),
-}  # fmt: skip
+    "schedules.x.csv: no such file: none.csv": ('[schedules.x]\ncsv = "none.csv"\ncolumn = "a"\n'),
+}
 
 
 @pytest.mark.parametrize("words", FAULTS)

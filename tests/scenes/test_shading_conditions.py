@@ -21,13 +21,7 @@ from scenes.room.operation import Operation
 from scenes.room.operation_tables import OperationTables
 from scenes.room.predictive import predictive_states
 from scenes.room.room import lit_room
-from scenes.room.shading import (
-    control_signals,
-    room_conditions,
-    ruled_year,
-    shading_states,
-    temperature_conditions,
-)
+from scenes.room.shading import control_signals, room_conditions, ruled_year, shading_states, temperature_conditions
 from scenes.room.shading_rules import ShadingRule, scenarios
 from scenes.room.solar import seasonal_outdoors
 from scenes.room.window_sensors import facade_illuminance, window_beam
@@ -49,10 +43,14 @@ def inputs(variant, glass, milk, blind, weather, year):
     def of(control: dict, **tables):
         space = TWO.spaces[0]
         return room_inputs(
-            TWO, space, in_all_windows(space, glass, milk, blind), weather,
+            TWO,
+            space,
+            in_all_windows(space, glass, milk, blind),
+            weather,
             tables.pop("options", FEW),
-            operation=OperationTables.model_validate({"control": control, **tables}), skies=year,
-        )  # fmt: skip
+            operation=OperationTables.model_validate({"control": control, **tables}),
+            skies=year,
+        )
 
     return of
 
@@ -106,9 +104,7 @@ def test_daylight_of_the_work_plane_is_limited_or_left(inputs) -> None:
     light = room_light(limited)
     states = shading_states(limited, light)
     lux = illuminance(light.light, light.states(states)).mean(axis=0)
-    closed = np.array(
-        [illuminance(light.light, np.full((2, len(lux)), j)).mean(axis=0) for j in range(3)]
-    ).min(axis=0)
+    closed = np.array([illuminance(light.light, np.full((2, len(lux)), j)).mean(axis=0) for j in range(3)]).min(axis=0)
     assert np.all((lux <= 800.0 * (1 + 1e-5)) | (closed > 790.0))
     assert len(np.unique(states)) == 3
     target = inputs({"rule": "daylight", "target_lx": 300.0})
@@ -123,9 +119,7 @@ def test_use_of_the_room_day_and_night(inputs, weather) -> None:
     up = is_up(sun_directions(weather))
     clock = np.arange(8760) % 24
     used = (clock >= 9) & (clock < 17)
-    for rule, expected in (
-        ("day", up), ("night", ~up), ("occupied", used), ("unoccupied", ~used),
-    ):  # fmt: skip
+    for rule, expected in (("day", up), ("night", ~up), ("occupied", used), ("unoccupied", ~used)):
         found = by_group(inputs({"rule": rule, "state": 1}, gains={"occupied": [9, 17]}))["S"]
         assert np.array_equal(found, expected.astype(int)), rule
         other = by_group(inputs({"rule": rule, "inverse": True}, gains={"occupied": [9, 17]}))["S"]
@@ -138,8 +132,12 @@ def test_few_moves_and_no_opening_before_an_event(inputs, weather) -> None:
     per_day = (np.concatenate([[0], np.abs(np.diff(few))]) > 0).reshape(365, 24).sum(axis=1)
     assert per_day.max() == 1 and np.count_nonzero(np.diff(free)) > 365
     up = is_up(sun_directions(weather))
-    ends = {"midnight": np.arange(8760) % 24 == 0, "sunset": ~up,
-            "sunrise": up & ~np.roll(up, 1), "arrival": np.arange(8760) % 24 == 8}  # fmt: skip
+    ends = {
+        "midnight": np.arange(8760) % 24 == 0,
+        "sunset": ~up,
+        "sunrise": up & ~np.roll(up, 1),
+        "arrival": np.arange(8760) % 24 == 8,
+    }
     for until, end in ends.items():
         late = by_group(inputs(SUN | {"until": until}))["S"]
         opens = np.flatnonzero(np.diff(late) < 0) + 1
@@ -150,10 +148,7 @@ def test_few_moves_and_no_opening_before_an_event(inputs, weather) -> None:
 def test_what_moved_the_windows_is_known(inputs) -> None:
     """Sun while the room is used, or a late hour: each move has the condition that changed."""
     late = {"rule": "schedule", "schedule": [0] * 20 + [1] * 4}
-    control = {
-        "rule": "any",
-        "parts": [{"rule": "all", "parts": [SUN, {"rule": "occupied"}]}, late],
-    }
+    control = {"rule": "any", "parts": [{"rule": "all", "parts": [SUN, {"rule": "occupied"}]}, late]}
     room = inputs(control | {"hold_h": 2.0})
     ruled = ruled_year(room, None, None)
     assert ruled.reasons == ("irradiance", "occupied", "schedule", "hold_h")
@@ -242,13 +237,12 @@ def test_every_scenario_is_a_rule_with_a_source(inputs) -> None:
 def test_a_scenario_of_a_group_is_itself(inputs) -> None:
     """Neither keys of [control] nor of its scenario change a group's own scenario or rule."""
     control = {
-        "scenario": "EnergyPlus OnIfHighHorizontalSolar", "setpoint": 600.0, "most_moves": 1,
+        "scenario": "EnergyPlus OnIfHighHorizontalSolar",
+        "setpoint": 600.0,
+        "most_moves": 1,
         "state": 1,
-        "group": [
-            {"facades": ["S"], "scenario": "EnergyPlus AlwaysOff"},
-            {"facades": ["N"], "rule": "irradiance"},
-        ],
-    }  # fmt: skip
+        "group": [{"facades": ["S"], "scenario": "EnergyPlus AlwaysOff"}, {"facades": ["N"], "rule": "irradiance"}],
+    }
     table = OperationTables.model_validate({"control": control}).control
     (_, whole), (_, south), (_, north) = table.rules
     assert (whole.sensor, whole.close_above, whole.setpoint) == ("horizontal", 600.0, 600.0)
@@ -328,10 +322,7 @@ def test_an_unknown_scenario_or_set_point_is_refused(control, words, tmp_path) -
         ({"rule": "glare", "inverse": True}, "inverse"),
         ({"rule": "illuminance", "open_below_lx": 30000.0}, "open_below_lx"),
         ({"rule": "cooling", "until": "sunset"}, "until"),
-        (
-            {"rule": "any", "parts": [{"rule": "manual"}, {"rule": "manual", "seed": 1}]},
-            "parts",
-        ),
+        ({"rule": "any", "parts": [{"rule": "manual"}, {"rule": "manual", "seed": 1}]}, "parts"),
         ({"rule": "all", "parts": [{"rule": "glare"}, {"rule": "work plane"}]}, "parts"),
         (
             {
@@ -358,18 +349,22 @@ def test_day_and_rule_by_loads(inputs) -> None:
     room = inputs({}, loads={"cooling_c": 24.0})
     space = TWO.spaces[0]
     lit = lit_room(
-        TWO, space, room.systems, room.weather, FEW, operation=Operation(Path("o"), tables, ()),
-        skies=room.skies, pictures=False,
-    )  # fmt: skip
+        TWO,
+        space,
+        room.systems,
+        room.weather,
+        FEW,
+        operation=Operation(Path("o"), tables, ()),
+        skies=room.skies,
+        pictures=False,
+    )
     year = lit.with_heat(heat_alone(lit.zone, room.weather, 3600.0, lambda *_: None))
     hours = year.operation.hours
     state = hours["shading_state_S"].to_numpy()
     power = hours["cooling_w"].to_numpy()
     assert np.array_equal(state[1:] > 0, power[:-1] > 200.0)
     assert 0 < np.count_nonzero(state) < 8000
-    assert set(year.operation.shading.moves(room.weather.midpoints)["moved_by"]) == {
-        "the room's temperature or load"
-    }
+    assert set(year.operation.shading.moves(room.weather.midpoints)["moved_by"]) == {"the room's temperature or load"}
 
 
 def test_the_page_lists_every_scenario() -> None:

@@ -25,12 +25,7 @@ from scenes.room.light import room_light
 from scenes.room.operation import Operation, OperationHours, check_schedules
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import compute_room, explored_combinations, operated_zone
-from scenes.room.shading import (
-    control_signals,
-    room_conditions,
-    shading_states,
-    temperature_conditions,
-)
+from scenes.room.shading import control_signals, room_conditions, shading_states, temperature_conditions
 from scenes.room.solar import seasonal_outdoors, solar_gains
 from scenes.room.window_sensors import window_beam
 from scenes.room.windows import in_all_windows, room_windows
@@ -39,10 +34,12 @@ from tests.scenes.small_box import FEW, HOURS, TWO, clear
 from thermal.control import RoomCondition
 
 BESIDE = shoebox(
-    6.0, 4.0, 2.8,
+    6.0,
+    4.0,
+    2.8,
     windows=(WindowRectangle(0.5, 0.9, 2.0, 1.5), WindowRectangle(3.5, 0.9, 2.0, 1.5)),
     reflectance={"wall": 0.3, "floor": 0.1, "ceiling": 0.4},
-)  # fmt: skip
+)
 TILTS = [0.0, 30.0, 60.0]
 CUT_OFF = {"rule": "cut-off", "slat_tilts_deg": TILTS, "slat_width": 0.08, "slat_spacing": 0.08}
 
@@ -64,9 +61,15 @@ def inputs(variant, glass, milk, blind, weather, year):
         space = building.spaces[0]
         operation = OperationTables.model_validate({"control": control, **tables})
         return room_inputs(
-            building, space, in_all_windows(space, glass, milk, blind), weather, FEW,
-            operation=operation, skies=skies, cache=MatrixCache.of_user(),
-        )  # fmt: skip
+            building,
+            space,
+            in_all_windows(space, glass, milk, blind),
+            weather,
+            FEW,
+            operation=operation,
+            skies=skies,
+            cache=MatrixCache.of_user(),
+        )
 
     return of
 
@@ -117,10 +120,15 @@ def test_each_facade_has_its_profile_angle(inputs, weather) -> None:
 
 
 WALL = Element(
-    "w", "wall", "IfcWall",
-    np.array([[[-9, -0.1, -5], [3, -0.1, -5], [3, -0.1, 20]],
-              [[-9, -0.1, -5], [3, -0.1, 20], [-9, -0.1, 20]]], dtype=float), 0.2, 0.2,
-)  # fmt: skip
+    "w",
+    "wall",
+    "IfcWall",
+    np.array(
+        [[[-9, -0.1, -5], [3, -0.1, -5], [3, -0.1, 20]], [[-9, -0.1, -5], [3, -0.1, 20], [-9, -0.1, 20]]], dtype=float
+    ),
+    0.2,
+    0.2,
+)
 
 
 def test_no_blind_tilts_for_a_sun_that_a_neighbour_shades(inputs) -> None:
@@ -176,15 +184,11 @@ def test_sun_of_a_room_is_the_sum_over_its_groups(inputs, skies) -> None:
 
     def transmitted(*states: int) -> np.ndarray:
         hours = np.tile(states, (skies.hours, 1))
-        solar, gains, _ = solar_gains(
-            room, outdoors, surfaces.room, surfaces.outer, hours, thermals=surfaces.thermals
-        )
+        solar, gains, _ = solar_gains(room, outdoors, surfaces.room, surfaces.outer, hours, thermals=surfaces.thermals)
         assert np.array_equal(solar.state, hours[:, room.windows.group])
         return gains["transmitted_w"][list(HOURS)]
 
-    np.testing.assert_allclose(
-        transmitted(0, 2) + transmitted(2, 0), transmitted(0, 0) + transmitted(2, 2), rtol=1e-6
-    )
+    np.testing.assert_allclose(transmitted(0, 2) + transmitted(2, 0), transmitted(0, 0) + transmitted(2, 2), rtol=1e-6)
     assert not np.allclose(transmitted(0, 2), transmitted(2, 0), rtol=0.1)
 
 
@@ -195,9 +199,15 @@ def test_a_year_has_a_column_for_each_group(glass, blind, weather, skies, varian
         {"control": control, "gains": {"lighting_w_m2": 8.0}, "loads": {"heating_c": 20.0}}
     )
     found = compute_room(
-        TWO, space, in_all_windows(space, glass, blind), weather, FEW,
-        operation=Operation(Path("o.toml"), tables, ()), skies=skies, explore=True,
-    )  # fmt: skip
+        TWO,
+        space,
+        in_all_windows(space, glass, blind),
+        weather,
+        FEW,
+        operation=Operation(Path("o.toml"), tables, ()),
+        skies=skies,
+        explore=True,
+    )
     hours = found.operation.hours
     assert set(hours["shading_state_N"]) == {1} and set(hours["shading_state_S"]) == {0}
     assert "shading_state" not in hours
@@ -220,8 +230,7 @@ def test_combinations_that_the_explorer_shows(inputs, skies) -> None:
 
 def test_groups_by_window_facade_and_rule(inputs, weather) -> None:
     south, north = TWO.spaces[0].windows
-    control = CUT_OFF | {"group": [{"name": "door", "windows": [north.name], "rule": "always",
-                                    "state": 2}]}  # fmt: skip
+    control = CUT_OFF | {"group": [{"name": "door", "windows": [north.name], "rule": "always", "state": 2}]}
     room = inputs(control)
     assert room.control.names == ("door", "S")
     assert room.control.rules[0].slat_tilts_deg == tuple(TILTS), "other keys are those of control"
@@ -273,9 +282,7 @@ def test_rules_by_weather(inputs, weather) -> None:
 
 
 def test_a_rule_that_the_weather_cannot_answer_is_refused_first(weather) -> None:
-    tables = OperationTables.model_validate(
-        {"control": {"rule": "any", "parts": [{"rule": "rain"}]}}
-    )
+    tables = OperationTables.model_validate({"control": {"rule": "any", "parts": [{"rule": "rain"}]}})
     airing = OperationTables.model_validate({"air": {"windows": {"closed_in_rain": True}}})
     check_schedules(tables, weather)
     for rain in (None, np.zeros_like(weather.dry_bulb_c)):
@@ -292,9 +299,7 @@ def test_a_rule_that_the_weather_cannot_answer_is_refused_first(weather) -> None
 def test_windows_are_tilted_while_nobody_is_there_and_shut_in_rain(weather) -> None:
     air = {"windows": {"share": 0.3, "absent_share": 0.02, "closed_in_rain": True}}
     tables = OperationTables.model_validate({"air": air, "gains": {"occupied": [8, 18]}})
-    window = SimpleNamespace(
-        glazing_height=1.5, height=1.6, area=3.0, normal=np.array([0.0, 1.0, 0.0])
-    )
+    window = SimpleNamespace(glazing_height=1.5, height=1.6, area=3.0, normal=np.array([0.0, 1.0, 0.0]))
     share = OperationHours(tables, weather).airing([window], 60.0).share
     clock, rains = weather.midpoints.hour.to_numpy(), np.nan_to_num(weather.rain_mm) > 0
     expected = np.where((clock >= 8) & (clock < 18), 0.3, 0.02)
@@ -304,9 +309,7 @@ def test_windows_are_tilted_while_nobody_is_there_and_shut_in_rain(weather) -> N
 def test_little_of_a_window_is_open_by_night(weather) -> None:
     air = {"night": [22, 6], "windows": {"share": 0.3, "when": "always", "night_share": 0.02}}
     tables = OperationTables.model_validate({"air": air})
-    window = SimpleNamespace(
-        glazing_height=1.5, height=1.6, area=3.0, normal=np.array([0.0, 1.0, 0.0])
-    )
+    window = SimpleNamespace(glazing_height=1.5, height=1.6, area=3.0, normal=np.array([0.0, 1.0, 0.0]))
     share = OperationHours(tables, weather).airing([window], 60.0).share
     clock = weather.midpoints.hour.to_numpy()
     assert np.array_equal(share, np.where((clock >= 22) | (clock < 6), 0.02, 0.3))
@@ -316,17 +319,12 @@ WARM = {"rule": "operative temperature", "close_above_c": 22.0, "open_below_c": 
 
 
 def test_rules_by_room_temperature_are_computed_both_ways(inputs) -> None:
-    sun, slow = (
-        {"rule": "irradiance", "close_above": 150.0},
-        WARM | {"open_delay_h": 2, "hold_h": 3},
-    )
+    sun, slow = ({"rule": "irradiance", "close_above": 150.0}, WARM | {"open_delay_h": 2, "hold_h": 3})
     room = inputs({"rule": "all", "parts": [sun, slow, slow]})
     (condition,) = temperature_conditions(room)
     assert condition == RoomCondition(22.0, 21.0, "operative", 2, 3)
     outdoors, by_sun = seasonal_outdoors(room), by_group(inputs(sun))["S"]
-    cold, warm = (
-        shading_states(room, None, outdoors, met={condition: met})[:, 0] for met in (False, True)
-    )
+    cold, warm = (shading_states(room, None, outdoors, met={condition: met})[:, 0] for met in (False, True))
     assert not cold.any() and np.array_equal(warm, by_sun)
 
 
@@ -335,8 +333,7 @@ def test_rules_that_combine_room_temperatures_wait(inputs) -> None:
     sun, fresh = {"rule": "irradiance", "close_above": 150.0}, {"rule": "outdoor temperature"}
     cool = {"rule": "air temperature", "close_above_c": 20.0}
     inner = {"rule": "all", "hold_h": 3, "parts": [sun, WARM]}
-    room = inputs({"rule": "any", "open_delay_h": 2, "parts": [inner, {
-        "rule": "all", "parts": [fresh, cool]}]})  # fmt: skip
+    room = inputs({"rule": "any", "open_delay_h": 2, "parts": [inner, {"rule": "all", "parts": [fresh, cool]}]})
     outdoors = seasonal_outdoors(room)
     conditions, read = room_conditions(room, None, outdoors)
     warm, cold, held_one, outer, *others = conditions
@@ -359,31 +356,23 @@ def test_rules_that_combine_room_temperatures_wait(inputs) -> None:
     [
         ({"rule": "any", "hold_h": 1.0, "parts": [WARM, {"rule": "glare"}]}, "control.hold_h"),
         (WARM | {"open_below_c": 23.0}, "control.open_below_c"),
-        ({"rule": "any", "parts": [WARM, WARM | {"open_below_c": 23.0}]},
-         "control.parts.1.open_below_c"),
+        ({"rule": "any", "parts": [WARM, WARM | {"open_below_c": 23.0}]}, "control.parts.1.open_below_c"),
     ],
-)  # fmt: skip
+)
 def test_what_a_rule_by_room_temperature_cannot_do_is_refused(control, key) -> None:
     fault = OperationTables.model_validate({"control": control}).control_fault(3)
     assert fault is not None and fault[0] == key
 
 
-def test_coupled_rooms_whose_light_and_heat_have_other_states_say_so(
-    glass, blind, weather, skies, variant
-) -> None:
+def test_coupled_rooms_whose_light_and_heat_have_other_states_say_so(glass, blind, weather, skies, variant) -> None:
     """The states of the balance alone are those of the light; a warm neighbour closes more."""
     tables = OperationTables.model_validate({"control": WARM | {"state": 1}})
     space = TWO.spaces[0]
-    room = room_inputs(
-        TWO, space, in_all_windows(space, glass, blind), weather, FEW, operation=tables, skies=skies
-    )
+    room = room_inputs(TWO, space, in_all_windows(space, glass, blind), weather, FEW, operation=tables, skies=skies)
     zone = operated_zone(room)
     alone, others = (
         heat_of([zone_in], weather, 3600.0)[0]
-        for zone_in in (
-            replace(zone, shading=replace(zone.shading, states=chosen(zone, weather))),
-            zone,
-        )
+        for zone_in in (replace(zone, shading=replace(zone.shading, states=chosen(zone, weather))), zone)
     )
     assert [issue.code for issue in alone[0].issues] == []
     (issue,) = others[0].issues  # its light is that of open blinds
@@ -391,15 +380,11 @@ def test_coupled_rooms_whose_light_and_heat_have_other_states_say_so(
     assert np.array_equal(alone[1].shading.states, others[1].shading.states)
 
 
-def test_shading_by_room_temperature_is_checked_by_half_the_step(
-    glass, blind, weather, skies, variant
-) -> None:
+def test_shading_by_room_temperature_is_checked_by_half_the_step(glass, blind, weather, skies, variant) -> None:
     """The year of a room that stays open is not that which half the step gives."""
     tables = OperationTables.model_validate({"control": WARM})
     space = TWO.spaces[0]
-    room = room_inputs(
-        TWO, space, in_all_windows(space, glass, blind), weather, FEW, operation=tables, skies=skies
-    )
+    room = room_inputs(TWO, space, in_all_windows(space, glass, blind), weather, FEW, operation=tables, skies=skies)
     zone = operated_zone(room)
     shaded = balances([zone], weather, 3600.0)
     opened = balances([replace(zone, alternatives=None)], weather, 3600.0)

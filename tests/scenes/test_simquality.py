@@ -43,10 +43,7 @@ def hidden(points: np.ndarray, sun: np.ndarray, triangles: np.ndarray) -> np.nda
 def test_shapes_shade_as_the_suite_says(file: Path, reference: Path) -> None:
     """The share of 60 x 60 points of the window that rays reach: within the suite's 0.05."""
     suite = pd.read_csv(reference / simquality.TABLE, sep="\t")
-    suns = direction(
-        np.radians(suite["Altitude [Deg]"].to_numpy()),
-        np.radians(suite["Azimuth [Deg]"].to_numpy()),
-    )
+    suns = direction(np.radians(suite["Altitude [Deg]"].to_numpy()), np.radians(suite["Azimuth [Deg]"].to_numpy()))
     inputs = study_inputs(read_study(file))
     building, (space,) = inputs.building, inputs.spaces
     corners = space.windows[0].triangles.reshape(-1, 3)
@@ -69,10 +66,7 @@ def test_sun_of_the_files_stands_where_the_suite_has_it(reference: Path) -> None
     suite = pd.read_csv(reference / simquality.TABLE, sep="\t")
     weather = read_files(read_study(FILES[0])).weather
     interval = (suite[simquality.MINUTES] % 1440 // 30).to_numpy()
-    theirs = direction(
-        np.radians(suite["Altitude [Deg]"].to_numpy()),
-        np.radians(suite["Azimuth [Deg]"].to_numpy()),
-    )
+    theirs = direction(np.radians(suite["Altitude [Deg]"].to_numpy()), np.radians(suite["Azimuth [Deg]"].to_numpy()))
     ours = simquality.sun_directions(weather)[interval]
     assert np.degrees(np.arccos(np.einsum("hi,hi->h", ours, theirs))).max() < 0.06
     angles = simquality.sun_angles(reference)

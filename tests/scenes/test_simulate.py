@@ -33,8 +33,23 @@ def year(variant) -> cfs.SimulatedYear:
 def ran(year, tmp_path_factory) -> Path:
     """The files of `cfs run` on the same."""
     out = tmp_path_factory.mktemp("run") / "out"
-    words = ["run", OFFICE, "--weather", WEATHER, "--cfs", VENETIAN_BLIND, "--out", out, "--quick",
-             "--space", "A", "--picture", "06-21 12", "--size", "96"]  # fmt: skip
+    words = [
+        "run",
+        OFFICE,
+        "--weather",
+        WEATHER,
+        "--cfs",
+        VENETIAN_BLIND,
+        "--out",
+        out,
+        "--quick",
+        "--space",
+        "A",
+        "--picture",
+        "06-21 12",
+        "--size",
+        "96",
+    ]
     assert run([str(word) for word in words]) == 0
     return out
 
@@ -91,9 +106,7 @@ def test_short_names_are_those_of_the_tables(year) -> None:
 def test_the_hours_are_one_frame(year) -> None:
     hours = year.hours
     assert len(hours) == HOURS and hours.columns.is_unique and hours.index.name == "time"
-    assert hours["illuminance_lx"].to_numpy() == pytest.approx(
-        year.daylight.illuminance.mean(axis=1, dtype=float)
-    )
+    assert hours["illuminance_lx"].to_numpy() == pytest.approx(year.daylight.illuminance.mean(axis=1, dtype=float))
     assert {"operative_c", "transmitted_w", "within_80"} <= set(hours)
 
 
@@ -146,9 +159,7 @@ def test_results_of_others_are_not_written_over(year, tmp_path) -> None:
 def test_a_room_that_is_no_file_has_a_year_too(variant, tmp_path) -> None:
     building = shoebox(3, 4, 3, windows=(WindowRectangle(0.5, 1.0, 2.0, 1.5),), name="cell")
     system, weather = cfs.read_system(VENETIAN_BLIND), cfs.read_weather(WEATHER)
-    year = cfs.simulate(
-        building.room("cell"), system, weather, quick=True, method="three-phase", **OPTIONS
-    )
+    year = cfs.simulate(building.room("cell"), system, weather, quick=True, method="three-phase", **OPTIONS)
     assert year.daylight.ase is None and year.daylight.da > 0
     year.write(tmp_path / "out", report=False)
     assert "building" not in json.loads((tmp_path / "out" / "run.json").read_text())["inputs"]

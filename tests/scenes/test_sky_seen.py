@@ -20,9 +20,13 @@ SILL, RISE, ROOF, DEPTH = 0.5, 1.5, 2.8, 1.2
 def overhung(*plates: Plate) -> Building:
     """A box, all of its walls outdoors, with a window to the south."""
     return shoebox(
-        4.0, 5.0, ROOF, windows=[WindowRectangle(0.5, SILL, 3.0, RISE, frame=0.05)],
-        adjacency={"wall": "outside"}, plates=plates,
-    )  # fmt: skip
+        4.0,
+        5.0,
+        ROOF,
+        windows=[WindowRectangle(0.5, SILL, 3.0, RISE, frame=0.05)],
+        adjacency={"wall": "outside"},
+        plates=plates,
+    )
 
 
 def zone_of(building: Building, glass, weather, skies) -> RoomZone:

@@ -31,8 +31,7 @@ def test_what_is_asked_of_the_windows_irradiance_is_what_its_directions_give() -
     names = "outer", "inner", "middle"
     sides = [SimpleNamespace(**{name: rng.random(K) for name in names}) for _ in range(G)]
     heats = [
-        SimpleNamespace(absorptances=side, back_reflectance=back)
-        for side, back in zip(sides, (0.1, 0.2), strict=True)
+        SimpleNamespace(absorptances=side, back_reflectance=back) for side, back in zip(sides, (0.1, 0.2), strict=True)
     ]
     T, omega = rng.random((G, K, K)), KLEMS_FULL.projected_solid_angles()
     incident = omega[:, None] * (outdoors.first.daylight.values @ skies.solar)  # [G, K, L]

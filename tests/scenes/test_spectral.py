@@ -14,13 +14,7 @@ from bim.shoebox import shoebox
 from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.spectra.channels import channels_of
-from mitsuba_cfs.spectra.detectors import (
-    NANOMETRES,
-    colour_temperature,
-    daylight_efficacy_ratio,
-    detected,
-    illuminant,
-)
+from mitsuba_cfs.spectra.detectors import NANOMETRES, colour_temperature, daylight_efficacy_ratio, detected, illuminant
 from scenes.cli import cfs
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import FenestrationSystem, read_system
@@ -37,9 +31,15 @@ from scenes.room.windows import in_all_windows
 from tests.scenes.test_tilts import family
 
 FEW = {
-    "method": "three-phase", "sensor_samples": 64, "patch_samples": 64, "sky_subdivision": 1,
-    "sensor_spacing": 2.0, "picture_size": 32, "picture_count": 1, "picture_samples": 1,
-}  # fmt: skip
+    "method": "three-phase",
+    "sensor_samples": 64,
+    "patch_samples": 64,
+    "sky_subdivision": 1,
+    "sensor_spacing": 2.0,
+    "picture_size": 32,
+    "picture_count": 1,
+    "picture_samples": 1,
+}
 
 
 def amber(path: Path) -> Path:
@@ -180,9 +180,7 @@ def state_of(path: Path, *layers: dict[str, object]) -> FenestrationSystem:
     return read_state(StateTable(bsdf=path, layers=layers), path)
 
 
-def test_layers_without_a_spectrum_are_named_and_a_stated_spectrum_goes_before(
-    blind, tmp_path
-) -> None:
+def test_layers_without_a_spectrum_are_named_and_a_stated_spectrum_goes_before(blind, tmp_path) -> None:
     pane = {"pane": pane_file(tmp_path / "pane.txt", EVERY_20), "thickness": 0.004}
     plain = {"thickness": 0.004, "solar": (0.8, 0.07, 0.07)}
     gap = {"gap": {"width": 0.016}}

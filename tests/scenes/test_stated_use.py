@@ -19,13 +19,7 @@ from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
 from scenes.input_files import read_weather
 from scenes.room.inputs import FileSensors
-from scenes.room.operation import (
-    OperationHours,
-    ground_note,
-    stated_note,
-    unstated_note,
-    with_stated_uses,
-)
+from scenes.room.operation import OperationHours, ground_note, stated_note, unstated_note, with_stated_uses
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.room import compute_room
@@ -75,10 +69,7 @@ def test_holidays_of_the_operation_are_the_files_holidays(used, weather):
 
 
 def test_an_operation_file_goes_before_the_buildings(used, weather):
-    tables = OperationTables(
-        gains={"equipment_w_m2": 1.0},
-        rooms=[{"spaces": ["Hall"], "gains": {"persons": 7.0}}],
-    )
+    tables = OperationTables(gains={"equipment_w_m2": 1.0}, rooms=[{"spaces": ["Hall"], "gains": {"persons": 7.0}}])
     office, hall = (hours_of(used, weather, name, tables) for name in ("Office", "Hall"))
     assert office.tables.gains.equipment_w_m2 == hall.tables.gains.equipment_w_m2 == 1.0
     assert (office.tables.gains.persons, hall.tables.gains.persons) == pytest.approx((4.0, 7.0))
@@ -106,8 +97,7 @@ def test_gains_and_leaks_that_nobody_states_are_named(used):
     building, tables = read_honeybee(TWO_ROOMS), OperationTables(gains={"persons": 0})
     (note,) = unstated_note(tables, building, "use.toml")
     assert note == (
-        "gains.equipment_w_m2 = 8.0, gains.occupied = [8, 18], air.infiltration_ach = 0.5, "
-        "not stated in use.toml."
+        "gains.equipment_w_m2 = 8.0, gains.occupied = [8, 18], air.infiltration_ach = 0.5, not stated in use.toml."
     )
     stated = {"equipment_w_m2": 0, "persons": 0, "occupied": [0, 24]}
     whole = OperationTables(gains=stated, air={"infiltration_ach": 0.5})
@@ -158,9 +148,13 @@ def test_a_grid_of_the_file_has_the_light_of_its_own_sensors(used, weather, vari
     """
     office = used.space("Office")
     options = RoomOptions.of(
-        method="three-phase", sky_subdivision=1, sensor_samples=256, patch_samples=64,
-        sensor_spacing=2.0, picture_count=0,
-    )  # fmt: skip
+        method="three-phase",
+        sky_subdivision=1,
+        sensor_samples=256,
+        patch_samples=64,
+        sensor_spacing=2.0,
+        picture_count=0,
+    )
     from scenes.fenestration.resolver import fill_windows
     from scenes.fenestration.systems import WindowOverrides
     from scenes.room.light import grid_points
@@ -199,10 +193,7 @@ def test_cfs_thermal_has_the_files_set_points(tmp_path):
     years, notes = run_study(read_study(study), lambda *_: None)
     office, hall = (year.hours["air_c"] for year in years)
     assert hall.min() < 15 < office.min()
-    assert any(
-        note.startswith("Gains, outdoor air and set points of 2 of 2 rooms are from ")
-        for note in notes
-    )
+    assert any(note.startswith("Gains, outdoor air and set points of 2 of 2 rooms are from ") for note in notes)
     assert any(note.startswith("The file states set points (rooms: Hall)") for note in notes)
 
 
@@ -210,8 +201,7 @@ def test_commands_with_rules_of_their_own_say_what_they_leave_out(used):
     """`cfs comply` has the uses, sensors and eyes of its rules."""
     said = unused_notes(replace(used, grids=(ModelGrid("g", np.zeros((1, 3)), np.eye(3)[2:]),)))
     assert said[-1] == (
-        "used.hbjson contains uses of rooms (2), sensor grids (1) and views (0); they are not used "
-        "here."
+        "used.hbjson contains uses of rooms (2), sensor grids (1) and views (0); they are not used here."
     )
     assert not unused_notes(read_honeybee(TWO_ROOMS))
     head = head_of(used)  # which every command shows

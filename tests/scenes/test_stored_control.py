@@ -99,8 +99,7 @@ def test_the_groups_are_those_of_ifc_and_are_replaced(written, tmp_path) -> None
         (relation,) = group.IsGroupedBy
         assert all(w.is_a("IfcWindow") or w.is_a("IfcDoor") for w in relation.RelatedObjects)
         (defined,) = group.IsDefinedBy
-        values = {p.Name: p.NominalValue.wrappedValue
-                  for p in defined.RelatingPropertyDefinition.HasProperties}  # fmt: skip
+        values = {p.Name: p.NominalValue.wrappedValue for p in defined.RelatingPropertyDefinition.HasProperties}
         assert values["rule"] == "irradiance"
     again = written("[control]\nrule = 'always'\nstate = 1\n", first)
     stored = read_control(again)
@@ -114,9 +113,7 @@ def test_a_model_of_ifc2x3_holds_them_too(tmp_path) -> None:
     organisation = model.create_entity("IfcOrganization", Name="x")
     both = model.create_entity("IfcPersonAndOrganization", person, organisation)
     program = model.create_entity("IfcApplication", organisation, "1", "x", "x")
-    owner = model.create_entity(
-        "IfcOwnerHistory", both, program, None, "ADDED", None, None, None, 0
-    )
+    owner = model.create_entity("IfcOwnerHistory", both, program, None, "ADDED", None, None, None, 0)
     guid = ifcopenshell.guid.new()
     model.create_entity("IfcWindow", guid, owner, "W1")
     path, out = tmp_path / "in.ifc", tmp_path / "out.ifc"
@@ -132,8 +129,7 @@ def test_a_model_of_ifc2x3_holds_them_too(tmp_path) -> None:
 def test_what_a_model_cannot_hold_or_lacks_is_refused(tmp_path, capsys) -> None:
     file = tmp_path / "rules.toml"
     file.write_text(
-        "[control]\nrule = 'schedule'\nschedule = 'use'\n[schedules.use]\n"
-        "weekday = [{ hours = [8, 18], value = 0 }]\n"
+        "[control]\nrule = 'schedule'\nschedule = 'use'\n[schedules.use]\nweekday = [{ hours = [8, 18], value = 0 }]\n"
     )
     out = tmp_path / "out.ifc"
     assert run(["ifc", "control", str(OFFICE), str(file), "-o", str(out)]) == 1
@@ -182,10 +178,7 @@ def test_plans_of_a_room_without_a_seat_do_not_take_that_of_another(tmp_path, wr
     model = written("[control]\nrule = 'always'\n")
     first, second = (w.GlobalId for w in ifcopenshell.open(str(model)).by_type("IfcWindow")[:2])
     plan = {"rule": "predictive", "predictive": {}}
-    groups = [
-        StoredGroup("A", (first,), plan | {"seat": [1.0, 1.0, 1.2]}),
-        StoredGroup("B", (second,), plan),
-    ]  # fmt: skip
+    groups = [StoredGroup("A", (first,), plan | {"seat": [1.0, 1.0, 1.2]}), StoredGroup("B", (second,), plan)]
     write_control(model, tmp_path / "plans.ifc", groups)
     control = taken(tmp_path / "plans.ifc", tmp_path).tables.control
     assert [control.rule_of(one).seat for one in control.group] == [(1.0, 1.0, 1.2), None]

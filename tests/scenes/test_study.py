@@ -36,48 +36,41 @@ g_value = 0.3
 WRONG = {
     "no system": ("", BOX + CLIMATE, "system: is missing"),
     "unknown key": ("colour = 1\n", BOX + SYSTEM + CLIMATE, "colour: no such key; there are "),
-    "unknown method": (
-        'methods = ["six-phase"]\n', BOX + SYSTEM + CLIMATE, "methods.0: expected 'three-phase', ",
-    ),
-    "no number": (
-        'orientations_deg = ["south"]\n', BOX + SYSTEM + CLIMATE, "orientations_deg.0: expected a",
-    ),
-    "one orientation twice": (
-        "orientations_deg = [0, 360]\n", BOX + SYSTEM + CLIMATE, "orientations_deg: 0.0 comes",
-    ),
+    "unknown method": ('methods = ["six-phase"]\n', BOX + SYSTEM + CLIMATE, "methods.0: expected 'three-phase', "),
+    "no number": ('orientations_deg = ["south"]\n', BOX + SYSTEM + CLIMATE, "orientations_deg.0: expected a"),
+    "one orientation twice": ("orientations_deg = [0, 360]\n", BOX + SYSTEM + CLIMATE, "orientations_deg: 0.0 comes"),
     "one name twice": ("", BOX + SYSTEM + SYSTEM + CLIMATE, "system: 'blind' comes twice"),
     "box and building": (
-        "", BOX.replace("[room.box]", f'building = "{OFFICE}"\n[room.box]') + SYSTEM + CLIMATE,
+        "",
+        BOX.replace("[room.box]", f'building = "{OFFICE}"\n[room.box]') + SYSTEM + CLIMATE,
         "room.0: give either `building` or `box`",
     ),
-    "system of nothing": (
-        "", BOX + '[[system]]\nname = "none"\n' + CLIMATE, "system.0: give `bsdf`, or `operation`",
-    ),
+    "system of nothing": ("", BOX + '[[system]]\nname = "none"\n' + CLIMATE, "system.0: give `bsdf`, or `operation`"),
     "U of no file": (
-        "", BOX + '[[system]]\noperation = "a.toml"\nu_value = 1.1\n' + CLIMATE,
+        "",
+        BOX + '[[system]]\noperation = "a.toml"\nu_value = 1.1\n' + CLIMATE,
         "system.0: `u_value` and `g_value` belong to a `bsdf`",
     ),
-    "no such operation": (
-        "", BOX + '[[system]]\noperation = "a.toml"\n' + CLIMATE, "system.0.operation: no such",
-    ),
+    "no such operation": ("", BOX + '[[system]]\noperation = "a.toml"\n' + CLIMATE, "system.0.operation: no such"),
     "no such file": ("", BOX + SYSTEM.replace(".xml", ".xlm") + CLIMATE, "system.0.bsdf: no such"),
     "no such peak": (
-        "", BOX + SYSTEM + 'see_through = ["blind.xml=sharp"]\n' + CLIMATE,
+        "",
+        BOX + SYSTEM + 'see_through = ["blind.xml=sharp"]\n' + CLIMATE,
         "system.0.see_through.0: --see-through: expected FILE=specular",
     ),
-    "negative option": (
-        "", BOX + SYSTEM + CLIMATE + "[options]\nsensor_spacing = -1\n", "options.sensor_spacing:",
-    ),
+    "negative option": ("", BOX + SYSTEM + CLIMATE + "[options]\nsensor_spacing = -1\n", "options.sensor_spacing:"),
     "by wavelength with paths": (
-        'methods = ["point-in-time"]\n', BOX + SYSTEM + CLIMATE + "[options]\nspectral = true\n",
+        'methods = ["point-in-time"]\n',
+        BOX + SYSTEM + CLIMATE + "[options]\nspectral = true\n",
         "options.spectral: needs methods of three-phase, five-phase",
     ),
     "no time": (
-        "", BOX + SYSTEM + CLIMATE + '[auto]\ntime_budget = "soon"\n',
+        "",
+        BOX + SYSTEM + CLIMATE + '[auto]\ntime_budget = "soon"\n',
         "auto.time_budget: expected a time such as",
     ),
     "not TOML": ("", BOX + SYSTEM + CLIMATE + "[[", "is not TOML"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("head, body, words", WRONG.values(), ids=WRONG.keys())
@@ -249,9 +242,12 @@ def test_a_case_computed_here_tells_its_stages(tmp_path, processes, told):
     study = study.model_copy(update={"room": (room,)})
     stages = []
     run_study(
-        study, Store(tmp_path / "out"), compute=noted, processes=processes,
+        study,
+        Store(tmp_path / "out"),
+        compute=noted,
+        processes=processes,
         progress=lambda stage, fraction: stages.append((str(stage), stage.number, fraction)),
-    )  # fmt: skip
+    )
     for number in (1, 2):
         assert (("daylight", number, 0.5) in stages) == told
         assert ("", number, 0.0) in stages
@@ -306,9 +302,7 @@ def test_failed_cases_end_with_exit_1_and_their_number(tmp_path, capsys, monkeyp
     from scenes.study import study as module
 
     monkeypatch.chdir(tmp_path)  # where `noted` leaves its log, under the room's name
-    monkeypatch.setattr(
-        "scenes.study_report.write_study_report", lambda _, path, _page: path.touch()
-    )
+    monkeypatch.setattr("scenes.study_report.write_study_report", lambda _, path, _page: path.touch())
     options = dict(module.run_study.__kwdefaults__) | {"compute": _failing}
     monkeypatch.setattr(module.run_study, "__kwdefaults__", options)
     path = study_file(tmp_path, "orientations_deg = [0, 13, 20]\n")
@@ -389,9 +383,8 @@ def test_an_interrupted_study_goes_on(tmp_path):
     path.write_text(text)
     command = [sys.executable, "-c", code, str(path), "--out", str(tmp_path / "out")]
     process = subprocess.Popen(
-        command, cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        preexec_fn=default_signals,
-    )  # fmt: skip
+        command, cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=default_signals
+    )
     cases = tmp_path / "out" / "cases"
 
     def finished() -> list[Path]:  # a case being written has another name

@@ -20,13 +20,10 @@ def test_auto_chooses_for_the_study_and_says_why(tmp_path):
     costs += [Cost("five-phase", "DGP", 20.0, 30.0, 0.002), Cost("five-phase", "sDGP", 1, 1, 1e-4)]
     costs += [Cost("point-in-time", "DGP", 0.0, 0.0, 5.0)]
     machine = Calibration("m", "now", 96, tuple(costs))
-    errors = {"three-phase DGP": 0.2, "five-phase DGP": 0.1, "five-phase sDGP": 0.15,
-              "point-in-time DGP": 0.1}  # fmt: skip
+    errors = {"three-phase DGP": 0.2, "five-phase DGP": 0.1, "five-phase sDGP": 0.15, "point-in-time DGP": 0.1}
     case = MeasuredCase("a room", "a blind", Traits(0.0, 1.0, 0.5, 0.0, 0.0, 0.0), errors)
     measured = MeasuredErrors("made up", "today", (case,))
-    mirrored = BOX.replace('"box"', '"mirrored"').replace(
-        "[room.box]", "specular = true\n[room.box]"
-    )
+    mirrored = BOX.replace('"box"', '"mirrored"').replace("[room.box]", "specular = true\n[room.box]")
     path = study_file(tmp_path, 'methods = ["auto"]\n' + mirrored)
 
     def chosen(**auto):

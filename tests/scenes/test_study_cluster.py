@@ -51,18 +51,27 @@ class Cluster:
 
     def begin_scheduler(self, port: str) -> None:
         """Start the scheduler."""
-        self.scheduler = self._start(
-            "scheduler", "--port", port, *self._options, "--idle-timeout", "120 s",
-        )  # fmt: skip
+        self.scheduler = self._start("scheduler", "--port", port, *self._options, "--idle-timeout", "120 s")
         self.address = self._said(self.scheduler, r"Scheduler at:\s+(t\w+://\S+)")
 
     def add_worker(self, *options: str, cwd: Path = REPOSITORY) -> None:
         """Start a worker; w0 is the first."""
         worker = self._start(
-            "worker", self.address, *self._options, "--nthreads", "1", "--no-nanny",
-            "--death-timeout", "60", "--local-directory", str(self._folder),
-            "--name", f"w{len(self.workers)}", *options, cwd=cwd,
-        )  # fmt: skip
+            "worker",
+            self.address,
+            *self._options,
+            "--nthreads",
+            "1",
+            "--no-nanny",
+            "--death-timeout",
+            "60",
+            "--local-directory",
+            str(self._folder),
+            "--name",
+            f"w{len(self.workers)}",
+            *options,
+            cwd=cwd,
+        )
         self.workers.append(worker)
 
     def wait_for_workers(self) -> None:
@@ -74,9 +83,8 @@ class Cluster:
         log = self._folder / f"{len(self.processes)}.log"
         with log.open("w") as output:
             process = subprocess.Popen(
-                [sys.executable, "-m", "dask", *arguments],
-                stdout=output, stderr=subprocess.STDOUT, cwd=cwd,
-            )  # fmt: skip
+                [sys.executable, "-m", "dask", *arguments], stdout=output, stderr=subprocess.STDOUT, cwd=cwd
+            )
         process.log = log
         self.processes.append(process)
         return process
@@ -192,18 +200,13 @@ def test_only_the_loopback_address_is_listened_on(cluster, tmp_path):
         listening = {}
         for pid in (os.getpid(), *(one.pid for one in cluster.processes if one.poll() is None)):
             process = psutil.Process(pid)
-            listening[pid] = {one.laddr.ip for one in process.net_connections() if
-                              one.status == psutil.CONN_LISTEN}  # fmt: skip
+            listening[pid] = {one.laddr.ip for one in process.net_connections() if one.status == psutil.CONN_LISTEN}
     assert listening.pop(os.getpid()) == set()
-    assert len(listening) >= 2 and set(map(frozenset, listening.values())) == {
-        frozenset({"127.0.0.1"})
-    }
+    assert len(listening) >= 2 and set(map(frozenset, listening.values())) == {frozenset({"127.0.0.1"})}
 
 
 @pytest.mark.slow
-def test_a_cluster_with_tls_computes_for_those_with_its_certificate_alone(
-    started, tmp_path, monkeypatch
-):
+def test_a_cluster_with_tls_computes_for_those_with_its_certificate_alone(started, tmp_path, monkeypatch):
     """The options and variables that SECURITY.md names."""
     import dask
 
@@ -312,9 +315,7 @@ def test_without_a_worker_that_can_compute_the_reasons_are_named(started, tmp_pa
 
 
 @pytest.mark.parametrize(("answer", "error"), [(600.0, ""), (1.0, "has not answered")])
-def test_a_worker_that_reads_its_files_slowly_is_waited_for(
-    started, tmp_path, monkeypatch, answer, error
-):
+def test_a_worker_that_reads_its_files_slowly_is_waited_for(started, tmp_path, monkeypatch, answer, error):
     """The first import of the program from a cluster's disks takes longer than the start."""
     monkeypatch.setattr("scenes.cluster.WAIT_SECONDS", 0.5)
     monkeypatch.setattr("scenes.cluster.ANSWER_SECONDS", answer)

@@ -65,10 +65,7 @@ def test_the_heat_of_a_system_that_stays_in_a_state_is_that_states(years):
 
 @pytest.mark.parametrize(
     ("system", "operation", "words"),
-    [
-        ('bsdf = "{blind}"\n', STATES, "leave [[system]] out"),
-        ("", "[loads]\nheating_c = 20\n", "is missing"),
-    ],
+    [('bsdf = "{blind}"\n', STATES, "leave [[system]] out"), ("", "[loads]\nheating_c = 20\n", "is missing")],
 )
 def test_states_are_where_the_system_has_none(tmp_path, system, operation, words):
     (tmp_path / "own.toml").write_text(operation)

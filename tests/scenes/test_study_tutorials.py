@@ -28,9 +28,7 @@ CLEAR = {"thickness": 0.003048, "solar": (0.834, 0.075, 0.075)}
 PANES = (CLEAR | {"gap": {"width": 0.012}}, CLEAR)
 
 
-@pytest.mark.parametrize(
-    "file", sorted(ashrae140_studies.STUDIES.glob("*.toml")), ids=lambda f: f.stem
-)
+@pytest.mark.parametrize("file", sorted(ashrae140_studies.STUDIES.glob("*.toml")), ids=lambda f: f.stem)
 def test_case_of_the_standard_reads(file: Path, tmp_path: Path) -> None:
     (tmp_path / ashrae140_studies.WEATHER).write_text("")
     study = read_study(Path(shutil.copy(file, tmp_path)))
@@ -50,9 +48,7 @@ def test_panes_alone_are_a_system() -> None:
     theirs = np.interp(np.radians(50), ANGLES, glass("double").tau)
     assert found.angular.transmitted(np.radians(50)) == pytest.approx(theirs, abs=0.015)
     assert any("no visible values" in note for note in found.notes)
-    seen = system_of_panes([
-        GlazingLayerTable.model_validate(pane | {"visible": (0.9, 0.08, 0.08)}) for pane in PANES
-    ])  # fmt: skip
+    seen = system_of_panes([GlazingLayerTable.model_validate(pane | {"visible": (0.9, 0.08, 0.08)}) for pane in PANES])
     assert not seen.notes
     visible = seen.visible.direct_hemispherical(seen.visible.transmission_front)
     assert visible[0] == pytest.approx(0.9**2 / (1 - 0.08**2), abs=2e-4)

@@ -31,9 +31,12 @@ QUARTER = TUTORIALS / "quarter.city.json"
 @pytest.fixture
 def options():
     return JobOptions(
-        TUTORIALS / "two_rooms.hbjson", WEATHER, spaces=("Office",), surroundings=(QUARTER,),
+        TUTORIALS / "two_rooms.hbjson",
+        WEATHER,
+        spaces=("Office",),
+        surroundings=(QUARTER,),
         surroundings_offset=(-456000.0, -5430000.0, -110.0),
-    )  # fmt: skip
+    )
 
 
 def test_the_quarter_stands_around_the_room(options):
@@ -55,13 +58,16 @@ def test_every_command_of_a_room_reads_them(command, tmp_path, capfd):
     broken = tmp_path / "broken.city.json"
     broken.write_text("{")
     words = [
-        command, TUTORIALS / "two_rooms.hbjson", "--weather", WEATHER, "--surroundings", broken,
-        "--out", tmp_path / ("out.png" if command == "picture" else "out"),
-    ]  # fmt: skip
-    more = {
-        "comply": ["--standard", "en17037"],
-        "picture": ["--at", "06-21 12:00", "--size", "16", "--samples", "1"],
-    }
+        command,
+        TUTORIALS / "two_rooms.hbjson",
+        "--weather",
+        WEATHER,
+        "--surroundings",
+        broken,
+        "--out",
+        tmp_path / ("out.png" if command == "picture" else "out"),
+    ]
+    more = {"comply": ["--standard", "en17037"], "picture": ["--at", "06-21 12:00", "--size", "16", "--samples", "1"]}
     assert cli.run([str(word) for word in [*words, *more.get(command, [])]]) == 1
     said = capfd.readouterr().err.strip().splitlines()
     assert "broken.city.json" in said[-1]
@@ -70,9 +76,7 @@ def test_every_command_of_a_room_reads_them(command, tmp_path, capfd):
 def test_ratings_of_a_year_are_not_found_again_for_other_surroundings(tmp_path, variant):
     wall = tmp_path / "wall.obj"
     wall.write_text("v -9 -3 0\nv 9 -3 0\nv 9 -3 6\nv -9 -3 6\nf 1 2 3 4\n")
-    options = YearOptions(
-        TUTORIALS / "two_rooms.hbjson", WEATHER, spaces=("Office",), surroundings=(wall,)
-    )
+    options = YearOptions(TUTORIALS / "two_rooms.hbjson", WEATHER, spaces=("Office",), surroundings=(wall,))
     moved = replace(options, surroundings_offset=(0.0, -1.0, 0.0))
     digests = [read_year(one).digest for one in (options, moved)]
     wall.write_text(wall.read_text().replace("6", "7"))
@@ -87,8 +91,7 @@ def study_of(folder, kind: str, more: str = ""):
     building = (TUTORIALS / "two_rooms.hbjson").as_posix()
     around = f'surroundings = ["wall.obj"]\nsurroundings_offset = [0, -1, 0]\n{more}'
     text = {
-        "thermal": f'{around}building = "{building}"\nspaces = ["Office"]\n'
-        f'weather = "{WEATHER.as_posix()}"\n',
+        "thermal": f'{around}building = "{building}"\nspaces = ["Office"]\nweather = "{WEATHER.as_posix()}"\n',
         "study": f'{around}[[room]]\nbuilding = "{building}"\nspaces = ["Office"]\n'
         f'[[climate]]\nweather = "{WEATHER.as_posix()}"\n',
     }

@@ -47,9 +47,7 @@ def test_named_windows_have_their_own_states_and_the_rest_the_others(tmp_path: P
     found = filled(tmp_path, system(4), system(6, "window 2"), system(8, "window 2"))
     assert found == [("panes 4 mm",), ("panes 6 mm", "panes 8 mm"), ("panes 4 mm",)]
     two = system(6, "window 1", "room-window-2")
-    assert filled(tmp_path, two, system(4, "window 2")) == [
-        ("panes 6 mm",), ("panes 4 mm",), ("panes 6 mm",)
-    ]  # fmt: skip
+    assert filled(tmp_path, two, system(4, "window 2")) == [("panes 6 mm",), ("panes 4 mm",), ("panes 6 mm",)]
 
 
 @pytest.mark.parametrize(
@@ -63,9 +61,7 @@ def test_named_windows_have_their_own_states_and_the_rest_the_others(tmp_path: P
         ),
     ],
 )
-def test_what_no_window_or_too_many_systems_have_is_named(
-    systems: tuple[str, ...], said: str, tmp_path: Path
-) -> None:
+def test_what_no_window_or_too_many_systems_have_is_named(systems: tuple[str, ...], said: str, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=said):
         filled(tmp_path, *systems)
 

@@ -35,9 +35,7 @@ def milk_at(tilt: float, tau: float) -> FenestrationSystem:
     even = np.full((KLEMS_FULL.size, KLEMS_FULL.size), tau / np.pi)
     back = np.full_like(even, 0.2 / np.pi)
     klems = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, even, even, back, back)
-    return FenestrationSystem(
-        f"milk {tilt:g}", klems, klems, u_value=2.0, g_value=tau + 0.1, tilt_deg=tilt
-    )
+    return FenestrationSystem(f"milk {tilt:g}", klems, klems, u_value=2.0, g_value=tau + 0.1, tilt_deg=tilt)
 
 
 def family() -> list[FenestrationSystem]:
@@ -47,9 +45,8 @@ def family() -> list[FenestrationSystem]:
 def room_with(states, weather, skies, control=None):
     tables = OperationTables.model_validate({"control": control or {}})
     return room_inputs(
-        TWO, TWO.spaces[0], in_all_windows(TWO.spaces[0], *states), weather, FEW,
-        operation=tables, skies=skies,
-    )  # fmt: skip
+        TWO, TWO.spaces[0], in_all_windows(TWO.spaces[0], *states), weather, FEW, operation=tables, skies=skies
+    )
 
 
 def test_states_in_steps_between_the_tilts() -> None:
@@ -61,14 +58,10 @@ def test_states_in_steps_between_the_tilts() -> None:
     assert [s.g_value for s in states[1:3]] == pytest.approx([0.7, 0.65])
 
 
-def test_the_light_between_two_tilts_is_their_mean_and_is_not_traced(
-    variant, weather, skies, monkeypatch
-) -> None:
+def test_the_light_between_two_tilts_is_their_mean_and_is_not_traced(variant, weather, skies, monkeypatch) -> None:
     counted = []
     traced = phases.direct_sun_matrix
-    monkeypatch.setattr(
-        phases, "direct_sun_matrix", lambda *a, **k: (counted.append(1), traced(*a, **k))[1]
-    )
+    monkeypatch.setattr(phases, "direct_sun_matrix", lambda *a, **k: (counted.append(1), traced(*a, **k))[1])
     states = tilt_states(family(), 10.0)
     room = room_with(states, weather, skies)
     light = room_light(room).light
@@ -98,9 +91,7 @@ def test_the_sun_between_two_tilts_is_their_mean(variant, weather, skies) -> Non
     assert both[0].inside == pytest.approx(0.75 * low[0].inside + 0.25 * high[0].inside)
 
 
-def test_cut_off_takes_the_least_tilt_of_the_family_that_stops_the_beam(
-    variant, weather, skies
-) -> None:
+def test_cut_off_takes_the_least_tilt_of_the_family_that_stops_the_beam(variant, weather, skies) -> None:
     """Closed form: tan(profile) >= (spacing/width - sin tilt)/cos tilt; raised stops nothing."""
     raised = replace(milk_at(0.0, 0.8), tilt_deg=None)
     states = tilt_states([raised, *family()], 5.0)
@@ -141,10 +132,9 @@ def test_the_error_is_that_of_tilts_left_out() -> None:
     [
         ([milk_at(0.0, 0.5)], "two or more"),
         ([milk_at(30.0, 0.5), milk_at(0.0, 0.4)], "rising"),
-        ([milk_at(0.0, 0.5), replace(milk_at(5.0, 0.4), tilt_deg=None), milk_at(9.0, 0.3)],
-         "after all others"),
+        ([milk_at(0.0, 0.5), replace(milk_at(5.0, 0.4), tilt_deg=None), milk_at(9.0, 0.3)], "after all others"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_family_is_refused(systems, words) -> None:
     with pytest.raises(DataError, match=words):
         tilt_states(systems, 5.0)
@@ -182,9 +172,7 @@ rule = "cut-off"
     assert isinstance(operation.file, Path)
 
 
-def test_the_sun_of_a_pane_stays_between_a_tilt_with_a_shade_node_and_one_without(
-    variant, weather, skies
-) -> None:
+def test_the_sun_of_a_pane_stays_between_a_tilt_with_a_shade_node_and_one_without(variant, weather, skies) -> None:
     """The state between them has no node for the sun that the first one's pane absorbs."""
     room = room_with(tilt_states(family(), 10.0), weather, skies)
     surfaces, outdoors = zone_surfaces(room), seasonal_outdoors(room)

@@ -25,10 +25,7 @@ GOOD = {"weather": "a.epw", "building": "a.ifc", "system": [{"bsdf": "a.xml"}]}
     [
         ({"contol": {}}, "s.toml: contol: no such key; did you mean control?"),
         ({"gains": {"person": 1}}, "s.toml: gains.person: no such key; did you mean persons?"),
-        (
-            {"system": [{"bsdf": "a", "gvalue": 1}]},
-            "s.toml: system.0.gvalue: no such key; did you mean g_value?",
-        ),
+        ({"system": [{"bsdf": "a", "gvalue": 1}]}, "s.toml: system.0.gvalue: no such key; did you mean g_value?"),
         (
             {"system": [{"bsdf": "a", "u_model": "gap", "gap": {"width": 1, "gases": {}}}]},
             "s.toml: system.0.gap.gases: no such key; did you mean gas?",
@@ -62,10 +59,7 @@ LAYER = {"thickness": 0.1, "conductivity": 1, "density": 1000, "heat_capacity": 
             {"box": BOX | {"construction": {"wall": [LAYER | {"thicknes": 1}]}}},
             "box.construction.wall.0.thicknes: no such key; did you mean thickness?",
         ),
-        (
-            {"box": BOX | {"reflectance": {"wals": 0.9}}},
-            "box.reflectance.wals: no such key; did you mean wall?",
-        ),
+        ({"box": BOX | {"reflectance": {"wals": 0.9}}}, "box.reflectance.wals: no such key; did you mean wall?"),
         ({"box": BOX | {"adjacency": {"facade": "adiabatic"}}}, "box.adjacency.facade: no such"),
         (
             {"box": BOX | {"adjacency": {"wall": "adiabatik"}}},
@@ -165,21 +159,25 @@ SLIPS = [
     ({"box": BOX | {"width": 4000}}, "box.width: expected 0 to 500 m", "4000 mm would be 4 m"),
     (
         {"box": BOX | {"construction": {"wall": [LAYER | {"thickness": 140}]}}},
-        "box.construction.wall.0.thickness: expected 0 to 5 m ", "140 mm would be 0.14 m",
+        "box.construction.wall.0.thickness: expected 0 to 5 m ",
+        "140 mm would be 0.14 m",
     ),
     (
         {"box": BOX | {"construction": {"wall": [LAYER | {"conductivity": 5000}]}}},
-        "box.construction.wall.0.conductivity: expected 0.001 to 500 W/(m K)", "got 5000",
+        "box.construction.wall.0.conductivity: expected 0.001 to 500 W/(m K)",
+        "got 5000",
     ),
     (
         {"box": BOX | {"construction": {"wall": [LAYER | {"density": 1e6}]}}},
-        "box.construction.wall.0.density: expected 0 to 20000 kg/m3", "got 1e+06",
+        "box.construction.wall.0.density: expected 0 to 20000 kg/m3",
+        "got 1e+06",
     ),
     (
         {"box": BOX | {"construction": {"wall": [LAYER | {"heat_capacity": 1.0}]}}},
-        "box.construction.wall.0.heat_capacity: expected 50 to 10000 J/(kg K)", "no kJ), got 1",
+        "box.construction.wall.0.heat_capacity: expected 50 to 10000 J/(kg K)",
+        "no kJ), got 1",
     ),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("more", "start", "words"), SLIPS)
@@ -211,9 +209,19 @@ def test_what_is_no_toml_is_said(tmp_path, content: bytes) -> None:
 
 @pytest.mark.parametrize(
     ("albedo", "good"),
-    [(0, True), (1.0, True), ([0.2] * 12, True), ("snow", True), (-0.1, False), (1.01, False),
-     ([0.2] * 11, False), ([0.2] * 13, False), ([1.5] * 12, False), ("ice", False)],
-)  # fmt: skip
+    [
+        (0, True),
+        (1.0, True),
+        ([0.2] * 12, True),
+        ("snow", True),
+        (-0.1, False),
+        (1.01, False),
+        ([0.2] * 11, False),
+        ([0.2] * 13, False),
+        ([1.5] * 12, False),
+        ("ice", False),
+    ],
+)
 def test_the_albedo_is_a_share_twelve_of_them_or_a_word(tmp_path, albedo, good) -> None:
     if good:
         table = validated(toml_file.OutdoorTable, {"albedo": albedo}, tmp_path / "s.toml")
@@ -227,16 +235,12 @@ def test_a_type_that_is_no_table_has_no_keys() -> None:
     for annotation in (float, tuple[int, ...], list[str], dict[str, float], str | None):
         assert keys_of(annotation) is None
     assert keys_of(dict[Literal["a", "b"], float] | None) == ("a", "b")
-    assert keys_of(tuple[float, float] | toml_file.OutdoorTable) == (
-        "surroundings", "surroundings_offset", "albedo",
-    )  # fmt: skip
+    assert keys_of(tuple[float, float] | toml_file.OutdoorTable) == ("surroundings", "surroundings_offset", "albedo")
 
 
 def test_reading_options_are_the_keys_that_a_table_has() -> None:
     room = toml_file.ReadTable(join=("A + B",), furniture=True)
-    assert toml_file.read_options(room) == {
-        "join": ("A + B",), "furniture": True, "apertures": (), "facade_panes": (),
-    }  # fmt: skip
+    assert toml_file.read_options(room) == {"join": ("A + B",), "furniture": True, "apertures": (), "facade_panes": ()}
     both = toml_file.read_options(toml_file.ReadTable(), toml_file.OutdoorTable(albedo="file"))
     assert both["albedo"] == "file" and both["furniture"] is False and len(both) == 7
 
@@ -249,6 +253,4 @@ def test_the_type_within_a_list_that_may_be_a_number_is_found() -> None:
 
 
 def test_what_annotates_a_table_is_passed_over() -> None:
-    assert keys_of(Annotated[toml_file.OutdoorTable, "of a study"]) == keys_of(
-        toml_file.OutdoorTable
-    )
+    assert keys_of(Annotated[toml_file.OutdoorTable, "of a study"]) == keys_of(toml_file.OutdoorTable)

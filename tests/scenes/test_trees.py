@@ -104,16 +104,9 @@ def test_heat_and_glare_of_an_hour_are_those_of_its_month(variant, behind, weath
         np.testing.assert_allclose(facade[hours], outside[lit[hours]], rtol=1e-6)
         light = room_light(alone)
         expected = annual_glare(alone, light, state)
-        assert year.dgp.iloc[lit[hours]].to_numpy() == pytest.approx(
-            expected.dgp.iloc[lit[hours]].to_numpy(), abs=0.02
-        )
-        assert year.ev.iloc[lit[hours]].to_numpy() == pytest.approx(
-            expected.ev.iloc[lit[hours]].to_numpy(), rel=0.06
-        )
-        of_month = {
-            one.hour: one.glare["ev"]
-            for one in room_glare(alone, light, state, list(HOURS)).pictures
-        }
+        assert year.dgp.iloc[lit[hours]].to_numpy() == pytest.approx(expected.dgp.iloc[lit[hours]].to_numpy(), abs=0.02)
+        assert year.ev.iloc[lit[hours]].to_numpy() == pytest.approx(expected.ev.iloc[lit[hours]].to_numpy(), rel=0.06)
+        of_month = {one.hour: one.glare["ev"] for one in room_glare(alone, light, state, list(HOURS)).pictures}
         for one in shown.pictures:
             if one.hour in lit[hours]:
                 assert one.glare["ev"] == pytest.approx(of_month[one.hour], rel=0.06)
@@ -173,9 +166,7 @@ def test_what_trees_let_pass_is_said_at_the_head(behind):
 def test_the_explorer_is_refused_before_anything_is_traced(behind, weather, skies, glass):
     (space,) = behind.spaces
     with pytest.raises(DataError, match="one transmittance"):
-        lit_room(
-            behind, space, in_all_windows(space, glass), weather, SMALL, skies=skies, explore=True
-        )
+        lit_room(behind, space, in_all_windows(space, glass), weather, SMALL, skies=skies, explore=True)
 
 
 @pytest.mark.slow
@@ -186,8 +177,24 @@ def test_a_year_of_glare_behind_trees(variant, tmp_path, capfd):
     for kind in ("deciduous", "evergreen"):
         trees, out = tmp_path / "trees.toml", tmp_path / kind
         trees.write_text(LIST.replace("deciduous", kind))
-        words = ["dgp", model, "--space", "Office", "--surroundings", trees, "--weather", WEATHER,
-                 "--metric", "sDGP", "--size", 64, "--samples", 1, "--out", out]  # fmt: skip
+        words = [
+            "dgp",
+            model,
+            "--space",
+            "Office",
+            "--surroundings",
+            trees,
+            "--weather",
+            WEATHER,
+            "--metric",
+            "sDGP",
+            "--size",
+            64,
+            "--samples",
+            1,
+            "--out",
+            out,
+        ]
         assert cli.run([str(word) for word in words]) == 0, capfd.readouterr().err
         manifest = json.loads((out / "glare_year.json").read_text())
         assert manifest["options"]["surroundings"] == [str(trees)]

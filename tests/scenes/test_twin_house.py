@@ -42,17 +42,14 @@ def test_study_reads_what_was_measured(written) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True,
-    reason="1.2 K: some 35 W/K to the rooms in the north are missing; docs/validation.md",
-)
+@pytest.mark.xfail(strict=True, reason="1.2 K: some 35 W/K to the rooms in the north are missing; docs/validation.md")
 def test_living_room_follows_the_measured_air(written) -> None:
     """RMS 1 K; the seven rooms coupled by the Python API reached 0.24 to 0.87 K."""
     source, folder = written
     experiment = twin_house.EXPERIMENTS[2]
-    both = twin_house.compare(
-        folder / experiment.study.name, twin_house.measured(source, experiment)
-    ).loc[experiment.phases["random heat"]]
+    both = twin_house.compare(folder / experiment.study.name, twin_house.measured(source, experiment)).loc[
+        experiment.phases["random heat"]
+    ]
     gap = both["ours"] - both["measured"]
     assert len(both) > 2000
     assert np.sqrt((gap**2).mean()) < 1.0

@@ -17,26 +17,14 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.fenestration.thermal_file import ThermalFile
-from scenes.fenestration.thermal_system import (
-    scattered_share,
-    sun_in_layers,
-    thermal_system,
-    with_likely_layers,
-)
+from scenes.fenestration.thermal_system import scattered_share, sun_in_layers, thermal_system, with_likely_layers
 from scenes.room.operation import read_operation
 from tests.scenes.fenestration_models import grey, room
 from thermal.blackbox import R_INNER, R_OUTER, Fenestration
 from thermal.closure import ERRORS, Closure
 from thermal.errors import ThermalInputError
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit, Openings
-from thermal.iso15099 import (
-    STATED_G,
-    iso15099_data,
-    iso15099_g_values,
-    iso15099_u_value,
-    prescribed,
-    yearly_g_values,
-)
+from thermal.iso15099 import STATED_G, iso15099_data, iso15099_g_values, iso15099_u_value, prescribed, yearly_g_values
 from thermal.window_model import layered_thermal_data, window_model
 
 BLIND = Path(__file__).parents[2] / "scenes" / "demo" / "venetian_blind.xml"
@@ -86,9 +74,7 @@ def test_layers_give_u_g_films_and_resistance_by_default():
     assert heat.transmittance[0] < heat.g_value[0] < 0.9
     assert "ISO 15099, layer by layer, with films of the shade" in heat.model
     assert len(heat.notes) == 2  # U and g are from the layers
-    known = thermal_system(
-        grey_system(closure=Closure("layers", unit=INTERNAL), u_value=1.0, g_value=0.4)
-    )
+    known = thermal_system(grey_system(closure=Closure("layers", unit=INTERNAL), u_value=1.0, g_value=0.4))
     assert known.fenestration.u_value == 1.0
     # g is stated for a sunny summer state; that of the year differs by the air flow at the shade
     theta = KLEMS_FULL.centres()[0]
@@ -168,8 +154,7 @@ def test_g_by_direction_of_assumed_layers_is_windows_engine_s(reference_data):
     from tests.validation.reference_systems import read_optics, system
 
     folder = reference_data / "energyplus"
-    for name, bound in (("dgu", 0.005), ("ext_shade", 0.005), ("ext_blind", 0.02),
-                        ("int_shade", 0.015)):  # fmt: skip
+    for name, bound in (("dgu", 0.005), ("ext_shade", 0.005), ("ext_blind", 0.02), ("int_shade", 0.015)):
         expected = read_optics(folder, name).diffuse[:, 2]
         found = system(folder, name, "typical").optics.diffuse[:, 2]
         np.testing.assert_allclose(found, expected, atol=bound, err_msg=name)
@@ -187,9 +172,7 @@ def test_assumed_layers_find_another_glazing_by_u_and_g(shaded):
     first = optics.tau[:1], absorbed[:1]
     g = float(iso15099_g_values(unit, prescribed(*STATED_G), *first)[0])
     place = "internal" if shaded else "none"
-    window = window_model(
-        *known, place, Closure(), absorbed=sun_in_layers, u_value=u, g_normal=g, item="clear"
-    )
+    window = window_model(*known, place, Closure(), absorbed=sun_in_layers, u_value=u, g_normal=g, item="clear")
     expected = yearly_g_values(unit, optics.tau, absorbed)
     assert np.abs(window.data.g_value - expected).max() < 0.012
     closed = window.closure.close(Fenestration("clear", u)).layer_resistance
@@ -201,8 +184,9 @@ def test_assumed_layers_find_another_glazing_by_u_and_g(shaded):
 
 def test_a_blind_that_lets_most_light_straight_through_is_still_a_shade():
     """Three quarters of what the demo's blind transmits leave straight on."""
-    blind, glazing = (replace(read_system(BLIND.with_name(f"{name}.xml")), g_by_patch=None)
-                      for name in ("venetian_blind", "glazing"))  # fmt: skip
+    blind, glazing = (
+        replace(read_system(BLIND.with_name(f"{name}.xml")), g_by_patch=None) for name in ("venetian_blind", "glazing")
+    )
     assert 0.2 < scattered_share(blind.solar) < 0.35 and scattered_share(glazing.solar) < 1e-9
     assert any("taken as external" in note for note in thermal_system(blind).notes)
     assert not any("taken as" in note for note in thermal_system(glazing).notes)
@@ -252,9 +236,7 @@ def operation(tmp_path: Path, text: str) -> FenestrationSystem:
 
 def test_toml_says_panes_gases_and_shade(tmp_path):
     unit = operation(tmp_path, LAYERS).closure.unit
-    assert unit == replace(
-        INTERNAL, layers=(CLEAR, LOW_E, replace(SHADE, infrared_transmittance=0.0))
-    )
+    assert unit == replace(INTERNAL, layers=(CLEAR, LOW_E, replace(SHADE, infrared_transmittance=0.0)))
     u = iso15099_u_value(unit, prescribed(0.0, 20.0))
     assert 1.1 < u < 1.2
     wide = operation(tmp_path, f"glazing_width = 3.0\n{LAYERS}").closure.unit

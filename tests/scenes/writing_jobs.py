@@ -87,66 +87,62 @@ GENERATE = "bsdf generate --depth-mm 80 --spacing-mm 72 --visible 0.5 --out".spl
 JOBS = {
     "run": to_folder("run", OFFICE, "--weather", WEATHER, "--cfs", VENETIAN_BLIND),
     "demo": to_folder("demo"),
-    "thermal": Job(
-        lambda inputs, out: ["thermal", thermal_file(inputs, ""), "--out", out], folder=True
-    ),
+    "thermal": Job(lambda inputs, out: ["thermal", thermal_file(inputs, ""), "--out", out], folder=True),
     "comply": to_folder("comply", OFFICE, "--weather", WEATHER, "--standard", "en17037"),
     "comply --write-ifc": Job(
         lambda inputs, out: [
-            "comply", OFFICE, "--weather", WEATHER, "--standard", "en17037",
-            "--out", inputs / "results", "--write-ifc", out,
-        ], "out.ifc",
+            "comply",
+            OFFICE,
+            "--weather",
+            WEATHER,
+            "--standard",
+            "en17037",
+            "--out",
+            inputs / "results",
+            "--write-ifc",
+            out,
+        ],
+        "out.ifc",
     ),
     "pv": to_folder("pv", OFFICE, "--weather", WEATHER, "--study", PV_STUDY),
     "dgp": to_folder("dgp"),
-    "explore": Job(
-        lambda inputs, out: ["explore", _explorer(inputs), "--out", out], folder=True
-    ),
+    "explore": Job(lambda inputs, out: ["explore", _explorer(inputs), "--out", out], folder=True),
     "study": Job(_study, folder=True),
     "study --write-ifc": Job(
-        lambda inputs, out: [
-            "study", _study_of_the_office(inputs), "--out", inputs / "results", "--write-ifc", out,
-        ], "out.ifc",
+        lambda inputs, out: ["study", _study_of_the_office(inputs), "--out", inputs / "results", "--write-ifc", out],
+        "out.ifc",
     ),
     "check": Job(lambda _, out: ["check", OFFICE, "--csv", out], "out.csv"),
     "check --bcf": Job(lambda _, out: ["check", OFFICE, "--bcf", out], "out.bcfzip"),
     "ifc correct": Job(_corrected, "out.ifc"),
-    "ifc attach": Job(lambda _, out: ["ifc", "attach", OFFICE, "--all", "--u", 1.1, "-o", out],
-                      "out.ifc"),
+    "ifc attach": Job(lambda _, out: ["ifc", "attach", OFFICE, "--all", "--u", 1.1, "-o", out], "out.ifc"),
     "ifc control": Job(lambda _, out: ["ifc", "control", OFFICE, CONTROLLED, "-o", out], "out.ifc"),
-    "export --radiance": Job(lambda _, out: ["export", OFFICE, "--radiance", out],
-                                 folder=True, adds=True),
-    "export --mitsuba": Job(lambda _, out: ["export", OFFICE, "--mitsuba", out],
-                                folder=True, adds=True),
-    "export --epjson": Job(lambda _, out: ["export", OFFICE, "--epjson", out],
-                               "out.epJSON"),
+    "export --radiance": Job(lambda _, out: ["export", OFFICE, "--radiance", out], folder=True, adds=True),
+    "export --mitsuba": Job(lambda _, out: ["export", OFFICE, "--mitsuba", out], folder=True, adds=True),
+    "export --epjson": Job(lambda _, out: ["export", OFFICE, "--epjson", out], "out.epJSON"),
     "export --gltf": Job(lambda _, out: ["export", OFFICE, "--gltf", out], "out.glb"),
     "ifc templates": to_folder("ifc", "templates"),
     "ifc bonsai": Job(lambda _, out: ["ifc", "bonsai", "--out", out], "out.zip"),
     "ifc survey": Job(lambda _, out: ["ifc", "survey", OFFICE, "--markdown", out], "out.md"),
-    "bsdf plot": Job(
-        lambda _, out: ["bsdf", "plot", VENETIAN_BLIND, "--incident", 40, 0, "--out", out],
-        "out.png",
-    ),
-    "bsdf thermal": Job(
-        lambda _, out: ["bsdf", "thermal", VENETIAN_BLIND, "--out", out], "out.csv"
-    ),
-    "bsdf thermal --toml": Job(
-        lambda _, out: ["bsdf", "thermal", VENETIAN_BLIND, "--toml", out], "out.toml"
-    ),
+    "bsdf plot": Job(lambda _, out: ["bsdf", "plot", VENETIAN_BLIND, "--incident", 40, 0, "--out", out], "out.png"),
+    "bsdf thermal": Job(lambda _, out: ["bsdf", "thermal", VENETIAN_BLIND, "--out", out], "out.csv"),
+    "bsdf thermal --toml": Job(lambda _, out: ["bsdf", "thermal", VENETIAN_BLIND, "--toml", out], "out.toml"),
     "bsdf generate": Job(lambda _, out: [*GENERATE, out], "out.xml"),
-    "bsdf library": Job(
-        lambda _, out: ["bsdf", "library", "--glazing", "triple low-e", "--out", out], "out.xml"
-    ),
+    "bsdf library": Job(lambda _, out: ["bsdf", "library", "--glazing", "triple low-e", "--out", out], "out.xml"),
     "bsdf interpolate": Job(_goniophotometer, "out.xml"),
-    "bsdf combine": Job(
-        lambda _, out: ["bsdf", "combine", VENETIAN_BLIND, VENETIAN_BLIND, "--out", out], "out.xml"
-    ),
+    "bsdf combine": Job(lambda _, out: ["bsdf", "combine", VENETIAN_BLIND, VENETIAN_BLIND, "--out", out], "out.xml"),
     "bsdf combine --absorptances": Job(
         lambda inputs, out: [
-            "bsdf", "combine", VENETIAN_BLIND, VENETIAN_BLIND, "--out", inputs / "both.xml",
-            "--absorptances", out,
-        ], "out.csv",
+            "bsdf",
+            "combine",
+            VENETIAN_BLIND,
+            VENETIAN_BLIND,
+            "--out",
+            inputs / "both.xml",
+            "--absorptances",
+            out,
+        ],
+        "out.csv",
     ),
     "sky matrix": Job(lambda _, out: ["sky", "matrix", WEATHER, out, "-5", "-m", 1], "out.smx"),
     "sky positions": Job(lambda _, out: ["sky", "positions", WEATHER, out], "out.csv"),
@@ -157,13 +153,11 @@ JOBS = {
     "glare --csv": Job(_glare("--csv"), "out.csv"),
     "glare --png": Job(_glare("--png"), folder=True, adds=True),
     **{
-        f"picture {kind}": Job(
-            lambda _, out: ["picture", "--at", "06-21 12:00", "--out", out], f"out.{kind}"
-        )
+        f"picture {kind}": Job(lambda _, out: ["picture", "--at", "06-21 12:00", "--out", out], f"out.{kind}")
         for kind in ("hdr", "exr", "png")
     },
     "calibrate": Job(lambda _, out: ["calibrate", "--out", out], "out.json"),
-}  # fmt: skip
+}
 # they take ten seconds and more; the same code writes for the others, which stay quick
 HEAVY = ("study", "study --write-ifc", "demo", "pv", "ifc survey", "comply", "comply --write-ifc")
 

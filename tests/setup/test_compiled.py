@@ -36,9 +36,7 @@ numba.core.caching.CacheImpl._locator_classes = []  # numba finds no folder
 for name in {names!r}:
     importlib.import_module(name)
 """
-    ran = subprocess.run(
-        [sys.executable, "-c", code], cwd=REPOSITORY, capture_output=True, text=True, check=False
-    )
+    ran = subprocess.run([sys.executable, "-c", code], cwd=REPOSITORY, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stderr[-500:]
 
 
@@ -74,9 +72,13 @@ def test_code_of_another_version_with_other_types_is_compiled_again(tmp_path) ->
     for name in ("Older", "Newer"):
         (tmp_path / "tuples.py").write_text(TUPLES.format(name=name))
         ran = subprocess.run(
-            [sys.executable, "-c", "import tuples"], cwd=tmp_path, env=environment,
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
+            [sys.executable, "-c", "import tuples"],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         assert ran.stdout == "7.0\n", ran.stderr[-500:]
 
 
@@ -104,8 +106,7 @@ print(increment.increment(np.array([1], dtype=kind)))
 def test_processes_that_compile_at_once_never_get_each_others_code(tmp_path) -> None:
     """Both have found the index empty; then one writes it last, and the other the code."""
     (tmp_path / "increment.py").write_text(
-        "from mitsuba_cfs.compiled import compiled\n"
-        "@compiled()\ndef increment(x):\n    return x[0] + 1\n"
+        "from mitsuba_cfs.compiled import compiled\n@compiled()\ndef increment(x):\n    return x[0] + 1\n"
     )
     environment = os.environ | {
         "NUMBA_CACHE_DIR": str(tmp_path / "kept"),
@@ -114,9 +115,7 @@ def test_processes_that_compile_at_once_never_get_each_others_code(tmp_path) -> 
 
     def start(kind: str, before: str = "-") -> subprocess.Popen[str]:
         command = [sys.executable, "-c", CALL, kind, before]
-        return subprocess.Popen(
-            command, cwd=tmp_path, env=environment, text=True, stdout=subprocess.PIPE
-        )
+        return subprocess.Popen(command, cwd=tmp_path, env=environment, text=True, stdout=subprocess.PIPE)
 
     started = []
     for kind, before in (("f8", "_save_index"), ("i8", "_save_data")):
@@ -160,9 +159,13 @@ def test_code_is_compiled_anew_when_what_is_inlined_changes(tmp_path) -> None:
         part.write_text(f"from numba import njit\n@njit\ndef grown(x):\n    return x + {step}\n")
         os.utime(part, (1e9, 1e9))
         return subprocess.run(
-            [sys.executable, "-B", "-m", "thermal.entry"], cwd=tmp_path, capture_output=True,
-            text=True, check=True, env=os.environ | {"PYTHONPATH": str(tmp_path)},
-        ).stdout.strip()  # fmt: skip
+            [sys.executable, "-B", "-m", "thermal.entry"],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+            env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        ).stdout.strip()
 
     assert [said(step) for step in (1, 1, 2)] == ["True 2 False", "False 2 False", "True 3 False"]
 
@@ -184,7 +187,6 @@ def test_the_heat_balance_is_compiled_once(tmp_path) -> None:
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     for said in ("True False", "False False"):
         ran = subprocess.run(
-            [sys.executable, "-c", BALANCE], env=environment, cwd=REPOSITORY,
-            capture_output=True, text=True, check=True,
-        )  # fmt: skip
+            [sys.executable, "-c", BALANCE], env=environment, cwd=REPOSITORY, capture_output=True, text=True, check=True
+        )
         assert ran.stdout.strip() == said

@@ -28,16 +28,25 @@ def users_folder(tmp_path: Path) -> Path:
 def _run(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
     # -P: the installed command `cfs` has the folder of its script first, never the current one
     return subprocess.run(
-        [sys.executable, "-P", "-c", code], cwd=folder, capture_output=True, text=True,
-        check=False, timeout=180, env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
-    )  # fmt: skip
+        [sys.executable, "-P", "-c", code],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=180,
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
+    )
 
 
 def test_a_python_of_ours_imports_none_of_the_users_modules(users_folder: Path) -> None:
     done = subprocess.run(
         own_python("-c", "import json, scenes.cli, numpy; print(json.dumps(1))"),
-        env=own_paths(), cwd=users_folder, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        env=own_paths(),
+        cwd=users_folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.stdout == "1\n", done.stderr
 
 
@@ -61,9 +70,14 @@ def test_workers_import_none_of_the_users_modules(users_folder: Path, tmp_path: 
         "    cli.main([])\n"
     )
     done = subprocess.run(
-        [sys.executable, str(script)], cwd=users_folder, capture_output=True, text=True,
-        check=False, timeout=180, env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
-    )  # fmt: skip
+        [sys.executable, str(script)],
+        cwd=users_folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=180,
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
+    )
     assert done.stdout == "1\n", done.stderr
 
 

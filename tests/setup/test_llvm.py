@@ -12,9 +12,7 @@ import pytest
 from mitsuba_cfs import llvm, variants
 from mitsuba_cfs.errors import VariantError
 
-linux_only = pytest.mark.skipif(
-    not sys.platform.startswith("linux"), reason="ELF and ldconfig are Linux"
-)
+linux_only = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="ELF and ldconfig are Linux")
 
 
 @pytest.fixture(autouse=True)
@@ -91,9 +89,13 @@ def test_what_is_chosen_survives_a_minimum_of_an_array() -> None:
     code += "print(drjit.minimum(drjit.arange(dr.Float, 1000) + 0.5, 0.25)[999])"
     for found in usable:
         done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False,
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
             env=os.environ | {llvm.VARIABLE: str(found.path)},
-        )  # fmt: skip
+        )
         assert done.stdout.strip() == "0.25", (found, done.stderr[-300:])
 
 

@@ -21,10 +21,7 @@ def _python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_preferred_variant_is_activated_and_stays() -> None:
-    done = _python(
-        "from mitsuba_cfs import variants\n"
-        "print(variants.activate('llvm_ad_rgb'), variants.activate())"
-    )
+    done = _python("from mitsuba_cfs import variants\nprint(variants.activate('llvm_ad_rgb'), variants.activate())")
     assert done.stdout.split() == ["llvm_ad_rgb", "llvm_ad_rgb"], done.stderr
 
 
@@ -128,6 +125,4 @@ def test_a_device_that_loses_the_second_scene_of_a_launch_is_named() -> None:
         "print(variants.two_scenes_fault())\n"
     )
     done = _python(code)
-    assert done.stdout.splitlines() == [
-        "None", "a launch that traces two scenes loses rays"
-    ], done.stderr  # fmt: skip
+    assert done.stdout.splitlines() == ["None", "a launch that traces two scenes loses rays"], done.stderr

@@ -70,9 +70,8 @@ def test_gaps_of_six_hours_are_interpolated_and_named(weather):
     bright = np.count_nonzero(stated[:-1] > 0.95)
     for year, words in (
         (snow, ["snow depth: 6 missing values", "snow depth: missing or impossible in 7 hours"]),
-        (filed, ["albedo: 6 missing values", "impossible in 1 hour; 0.2",
-                 f"above 0.95 in {bright} hours"]),
-    ):  # fmt: skip
+        (filed, ["albedo: 6 missing values", "impossible in 1 hour; 0.2", f"above 0.95 in {bright} hours"]),
+    ):
         notes = [str(note) for note in year.notes[len(weather.notes) :]]
         assert all(word in note for word, note in zip(words, notes, strict=True)), notes
 
@@ -108,9 +107,7 @@ def test_numbers_of_the_sources():
     assert (SNOW, SNOW_CM, TOO_WARM_C, MANY_HOURS) == (0.7, 1.0, 10.0, 100)
 
 
-@pytest.mark.parametrize(
-    "wrong", [-0.01, 1.01, (0.2,) * 11, (*(0.2,) * 11, 1.5), (*(0.2,) * 11, -0.1), (-0.1,) * 12]
-)
+@pytest.mark.parametrize("wrong", [-0.01, 1.01, (0.2,) * 11, (*(0.2,) * 11, 1.5), (*(0.2,) * 11, -0.1), (-0.1,) * 12])
 def test_reflectances_outside_of_their_range_are_refused(weather, wrong):
     with pytest.raises(DataError, match="from 0 to 1"):
         with_albedo(weather, wrong)

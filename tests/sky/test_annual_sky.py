@@ -73,8 +73,7 @@ def test_skies_have_the_sun_alone_and_no_heat_unless_asked():
     assert given.sun is not None and given.solar is None
     assert given.lit.tolist() == [0] and given.hours == 2
     times = pd.date_range("2023-04-10 12:00", periods=2, freq="12h")
-    year = Weather("site", 40.0, 0.0, 0.0, 0.0, 1.0, times, np.array([500.0, 0.0]),
-                   np.array([100.0, 0.0]))  # fmt: skip
+    year = Weather("site", 40.0, 0.0, 0.0, 0.0, 1.0, times, np.array([500.0, 0.0]), np.array([100.0, 0.0]))
     sky = annual_sky(year, 1)
     assert sky.sun is not None and sky.solar is None and sky.lit.tolist() == [0]
     bare = annual_sky(year, 1, sun=False, solar=True)

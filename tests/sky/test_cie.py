@@ -22,8 +22,7 @@ def sun_at(altitude_deg: float, azimuth_deg: float) -> np.ndarray:
 
 @pytest.mark.peer
 @pytest.mark.parametrize(
-    ("kind", "option"),
-    [("overcast", "-c"), ("clear", "-s"), ("intermediate", "-i"), ("uniform", "-u")],
+    ("kind", "option"), [("overcast", "-c"), ("clear", "-s"), ("intermediate", "-i"), ("uniform", "-u")]
 )
 @pytest.mark.parametrize(("altitude", "azimuth"), [(40.0, 210.0), (15.0, 100.0), (70.0, 300.0)])
 def test_distribution_is_that_of_gensky(kind, option, altitude, azimuth, radiance):
@@ -36,12 +35,7 @@ def test_distribution_is_that_of_gensky(kind, option, altitude, azimuth, radianc
         np.testing.assert_allclose(arguments[4:7], sun_at(altitude, azimuth), atol=1e-6)
     constants = ";".join(f"{name}:{value}" for name, value in names.items())
     given = "A4:1;A5:0;A6:0;A7:1;" if "A5" not in names else ""
-    functions = {
-        "overcast": "cloudysky",
-        "clear": "sunnysky",
-        "intermediate": "intersky",
-        "uniform": "unifsky",
-    }
+    functions = {"overcast": "cloudysky", "clear": "sunnysky", "intermediate": "intersky", "uniform": "unifsky"}
     program = "Acos(x):if(x-1,0,if(-1-x,PI,acos(x)));" + given + constants
     command = [radiance / "rcalc", "-id3", "-od", "-e", program, "-f", "skybright.cal"]
     run = subprocess.run(

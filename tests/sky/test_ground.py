@@ -9,12 +9,7 @@ import pytest
 
 from mitsuba_cfs.sky.annual import annual_sky, given_sky
 from mitsuba_cfs.sky.epw import read_epw, read_wea, write_wea
-from mitsuba_cfs.sky.matrix import (
-    gendaylit_ground,
-    reflected_ground,
-    series_for_suns,
-    sky_series,
-)
+from mitsuba_cfs.sky.matrix import gendaylit_ground, reflected_ground, series_for_suns, sky_series
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.perez import relative_luminance
 from mitsuba_cfs.sky.sun import direction
@@ -22,8 +17,7 @@ from mitsuba_cfs.sky.sun import direction
 NEW_YEAR = 1  # the day whose distance to the sun `gendaylit -ang` takes
 # overcast, three between, clear, low and high suns: altitude [degrees], direct, diffuse [W/m2]
 MOMENTS = np.array(
-    [[30, 0, 200], [30, 500, 100], [5, 100, 30], [60, 900, 80], [45, 200, 300], [12, 700, 60]],
-    dtype=float,
+    [[30, 0, 200], [30, 500, 100], [5, 100, 30], [60, 900, 80], [45, 200, 300], [12, 700, 60]], dtype=float
 )
 
 
@@ -32,8 +26,7 @@ def gendaylit(radiance, altitude, direct, diffuse) -> tuple[float, list[float]]:
     command = [radiance / "gendaylit", "-ang", str(altitude), "30", "-W", str(direct), str(diffuse)]
     run = subprocess.run([*command, "-O", "2"], capture_output=True, check=True, text=True)
     three, ten = (
-        next(line for line in run.stdout.splitlines() if line.startswith(start)).split()[1:]
-        for start in ("3 ", "10 ")
+        next(line for line in run.stdout.splitlines() if line.startswith(start)).split()[1:] for start in ("3 ", "10 ")
     )
     return float(three[0]), [float(text) for text in ten]
 
@@ -83,10 +76,14 @@ def test_given_suns_make_the_weathers_own_sky(chicago):
     ours = annual_sky(weather, 1, sun_model="radiance", solar=True)
     series = sky_series(weather, sun_model="radiance")
     again = given_sky(
-        series.sun, weather.direct_normal, weather.diffuse_horizontal, 1, solar=True,
+        series.sun,
+        weather.direct_normal,
+        weather.diffuse_horizontal,
+        1,
+        solar=True,
         day_of_year=weather.midpoints.day_of_year.to_numpy(),
         dew_point_c=_three_hours(weather.dew_point_c),
-    )  # fmt: skip
+    )
     for name in ("whole", "sun", "solar", "direction", "illuminance", "lit"):
         assert np.array_equal(getattr(ours, name), getattr(again, name)), name
     exact = annual_sky(weather, 1)
@@ -124,9 +121,7 @@ def test_ground_of_three_skies_by_gendaylits_formulas():
     """Zenith 1,000 cd/m2, sun at 50 degrees with 3,000 lx on the ground, reflectance 0.3."""
     h = np.radians(50.0)
     suns = direction(np.full(3, h), np.full(3, 2.0))
-    found = gendaylit_ground(
-        np.full(3, 1e3), np.full(3, 3e3), np.array([1.0, 5.99, 6.0]), suns, 0.3
-    )
+    found = gendaylit_ground(np.full(3, 1e3), np.full(3, 3e3), np.array([1.0, 5.99, 6.0]), suns, 0.3)
     x, below = (50.0 - 45.0) / 45.0, np.pi / 2 - h
     clear = 0.274 * (0.91 + 10 * np.exp(-3 * below) + 0.45 * np.sin(h) ** 2)
     series = 2.766521 + 0.547665 * x - 0.369832 * x**2 + 0.009237 * x**3 + 0.059229 * x**4
@@ -136,9 +131,7 @@ def test_ground_of_three_skies_by_gendaylits_formulas():
     factors = np.array([0.777778, middle / between / np.pi, series / clear / np.pi])
     assert found == pytest.approx(0.3 * (1e3 * factors + 3e3 / np.pi))
     # x = -1 at the horizon, where the polynomials' odd terms change sign
-    low = gendaylit_ground(
-        np.full(1, 1e3), np.zeros(1), np.array([7.0]), np.array([[0.0, 1.0, 0.0]]), 1.0
-    )
+    low = gendaylit_ground(np.full(1, 1e3), np.zeros(1), np.array([7.0]), np.array([[0.0, 1.0, 0.0]]), 1.0)
     clear = 0.274 * (0.91 + 10 * np.exp(-1.5 * np.pi))
     series = 2.766521 - 0.547665 - 0.369832 - 0.009237 + 0.059229
     assert low == pytest.approx(1e3 * series / clear / np.pi)

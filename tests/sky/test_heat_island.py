@@ -27,12 +27,21 @@ def _weather(**changes) -> Weather:
     dry[52] -= 4.0
     sun = np.where((clock > 6) & (clock < 19), 500.0, 0.0)
     made = Weather(
-        site="Here", latitude_deg=52.0, longitude_deg=5.0, timezone_h=1.0, elevation_m=0.0,
-        step_h=1.0, times=pd.date_range("2001-06-01 01:00", periods=24 * DAYS, freq="h"),
-        direct_normal=sun, diffuse_horizontal=0 * sun, global_horizontal=sun, dry_bulb_c=dry,
-        dew_point_c=np.full(len(hours), 8.0), wind_speed=np.full(len(hours), 3.0),
+        site="Here",
+        latitude_deg=52.0,
+        longitude_deg=5.0,
+        timezone_h=1.0,
+        elevation_m=0.0,
+        step_h=1.0,
+        times=pd.date_range("2001-06-01 01:00", periods=24 * DAYS, freq="h"),
+        direct_normal=sun,
+        diffuse_horizontal=0 * sun,
+        global_horizontal=sun,
+        dry_bulb_c=dry,
+        dew_point_c=np.full(len(hours), 8.0),
+        wind_speed=np.full(len(hours), 3.0),
         pressure_pa=np.full(len(hours), 101325.0),
-    )  # fmt: skip
+    )
     return replace(made, **changes)
 
 
@@ -93,8 +102,7 @@ def test_the_water_in_the_air_stays_and_the_head_says_it() -> None:
 
 def test_a_calm_day_counts_with_half_a_metre_a_second() -> None:
     calm, slow = (
-        in_city(_weather(wind_speed=np.full(24 * DAYS, wind)), 0.5, 0.2, NIGHT).dry_bulb_c
-        for wind in (0.0, 0.5)
+        in_city(_weather(wind_speed=np.full(24 * DAYS, wind)), 0.5, 0.2, NIGHT).dry_bulb_c for wind in (0.0, 0.5)
     )
     np.testing.assert_array_equal(calm, slow)
     faster = in_city(_weather(wind_speed=np.full(72, 0.55)), 0.5, 0.2, NIGHT).dry_bulb_c
@@ -109,10 +117,11 @@ def test_without_global_irradiance_it_is_refused() -> None:
 
 def _study(**island) -> StudyFile:
     table = {
-        "weather": WEATHER, "system": [{"bsdf": VENETIAN_BLIND}],
+        "weather": WEATHER,
+        "system": [{"bsdf": VENETIAN_BLIND}],
         "box": {"width": 4, "depth": 5, "height": 3, "window": []},
         "heat_island": {"sky_view": 0.5, "vegetation": 0.1, "hourly_shares": NIGHT} | island,
-    }  # fmt: skip
+    }
     return StudyFile.model_validate(table)
 
 
@@ -141,8 +150,12 @@ def test_limits_and_numbers_of_the_source() -> None:
     for sky, green in ((0.2, 0.0), (0.9, 0.4)):
         found = maximum_heat_island(sky, green, 1.0, 1.0, 1.0)
         assert found == pytest.approx(2 - sky - green)
-    for sky, green, word in ((0.19, 0.2, "sky_view"), (0.91, 0.2, "sky_view"),
-                             (0.5, -0.01, "vegetation"), (0.5, 0.41, "vegetation")):  # fmt: skip
+    for sky, green, word in (
+        (0.19, 0.2, "sky_view"),
+        (0.91, 0.2, "sky_view"),
+        (0.5, -0.01, "vegetation"),
+        (0.5, 0.41, "vegetation"),
+    ):
         with pytest.raises(ValueError, match=f"{word}: expected"):
             maximum_heat_island(sky, green, 1.0, 1.0, 1.0)
     for wind in (0.0, [1.0, 0.0]):
@@ -151,10 +164,7 @@ def test_limits_and_numbers_of_the_source() -> None:
 
 
 def test_a_calm_day_counts_with_half_a_metre_per_second() -> None:
-    calm, slow = (
-        in_city(_weather(wind_speed=np.full(72, wind)), 0.5, 0.2, NIGHT).dry_bulb_c
-        for wind in (0.1, 0.5)
-    )
+    calm, slow = (in_city(_weather(wind_speed=np.full(72, wind)), 0.5, 0.2, NIGHT).dry_bulb_c for wind in (0.1, 0.5))
     np.testing.assert_array_equal(calm, slow)
 
 
@@ -167,21 +177,34 @@ def test_density_by_the_gas_law() -> None:
     assert warmer == pytest.approx(1.3 * (heating * 1000 / 3) ** 0.25, rel=1e-6)
 
 
-@pytest.mark.parametrize(("north", "east", "noted"), [
-    (45.0, -11.0, False), (61.0, 16.0, False), (44.9, 5.0, True), (61.1, 5.0, True),
-    (52.0, -11.1, True), (52.0, 16.1, True), (30.0, 50.0, True),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("north", "east", "noted"),
+    [
+        (45.0, -11.0, False),
+        (61.0, 16.0, False),
+        (44.9, 5.0, True),
+        (61.1, 5.0, True),
+        (52.0, -11.1, True),
+        (52.0, 16.1, True),
+        (30.0, 50.0, True),
+    ],
+)
 def test_places_elsewhere_are_noted_once(north, east, noted) -> None:
     notes = in_city(_weather(latitude_deg=north, longitude_deg=east), 0.5, 0.2, NIGHT).notes
     assert sum("is elsewhere" in str(note) for note in notes) == noted
 
 
-@pytest.mark.parametrize(("changes", "words"), [
-    ({"step_h": 0.5}, "whole days"),
-    ({"times": pd.date_range("2001-06-01 02:00", periods=72, freq="h")}, "whole days"),
-    ({"global_horizontal": None}, "global irradiance"), ({"dry_bulb_c": None}, "temperature"),
-    ({"dew_point_c": None}, "dew point"), ({"wind_speed": None}, "wind"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"step_h": 0.5}, "whole days"),
+        ({"times": pd.date_range("2001-06-01 02:00", periods=72, freq="h")}, "whole days"),
+        ({"global_horizontal": None}, "global irradiance"),
+        ({"dry_bulb_c": None}, "temperature"),
+        ({"dew_point_c": None}, "dew point"),
+        ({"wind_speed": None}, "wind"),
+    ],
+)
 def test_weather_that_the_equation_cannot_take(changes, words) -> None:
     with pytest.raises(ValueError, match=words):
         in_city(_weather(**changes), 0.5, 0.2, NIGHT)

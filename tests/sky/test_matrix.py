@@ -48,8 +48,7 @@ def assert_same_sky(ours, theirs, subdivision):
 
 @pytest.mark.peer
 @pytest.mark.parametrize(
-    ("subdivision", "output", "band"),
-    [(1, "-O0", "visible"), (1, "-O1", "solar"), (4, "-O0", "visible")],
+    ("subdivision", "output", "band"), [(1, "-O0", "visible"), (1, "-O1", "solar"), (4, "-O0", "visible")]
 )
 def test_chicago_is_that_of_gendaymtx(chicago, radiance, subdivision, output, band):
     ours = sky_matrix(read_epw(chicago), subdivision, band, sun_model="radiance")
@@ -67,9 +66,7 @@ def test_six_climates_are_those_of_gendaymtx(real_data, radiance, name, output, 
 
 @pytest.mark.peer
 @pytest.mark.parametrize(("output", "band"), [("-O0", "visible"), ("-O1", "solar")])
-@pytest.mark.parametrize(
-    ("place", "leap"), [("-34.93,138.60,9.5,48.0", False), ("67.28,14.40,1.0,13.0", True)]
-)
+@pytest.mark.parametrize(("place", "leap"), [("-34.93,138.60,9.5,48.0", False), ("67.28,14.40,1.0,13.0", True)])
 def test_years_made_here_are_those_of_gendaymtx(tmp_path, radiance, place, leap, output, band):
     """The southern hemisphere and a half-hour zone; the polar circle and a leap year."""
     path = write_epw(tmp_path / "a.epw", epw_rows(leap=leap))

@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.matrices.mtx_io import (
-    FORMATS,
-    luminance,
-    read_header,
-    read_matrix,
-    write_matrix,
-)
+from mitsuba_cfs.matrices.mtx_io import FORMATS, luminance, read_header, read_matrix, write_matrix
 
 # rounding of each format: nine digits, float32, nothing
 ROUNDING = {"ascii": 5e-9, "float": 6e-8, "double": 0.0}

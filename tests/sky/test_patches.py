@@ -38,8 +38,7 @@ def test_share_of_random_directions_is_the_solid_angle(mf):
     level = np.sqrt(1 - z**2)
     sky = ReinhartSky(mf)
     found = np.bincount(
-        sky.index(np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=1)),
-        minlength=sky.size,
+        sky.index(np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=1)), minlength=sky.size
     )
     expected = count * sky.solid_angles[1:] / (2 * np.pi)
     chi_square = np.sum((found[1:] - expected) ** 2 / expected)

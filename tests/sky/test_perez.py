@@ -49,9 +49,7 @@ def test_distribution_is_that_of_gendaylit(moment, radiance):
     command = [radiance / "gendaylit", "4", "10", str(hour), "-a", "40", "-o", "0", "-m", "0"]
     command += ["-W", str(direct), str(diffuse), "-O", "1"]
     text = subprocess.run(command, capture_output=True, check=True, text=True).stdout
-    numbers = [
-        float(word) for word in re.search(r"skybright perezlum.cal\n0\n10 (.*)", text)[1].split()
-    ]
+    numbers = [float(word) for word in re.search(r"skybright perezlum.cal\n0\n10 (.*)", text)[1].split()]
     ours = model_of(moment)
     np.testing.assert_allclose(ours.sun[0], numbers[7:10], atol=1e-6)  # six printed digits
     np.testing.assert_allclose(ours.coefficients[:, 0], numbers[2:7], atol=2e-5, rtol=1e-6)
@@ -94,18 +92,56 @@ def test_efficacies_are_plausible():
 def test_tables_are_those_compared_with_radiance():
     """Check sums of the tables with which the tests against gendaymtx passed: none is edited."""
     for table, total, by_row in (
-        (perez.LUMINANCE_COEFFICIENTS.reshape(8, 20),
-         [-5.1834, -2.6211, 1.2101, 3.9695, -0.0146, -0.9411, -20.8714, 8.1859, 152.8983,
-          -55.8689, -165.867, 156.0597, -26.3376, 1.8118, 18.3288, 0.7327, 3.2311, -0.7705,
-          -0.8177, 1.3916],
-         [-31.0785, -8.8258, 4.6497, 23.0045, 1.0439, -3.6357, -83.1421, 33.8121, 794.7713,
-          -292.3158, -858.9755, 824.7576, -154.0358, 6.1765, 123.8427, 11.3221, 21.3176, -5.8293,
-          -0.929, 9.5512]),
-        (perez.DIFFUSE_EFFICACY, [913.06, 21.26, -164.3, -110.11],
-         [4389.22, 101.86, -1124.7, -552.45]),
-        (perez.DIRECT_EFFICACY, [796.84, -21.62, -13.51, 40.51],
-         [3750.66, -58.85, -53.92, -401.37]),
-    ):  # fmt: skip
+        (
+            perez.LUMINANCE_COEFFICIENTS.reshape(8, 20),
+            [
+                -5.1834,
+                -2.6211,
+                1.2101,
+                3.9695,
+                -0.0146,
+                -0.9411,
+                -20.8714,
+                8.1859,
+                152.8983,
+                -55.8689,
+                -165.867,
+                156.0597,
+                -26.3376,
+                1.8118,
+                18.3288,
+                0.7327,
+                3.2311,
+                -0.7705,
+                -0.8177,
+                1.3916,
+            ],
+            [
+                -31.0785,
+                -8.8258,
+                4.6497,
+                23.0045,
+                1.0439,
+                -3.6357,
+                -83.1421,
+                33.8121,
+                794.7713,
+                -292.3158,
+                -858.9755,
+                824.7576,
+                -154.0358,
+                6.1765,
+                123.8427,
+                11.3221,
+                21.3176,
+                -5.8293,
+                -0.929,
+                9.5512,
+            ],
+        ),
+        (perez.DIFFUSE_EFFICACY, [913.06, 21.26, -164.3, -110.11], [4389.22, 101.86, -1124.7, -552.45]),
+        (perez.DIRECT_EFFICACY, [796.84, -21.62, -13.51, 40.51], [3750.66, -58.85, -53.92, -401.37]),
+    ):
         assert table.sum(axis=0) == pytest.approx(total, abs=1e-9)
         assert np.arange(1, 9) @ table == pytest.approx(by_row, abs=1e-9)
     bins = [1.065, 1.230, 1.500, 1.950, 2.800, 4.500, 6.200]  # table 1's upper bounds
@@ -182,9 +218,7 @@ def test_limits_of_the_model():
     ("clearness", "brightness", "counts"),
     [(1.06, 0.05, 0.05), (1.07, 0.05, 0.2), (1.1, 0.3, 0.3), (2.79, 0.05, 0.2), (2.81, 0.05, 0.05)],
 )
-def test_brightness_counts_as_a_fifth_at_least_between_two_clearnesses(
-    clearness, brightness, counts
-):
+def test_brightness_counts_as_a_fifth_at_least_between_two_clearnesses(clearness, brightness, counts):
     """1.065 to 2.8, as gendaylit has it: b of category 3 or 5 by its printed row."""
     category = 2
     zenith, x = 1.0, perez.LUMINANCE_COEFFICIENTS[category, 1]
@@ -198,9 +232,7 @@ def test_brightness_counts_as_a_fifth_at_least_between_two_clearnesses(
 def test_gradation_of_the_horizon_and_the_floor_of_zero():
     """[1 + a exp(b/cos Z)][1 + c exp(d gamma) + e cos^2 gamma] by hand, never below zero."""
     coefficients = np.array([[-0.6], [-0.1], [2.0], [-1.5], [0.3]])
-    found = perez.relative_luminance(coefficients, np.array([0.0, 0.5]), np.cos([[0.7], [1.2]]))[
-        :, 0
-    ]
+    found = perez.relative_luminance(coefficients, np.array([0.0, 0.5]), np.cos([[0.7], [1.2]]))[:, 0]
     around = [1 + 2.0 * np.exp(-1.5 * g) + 0.3 * np.cos(g) ** 2 for g in (0.7, 1.2)]
     assert found[0] == pytest.approx(around[0], rel=1e-9)
     assert found[1] == pytest.approx((1 - 0.6 * np.exp(-0.2)) * around[1])

@@ -60,9 +60,7 @@ def test_dctimestep_takes_our_sky(epw, tmp_path, radiance):
     cfs_sky("matrix", epw, out, "-f", "ascii")
     ones = tmp_path / "dc.mtx"
     ones.write_text("#?RADIANCE\nNROWS=1\nNCOLS=146\nNCOMP=3\nFORMAT=ascii\n\n" + "1 1 1\n" * 146)
-    product = subprocess.run(
-        [radiance / "dctimestep", "-od", ones, out], capture_output=True, check=True
-    ).stdout
+    product = subprocess.run([radiance / "dctimestep", "-od", ones, out], capture_output=True, check=True).stdout
     (tmp_path / "e.mtx").write_bytes(product)
     expected = read_matrix(out).sum(axis=0)[:, 0]
     np.testing.assert_allclose(read_matrix(tmp_path / "e.mtx")[0, :, 0], expected, rtol=1e-5)
@@ -114,9 +112,7 @@ def test_labels_of_measured_times(tmp_path):
     found = []
     for label, first in (("start", "07:00"), ("middle", "07:15"), ("end", "07:30")):
         times = pd.date_range(f"2017-03-21 {first}", periods=20, freq="30min")
-        table = pd.DataFrame(
-            {"time": times, "global_horizontal": 400.0, "diffuse_horizontal": 150.0}
-        )
+        table = pd.DataFrame({"time": times, "global_horizontal": 400.0, "diffuse_horizontal": 150.0})
         table.to_csv(tmp_path / "m.csv", index=False)
         place = ("--latitude", 48, "--longitude", 8, "--timezone", 1)
         cfs_sky("measured", tmp_path / "m.csv", tmp_path / label, *place, "--label", label)

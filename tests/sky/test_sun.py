@@ -18,9 +18,7 @@ def weather_at(times, latitude=0.0, longitude=0.0, zone=0.0, elevation=0.0, **se
     middle = pd.DatetimeIndex(times)
     none = np.zeros(len(middle))
     ends = middle + pd.Timedelta(minutes=30)
-    return Weather(
-        "x", latitude, longitude, zone, elevation, 1.0, ends, none, none, **series
-    )  # fmt: skip
+    return Weather("x", latitude, longitude, zone, elevation, 1.0, ends, none, none, **series)
 
 
 def test_spa_is_that_of_its_paper():
@@ -64,9 +62,17 @@ def test_longitude_and_time_zone():
 
 @pytest.mark.parametrize(
     ("latitude", "longitude", "zone"),
-    [(78.22, 15.63, 1.0), (27.70, 85.32, 5.75), (-34.93, 138.60, 9.5), (47.56, -52.71, -3.5),
-     (-54.80, -68.30, -3.0), (-70.67, -8.27, 0.0), (19.09, 72.85, 5.5), (0.0, 179.0, 12.0)],
-)  # fmt: skip
+    [
+        (78.22, 15.63, 1.0),
+        (27.70, 85.32, 5.75),
+        (-34.93, 138.60, 9.5),
+        (47.56, -52.71, -3.5),
+        (-54.80, -68.30, -3.0),
+        (-70.67, -8.27, 0.0),
+        (19.09, 72.85, 5.5),
+        (0.0, 179.0, 12.0),
+    ],
+)
 def test_noon_is_by_longitude_and_zone_on_every_side_of_the_equator(latitude, longitude, zone):
     """21 March 2023: 7.4 min late by the equation of time; the equinox was 20 March, 21:24 UTC."""
     minutes = pd.date_range("2023-03-21", periods=24 * 60, freq="min")
@@ -89,9 +95,14 @@ def test_polar_night_and_midnight_sun_have_their_days(latitude, year):
     by_day = pd.Series(up).groupby(hours.day_of_year)
     g = 2 * np.pi * (np.arange(by_day.ngroups) + 0.5) / by_day.ngroups
     declination = (
-        0.006918 - 0.399912 * np.cos(g) + 0.070257 * np.sin(g) - 0.006758 * np.cos(2 * g)
-        + 0.000907 * np.sin(2 * g) - 0.002697 * np.cos(3 * g) + 0.00148 * np.sin(3 * g)
-    )  # fmt: skip
+        0.006918
+        - 0.399912 * np.cos(g)
+        + 0.070257 * np.sin(g)
+        - 0.006758 * np.cos(2 * g)
+        + 0.000907 * np.sin(2 * g)
+        - 0.002697 * np.cos(3 * g)
+        + 0.00148 * np.sin(3 * g)
+    )
     lowest = np.degrees(np.abs(np.radians(latitude) + declination)) - 90
     highest = 90 - np.degrees(np.abs(np.radians(latitude) - declination))
     for days, bound in ((by_day.sum() == 0, -highest), (by_day.mean() == 1, lowest)):
@@ -157,9 +168,7 @@ def test_weather_turned_round_the_model():
     for model in sun.SUN_MODELS:
         seen = sun.sun_directions(turned, model=model) @ south
         assert seen == pytest.approx(sun.sun_directions(weather, model=model) @ facade, abs=1e-12)
-    assert np.mod(turned.wind_direction_deg - 180.0, 360.0) == pytest.approx(
-        np.mod(wind - 230.0, 360.0), abs=1e-9
-    )
+    assert np.mod(turned.wind_direction_deg - 180.0, 360.0) == pytest.approx(np.mod(wind - 230.0, 360.0), abs=1e-9)
 
 
 def test_figures_of_the_disc():

@@ -13,9 +13,7 @@ from mitsuba_cfs.sky.perez import SOLAR_CONSTANT, air_mass, eccentricity
 from mitsuba_cfs.sky.three_part import three_part
 
 HEIGHT, TURN = np.radians([50.0, 20.0, 35.0, 60.0]), np.radians([180.0, 120.0, 225.0, 200.0])
-SUN = np.stack(
-    [np.cos(HEIGHT) * np.sin(TURN), np.cos(HEIGHT) * np.cos(TURN), np.sin(HEIGHT)], axis=1
-)
+SUN = np.stack([np.cos(HEIGHT) * np.sin(TURN), np.cos(HEIGHT) * np.cos(TURN), np.sin(HEIGHT)], axis=1)
 DIRECT = np.array([800.0, 500.0, 150.0, 0.0])  # clear to overcast
 DIFFUSE = np.array([90.0, 110.0, 220.0, 160.0])
 DAY = 100
@@ -31,9 +29,16 @@ def _sky(subdivision: int) -> tuple[ReinhartSky, np.ndarray]:
 def _pvlib(tilt: float, azimuth: float) -> np.ndarray:
     zenith = np.pi / 2 - HEIGHT
     return irradiance.perez(
-        tilt, azimuth, DIFFUSE, DIRECT, SOLAR_CONSTANT * eccentricity(DAY), np.degrees(zenith),
-        np.degrees(TURN), air_mass(zenith), model="allsitescomposite1990",
-    )  # fmt: skip
+        tilt,
+        azimuth,
+        DIFFUSE,
+        DIRECT,
+        SOLAR_CONSTANT * eccentricity(DAY),
+        np.degrees(zenith),
+        np.degrees(TURN),
+        air_mass(zenith),
+        model="allsitescomposite1990",
+    )
 
 
 @pytest.mark.parametrize("subdivision", [1, 4, 6])

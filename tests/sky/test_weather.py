@@ -76,9 +76,7 @@ def test_missing_fields_that_can_be_derived(tmp_path, year):
     np.testing.assert_allclose(back, 0.71, rtol=1e-12)  # the formula and its inverse
     # EnergyPlus's formula worked by hand: eps = (.787 + .764 ln(278.12/273)) 1.0595, T = 283.15
     emissivity = (0.787 + 0.764 * np.log(278.12 / 273)) * (1 + 0.112 - 0.0875 + 0.035)
-    np.testing.assert_allclose(
-        weather.horizontal_infrared, emissivity * 5.6704e-8 * 283.15**4, rtol=2e-4
-    )
+    np.testing.assert_allclose(weather.horizontal_infrared, emissivity * 5.6704e-8 * 283.15**4, rtol=2e-4)
 
 
 def test_blank_fields_are_missing_and_a_byte_order_mark_is_not_text(tmp_path, year):
@@ -122,15 +120,9 @@ FAULTS = {
         lambda rows: gap(3, DEW, "99.9")(gap(3, HUMIDITY, "999")(rows)),
         ("line 12", "relative humidity", "7 hours"),
     ),
-    "hour left out": (
-        lambda rows: rows[:100] + rows[101:],
-        ("line 109", "expected month 1, day 5"),
-    ),
+    "hour left out": (lambda rows: rows[:100] + rows[101:], ("line 109", "expected month 1, day 5")),
     "hour twice": (lambda rows: rows[:100] + rows[99:], ("line 109", "expected month 1, day 5")),
-    "rows swapped": (
-        lambda rows: [*rows[:50], rows[51], rows[50], *rows[52:]],
-        ("line 59", "out of order"),
-    ),
+    "rows swapped": (lambda rows: [*rows[:50], rows[51], rows[50], *rows[52:]], ("line 59", "out of order")),
     "half a year": (lambda rows: rows[:4380], ("8760 or 8784", "4380 rows")),
     "one hour short": (lambda rows: rows[:-1], ("8760 or 8784", "8759 rows")),
     "no rows": (lambda rows: [], ("8760 or 8784", "0 rows")),
@@ -169,9 +161,7 @@ def test_values_that_no_weather_has_are_named(tmp_path, year, column, text, word
     assert not any("implausible" in note for note in read_epw(path).notes)
 
 
-@pytest.mark.parametrize(
-    ("column", "text"), [(DEW, "10.0"), (HUMIDITY, "1"), (DRY, "24"), (WIND, "55"), (DEW, "-9")]
-)
+@pytest.mark.parametrize(("column", "text"), [(DEW, "10.0"), (HUMIDITY, "1"), (DRY, "24"), (WIND, "55"), (DEW, "-9")])
 def test_fog_a_desert_and_a_storm_are_weather(tmp_path, year, column, text):
     """Dew point at the temperature, 1 % humidity, 14 K in an hour, a storm of 55 m/s."""
     year[100][column] = text
@@ -181,9 +171,15 @@ def test_fog_a_desert_and_a_storm_are_weather(tmp_path, year, column, text):
 
 @pytest.mark.parametrize(
     ("column", "text", "named"),
-    [(DRY, "-67.9", False), (DRY, "-68.1", True), (DRY, "56.9", False), (DRY, "57.1", True),
-     (WIND, "59.9", False), (WIND, "60.1", True)],
-)  # fmt: skip
+    [
+        (DRY, "-67.9", False),
+        (DRY, "-68.1", True),
+        (DRY, "56.9", False),
+        (DRY, "57.1", True),
+        (WIND, "59.9", False),
+        (WIND, "60.1", True),
+    ],
+)
 def test_records_of_the_earth_bound_what_is_named(tmp_path, year, column, text, named):
     """-67.8 degC outside Antarctica, 56.7 degC, 60 m/s, all year so that nothing jumps."""
     for row in year:
@@ -197,12 +193,7 @@ def test_a_spike_is_one_value_far_from_both_of_its_neighbours():
     assert spikes(np.array([10.0, 10, 40, 10, 10])).tolist() == [False, False, True, False, False]
     assert spikes(np.array([10.0, 10, -20, 10, 10])).tolist() == [False, False, True, False, False]
     assert spikes(np.array([10.0, 10, 25.5, 10, 10])).tolist() == [False, False, True, False, False]
-    for sound in (
-        [10.0, 10, 40, 40, 10, 10],
-        [10.0, 24, 10, 10],
-        [10.0, 24.9, 10, 10],
-        [-20.0, -6, 8, 22, 22, 8, -6],
-    ):
+    for sound in ([10.0, 10, 40, 40, 10, 10], [10.0, 24, 10, 10], [10.0, 24.9, 10, 10], [-20.0, -6, 8, 22, 22, 8, -6]):
         assert not spikes(np.array(sound)).any()
 
 
@@ -285,9 +276,12 @@ def test_a_year_is_the_files_own_where_its_days_fit():
     assert year_of(np.array([1999]), leap=False) == 1999
     assert year_of(np.array([2000]), leap=True) == 2000
     for years, leap, stands_for in (
-        ([1999], True, 2012), ([2000], False, 2017), ([1899], False, 2017), ([2101], False, 2017),
+        ([1999], True, 2012),
+        ([2000], False, 2017),
+        ([1899], False, 2017),
+        ([2101], False, 2017),
         ([1998, 1999], False, 2017),
-    ):  # fmt: skip
+    ):
         assert year_of(np.array(years), leap=leap) == stands_for
     assert year_of(np.array([1901]), leap=False) == 1901
     assert year_of(np.array([2099]), leap=False) == 2099
@@ -312,10 +306,7 @@ def test_a_place_is_on_earth(number, name, most):
 
 
 def test_ground_temperatures_are_those_of_each_depth():
-    blocks = [
-        ["0.5", "", "", "", *map(str, range(1, 13))],
-        ["2", "", "", "", *map(str, range(13, 25))],
-    ]
+    blocks = [["0.5", "", "", "", *map(str, range(1, 13))], ["2", "", "", "", *map(str, range(13, 25))]]
 
     def ground(*fields: str):
         return epw_ground(["", "", "", ",".join(["GROUND TEMPERATURES", *fields])], "a.epw")

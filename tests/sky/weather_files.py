@@ -28,13 +28,7 @@ def epw_rows(steps: int = 1, leap: bool = False) -> list[list[str]]:
                     shine = max(0.0, np.sin(np.pi * (hour - 6) / 12))
                     row = ["1999", str(month), str(day), str(hour), str(60 * step // steps), "?"]
                     row += ["10.0", "5.0", "71", "98000", "0", "0", "300", f"{800 * shine:.0f}"]
-                    row += [
-                        f"{700 * shine:.0f}",
-                        f"{120 * shine:.0f}",
-                        "999999",
-                        "999999",
-                        "999999",
-                    ]
+                    row += [f"{700 * shine:.0f}", f"{120 * shine:.0f}", "999999", "999999", "999999"]
                     row += ["9999", "270", "3.5", "5", "5", "9999", "99999", "9", "999999999"]
                     rows.append([*row, "0", "0", "0", "88", "0.2", "0", "0"])
     return rows

@@ -27,9 +27,7 @@ def test_power_is_complete_and_d65_exact(count: int) -> None:
 
 
 @pytest.mark.parametrize(("count", "most"), [(3, 0.14), (5, 0.11), (9, 0.026), (20, 1e-3)])
-def test_error_of_the_melanopic_ratio_against_every_five_nanometres(
-    count: int, most: float
-) -> None:
+def test_error_of_the_melanopic_ratio_against_every_five_nanometres(count: int, most: float) -> None:
     # docs/spectral.md states these bounds
     spectra, fine, coarse = daylight(), channels_of(81), channels_of(count)
     exact = fine.power(spectra) @ fine.detection.T

@@ -27,13 +27,7 @@ def climate(hours: int = 48, *, outdoor=0.0, sky=None, wind: float = 3.0) -> Cli
     )
 
 
-def box(
-    *,
-    window: Fenestration | None = None,
-    window_area: float = 4.5,
-    outside: str = "twin",
-    **changes,
-) -> Zone:
+def box(*, window: Fenestration | None = None, window_area: float = 4.5, outside: str = "twin", **changes) -> Zone:
     """A 4 x 5 x 3 m room with one facade to the south."""
     partition = (PLASTER, Layer(0.05, 2.3, 2300.0, 1000.0), PLASTER)
     slab = (PLASTER, CONCRETE, PLASTER)

@@ -76,13 +76,22 @@ def test_the_load_of_a_periodic_gain_is_the_closed_form(step, late):
     faces = tuple(replace(f, emissivity_in=1.0, emissivity_out=0.0) for f in zone.surfaces)
     t = np.arange(0.5, 30 * 86400 / step) * step
     zone = replace(
-        zone, surfaces=faces, infiltration_ach=0.0, air_capacity_factor=0.0,
-        gains=Gains(radiant=1000.0 + 500.0 * np.sin(DAY * t)), loads=IdealLoads(26.0, 26.0),
-    )  # fmt: skip
+        zone,
+        surfaces=faces,
+        infiltration_ach=0.0,
+        air_capacity_factor=0.0,
+        gains=Gains(radiant=1000.0 + 500.0 * np.sin(DAY * t)),
+        loads=IdealLoads(26.0, 26.0),
+    )
     options = BalanceOptions(
-        inside_convection="stated", inside_films=(2.7, 1.7, 1.7), inside_radiation=5.0,
-        outside_convection="constant", outside_film=20.0, warm_days=0, start_c=26.0,
-    )  # fmt: skip
+        inside_convection="stated",
+        inside_films=(2.7, 1.7, 1.7),
+        inside_radiation=5.0,
+        outside_convection="constant",
+        outside_film=20.0,
+        warm_days=0,
+        start_c=26.0,
+    )
     weather, dark = climate(len(t), outdoor=26.0), no_sun(len(t), len(faces), 0)
     year = simulate(zone, weather, dark, step_s=step, row_s=step, options=options)
     last = slice(-round(86400 / step), None)
@@ -97,11 +106,7 @@ def test_semi_infinite_wall_follows_the_closed_form():
     wall = Layer(2.0, 1.0, 2000.0, 1000.0)  # the front of heat goes 0.4 m in a day
     options = BalanceOptions(**FILMS, warm_days=0, start_c=0.0, cell=0.002)
     result = simulate(
-        one_wall((wall,)),
-        climate(hours, outdoor=10.0),
-        no_sun(hours, 1, 0),
-        step_s=60.0,
-        options=options,
+        one_wall((wall,)), climate(hours, outdoor=10.0), no_sun(hours, 1, 0), step_s=60.0, options=options
     )
     t = (np.arange(hours * 60) + 1.0) * 60.0
     root = film / 1.0 * np.sqrt(5e-7 * t)  # Carslaw and Jaeger 1959, 2.7: convective boundary
@@ -158,9 +163,7 @@ def test_energy_closes_every_hour_and_over_the_run(step_s):
     scale = sum(np.abs(flow).mean() for flow in result.heat_flow.values())
     assert np.max(np.abs(result.residual)) < 1e-6 * scale
     assert abs(result.residual.sum()) < 1e-6 * scale
-    assert result.heat_flow["glass sun"].mean() == pytest.approx(
-        4.5 * (sun(hours, zone).absorbed_outer).mean()
-    )
+    assert result.heat_flow["glass sun"].mean() == pytest.approx(4.5 * (sun(hours, zone).absorbed_outer).mean())
 
 
 def half_of_symmetric(layers):
@@ -181,9 +184,7 @@ def test_symmetric_partition_is_half_a_partition_with_adiabatic_middle():
     weather = climate(hours, outdoor=10 + 10 * np.sin(np.arange(hours) / 24 * 2 * np.pi))
     whole = box()
     halves = tuple(
-        OpaqueSurface(s.name, s.area, half_of_symmetric(s.layers), s.normal, "adiabatic")
-        if s.outside == "twin"
-        else s
+        OpaqueSurface(s.name, s.area, half_of_symmetric(s.layers), s.normal, "adiabatic") if s.outside == "twin" else s
         for s in whole.surfaces
     )
     half = Zone("room", 60.0, halves)
@@ -201,15 +202,11 @@ def test_two_equal_rooms_behave_like_twins_and_heat_flows_to_the_colder():
 
     def room(name: str, other: str, side: str, gains: Gains) -> Zone:
         surfaces = tuple(
-            OpaqueSurface(s.name, s.area, s.layers, s.normal, other, "party")
-            if s.name == side
-            else s
+            OpaqueSurface(s.name, s.area, s.layers, s.normal, other, "party") if s.name == side else s
             for s in alone.surfaces
         )
         named = tuple(
-            OpaqueSurface("party", s.area, s.layers, s.normal, other, "party")
-            if s.outside == other
-            else s
+            OpaqueSurface("party", s.area, s.layers, s.normal, other, "party") if s.outside == other else s
             for s in surfaces
         )
         return Zone(name, 60.0, named, gains=gains)
@@ -268,9 +265,7 @@ def test_shading_state_switches_the_thermal_state():
     dark = no_sun(hours, 6, 1)
     state = np.zeros((hours, 1), dtype=int)
     state[24:] = 1
-    switched = Solar(
-        dark.absorbed_outer, dark.absorbed_inner, dark.inside, dark.facade, state=state
-    )
+    switched = Solar(dark.absorbed_outer, dark.absorbed_inner, dark.inside, dark.facade, state=state)
     result = simulate(zone, climate(hours), switched)
     assert result.heating[30] < 0.8 * result.heating[20]
 

@@ -100,9 +100,7 @@ def test_realised_films_keep_the_sum_of_conductances():
     resistance = closed.layer_resistance.at(10.0, 10.0)
     assert 1 / closed.u_value == pytest.approx(0.03 + resistance + 0.073)
     # the extra conductances are in the realised films, not beside them
-    assert closed.inward_shares() == pytest.approx(
-        (closed.u_value * 0.03, 0.0, 1 - closed.u_value * 0.073)
-    )
+    assert closed.inward_shares() == pytest.approx((closed.u_value * 0.03, 0.0, 1 - closed.u_value * 0.073))
 
 
 def test_fenestration_refuses_what_cannot_be():
@@ -115,10 +113,20 @@ def test_fenestration_refuses_what_cannot_be():
 
 
 SHADE = ShadeNode(
-    exterior=False, width=0.05, height=1.5, tilt=np.pi / 2, impedance=3.0, exchange=0.8,
-    pane_weight=0.0, emissivity=0.9, panes=LayerResistance("constant", (0.2,)), sun=(0.1, 0.6, 1.0),
-    inward=(0.1, 0.5, 0.8), two_layers=LayerResistance("constant", (0.4,)), film=0.08,
-)  # fmt: skip
+    exterior=False,
+    width=0.05,
+    height=1.5,
+    tilt=np.pi / 2,
+    impedance=3.0,
+    exchange=0.8,
+    pane_weight=0.0,
+    emissivity=0.9,
+    panes=LayerResistance("constant", (0.2,)),
+    sun=(0.1, 0.6, 1.0),
+    inward=(0.1, 0.5, 0.8),
+    two_layers=LayerResistance("constant", (0.4,)),
+    film=0.08,
+)
 
 
 @pytest.mark.parametrize("more", [-0.3, -0.05, 0.0, 0.05, 0.15])

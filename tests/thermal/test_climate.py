@@ -9,15 +9,7 @@ import pytest
 
 from tests.thermal.rooms import box
 from thermal.blackbox import Fenestration
-from thermal.climate import (
-    SIGMA,
-    Climate,
-    Solar,
-    no_sun,
-    sky_temperature,
-    to_steps,
-    undisturbed_ground,
-)
+from thermal.climate import SIGMA, Climate, Solar, no_sun, sky_temperature, to_steps, undisturbed_ground
 from thermal.convection import local_wind_factor
 from thermal.errors import ThermalInputError
 from thermal.network import network, window_mix
@@ -73,9 +65,13 @@ def test_forced_film_takes_the_local_wind_to_its_power():
 
 
 LIMITS = {
-    "outdoor_c": (-90.0, 70.0), "sky_c": (-150.0, 70.0), "wind_speed": (0.0, 100.0),
-    "wind_direction_deg": (0.0, 360.0), "ground_c": (-60.0, 60.0), "pressure": (3e4, 1.2e5),
-}  # fmt: skip
+    "outdoor_c": (-90.0, 70.0),
+    "sky_c": (-150.0, 70.0),
+    "wind_speed": (0.0, 100.0),
+    "wind_direction_deg": (0.0, 360.0),
+    "ground_c": (-60.0, 60.0),
+    "pressure": (3e4, 1.2e5),
+}
 
 
 @pytest.mark.parametrize("name", LIMITS)

@@ -43,9 +43,7 @@ def test_running_mean_looks_back_only():
 def test_ashrae_bands_agree_with_pythermalcomfort(share):
     operative, outdoor = np.meshgrid(np.linspace(15, 36, 211), np.linspace(11, 33, 23))
     ours = adaptive_comfort(operative.ravel(), outdoor.ravel(), f"ASHRAE 55 {share} %")
-    theirs = adaptive_ashrae(
-        tdb=operative.ravel(), tr=operative.ravel(), t_running_mean=outdoor.ravel(), v=0.1
-    )
+    theirs = adaptive_ashrae(tdb=operative.ravel(), tr=operative.ravel(), t_running_mean=outdoor.ravel(), v=0.1)
     expected = theirs.acceptability_80 if share == "80" else theirs.acceptability_90
     # pythermalcomfort rounds its limits to 0.1 K
     clear = np.abs(ours.excess) > 0.06
@@ -54,9 +52,7 @@ def test_ashrae_bands_agree_with_pythermalcomfort(share):
     assert not np.any(ours.comfortable[clear]) and not np.any(np.asarray(expected)[clear])
 
 
-@pytest.mark.parametrize(
-    ("category", "field"), [("I", "cat_i"), ("II", "cat_ii"), ("III", "cat_iii")]
-)
+@pytest.mark.parametrize(("category", "field"), [("I", "cat_i"), ("II", "cat_ii"), ("III", "cat_iii")])
 def test_en_bands_agree_with_pythermalcomfort(category, field):
     operative = np.linspace(15, 36, 211)
     outdoor = np.full(211, 20.0)
@@ -87,8 +83,7 @@ def test_bands_and_ranges_of_the_standards_by_hand(band, low, high, range_c):
     np.testing.assert_allclose(comfort.excess, [-0.01, 0, 0, 0.01], atol=1e-9)
     least, most = range_c
     outdoor = np.array([least - 0.1, least, most, most + 0.1])
-    assert adaptive_comfort(outdoor, outdoor, band).applicable.tolist() == [False, True, True,
-                                                                           False]  # fmt: skip
+    assert adaptive_comfort(outdoor, outdoor, band).applicable.tolist() == [False, True, True, False]
 
 
 def test_running_means_weigh_the_days_before_as_printed():
@@ -157,9 +152,7 @@ def test_operative_temperature_forms():
     assert operative_temperature(20.0, 24.0, 0.4) == pytest.approx((24 + 2 * 20) / 3)
     assert operative_temperature(20.0, 24.0, 0.199) == pytest.approx(22.0)
     weight = np.sqrt(2.0)  # from 0.2 m/s on
-    assert operative_temperature(20.0, 24.0, 0.2) == pytest.approx(
-        (24 + weight * 20) / (1 + weight)
-    )
+    assert operative_temperature(20.0, 24.0, 0.2) == pytest.approx((24 + weight * 20) / (1 + weight))
     assert operative_temperature(20.0, 24.0, 0.0) == pytest.approx(22.0)
     with pytest.raises(ThermalInputError, match="negative"):
         operative_temperature(20.0, 24.0, -0.1)
@@ -180,14 +173,19 @@ def test_summary_counts_add_up():
 
 # rows of ISO 7730:2005, table D.1: air, radiant, speed, humidity, met, clo, PMV, PPD
 ANNEX_D = (
-    (22.0, 22.0, 0.10, 60, 1.2, 0.5, -0.75, 17), (27.0, 27.0, 0.10, 60, 1.2, 0.5, 0.77, 17),
-    (27.0, 27.0, 0.30, 60, 1.2, 0.5, 0.44, 9), (23.5, 25.5, 0.10, 60, 1.2, 0.5, -0.01, 5),
-    (23.5, 25.5, 0.30, 60, 1.2, 0.5, -0.55, 11), (19.0, 19.0, 0.10, 40, 1.2, 1.0, -0.60, 13),
+    (22.0, 22.0, 0.10, 60, 1.2, 0.5, -0.75, 17),
+    (27.0, 27.0, 0.10, 60, 1.2, 0.5, 0.77, 17),
+    (27.0, 27.0, 0.30, 60, 1.2, 0.5, 0.44, 9),
+    (23.5, 25.5, 0.10, 60, 1.2, 0.5, -0.01, 5),
+    (23.5, 25.5, 0.30, 60, 1.2, 0.5, -0.55, 11),
+    (19.0, 19.0, 0.10, 40, 1.2, 1.0, -0.60, 13),
     (23.5, 23.5, 0.30, 40, 1.2, 1.0, 0.12, 5),
-    (23.0, 21.0, 0.10, 40, 1.2, 1.0, 0.05, 5), (23.0, 21.0, 0.30, 40, 1.2, 1.0, -0.16, 6),
-    (22.0, 22.0, 0.10, 60, 1.6, 0.5, 0.05, 5), (27.0, 27.0, 0.10, 60, 1.6, 0.5, 1.17, 34),
+    (23.0, 21.0, 0.10, 40, 1.2, 1.0, 0.05, 5),
+    (23.0, 21.0, 0.30, 40, 1.2, 1.0, -0.16, 6),
+    (22.0, 22.0, 0.10, 60, 1.6, 0.5, 0.05, 5),
+    (27.0, 27.0, 0.10, 60, 1.6, 0.5, 1.17, 34),
     (27.0, 27.0, 0.30, 60, 1.6, 0.5, 0.95, 24),
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize("row", ANNEX_D)
@@ -197,9 +195,7 @@ def test_pmv_of_iso_7730_annex_d(row):
     The first digit of each PMV is that of the open validation data of comfort models (MIT) too.
     """
     air, mrt, speed, humidity, met, clo, vote, dissatisfied = row
-    pmv, ppd = pmv_ppd(
-        [air], [mrt], air_speed=speed, humidity=humidity, metabolic_rate=met, clothing=clo
-    )
+    pmv, ppd = pmv_ppd([air], [mrt], air_speed=speed, humidity=humidity, metabolic_rate=met, clothing=clo)
     assert pmv[0] == pytest.approx(vote, abs=0.025)
     assert ppd[0] == pytest.approx(dissatisfied, abs=1.0)
 

@@ -14,9 +14,7 @@ AIR = Layer(0.02, 0.1, 0.0, 0.0)  # two cells without any heat, and beside anoth
 
 
 @pytest.mark.parametrize("step_s", [60.0, 600.0, 3600.0])
-@pytest.mark.parametrize(
-    "layers", [(PLASTER,), (PLASTER, INSULATION, CONCRETE), (AIR, AIR, PLASTER)]
-)
+@pytest.mark.parametrize("layers", [(PLASTER,), (PLASTER, INSULATION, CONCRETE), (AIR, AIR, PLASTER)])
 def test_modes_go_as_the_nodes_do(layers: tuple[Layer, ...], step_s: float) -> None:
     grid = wall_grid(layers)
     modes, capacity = grid.modes(step_s), grid.capacity[1:-1] / step_s

@@ -81,9 +81,7 @@ def test_a_state_holds_for_its_least_time():
 
 def test_cut_off_of_the_reference_blind():
     # 80 mm slats 72 mm apart at 45 degrees: tan = (0.9 - 0.7071)/0.7071
-    assert np.degrees(cut_off_angle(np.radians(45.0), 0.08, 0.072)) == pytest.approx(
-        15.26, abs=0.01
-    )
+    assert np.degrees(cut_off_angle(np.radians(45.0), 0.08, 0.072)) == pytest.approx(15.26, abs=0.01)
     # level slats as far apart as they are wide: 45 degrees
     assert np.degrees(cut_off_angle(0.0, 0.08, 0.08)) == pytest.approx(45.0)
 
@@ -107,9 +105,7 @@ def test_switched_room_equals_each_state_while_it_holds():
     weather = climate(hours, outdoor=8.0)
     shut_all = switched([bright, dim], always(1, hours))
     expected = simulate(
-        Zone("room", 60.0, base.surfaces, (WindowElement("w", 4.5, window.normal, states[1:]),)),
-        weather,
-        dim,
+        Zone("room", 60.0, base.surfaces, (WindowElement("w", 4.5, window.normal, states[1:]),)), weather, dim
     )
     np.testing.assert_allclose(simulate(zone, weather, shut_all).air_c, expected.air_c, atol=1e-9)
     half = switched([bright, dim], np.repeat([0, 1], hours // 2))

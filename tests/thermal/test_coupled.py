@@ -27,9 +27,14 @@ SOUTH, NORTH, UP = np.array([0.0, -1, 0]), np.array([0.0, 1, 0]), np.array([0.0,
 def black_box(name: str, wall: OpaqueSurface, *, outdoors: bool, **changes) -> Zone:
     """A room of one shared wall and one other vertical wall, without longwave exchange."""
     other = OpaqueSurface(
-        f"{name} other", 10.0, WALL, -wall.normal, "outdoor" if outdoors else "adiabatic",
-        emissivity_in=0.0, emissivity_out=0.0,
-    )  # fmt: skip
+        f"{name} other",
+        10.0,
+        WALL,
+        -wall.normal,
+        "outdoor" if outdoors else "adiabatic",
+        emissivity_in=0.0,
+        emissivity_out=0.0,
+    )
     return Zone(name, 30.0, (wall, other), infiltration_ach=0.0, **changes)
 
 
@@ -43,9 +48,14 @@ def test_floating_room_between_a_warm_room_and_outdoors():
     warm = black_box("first", shared[0], outdoors=False, loads=IdealLoads(22.0, 22.0))
     cold = black_box("second", shared[1], outdoors=True)
     options = BalanceOptions(
-        inside_convection="constant", outside_convection="constant", outside_film=20.0,
-        warm_tolerance=1e-9, warm_days=2000, tolerance=1e-9, iterations=50,
-    )  # fmt: skip
+        inside_convection="constant",
+        outside_convection="constant",
+        outside_film=20.0,
+        warm_tolerance=1e-9,
+        warm_days=2000,
+        tolerance=1e-9,
+        iterations=50,
+    )
     dark = [no_sun(hours, 2, 0)] * 2
     first, second = simulate_zones([warm, cold], climate(hours), dark, options=options)
     resistance = sum(layer.resistance for layer in WALL)
@@ -65,9 +75,7 @@ def test_plants_give_no_more_than_their_zones_ask(limits):
     for i, (name, other) in enumerate((("a", "b"), ("b", "a"))):
         room = box(window=Fenestration("glass", 2.5), gains=Gains(100.0 * i, 0.0))
         walls = tuple(
-            replace(s, name="party", outside=other, partner="party")
-            if s.name == ("east", "west")[i]
-            else s
+            replace(s, name="party", outside=other, partner="party") if s.name == ("east", "west")[i] else s
             for s in room.surfaces
         )
         loads = IdealLoads(20.0 + i, 24.0 - i, *limits)
@@ -95,8 +103,7 @@ def test_energy_of_coupled_rooms_closes_with_control_loads_gains_and_doors():
     for name, other, side, heat in (("a", "b", "east", 100.0), ("b", "a", "west", 10.0)):
         room = box(window=states[0], gains=Gains(heat, heat))
         walls = tuple(
-            replace(s, name="party", outside=other, partner="party") if s.name == side else s
-            for s in room.surfaces
+            replace(s, name="party", outside=other, partner="party") if s.name == side else s for s in room.surfaces
         )
         windows = (replace(room.windows[0], states=states),)
         loads = IdealLoads(20.0, 26.0, 300.0, 200.0)
@@ -130,12 +137,9 @@ def test_stretches_of_a_year_are_the_year_in_one(sun_by_step, monkeypatch):
     for name, other, side in (("a", "b", "east"), ("b", "a", "west")):
         room = box(window=states[0], gains=Gains(100.0 * rng.random(hours), 50.0))
         walls = tuple(
-            replace(s, name="party", outside=other, partner="party") if s.name == side else s
-            for s in room.surfaces
+            replace(s, name="party", outside=other, partner="party") if s.name == side else s for s in room.surfaces
         )
-        beyond = OpaqueSurface(
-            "known", 4.0, WALL, UP, "known", beyond_c=10.0 + 5.0 * rng.random(hours),
-        )  # fmt: skip
+        beyond = OpaqueSurface("known", 4.0, WALL, UP, "known", beyond_c=10.0 + 5.0 * rng.random(hours))
         rooms.append(
             replace(
                 room,
@@ -186,10 +190,7 @@ def test_rooms_of_an_ifc_share_their_wall_and_door():
     np.testing.assert_allclose(door_links(spaces, 0.1), [[0, 0.1], [0.1, 0]])
     hours = 48
     dark = [no_sun(hours, len(r.zone.surfaces), len(r.zone.windows)) for r in rooms]
-    zones = [
-        replace(r.zone, loads=IdealLoads(heating_c=22.0) if i == 0 else IdealLoads())
-        for i, r in enumerate(rooms)
-    ]
+    zones = [replace(r.zone, loads=IdealLoads(heating_c=22.0) if i == 0 else IdealLoads()) for i, r in enumerate(rooms)]
     _, floating = simulate_zones(zones, climate(hours), dark)
     single = simulate_zones([replace(alone[1].zone)], climate(hours), dark[1:])[0]
     assert floating.air_c[-1] > single.air_c[-1] + 2.0
@@ -211,9 +212,7 @@ def test_both_faces_of_a_wall_get_one_construction():
     first, second = read_ifc(OFFICE).spaces
     thin = MaterialLayer("glass", 0.01, 1.0, 2500.0, 800.0)
     other = Construction("other", (thin, MaterialLayer("air", 0.02, 0.1, 2.0, 1000.0)))
-    faces = tuple(
-        replace(f, construction=other) if f.neighbour == second.guid else f for f in first.faces
-    )
+    faces = tuple(replace(f, construction=other) if f.neighbour == second.guid else f for f in first.faces)
     one, two = shared_constructions([replace(first, faces=faces), second])
     pairs = 0
     for face in one.faces:

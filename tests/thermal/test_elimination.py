@@ -28,9 +28,7 @@ def test_solution_is_that_of_the_dense_system(unknowns, density):
 
 def test_a_chain_of_rooms_fills_in_next_to_nothing():
     """Twelve faces in a clique for each of 50 rooms, one face tied to the next room's."""
-    pairs = [
-        (12 * room + i, 12 * room + j) for room in range(50) for i in range(12) for j in range(i)
-    ]
+    pairs = [(12 * room + i, 12 * room + j) for room in range(50) for i in range(12) for j in range(i)]
     pairs += [(12 * room + 11, 12 * room + 12) for room in range(49)]
     assert len(elimination(600, pairs).rows) == len(pairs)
 

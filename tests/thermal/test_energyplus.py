@@ -14,35 +14,15 @@ import pytest
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.demo import WEATHER as EPW
 from tests.conftest import REPOSITORY
-from tests.validation.energyplus_cases import (
-    EPW_FILES,
-    FIRST_HOUR,
-    Site,
-    pairs,
-    simulate_case,
-)
+from tests.validation.energyplus_cases import EPW_FILES, FIRST_HOUR, Site, pairs, simulate_case
 from tests.validation.energyplus_loads import annual_loads
 from tests.validation.energyplus_reference import DEMO_FILE, DEMO_ORIENTATIONS
-from tests.validation.energyplus_statistics import (
-    case_row,
-    comfort_classification,
-    pooled,
-)
+from tests.validation.energyplus_statistics import case_row, comfort_classification, pooled
 from tests.validation.facade_sun import facade_sun, sun_steps
-from tests.validation.reference_room import (
-    ORIENTATIONS,
-    RoomLight,
-    climate,
-    facade_normal,
-)
+from tests.validation.reference_room import ORIENTATIONS, RoomLight, climate, facade_normal
 from tests.validation.reference_systems import clear_double
 
-BARS = {
-    "dgu": (0.2, 0.3),
-    "ext_shade": (0.15, 0.25),
-    "ext_blind": (0.5, 0.7),
-    "int_shade": (0.5, 0.8),
-}
+BARS = {"dgu": (0.2, 0.3), "ext_shade": (0.15, 0.25), "ext_blind": (0.5, 0.7), "int_shade": (0.5, 0.8)}
 
 
 def compared(real_data, reference_data, closure, climates, orientations) -> pd.DataFrame:

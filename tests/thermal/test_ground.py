@@ -39,8 +39,7 @@ HOUSE = Footprint(100.0, 40.0, 0.3, SOILS["clay"])
 
 
 @pytest.mark.parametrize(
-    ("ratio", "u"),
-    [(0.05, 0.13), (0.1, 0.22), (0.2, 0.37), (0.3, 0.49), (0.5, 0.70), (0.7, 0.86), (1.0, 1.05)],
+    ("ratio", "u"), [(0.05, 0.13), (0.1, 0.22), (0.2, 0.37), (0.3, 0.49), (0.5, 0.70), (0.7, 0.86), (1.0, 1.05)]
 )
 def test_uninsulated_slab_on_clay_as_cibse_prints_it(ratio, u):
     """CIBSE Guide A (2006), table 3.15: walls of 0.3 m, to its two digits (quoted from memory)."""
@@ -159,17 +158,14 @@ def test_room_on_its_slab_loses_what_iso_says():
     room = box(loads=IdealLoads(20.0, 20.0), infiltration_ach=0.0)
     up = 1.0 / R_SI_DOWN
     floor = OpaqueSurface(
-        "slab", 20.0, element.layers((CONCRETE,)), np.array([0, 0, -1.0]), "known",
-        emissivity_in=0.0, beyond_c=beyond,
-    )  # fmt: skip
+        "slab", 20.0, element.layers((CONCRETE,)), np.array([0, 0, -1.0]), "known", emissivity_in=0.0, beyond_c=beyond
+    )
     other = OpaqueSurface(
-        "roof", 20.0, (Layer(0.1, 0.1, 0.0, 0.0),), np.array([0, 0, 1.0]), "adiabatic",
-        emissivity_in=0.0,
-    )  # fmt: skip
+        "roof", 20.0, (Layer(0.1, 0.1, 0.0, 0.0),), np.array([0, 0, 1.0]), "adiabatic", emissivity_in=0.0
+    )
     room = Zone("on the ground", 60.0, (floor, other), infiltration_ach=0.0, loads=room.loads)
     options = BalanceOptions(inside_convection="constant", warm_tolerance=1e-4)
-    result = simulate(room, climate(2 * 8760, outdoor=outdoor), no_sun(2 * 8760, 2, 0),
-                      step_s=3600.0, options=options)  # fmt: skip
+    result = simulate(room, climate(2 * 8760, outdoor=outdoor), no_sun(2 * 8760, 2, 0), step_s=3600.0, options=options)
     film, beyond = (result.heating - result.cooling)[8760:], beyond[8760:]
     assert np.abs(result.residual).max() < 1e-6
     # the film of the balance is not R_si: compare at equal total resistance
@@ -194,14 +190,10 @@ def test_neighbour_at_a_known_temperature_has_its_u():
     wall = Layer(0.1, 0.5, 0.0, 0.0)
     film = Layer(1.0, 1.0 / 0.13, 0.0, 0.0)
     surface = OpaqueSurface(
-        "party", 12.0, (film, wall), np.array([1.0, 0, 0]), "known",
-        emissivity_in=0.0, beyond_c=np.full(24, 12.0),
-    )  # fmt: skip
-    other = OpaqueSurface(
-        "rest", 20.0, (wall,), np.array([-1.0, 0, 0]), "adiabatic", emissivity_in=0.0
+        "party", 12.0, (film, wall), np.array([1.0, 0, 0]), "known", emissivity_in=0.0, beyond_c=np.full(24, 12.0)
     )
-    room = Zone("room", 30.0, (surface, other), infiltration_ach=0.0,
-                loads=IdealLoads(22.0, 22.0), bridges=1.5)  # fmt: skip
+    other = OpaqueSurface("rest", 20.0, (wall,), np.array([-1.0, 0, 0]), "adiabatic", emissivity_in=0.0)
+    room = Zone("room", 30.0, (surface, other), infiltration_ach=0.0, loads=IdealLoads(22.0, 22.0), bridges=1.5)
     options = BalanceOptions(inside_convection="constant", warm_tolerance=1e-9, tolerance=1e-9)
     found = simulate(room, climate(24, outdoor=2.0), no_sun(24, 2, 0), options=options)
     u = 1.0 / (0.13 + wall.resistance + 1 / 3.076)
@@ -308,8 +300,7 @@ def test_constants_of_the_standard():
 
 
 def test_what_is_no_ground_is_refused():
-    for area, perimeter, wall in ((0.0, 40.0, 0.3), (100.0, 0.0, 0.3), (100.0, 40.0, -0.01),
-                                  (100.0, 40.0, 3.01)):  # fmt: skip
+    for area, perimeter, wall in ((0.0, 40.0, 0.3), (100.0, 0.0, 0.3), (100.0, 40.0, -0.01), (100.0, 40.0, 3.01)):
         with pytest.raises(ThermalInputError, match="ground"):
             Footprint(area, perimeter, wall, SOILS["clay"])
     for wall in (0.0, 3.0):
@@ -339,8 +330,7 @@ def test_cellar_by_its_printed_swing():
     d = 0.3 + k * (0.17 + 0.6 + 0.04)
     ground = 0.37 * 40 * k * (2 - np.exp(-z / reach)) * np.log(reach / d + 1)
     whole = (100 + z * 40) * k / reach + outdoors + 100 * own
-    cellar = over_unheated_basement(HOUSE, 1.0, depth=z, height=0.5, wall_u=1.5,
-                                    floor_resistance=0.6)  # fmt: skip
+    cellar = over_unheated_basement(HOUSE, 1.0, depth=z, height=0.5, wall_u=1.5, floor_resistance=0.6)
     assert cellar.swing == pytest.approx(own * (ground + outdoors) / whole)
     assert (cellar.lag, cellar.resistance, cellar.r_si, cellar.soil) == (1.0, 1.0, 0.17, None)
 

@@ -10,11 +10,7 @@ import pytest
 from mitsuba_cfs.bsdf.glazing import roos_factor
 from tests.conftest import WINDOW_GLAZING
 from thermal.errors import ThermalInputError
-from thermal.glazing import (
-    Gap,
-    en410_g_value,
-    en673_u_value,
-)
+from thermal.glazing import Gap, en410_g_value, en673_u_value
 from thermal.gvalue import (
     InternalShade,
     external_shade_g,
@@ -54,9 +50,7 @@ def test_en410_agrees_with_window_s_engine():
 def test_roos_factor():
     # EQUATIONS.md 3.6: f(60 deg; p = 2, q = 4) = .87439
     assert roos_factor(np.radians(60.0), panes=2, category=4.0) == pytest.approx(0.87439, abs=5e-6)
-    np.testing.assert_allclose(
-        roos_factor([0.0, np.pi / 2], panes=2, category=4.0), [1.0, 0.0], atol=1e-12
-    )
+    np.testing.assert_allclose(roos_factor([0.0, np.pi / 2], panes=2, category=4.0), [1.0, 0.0], atol=1e-12)
 
 
 def test_roos_factor_follows_the_reference_glazing():

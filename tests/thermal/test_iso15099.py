@@ -11,12 +11,7 @@ import pytest
 from tests.conftest import WINDOW_GLAZING
 from tests.thermal.rooms import box, climate
 from thermal.balance import BalanceOptions, simulate
-from thermal.blackbox import (
-    Fenestration,
-    layer_absorptances,
-    node_absorptances,
-    with_realised_films,
-)
+from thermal.blackbox import Fenestration, layer_absorptances, node_absorptances, with_realised_films
 from thermal.climate import no_sun
 from thermal.closure import Closure
 from thermal.emitters import IdealLoads
@@ -135,8 +130,7 @@ def test_g_counts_what_each_layer_sends_inwards():
 def test_blackbox_of_the_layers_gives_their_u_and_films():
     data = iso15099_data(shaded("internal"))
     fenestration = with_realised_films(
-        Fenestration("shade", data.u_value, resistance=data.resistance),
-        r_inner_realised=data.r_inner,
+        Fenestration("shade", data.u_value, resistance=data.resistance), r_inner_realised=data.r_inner
     )
     mid, apart = 10.0, 15.0
     resistance = float(fenestration.layer_resistance.at(mid, apart))
@@ -149,9 +143,7 @@ def test_blackbox_of_the_layers_gives_their_u_and_films():
 @pytest.mark.parametrize("inner_emissivity", [0.84, 0.05])
 @pytest.mark.parametrize("absorbed", [(0.0, 0.0, 0.0), (20.0, 30.0, 150.0), (0.0, 150.0, 20.0)])
 @pytest.mark.parametrize("exterior", [False, True])
-def test_a_shade_in_the_balance_is_that_of_its_layers(
-    absorbed, inner_emissivity, openness, exterior
-):
+def test_a_shade_in_the_balance_is_that_of_its_layers(absorbed, inner_emissivity, openness, exterior):
     """Faces, heat to the air and to the room, by hourly balance and by ISO 15099 layer by layer.
 
     The room is as warm as its air, but where the sun is: the surroundings of the standard.
@@ -173,19 +165,14 @@ def test_a_shade_in_the_balance_is_that_of_its_layers(
         absorbed_middle=np.full((24, 1), parts.middle),
         absorbed_inner=np.full((24, 1), parts.inner),
     )
-    room = box(window=window, window_area=0.01, outside="adiabatic", infiltration_ach=0.0,
-               loads=IdealLoads(25.0, 25.0))  # fmt: skip
+    room = box(window=window, window_area=0.01, outside="adiabatic", infiltration_ach=0.0, loads=IdealLoads(25.0, 25.0))
     walls = tuple(
-        replace(one, outside="known", beyond_c=25.0, layers=(Layer(0.01, 400.0, 0.0, 0.0),))
-        for one in room.surfaces
+        replace(one, outside="known", beyond_c=25.0, layers=(Layer(0.01, 400.0, 0.0, 0.0),)) for one in room.surfaces
     )
     options = BalanceOptions(
-        outside_convection="constant", warm_days=400, warm_tolerance=1e-7, tolerance=1e-7,
-        iterations=50,
-    )  # fmt: skip
-    result = simulate(
-        replace(room, surfaces=walls), climate(24, outdoor=10.0), light, options=options
+        outside_convection="constant", warm_days=400, warm_tolerance=1e-7, tolerance=1e-7, iterations=50
     )
+    result = simulate(replace(room, surfaces=walls), climate(24, outdoor=10.0), light, options=options)
     assert np.abs(result.residual).max() < 1e-6
     seen = 0.0 if exterior else data.shade.pane_weight
     shade, pane = balance.faces_c[-1], balance.faces_c[-3]
@@ -258,11 +245,14 @@ def engine_system(unit, solid, conditions, shade_openness=0.02):
         model = pywincalc.BoundaryConditionsCoefficientModelType
         kelvin = one.air_c + 273.15
         return pywincalc.Environment(
-            air_temperature=kelvin, pressure=101325.0,
+            air_temperature=kelvin,
+            pressure=101325.0,
             convection_coefficient=0.0 if free else one.convection,
             coefficient_model=model.CALCULATED_H if free else model.HC_PRESCRIBED,
-            radiation_temperature=kelvin, emissivity=1.0, direct_solar_radiation=sun,
-        )  # fmt: skip
+            radiation_temperature=kelvin,
+            emissivity=1.0,
+            direct_solar_radiation=sun,
+        )
 
     return pywincalc.GlazingSystem(
         solid_layers=solid,
@@ -348,9 +338,7 @@ def test_longwave_of_blinds_and_fabrics_is_that_of_windows_engine(real_data):
     hole = pywincalc.PerforatedGeometry.Type.CIRCULAR
     pairs = [
         (
-            pywincalc.create_venetian_blind(
-                pywincalc.VenetianGeometry(tilt, 0.0148, 0.0127, 0.0), slat
-            ),
+            pywincalc.create_venetian_blind(pywincalc.VenetianGeometry(tilt, 0.0148, 0.0127, 0.0), slat),
             venetian_layer(0.0148, 0.0127, tilt, slat_thickness=thick),
         )
         for tilt in (0.0, 30.0, 45.0, 70.0)

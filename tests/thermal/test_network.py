@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 
 from tests.thermal.rooms import CONCRETE, INSULATION
-from tests.validation.room_exchange import (
-    absorbed_after_reflections,
-    area_view_factors,
-    spread_evenly,
-    window_share,
-)
+from tests.validation.room_exchange import absorbed_after_reflections, area_view_factors, spread_evenly, window_share
 from thermal.blackbox import Fenestration
 from thermal.convection import doe2_outside, iso15099_inside, local_wind_factor, tarp_inside
 from thermal.errors import ThermalInputError
@@ -194,8 +189,9 @@ def _two_windows() -> Zone:
 
 def test_a_network_numbers_windows_and_shares_radiant_gains():
     zone = _two_windows()
-    net = network([zone], [window_mix(zone, None, 1)], step_s=600.0, terrain="suburbs",
-                  cell=0.02, link=np.zeros((1, 1)))  # fmt: skip
+    net = network(
+        [zone], [window_mix(zone, None, 1)], step_s=600.0, terrain="suburbs", cell=0.02, link=np.zeros((1, 1))
+    )
     assert net.faces.window.tolist() == [-1, 0, 1]
     weight = np.array([10.0 * 0.6, 2.0 * 0.84, 2.0 * 0.84])
     np.testing.assert_allclose(net.radiation.shares(0), [weight / weight.sum()])
@@ -204,10 +200,10 @@ def test_a_network_numbers_windows_and_shares_radiant_gains():
 def test_the_faces_of_a_wall_keep_their_sides():
     """Half of the outermost and of the innermost cell, 7 cells of insulation and 10 of concrete."""
     zone = _two_windows()
-    net = network([zone], [window_mix(zone, None, 1)], step_s=600.0, terrain="suburbs",
-                  cell=0.02, link=np.zeros((1, 1)))  # fmt: skip
-    halves = [0.5 * one.thickness / n * one.density * one.heat_capacity
-              for one, n in ((INSULATION, 7), (CONCRETE, 10))]  # fmt: skip
+    net = network(
+        [zone], [window_mix(zone, None, 1)], step_s=600.0, terrain="suburbs", cell=0.02, link=np.zeros((1, 1))
+    )
+    halves = [0.5 * one.thickness / n * one.density * one.heat_capacity for one, n in ((INSULATION, 7), (CONCRETE, 10))]
     assert net.faces.port[0, :2] * 600.0 == pytest.approx(halves)
     between = [one.conductivity * n / one.thickness for one, n in ((INSULATION, 7), (CONCRETE, 10))]
     assert net.faces.port[0, 2:4] == pytest.approx(between)
@@ -222,8 +218,9 @@ def test_radiant_gains_go_by_area_and_emissivity_or_by_area_alone(emissivity):
         for area, sign, eps in zip((10.0, 30.0), (1, -1), emissivity, strict=True)
     )
     zone = Zone("room", 60.0, walls)
-    net = network([zone], [window_mix(zone, None, 1)], step_s=600.0, terrain="suburbs",
-                  cell=0.02, link=np.zeros((1, 1)))  # fmt: skip
+    net = network(
+        [zone], [window_mix(zone, None, 1)], step_s=600.0, terrain="suburbs", cell=0.02, link=np.zeros((1, 1))
+    )
     weight = np.array([10.0, 30.0]) * (emissivity if any(emissivity) else 1.0)
     np.testing.assert_allclose(net.radiation.shares(0)[0], weight / weight.sum(), rtol=1e-9)
 
@@ -237,9 +234,8 @@ def test_star_of_a_face_larger_than_all_others():
 
 def test_a_frame_is_massless_and_has_its_u():
     window = WindowElement(
-        "w", 2.0, np.array([0.0, -1.0, 0.0]), _two_windows().windows[0].states,
-        frame_area=0.4, frame_u=1.6,
-    )  # fmt: skip
+        "w", 2.0, np.array([0.0, -1.0, 0.0]), _two_windows().windows[0].states, frame_area=0.4, frame_u=1.6
+    )
     (layer,) = frame_surface(window).layers
     assert layer.thickness / layer.conductivity == pytest.approx(1 / 1.6 - 0.17)
     assert layer.density * layer.heat_capacity == 0.0
@@ -263,9 +259,7 @@ def _partitioned(partner: str = "there", back: str = "here", behind: str = "one"
 
 def _network(zones: list[Zone]):
     mixes = [window_mix(zone, None, 1) for zone in zones]
-    return network(
-        zones, mixes, step_s=600.0, terrain="suburbs", cell=0.02, link=np.zeros((len(zones),) * 2)
-    )
+    return network(zones, mixes, step_s=600.0, terrain="suburbs", cell=0.02, link=np.zeros((len(zones),) * 2))
 
 
 def test_a_wall_between_zones_is_stored_by_its_first_side():
@@ -321,11 +315,7 @@ def test_each_zone_has_its_own_shares_of_radiant_gains():
     walls = tuple(replace(s, outside="adiabatic", partner=None) for s in alone.surfaces)
     zones = [_two_windows(), replace(alone, surfaces=walls), replace(_two_windows(), name="third")]
     net = _network(zones)
-    weights = (
-        [10.0 * 0.6, 2.0 * 0.84, 2.0 * 0.84],
-        [8.0, 12.0],
-        [10.0 * 0.6, 2.0 * 0.84, 2.0 * 0.84],
-    )
+    weights = ([10.0 * 0.6, 2.0 * 0.84, 2.0 * 0.84], [8.0, 12.0], [10.0 * 0.6, 2.0 * 0.84, 2.0 * 0.84])
     for z, weight in enumerate(weights):
         np.testing.assert_allclose(net.radiation.shares(z), [np.array(weight) / sum(weight)])
     assert net.radiation.first_face.tolist() == [0, 3, 5, 8]
@@ -337,8 +327,7 @@ def _shaded_windows() -> Zone:
         Fenestration(name, 1.1, emissivity_in=inner, emissivity_out=outer)
         for name, inner, outer in (("pane", 0.84, 0.8), ("shade", 0.3, 0.7))
     )
-    left, right = (WindowElement(name, 2.0, south, s) for name, s in
-                   (("left", states), ("right", states[:1])))  # fmt: skip
+    left, right = (WindowElement(name, 2.0, south, s) for name, s in (("left", states), ("right", states[:1])))
     return replace(_two_windows(), windows=(left, right))
 
 

@@ -29,9 +29,7 @@ def test_lightswitch_lowers_once_and_raises_in_the_morning() -> None:
 def test_haldi_and_robinson_s_first_step_has_the_probability_of_arrival() -> None:
     """4000 open blinds, one step: lowered with p(-7.41 + 1.035e-3 E + 2.17)."""
     lux, count = 5000.0, 4000
-    (shares,) = haldi_robinson_2010(
-        lambda hour, open_shares: lux, [40000.0], [1.0], blinds=count, substeps=1
-    )
+    (shares,) = haldi_robinson_2010(lambda hour, open_shares: lux, [40000.0], [1.0], blinds=count, substeps=1)
     expected = 1 / (1 + np.exp(-(-7.41 + 1.035e-3 * lux + 2.17)))
     error = np.sqrt(expected * (1 - expected) / count)
     lowered = shares < 1.0
@@ -45,9 +43,7 @@ def test_haldi_and_robinson_s_first_step_has_the_probability_of_arrival() -> Non
 
 
 def test_nobody_moves_a_blind_who_is_not_there() -> None:
-    shares = haldi_robinson_2010(
-        lambda hour, open_shares: 20000.0, np.full(72, 80000.0), PRESENT, blinds=2, seed=3
-    )
+    shares = haldi_robinson_2010(lambda hour, open_shares: 20000.0, np.full(72, 80000.0), PRESENT, blinds=2, seed=3)
     away = np.flatnonzero(PRESENT == 0)
     away = away[(away > 0)]
     same = [np.array_equal(shares[h], shares[h - 1]) for h in away if PRESENT[h - 1] == 0]

@@ -27,11 +27,7 @@ def steady(outdoor: float, behind: float, internal: float, sun: float, power: fl
     to_mass, to_air = MASS_FILM * MASS_AREA, SURFACE_FILM * AREA
     em = 1 / (1 / OPAQUE - 1 / to_mass)
     rest = 0.5 * internal + sun
-    matrix = [
-        [AIR + to_air, -to_air, 0],
-        [-to_air, to_air + WINDOWS + to_mass, -to_mass],
-        [0, -to_mass, to_mass + em],
-    ]
+    matrix = [[AIR + to_air, -to_air, 0], [-to_air, to_air + WINDOWS + to_mass, -to_mass], [0, -to_mass, to_mass + em]]
     right = [
         AIR * outdoor + 0.5 * internal + power,
         WINDOWS * outdoor + (1 - MASS_AREA / AREA - WINDOWS / (MASS_FILM * AREA)) * rest,
@@ -59,21 +55,32 @@ def test_an_hour_stores_what_does_not_leave() -> None:
 
 def zone_of(hours: int, **changed) -> ReducedZone:
     values = {
-        "windows": np.array([15.0, 12.0]), "opaque": OPAQUE, "mass": MASS, "mass_area": MASS_AREA,
-        "area": AREA, "air": np.full(hours, AIR), "outdoor_c": np.linspace(-5, 12, hours),
-        "behind_c": np.full(hours, 5.0), "heating_c": np.full(hours, 20.0),
-        "cooling_c": np.full(hours, 24.0), "heating_limit": np.inf, "cooling_limit": np.inf,
-    } | changed  # fmt: skip
+        "windows": np.array([15.0, 12.0]),
+        "opaque": OPAQUE,
+        "mass": MASS,
+        "mass_area": MASS_AREA,
+        "area": AREA,
+        "air": np.full(hours, AIR),
+        "outdoor_c": np.linspace(-5, 12, hours),
+        "behind_c": np.full(hours, 5.0),
+        "heating_c": np.full(hours, 20.0),
+        "cooling_c": np.full(hours, 24.0),
+        "heating_limit": np.inf,
+        "cooling_limit": np.inf,
+    } | changed
     return ReducedZone(**values)
 
 
 def acting(hours: int, seed: int = 3, **changed) -> PredictedHours:
     random = np.random.default_rng(seed)
     values = {
-        "sun": random.uniform(0, 2500, (hours, 2)), "daylight": random.uniform(0, 800, (hours, 2)),
-        "lamps": np.full(hours, 400.0), "dimming": DIMMING, "internal": np.full(hours, 200.0),
+        "sun": random.uniform(0, 2500, (hours, 2)),
+        "daylight": random.uniform(0, 800, (hours, 2)),
+        "lamps": np.full(hours, 400.0),
+        "dimming": DIMMING,
+        "internal": np.full(hours, 200.0),
         "penalty": np.zeros((hours, 2)),
-    } | changed  # fmt: skip
+    } | changed
     return PredictedHours(**values)
 
 
@@ -83,9 +90,18 @@ def cost_of(zone: ReducedZone, hours: PredictedHours, states, start_c: float) ->
     for h, m in enumerate(states):
         lamps = hours.lamps[h] * dimmed_share(hours.daylight[h, m], DIMMING)
         responses(
-            zone.air[h], zone.windows[m], zone.opaque, zone.mass, zone.mass_area, zone.area,
-            zone.outdoor_c[h], zone.behind_c[h], hours.internal[h] + lamps, hours.sun[h, m], out,
-        )  # fmt: skip
+            zone.air[h],
+            zone.windows[m],
+            zone.opaque,
+            zone.mass,
+            zone.mass_area,
+            zone.area,
+            zone.outdoor_c[h],
+            zone.behind_c[h],
+            hours.internal[h] + lamps,
+            hours.sun[h, m],
+            out,
+        )
         free = out[0] + out[1] * mass_c
         power = max((20.0 - free) / out[2], 0) if free < 24 else (24.0 - free) / out[2]
         mass_c = out[3] + out[4] * mass_c + out[5] * power
@@ -109,21 +125,14 @@ def test_a_plan_with_moves_that_cost_is_the_cheapest_of_all_sequences(move_wh) -
     """Two groups of two states: each that moves in an hour costs; before the first all are open."""
     random, hours = np.random.default_rng(5), 5
     zone = zone_of(hours, windows=np.array([15.0, 13.5, 13.5, 12.0]))
-    many = {key: random.uniform(0, top, (hours, 4)) for key, top in
-            (("sun", 2500.0), ("daylight", 800.0))}  # fmt: skip
-    acts = acting(
-        hours, **many, penalty=np.zeros((hours, 4)), counts=(2, 2), move_wh=move_wh
-    )  # fmt: skip
+    many = {key: random.uniform(0, top, (hours, 4)) for key, top in (("sun", 2500.0), ("daylight", 800.0))}
+    acts = acting(hours, **many, penalty=np.zeros((hours, 4)), counts=(2, 2), move_wh=move_wh)
     plan = predicted_year(zone, acts, ahead=hours, start_c=21.0)
-    assert (
-        plan.states != predicted_year(zone, replace(acts, move_wh=0.0), ahead=hours).states
-    ).any()
+    assert (plan.states != predicted_year(zone, replace(acts, move_wh=0.0), ahead=hours).states).any()
 
     def whole(states) -> float:
         groups = np.array([[0, 0], *((s // 2, s % 2) for s in states)])
-        return cost_of(zone, acts, states, 21.0) + move_wh * np.count_nonzero(
-            np.diff(groups, axis=0)
-        )
+        return cost_of(zone, acts, states, 21.0) + move_wh * np.count_nonzero(np.diff(groups, axis=0))
 
     least = min(map(whole, product(range(4), repeat=hours)))
     assert whole(plan.states.tolist()) <= 1.001 * least
@@ -183,18 +192,15 @@ def test_the_reduced_model_of_a_zone() -> None:
     floor = OpaqueSurface("floor", 20.0, (concrete,), np.array([0.0, 0.0, -1.0]), "adiabatic")
     hours = 24
     weather = Climate(
-        np.zeros(hours), np.zeros(hours), np.zeros(hours), np.zeros(hours), np.zeros(hours),
-        np.full(hours, 1e5),
-    )  # fmt: skip
+        np.zeros(hours), np.zeros(hours), np.zeros(hours), np.zeros(hours), np.zeros(hours), np.full(hours, 1e5)
+    )
     zone = Zone("z", 60.0, (wall, floor), infiltration_ach=0.6, bridges=2.0)
     facade = np.zeros((hours, 2))
     facade[12, 0] = 500.0
     reduced = reduced_zone(zone, weather, facade, np.zeros((1, 0), dtype=np.int64))
     kappa = np.array([0.02 * 1200e3, 0.1 * 2400e3])
     assert reduced.mass == pytest.approx(12 * kappa[0] + 20 * kappa[1])
-    assert reduced.mass_area == pytest.approx(
-        reduced.mass**2 / (12 * kappa[0] ** 2 + 20 * kappa[1] ** 2)
-    )
+    assert reduced.mass_area == pytest.approx(reduced.mass**2 / (12 * kappa[0] ** 2 + 20 * kappa[1] ** 2))
     assert reduced.opaque == pytest.approx(12 / (0.13 + 0.04 + 0.04 + 2.5 + 0.1))
     assert reduced.air[0] == pytest.approx(60 * 0.6 / 3600 * 1200)
     assert reduced.windows.tolist() == [2.0]
@@ -203,17 +209,14 @@ def test_the_reduced_model_of_a_zone() -> None:
 
 def test_the_reduced_model_has_leaks_by_wind_and_temperature() -> None:
     """At 3 m in the country, outdoors 10 degC, wind 5 m/s: (270/10)^.14 (3/270)^.14 of it there."""
-    wall = OpaqueSurface("w", 12.0, (Layer(0.2, 2.0, 2400.0, 1000.0),), np.array([0.0, -1.0, 0.0]),
-                         height=3.0)  # fmt: skip
+    wall = OpaqueSurface("w", 12.0, (Layer(0.2, 2.0, 2400.0, 1000.0),), np.array([0.0, -1.0, 0.0]), height=3.0)
     cold, air = replace(climate(1, outdoor=np.full(1, 10.0)), wind_speed=np.full(1, 5.0)), 60 / 3600
     test = Leakage(stack=0.01, wind=0.02)
     for leakage, ach, expected in (
-        (Leakage((0.6, 0.03, 0.1, 0.01)), 0.5,
-         0.5 * air * (0.6 + 0.3 + 0.1 * 4.22442 + 0.01 * 4.22442**2)),
+        (Leakage((0.6, 0.03, 0.1, 0.01)), 0.5, 0.5 * air * (0.6 + 0.3 + 0.1 * 4.22442 + 0.01 * 4.22442**2)),
         (test, 0.0, np.hypot(0.01 * 10**0.5, 0.02 * 4.22442)),
-    ):  # fmt: skip
-        zone = Zone("z", 60.0, (wall,), infiltration_ach=ach, leakage=leakage,
-                    loads=IdealLoads(20.0, 26.0))  # fmt: skip
+    ):
+        zone = Zone("z", 60.0, (wall,), infiltration_ach=ach, leakage=leakage, loads=IdealLoads(20.0, 26.0))
         none = np.zeros((1, 1)), np.zeros((1, 0), dtype=np.int64)
         reduced = reduced_zone(zone, cold, *none, terrain="country")
         assert reduced.air[0] == pytest.approx(1200.0 * expected, rel=1e-4)
@@ -233,9 +236,13 @@ def test_the_reduced_model_has_the_loads_of_the_detailed_balance() -> None:
     absorbed = (solar.absorbed_outer * outer + solar.absorbed_inner * inner) @ [4.5]
     reduced = reduced_zone(zone, weather, solar.facade, np.zeros((1, 1), dtype=np.int64))
     acts = PredictedHours(
-        (solar.inside.sum(axis=1) + absorbed)[:, None], np.zeros((len(hours), 1)),
-        np.zeros(len(hours)), None, 300 * used, np.zeros((len(hours), 1)),
-    )  # fmt: skip
+        (solar.inside.sum(axis=1) + absorbed)[:, None],
+        np.zeros((len(hours), 1)),
+        np.zeros(len(hours)),
+        None,
+        300 * used,
+        np.zeros((len(hours), 1)),
+    )
     year = predicted_year(reduced, acts, ahead=1)
     assert year.heating.sum() == pytest.approx(detailed.heating.sum(), rel=0.12)
     assert year.cooling.sum() == pytest.approx(detailed.cooling.sum(), rel=0.05)

@@ -52,9 +52,7 @@ def test_view_factors_of_a_room_with_a_window(variant, room):
     np.testing.assert_allclose(exchange.sum(axis=1), 0.9 * np.array(area), rtol=1e-6)
 
 
-def test_view_factors_are_found_again_while_the_room_is_as_it_was(
-    variant, room, tmp_path, monkeypatch
-):
+def test_view_factors_are_found_again_while_the_room_is_as_it_was(variant, room, tmp_path, monkeypatch):
     from mitsuba_cfs.matrices.cache import MatrixCache
     from scenes.heat import study as module
 
@@ -107,9 +105,7 @@ def test_felt_temperatures_follow_their_rules_and_energy_closes(variant, room):
     by_window[glass] = 1.0
     at_glass = felt(result, RadiantRoom(radiant.among, by_window), "view factors", 0, 0.1)
     np.testing.assert_allclose(at_glass.mrt_c, faces[:, glass], atol=1e-9)
-    np.testing.assert_allclose(
-        at_glass.operative_c, operative_temperature(result.air_c, faces[:, glass])
-    )
+    np.testing.assert_allclose(at_glass.operative_c, operative_temperature(result.air_c, faces[:, glass]))
     centre = felt(result, radiant, "room centre", 2, 0.1)
     np.testing.assert_allclose(centre.mrt_c, 0.5 * (faces.mean(axis=1) + faces[:, 2]))
     plain = felt(result, radiant, "area", 0, 0.1)

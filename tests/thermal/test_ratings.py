@@ -15,13 +15,7 @@ from scenes.fenestration.thermal_file import ThermalFile
 from scenes.fenestration.thermal_system import sun_in_layers
 from thermal.glazing import Gap, en410_g_value, en673_u_value, gap_conductances
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit, sheet_layer
-from thermal.ratings import (
-    REFERENCE_GLAZINGS,
-    ThermalRating,
-    _known_to_en673,
-    layered_ratings,
-    shade_ratings,
-)
+from thermal.ratings import REFERENCE_GLAZINGS, ThermalRating, _known_to_en673, layered_ratings, shade_ratings
 
 
 def rated(tau: float, g: float) -> ThermalRating:
@@ -100,9 +94,7 @@ def test_command_rates_a_state_and_writes_what_the_balance_takes(tmp_path, shade
     said = capsys.readouterr().out
     assert "ISO 52022-3, summer" in said and "ISO 15099, layer by layer" in said
     table = pd.read_csv(out[0])
-    assert list(table["method"]) == [
-        "heat balance", "NFRC", "ISO 52022-3, reference", "ISO 52022-3, summer",
-    ]  # fmt: skip
+    assert list(table["method"]) == ["heat balance", "NFRC", "ISO 52022-3, reference", "ISO 52022-3, summer"]
     np.testing.assert_allclose(table["g_tot"] - table["tau_e"], table["q_i"], atol=2e-4)
     assert cli.run([*command, "--out", str(out[1])]) == 0
     record = json.loads(out[1].read_text())
@@ -170,14 +162,17 @@ def test_command_names_a_file_that_is_missing(tmp_path, capsys):
 def test_tables_of_en_14501():
     """Annex A: U, g, tau, rho, rho' of the reference glazings; the limits of the classes."""
     printed = {
-        "A": (5.8, 0.85, 0.83, 0.08, 0.08), "B": (2.9, 0.76, 0.69, 0.14, 0.14),
-        "C": (1.2, 0.59, 0.49, 0.29, 0.27), "D": (1.1, 0.32, 0.27, 0.29, 0.38),
-    }  # fmt: skip
+        "A": (5.8, 0.85, 0.83, 0.08, 0.08),
+        "B": (2.9, 0.76, 0.69, 0.14, 0.14),
+        "C": (1.2, 0.59, 0.49, 0.29, 0.27),
+        "D": (1.1, 0.32, 0.27, 0.29, 0.38),
+    }
     assert {name: astuple(glazing) for name, glazing in REFERENCE_GLAZINGS.items()} == printed
     for of, limits in (
-        ("g", (0.5, 0.35, 0.15, 0.1)), ("secondary", (0.3, 0.2, 0.1, 0.03)),
+        ("g", (0.5, 0.35, 0.15, 0.1)),
+        ("secondary", (0.3, 0.2, 0.1, 0.03)),
         ("tau", (0.2, 0.15, 0.1, 0.05)),
-    ):  # fmt: skip
+    ):
         for number, limit in enumerate(limits):
             for value, expected in ((limit + 1e-9, number), (limit - 1e-9, number + 1)):
                 tau = value if of == "tau" else 0.0
@@ -186,8 +181,10 @@ def test_tables_of_en_14501():
 
 def test_european_rating_by_the_formulas():
     """EN 673's U with 1 W/(m K) glass, EN 410's q_i over half panes and the gap; by tilt."""
-    panes = (GlazingLayer(0.006, 1.0, (0.837, 0.837), solar=(0.8, 0.07, 0.07)),
-             GlazingLayer(0.008, 0.9, (0.1, 0.837), solar=(0.6, 0.2, 0.2)))  # fmt: skip
+    panes = (
+        GlazingLayer(0.006, 1.0, (0.837, 0.837), solar=(0.8, 0.07, 0.07)),
+        GlazingLayer(0.008, 0.9, (0.1, 0.837), solar=(0.6, 0.2, 0.2)),
+    )
     gap = GasGap(0.016, (("argon", 0.9), ("air", 0.1)))
     found = {}
     for tilt, position in ((90.0, "vertical"), (60.0, "tilted"), (15.0, "horizontal")):
@@ -231,9 +228,7 @@ def test_european_rating_of_three_panes_by_the_formulas():
     alpha = [0.1, 0.08, 0.06]
     rating = layered_ratings(GlazingUnit(panes, gaps), 0.5, alpha)[-1]
     own = [Gap(0.012, gap.gas, (0.837, 0.837)) for gap in gaps]
-    expected = en673_u_value(
-        thicknesses, own, position="vertical", emissivity_in=0.2, conductivity=1.0
-    )
+    expected = en673_u_value(thicknesses, own, position="vertical", emissivity_in=0.2, conductivity=1.0)
     assert rating.u_value == pytest.approx(expected)
     solid = np.array(thicknesses)
     between = 1 / gap_conductances(own, "vertical") + (solid[:-1] + solid[1:]) / 2

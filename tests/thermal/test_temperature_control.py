@@ -10,15 +10,7 @@ import pytest
 from tests.thermal.rooms import box, climate, sun
 from thermal.balance import BalanceOptions, simulate, simulate_zones
 from thermal.blackbox import Fenestration
-from thermal.control import (
-    RoomCondition,
-    TemperatureControl,
-    WaitingRule,
-    by_threshold,
-    delayed,
-    held,
-    switched,
-)
+from thermal.control import RoomCondition, TemperatureControl, WaitingRule, by_threshold, delayed, held, switched
 from thermal.emitters import IdealLoads
 from thermal.errors import ThermalInputError
 from thermal.ventilation import SupplyAir, WindowAiring
@@ -33,9 +25,7 @@ SHUT = Fenestration("shut", 0.8, emissivity_in=0.3)
 def shaded_room():
     """A room with two states of its window, and the sun in each."""
     room = box(window=Fenestration("open", 1.2), infiltration_ach=1.0)
-    room = replace(
-        room, windows=(replace(room.windows[0], states=(*room.windows[0].states, SHUT)),)
-    )
+    room = replace(room, windows=(replace(room.windows[0], states=(*room.windows[0].states, SHUT)),))
     day = replace(sun(HOURS, room), state=np.zeros((HOURS, 1), np.int64))
     shade = replace(sun(HOURS, room, strength=0.2), state=np.ones((HOURS, 1), np.int64))
     return room, day, shade
@@ -148,9 +138,12 @@ def aired(**changes):
     """A week of a room with gains by day, a fan and opened windows."""
     by_day = np.tile(np.repeat([0.0, 1500.0, 0.0], [8, 10, 6]), HOURS // 24)
     room = box(
-        gains=Gains(by_day), supply=SupplyAir(2.0, recovery=0.8), loads=IdealLoads(20.0, 26.0),
-        airing=WINDOWS, infiltration_ach=0.0,
-    )  # fmt: skip
+        gains=Gains(by_day),
+        supply=SupplyAir(2.0, recovery=0.8),
+        loads=IdealLoads(20.0, 26.0),
+        airing=WINDOWS,
+        infiltration_ach=0.0,
+    )
     room = replace(room, **changes)
     weather = climate(HOURS, outdoor=OUTDOOR + changes.pop("warmer", 0.0))
     result = simulate(room, weather, sun(HOURS, room), step_s=3600.0)
@@ -174,15 +167,12 @@ def test_windows_by_operative_temperature():
     """Where they are open in part the operative temperature is the limit, within the tolerance of
     the iterates."""
     by_air, by_operative = (
-        aired(airing=replace(WINDOWS, operative=operative), loads=IdealLoads(20.0))
-        for operative in (False, True)
+        aired(airing=replace(WINDOWS, operative=operative), loads=IdealLoads(20.0)) for operative in (False, True)
     )
     held = [
         np.isclose(values, 22.0, atol=tolerance).sum()
-        for values, tolerance in (
-            (by_air.air_c, 1e-6), (by_air.operative_c, 0.02), (by_operative.operative_c, 0.02)
-        )
-    ]  # fmt: skip
+        for values, tolerance in ((by_air.air_c, 1e-6), (by_air.operative_c, 0.02), (by_operative.operative_c, 0.02))
+    ]
     assert held[0] > 5 and held[2] > 5 and held[1] < 5
     opened = by_operative.outdoor_air - by_operative.fan_air > 1e-9
     assert by_operative.operative_c[opened].min() > 22.0 - 0.02

@@ -60,14 +60,17 @@ V = WIND * local_wind_factor(1.5, "suburbs")  # no face outdoors: the height of 
     [
         (Leakage(), VOLUME / 3600.0),
         (Leakage(DOE2), VOLUME / 3600.0 * 0.224 * V),
-        (Leakage((0.606, 0.03636, 0.1177, 0.01)),
-         VOLUME / 3600 * (0.606 + 0.03636 * 18 + 0.1177 * V + 0.01 * V**2)),
-        (replace(sherman_grimsrud(500.0, stack=0.000145, wind=0.000174), factors=(0, 0, 0, 0)),
-         0.5 * np.sqrt(0.000145 * 18 + 0.000174 * V**2)),
-        (replace(aim2(0.05, 0.67, stack=0.054, wind=0.156, shelter=0.5), factors=(0, 0, 0, 0)),
-         0.05 * np.hypot(0.054 * 18**0.67, 0.156 * (0.5 * V) ** 1.34)),
+        (Leakage((0.606, 0.03636, 0.1177, 0.01)), VOLUME / 3600 * (0.606 + 0.03636 * 18 + 0.1177 * V + 0.01 * V**2)),
+        (
+            replace(sherman_grimsrud(500.0, stack=0.000145, wind=0.000174), factors=(0, 0, 0, 0)),
+            0.5 * np.sqrt(0.000145 * 18 + 0.000174 * V**2),
+        ),
+        (
+            replace(aim2(0.05, 0.67, stack=0.054, wind=0.156, shelter=0.5), factors=(0, 0, 0, 0)),
+            0.05 * np.hypot(0.054 * 18**0.67, 0.156 * (0.5 * V) ** 1.34),
+        ),
     ],
-)  # fmt: skip
+)
 def test_leaks_by_their_formulas(leakage, flow):
     zone = sealed(loads=KEPT, infiltration_ach=1.0, leakage=leakage)
     assert load(zone) == pytest.approx(HEAT * flow * 18.0, rel=1e-9)
@@ -192,16 +195,12 @@ def test_windows_flow_as_en_16798_7_says():
 
 def test_windows_open_and_close_by_temperature_wind_and_outdoors():
     hours = 48
-    room = sealed(gains=Gains(400.0, 0.0), airing=WindowAiring(
-        0.01, 0.01, open_above_c=24.0, close_below_c=22.0))  # fmt: skip
+    room = sealed(gains=Gains(400.0, 0.0), airing=WindowAiring(0.01, 0.01, open_above_c=24.0, close_below_c=22.0))
     result = simulate(room, climate(hours, outdoor=10.0), no_sun(hours, 2, 0), step_s=60.0)
     assert 22.0 - 1.0 < result.air_c.min() and result.air_c.max() < 24.0 + 1.0
     assert (result.outdoor_air > 0).any()
     still = BalanceOptions(warm_days=0, start_c=26.0)
-    for shut in (
-        {"greatest_wind": 1.0}, {"least_outdoor_c": 12.0}, {"least_difference": 500.0},
-        {"share": 0.0},
-    ):  # fmt: skip
+    for shut in ({"greatest_wind": 1.0}, {"least_outdoor_c": 12.0}, {"least_difference": 500.0}, {"share": 0.0}):
         zone = replace(room, airing=replace(room.airing, **shut))
         closed = simulate(zone, climate(hours, outdoor=10.0), no_sun(hours, 2, 0), options=still)
         assert (closed.outdoor_air == 0.0).all()
@@ -275,10 +274,8 @@ def test_cross_flow_is_between_facades():
         (lambda n: aim2(1.0, n, stack=1.0, wind=1.0), (0.49, 1.01), (0.5, 1.0)),
         (lambda share: SupplyAir(1.0, recovery=share), (-0.01, 1.01), (0.0, 1.0)),
         (SupplyAir, (-0.01, np.array([1.0, -1.0])), (0.0, np.zeros(2))),
-        (lambda share: WindowAiring(1.0, 1.0, share=share), (-0.01, 1.01, np.array([0.0, 2.0])),
-         (0.0, 1.0)),
-        (lambda c: WindowAiring(1.0, 1.0, open_above_c=22.0, close_below_c=c), (22.1,),
-         (22.0, 20.0)),
+        (lambda share: WindowAiring(1.0, 1.0, share=share), (-0.01, 1.01, np.array([0.0, 2.0])), (0.0, 1.0)),
+        (lambda c: WindowAiring(1.0, 1.0, open_above_c=22.0, close_below_c=c), (22.1,), (22.0, 20.0)),
         (lambda flow: AirTransfer("a", "b", flow), (-0.01, np.array([1.0, -1.0])), (0.0,)),
         (lambda name: AirTransfer("a", name, 1.0), ("a",), ("b",)),
         (lambda flow: NeighbourAir(20.0, flow=flow), (-0.01, np.array([1.0, -1.0])), (0.0,)),
@@ -286,7 +283,7 @@ def test_cross_flow_is_between_facades():
         (lambda share: NeighbourAir(20.0, share=share), (-0.01, np.array([0.5, -1.0])), (0.0,)),
         (lambda a: Leakage((1.0, 0.0, 0.0, a)), (-0.01,), (0.0,)),
     ],
-)  # fmt: skip
+)
 def test_limits_of_air_are_allowed_and_what_lies_beyond_is_refused(make, wrong, right):
     for value in right:
         make(value)
@@ -311,16 +308,18 @@ def test_one_way_air_from_room_to_room():
     second = sealed("b", loads=IdealLoads(23.0, 23.0))
     dark = [no_sun(24, 2, 0)] * 2
     a, b = simulate_zones(
-        [first, second], climate(24, outdoor=OUT), dark,
-        transfers=[AirTransfer("a", "b", flow)], options=OPTIONS,
-    )  # fmt: skip
+        [first, second], climate(24, outdoor=OUT), dark, transfers=[AirTransfer("a", "b", flow)], options=OPTIONS
+    )
     np.testing.assert_allclose(a.heating, HEAT * flow * 18.0, rtol=1e-9)
     np.testing.assert_allclose(b.heating, HEAT * flow * 3.0, rtol=1e-9)
     free = replace(second, loads=IdealLoads())
     _, b = simulate_zones(
-        [first, free], climate(24, outdoor=OUT), dark,
-        transfers=[AirTransfer("a", "b", np.full(24, flow))], options=OPTIONS,
-    )  # fmt: skip
+        [first, free],
+        climate(24, outdoor=OUT),
+        dark,
+        transfers=[AirTransfer("a", "b", np.full(24, flow))],
+        options=OPTIONS,
+    )
     np.testing.assert_allclose(b.air_c, 20.0, atol=1e-6)
 
 
@@ -335,15 +334,13 @@ def test_radiant_share_of_an_ideal_plant():
         result = simulate(room, climate(hours, outdoor=outdoor), sun(hours, room, strength=0.2))
         held = result.heating > 1.0
         assert held.any()
-        np.testing.assert_allclose(result.air_c[held & np.roll(held, 1) & np.roll(held, -1)], 20.0,
-                                   atol=1e-6)  # fmt: skip
+        np.testing.assert_allclose(result.air_c[held & np.roll(held, 1) & np.roll(held, -1)], 20.0, atol=1e-6)
         assert np.abs(result.residual).max() < 1e-6 * np.abs(result.heating).max()
         warmer = result.mrt_c[held].mean()
         assert warmer > before
         before = warmer
     tight = replace(loads, heating_limit=50.0)
-    weak = simulate(replace(room, loads=tight), climate(hours, outdoor=outdoor),
-                    sun(hours, room, strength=0.2))  # fmt: skip
+    weak = simulate(replace(room, loads=tight), climate(hours, outdoor=outdoor), sun(hours, room, strength=0.2))
     assert weak.heating.max() == pytest.approx(50.0)
     assert weak.air_c.min() < 20.0
 

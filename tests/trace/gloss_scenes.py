@@ -79,9 +79,7 @@ def one_hour(sky, sun, illuminance: float):
     patch = int(reinhart.index(sun[None])[0])
     alone = np.zeros_like(sky)
     alone[patch] = illuminance / reinhart.solid_angles[patch]
-    return cfs.AnnualSky(
-        sky + alone, sun[None], np.array([illuminance]), np.array([12]), 8760, sun=alone
-    )
+    return cfs.AnnualSky(sky + alone, sun[None], np.array([illuminance]), np.array([12]), 8760, sun=alone)
 
 
 def normal_illuminance(picture, view) -> float:

@@ -90,8 +90,7 @@ def daylight(name: str, folder: Path) -> Repeated:
         # rfluxmtx's rays start with the same random numbers in each run: only another count of
         # them, and so another division of the patch, makes a repetition
         runs = [
-            f"rfluxmtx -ff -n 2 -ab 4 -ad 1 -lw 1e-6 -c {RAYS + 41 * i} "
-            f"group{g}.rad sky.rad outdoors.rad"
+            f"rfluxmtx -ff -n 2 -ab 4 -ad 1 -lw 1e-6 -c {RAYS + 41 * i} group{g}.rad sky.rad outdoors.rad"
             for i in range(RUNS)
         ]
         runs = [radiance.read_float_matrix(radiance.run(command, folder)) for command in runs]

@@ -78,9 +78,7 @@ def l_shaped_room() -> tuple[Surfaces, list[WindowGroup], Surfaces]:
             strips = [(0, length, 0, z0), (0, length, z1, h), (0, s0, z0, z1), (s1, length, z0, z1)]
         for a, b, c, d in strips:
             places = [(a, c), (b, c), (b, d), (a, d)]
-            parts.append(
-                (quad(*(origin + along * (s / length) + [0, 0, z] for s, z in places)), 0.5)
-            )
+            parts.append((quad(*(origin + along * (s / length) + [0, 0, z] for s, z in places)), 0.5))
     for z, r in ((0.0, 0.2), (h, 0.7)):
         parts.append((quad((0, 0, z), (4, 0, z), (4, 6, z), (0, 6, z)), r))
         parts.append((quad((4, 3, z), (7, 3, z), (7, 6, z), (4, 6, z)), r))

@@ -80,10 +80,7 @@ def test_matrices_are_those_of_radiance(matrix, name):
 @pytest.mark.parametrize("matrix", MATRICES)
 def test_matrices_are_those_of_radiance_run_here_and_now(matrix, name, tmp_path):
     pytest.importorskip("pyradiance")
-    theirs, stored = (
-        MATRICES[matrix](name, tmp_path),
-        Repeated.read(STORED / f"{matrix}_{name}.npz"),
-    )
+    theirs, stored = (MATRICES[matrix](name, tmp_path), Repeated.read(STORED / f"{matrix}_{name}.npz"))
     check(ours(matrix, name), theirs, f"{matrix}, {name}")
     # what is stored is what Radiance computes: both have the noise of their runs
     error = np.hypot(theirs.sum_deviation, stored.sum_deviation) / np.sqrt(theirs.runs)

@@ -22,10 +22,7 @@ def test_a_direction_that_is_none_is_looked_up_inside_the_tables():
     from mitsuba_cfs.trace.kernels.scattering import AngularBeam
 
     odd = [np.nan, np.inf, -np.inf, 0.6, -0.8]
-    x, y, z = (
-        mi.Float(np.array(axis, dtype=np.float32))
-        for axis in zip(*product(odd, repeat=3), strict=True)
-    )
+    x, y, z = (mi.Float(np.array(axis, dtype=np.float32)) for axis in zip(*product(odd, repeat=3), strict=True))
     direction, sky, bins = mi.Vector3f(x, y, z), SkyBins(ReinhartSky(4)), DirectionBins(KLEMS_FULL)
     assert cell(x, 7).numpy().max() <= 7
     assert sky.index(direction).numpy().max() < sky.size

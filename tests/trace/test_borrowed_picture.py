@@ -23,9 +23,7 @@ from tests.validation.inner_glass import GLASS, INNER_TAU, TAU, WINDOW, walls_at
 
 pytestmark = pytest.mark.usefixtures("variant")
 
-FEW = Sampling(
-    sensor_samples=256, patch_samples=512, view_samples=4, outdoor_samples=4, subdivision=1
-)
+FEW = Sampling(sensor_samples=256, patch_samples=512, view_samples=4, outdoor_samples=4, subdivision=1)
 # [cd/m2] mean over the glass by `path`, 4,096 rays of each pixel, standard error 0.1 %:
 # `test_the_glass_shows_what_paths_show`
 BY_PATH = 320.7
@@ -68,9 +66,7 @@ def _within(view: View, rooms: int) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize(("rooms", "five_phase"), [(2, False), (3, True)])
-def test_black_rooms_show_the_sky_in_the_window_beyond_and_nothing_else(
-    rooms: int, *, five_phase: bool
-) -> None:
+def test_black_rooms_show_the_sky_in_the_window_beyond_and_nothing_else(rooms: int, *, five_phase: bool) -> None:
     """Even sky, black ground: the panes' transmittances above the horizon in the window, else 0."""
     even = inner_glass.overcast()
     even = replace(even, whole=np.where(np.arange(len(even.whole))[:, None] > 0, 1000.0, 0.0))

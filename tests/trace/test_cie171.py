@@ -47,8 +47,9 @@ def test_past_the_wall_the_reports_figures_are_those_of_the_quadrature(reference
     for name, parameter, kind, values in reported(reference_data / "cie171/sky_component.tsv"):
         if name == WALL and kind in (5, 8, 16):
             free = slice(3, 8) if parameter == 3.0 else slice(6, 8)
-            found = replace(known[parameter], points=known[parameter].points[free],
-                            normals=known[parameter].normals[free]).quadrature(kind)  # fmt: skip
+            found = replace(
+                known[parameter], points=known[parameter].points[free], normals=known[parameter].normals[free]
+            ).quadrature(kind)
             assert found == pytest.approx(values[free], rel=0.005, abs=0.005), (parameter, kind)
             compared += len(found)
     assert compared == 27

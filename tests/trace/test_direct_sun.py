@@ -25,9 +25,7 @@ def matrix(scattering, exterior=rooms.NOTHING, suns=SUNS, points=POINTS, **optio
 
     room, groups = rooms.test_room()
     normals = np.tile(UP, (len(points), 1))
-    return direct_sun_matrix(
-        room, exterior, groups, [scattering], points, normals, suns=suns, **options
-    )
+    return direct_sun_matrix(room, exterior, groups, [scattering], points, normals, suns=suns, **options)
 
 
 def diffuser(tau: float):
@@ -73,10 +71,7 @@ def test_sun_through_glass_lights_the_sensors_in_its_beam():
     from mitsuba_cfs.trace.sun.direct import SUN_SOLID_ANGLE
 
     found = matrix(glass(0.8)).values / SUN_SOLID_ANGLE
-    foot = (
-        POINTS[:, None]
-        - SUNS[None] * (POINTS[:, 1, None] / np.minimum(SUNS[:, 1], -1e-9))[..., None]
-    )
+    foot = POINTS[:, None] - SUNS[None] * (POINTS[:, 1, None] / np.minimum(SUNS[:, 1], -1e-9))[..., None]
     across = (foot[..., 0] > rooms.X0) & (foot[..., 0] < rooms.X1)
     within = across & (foot[..., 2] > rooms.Z0) & (foot[..., 2] < rooms.Z1) & (SUNS[:, 1] < 0)
     assert within.any() and not within.all()
@@ -97,9 +92,7 @@ def test_a_half_hidden_disc_gives_its_visible_part(share):
     t = np.linspace(0, np.pi, 20001)
     chord = np.cos(np.interp(np.pi * share, t - np.sin(t) * np.cos(t), t))
     edge = x + chord * SUN_RADIUS * far * np.sqrt(1.25)
-    cover = rooms.surfaces(
-        [(rooms.quad((-90, -far, 0), (edge, -far, 0), (edge, -far, 200), (-90, -far, 200)), 0.0)]
-    )
+    cover = rooms.surfaces([(rooms.quad((-90, -far, 0), (edge, -far, 0), (edge, -far, 200), (-90, -far, 200)), 0.0)])
     point = np.array([[x, 1e-3, 1.8]])
     found = matrix(glass(1.0), cover, sun[None], point, stopping=Stopping(batches=64))
     value = found.values[0, 0] / SUN_SOLID_ANGLE / sun[2]
@@ -180,9 +173,7 @@ def test_five_phase_of_clear_glass_is_never_negative_and_has_the_exact_sun():
     matrices = {}
     for depth in (32, 1):
         view = view_matrix(room, groups, POINTS, NORMALS, samples=1024, max_depth=depth, seed=3)
-        daylight = daylight_matrix(
-            rooms.NOTHING, groups, subdivision=1, samples=256, max_depth=depth, seed=3
-        )
+        daylight = daylight_matrix(rooms.NOTHING, groups, subdivision=1, samples=256, max_depth=depth, seed=3)
         matrices[depth] = (view.values, daylight.values)
     view, view_direct = matrices[32][0], matrices[1][0]
     assert np.all(view - view_direct >= -1e-9 * view)  # the direct part is a part, entry by entry

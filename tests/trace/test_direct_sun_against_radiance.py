@@ -76,9 +76,15 @@ def test_scattered_sun(name, tmp_path):
     suns /= np.linalg.norm(suns, axis=1)[:, None]
     scattering = KlemsScattering(KLEMS_FULL, system.transmission_front, np.zeros(KLEMS_FULL.size))
     ours = direct_sun_matrix(
-        surfaces, outside, groups, [scattering] * len(groups), POINTS,
-        np.tile([0, 0, 1.0], (3, 1)), suns=suns, window_points=4096,
-    )  # fmt: skip
+        surfaces,
+        outside,
+        groups,
+        [scattering] * len(groups),
+        POINTS,
+        np.tile([0, 0, 1.0], (3, 1)),
+        suns=suns,
+        window_points=4096,
+    )
     theirs = np.stack([radiance_illuminance(name, sun, tmp_path) for sun in suns], axis=2)
     mean, error = theirs.mean(axis=0), theirs.std(axis=0, ddof=1) / np.sqrt(RUNS)
     found, noise = ours.values * 1e6, ours.standard_error * 1e6

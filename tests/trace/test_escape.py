@@ -65,9 +65,7 @@ def test_windows_hole_and_what_is_absorbed_make_all():
     room, groups = without("north")
     white = Surfaces(room.triangles, np.ones(len(room.triangles)), room.surface)
     found = escaped_view(white, groups, POINTS, NORMALS, samples=4096, max_depth=400)
-    view = view_matrix(
-        white, groups, POINTS, NORMALS, samples=4096, max_depth=400, stopping=Stopping(batches=8)
-    )
+    view = view_matrix(white, groups, POINTS, NORMALS, samples=4096, max_depth=400, stopping=Stopping(batches=8))
     whole = view.values.sum(axis=(1, 2)) / np.pi + found.share
     error = np.hypot(view.sum_error[:, 0] / np.pi, found.error)
     assert np.all(np.abs(whole - 1) < 5 * error + 1e-3), whole  # 1e-3: the walls' last bounce

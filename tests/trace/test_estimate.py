@@ -21,9 +21,7 @@ def test_entries_that_go_together_do_so_in_a_weighted_sum(common: float, weighti
     runs = [estimate(seed, common) for seed in range(300)]
     spread = np.std([run.values @ weights for run in runs])
     stated = np.sqrt(np.mean([run.error_of(weights) ** 2 for run in runs]))
-    assert stated == pytest.approx(
-        spread, rel=0.12 if weighting == "smooth" or not common else 0.25
-    )
+    assert stated == pytest.approx(spread, rel=0.12 if weighting == "smooth" or not common else 0.25)
     np.testing.assert_allclose(runs[0].error_of(np.ones(HOURS)), runs[0].sum_error)
 
 

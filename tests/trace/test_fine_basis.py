@@ -41,9 +41,7 @@ def test_the_sun_through_glass_is_nearer_the_two_phase_matrix_on_a_fine_basis(va
 
     def error(basis: KlemsBasis) -> float:
         view = view_matrix(room, groups, points, up, basis=basis, samples=1024)
-        daylight = daylight_matrix(
-            rooms.NOTHING, groups, basis=basis, subdivision=2, samples=4096 * 145 // basis.size
-        )
+        daylight = daylight_matrix(rooms.NOTHING, groups, basis=basis, subdivision=2, samples=4096 * 145 // basis.size)
         found = phases.three_phase(view.values, [np.eye(basis.size)], daylight.values, sky)
         return float(np.sqrt(np.mean((found - exact.values @ sky) ** 2)))
 

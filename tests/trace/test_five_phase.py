@@ -10,11 +10,7 @@ import pytest
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.evaluate import held_beams
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.methods.coefficients import (
-    GroupCoefficients,
-    direct_transmittance,
-    group_coefficients,
-)
+from mitsuba_cfs.methods.coefficients import GroupCoefficients, direct_transmittance, group_coefficients
 from mitsuba_cfs.methods.light import daylight_coefficients, illuminance, illuminance_with_error
 from mitsuba_cfs.methods.phase_light import SensorLight, over_hours, phase_light
 from mitsuba_cfs.methods.phase_matrices import phase_matrices
@@ -23,17 +19,7 @@ from mitsuba_cfs.methods.reflected_sun import reflected_sun, reflected_to_sensor
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-from tests.trace.phase_rooms import (
-    OMEGA,
-    POINTS,
-    K,
-    diffuser,
-    glass,
-    glass_transmittance,
-    lit,
-    sun_series,
-    traced,
-)
+from tests.trace.phase_rooms import OMEGA, POINTS, K, diffuser, glass, glass_transmittance, lit, sun_series, traced
 
 from . import rooms
 
@@ -89,9 +75,16 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     found = lit(matrices, [[one] for one in chosen], sky)
     t, ways = [c.transmission for c in chosen], [c.scattering for c in chosen]
     exact = direct_sun_matrix(
-        scene.interior, scene.exterior, scene.groups, ways, scene.points, scene.normals,
-        suns=sky.direction, window_points=256, stopping=Stopping(batches=4),
-    )  # fmt: skip
+        scene.interior,
+        scene.exterior,
+        scene.groups,
+        ways,
+        scene.points,
+        scene.normals,
+        suns=sky.direction,
+        window_points=256,
+        stopping=Stopping(batches=4),
+    )
     view, direct_view = matrices.sensors.values, matrices.direct_sensors
     expected = phases.three_phase(view, t, matrices.daylight.values, sky.whole)
     expected -= phases.three_phase(direct_view, t, matrices.direct_daylight, sky.sun)
@@ -103,9 +96,7 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     groups = [one for (one,) in group_coefficients(matrices, [[one] for one in chosen])]
     sun = reflected_sun(matrices, sky)
     expected -= np.einsum("sgk,gkh->sh", view - direct_view, by_patch)
-    for added, _, _ in reflected_to_sensors(
-        matrices, sun, sunlit_room(matrices, sun), list(enumerate(groups))
-    ):
+    for added, _, _ in reflected_to_sensors(matrices, sun, sunlit_room(matrices, sun), list(enumerate(groups))):
         expected += added
     whole, direct = groups[0].straight.values.values, groups[0].straight.direct
     lost = direct_view[:, 0] * groups[0].beam
@@ -174,9 +165,15 @@ def test_the_suns_light_by_group_adds_up_to_that_of_the_room(corner):
     assert each.values.shape == (2, 3, 3) and np.all(each.values.max(axis=(1, 2)) > 0)
     assert each.values.sum(axis=0) == pytest.approx(both.values, rel=1e-5)
     alone = direct_sun_matrix(
-        scene.interior, scene.exterior, scene.groups, [ways[0], None], scene.points,
-        scene.normals, suns=sky.direction, stopping=Stopping(batches=4),
-    )  # fmt: skip
+        scene.interior,
+        scene.exterior,
+        scene.groups,
+        [ways[0], None],
+        scene.points,
+        scene.normals,
+        suns=sky.direction,
+        stopping=Stopping(batches=4),
+    )
     assert each.values[0] == pytest.approx(alone.values, rel=1e-6)
 
 
@@ -220,9 +217,7 @@ def test_windows_reflect_the_light_of_the_room_as_paths_have_it(kind):
     sky = ReinhartSky(1)
     whole = np.full((sky.size, 1), 3000.0)
     whole[0] = 600.0
-    hours = AnnualSky(
-        whole, np.array([[0, -0.8, 0.6]]), np.zeros(1), np.arange(1), 1, np.zeros_like(whole)
-    )
+    hours = AnnualSky(whole, np.array([[0, -0.8, 0.6]]), np.zeros(1), np.arange(1), 1, np.zeros_like(whole))
     few = Sampling(sensor_samples=65_536, patch_samples=8_192, hour_samples=262_144, subdivision=1)
     found = {}
     for back in (0.0, 0.4):

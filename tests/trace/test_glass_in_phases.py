@@ -8,17 +8,7 @@ import pytest
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-from tests.trace.phase_rooms import (
-    OMEGA,
-    POINTS,
-    UP,
-    K,
-    glass,
-    glass_transmittance,
-    lit,
-    sun_series,
-    traced,
-)
+from tests.trace.phase_rooms import OMEGA, POINTS, UP, K, glass, glass_transmittance, lit, sun_series, traced
 
 from . import rooms
 
@@ -29,9 +19,7 @@ def between_the_rings(cosine):
     """What the glass's file says at an angle of incidence."""
     theta, _ = KLEMS_FULL.centres()
     rings = np.append(theta[KLEMS_FULL.ring_starts], np.pi / 2)
-    return np.interp(
-        np.arccos(cosine), rings, np.append(glass_transmittance(np.cos(rings[:-1])), 0)
-    )
+    return np.interp(np.arccos(cosine), rings, np.append(glass_transmittance(np.cos(rings[:-1])), 0))
 
 
 def suns_at(places, diffuse: float = 0.0):
@@ -39,8 +27,7 @@ def suns_at(places, diffuse: float = 0.0):
     sky = ReinhartSky(4)
     cosine = sky.directions @ [0, -1, 0]
     patches = [
-        int(np.argmin(np.hypot(cosine - np.cos(np.radians(angle)), sky.directions[:, 2] - z)))
-        for angle, z in places
+        int(np.argmin(np.hypot(cosine - np.cos(np.radians(angle)), sky.directions[:, 2] - z))) for angle, z in places
     ]
     return sky, sun_series(sky, patches, diffuse)
 
@@ -66,9 +53,7 @@ def test_the_beam_between_patches_is_linear_in_angle_and_that_of_the_patch_at_it
     turn = 2 * np.pi * place / 24
     rings = [0.25 * values[s + 1] + 0.75 * values[s + 2] for s in starts]
     assert KLEMS_FULL.phi_counts[4:6] == counts
-    assert at(np.radians([45.0]), np.array([turn])).numpy() == pytest.approx(
-        [np.mean(rings)], abs=2e-5
-    )
+    assert at(np.radians([45.0]), np.array([turn])).numpy() == pytest.approx([np.mean(rings)], abs=2e-5)
     last = values[KLEMS_FULL.ring_starts[8]]
     assert at(np.radians([86.25]), np.zeros(1)).numpy() == pytest.approx([last / 2], abs=2e-5)
     # just before the first patch of a ring its neighbour is the last
@@ -102,9 +87,7 @@ def test_five_phases_of_clear_glass_have_the_suns_own_transmittance_all_through(
     found = lit(matrices, [[glass()]], sun)
     at_sun = between_the_rings(sun.direction @ [0, -1, 0])
     for h, tau in enumerate(at_sun):
-        even = MatrixOptics(
-            tau * np.eye(K), KlemsScattering(KLEMS_FULL, np.zeros((K, K)), np.full(K, tau))
-        )
+        even = MatrixOptics(tau * np.eye(K), KlemsScattering(KLEMS_FULL, np.zeros((K, K)), np.full(K, tau)))
         # between 82.5 and 90 degrees the even glass falls to 0, and so differs
         if wanted[h][0] < 82:
             alone = lit(matrices, [[even]], sun)[:, h]
@@ -132,15 +115,16 @@ def test_five_phases_of_clear_glass_are_never_five_per_cent_above_its_paths():
     matrices = traced(room, rooms.NOTHING, groups, POINTS, sensor_samples=262_144)
     found = lit(matrices, [[glass()]], sun)
     beam = AngularBeam(glass_transmittance(np.linspace(0, 1, 128)))
-    behind, luminance = (
-        PathTracingScene(room, rooms.NOTHING, groups, [PathOptics(None, beam)]),
-        1e5 / SUN_SOLID_ANGLE,
-    )
+    behind, luminance = (PathTracingScene(room, rooms.NOTHING, groups, [PathOptics(None, beam)]), 1e5 / SUN_SOLID_ANGLE)
     for h, direction in enumerate(sun.direction):
         paths = point_in_time(
-            behind, Sky(np.full(sky.size, diffuse), direction, luminance), POINTS, UP,
-            samples=8192, stopping=Stopping(batches=8),
-        )  # fmt: skip
+            behind,
+            Sky(np.full(sky.size, diffuse), direction, luminance),
+            POINTS,
+            UP,
+            samples=8192,
+            stopping=Stopping(batches=8),
+        )
         ratio = found[:, h].sum() / paths.values.sum()
         noise = 5 * float(np.hypot.reduce(paths.standard_error)) / paths.values.sum()
         assert 0.85 < ratio < 1.05, (h, ratio, noise)

@@ -9,18 +9,7 @@ import pytest
 
 from mitsuba_cfs.gloss import dielectric, lacquer, mirror, pane, radiance_gloss, radiance_trans
 from mitsuba_cfs.surfaces import Surfaces
-from tests.trace.gloss_scenes import (
-    NORTH,
-    POINTS,
-    SUN,
-    UP,
-    agree,
-    black_room,
-    facade,
-    lit_by,
-    lobe_irradiance,
-    traced,
-)
+from tests.trace.gloss_scenes import NORTH, POINTS, SUN, UP, agree, black_room, facade, lit_by, lobe_irradiance, traced
 
 from . import rooms
 
@@ -42,18 +31,11 @@ def test_radiances_materials_are_its_own_numbers():
     """Of `rtrace` on mirrors under a uniform glow at 0, 45, 60 and 78.5 degrees."""
     cosine = [1, 0.7071068, 0.5, 0.2]
     diffuse, plastic = radiance_gloss("plastic", (0.5, 0.5, 0.5, 0.04, 0.0))
-    assert plastic.reflectance(cosine) == pytest.approx(
-        [0.04081645, 0.05339013, 0.08956985, 0.3360040], rel=2e-3
-    )
+    assert plastic.reflectance(cosine) == pytest.approx([0.04081645, 0.05339013, 0.08956985, 0.3360040], rel=2e-3)
     assert diffuse == pytest.approx(0.5 * (1 - 0.04081645))
     _, metal = radiance_gloss("metal", (0.5, 0.5, 0.5, 0.9, 0.0))
-    assert metal.reflectance(cosine) == pytest.approx(
-        [0.4504678, 0.4576714, 0.4783994, 0.6195856], rel=1e-3
-    )
-    assert radiance_gloss("metal", (0.5, 0.5, 0.5, 0.9, 0.1)) == (
-        pytest.approx(0.05),
-        mirror(0.45, 0.1),
-    )
+    assert metal.reflectance(cosine) == pytest.approx([0.4504678, 0.4576714, 0.4783994, 0.6195856], rel=1e-3)
+    assert radiance_gloss("metal", (0.5, 0.5, 0.5, 0.9, 0.1)) == (pytest.approx(0.05), mirror(0.45, 0.1))
     assert radiance_gloss("plastic", (0.3, 0.3, 0.3, 0.0, 0.0)) == (0.3, None)
 
 
@@ -109,9 +91,8 @@ def test_a_rough_mirror_gives_off_no_more_than_it_gets(gloss):
 
     table = Surfaces(NORTH, np.zeros(2), np.zeros(2, dtype=int), (), (gloss,))
     found = sky_irradiance_matrix(
-        table, [[0.0, -9.9, 0.0]], [[0.0, -1.0, 0.0]], samples=65536,
-        stopping=Stopping(batches=2),
-    )  # fmt: skip
+        table, [[0.0, -9.9, 0.0]], [[0.0, -1.0, 0.0]], samples=65536, stopping=Stopping(batches=2)
+    )
     total = found.values.sum() / np.pi
     assert total <= 0.7
     assert total == pytest.approx(0.7 * albedo(gloss.roughness), abs=0.003)
@@ -155,9 +136,8 @@ def test_the_sun_on_a_rough_facade_is_that_on_its_lobe(alpha):
     # a sensor in the plane of the window's glass: nothing of the room is before it
     window = np.array([[1.8, 1e-3, 1.7]])
     seen = traced(
-        facade(mirror(0.6, alpha)), lit_by(dark, SUN, luminance), samples=65536,
-        points=window, normals=plane[1],
-    )  # fmt: skip
+        facade(mirror(0.6, alpha)), lit_by(dark, SUN, luminance), samples=65536, points=window, normals=plane[1]
+    )
     agree(seen, [lobe_irradiance(0.6, alpha) * luminance], least=2e-3)
 
 
@@ -181,17 +161,15 @@ def test_the_sun_by_a_glossy_floor_is_a_spot_on_the_ceiling():
     y = (1.75 + rooms.HEIGHT - 1e-3) / 2
     points = np.array([[1.8, y, rooms.HEIGHT - 1e-3], [1.8, 0.5, rooms.HEIGHT - 1e-3]])
     found = traced(
-        rooms.NOTHING, lit_by(np.zeros(146), sun, 1e9), interior=floor,
-        points=points[:1], normals=[[0.0, 0.0, -1.0]],
-    )  # fmt: skip
+        rooms.NOTHING, lit_by(np.zeros(146), sun, 1e9), interior=floor, points=points[:1], normals=[[0.0, 0.0, -1.0]]
+    )
     from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 
     expected = lacquer(0.3).reflectance(sun[2]) * 1e9 * SUN_SOLID_ANGLE * sun[2]
     assert found.values[0] == pytest.approx(expected, rel=2e-3)
     none = traced(
-        rooms.NOTHING, lit_by(np.zeros(146), sun, 1e9), interior=floor,
-        points=points[1:], normals=[[0.0, 0.0, -1.0]],
-    )  # fmt: skip
+        rooms.NOTHING, lit_by(np.zeros(146), sun, 1e9), interior=floor, points=points[1:], normals=[[0.0, 0.0, -1.0]]
+    )
     assert none.values[0] == 0
 
 
@@ -206,9 +184,7 @@ def test_a_view_matrix_sees_the_window_in_the_floor():
     point, down, up = [[1.8, 1.5, 1.0]], [[0.0, 0.0, -1.0]], [[0.0, 0.0, 1.0]]
     seen = view_matrix(floor, groups, point, down, **options)
     image = view_matrix(rooms.NOTHING, groups, [[1.8, 1.5, -1.0]], up, **options)
-    assert seen.values.sum() == pytest.approx(
-        direct_down(groups, point) + 0.5 * image.values.sum(), rel=0.01
-    )
+    assert seen.values.sum() == pytest.approx(direct_down(groups, point) + 0.5 * image.values.sum(), rel=0.01)
 
 
 def direct_down(groups, point) -> float:

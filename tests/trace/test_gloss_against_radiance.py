@@ -20,9 +20,8 @@ def test_illuminance_at_the_eye_is_that_of_rtrace(name):
 
     given, view = gloss.case(name), fisheye(gloss.EYE, gloss.DIRECTION, 50)
     found = point_in_time(
-        given.lit, given.sky, [view.position], [view.direction], samples=2**18,
-        stopping=Stopping(batches=4),
-    )  # fmt: skip
+        given.lit, given.sky, [view.position], [view.direction], samples=2**18, stopping=Stopping(batches=4)
+    )
     ev, error = RTRACE[name]
     noise = 4 * (found.standard_error[0] ** 2 + error**2) ** 0.5
     assert noise < 0.01 * ev

@@ -72,9 +72,7 @@ def test_five_phases_have_the_sun_of_a_mirror_facade():
     scene = cfs.DaylightScene(room, outdoors, groups, POINTS, UP)
     sky = np.tile(np.where(np.arange(2306) == 0, 200.0, 2000.0)[:, None], (1, 1))
     system = cfs.AngularOptics(np.ones(64))
-    traced_scene = cfs.phase_matrices(
-        scene, cfs.Sampling(patch_samples=2**14, sensor_samples=2**15)
-    )
+    traced_scene = cfs.phase_matrices(scene, cfs.Sampling(patch_samples=2**14, sensor_samples=2**15))
     annual = one_hour(sky, SUN, 50_000.0)
     found = cfs.illuminance(cfs.phase_light(traced_scene, [[system]], annual))[:, 0]
     paths = traced(outdoors, lit_by(sky[:, 0], SUN, 50_000.0 / SUN_SOLID_ANGLE), samples=2**16)
@@ -173,9 +171,7 @@ def test_the_sun_on_a_smooth_mirror_is_counted_by_its_image_alone():
     from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, reflecting_points
 
     normals = np.tile(np.float32([0, -1, 0]), (4096, 1))
-    for gloss, diffuse, expected in (
-        (mirror(0.8), 0.0, 0.0), (mirror(0.5), 0.3, 0.3), (mirror(0.6, 0.1), 0.3, 0.9),
-    ):  # fmt: skip
+    for gloss, diffuse, expected in ((mirror(0.8), 0.0, 0.0), (mirror(0.5), 0.3, 0.3), (mirror(0.6, 0.1), 0.3, 0.9)):
         outside = TracedScene(facade(gloss, diffuse), rooms.test_room()[1])
         start = SurfacePoints(np.zeros((4096, 3), np.float32), normals)
         whole = reflecting_points(outside, start, 0, 1)
@@ -266,17 +262,20 @@ def test_the_sun_in_a_mirror_is_a_glare_source_whatever_the_pixel(method):
 
     sky = given_sky(SUN[None], [800.0], [90.0], 1, day_of_year=172)
     few = Sampling(
-        patch_samples=256, sun_points=16, view_samples=1, outdoor_samples=1, picture_samples=1,
-        subdivision=1, window_parts=1,
-    )  # fmt: skip
+        patch_samples=256,
+        sun_points=16,
+        view_samples=1,
+        outdoor_samples=1,
+        picture_samples=1,
+        subdivision=1,
+        window_parts=1,
+    )
     room, groups = rooms.test_room()
     dgp = []
     for size in (40, 160):
         view = fisheye(EYE, (0.0, -1.0, 0.0), size)
         scene = DaylightScene(room, facade(mirror(0.1)), groups, POINTS[:1], UP[:1], view)
-        light = daylight(
-            scene, [[AngularOptics([0.0, 0.7, 0.7])]], sky, method=method, sampling=few
-        )
+        light = daylight(scene, [[AngularOptics([0.0, 0.7, 0.7])]], sky, method=method, sampling=few)
         [(_, rated)] = rated_pictures(light, [0])
         assert rated.dgp > 0.35  # 0.25 without the sun's image
         dgp.append(rated.dgp)

@@ -26,10 +26,7 @@ def beam_of(bsdf, theta) -> dict:
 
     local = np.stack([np.sin(theta) * 0.6, np.sin(theta) * 0.8, np.cos(theta)])
     towards = mi.Vector3f(local.astype(np.float32))
-    return {
-        "sun": sun_scattering(bsdf).through(towards).numpy(),
-        "paths": path_optics(bsdf).straight(towards).numpy(),
-    }
+    return {"sun": sun_scattering(bsdf).through(towards).numpy(), "paths": path_optics(bsdf).straight(towards).numpy()}
 
 
 @pytest.mark.parametrize("pane", PANES, ids=lambda pane: pane.name)
@@ -50,12 +47,7 @@ def test_two_panes_fall_twice():
     omega = KLEMS_FULL.projected_solid_angles()
     step = np.degrees(np.asarray(KLEMS_FULL.theta_bounds))
     fine = [np.radians(np.linspace(a, b, 400)) for a, b in pairwise(step)]
-    means = np.array(
-        [
-            np.average(pane_values(pane, t)[0] ** 2, weights=np.sin(t) * np.cos(t) + 1e-12)
-            for t in fine
-        ]
-    )
+    means = np.array([np.average(pane_values(pane, t)[0] ** 2, weights=np.sin(t) * np.cos(t) + 1e-12) for t in fine])
     block = np.diag(means[KLEMS_FULL.rings] / omega)
     nothing = np.zeros_like(one)
     two = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, block, block, nothing, nothing)

@@ -9,14 +9,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
 from tests.validation.cut_groups import surfaces
-from tests.validation.inner_glass import (
-    FIRST,
-    GLASS,
-    by_paths,
-    by_phases,
-    pooled,
-    upright,
-)
+from tests.validation.inner_glass import FIRST, GLASS, by_paths, by_phases, pooled, upright
 
 pytestmark = pytest.mark.usefixtures("variant")
 

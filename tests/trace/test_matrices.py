@@ -89,9 +89,7 @@ def test_a_wall_of_reflectance_r_before_the_window_reflects_r_times_what_it_rece
     from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 
     r = 0.6
-    wall = rooms.surfaces(
-        [(rooms.quad((-90, -8, -90), (90, -8, -90), (90, -8, 90), (-90, -8, 90)), r)]
-    )
+    wall = rooms.surfaces([(rooms.quad((-90, -8, -90), (90, -8, -90), (90, -8, 90), (-90, -8, 90)), r)])
     _, groups = rooms.test_room()
     values = daylight_matrix(wall, groups, subdivision=1, samples=2048).values[0]
     # straight ahead the window sees only the wall, which sees half a sky, half a ground, and of
@@ -109,9 +107,7 @@ def test_clear_opening_three_phase_is_the_two_phase_matrix():
     points, directions = [[1.2, 1.5, 0.85], [2.0, 3.5, 0.85]], [UP, UP]
     view = view_matrix(room, groups, points, directions, samples=32768).values[:, 0]
     daylight = daylight_matrix(rooms.NOTHING, groups, subdivision=1, samples=8192).values[0]
-    direct = sky_irradiance_matrix(
-        room, points, directions, subdivision=1, samples=131072, max_depth=40
-    )
+    direct = sky_irradiance_matrix(room, points, directions, subdivision=1, samples=131072, max_depth=40)
     three_phase = view @ daylight
     total = direct.values.sum(axis=1)
     assert three_phase.sum(axis=1) == pytest.approx(total, rel=0.004)
@@ -129,9 +125,7 @@ def test_absorbed_shares_sum_to_one_and_follow_the_reflectances():
     black = absorption_matrix(rooms.test_room(scale=0.0)[0], groups, samples=2048).values[0]
     assert black[:, -1] == pytest.approx(np.zeros(145), abs=1e-6)  # nothing comes back
     mirror = absorption_matrix(room, groups, window_reflectance=[1.0], samples=2048).values[0]
-    assert mirror[:, -1] == pytest.approx(
-        np.zeros(145), abs=1e-6
-    )  # nothing stays in a white window
+    assert mirror[:, -1] == pytest.approx(np.zeros(145), abs=1e-6)  # nothing stays in a white window
     assert mirror.sum(axis=1) == pytest.approx(np.ones(145), abs=3e-3)
     down = KLEMS_FULL.index(np.radians(50), np.radians(270))  # light from the sun goes down
     assert black[down, 0] > 0.9  # ... to the floor
@@ -165,10 +159,7 @@ def test_seed_and_batches_key_the_result():
 
     room, groups = rooms.test_room()
     options = {"samples": 256, "stopping": Stopping(batches=2)}
-    one, same, other = (
-        view_matrix(room, groups, [[1, 1, 1]], [UP], seed=seed, **options).values
-        for seed in (1, 1, 2)
-    )
+    one, same, other = (view_matrix(room, groups, [[1, 1, 1]], [UP], seed=seed, **options).values for seed in (1, 1, 2))
     np.testing.assert_allclose(one, same, rtol=1e-12)  # order of the float64 sums
     assert np.abs(one - other).max() > 1e-4
 
@@ -179,9 +170,7 @@ def test_stated_error_is_the_spread_between_seeds():
 
     room, groups = rooms.test_room()
     runs = [
-        view_matrix(
-            room, groups, [[1.5, 2.0, 0.8]], [UP], samples=512, seed=s, stopping=Stopping(batches=8)
-        )
+        view_matrix(room, groups, [[1.5, 2.0, 0.8]], [UP], samples=512, seed=s, stopping=Stopping(batches=8))
         for s in range(24)
     ]
     values = np.stack([r.values for r in runs])
@@ -198,12 +187,9 @@ def test_stated_error_of_sums_is_the_spread_between_seeds():
     room, groups = rooms.test_room()
     points = [[0.5 + 0.4 * i, 0.5 + 0.5 * j, 0.8] for i in range(8) for j in range(8)]
     runs = [
-        view_matrix(
-            room, groups, points, np.tile(UP, (64, 1)), samples=512, seed=s,
-            stopping=Stopping(batches=8),
-        )
+        view_matrix(room, groups, points, np.tile(UP, (64, 1)), samples=512, seed=s, stopping=Stopping(batches=8))
         for s in range(10)
-    ]  # fmt: skip
+    ]
     for weights in (np.ones(145), np.linspace(1, 3, 145)):
         sums = np.stack([r.values @ weights for r in runs])
         stated = np.mean([r.error_of(weights) ** 2 for r in runs])
@@ -232,12 +218,7 @@ def test_rays_that_leave_through_a_gap_bring_nothing():
 
     room, groups = rooms.test_room()
     keep = room.surface != 2  # without its back wall
-    gap = replace(
-        room,
-        triangles=room.triangles[keep],
-        reflectance=room.reflectance[keep],
-        surface=room.surface[keep],
-    )
+    gap = replace(room, triangles=room.triangles[keep], reflectance=room.reflectance[keep], surface=room.surface[keep])
     points = [[1.0, 2.0, 0.8], [2.0, 4.0, 0.8]]
     whole, less = (view_matrix(r, groups, points, [UP, UP]).values.sum() for r in (room, gap))
     assert 0.5 * whole < less < 0.98 * whole
@@ -264,8 +245,7 @@ def test_panes_before_a_screen_do_not_take_its_light():
 
     alone, both = panes_before_a_screen()
     expected, found = (
-        daylight_matrix(rooms.obstruction(), groups, subdivision=1, samples=512).part(0)
-        for groups in ([alone], both)
+        daylight_matrix(rooms.obstruction(), groups, subdivision=1, samples=512).part(0) for groups in ([alone], both)
     )
     total = expected.values.sum()
     error = np.sqrt((expected.sum_error**2).sum() + (found.sum_error**2).sum())
@@ -279,9 +259,7 @@ def test_cells_of_a_screen_have_its_light():
 
     alone, both = panes_before_a_screen()
     expected, found = (
-        cell_daylight(
-            rooms.obstruction(), groups, [window_cells(g) for g in groups], samples=4, max_depth=1
-        )[0]
+        cell_daylight(rooms.obstruction(), groups, [window_cells(g) for g in groups], samples=4, max_depth=1)[0]
         for groups in ([alone], both)
     )
     # the same rays straight to the sky
@@ -297,9 +275,7 @@ def test_a_sensor_sees_the_outdoors_through_a_screen():
     outside, eye = rooms.obstruction(), [[1.8, 2.0, 0.8]]
     clear = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.full(145, 0.5))
     expected, found = (
-        straight_view_matrix(
-            room, outside, groups, systems, eye, [UP], subdivision=1, max_depth=1
-        ).values[0]
+        straight_view_matrix(room, outside, groups, systems, eye, [UP], subdivision=1, max_depth=1).values[0]
         for groups, systems in (([alone], [clear]), (both, [clear, None]))
     )
     # the same rays straight to the sky
@@ -320,9 +296,8 @@ def test_a_sensor_at_the_glass_sees_the_outdoors_as_by_its_solid_angle(direction
     clear = AngularScattering([0.5, 0.5], [0.0, 0.0])
     systems = [clear] + [None] * (len(groups) - 1)
     found = straight_view_matrix(
-        room, Surfaces.none(), groups, systems, points, [direction] * 5,
-        subdivision=1, samples=2048, max_depth=1,
-    ).values[0]  # fmt: skip
+        room, Surfaces.none(), groups, systems, points, [direction] * 5, subdivision=1, samples=2048, max_depth=1
+    ).values[0]
     view = view_matrix(room, groups, points, [direction] * 5, samples=256, max_depth=1)
     np.testing.assert_allclose(found.sum(axis=1), 0.5 * view.values[:, 0].sum(axis=1), rtol=0.03)
 
@@ -342,8 +317,7 @@ def test_the_reveal_between_panes_and_a_screen_lights_the_screen():
     )
     alone, (screen, panes) = panes_before_a_screen(0.8)
     expected, found = (
-        daylight_matrix(reveal, groups, subdivision=1, samples=512).part(0)
-        for groups in ([alone], [screen, panes])
+        daylight_matrix(reveal, groups, subdivision=1, samples=512).part(0) for groups in ([alone], [screen, panes])
     )
     error = np.sqrt((expected.sum_error**2).sum() + (found.sum_error**2).sum())
     total = expected.values.sum()
@@ -373,9 +347,7 @@ def test_batches_of_few_paths_go_on_to_the_next_places(variant):
     corners = np.array([(-1e4, 0, 1), (1e4, 0, 1), (1e4, 1e4, 1), (-1e4, 1e4, 1)], dtype=float)
     roof = Surfaces(corners[[[0, 1, 2], [0, 2, 3]]], np.zeros(2), np.zeros(2, dtype=int))
     places = np.array([[[0, -5e3, 0], [0, 5e3, 0]]], dtype=float)  # free, and below the roof
-    found = sky_irradiance_matrix(
-        roof, places, [UP], subdivision=1, samples=1, stopping=Stopping(batches=32)
-    )
+    found = sky_irradiance_matrix(roof, places, [UP], subdivision=1, samples=1, stopping=Stopping(batches=32))
     assert found.values.sum() == pytest.approx(np.pi / 2, rel=0.01)
 
 

@@ -44,10 +44,12 @@ def absorbed(reflectance: float, *, through: bool, depth: float = 0.3) -> np.nda
     inner = pane_transmissivity(TAU, INDEX)
     even = tuple(pane_shares(np.linspace(0, 1, STEPS), INDEX, inner)[0].tolist())
     surfaces = Surfaces(
-        np.concatenate(triangles), rho[numbers], numbers,
+        np.concatenate(triangles),
+        rho[numbers],
+        numbers,
         gloss=tuple(pane(INDEX, inner) if i in panes else None for i in range(12)),
         transmittance=tuple(even if i in panes and through else None for i in range(12)),
-    )  # fmt: skip
+    )
     window = WindowGroup("S", (WindowSurface("w", first[FRONT]),))
     return absorption_matrix(surfaces, [window], samples=2048).values[0]
 

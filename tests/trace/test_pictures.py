@@ -27,9 +27,7 @@ def picture(systems, sky, scene, view=VIEW, **options):
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     interior, groups, exterior = scene
-    return point_in_time_picture(
-        PathTracingScene(interior, exterior, groups, systems), sky, view, **options
-    )
+    return point_in_time_picture(PathTracingScene(interior, exterior, groups, systems), sky, view, **options)
 
 
 def eye_illuminance(values, view=VIEW) -> float:
@@ -60,10 +58,7 @@ def test_panes_before_a_fabric_do_not_hide_the_sun_that_it_scatters():
     alone, (screen, panes) = panes_before_a_screen(0.1)
     by_itself, behind = (
         eye_illuminance(picture(systems, sky, (room, groups, rooms.NOTHING)))
-        for groups, systems in (
-            ([alone], [diffuser(0.3)]),
-            ([screen, panes], [diffuser(0.3), glass()]),
-        )
+        for groups, systems in (([alone], [diffuser(0.3)]), ([screen, panes], [diffuser(0.3), glass()]))
     )
     assert behind == pytest.approx(by_itself, rel=0.01)
 
@@ -98,8 +93,7 @@ def test_no_light_of_a_picture_comes_through_the_room_from_behind():
     ]
     front = rooms.quad(*((x, d, z) for x, z in corners))
     inner = rooms.X0, rooms.X1, rooms.Z0, rooms.Z1
-    round_it = ((x0, x1, z0, inner[2]), (x0, x1, inner[3], z1),
-                (x0, inner[0], *inner[2:]), (inner[1], x1, *inner[2:]))  # fmt: skip
+    round_it = ((x0, x1, z0, inner[2]), (x0, x1, inner[3], z1), (x0, inner[0], *inner[2:]), (inner[1], x1, *inner[2:]))
     wall = [rooms.quad((a, 0, b), (c, 0, b), (c, 0, e), (a, 0, e)) for a, c, b, e in round_it]
     box = rooms.surfaces([(quad, 0.9) for quad in (front, *sides, *wall)])
     clear = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.full(145, 0.5))
@@ -131,9 +125,7 @@ def test_a_picture_has_the_illuminance_of_a_sensor_at_its_eye(kind):
     scene, sky = (interior, groups, rooms.obstruction()), Sky(SKY, SUN, SUN_LUMINANCE)
     found = eye_illuminance(picture([system], sky, scene, samples=32))
     room = PathTracingScene(*scene[::2], groups, [system])
-    sensor = point_in_time(
-        room, sky, [EYE], [VIEW.direction], samples=65536, stopping=Stopping(batches=8)
-    )
+    sensor = point_in_time(room, sky, [EYE], [VIEW.direction], samples=65536, stopping=Stopping(batches=8))
     # pixels of 1.5 degrees at the edges of window and sun, 32 places in each: 0.5 %
     assert found == pytest.approx(sensor.values[0], abs=5 * sensor.standard_error[0], rel=0.005)
 
@@ -185,10 +177,7 @@ def test_noise_of_few_paths_makes_no_glare_sources():
     interior, groups = rooms.test_room()
     scene, sky = (interior, groups, rooms.NOTHING), Sky(SKY, SUN, SUN_LUMINANCE)
     view = fisheye(EYE, (0.0, -1.0, 0.0), 200)
-    found = [
-        evaluate(picture([diffuser(0.4)], sky, scene, view, samples=4, seed=s), view)
-        for s in range(3)
-    ]
+    found = [evaluate(picture([diffuser(0.4)], sky, scene, view, samples=4, seed=s), view) for s in range(3)]
     assert {result.count for result in found} == {1}  # the window
     assert np.std([result.dgp for result in found], ddof=1) < 0.005
 

@@ -37,9 +37,7 @@ def traced(systems, sky, *, scene=None, **options):
 def klems(front: float, reflection_back: float = 0.0) -> KlemsBsdf:
     """A diffuser: Lambertian transmission `front`, reflection to the room `reflection_back`."""
     full = np.ones((K, K)) / np.pi
-    return KlemsBsdf(
-        KLEMS_FULL, KLEMS_FULL, front * full, front * full, 0 * full, reflection_back * full
-    )
+    return KlemsBsdf(KLEMS_FULL, KLEMS_FULL, front * full, front * full, 0 * full, reflection_back * full)
 
 
 def diffuser(*values):
@@ -139,9 +137,7 @@ def test_a_white_back_returns_light_to_the_room():
     """Closed form: a room seen as an integrating sphere gains where the window reflects."""
     from mitsuba_cfs.trace.paths.scene import Sky
 
-    black, white = (
-        traced([diffuser(0.3, back)], Sky(SKY, NO_SUN, 0)).values for back in (0.0, 0.7)
-    )
+    black, white = (traced([diffuser(0.3, back)], Sky(SKY, NO_SUN, 0)).values for back in (0.0, 0.7))
     assert np.all(white > black * 1.05)
 
 
@@ -201,9 +197,7 @@ def test_daylight_coefficients_of_a_diffuser_are_the_three_phase_matrix():
     exterior = rooms.NOTHING  # something near lights parts of the window: V T D knows their mean
     system = diffuser(0.5)
     room = PathTracingScene(interior, exterior, groups, [system])
-    found = daylight_coefficients(
-        room, POINTS, UP, subdivision=1, samples=32768, stopping=Stopping(batches=8)
-    )
+    found = daylight_coefficients(room, POINTS, UP, subdivision=1, samples=32768, stopping=Stopping(batches=8))
     view = view_matrix(interior, groups, POINTS, UP)
     daylight = daylight_matrix(exterior, groups, subdivision=1)
     T = klems(0.5).transmission_matrix()
@@ -215,9 +209,6 @@ def test_daylight_coefficients_of_a_diffuser_are_the_three_phase_matrix():
     total, error = found.values.sum(axis=1), found.error_of(np.ones(146))
     assert np.all(np.abs(total - expected.sum(axis=1)) < 5 * error + 2e-3 * total)
     lit = traced([system], Sky(SKY, NO_SUN, 0), scene=(interior, groups, exterior))
-    assert np.all(
-        np.abs(found.values @ SKY - lit.values)
-        < 5 * np.hypot(found.error_of(SKY), lit.standard_error)
-    )
+    assert np.all(np.abs(found.values @ SKY - lit.values) < 5 * np.hypot(found.error_of(SKY), lit.standard_error))
     with pytest.raises(ValueError, match="needs a `key`"):
         daylight_coefficients(room, POINTS, UP, cache=True)

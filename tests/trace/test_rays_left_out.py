@@ -35,9 +35,7 @@ def test_discs_that_no_window_can_show_are_those_of_all_pairs(monkeypatch):
     way = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.full(145, 0.8))
 
     def matrix():
-        found = direct_sun_matrix(
-            room, rooms.NOTHING, groups, [way], sensors, normals, suns=suns, window_points=1
-        )
+        found = direct_sun_matrix(room, rooms.NOTHING, groups, [way], sensors, normals, suns=suns, window_points=1)
         return found.values
 
     some = matrix()
@@ -58,14 +56,10 @@ def test_rays_that_pass_the_box_of_a_mirror_are_all_that_meet_it(monkeypatch):
     outside = TracedScene(there, rooms.test_room()[1])
     rng = np.random.default_rng(3)
     point = rng.uniform((-2, -9, 0), (6, -1, 4), (400, 3)).astype(np.float32)
-    places = SurfacePoints(
-        (point - outside.centre).astype(np.float32), np.tile([0, -1, 0.0], (400, 1))
-    )
+    places = SurfacePoints((point - outside.centre).astype(np.float32), np.tile([0, -1, 0.0], (400, 1)))
     suns = directions(64) * [1, -1, 1]
     some = sunlight(outside, places, suns)
-    monkeypatch.setattr(
-        SpecularPath, "_may_meet", lambda self, ray, plane: dr.full(type(ray.o.x > 0), True)
-    )
+    monkeypatch.setattr(SpecularPath, "_may_meet", lambda self, ray, plane: dr.full(type(ray.o.x > 0), True))
     np.testing.assert_array_equal(some, sunlight(outside, places, suns))
     assert 0.02 < np.mean(some > 0) < 0.5
 

@@ -52,9 +52,7 @@ def both(exterior: Surfaces, sky: AnnualSky, sensor_samples: int = 32_768):
     from mitsuba_cfs.methods.scene import Sampling
 
     system = [[BsdfOptics(clear_glass())]]
-    chosen = Sampling(
-        sensor_samples=sensor_samples, patch_samples=4096, subdivision=1, hour_samples=65_536
-    )
+    chosen = Sampling(sensor_samples=sensor_samples, patch_samples=4096, subdivision=1, hour_samples=65_536)
     light = phase_light(phase_matrices(scene(exterior), chosen), system, sky)
     paths, error = illuminance_with_error(PathLight(scene(exterior), system, sky, chosen))
     direct = direct_sun(light)[:, 0]
@@ -113,9 +111,7 @@ def test_a_row_with_little_light_has_as_many_places_as_one_with_much():
     points[count:, 0] += 5.0
     up = np.tile(np.float32([0, 0, 1]), (2 * count, 1))
     row, weight = np.repeat([0, 1], count), np.repeat([1.0, 0.02], count)
-    found = SunShares.of(
-        [_Met(row, weight, SurfacePoints(points.astype(np.float32), up), [])], 2, 0
-    )
+    found = SunShares.of([_Met(row, weight, SurfacePoints(points.astype(np.float32), up), [])], 2, 0)
     assert found.share.sum(axis=1) == pytest.approx([count, 0.02 * count])
     assert np.diff(found.share.indptr) == pytest.approx([PLACES / 2, PLACES / 2], rel=0.05)
 

@@ -53,9 +53,7 @@ def test_rooms_together_have_the_matrices_of_each_alone(depth):
     several = three_rooms()
     together = views_of_rooms(several, max_depth=depth, with_direct=True, **FEW)
     for room, (found, direct) in zip(several, together, strict=True):
-        alone = view_matrix(
-            room.surfaces, room.groups, room.points, room.directions, max_depth=depth, **FEW
-        )
+        alone = view_matrix(room.surfaces, room.groups, room.points, room.directions, max_depth=depth, **FEW)
         assert found.values.shape == alone.values.shape
         change = np.abs(found.values - alone.values).sum() / alone.values.sum()
         assert change < 2e-5, f"{change:.1e} of the light"
@@ -81,16 +79,12 @@ def facade():
         windows.append(Surfaces(np.concatenate([pane, pane + out]), np.full(4, 0.6), np.zeros(4)))
     common = rooms.obstruction()
     outdoors = SharedOutdoors(
-        joined_surfaces([common, *windows]),
-        np.repeat([-1, 0, 1, 2], [len(common.triangles), 4, 4, 4]),
+        joined_surfaces([common, *windows]), np.repeat([-1, 0, 1, 2], [len(common.triangles), 4, 4, 4])
     )
     each = [
-        TracedRoom(
-            joined_surfaces([common, *(w for w in windows if w is not windows[i])]),
-            groups[i], number=i,
-        )
+        TracedRoom(joined_surfaces([common, *(w for w in windows if w is not windows[i])]), groups[i], number=i)
         for i in range(3)
-    ]  # fmt: skip
+    ]
     return each, outdoors
 
 
@@ -117,9 +111,7 @@ def test_windows_together_before_a_mountain_have_the_daylight_of_each_alone():
     each, outdoors = facade()
     slope = rooms.quad((-900, -6000, 0), (900, -6000, 0), (900, -7000, 800), (-900, -7000, 800))
     mountain = Surfaces(slope, np.full(2, 0.5), np.zeros(2))
-    before = SharedOutdoors(
-        joined_surfaces([mountain, outdoors.surfaces]), np.append([-1, -1], outdoors.owner)
-    )
+    before = SharedOutdoors(joined_surfaces([mountain, outdoors.surfaces]), np.append([-1, -1], outdoors.owner))
     far = [replace(one, surfaces=joined_surfaces([mountain, one.surfaces])) for one in each]
     options = {"max_depth": 16, "subdivision": 1, "samples": 64, "seed": 2}
     for room, found in zip(far, daylight_of_rooms(far, before, **options), strict=True):

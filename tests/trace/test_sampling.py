@@ -75,9 +75,7 @@ def test_every_seed_has_paths_of_its_own():
     view = fisheye((1.8, 2.5, 1.2), (0.5, 1.0, 0.0), 8)  # of walls alone
 
     def rows(seed: int) -> np.ndarray:
-        ((_, matrix),) = picture_matrix_blocks(
-            room, groups, view, samples=2, max_depth=1, seed=seed
-        )
+        ((_, matrix),) = picture_matrix_blocks(room, groups, view, samples=2, max_depth=1, seed=seed)
         return matrix
 
     np.testing.assert_array_equal(rows(1), rows(1))

@@ -41,9 +41,7 @@ def met(scene, rays: int = 50_000, *, half: bool = False):
     way = random.normal(size=(rays, 3))
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     axes = ((at - scene.centre).T, way.T)
-    start, towards = (
-        kind(*map(mi.Float, a)) for kind, a in zip((mi.Point3f, mi.Vector3f), axes, strict=True)
-    )
+    start, towards = (kind(*map(mi.Float, a)) for kind, a in zip((mi.Point3f, mi.Vector3f), axes, strict=True))
     ray = mi.Ray3f(start, towards)
     ray.maxt = mi.Float(random.uniform(0.1, 40, rays))
     active = mi.Float(way.T[0]) > 0 if half else mi.Bool(True)

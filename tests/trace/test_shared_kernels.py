@@ -28,9 +28,7 @@ def turned_room() -> tuple[Surfaces, list[WindowGroup], Surfaces]:
     interior, (group,) = rooms.test_room()
     glass = group.windows[0].triangles
     panes = tuple(WindowSurface(f"w{i}", moved(glass[i : i + 1])) for i in range(2))
-    walls = Surfaces(
-        moved(interior.triangles[:-2]), interior.reflectance[:-2], interior.surface[:-2]
-    )
+    walls = Surfaces(moved(interior.triangles[:-2]), interior.reflectance[:-2], interior.surface[:-2])
     outside = rooms.obstruction()
     shade = Surfaces(moved(outside.triangles), outside.reflectance, outside.surface)
     return walls, [WindowGroup("south", panes)], shade
@@ -71,18 +69,13 @@ def the_rest(interior: Surfaces, groups: list[WindowGroup], exterior: Surfaces, 
     escaped_view(interior, groups, points, up, **FEW)
     way = KlemsScattering(KLEMS_FULL, np.full((K, K), 0.1), np.full(K, 0.3))
     suns = groups[0].frame[2] + np.linspace(0.0, 0.2, 5 + sensors)[:, None]
-    direct_sun_matrix(
-        interior, exterior, groups, [way], points, up,
-        suns=suns, window_points=8, stopping=stopping,
-    )  # fmt: skip
+    direct_sun_matrix(interior, exterior, groups, [way], points, up, suns=suns, window_points=8, stopping=stopping)
     window_shares(TracedScene(exterior, groups), samples=8)
     view = fisheye(points[0], groups[0].frame[2], 16 + sensors)
     view_matrices(interior, groups, view, samples=2, max_depth=4)
 
 
-@pytest.mark.parametrize(
-    "traced", [matrices, pytest.param(the_rest, marks=pytest.mark.slow)], ids=lambda f: f.__name__
-)
+@pytest.mark.parametrize("traced", [matrices, pytest.param(the_rest, marks=pytest.mark.slow)], ids=lambda f: f.__name__)
 def test_second_room_compiles_nothing(traced):
     import drjit as dr
 
@@ -134,10 +127,12 @@ def test_sun_by_many_mirrors_has_a_kernel_for_each_number_of_mirrors():
     from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, sunlight
     from mitsuba_cfs.trace.sun.specular_paths import specular_sun_paths
 
-    panes = np.concatenate([
-        rooms.quad((x, y, 0), (x + 4, y + turn, 0), (x + 4, y + turn, 3), (x, y, 3))
-        for x, y, turn in [(0, -10, -1), (5, -11, 0), (10, -11, 1), (0, 0.5, 1), (5, 1.5, 0)]
-    ])  # fmt: skip
+    panes = np.concatenate(
+        [
+            rooms.quad((x, y, 0), (x + 4, y + turn, 0), (x + 4, y + turn, 3), (x, y, 3))
+            for x, y, turn in [(0, -10, -1), (5, -11, 0), (10, -11, 1), (0, 0.5, 1), (5, 1.5, 0)]
+        ]
+    )
     number = np.repeat(np.arange(5), 2)
     there = Surfaces(panes, np.zeros(10), number, (), (mirror(0.8),) * 5)
     outside = TracedScene(there, rooms.test_room()[1])

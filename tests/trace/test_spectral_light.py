@@ -44,9 +44,8 @@ def sky(height_deg: float = 35.0):
     """Four hours: clear from three sides, and overcast."""
     azimuth, height = np.radians([150.0, 180.0, 250.0, 200.0]), np.radians(height_deg)
     towards = np.stack(
-        [np.sin(azimuth) * np.cos(height), np.cos(azimuth) * np.cos(height),
-         np.full(4, np.sin(height))], axis=1,
-    )  # fmt: skip
+        [np.sin(azimuth) * np.cos(height), np.cos(azimuth) * np.cos(height), np.full(4, np.sin(height))], axis=1
+    )
     beam, diffuse = [700.0, 800.0, 300.0, 0.0], [90.0, 100.0, 200.0, 180.0]
     return given_sky(towards, beam, diffuse, 1, day_of_year=80)
 
@@ -65,9 +64,7 @@ def in_channel(whole, spectra, c: int):
     diffuse[0] = CHANNELS.power(spectra.ground)[:, c] * spectra.ground_luminance
     beam = CHANNELS.power(spectra.sun)[:, c]
     sun = whole.sun_alone() * beam
-    return replace(
-        whole, whole=diffuse + sun, illuminance=whole.illuminance * beam, sun=sun, solar=None
-    )
+    return replace(whole, whole=diffuse + sun, illuminance=whole.illuminance * beam, sun=sun, solar=None)
 
 
 def traced_by_channel(matrices, factor, whole) -> np.ndarray:

@@ -82,9 +82,7 @@ def by_paths(exterior: Surfaces):
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.methods.scene import Sampling
 
-    light = PathLight(
-        scene(exterior), [[BsdfOptics(clear_glass())]], overcast(), Sampling(hour_samples=131_072)
-    )
+    light = PathLight(scene(exterior), [[BsdfOptics(clear_glass())]], overcast(), Sampling(hour_samples=131_072))
     values, error = illuminance_with_error(light)
     return values[:, 0], error
 
@@ -121,9 +119,7 @@ def test_an_open_site_is_not_cut_and_keeps_its_digits():
         _, said, traced = by_phases(exterior)
         assert traced.parts.groups == tuple(traced.scene.groups)
         assert said.max() < 0.02
-        plain = daylight_matrix(
-            exterior, traced.scene.groups, subdivision=1, samples=512, stopping=Stopping(batches=8)
-        )
+        plain = daylight_matrix(exterior, traced.scene.groups, subdivision=1, samples=512, stopping=Stopping(batches=8))
         np.testing.assert_array_equal(traced.daylight.values, plain.values)
 
 
@@ -161,13 +157,9 @@ def test_the_cut_follows_what_varies():
     """Below a wide slab in height, beside fins in width."""
     for outdoors, axis in ((overhang(1.0), 1), (fins(0.8), 0)):
         _, _, traced = by_phases(outdoors, window_parts=2)
-        low, high = (
-            part.windows[0].triangles.reshape(-1, 3) @ part.frame.T for part in traced.parts.groups
-        )
+        low, high = (part.windows[0].triangles.reshape(-1, 3) @ part.frame.T for part in traced.parts.groups)
         across = [np.ptp(p, axis=0)[:2] for p in (low, high)]
-        whole = np.ptp(
-            traced.scene.groups[0].windows[0].triangles.reshape(-1, 3) @ low_frame(traced), axis=0
-        )
+        whole = np.ptp(traced.scene.groups[0].windows[0].triangles.reshape(-1, 3) @ low_frame(traced), axis=0)
         assert all(side[1 - axis] == pytest.approx(whole[1 - axis]) for side in across)
         assert all(side[axis] < 0.9 * whole[axis] for side in across)
 
@@ -179,10 +171,7 @@ def low_frame(traced):
 def l_shape() -> WindowGroup:
     """A window that is no convex polygon, and a triangle beside it."""
     glass = np.concatenate(
-        [
-            rooms.quad((0, 0, 0), (2, 0, 0), (2, 0, 1), (0, 0, 1)),
-            rooms.quad((0, 0, 1), (1, 0, 1), (1, 0, 2), (0, 0, 2)),
-        ]
+        [rooms.quad((0, 0, 0), (2, 0, 0), (2, 0, 1), (0, 0, 1)), rooms.quad((0, 0, 1), (1, 0, 1), (1, 0, 2), (0, 0, 2))]
     )
     gable = np.array([[(3, -0.5, 0), (5, -0.5, 0), (4, -0.5, 2)]], dtype=float)
     return WindowGroup("south", (WindowSurface("L", glass), WindowSurface("gable", gable)))
@@ -227,9 +216,13 @@ def test_states_of_a_cut_group_go_together():
     traced = phase_matrices(scene(overhang(1.0)), Sampling(**FEW))
     sky = overcast()
     twice = AnnualSky(
-        np.tile(sky.whole, 2), np.tile(sky.direction, (2, 1)), np.zeros(2), np.arange(2), 2,
+        np.tile(sky.whole, 2),
+        np.tile(sky.direction, (2, 1)),
+        np.zeros(2),
+        np.arange(2),
+        2,
         np.zeros((sky.whole.shape[0], 2)),
-    )  # fmt: skip
+    )
     light = phase_light(traced, [[BsdfOptics(glass), BsdfOptics(half)]], twice)
     lit = illuminance(light, np.array([[0, 1]]))
     np.testing.assert_allclose(lit[:, 1], 0.5 * lit[:, 0], rtol=1e-6)
@@ -239,11 +232,8 @@ def test_few_paths_leave_few_parts():
     """What parts put right is not to be less than the noise of D."""
     from mitsuba_cfs.methods.subdivision import LIMIT, allowed
 
-    assert allowed(65_536) == allowed(16_384) == LIMIT and allowed(1_024) == pytest.approx(
-        4 * LIMIT
-    )
+    assert allowed(65_536) == allowed(16_384) == LIMIT and allowed(1_024) == pytest.approx(4 * LIMIT)
     count = [
-        len(by_phases(overhang(1.0), patch_samples=n, sensor_samples=256)[2].parts.groups)
-        for n in (1_024, 16_384)
+        len(by_phases(overhang(1.0), patch_samples=n, sensor_samples=256)[2].parts.groups) for n in (1_024, 16_384)
     ]
     assert 1 < count[0] < count[1]

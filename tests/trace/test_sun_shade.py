@@ -55,9 +55,7 @@ def test_sun_behind_a_receiver_gives_nothing_and_chunks_change_nothing(monkeypat
     behind = normals @ suns.T < -0.02 * np.linalg.norm(normals, axis=1)[:, None] * 4
     assert behind.any() and not whole[behind].any()
     monkeypatch.setattr("mitsuba_cfs.trace.sun.shade.RAYS", 500)
-    np.testing.assert_array_equal(
-        sunlit_shares(half_plane(0.0), points, normals, suns, samples=8), whole
-    )
+    np.testing.assert_array_equal(sunlit_shares(half_plane(0.0), points, normals, suns, samples=8), whole)
 
 
 def test_accepted_light_of_a_uniform_sky_is_the_weighted_integral():

@@ -181,11 +181,7 @@ def test_elements_are_numbered_in_the_order_of_their_cubes() -> None:
     some = _Hits(np.zeros(n, dtype=np.int64), np.ones(n), SurfacePoints(points, sides), halvings)
     element, order, cubes = _pieces(some, edge)
     table = np.vstack(
-        [
-            np.floor(points.T * (0.5 ** -halvings.astype(float) / edge)),
-            np.round(sides.T * FACE_STEPS),
-            halvings,
-        ]
+        [np.floor(points.T * (0.5 ** -halvings.astype(float) / edge)), np.round(sides.T * FACE_STEPS), halvings]
     ).astype(np.int64)
     expected, numbers = np.unique(table, axis=1, return_inverse=True)
     assert len(cubes) > 1000

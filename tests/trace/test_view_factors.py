@@ -44,9 +44,8 @@ def perpendicular(common: float, width: float, height: float) -> float:
     b = (w**2 * (1 + s) / ((1 + w**2) * s)) ** (w**2)
     c = (h**2 * (1 + s) / ((1 + h**2) * s)) ** (h**2)
     return (
-        w * np.arctan(1 / w) + h * np.arctan(1 / h) - np.sqrt(s) * np.arctan(1 / np.sqrt(s))
-        + 0.25 * np.log(a * b * c)
-    ) / (np.pi * w)  # fmt: skip
+        w * np.arctan(1 / w) + h * np.arctan(1 / h) - np.sqrt(s) * np.arctan(1 / np.sqrt(s)) + 0.25 * np.log(a * b * c)
+    ) / (np.pi * w)
 
 
 def test_box_against_closed_forms(variant):
@@ -120,9 +119,7 @@ def test_the_sky_below_a_long_overhang(variant):
 
     depth, down = 1.5, np.array([0.2, 0.8, 1.7, 2.9])
     places = np.stack([0 * down, 0 * down - 1e-3, 3.0 - down], axis=1)
-    found = sky_shares(
-        plate(2e3, depth, 3.0), places[:, None], [[0, -1, 0]] * 4, samples=2**15, seed=3
-    )
+    found = sky_shares(plate(2e3, depth, 3.0), places[:, None], [[0, -1, 0]] * 4, samples=2**15, seed=3)
     # the edge stands at the angle phi over the horizon: of the half space's sky, sin phi is seen
     expected = down / np.hypot(down, depth)
     assert found == pytest.approx(expected, abs=0.008)

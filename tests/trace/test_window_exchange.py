@@ -11,25 +11,13 @@ from scipy import stats
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.methods.coefficients import reflected_shares
-from mitsuba_cfs.methods.light import (
-    daylight_coefficients,
-    eye_illuminance,
-    illuminance,
-    illuminance_with_error,
-)
+from mitsuba_cfs.methods.light import daylight_coefficients, eye_illuminance, illuminance, illuminance_with_error
 from mitsuba_cfs.methods.phase_light import illuminance_of_all, phase_light
 from mitsuba_cfs.methods.phase_matrices import phase_matrices
 from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.methods.point_in_time import PathLight
-from mitsuba_cfs.methods.reflected_sun import (
-    reflected_sun,
-    replaced_before,
-    replaced_luminance,
-)
-from mitsuba_cfs.methods.window_reflection import (
-    by_way_of_outdoors,
-    returned_from_outdoors,
-)
+from mitsuba_cfs.methods.reflected_sun import reflected_sun, replaced_before, replaced_luminance
+from mitsuba_cfs.methods.window_reflection import by_way_of_outdoors, returned_from_outdoors
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
@@ -180,9 +168,7 @@ def test_an_hour_alone_is_what_it_is_among_others() -> None:
     """What windows send out and get back goes from hours on; that of sensors, from these on."""
     from mitsuba_cfs.methods.scene import Sampling
 
-    few = Sampling(
-        sensor_samples=256, patch_samples=256, subdivision=1, window_parts=2, view_samples=1
-    )
+    few = Sampling(sensor_samples=256, patch_samples=256, subdivision=1, window_parts=2, view_samples=1)
     light = phase_light(phase_matrices(between_fins(), few), [[mirroring(0.4)]], hours(1))
     every = np.arange(2)
     whole = pictures_in_state(light, every, [0]).values(every)
@@ -202,11 +188,7 @@ def test_an_hour_alone_is_what_it_is_among_others() -> None:
 def test_the_reflection_in_windows_is_computed_once_for_a_state(monkeypatch) -> None:
     """For the hours, their error, the daylight factor and the eye, of all sensors or of one."""
     from mitsuba_cfs.methods import coefficients
-    from mitsuba_cfs.methods.light import (
-        daylight_coefficients,
-        eye_illuminance,
-        illuminance_with_error,
-    )
+    from mitsuba_cfs.methods.light import daylight_coefficients, eye_illuminance, illuminance_with_error
     from mitsuba_cfs.methods.scene import Sampling
 
     few = Sampling(sensor_samples=256, patch_samples=256, subdivision=1, window_parts=2)

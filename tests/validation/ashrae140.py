@@ -94,15 +94,11 @@ def _row(name: str, output: str, value: float, ranges: dict) -> dict[str, object
 
 def _judged(name: str, output: str, value: float, low: float, high: float) -> dict[str, object]:
     inside = bool(low <= value <= high)
-    return {"case": name, "output": output, "ours": float(value), "low": low, "high": high,
-            "inside": inside}  # fmt: skip
+    return {"case": name, "output": output, "ours": float(value), "low": low, "high": high, "inside": inside}
 
 
 def _transmitted_rows(
-    name: str,
-    case: ashrae140_cases.TestCase,
-    light: tuple[ashrae140_sun.Transmitted, ...],
-    ranges: dict,
+    name: str, case: ashrae140_cases.TestCase, light: tuple[ashrae140_sun.Transmitted, ...], ranges: dict
 ):
     """Annual transmitted sun [kWh/m2] of the facades that the standard lists."""
     rows = []

@@ -20,9 +20,13 @@ from thermal.zone import Gains, Layer, OpaqueSurface, WindowElement, Zone, sched
 FloatArray = NDArray[np.float64]
 WIDTH, DEPTH, HEIGHT = 8.0, 6.0, 2.7
 NORMALS = {
-    "south": (0.0, -1.0, 0.0), "north": (0.0, 1.0, 0.0), "east": (1.0, 0.0, 0.0),
-    "west": (-1.0, 0.0, 0.0), "floor": (0.0, 0.0, -1.0), "roof": (0.0, 0.0, 1.0),
-}  # fmt: skip
+    "south": (0.0, -1.0, 0.0),
+    "north": (0.0, 1.0, 0.0),
+    "east": (1.0, 0.0, 0.0),
+    "west": (-1.0, 0.0, 0.0),
+    "floor": (0.0, 0.0, -1.0),
+    "roof": (0.0, 0.0, 1.0),
+}
 # seen from outside: facade, left, right, back, floor, ceiling of `sunlit_room`
 SEEN_FROM = {
     "south": ("south", "west", "east", "north", "floor", "roof"),
@@ -34,11 +38,7 @@ SIDING = Layer(0.009, 0.14, 530.0, 900.0)
 LIGHT = {
     "wall": (SIDING, Layer(0.066, 0.04, 12.0, 840.0), Layer(0.012, 0.16, 950.0, 840.0)),
     "floor": (Layer(1.003, 0.04, 0.0, 0.0), Layer(0.025, 0.14, 650.0, 1200.0)),
-    "roof": (
-        Layer(0.019, 0.14, 530.0, 900.0),
-        Layer(0.1118, 0.04, 12.0, 840.0),
-        Layer(0.010, 0.16, 950.0, 840.0),
-    ),
+    "roof": (Layer(0.019, 0.14, 530.0, 900.0), Layer(0.1118, 0.04, 12.0, 840.0), Layer(0.010, 0.16, 950.0, 840.0)),
 }
 HEAVY = {
     "wall": (SIDING, Layer(0.0615, 0.04, 10.0, 1400.0), Layer(0.100, 0.51, 1400.0, 1000.0)),
@@ -90,11 +90,7 @@ _SIDE = (((1.5, 4.5), (0.2, 2.2)),)
 _SOUTH = Opening("south", _TWO)
 _SOUTH_SHADED = Opening("south", _TWO, (Overhang(HEIGHT, (0.0, WIDTH), 1.0),))
 _SIDES = (Opening("east", _SIDE), Opening("west", _SIDE))
-_FINS = (
-    Overhang(HEIGHT, (1.5, 4.5), 1.0),
-    Fin(1.5, (0.0, HEIGHT), 1.0),
-    Fin(4.5, (0.0, HEIGHT), 1.0),
-)
+_FINS = (Overhang(HEIGHT, (1.5, 4.5), 1.0), Fin(1.5, (0.0, HEIGHT), 1.0), Fin(4.5, (0.0, HEIGHT), 1.0))
 _SIDES_SHADED = tuple(replace(o, devices=_FINS) for o in _SIDES)
 # 10 degC from 23 to 7, linear to 20 degC from 7 to 8; [144] values of ten minutes
 _SETBACK = (10.0,) * 42 + tuple(10.0 + 10.0 * k / 6 for k in range(1, 7)) + (20.0,) * 90

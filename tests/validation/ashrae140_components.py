@@ -74,9 +74,17 @@ def compare(reference: Path, *, samples: int = 4096) -> pd.DataFrame:
             radiance = ours[part]
             traced = float(radiance @ (omega * tau))
             simple = traced if part == "sun" else flat * float(radiance @ omega)
-            rows.append({"case": name, "part": part, "on: EnergyPlus": on,
-                         "on: traced": float(radiance @ omega), "through: EnergyPlus": through,
-                         "through: traced": traced, "through: flat": simple})  # fmt: skip
+            rows.append(
+                {
+                    "case": name,
+                    "part": part,
+                    "on: EnergyPlus": on,
+                    "on: traced": float(radiance @ omega),
+                    "through: EnergyPlus": through,
+                    "through: traced": traced,
+                    "through: flat": simple,
+                }
+            )
     table = pd.DataFrame(rows)
     totals = table.drop(columns="part").groupby("case").sum().reset_index().assign(part="all")
     return pd.concat([table, totals], ignore_index=True)

@@ -38,9 +38,11 @@ def figures(name: str, year: ThermalYear) -> dict[str, float]:
         return {"maximum": air.max(), "minimum": air.min(), "average": air.mean()}
     heating, cooling = hours["heating_w"], hours["cooling_w"]
     return {
-        "heating": heating.sum() / 1e6, "cooling": cooling.sum() / 1e6,
-        "peak heating": heating.max() / 1e3, "peak cooling": cooling.max() / 1e3,
-    }  # fmt: skip
+        "heating": heating.sum() / 1e6,
+        "cooling": cooling.sum() / 1e6,
+        "peak heating": heating.max() / 1e3,
+        "peak cooling": cooling.max() / 1e3,
+    }
 
 
 def compare(reference: Path, folder: Path, only: Sequence[str] = ()) -> pd.DataFrame:

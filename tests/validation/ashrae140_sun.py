@@ -67,16 +67,26 @@ def glass(kind: str) -> AshraeGlazing:
     share, back = (_in_two(o.absorptance) for o in (optics, behind))
     g = en410_g_value(optics.tau, share, between, **films)
     layers = layer_absorptances(optics.tau, optics.rho_front, g, u, item=f"{kind} glazing")
-    mean = {k: float(hemispherical_mean(v, ANGLES)) for k, v in (
-        ("tau", optics.tau), ("outer", layers.outer), ("inner", layers.inner),
-        ("back", optics.rho_back), ("back outer", back[:, 1]), ("back inner", back[:, 0]),
-    )}  # fmt: skip
+    mean = {
+        k: float(hemispherical_mean(v, ANGLES))
+        for k, v in (
+            ("tau", optics.tau),
+            ("outer", layers.outer),
+            ("inner", layers.inner),
+            ("back", optics.rho_back),
+            ("back outer", back[:, 1]),
+            ("back inner", back[:, 0]),
+        )
+    }
     fenestration = Fenestration(f"{kind} glazing", u, resistance=resistance)
     return AshraeGlazing(
-        fenestration, optics.tau, layers.outer, layers.inner,
+        fenestration,
+        optics.tau,
+        layers.outer,
+        layers.inner,
         (mean["tau"], mean["outer"], mean["inner"]),
         (mean["back"], mean["back outer"], mean["back inner"]),
-    )  # fmt: skip
+    )
 
 
 def _in_two(absorptance: FloatArray) -> FloatArray:
@@ -95,9 +105,7 @@ class Transmitted:
     first: FloatArray  # [T, 6] first hits [W] in the order of `SEEN_FROM`
 
 
-def transmitted(
-    opening: Opening, sun: FacadeSun, pane: AshraeGlazing, *, depth: float | None = None
-):
+def transmitted(opening: Opening, sun: FacadeSun, pane: AshraeGlazing, *, depth: float | None = None):
     """What the windows of a facade let through and absorb, shaded by their devices."""
     lit = sun.beam > 0
     share = np.zeros(len(sun.beam))
@@ -123,9 +131,8 @@ def transmitted(
         first += area * spread[:, None] * diffuse_hits(room)
         first[lit] += area * through[lit, None] * BeamTable(room)(sun.local[lit])
     return Transmitted(
-        through, spread, beam * at[1] + diffuse * pane.diffuse[1],
-        beam * at[2] + diffuse * pane.diffuse[2], first,
-    )  # fmt: skip
+        through, spread, beam * at[1] + diffuse * pane.diffuse[1], beam * at[2] + diffuse * pane.diffuse[2], first
+    )
 
 
 def zone_solar(
@@ -149,9 +156,7 @@ def zone_solar(
     rho = np.array([1 - s.absorptance_in for s in zone.surfaces] + [pane.back[0]] * len(openings))
     kept = spread_evenly(hits, rho, area)
     at_glass = kept[:, len(names) :] / np.array([o.area for o in openings]) / (1 - pane.back[0])
-    facade = np.stack([
-        suns[n].total if n in suns else np.zeros(len(hits)) for n in names
-    ], axis=1)  # fmt: skip
+    facade = np.stack([suns[n].total if n in suns else np.zeros(len(hits)) for n in names], axis=1)
     return Solar(
         absorbed_outer=np.stack([t.outer for t in light], axis=1) + at_glass * pane.back[1],
         absorbed_inner=np.stack([t.inner for t in light], axis=1) + at_glass * pane.back[2],
@@ -162,11 +167,7 @@ def zone_solar(
 
 def box_irradiance(steps: SunSteps) -> dict[str, FacadeSun]:
     """Irradiance of the four facades and the roof."""
-    return {
-        name: facade_sun(steps, np.array(normal))
-        for name, normal in NORMALS.items()
-        if name != "floor"
-    }
+    return {name: facade_sun(steps, np.array(normal)) for name, normal in NORMALS.items() if name != "floor"}
 
 
 def double_glazing_resistance(
@@ -176,12 +177,9 @@ def double_glazing_resistance(
 
     Args: panes: thicknesses [m], outside and inside.
     """
-    mean, difference = (
-        a.ravel() for a in np.meshgrid(np.linspace(-15.0, 50.0, 14), np.linspace(1.0, 45.0, 12))
-    )
+    mean, difference = (a.ravel() for a in np.meshgrid(np.linspace(-15.0, 50.0, 14), np.linspace(1.0, 45.0, 12)))
     solid = sum(panes) / conductivity
     resistance = [
-        solid + 1.0 / gap.conductance(d, mean_temperature=m + 273.15)
-        for m, d in zip(mean, difference, strict=True)
+        solid + 1.0 / gap.conductance(d, mean_temperature=m + 273.15) for m, d in zip(mean, difference, strict=True)
     ]
     return fit_conductance_surface(mean, difference, np.array(resistance))

@@ -44,19 +44,20 @@ def traced_light(
     """Annual radiance [K] on the windows of a facade from sun, sky and ground [kWh/(m2 sr)]."""
     width = 8.0 if opening.facade == "south" else 6.0
     building = shoebox(
-        width, 6.0 if opening.facade == "south" else 8.0, HEIGHT,
+        width,
+        6.0 if opening.facade == "south" else 8.0,
+        HEIGHT,
         windows=[WindowRectangle(x[0], y[0], x[1] - x[0], y[1] - y[0]) for x, y in opening.windows],
         facing_deg=FACING_DEG[opening.facade],
-    )  # fmt: skip
+    )
     space = building.spaces[0]
     groups = window_groups(space)
     frame = groups[0].frame
     plates = tuple(_element(d, i, frame) for i, d in enumerate(opening.devices))
     exterior = exterior_surfaces(replace(building, elements=plates), space, "solar")
     daylight = daylight_matrix(
-        exterior, groups, subdivision=SUBDIVISION, samples=samples // 8,
-        stopping=Stopping(batches=8), seed=seed,
-    )  # fmt: skip
+        exterior, groups, subdivision=SUBDIVISION, samples=samples // 8, stopping=Stopping(batches=8), seed=seed
+    )
     area = np.array([g.area for g in groups])
     seen = np.einsum("g,gkp->kp", area / area.sum(), daylight.values)
     series = three_part(sky_series(weather, "solar"))
@@ -66,11 +67,7 @@ def traced_light(
         * (weather.step_h / 1e3)
         for part in ("sun", "sky")
     )
-    return {
-        "sun": seen[:, 1:] @ sun[1:],
-        "sky": seen[:, 1:] @ sky[1:],
-        "ground": seen[:, 0] * (sun[0] + sky[0]),
-    }
+    return {"sun": seen[:, 1:] @ sun[1:], "sky": seen[:, 1:] @ sky[1:], "ground": seen[:, 0] * (sun[0] + sky[0])}
 
 
 def traced_transmission(
@@ -117,8 +114,16 @@ def compare(reference: Path, *, samples: int = 4096) -> pd.DataFrame:
         row = ranges[table]["rows"][f"{name} {opening.facade.capitalize()}"]
         ours = traced_transmission(opening, weather, pane, samples=samples)
         inside = row["min"] <= ours <= row["max"]
-        rows.append({"case": name, "facade": opening.facade, "traced": ours, "low": row["min"],
-                     "high": row["max"], "inside": bool(inside)})  # fmt: skip
+        rows.append(
+            {
+                "case": name,
+                "facade": opening.facade,
+                "traced": ours,
+                "low": row["min"],
+                "high": row["max"],
+                "inside": bool(inside),
+            }
+        )
     return pd.DataFrame(rows)
 
 

@@ -39,26 +39,24 @@ class BlindRoom:
 def test_room() -> BlindRoom:
     """The room of Table 1, its facade to the south-west."""
     building = shoebox(
-        3.65, 4.60, 3.00,
+        3.65,
+        4.60,
+        3.00,
         windows=(WindowRectangle(0.30, 0.90, 3.05, 1.70),),
         facing_deg=225.0,
         reflectance={"wall": 0.50, "ceiling": 0.80, "roof": 0.80, "floor": 0.34},
-    )  # fmt: skip
+    )
     space = building.spaces[0]
     groups = window_groups(space)
     inward = -groups[0].frame[2]
     middle = groups[0].windows[0].triangles.reshape(-1, 3).mean(axis=0) * [1, 1, 0]
     points = middle + np.arange(0.6, 4.2, 0.6)[:, None] * inward + [0, 0, 0.85]
-    return BlindRoom(
-        interior_surfaces(space), groups, points, np.tile([0.0, 0.0, 1.0], (len(points), 1))
-    )
+    return BlindRoom(interior_surfaces(space), groups, points, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
 
 
 def glass_transmittance(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
     """Transmittance [...] of the double glazing at the cosine of incidence."""
-    return GLASS_TRANSMITTANCE * roos_factor(
-        np.arccos(np.clip(cosine, 0, 1)), panes=2, category=4.0
-    )
+    return GLASS_TRANSMITTANCE * roos_factor(np.arccos(np.clip(cosine, 0, 1)), panes=2, category=4.0)
 
 
 def glass_reflectance(cosine: NDArray[np.float64], normal: float) -> NDArray[np.float64]:
@@ -98,9 +96,7 @@ def slats(group: WindowGroup, tilt_deg: float) -> Surfaces:
     wall = wall_round(low, high)
     reflectance = np.repeat([SLAT_REFLECTANCE, GLASS_FRONT], [len(triangles), len(wall)])
     return Surfaces(
-        np.concatenate([triangles, wall]) @ group.frame,
-        reflectance,
-        np.zeros(len(reflectance), dtype=np.int64),
+        np.concatenate([triangles, wall]) @ group.frame, reflectance, np.zeros(len(reflectance), dtype=np.int64)
     )
 
 

@@ -25,10 +25,7 @@ from mitsuba_cfs.processes import process_pool
 FOLDERS = ("../shared/data/ifc", "../shared/cases/ifc")
 OUTDOORS = ("space-outdoors", "space-external")  # codes of issues
 SURFACES = 0.17  # resistances of both surfaces of an outer wall, EN ISO 6946:2017 [m2 K/W]
-HEAD = (
-    "| file | rooms of spaces | volume m3 | glass m2 of all | outdoors | wall U | north | s "
-    "| verdict |"
-)
+HEAD = "| file | rooms of spaces | volume m3 | glass m2 of all | outdoors | wall U | north | s | verdict |"
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -60,14 +57,18 @@ def figures(path: Path) -> str:
     except CfsError as error:
         return f"refused: {str(error).split(': ', 1)[-1]}"
     account = building.account
-    return " | ".join((
-        f"{len(building.spaces)} of {account.spaces}",
-        f"{sum(s.volume for s in building.spaces):.1f}",
-        f"{account.glass_used:.1f} of {account.glass_out:.1f}",
-        f"{sum(issue.code in OUTDOORS for issue in building.issues)}",
-        outer_wall(building), f"{north(building):.1f}", f"{time.perf_counter() - start:.1f}",
-        str(account.verdict),
-    ))  # fmt: skip
+    return " | ".join(
+        (
+            f"{len(building.spaces)} of {account.spaces}",
+            f"{sum(s.volume for s in building.spaces):.1f}",
+            f"{account.glass_used:.1f} of {account.glass_out:.1f}",
+            f"{sum(issue.code in OUTDOORS for issue in building.issues)}",
+            outer_wall(building),
+            f"{north(building):.1f}",
+            f"{time.perf_counter() - start:.1f}",
+            str(account.verdict),
+        )
+    )
 
 
 def outer_wall(building: Building) -> str:
@@ -78,9 +79,7 @@ def outer_wall(building: Building) -> str:
         for face in space.faces
         if face.kind == "wall" and face.adjacency == "outside"
     ]
-    return (
-        f"{np.average([u for _, u in walls], weights=[a for a, _ in walls]):.2f}" if walls else "-"
-    )
+    return f"{np.average([u for _, u in walls], weights=[a for a, _ in walls]):.2f}" if walls else "-"
 
 
 def north(building: Building) -> float:

@@ -19,14 +19,7 @@ import pandas as pd
 from mitsuba_cfs import variants
 from scenes.heat.study import ThermalYear, run_study
 from scenes.heat.study_file import StudyFile
-from tests.validation.reference_room import (
-    EXTERIOR_FINISH,
-    FINISH,
-    INSULATION,
-    MASSIVE,
-    MASSIVE_THIN,
-    ORIENTATIONS,
-)
+from tests.validation.reference_room import EXTERIOR_FINISH, FINISH, INSULATION, MASSIVE, MASSIVE_THIN, ORIENTATIONS
 from tests.validation.systems import blind_before_glazing
 from thermal.zone import Layer
 
@@ -41,9 +34,14 @@ def study(weather: Path, bsdf: Path, facing_deg: float, samples: int) -> StudyFi
 
     def layers(*stack: Layer) -> list[dict[str, float]]:
         return [
-            {"thickness": s.thickness, "conductivity": s.conductivity, "density": s.density,
-             "heat_capacity": s.heat_capacity} for s in stack
-        ]  # fmt: skip
+            {
+                "thickness": s.thickness,
+                "conductivity": s.conductivity,
+                "density": s.density,
+                "heat_capacity": s.heat_capacity,
+            }
+            for s in stack
+        ]
 
     inner, slab = layers(FINISH, MASSIVE_THIN, FINISH), layers(FINISH, MASSIVE, FINISH)
     front = layers(EXTERIOR_FINISH, INSULATION, MASSIVE, FINISH)
@@ -52,28 +50,27 @@ def study(weather: Path, bsdf: Path, facing_deg: float, samples: int) -> StudyFi
         {
             "weather": weather,
             "box": {
-                "width": 4.0, "depth": 5.0, "height": 3.0, "facing_deg": facing_deg,
+                "width": 4.0,
+                "depth": 5.0,
+                "height": 3.0,
+                "facing_deg": facing_deg,
                 "window": [WINDOW],
                 "adjacency": dict.fromkeys((*sides, "floor", "ceiling"), "adiabatic"),
-                "construction": {"front": front, "floor": slab, "ceiling": slab}
-                | dict.fromkeys(sides, inner),
+                "construction": {"front": front, "floor": slab, "ceiling": slab} | dict.fromkeys(sides, inner),
             },
             "system": [{"bsdf": bsdf}],
             "gains": {"equipment_w_m2": 8.0, "persons": 1.0, "occupied": HOURS},
             "comfort": {"mean_radiant": "room centre"},
             "trace": {"patch_samples": samples, "sensor_samples": samples},
         }
-    )  # fmt: skip
+    )
 
 
 def shares(year: ThermalYear) -> dict[str, float]:
     """Percent of the hours from 8 to 18 that are comfortable; degree hours beyond the 80 % band."""
     hours = 365 * (HOURS[1] - HOURS[0])
     summary = year.summary
-    found = {
-        f"comfortable {name}": 100 * summary[f"comfortable_h {band}"] / hours
-        for name, band in BANDS.items()
-    }
+    found = {f"comfortable {name}": 100 * summary[f"comfortable_h {band}"] / hours for name, band in BANDS.items()}
     for side in ("warm", "cold"):
         found[f"degree hours {side}"] = summary[f"degree_hours_{side} {BANDS['80 %']}"]
     return found | {"operative max": summary["operative_max_c"]}

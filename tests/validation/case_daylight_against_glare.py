@@ -91,8 +91,7 @@ def draw(table: pd.DataFrame, path: Path) -> None:
 
     figure, axes = plt.subplots(figsize=(8.0, 4.2), layout="constrained")
     at = np.arange(len(table))
-    bars = axes.bar(at - 0.2, table["daylight autonomy"], 0.36, color="#4878a8",
-                    label="daylight autonomy, 300 lx")  # fmt: skip
+    bars = axes.bar(at - 0.2, table["daylight autonomy"], 0.36, color="#4878a8", label="daylight autonomy, 300 lx")
     axes.bar_label(bars, fmt="%.0f", padding=2)
     below = np.zeros(len(table))
     for name, colour in zip(CLASSES, COLOURS, strict=True):
@@ -108,11 +107,7 @@ def draw(table: pd.DataFrame, path: Path) -> None:
 
 
 def main(
-    *,
-    weather: Path,
-    out: Path,
-    facing: float = 180.0,
-    size: Annotated[int, "pixels of a picture's side"] = 400,
+    *, weather: Path, out: Path, facing: float = 180.0, size: Annotated[int, "pixels of a picture's side"] = 400
 ) -> pd.DataFrame:
     """Run the study and write table and figure."""
     out.mkdir(parents=True, exist_ok=True)

@@ -32,10 +32,7 @@ from mitsuba_cfs.trace.paths.scene import PathTracingScene
 from tests.validation.cie171_cases import GLASS, SKIES, Case, cases, cie_sky, reported
 from tests.validation.cie171_quadrature import INDEX, Array
 
-METHODS = {
-    "paths": "point-in-time", "two-phase": "two-phase",
-    "three-phase": "three-phase", "five-phase": "five-phase",
-}  # fmt: skip
+METHODS = {"paths": "point-in-time", "two-phase": "two-phase", "three-phase": "three-phase", "five-phase": "five-phase"}
 SAMPLING = Sampling(sensor_samples=1 << 17, patch_samples=1 << 13, hour_samples=1 << 20)
 BATCHES = 4  # of two-phase coefficients
 MORE = 2  # paths of those, for each of an hour's: all skies share them
@@ -68,9 +65,13 @@ def computed(case: Case, method: str, glass: str, sampling: Sampling = SAMPLING)
     if method == "two-phase":
         room = PathTracingScene(Surfaces.none(), case.exterior(), [group], [filled.paths])
         found = daylight_coefficients(
-            room, case.points, case.normals, subdivision=sampling.subdivision,
-            samples=MORE * sampling.hour_samples // BATCHES, stopping=Stopping(batches=BATCHES),
-        )  # fmt: skip
+            room,
+            case.points,
+            case.normals,
+            subdivision=sampling.subdivision,
+            samples=MORE * sampling.hour_samples // BATCHES,
+            stopping=Stopping(batches=BATCHES),
+        )
         return found.values @ sky.whole
     scene = DaylightScene(Surfaces.none(), case.exterior(), [group], case.points, case.normals)
     light = daylight(scene, [[filled]], sky, method=METHODS[method], sampling=sampling)

@@ -81,10 +81,7 @@ class Case:
         near, far = self.opening.corner[0] + self.opening.right[0], self.opening.corner[0]
         walls = [(left, right, 0, sill), (left, right, top, HEIGHT)]
         walls += [(left, near, sill, top), (far, right, sill, top)]
-        quads = [
-            [(a, DEPTH, low), (b, DEPTH, low), (b, DEPTH, high), (a, DEPTH, high)]
-            for a, b, low, high in walls
-        ]
+        quads = [[(a, DEPTH, low), (b, DEPTH, low), (b, DEPTH, high), (a, DEPTH, high)] for a, b, low, high in walls]
         if self.shelf is not None:
             around = _around(left, right, DEPTH, DEPTH + self.shelf)
             quads.append([(x, y, HEIGHT) for x, y in around])
@@ -210,13 +207,9 @@ def _case(
 def cie_sky(subdivision: int) -> AnnualSky:
     """The five skies as hours, for 100 lx on the ground outdoors."""
     patches = ReinhartSky(subdivision)
-    whole = np.stack(
-        [cie_patches(k, patches, 100.0, sun=SUN, ground_reflectance=GROUND) for k in SKIES], axis=1
-    )
+    whole = np.stack([cie_patches(k, patches, 100.0, sun=SUN, ground_reflectance=GROUND) for k in SKIES], axis=1)
     count = len(SKIES)
-    return AnnualSky(
-        whole, np.tile(SUN, (count, 1)), np.zeros(count), np.arange(count), count, 0 * whole
-    )
+    return AnnualSky(whole, np.tile(SUN, (count, 1)), np.zeros(count), np.arange(count), count, 0 * whole)
 
 
 def reported(file: Path) -> Iterator[tuple[str, float | None, int, Array]]:

@@ -54,9 +54,7 @@ POINT = "-ab 7 -lr -12 -lw 1e-6 -as 0 -aa 0"
 SUN_OMEGA = 2 * np.pi * (1 - np.cos(SUN_RADIUS))
 ROOMS = {
     "south-east": shoebox(4.0, 6.0, facing_deg=150),
-    "south, high window": shoebox(
-        5.0, 7.0, facing_deg=180, windows=[WindowRectangle(0.8, 1.6, 3.4, 1.0)]
-    ),
+    "south, high window": shoebox(5.0, 7.0, facing_deg=180, windows=[WindowRectangle(0.8, 1.6, 3.4, 1.0)]),
     "north-west": shoebox(4.0, 5.0, facing_deg=315),
 }
 
@@ -92,9 +90,7 @@ class Sides:
 
     def sunlit(self) -> tuple[FloatArray, FloatArray]:
         """Hours with 1000 lx of direct sun of each sensor [S], ours and theirs."""
-        ours, theirs = (
-            lm83.sunlit_hours(light.direct, self.calendar.ten) for light in (self.ours, self.theirs)
-        )
+        ours, theirs = (lm83.sunlit_hours(light.direct, self.calendar.ten) for light in (self.ours, self.theirs))
         return ours, theirs
 
 
@@ -104,29 +100,21 @@ def glass() -> FenestrationSystem:
     return FenestrationSystem("clear", klems, klems, source="made")
 
 
-def compared(
-    building: Building, folder: Path, sensor_samples: int = 4096, *, seed: int = 0
-) -> Sides:
+def compared(building: Building, folder: Path, sensor_samples: int = 4096, *, seed: int = 0) -> Sides:
     """A room in both programs; each seed is another sample of paths in both."""
     weather, space = read_epw(WEATHER), building.spaces[0]
     options = RoomOptions.of(
-        sky_subdivision=SUBDIVISION, sensor_samples=sensor_samples, patch_samples=1024,
-        sun_points=128, seed=seed,
-    )  # fmt: skip
-    skies = skies_for(weather, options.sampling)
-    room = room_inputs(
-        building, space, in_all_windows(space, glass()), weather, options, skies=skies, grids=[GRID]
+        sky_subdivision=SUBDIVISION, sensor_samples=sensor_samples, patch_samples=1024, sun_points=128, seed=seed
     )
+    skies = skies_for(weather, options.sampling)
+    room = room_inputs(building, space, in_all_windows(space, glass()), weather, options, skies=skies, grids=[GRID])
     light, calendar = room_light(room), calendar_of(weather)
     hours = np.unique(np.concatenate([calendar.clear_hours(clock) for clock in NEED.clocks]))
     scene = _scene(building, folder)
     up = np.tile([0.0, 0.0, 1.0], (len(light.scene.points), 1))
     sensors = radiance.sensors_text(light.scene.points, up)
     options_of_point = f"{POINT} -ad {DIVISIONS + 7 * seed}"
-    clear = [
-        _traced(scene, skies, int(h), sensors, options_of_point)
-        for h in np.searchsorted(skies.lit, hours)
-    ]
+    clear = [_traced(scene, skies, int(h), sensors, options_of_point) for h in np.searchsorted(skies.lit, hours)]
     direct = _direct(scene, skies, sensors)
     (ours,) = lights_of(room, light, ())
     whole = skies.whole_year(direct.astype(np.float32).T).T
@@ -146,9 +134,7 @@ def _scene(building: Building, folder: Path) -> RenderedScene:
     return RenderedScene(folder, "room.rad glass.rad", "", POINT)
 
 
-def _traced(
-    scene: RenderedScene, skies: AnnualSky, hour: int, sensors: bytes, options: str
-) -> FloatArray:
+def _traced(scene: RenderedScene, skies: AnnualSky, hour: int, sensors: bytes, options: str) -> FloatArray:
     """Illuminance [S] [lx] of an hour by rtrace."""
     luminance = float(skies.illuminance[hour]) / SUN_OMEGA
     patches = skies.without_sun(slice(hour, hour + 1))[:, 0]
@@ -163,8 +149,7 @@ def _direct(scene: RenderedScene, skies: AnnualSky, sensors: bytes) -> FloatArra
     shining = np.flatnonzero((skies.illuminance > 0) & (skies.direction[:, 2] > 0))
     degrees = 2 * np.degrees(SUN_RADIUS)
     suns = [
-        f"void light sun{i}\n0\n0\n3 1 1 1\nsun{i} source disc{i}\n0\n0\n"
-        f"4 {x:.9g} {y:.9g} {z:.9g} {degrees:.6g}\n"
+        f"void light sun{i}\n0\n0\n3 1 1 1\nsun{i} source disc{i}\n0\n0\n4 {x:.9g} {y:.9g} {z:.9g} {degrees:.6g}\n"
         for i, (x, y, z) in enumerate(skies.direction[shining].tolist())
     ]
     (scene.folder / "suns.rad").write_text("".join(suns))

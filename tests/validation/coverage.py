@@ -46,9 +46,13 @@ EVERY_BY_PATHS = 16  # of these
 METHODS = ("five-phase", "point-in-time")
 PICTURES = 6  # the brightest hours
 PATHS = {
-    "sensor_samples": 1_024, "patch_samples": 1_024, "sun_points": 256, "view_samples": 2,
-    "outdoor_samples": 2, "hour_samples": 512,
-}  # fmt: skip
+    "sensor_samples": 1_024,
+    "patch_samples": 1_024,
+    "sun_points": 256,
+    "view_samples": 2,
+    "outdoor_samples": 2,
+    "hour_samples": 512,
+}
 
 
 def sky() -> cfs.AnnualSky:
@@ -82,11 +86,7 @@ def of_seed(
     scaled = lux.T / limits
     da = daylight_autonomy(scaled, every, 1.0)
     noise = daylight_autonomy_noise(
-        scaled,
-        every,
-        lambda weights: of_sums(weights.T / limits[:, None]),
-        relative_error=relative,
-        threshold=1.0,
+        scaled, every, lambda weights: of_sums(weights.T / limits[:, None]), relative_error=relative, threshold=1.0
     )
     overcast = cie_patches("overcast", ReinhartSky(SUBDIVISION), 1.0)
     factor = daylight_factor(cfs.daylight_coefficients(light) @ overcast, 1.0)
@@ -98,7 +98,7 @@ def of_seed(
         "DA": (da, noise.standard_error()),
         "sDA": (sda, np.array([spatial_daylight_autonomy_error(da, noise)])),
         "DGP": (rated.dgp, rated.dgp_standard_error),
-    }, limits  # fmt: skip
+    }, limits
 
 
 def coverage(values: NDArray[np.float64], errors: NDArray[np.float64]) -> dict[str, float]:
@@ -131,10 +131,7 @@ def main(
         for seed in range(seeds):
             run, limits = of_seed(method, seed, under, limits)
             runs.append(run)
-        found |= {
-            name: coverage(*(np.stack([run[name][k] for run in runs]) for k in (0, 1)))
-            for name in runs[0]
-        }
+        found |= {name: coverage(*(np.stack([run[name][k] for run in runs]) for k in (0, 1))) for name in runs[0]}
     if json_ is not None:
         json_.write_text(json.dumps({"seeds": seeds, **found}, indent=1), "utf-8")
     head = f"{'quantity':29}{'covered by 2 SE':>16}{'spread':>10}{'stated / spread':>17}"

@@ -30,11 +30,7 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
-from tests.benchmarks.radiance import (
-    run,
-    sensors_text,
-    write_surfaces,
-)
+from tests.benchmarks.radiance import run, sensors_text, write_surfaces
 
 W, D, H = 4.0, 6.0, 3.0  # of the room [m]
 X0, X1, Z0, Z1 = 0.5, 3.5, 0.9, 2.6  # its window, in the wall y = 0
@@ -55,9 +51,7 @@ def quad(*corners: tuple[float, float, float]) -> NDArray[np.float64]:
 def front(a: float, b: float, c: float, d: float, reflectance: float) -> Quads:
     """The wall y = 0 from a to b and from c to d high, round the window."""
     strips = ((a, b, c, Z0), (a, b, Z1, d), (a, X0, Z0, Z1), (X1, b, Z0, Z1))
-    return [
-        (quad((p, 0, r), (q, 0, r), (q, 0, s), (p, 0, s)), reflectance) for p, q, r, s in strips
-    ]
+    return [(quad((p, 0, r), (q, 0, r), (q, 0, s), (p, 0, s)), reflectance) for p, q, r, s in strips]
 
 
 def surfaces(quads: Quads) -> Surfaces:
@@ -124,9 +118,7 @@ CASES = {
 def overcast() -> AnnualSky:
     """One hour without sun, 10,000 lx."""
     sky = cie_patches("overcast", ReinhartSky(4), 1e4)[:, None]
-    return AnnualSky(
-        sky, np.array([[0, -0.8, 0.6]]), np.zeros(1), np.arange(1), 1, np.zeros_like(sky)
-    )
+    return AnnualSky(sky, np.array([[0, -0.8, 0.6]]), np.zeros(1), np.arange(1), 1, np.zeros_like(sky))
 
 
 def by_phases(
@@ -197,8 +189,7 @@ def main() -> None:
         scene = DaylightScene(interior, outside, [group], POINTS, UP)
         if not compiled:  # kernels are compiled once
             for parts in (1, 0):
-                by_phases(DaylightScene(interior, surfaces(fins()), [group], POINTS, UP), glass,
-                          parts, True)  # fmt: skip
+                by_phases(DaylightScene(interior, surfaces(fins()), [group], POINTS, UP), glass, parts, True)
             compiled = True
         sampling = Sampling(hour_samples=PATHS)
         paths = PathLight(scene, [[BsdfOptics(glass)]], overcast(), sampling)

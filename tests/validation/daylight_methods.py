@@ -42,22 +42,9 @@ from mitsuba_cfs.trace.matrices.view import view_matrix
 from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
 from mitsuba_cfs.trace.paths.point_in_time import point_in_time
 from mitsuba_cfs.trace.paths.scene import PathOptics, PathTracingScene, Sky, path_optics
-from tests.validation.blind_room import (
-    TILTS,
-    BlindRoom,
-    blind_layer,
-    empty,
-    glass_klems,
-    slats,
-    test_room,
-)
+from tests.validation.blind_room import TILTS, BlindRoom, blind_layer, empty, glass_klems, slats, test_room
 from tests.validation.fine_basis import fine_basis
-from tests.validation.glare_room import (
-    glazing,
-    known_system,
-    lit_hours,
-    sunny_days,
-)
+from tests.validation.glare_room import glazing, known_system, lit_hours, sunny_days
 
 DIM = 50.0  # [lx] hours below this at the reference count no relative error
 SUBDIVISION = 4
@@ -65,8 +52,14 @@ SAMPLING = Sampling(sensor_samples=262_144, patch_samples=32_768, subdivision=SU
 FINE = fine_basis(3)  # 1,321 patches
 THRESHOLD = 300.0  # [lx] of daylight autonomy
 DAYS = {"glass": (3, 25), "5 degrees": (4, 6), "40 degrees": (4, 1), "70 degrees": (6, 16)}
-SHOWN = ("slats", "three-phase", "five-phase, Klems", "five-phase, tensor tree",
-         "point in time, Klems", "point in time, tensor tree")  # fmt: skip
+SHOWN = (
+    "slats",
+    "three-phase",
+    "five-phase, Klems",
+    "five-phase, tensor tree",
+    "point in time, Klems",
+    "point in time, tensor tree",
+)
 COEFFICIENT_PATHS = 65_536  # of a sensor in each of 16 batches
 
 
@@ -96,12 +89,7 @@ def by_phases(
     """
     room = DaylightScene(scene.interior, empty(), scene.groups, scene.points, scene.up)
     known, found = BsdfOptics(system), {}
-    systems = [
-        [
-            MatrixOptics(known.transmission, way, reflection=known.reflection)
-            for way in ways.values()
-        ]
-    ]
+    systems = [[MatrixOptics(known.transmission, way, reflection=known.reflection) for way in ways.values()]]
     three_phase = phase_light(phase_matrices(room, SAMPLING, five_phase=False), systems, sky)
     found["three-phase"] = illuminance(three_phase)
     light = phase_light(phase_matrices(room, SAMPLING), systems, sky)
@@ -112,13 +100,8 @@ def by_phases(
 
 def by_fine_matrix(scene: BlindRoom, tilt_deg: float | None, sky: AnnualSky) -> NDArray[np.float64]:
     """Illuminance [S, H] by three phases with matrices of high resolution."""
-    view = view_matrix(
-        scene.interior, scene.groups, scene.points, scene.up, samples=16384, max_depth=32,
-        basis=FINE,
-    )  # fmt: skip
-    daylight = daylight_matrix(
-        empty(), scene.groups, subdivision=SUBDIVISION, samples=512, max_depth=32, basis=FINE
-    )
+    view = view_matrix(scene.interior, scene.groups, scene.points, scene.up, samples=16384, max_depth=32, basis=FINE)
+    daylight = daylight_matrix(empty(), scene.groups, subdivision=SUBDIVISION, samples=512, max_depth=32, basis=FINE)
     T = known_klems(tilt_deg, FINE, 8192).transmission_matrix()
     return phases.three_phase(view.values, [T], daylight.values, sky.whole)
 
@@ -141,13 +124,8 @@ def by_paths(
     for h in range(len(sky.lit)):
         luminance = sky.illuminance[h] / SUN_SOLID_ANGLE
         now = Sky(sky.without_sun(h), sky.direction[h], luminance)
-        runs.append(
-            point_in_time(
-                room, now, scene.points, scene.up, samples=samples, stopping=Stopping(batches=4)
-            )
-        )
-    return tuple(np.stack([getattr(r, name) for r in runs], axis=1) for name in
-                 ("values", "standard_error"))  # fmt: skip
+        runs.append(point_in_time(room, now, scene.points, scene.up, samples=samples, stopping=Stopping(batches=4)))
+    return tuple(np.stack([getattr(r, name) for r in runs], axis=1) for name in ("values", "standard_error"))
 
 
 def errors(found: NDArray, reference: NDArray) -> dict[str, float]:
@@ -183,9 +161,7 @@ def classified(found: NDArray, reference: NDArray) -> dict[str, float]:
         (" of the sensors' mean", found.mean(axis=0), reference.mean(axis=0)),
     ):
         said, enough = ours >= THRESHOLD, theirs >= THRESHOLD
-        for word, chosen, right in (
-            ("sensitivity", enough, said), ("specificity", ~enough, ~said),
-        ):  # fmt: skip
+        for word, chosen, right in (("sensitivity", enough, said), ("specificity", ~enough, ~said)):
             share = 100 * float(right[chosen].mean()) if chosen.any() else None
             table[f"{word}{name} [%]"] = share
     return table
@@ -213,13 +189,9 @@ def one_case(scene: BlindRoom, sky: AnnualSky, tilt_deg: float | None, samples: 
         "seconds of the reference": round(seconds, 1),
         "hours": reference.shape[1],
         "series": {
-            name: values.mean(axis=0).round(1).tolist()
-            for name, values in {"slats": reference, **found}.items()
+            name: values.mean(axis=0).round(1).tolist() for name, values in {"slats": reference, **found}.items()
         },
-        **{
-            name: errors(values, reference) | classified(values, reference)
-            for name, values in found.items()
-        },
+        **{name: errors(values, reference) | classified(values, reference) for name, values in found.items()},
     }
 
 
@@ -227,9 +199,7 @@ def of_a_day(weather: Weather, month: int, day: int) -> tuple[AnnualSky, list[st
     """The sunniest day within a fortnight of a date: its skies, and its hours."""
     of_day = sunny_days(weather, month, day, 1)
     hours = lit_hours(weather, of_day, 1)
-    return annual_sky(weather, SUBDIVISION, hours=hours), [
-        f"{t:%H:%M}" for t in weather.midpoints[hours]
-    ]
+    return annual_sky(weather, SUBDIVISION, hours=hours), [f"{t:%H:%M}" for t in weather.midpoints[hours]]
 
 
 def write_series(results: dict, path: Path) -> None:

@@ -46,9 +46,7 @@ class Printed:
 
 
 def main(
-    names: Annotated[
-        Sequence[str], "runners of tests.validation; default: those of `RUNNERS`"
-    ] = RUNNERS,
+    names: Annotated[Sequence[str], "runners of tests.validation; default: those of `RUNNERS`"] = RUNNERS,
     *,
     benchmarks: Annotated[Sequence[str], "benchmarks; default: those of `BENCHMARKS`"] = BENCHMARKS,
     keep: Annotated[Path, "folder for what the runners print"] = Path("devices"),
@@ -82,9 +80,12 @@ def _compared(package: str, name: str, keep: Path) -> dict[str, object]:
                 worst, where = difference, one.strip()[:60]
     lines = len(cpu.lines) == len(cuda.lines)
     return {
-        **row, "figures": figures, "over 1 % and the last digit": apart,
-        "largest difference": worst, "where": where if lines else "not the same lines",
-    }  # fmt: skip
+        **row,
+        "figures": figures,
+        "over 1 % and the last digit": apart,
+        "largest difference": worst,
+        "where": where if lines else "not the same lines",
+    }
 
 
 def _printed(package: str, name: str, device: str, keep: Path) -> Printed:

@@ -22,11 +22,7 @@ from typing import Annotated
 import pandas as pd
 
 from mitsuba_cfs.sky.epw import read_epw
-from tests.validation import (
-    energyplus_figures,
-    energyplus_sensitivity,
-    reference_systems,
-)
+from tests.validation import energyplus_figures, energyplus_sensitivity, reference_systems
 from tests.validation.energyplus_cases import ALL_FILES, EPW_FILES, EnergyPlusCase, pairs
 from tests.validation.energyplus_statistics import (
     Classification,
@@ -42,19 +38,13 @@ BANDS = ("ASHRAE 55 90 %", "ASHRAE 55 80 %")
 
 
 def compare(
-    reference: Path,
-    epw: Path,
-    climates: Sequence[str],
-    orientations: Sequence[str],
-    closures: Sequence[str] = CLOSURES,
+    reference: Path, epw: Path, climates: Sequence[str], orientations: Sequence[str], closures: Sequence[str] = CLOSURES
 ) -> tuple[pd.DataFrame, dict[str, object]]:
     """One row per case and closure, and the correlations and comfort counts."""
     weathers = {name: read_epw(epw / ALL_FILES[name]) for name in climates}
     rows, kept = [], []
     comfort: dict[tuple[str, str, str], Classification] = {}
-    for theirs, ours in pairs(
-        reference, epw, closures=closures, climates=climates, orientations=orientations
-    ):
+    for theirs, ours in pairs(reference, epw, closures=closures, climates=climates, orientations=orientations):
         outdoor = weathers[theirs.climate].dry_bulb_c
         for case in ours:
             rows.append(case_row(case, theirs))
@@ -85,9 +75,7 @@ def _comfort_row(key: tuple[str, str, str], counts: Classification) -> dict[str,
 
 
 def _correlations(
-    kept: list[tuple[EnergyPlusCase, list[EnergyPlusCase]]],
-    weathers: dict,
-    closures: Sequence[str],
+    kept: list[tuple[EnergyPlusCase, list[EnergyPlusCase]]], weathers: dict, closures: Sequence[str]
 ) -> list[dict[str, object]]:
     rows: list[dict[str, object]] = []
     for index, model in enumerate(closures):
@@ -145,14 +133,7 @@ def main(
 ) -> None:
     """Run the comparison and write its results."""
     start = time.perf_counter()
-    cases, summary = study(
-        reference,
-        epw,
-        climates,
-        orientations,
-        closures=closures,
-        sensitivity=not no_sensitivity,
-    )
+    cases, summary = study(reference, epw, climates, orientations, closures=closures, sensitivity=not no_sensitivity)
     summary["seconds"] = time.perf_counter() - start
     out.mkdir(parents=True, exist_ok=True)
     cases.to_csv(out / "cases.csv", index=False)

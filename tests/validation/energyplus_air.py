@@ -39,24 +39,24 @@ def energyplus_model(leaks: str, orientation: str, recovery: float) -> Model:
         f"{name}_coefficient": value for name, value in zip(names, LEAKS[leaks], strict=True)
     }
     model["HeatExchanger:AirToAir:SensibleAndLatent"]["EXCHANGER"] |= {
-        f"sensible_effectiveness_at_100_{load}_air_flow": recovery
-        for load in ("heating", "cooling")
+        f"sensible_effectiveness_at_100_{load}_air_flow": recovery for load in ("heating", "cooling")
     }
     return model
 
 
 def compare(leaks: str, orientation: str, recovery: float = RECOVERY) -> dict[str, Any]:
     """Air RMSE and bias [K], heating and cooling of a year of both [kWh]."""
-    theirs = run_energyplus(
-        energyplus_model(leaks, orientation, recovery), WEATHER, outputs=OUTPUTS
-    )
+    theirs = run_energyplus(energyplus_model(leaks, orientation, recovery), WEATHER, outputs=OUTPUTS)
     weather = read_epw(WEATHER)
     density = weather.pressure_pa / (287.055 * (weather.dry_bulb_c + 273.15))
     ours = clear_double_year(
-        weather, orientation, infiltration_ach=LEAK_ACH, leakage=Leakage(LEAKS[leaks]),
+        weather,
+        orientation,
+        infiltration_ach=LEAK_ACH,
+        leakage=Leakage(LEAKS[leaks]),
         supply=SupplyAir(SUPPLY_ACH * STANDARD_DENSITY / density, recovery=recovery),
         loads=IdealLoads(HEATING_C, COOLING_C),
-    )  # fmt: skip
+    )
     row: dict[str, Any] = {"leaks": leaks, "facing": orientation, "recovery": recovery}
     row["air rmse K"], row["air bias K"] = rmse_and_bias(ours.air_c, theirs["air"])
     for load in ("heating", "cooling"):

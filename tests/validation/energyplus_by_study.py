@@ -68,9 +68,13 @@ OUTSIDE = f"{SHEET}edges = [0.1, 0.1, 0.1, 0.1]\ngap = {{ width = 0.1 }}\n"
 INSIDE = f"gap = {{ width = 0.05 }}\n{SHEET}edges = [0.05, 0.05, 0.05, 0.05]\n"
 ONE_DIFFUSE = "layers, one diffuse value"  # of the window, for all light but the sun's
 LAYERS = {
-    "dgu": PANES, "ext_blind": BLIND + PANES, "ext_shade": OUTSIDE + PANES,
-    "int_shade": PANES + INSIDE, "clear": CLEAR_PANES, "clear int_shade": CLEAR_PANES + INSIDE,
-}  # fmt: skip
+    "dgu": PANES,
+    "ext_blind": BLIND + PANES,
+    "ext_shade": OUTSIDE + PANES,
+    "int_shade": PANES + INSIDE,
+    "clear": CLEAR_PANES,
+    "clear int_shade": CLEAR_PANES + INSIDE,
+}
 PATCHES = {"clear": ("clear_double",), "clear int_shade": ("clear_double", "int_shade")}
 POSITIONS = PLACES | {"clear": "none", "clear int_shade": "internal"}
 LOW_E_GAP = "gap = { width = 0.016, gas = { argon = 0.9, air = 0.1 }, emissivity = [0.84, 0.05] }\n"
@@ -103,10 +107,7 @@ def known_window(folder: Path, reference: Path, name: str) -> KnownWindow:
         g = float(iso15099_g_values(unit, prescribed(*STATED_G), optics.tau[:1], absorbed)[0])
         like = "int_shade" if name != "clear" else "dgu"
         system = replace(traced_system(like, optics), closure=None)
-    write_bsdf_xml(
-        BsdfFile({"Visible": system.visible, "Solar": system.solar}, name=name),
-        folder / f"{name}.xml",
-    )
+    write_bsdf_xml(BsdfFile({"Visible": system.visible, "Solar": system.solar}, name=name), folder / f"{name}.xml")
     return KnownWindow(f"{name}.xml", float(u), float(g))
 
 
@@ -123,13 +124,8 @@ def clear_system(*, shaded: bool) -> tuple[Optics, GlazingUnit]:
         return _optics(glass.tau, glass.rho_front, back), GlazingUnit(panes, (gap,))
     passed, thrown = SHADE
     bounce = 1.0 / (1.0 - thrown * behind)
-    back = {
-        "tau_back": passed * bounce * through,
-        "rho_back": thrown + passed**2 * behind * bounce,
-    }
-    optics = _optics(
-        glass.tau * passed * bounce, glass.rho_front + glass.tau * thrown * bounce * through, back
-    )
+    back = {"tau_back": passed * bounce * through, "rho_back": thrown + passed**2 * behind * bounce}
+    optics = _optics(glass.tau * passed * bounce, glass.rho_front + glass.tau * thrown * bounce * through, back)
     shade = layers("int_shade").layers[-1]
     return optics, GlazingUnit((*panes, shade), (gap, GasGap(0.05)))
 
@@ -197,16 +193,17 @@ def main(
                 needs = load_hours(patches, orientation, told)
                 for kind in inputs:
                     row: dict[str, object] = {
-                        "climate": epw.stem, "facing": orientation, "system": name, "inputs": kind,
-                    }  # fmt: skip
+                        "climate": epw.stem,
+                        "facing": orientation,
+                        "system": name,
+                        "inputs": kind,
+                    }
                     window = window_text(known[name], name, kind)
                     for held, more in (("floating", ""), ("kept", KEPT)):
                         study = folder / f"{epw.stem} {orientation} {name} {kind} {held}.toml"
                         text = study_text(epw, orientation, window, more)
                         if kind == ONE_DIFFUSE:
-                            text = text.replace(
-                                "[trace]\n", '[trace]\nsky_light = "hemispherical"\n'
-                            )
+                            text = text.replace("[trace]\n", '[trace]\nsky_light = "hemispherical"\n')
                         study.write_text(text, "utf-8")
                         hours = our_year(study)
                         if held == "floating":

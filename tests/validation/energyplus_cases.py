@@ -92,9 +92,7 @@ def reference_case(name: str, system: str, orientation: str, table: pd.DataFrame
     faces = np.column_stack([walls, window])
     centre = centre_operative(air, faces, floor)
     wall = walls.mean(axis=1)
-    return EnergyPlusCase(
-        name, system, orientation, "EnergyPlus", air, wall, window, floor, own, centre
-    )
+    return EnergyPlusCase(name, system, orientation, "EnergyPlus", air, wall, window, floor, own, centre)
 
 
 def our_case(
@@ -162,9 +160,7 @@ def pairs(
     """EnergyPlus' case and ours with every closure, case by case."""
     light = reference_room.RoomLight()
     models = {
-        (name, closure): reference_systems.system(reference, name, closure)
-        for name in systems
-        for closure in closures
+        (name, closure): reference_systems.system(reference, name, closure) for name in systems for closure in closures
     }
     done, total = 0, len(climates) * len(orientations) * len(systems)
     for name in climates:
@@ -173,24 +169,17 @@ def pairs(
         for orientation in orientations:
             for system in systems:
                 theirs = reference_case(name, system, orientation, hours(system, orientation))
-                ours = [
-                    our_case(place, orientation, system, models[(system, c)], light, c)
-                    for c in closures
-                ]
+                ours = [our_case(place, orientation, system, models[(system, c)], light, c) for c in closures]
                 yield theirs, ours
                 done += 1
                 if progress:
                     progress(done / total)
 
 
-def _reference_hours(
-    reference: Path, epw: Path, climate: str
-) -> Callable[[str, str], pd.DataFrame]:
+def _reference_hours(reference: Path, epw: Path, climate: str) -> Callable[[str, str], pd.DataFrame]:
     """EnergyPlus' table of a system and orientation: stored, or run now."""
     if climate in LIVE_FILES:
-        return lambda system, orientation: run_energyplus(
-            room_model(orientation, system), epw / LIVE_FILES[climate]
-        )
+        return lambda system, orientation: run_energyplus(room_model(orientation, system), epw / LIVE_FILES[climate])
     table = pd.read_parquet(reference / f"ep_{climate}.parquet")
     tables = dict(list(table.groupby(["cfs", "ori"], observed=True)))
     return lambda system, orientation: tables[(system, orientation)]
@@ -200,9 +189,7 @@ def with_g(optics: Optics, g: FloatArray, diffuse_g: FloatArray) -> Optics:
     """The same optics with another g per direction [K] and for sky and ground light [2]."""
     diffuse = optics.diffuse.copy()
     diffuse[:, 2] = diffuse_g
-    return Optics(
-        optics.theta, optics.phi, optics.tau, optics.rho, g, diffuse, optics.scatter, optics.back
-    )
+    return Optics(optics.theta, optics.phi, optics.tau, optics.rho, g, diffuse, optics.scatter, optics.back)
 
 
 def errors(ours: EnergyPlusCase, theirs: EnergyPlusCase) -> dict[str, FloatArray]:

@@ -50,9 +50,7 @@ def _bars(axis: Axes, table: pd.DataFrame, by: str, quantity: str) -> None:
     for i, model in enumerate(models):
         rows = table[table["model"] == model].set_index(by)
         x = np.arange(len(groups)) + (i - (len(models) - 1) / 2) * width
-        axis.bar(
-            x, rows.loc[groups, f"{quantity} rmse"], width, label=model, color=COLOURS.get(model)
-        )
+        axis.bar(x, rows.loc[groups, f"{quantity} rmse"], width, label=model, color=COLOURS.get(model))
     axis.set_xticks(range(len(groups)), groups, fontsize=8)
     axis.set_title(quantity, loc="left")
     axis.spines[["top", "right"]].set_visible(False)
@@ -88,14 +86,7 @@ def _measurement(summary: dict[str, Any], folder: Path) -> Path:
             none = {"error": 0.0} | dict.fromkeys(QUANTITIES, 0.0)
             rows = pd.concat([rows, pd.DataFrame([none])]).sort_values("error")
             for i, q in enumerate(QUANTITIES):
-                axis.plot(
-                    rows["error"],
-                    rows[q],
-                    style,
-                    marker="o",
-                    color=f"C{i}",
-                    label=f"{q}, {position}",
-                )
+                axis.plot(rows["error"], rows[q], style, marker="o", color=f"C{i}", label=f"{q}, {position}")
         axis.set_xlabel("error of g" if quantity == "g" else "error of U [W/(m2 K)]")
         axis.set_ylabel("RMS change [K]")
         axis.spines[["top", "right"]].set_visible(False)

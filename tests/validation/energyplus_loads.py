@@ -20,15 +20,10 @@ from thermal.emitters import IdealLoads
 SET_POINTS = IdealLoads(heating_c=20.0, cooling_c=26.0)
 
 
-def annual_loads(
-    reference: Path, epw: Path, climates: Sequence[str], closure: str = "films"
-) -> pd.DataFrame:
+def annual_loads(reference: Path, epw: Path, climates: Sequence[str], closure: str = "films") -> pd.DataFrame:
     """One row per case: heating and cooling [kWh], ours and EnergyPlus'."""
     light, rows = reference_room.RoomLight(), []
-    systems = {
-        name: reference_systems.system(reference, name, closure)
-        for name in reference_systems.SYSTEMS
-    }
+    systems = {name: reference_systems.system(reference, name, closure) for name in reference_systems.SYSTEMS}
     for climate in climates:
         place = site(climate, epw / EPW_FILES[climate])
         for case in json.loads((reference / f"summary_{climate}.json").read_text()):
@@ -36,20 +31,22 @@ def annual_loads(
             sun = reference_room.solar(place.suns[case["ori"]], system, light)
             zone = reference_room.zone(case["ori"], system.fenestration, loads=SET_POINTS)
             result = simulate(zone, place.climate, sun, step_s=3600.0 / STEPS)
-            rows.append({
-                "climate": climate, "system": case["cfs"], "orientation": case["ori"],
-                "heating": result.heating.sum() / 1e3, "cooling": result.cooling.sum() / 1e3,
-                "EnergyPlus heating": case["Q_heat_kWh"], "EnergyPlus cooling": case["Q_cool_kWh"],
-            })  # fmt: skip
+            rows.append(
+                {
+                    "climate": climate,
+                    "system": case["cfs"],
+                    "orientation": case["ori"],
+                    "heating": result.heating.sum() / 1e3,
+                    "cooling": result.cooling.sum() / 1e3,
+                    "EnergyPlus heating": case["Q_heat_kWh"],
+                    "EnergyPlus cooling": case["Q_cool_kWh"],
+                }
+            )
     return pd.DataFrame(rows)
 
 
 def main(
-    *,
-    reference: Path,
-    epw: Path,
-    closure: str = "films",
-    climates: Sequence[str] = tuple(EPW_FILES),
+    *, reference: Path, epw: Path, closure: str = "films", climates: Sequence[str] = tuple(EPW_FILES)
 ) -> pd.DataFrame:
     """Mean of EnergyPlus, bias and RMS difference [kWh] by system."""
     rows = []

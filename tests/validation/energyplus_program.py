@@ -39,9 +39,7 @@ OUTPUTS = {
 }
 
 
-def room_model(
-    orientation: str, *changes: str, outputs: dict[str, str] | None = None, steps: int = 6
-) -> Model:
+def room_model(orientation: str, *changes: str, outputs: dict[str, str] | None = None, steps: int = 6) -> Model:
     """The room that faces `orientation`, with the changes that files of `models` name, in order.
 
     Args: changes: names of patches; "dgu" is the room's own glazing.
@@ -55,9 +53,7 @@ def room_model(
     model["Timestep"]["main"]["number_of_timesteps_per_hour"] = steps
     names = sorted({key.split(":", 1)[1] for key in (OUTPUTS if outputs is None else outputs)})
     hourly = {"key_value": "*", "reporting_frequency": "Hourly"}
-    model["Output:Variable"] = {
-        f"out {i}": hourly | {"variable_name": name} for i, name in enumerate(names)
-    }
+    model["Output:Variable"] = {f"out {i}": hourly | {"variable_name": name} for i, name in enumerate(names)}
     return model
 
 

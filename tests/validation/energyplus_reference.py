@@ -57,9 +57,7 @@ def hours(system: str, orientation: str, epw: Path) -> pd.DataFrame:
 
 def loads(patches: Sequence[str], orientation: str, epw: Path) -> dict[str, float]:
     """Heating and cooling of one case's year [kWh]; patches: of its window, see `room_model`."""
-    return {
-        name: float(hours.sum()) for name, hours in load_hours(patches, orientation, epw).items()
-    }
+    return {name: float(hours.sum()) for name, hours in load_hours(patches, orientation, epw).items()}
 
 
 def load_hours(patches: Sequence[str], orientation: str, epw: Path) -> pd.DataFrame:
@@ -68,9 +66,7 @@ def load_hours(patches: Sequence[str], orientation: str, epw: Path) -> pd.DataFr
     return run_energyplus(model, epw, outputs=LOADS) / JOULES
 
 
-def write_climate(
-    name: str, epw: Path, systems: Sequence[str], orientations: Sequence[str], out: Path
-) -> None:
+def write_climate(name: str, epw: Path, systems: Sequence[str], orientations: Sequence[str], out: Path) -> None:
     """Run every case of a climate and write both files."""
     cases = [(system, orientation) for system in systems for orientation in orientations]
     table = pd.concat([hours(*case, epw) for case in cases], ignore_index=True)

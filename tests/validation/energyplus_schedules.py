@@ -75,9 +75,8 @@ def compare(orientation: str) -> pd.DataFrame:
     weather = read_epw(WEATHER)
     hours = OperationHours(OperationTables.model_validate(tomllib.loads(OFFICE)), weather)
     ours = clear_double_year(
-        weather, orientation, **hours.outdoor_air(),
-        gains=split_gains(hours.heat(FLOOR_AREA), 0.5), loads=hours.loads(),
-    )  # fmt: skip
+        weather, orientation, **hours.outdoor_air(), gains=split_gains(hours.heat(FLOOR_AREA), 0.5), loads=hours.loads()
+    )
     date = weather.midpoints.strftime("%m-%d").to_numpy(dtype=str)
     rows = []
     for name, (start, end) in (WEEKS | {"year": ("01-01", "12-31")}).items():

@@ -23,12 +23,7 @@ from tests.validation.energyplus_cases import (
     with_g,
 )
 from tests.validation.energyplus_statistics import case_row, pooled
-from tests.validation.reference_systems import (
-    Optics,
-    ReferenceSystem,
-    read_optics,
-    system,
-)
+from tests.validation.reference_systems import Optics, ReferenceSystem, read_optics, system
 from thermal.gvalue import InternalShade
 
 FloatArray = NDArray[np.float64]
@@ -56,9 +51,7 @@ def kappa_system(folder: Path, kappa: float) -> ReferenceSystem:
         tau_shade_diffuse=SHADE[0],
         rho_shade_diffuse=SHADE[1],
     )
-    hemispherical = replace(
-        shade, tau_glazing=diffuse[0], rho_glazing=diffuse[1], g_glazing=diffuse[2]
-    )
+    hemispherical = replace(shade, tau_glazing=diffuse[0], rho_glazing=diffuse[1], g_glazing=diffuse[2])
     g = _physical(shade.kuhn(kappa=kappa)[2], whole.tau, whole.rho)
     g_diffuse = hemispherical.kuhn(kappa=kappa)[2]
     optics = with_g(whole, g, np.array([g_diffuse, g_diffuse]))
@@ -70,9 +63,7 @@ def _physical(g: FloatArray, tau: FloatArray, rho: FloatArray) -> FloatArray:
     return np.clip(g, tau, np.maximum(1.0 - rho, tau))
 
 
-def kappa_study(
-    reference: Path, epw: Path, climates: Sequence[str], orientations: Sequence[str]
-) -> pd.DataFrame:
+def kappa_study(reference: Path, epw: Path, climates: Sequence[str], orientations: Sequence[str]) -> pd.DataFrame:
     """RMSE and bias of the interior shade's case against EnergyPlus for every kappa."""
     light, rows = reference_room.RoomLight(), []
     systems = {kappa: kappa_system(reference, kappa) for kappa in KAPPAS}
@@ -102,9 +93,7 @@ def wrong_u(folder: Path, name: str, error: float) -> ReferenceSystem:
     return system(folder, name, "kuhn", u_value=right.fenestration.u_value + error)
 
 
-def measurement_study(
-    reference: Path, epw: Path, climates: Sequence[str], orientations: Sequence[str]
-) -> pd.DataFrame:
+def measurement_study(reference: Path, epw: Path, climates: Sequence[str], orientations: Sequence[str]) -> pd.DataFrame:
     """RMS change [K] of the temperatures in plain Kuhn for errors of g and of U, by position."""
     light, rows = reference_room.RoomLight(), []
     for name in climates:

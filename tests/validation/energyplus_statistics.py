@@ -10,12 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 from mitsuba_cfs.sky.weather import Weather
-from tests.validation.energyplus_cases import (
-    FIRST_HOUR,
-    QUANTITIES,
-    EnergyPlusCase,
-    errors,
-)
+from tests.validation.energyplus_cases import FIRST_HOUR, QUANTITIES, EnergyPlusCase, errors
 from thermal.comfort import comfort_by_outdoors
 from thermal.zone import work_hours
 
@@ -56,9 +51,7 @@ def weather_correlations(
     p is the chance of such a correlation between independent values; hours follow each other, so
     it says less than it seems to: the number of hours is large and they are not independent.
     """
-    error = np.concatenate(
-        [np.abs(errors(o, t)["window"]) for o, t in zip(ours, theirs, strict=True)]
-    )
+    error = np.concatenate([np.abs(errors(o, t)["window"]) for o, t in zip(ours, theirs, strict=True)])
     rows = []
     for index, name in enumerate(WEATHER_NAMES):
         value = np.concatenate([_weather_series(weathers[o.climate])[index] for o in ours])

@@ -32,12 +32,7 @@ from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.room import operated_zone
 from scenes.room.windows import in_all_windows
 from scenes.room.zone import balances
-from tests.validation.energyplus_cases import (
-    EPW_FILES,
-    EnergyPlusCase,
-    centre_operative,
-    reference_case,
-)
+from tests.validation.energyplus_cases import EPW_FILES, EnergyPlusCase, centre_operative, reference_case
 from tests.validation.energyplus_statistics import case_row, pooled
 from tests.validation.energyplus_study import STUDY
 from tests.validation.reference_room import ORIENTATIONS
@@ -90,11 +85,7 @@ def _patches(optics: Optics, theta: FloatArray, phi: FloatArray) -> NDArray[np.i
 
 
 def traced_case(
-    study: StudyFile,
-    place: Place,
-    orientation: str,
-    system: FenestrationSystem,
-    cache: MatrixCache | None,
+    study: StudyFile, place: Place, orientation: str, system: FenestrationSystem, cache: MatrixCache | None
 ) -> EnergyPlusCase:
     """Our hours of a case, traced."""
     turned = study.box.model_copy(update={"facing_deg": float(ORIENTATIONS[orientation])})
@@ -102,9 +93,15 @@ def traced_case(
     (space,) = building.spaces
 
     inputs = room_inputs(
-        building, space, in_all_windows(space, system), place.weather, study.options,
-        operation=study, skies=place.skies, cache=cache,
-    )  # fmt: skip
+        building,
+        space,
+        in_all_windows(space, system),
+        place.weather,
+        study.options,
+        operation=study,
+        skies=place.skies,
+        cache=cache,
+    )
     room = operated_zone(inputs)
     step_s = study.options.heat_step_s
     (result,) = balances([room], place.weather, step_s, terrain=study.terrain)
@@ -112,10 +109,17 @@ def traced_case(
     (floor,) = (k for k, one in enumerate(room.zone.surfaces) if one.normal[2] < -FLOOR)
     faces = np.column_stack([walls, window])
     return EnergyPlusCase(
-        place.name, system.name, orientation, "traced", result.air_c, walls.mean(axis=1),
-        window[:, 0], walls[:, floor], result.operative_c,
+        place.name,
+        system.name,
+        orientation,
+        "traced",
+        result.air_c,
+        walls.mean(axis=1),
+        window[:, 0],
+        walls[:, floor],
+        result.operative_c,
         centre_operative(result.air_c, faces, walls[:, floor]),
-    )  # fmt: skip
+    )
 
 
 def compare(
@@ -143,9 +147,7 @@ def compare(
         tables = dict(list(hours.groupby(["cfs", "ori"], observed=True)))
         for orientation in orientations:
             for system in systems:
-                theirs = reference_case(
-                    name, system.name, orientation, tables[(system.name, orientation)]
-                )
+                theirs = reference_case(name, system.name, orientation, tables[(system.name, orientation)])
                 ours = traced_case(study, place, orientation, system, cache)
                 rows.append(case_row(ours, theirs))
     return pd.DataFrame(rows)

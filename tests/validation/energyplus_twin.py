@@ -47,12 +47,7 @@ SUMS = {"incident_w": "sun on", "transmitted_w": "sun in", "absorbed_room_w": "s
 
 
 def compared(
-    path: Path,
-    folder: Path,
-    *,
-    their_sun: bool = False,
-    open_sky: bool = False,
-    clock: bool = False,
+    path: Path, folder: Path, *, their_sun: bool = False, open_sky: bool = False, clock: bool = False
 ) -> dict[str, pd.DataFrame]:
     """Air [K] and loads [kWh] of every room of a study, ours and EnergyPlus', by what ours has.
 
@@ -73,9 +68,13 @@ def compared(
 
     def again(rooms: list[RoomZone]) -> pd.DataFrame:
         results = balances(
-            rooms, found.weather, study.options.heat_step_s,
-            air_links=found.air_links, transfers=found.transfers, terrain=study.terrain,
-        )  # fmt: skip
+            rooms,
+            found.weather,
+            study.options.heat_step_s,
+            air_links=found.air_links,
+            transfers=found.transfers,
+            terrain=study.terrain,
+        )
         return _rows(twin.zones, replace(found, rooms=rooms, results=results), theirs)
 
     tables = {"ours": _rows(twin.zones, found, theirs)}
@@ -93,26 +92,18 @@ def compared(
         tables["ours under an open sky"] = again([under_open_sky(room) for room in found.rooms])
     if their_sun:
         pairs = zip(twin.zones, found.rooms, strict=True)
-        tables["ours with EnergyPlus' sun"] = again(
-            [with_their_sun(zone, room, theirs) for zone, room in pairs]
-        )
+        tables["ours with EnergyPlus' sun"] = again([with_their_sun(zone, room, theirs) for zone, room in pairs])
     return tables
 
 
 def window_outputs(zones: Sequence[str], rooms: Sequence[RoomZone]) -> dict[str, dict[str, str]]:
     """The request for what `with_their_sun` reads of every window."""
-    windows = [
-        f"{zone} W{k}"
-        for zone, room in zip(zones, rooms, strict=True)
-        for k in range(len(room.zone.windows))
-    ]
+    windows = [f"{zone} W{k}" for zone, room in zip(zones, rooms, strict=True) for k in range(len(room.zone.windows))]
     return {
-        f"{window} {k}": {
-            "key_value": window, "variable_name": name, "reporting_frequency": "Hourly",
-        }
+        f"{window} {k}": {"key_value": window, "variable_name": name, "reporting_frequency": "Hourly"}
         for window in windows
         for k, name in enumerate(WINDOWS)
-    }  # fmt: skip
+    }
 
 
 def under_open_sky(room: RoomZone) -> RoomZone:
@@ -143,8 +134,9 @@ def sky_seen(zone: str, room: RoomZone, listed: str) -> pd.DataFrame:
         seen = [float(part[number["ViewFactorToSky-IR"]]) / half for part in mine]
         if mine:
             theirs = float(np.average(seen, weights=area))
-            rows.append({"room": zone, "face": one.name, "area": one.area,
-                         "sky seen": one.sky_seen, "sky seen E+": theirs})  # fmt: skip
+            rows.append(
+                {"room": zone, "face": one.name, "area": one.area, "sky seen": one.sky_seen, "sky seen E+": theirs}
+            )
     return pd.DataFrame(rows).set_index("room")
 
 
@@ -187,10 +179,14 @@ def with_their_sun(zone: str, room: RoomZone, theirs: pd.DataFrame) -> RoomZone:
             falls = [c for c in parts if c.endswith(f":{INCIDENT}")]
             facade[:, index] = theirs[falls].to_numpy().mean(axis=1)
     solar = replace(
-        sun, absorbed_outer=outer, absorbed_inner=inner, absorbed_middle=None, inside=inside,
+        sun,
+        absorbed_outer=outer,
+        absorbed_inner=inner,
+        absorbed_middle=None,
+        inside=inside,
         facade=facade,
         window_inside=None if sun.window_inside is None else np.zeros_like(sun.window_inside),
-    )  # fmt: skip
+    )
     return replace(room, solar=solar, gains=room.gains | their_sums(zone, room, theirs))
 
 
@@ -206,10 +202,7 @@ def _rows(zones: Sequence[str], found: BalancedRooms, theirs: pd.DataFrame) -> p
         sums = their_sums(zone, room, theirs)
         gap = (result.air_c - air)[SETTLED:]
         row = {"room": result.name, "air RMSE": np.sqrt(np.mean(gap**2)), "bias": gap.mean()}
-        for name, ours, key in (
-            ("heating", result.heating, HEATING),
-            ("cooling", result.cooling, COOLING),
-        ):
+        for name, ours, key in (("heating", result.heating, HEATING), ("cooling", result.cooling, COOLING)):
             row[name] = ours.sum() / 1e3
             other = theirs.get(f"{plant}:{key}")
             row[f"{name} E+"] = np.nan if other is None else other.sum() / 1e3
@@ -219,10 +212,7 @@ def _rows(zones: Sequence[str], found: BalancedRooms, theirs: pd.DataFrame) -> p
         rows.append(row)
     table = pd.DataFrame(rows).set_index("room")
     total = table.drop(columns=["air RMSE", "bias"]).sum()
-    total["air RMSE"], total["bias"] = (
-        np.sqrt((table["air RMSE"] ** 2).mean()),
-        table["bias"].mean(),
-    )
+    total["air RMSE"], total["bias"] = (np.sqrt((table["air RMSE"] ** 2).mean()), table["bias"].mean())
     return pd.concat([table, total.to_frame("all").T])
 
 
@@ -232,18 +222,11 @@ def shouted(name: str) -> str:
 
 
 def main(
-    studies: Sequence[Path],
-    *,
-    out: Path,
-    their_sun: bool = False,
-    open_sky: bool = False,
-    clock: bool = False,
+    studies: Sequence[Path], *, out: Path, their_sun: bool = False, open_sky: bool = False, clock: bool = False
 ) -> dict[str, pd.DataFrame]:
     """A table for each study; their_sun, open_sky, clock: see `compared`."""
     return {
         f"{path.name}, {title}": table.round(2)
         for path in studies
-        for title, table in compared(
-            path, out / path.stem, their_sun=their_sun, open_sky=open_sky, clock=clock
-        ).items()
+        for title, table in compared(path, out / path.stem, their_sun=their_sun, open_sky=open_sky, clock=clock).items()
     }

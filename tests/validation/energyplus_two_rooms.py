@@ -44,10 +44,7 @@ def our_rooms(door: float) -> tuple[ZoneResult, ...]:
     rear = _rear(front)
     front = replace(
         front,
-        surfaces=tuple(
-            replace(s, outside="rear", partner="front") if s.name == "back" else s
-            for s in front.surfaces
-        ),
+        surfaces=tuple(replace(s, outside="rear", partner="front") if s.name == "back" else s for s in front.surfaces),
     )
     sunny = reference_room.solar(
         facade_sun(steps, reference_room.facade_normal("S")), system, reference_room.RoomLight()
@@ -70,8 +67,7 @@ def _rear(front: Zone) -> Zone:
     """The room behind: the front room turned round, its window closed."""
     by_name = {s.name: s for s in front.surfaces}
     turned = [replace(by_name[name]) for name in ("left", "right", "floor", "ceiling")]
-    wall = replace(by_name["back"], name="front", outside="room", partner="back",
-                   normal=-by_name["back"].normal)  # fmt: skip
+    wall = replace(by_name["back"], name="front", outside="room", partner="back", normal=-by_name["back"].normal)
     facade = replace(by_name["facade"], area=12.0, normal=-by_name["facade"].normal)
     surfaces = (facade, *turned, wall)
     return Zone(
@@ -88,9 +84,7 @@ def compare() -> pd.DataFrame:
     rows = []
     for label, door in (("wall", 0.0), ("wall and open door", DOOR_M3_S)):
         changes = ("clear_double", "second_room", *(("open_door",) if door else ()))
-        theirs = run_energyplus(
-            room_model("S", *changes, outputs=OUTPUTS), WEATHER, outputs=OUTPUTS
-        )
+        theirs = run_energyplus(room_model("S", *changes, outputs=OUTPUTS), WEATHER, outputs=OUTPUTS)
         front, rear = our_rooms(door)
         ours = {
             "front air": front.air_c,
@@ -100,8 +94,7 @@ def compare() -> pd.DataFrame:
         }
         for name, values in ours.items():
             rmse, bias = rmse_and_bias(values[SETTLED:], theirs[name][SETTLED:])
-            rows.append({"between": label, "quantity": name, "mean C": values.mean(),
-                         "rmse K": rmse, "bias K": bias})  # fmt: skip
+            rows.append({"between": label, "quantity": name, "mean C": values.mean(), "rmse K": rmse, "bias K": bias})
     return pd.DataFrame(rows)
 
 

@@ -42,15 +42,10 @@ RADIANT_SHARES = (0.5, 0.0)  # of the gains; the first is the room's
 AREA, ROOM_AREA = 4.5, 94.0  # of the window and of all inner faces [m2]
 GAINS_W = 235.0  # of person and computers, from 8 to 18 h
 STEPS = 6  # per hour
-SHADED = {
-    "clear int_shade": lambda: clear_system(shaded=True)[1],
-    "int_shade": lambda: layers("int_shade"),
-}
+SHADED = {"clear int_shade": lambda: clear_system(shaded=True)[1], "int_shade": lambda: layers("int_shade")}
 GLAZING_WIDTH = 3.0  # [m] as the study files state it
 KELVIN = 273.15
-ALL_REPORTS = {
-    "Output:Diagnostics": {"more": {"diagnostics": [{"key": "DisplayAdvancedReportVariables"}]}}
-}
+ALL_REPORTS = {"Output:Diagnostics": {"more": {"diagnostics": [{"key": "DisplayAdvancedReportVariables"}]}}}
 OUTSIDE, INSIDE = "WINDOW:Surface Outside Face ", "WINDOW:Surface Inside Face "
 FILM, NET_LONGWAVE = "Convection Heat Transfer Coefficient", "Net Thermal Radiation Heat Gain Rate"
 LOSSES = ("Convection Heat Gain Rate", "Net Thermal Radiation Heat Gain Rate")
@@ -100,9 +95,7 @@ def year_of_loads(folder: Path, reference: Path, epw: Path, system: str) -> pd.D
     window = window_text(known_window(folder, reference, system), system, "layers")
     rows = []
     for share in RADIANT_SHARES:
-        model = room_model(
-            "S", *PATCHES.get(system, (system,)), "ideal_loads_20_26", outputs=LOADS, steps=STEPS
-        )
+        model = room_model("S", *PATCHES.get(system, (system,)), "ideal_loads_20_26", outputs=LOADS, steps=STEPS)
         for kind in ("ElectricEquipment", "People"):
             for gain in model[kind].values():
                 gain["fraction_radiant"] = share
@@ -131,8 +124,9 @@ def hour_of_greatest_cooling(folder: Path, epw: Path, system: str) -> pd.DataFra
         *(f"{OUTSIDE[7:]}{n}" for n in ("Temperature", FILM, *LOSSES)),
         *(f"Surface Window Inside Face {n}" for n in ROOM_SHADE),
         *(f"Surface Window {n}" for n in SUN_SHADE),
-        "Zone Mean Air Temperature", "Site Outdoor Air Drybulb Temperature",
-    ]  # fmt: skip
+        "Zone Mean Air Temperature",
+        "Site Outdoor Air Drybulb Temperature",
+    ]
     outputs = {f"X:{n}": n for n in names} | LOADS
     patches = PATCHES.get(system, (system,))
     model = room_model("S", *patches, "ideal_loads_20_26", outputs=outputs, steps=STEPS)
@@ -140,17 +134,21 @@ def hour_of_greatest_cooling(folder: Path, epw: Path, system: str) -> pd.DataFra
     at = int(hours[tuple(LOADS)[1]].argmax())
     hour = hours.iloc[at]
     unit = replace(SHADED[system](), width=GLAZING_WIDTH)
-    gap, face, longwave = (
-        hour[f"WINDOW:Surface Window Inside Face {n}"] / AREA for n in ROOM_SHADE
-    )
+    gap, face, longwave = (hour[f"WINDOW:Surface Window Inside Face {n}"] / AREA for n in ROOM_SHADE)
     glass, shade = (hour[f"WINDOW:Surface Window {n}"] / AREA for n in SUN_SHADE)
     outer_c, inner_c = hour[f"{OUTSIDE}Temperature"], hour[f"{INSIDE}Temperature"]
     outdoors = -sum(hour[f"{OUTSIDE}{n}"] for n in LOSSES) / AREA
     reported = {
-        "hour": at, "reckoning": "EnergyPlus", "outer c": outer_c, "shade c": inner_c,
-        "air behind": gap, "face": face, "longwave": longwave, "outdoors": outdoors,
+        "hour": at,
+        "reckoning": "EnergyPlus",
+        "outer c": outer_c,
+        "shade c": inner_c,
+        "air behind": gap,
+        "face": face,
+        "longwave": longwave,
+        "outdoors": outdoors,
         "missing": gap + face + longwave + outdoors - glass - shade,
-    }  # fmt: skip
+    }
     emissivity = unit.layers[0].emissivity[0], unit.layers[-1].emissivity[1]
     lost = -hour[f"{OUTSIDE}{NET_LONGWAVE}"] / AREA, longwave
     radiant = [
@@ -159,11 +157,7 @@ def hour_of_greatest_cooling(folder: Path, epw: Path, system: str) -> pd.DataFra
     ]
     air_c = hour["ROOM:Zone Mean Air Temperature"]
     around = Conditions(
-        Environment(
-            hour["Environment:Site Outdoor Air Drybulb Temperature"],
-            hour[f"{OUTSIDE}{FILM}"],
-            radiant[0],
-        ),
+        Environment(hour["Environment:Site Outdoor Air Drybulb Temperature"], hour[f"{OUTSIDE}{FILM}"], radiant[0]),
         Environment(air_c, hour[f"{INSIDE}{FILM}"], radiant[1]),
     )
 
@@ -175,23 +169,23 @@ def hour_of_greatest_cooling(folder: Path, epw: Path, system: str) -> pd.DataFra
 
     sun = absorbed(bisected(warmer, 0.0, 1.0))
     layered = unit_balance(unit, around, sun)
-    return pd.DataFrame(
-        [
-            reported,
-            {"hour": at, "reckoning": "ISO 15099"} | _flows(layered, air_c, sun),
-        ]
-    ).assign(system=system)
+    return pd.DataFrame([reported, {"hour": at, "reckoning": "ISO 15099"} | _flows(layered, air_c, sun)]).assign(
+        system=system
+    )
 
 
 def _flows(balance: UnitBalance, air_c: float, sun: np.ndarray) -> dict[str, float]:
     """Temperatures [degC] and the heat [W/m2] to the air behind, by the face, to outdoors."""
     face = float(balance.films[1] * (balance.faces_c[-1] - air_c))
     return {
-        "outer c": float(balance.faces_c[0]), "shade c": float(balance.faces_c[-1]),
-        "air behind": balance.air_in, "face": face,
+        "outer c": float(balance.faces_c[0]),
+        "shade c": float(balance.faces_c[-1]),
+        "air behind": balance.air_in,
+        "face": face,
         "longwave": balance.heat_in - balance.air_in - face,
-        "outdoors": float(sun.sum()) - balance.heat_in, "missing": 0.0,
-    }  # fmt: skip
+        "outdoors": float(sun.sum()) - balance.heat_in,
+        "missing": 0.0,
+    }
 
 
 def _run(model: Model, folder: Path, epw: Path) -> pd.DataFrame:

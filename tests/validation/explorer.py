@@ -78,10 +78,7 @@ class WalkedState:
         times = {"a full hour": self.milliseconds, "picture": self.picture, "glare": self.glare}
         for name, found in times.items():
             low, high = np.percentile(found, (50, 95))
-            lines.append(
-                f"    {name}: median {low:.0f} ms, 95 % below {high:.0f} ms, most {found.max():.0f}"
-                " ms"
-            )
+            lines.append(f"    {name}: median {low:.0f} ms, 95 % below {high:.0f} ms, most {found.max():.0f} ms")
         return "\n".join(lines)
 
 

@@ -44,10 +44,8 @@ def compare(control: str = CONTROL, step_minutes: int = 60) -> pd.DataFrame:
     """By window: moves of the year, hours of each state, hours with another state in EnergyPlus."""
     systems = "".join(
         f'[[system]]\nbsdf = "{path}"\n{more}'
-        for path, more in (
-            (GLAZING, ""), (VENETIAN_BLIND, ""), (VENETIAN_BLIND, "u_value = 1.0\ng_value = 0.18\n")
-        )
-    )  # fmt: skip
+        for path, more in ((GLAZING, ""), (VENETIAN_BLIND, ""), (VENETIAN_BLIND, "u_value = 1.0\ng_value = 0.18\n"))
+    )
     text = STUDY.format(weather=WEATHER, plates="", systems=systems, control=control)
     text = f"step_minutes = {step_minutes}\n" + text
     with tempfile.TemporaryDirectory() as name:
@@ -58,16 +56,15 @@ def compare(control: str = CONTROL, step_minutes: int = 60) -> pd.DataFrame:
         run_study(study, silent, balanced=kept.append)
         balanced: BalancedRooms = kept[0]
         twin = energyplus_twin(study, balanced)
-        twin.model["Output:Diagnostics"] = {
-            "all": {"diagnostics": [{"key": "DisplayAdvancedReportVariables"}]}
-        }
+        twin.model["Output:Diagnostics"] = {"all": {"diagnostics": [{"key": "DisplayAdvancedReportVariables"}]}}
         windows = [w for w in twin.model["FenestrationSurface:Detailed"]]
         for window in windows:
             for variable in (INDEX, INCIDENT, PASSED):
                 twin.model["Output:Variable"][f"{window} {variable}"] = {
-                    "key_value": window, "variable_name": variable,
+                    "key_value": window,
+                    "variable_name": variable,
                     "reporting_frequency": "Hourly",
-                }  # fmt: skip
+                }
         model, *_ = twin.write(folder)
         theirs = run_written(model, WEATHER)
     ours = balanced.rooms[0].shading
@@ -80,9 +77,7 @@ def compare(control: str = CONTROL, step_minutes: int = 60) -> pd.DataFrame:
         # the construction that most hours of a state have
         own = {j: float(pd.Series(index[states == j]).mode()[0]) for j in np.unique(states)}
         expected = np.array([own[j] for j in states])
-        share = {
-            j: passed[states == j].sum() / max(AREA * sun[states == j].sum(), 1e-9) for j in own
-        }
+        share = {j: passed[states == j].sum() / max(AREA * sun[states == j].sum(), 1e-9) for j in own}
         rows.append(
             {
                 "window": window,

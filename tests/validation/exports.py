@@ -42,9 +42,7 @@ from scenes.fenestration_exports import known_fenestration
 from tests.benchmarks import radiance
 
 FOLDER = Path("../shared/data/ifc/buildings")
-FILES = (
-    "Duplex_A_20110907.ifc", "AC20-FZK-Haus.ifc", "House_Renga.ifc", "SampleHouse4_Revit_IFC4.ifc",
-)  # fmt: skip
+FILES = ("Duplex_A_20110907.ifc", "AC20-FZK-Haus.ifc", "House_Renga.ifc", "SampleHouse4_Revit_IFC4.ifc")
 U_VALUE, G_VALUE, VISIBLE = 1.1, 0.5, 0.7  # of the windows without a BSDF
 SOUTH, OTHERS = "134-226", "226-134"  # azimuths [deg]
 DAYS = 2
@@ -115,9 +113,9 @@ def rows(path: Path, folder: Path, peers: Path | None) -> list[str]:
             panes = [Pane(*one[1:5], bsdf_of(one[5], folder)) for one in part["panes"]]
             result.append((name, part["rooms"], len(part["faults"]), "-", panes))
         radiance.run(
-            "oconv model/scene/*.mat model/scene/*.rad model/aperture/*.mat model/aperture/*.rad "
-            "> scene.oct", folder / "radiance",
-        )  # fmt: skip
+            "oconv model/scene/*.mat model/scene/*.rad model/aperture/*.mat model/aperture/*.rad > scene.oct",
+            folder / "radiance",
+        )
     counts = energyplus(folder / "model.epJSON", folder / "energyplus")
     rooms = len(json.loads((folder / "model.epJSON").read_text())["Zone"])
     result.append(("epJSON", rooms, *counts, tabled_panes(folder)))
@@ -203,8 +201,10 @@ def tabled_panes(folder: Path) -> list[Pane]:
         table = list(csv.reader(stream))
     start = next(i for i, line in enumerate(table) if line[:1] == ["Exterior Fenestration"])
     titles = next(line for line in table[start:] if "Construction" in line)
-    columns = [titles.index(next(t for t in titles if t.startswith(name))) for name in (
-        "Glass Area", "Glass U-Factor", "Glass SHGC", "Glass Visible")]  # fmt: skip
+    columns = [
+        titles.index(next(t for t in titles if t.startswith(name)))
+        for name in ("Glass Area", "Glass U-Factor", "Glass SHGC", "Glass Visible")
+    ]
     panes, construction = [], titles.index("Construction")
     systems = {name.upper(): name for name in model.get(COMPLEX, {})}
     for line in table[table.index(titles) + 1 :]:
@@ -229,10 +229,7 @@ def differences(panes: Sequence[Pane], expected: Sequence[Pane]) -> list[str]:
     cells = [f"{area:.4f}"]
     for field in ("u_value", "g_value", "visible"):
         is_partial = any(getattr(p, field) is None for p in panes)
-        chosen = [
-            [p for p in some if not (is_partial and p.bsdf is not None)]
-            for some in (panes, expected)
-        ]
+        chosen = [[p for p in some if not (is_partial and p.bsdf is not None)] for some in (panes, expected)]
         if any(getattr(p, field) is None for p in chosen[0]) or not chosen[0]:
             cells.append("none")
             continue

@@ -33,8 +33,7 @@ def honeybee(path: Path, folder: Path) -> dict[str, Any]:
         modifier = aperture.properties.radiance.modifier.to_dict()
         values = [getattr(material, field, None) for field in ("u_factor", "shgc", "vt")]
         panes.append([aperture.display_name, aperture.area, *values, modifier.get("bsdf_data")])
-    return {"faults": [fault["message"] for fault in faults], "panes": panes,
-            "rooms": len(model.rooms)}  # fmt: skip
+    return {"faults": [fault["message"] for fault in faults], "panes": panes, "rooms": len(model.rooms)}
 
 
 def gbxml(path: Path) -> dict[str, Any]:
@@ -59,8 +58,11 @@ def gbxml(path: Path) -> dict[str, Any]:
             if simple is not None and simple.is_initialized():
                 glass = simple.get()
                 visible = glass.visibleTransmittance()
-                values = [glass.uFactor(), glass.solarHeatGainCoefficient(),
-                          visible.get() if visible.is_initialized() else None]  # fmt: skip
+                values = [
+                    glass.uFactor(),
+                    glass.solarHeatGainCoefficient(),
+                    visible.get() if visible.is_initialized() else None,
+                ]
         panes.append([surface.nameString(), surface.grossArea(), *values, None])
     return {"faults": errors, "panes": panes, "rooms": len(model.getSpaces())}
 

@@ -96,9 +96,7 @@ def _directions(weather: Weather, instants: pd.DatetimeIndex) -> FloatArray:
         - 0.00270502 * np.sin(4 * x)
         - 0.00167992 * np.cos(4 * x)
     )
-    angle = np.radians(
-        15.0 * (12.0 - (hour + equation)) + (15.0 * weather.timezone_h - weather.longitude_deg)
-    )
+    angle = np.radians(15.0 * (12.0 - (hour + equation)) + (15.0 * weather.timezone_h - weather.longitude_deg))
     latitude = np.radians(weather.latitude_deg)
     up = np.sin(latitude) * np.sin(declination)
     up = up + np.cos(latitude) * np.cos(declination) * np.cos(angle)

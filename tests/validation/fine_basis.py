@@ -31,6 +31,4 @@ def fine_basis(division: int, basis: KlemsBasis = KLEMS_FULL) -> KlemsBasis:
             counts += [1, *(CAP_AZIMUTHS * k for k in range(1, division))]
         else:
             counts += [count * division] * division
-    return KlemsBasis(
-        f"{basis.name}, each patch {division} x {division}", tuple(bounds), tuple(counts)
-    )
+    return KlemsBasis(f"{basis.name}, each patch {division} x {division}", tuple(bounds), tuple(counts))

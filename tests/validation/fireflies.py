@@ -252,9 +252,7 @@ def main(
     rows = {}
     for lit in scenes:
         found = held(lit, hours, samples=samples, seed=seed)
-        rows[lit.name] = {
-            name: getattr(found, name).tolist() for name in ("worst", "beyond", "bright", "looked")
-        }
+        rows[lit.name] = {name: getattr(found, name).tolist() for name in ("worst", "beyond", "bright", "looked")}
         print(f"| {lit.name} | {found.line()} |", flush=True)
     if json_:
         json_.write_text(json.dumps(rows))

@@ -43,9 +43,7 @@ RANGE = (0.25, 0.75)  # of the reference's DGP
 EPW_HEAD, EPW_DEW_POINT = 8, 7  # lines of an EPW before its hours; column
 
 
-def by_functions(
-    folder: Path, case: str, views: Sequence[int], every: int, size: int
-) -> Iterator[pd.DataFrame]:
+def by_functions(folder: Path, case: str, views: Sequence[int], every: int, size: int) -> Iterator[pd.DataFrame]:
     """DGP and Ev [lx] by hour of the year, of each view; `core_s` took the view."""
     groups, systems = geneva.window_groups(folder, case)
     solid = bim.opaque_surfaces(geneva.scene(folder, case))
@@ -67,9 +65,7 @@ def by_functions(
         yield pd.DataFrame(columns, index=hours).assign(core_s=seconds)
 
 
-def by_command(
-    folder: Path, case: str, views: Sequence[int], size: int, weather: str
-) -> Iterator[pd.DataFrame]:
+def by_command(folder: Path, case: str, views: Sequence[int], size: int, weather: str) -> Iterator[pd.DataFrame]:
     """The same by `cfs dgp`, with the sun and the ground of the reference's sky."""
     for number in views:
         with tempfile.TemporaryDirectory() as temporary:
@@ -80,16 +76,28 @@ def by_command(
             files = f"options/{geneva.CASES[case]}.rad", "RAD/office.rad"
             scene.write_text("".join(f"!xform {file}\n" for file in files))
             words = [
-                "dgp", scene, "--weather", folder / f"refs/geneva.{weather}", "--out", out,
-                "--view", format_view(geneva.view(folder, number, size)), "--size", size,
-                "--sun-model", "radiance", "--sky-ground", "gendaylit", "--worst", 0,
-            ]  # fmt: skip
+                "dgp",
+                scene,
+                "--weather",
+                folder / f"refs/geneva.{weather}",
+                "--out",
+                out,
+                "--view",
+                format_view(geneva.view(folder, number, size)),
+                "--size",
+                size,
+                "--sun-model",
+                "radiance",
+                "--sky-ground",
+                "gendaylit",
+                "--worst",
+                0,
+            ]
             command, tables = [sys.executable, "-m", "scenes.cli", *map(str, words)], {}
             for sources in ("pixels", "evalglare"):
                 done = subprocess.run(
-                    [*command, "--glare-sources", sources],
-                    check=True, capture_output=True, text=True,
-                )  # fmt: skip
+                    [*command, "--glare-sources", sources], check=True, capture_output=True, text=True
+                )
                 print(done.stdout, file=sys.stderr)
                 (file,) = out.glob("*.parquet")
                 tables[sources] = pd.read_parquet(file)
@@ -99,9 +107,7 @@ def by_command(
         yield table
 
 
-def by_rtrace(
-    folder: Path, case: str, views: Sequence[int], every: int, bounces: int
-) -> Iterator[pd.DataFrame]:
+def by_rtrace(folder: Path, case: str, views: Sequence[int], every: int, bounces: int) -> Iterator[pd.DataFrame]:
     """Ev [lx] by hour of the year as `rtrace` computes it from 20,000 rays."""
     rows = np.loadtxt(folder / "refs/skydata.txt")
     files = [f"scene/options/{geneva.CASES[case]}.rad", "scene/RAD/office.rad"]

@@ -103,6 +103,4 @@ def sky(folder: Path, hours: NDArray[np.int64]) -> cfs.AnnualSky:
     """
     rows = np.loadtxt(folder / "refs/skydata.txt")
     days = 1 + np.arange(len(rows)) // 24
-    return cfs.given_sky(
-        rows[:, :3], rows[:, 3], rows[:, 4], day_of_year=days, hours=hours, ground="gendaylit"
-    )  # fmt: skip
+    return cfs.given_sky(rows[:, :3], rows[:, 3], rows[:, 4], day_of_year=days, hours=hours, ground="gendaylit")

@@ -37,13 +37,7 @@ from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.pictures import write_falsecolour
 from tests.validation.blind_room import TILTS, blind_layer, empty, slats
-from tests.validation.glare_room import (
-    glare_scene,
-    known_system,
-    lit_hours,
-    measurement,
-    sunny_days,
-)
+from tests.validation.glare_room import glare_scene, known_system, lit_hours, measurement, sunny_days
 from tests.validation.method_errors import method_matrices
 
 GLARE = ("DGP", "eDGP", "sDGP")
@@ -100,17 +94,20 @@ def measured(
     return dgp, lux
 
 
-def rated(
-    scene: DaylightScene, cases: list[GlareCase], sampling: Sampling, pictures: Path | None
-) -> list[dict]:
+def rated(scene: DaylightScene, cases: list[GlareCase], sampling: Sampling, pictures: Path | None) -> list[dict]:
     """The measurement and all methods for all cases; a method's scene is traced once."""
     found = []
     for case in cases:
         dgp, lux = measured(scene, case, sampling, pictures)
         found.append(
-            {"system": case.name, "times": list(case.times), "Ev": lux.round(1).tolist(),
-             "measured": dgp.round(5).tolist(), "methods": {}}
-        )  # fmt: skip
+            {
+                "system": case.name,
+                "times": list(case.times),
+                "Ev": lux.round(1).tolist(),
+                "measured": dgp.round(5).tolist(),
+                "methods": {},
+            }
+        )
         print(case.name, "measured", dgp.round(3), file=sys.stderr, flush=True)
     for method in METHODS:
         matrices = method_matrices(method, scene, sampling)
@@ -118,9 +115,14 @@ def rated(
             start = time.monotonic()
             for case, run in zip(cases, found, strict=True):
                 light = daylight(
-                    scene, [[case.system]] * len(scene.groups), case.sky,
-                    method=method, sampling=sampling, needs=(), matrices=matrices,
-                )  # fmt: skip
+                    scene,
+                    [[case.system]] * len(scene.groups),
+                    case.sky,
+                    method=method,
+                    sampling=sampling,
+                    needs=(),
+                    matrices=matrices,
+                )
                 options = GlareOptions(sun=case.sun)
                 dgp = hourly_glare(light, metric, options=options).dgp
                 run["methods"][f"{method} {metric}"] = dgp.round(5).tolist()
@@ -129,9 +131,7 @@ def rated(
     return found
 
 
-def weather_case(
-    name: str, weather: Weather, scene: DaylightScene, days: int, every: int, levels: int
-) -> GlareCase:
+def weather_case(name: str, weather: Weather, scene: DaylightScene, days: int, every: int, levels: int) -> GlareCase:
     """A system of `TILTS` in every so-many-th hour of so many days in a month."""
     tilt = TILTS[name]
     chosen = [sunny_days(weather, 9, 4, days)]

@@ -52,9 +52,7 @@ class TreeBehind:
         self._glass = glass
         self.key = tree, between
         self._scatter = mi.BSDFContext()
-        self._scatter.type_mask = int(mi.BSDFFlags.GlossyReflection) | int(
-            mi.BSDFFlags.GlossyTransmission
-        )
+        self._scatter.type_mask = int(mi.BSDFFlags.GlossyReflection) | int(mi.BSDFFlags.GlossyTransmission)
         self._from_sun = mi.BSDFContext(mi.TransportMode.Importance)
 
     def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
@@ -130,9 +128,7 @@ def glare_scene(size: int, distance: float = 1.5) -> DaylightScene:
     middle = scene.groups[0].windows[0].triangles.reshape(-1, 3).mean(axis=0) * [1, 1, 0]
     eye = middle + distance * inward + [0, 0, EYE_HEIGHT]
     view = fisheye(eye, -inward, size)
-    return DaylightScene(
-        scene.interior, blind_room.empty(), scene.groups, scene.points, scene.up, view
-    )
+    return DaylightScene(scene.interior, blind_room.empty(), scene.groups, scene.points, scene.up, view)
 
 
 def glazing() -> PathOptics:
@@ -144,17 +140,13 @@ def glazing() -> PathOptics:
     return PathOptics(None, AngularBeam(blind_room.glass_transmittance(COSINE)), mirrors)
 
 
-def measurement(
-    scene: DaylightScene, exterior: Surfaces, sky: AnnualSky, sampling: Sampling
-) -> PathLight:
+def measurement(scene: DaylightScene, exterior: Surfaces, sky: AnnualSky, sampling: Sampling) -> PathLight:
     """The room with everything as geometry, path-traced."""
     scene = replace(scene, exterior=exterior)
     return PathLight(scene, [[MatrixOptics(paths=glazing())]] * len(scene.groups), sky, sampling)
 
 
-def known_system(
-    layer: PeriodicLayer | None, *, levels: int = 5, samples: int = 4096
-) -> SystemOptics:
+def known_system(layer: PeriodicLayer | None, *, levels: int = 5, samples: int = 4096) -> SystemOptics:
     """What the methods know: Klems matrices, and the layer's tensor tree before the glazing.
 
     The light that layer and glazing throw at each other, which the matrices hold, is added to the
@@ -176,9 +168,7 @@ def _between(layer: KlemsBsdf, both: KlemsBsdf) -> KlemsBsdf:
     front = both.transmission_front - tau[:, None] * layer.transmission_front
     back = both.transmission_back - tau[None, :] * layer.transmission_back
     nothing = np.zeros_like(front)
-    return KlemsBsdf(
-        KLEMS_FULL, KLEMS_FULL, np.maximum(front, 0), np.maximum(back, 0), nothing, nothing
-    )
+    return KlemsBsdf(KLEMS_FULL, KLEMS_FULL, np.maximum(front, 0), np.maximum(back, 0), nothing, nothing)
 
 
 def sunny_days(weather: Weather, month: int, day: int, count: int) -> NDArray[np.int64]:

@@ -45,16 +45,12 @@ SCALES = (1.0, 0.1, 10.0)  # of the bars, Table 12's third series
 EYES = 4  # at different heights behind the slits: an eye sees the sun through a few of them
 ASIDE_DEG = 20.0  # azimuth of the sun from the facade's normal
 TABLE_12 = {  # largest relative error [%] against rtrace_ttree's DGP
-    "transmittance": {"three-phase": (40, 60, 50), "five-phase": (50, 50, 50),
-                      "point-in-time": (0, 10, None)},
-    "amplitude": {"three-phase": (40, 40, 48), "five-phase": (13, 14, 15),
-                  "point-in-time": (0, 10, 12)},
-}  # fmt: skip
+    "transmittance": {"three-phase": (40, 60, 50), "five-phase": (50, 50, 50), "point-in-time": (0, 10, None)},
+    "amplitude": {"three-phase": (40, 40, 48), "five-phase": (13, 14, 15), "point-in-time": (0, 10, 12)},
+}
 
 
-def peaked_slats(
-    transmittance: float, amplitude_deg: float, width: float = SPACING
-) -> PeriodicLayer:
+def peaked_slats(transmittance: float, amplitude_deg: float, width: float = SPACING) -> PeriodicLayer:
     """Bars with slits at the profile angle: their transmittance and their amplitude.
 
     A slit `gap` high through bars `depth` thick lets light pass at profile angles up to
@@ -68,10 +64,7 @@ def peaked_slats(
     edges = np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
     triangles = extrude(edges, width)
     return PeriodicLayer(
-        triangles,
-        np.zeros(len(triangles), dtype=np.int64),
-        (plastic("slat", REFLECTANCE),),
-        (width, SPACING),
+        triangles, np.zeros(len(triangles), dtype=np.int64), (plastic("slat", REFLECTANCE),), (width, SPACING)
     )
 
 
@@ -83,11 +76,7 @@ def scale_series(samples: int = 4096) -> list[dict]:
     """
     layer, runs = peaked_slats(TRANSMITTANCE, AMPLITUDE_DEG), []
     for number, scale in enumerate((*SCALES, SCALES[0])):
-        larger = replace(
-            layer,
-            triangles=scale * layer.triangles,
-            period=tuple(scale * side for side in layer.period),
-        )
+        larger = replace(layer, triangles=scale * layer.triangles, period=tuple(scale * side for side in layer.period))
         klems = generate_klems(larger, samples=samples, seed=number).bsdf[0]
         runs.append((scale, klems.direct_hemispherical(klems.transmission_front)))
     first = runs[0][1]
@@ -115,9 +104,7 @@ def peaked_geometry(group: WindowGroup, transmittance: float, amplitude_deg: flo
     wall = blind_room.wall_round(low, high)
     reflectance = np.repeat([REFLECTANCE, blind_room.GLASS_FRONT], [len(triangles), len(wall)])
     return Surfaces(
-        np.concatenate([triangles, wall]) @ group.frame,
-        reflectance,
-        np.zeros(len(reflectance), dtype=np.int64),
+        np.concatenate([triangles, wall]) @ group.frame, reflectance, np.zeros(len(reflectance), dtype=np.int64)
     )
 
 
@@ -126,11 +113,7 @@ def clear_sky(scene: DaylightScene) -> AnnualSky:
     profile = np.radians(PROFILE_DEG)
     aside = np.radians(ASIDE_DEG)
     along, _, outward = scene.groups[0].frame
-    sun = (
-        np.cos(aside) * outward
-        + np.sin(aside) * along
-        + np.tan(profile) * np.cos(aside) * np.array([0, 0, 1.0])
-    )
+    sun = np.cos(aside) * outward + np.sin(aside) * along + np.tan(profile) * np.cos(aside) * np.array([0, 0, 1.0])
     sun /= np.linalg.norm(sun)
     reinhart = ReinhartSky(4)
     sky = cie_patches("clear", reinhart, DIFFUSE, sun=sun, direct_horizontal=DIRECT * sun[2])
@@ -158,9 +141,7 @@ def cases(scene: DaylightScene, levels: int) -> list[GlareCase]:
                 GlareCase(
                     f"{name} {value:g}",
                     peaked_geometry(scene.groups[0], transmittance, amplitude),
-                    known_system(
-                        peaked_slats(transmittance, amplitude), levels=levels, samples=1024
-                    ),
+                    known_system(peaked_slats(transmittance, amplitude), levels=levels, samples=1024),
                     sky,
                     (name,),
                     tuple(SPACING * np.arange(EYES) / EYES),
@@ -177,18 +158,14 @@ def table(runs: list[dict]) -> str:
     for run in runs:
         values = [run["measured"][0], *(run["methods"][key][0] for key in keys)]
         lines.append(f"| {run['system']} | " + " | ".join(f"{v:.3f}" for v in values) + " |")
-    lines += ["", "| largest error [%] | against | " + " | ".join(keys) + " |",
-              "|" + "---|" * (len(keys) + 2)]  # fmt: skip
+    lines += ["", "| largest error [%] | against | " + " | ".join(keys) + " |", "|" + "---|" * (len(keys) + 2)]
     for name, theirs in TABLE_12.items():
         mine = [run for run in runs if run["system"].startswith(name)]
         for label, reference in (
             ("point-in-time DGP", [run["methods"]["point-in-time DGP"][0] for run in mine]),
             ("slats", [run["measured"][0] for run in mine]),
         ):
-            worst = [
-                100 * np.abs(np.array([r["methods"][k][0] for r in mine]) / reference - 1).max()
-                for k in keys
-            ]
+            worst = [100 * np.abs(np.array([r["methods"][k][0] for r in mine]) / reference - 1).max() for k in keys]
             lines.append(f"| {name} | {label} | " + " | ".join(f"{w:.0f}" for w in worst) + " |")
         known = [theirs[key.rsplit(" ", 1)[0]][GLARE.index(key.rsplit(" ", 1)[1])] for key in keys]
         cells = ["" if v is None else str(v) for v in known]

@@ -48,19 +48,16 @@ BACKING = np.array([0.0, 0.05, 0.0])  # of dark behind panes [m]
 SIZE = 200  # [px]
 SEEDS = (0, 1, 2)  # of our pictures and phases
 SUN = np.array([0.25, -1.0, 0.8]) / np.linalg.norm([0.25, -1.0, 0.8])
-SUN_ILLUMINANCE = {
-    "mirror": 80_000.0,
-    "glass": 80_000.0,
-    "metal": 15_000.0,
-    "floor": 0.0,
-}  # normal to it [lx]
+SUN_ILLUMINANCE = {"mirror": 80_000.0, "glass": 80_000.0, "metal": 15_000.0, "floor": 0.0}  # normal to it [lx]
 SKY_ILLUMINANCE = 12_000.0  # on the ground [lx]
 CACHED = "-ps 1 -pa 0 -ss 16 -ab 5 -ad 512 -as 0 -aa 0.2 -ar 32 -lr 8 -lw 1e-3"  # of the pictures
 POINT = "-u+ -ss 1e5 -ab 8 -ad 16384 -aa 0 -lr 20 -lw 1e-9"  # of Ev; several rays to each lobe
 MATERIALS: dict[str, Gloss] = {
-    "mirror": mirror(0.8), "glass": pane(1.52, 0.985), "metal": mirror(0.6, 0.15),
+    "mirror": mirror(0.8),
+    "glass": pane(1.52, 0.985),
+    "metal": mirror(0.6, 0.15),
     "floor": lacquer(0.05),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -175,27 +172,30 @@ def outcome(name: str, folder: Path, *, size: int = SIZE, points: int = 8) -> Ou
     folder.mkdir(parents=True, exist_ok=True)
     theirs = rendered(given, folder)
     ev, ev_error = theirs.eye_illuminance(view, points)
-    found, plain, even = (
-        _eye(one, view) for one in (given, _without_gloss(given), _diffuse(given))
-    )
-    pictures = [
-        point_in_time_picture(given.lit, given.sky, view, samples=64, seed=seed) for seed in SEEDS
-    ]
+    found, plain, even = (_eye(one, view) for one in (given, _without_gloss(given), _diffuse(given)))
+    pictures = [point_in_time_picture(given.lit, given.sky, view, samples=64, seed=seed) for seed in SEEDS]
     halves = theirs.halves(view)
     phases, at_point = zip(*(_five_phase(given, view, seed) for seed in SEEDS), strict=True)
-    np.savez(
-        folder / "pictures.npz", ours=pictures[0], theirs=np.mean(halves, axis=0),
-        five_phase=phases[0],
-    )  # fmt: skip
+    np.savez(folder / "pictures.npz", ours=pictures[0], theirs=np.mean(halves, axis=0), five_phase=phases[0])
     rated = evaluate(np.mean(halves, axis=0), view, illuminance=ev).dgp
     first, second = (evaluate(half, view, illuminance=ev).dgp for half in halves)
     ours, third = ([evaluate(one, view) for one in of] for of in (pictures, phases))
     return Outcome(
-        name, ev, ev_error, float(found.values[0]), float(found.standard_error[0]),
-        _mean(one.Ev for one in ours)[0], *_mean(one.Ev for one in third), *_mean(at_point),
-        rated, abs(first - second) / 2, *_mean(one.dgp for one in ours),
-        *_mean(one.dgp for one in third), float(plain.values[0]), float(even.values[0]),
-    )  # fmt: skip
+        name,
+        ev,
+        ev_error,
+        float(found.values[0]),
+        float(found.standard_error[0]),
+        _mean(one.Ev for one in ours)[0],
+        *_mean(one.Ev for one in third),
+        *_mean(at_point),
+        rated,
+        abs(first - second) / 2,
+        *_mean(one.dgp for one in ours),
+        *_mean(one.dgp for one in third),
+        float(plain.values[0]),
+        float(even.values[0]),
+    )
 
 
 def _mean(values: Iterable[float]) -> tuple[float, float]:
@@ -211,9 +211,7 @@ def _five_phase(given: Case, view: View, seed: int) -> tuple[np.ndarray, float]:
     patch = int(reinhart.index(SUN[None])[0])
     sun[patch] = strength / reinhart.solid_angles[patch]
     hour = np.array([12])
-    sky = cfs.AnnualSky(
-        given.patches[:, None] + sun, SUN[None], np.array([strength]), hour, 8760, sun=sun
-    )
+    sky = cfs.AnnualSky(given.patches[:, None] + sun, SUN[None], np.array([strength]), hour, 8760, sun=sun)
     points, normals = np.array([view.position]), np.array([view.direction])
     around = given.interior, given.exterior, given.groups
     scene = cfs.DaylightScene(*around, points, normals, view=view)
@@ -229,9 +227,8 @@ def _five_phase(given: Case, view: View, seed: int) -> tuple[np.ndarray, float]:
 
 def _eye(given: Case, view: View):
     return point_in_time(
-        given.lit, given.sky, [view.position], [view.direction], samples=2**19,
-        stopping=Stopping(batches=8),
-    )  # fmt: skip
+        given.lit, given.sky, [view.position], [view.direction], samples=2**19, stopping=Stopping(batches=8)
+    )
 
 
 def _without_gloss(given: Case) -> Case:

@@ -70,9 +70,11 @@ def measured_files(
     rings = np.arange(0, 89.0, outgoing_step_deg)
     counts = np.maximum(1, np.round(360 * np.sin(np.radians(rings)) / outgoing_step_deg))
     out = np.concatenate(
-        [np.stack([np.full(int(n), 180 - ring), 360 * np.arange(n) / n], -1)
-         for ring, n in zip(rings, counts, strict=True)]
-    )  # fmt: skip
+        [
+            np.stack([np.full(int(n), 180 - ring), 360 * np.arange(n) / n], -1)
+            for ring, n in zip(rings, counts, strict=True)
+        ]
+    )
     for azimuth in azimuths_deg:
         for theta in np.arange(0, 80.1, incident_step_deg):
             values = lobe(unit_vectors(np.array([theta, azimuth])), unit_vectors(out))
@@ -80,10 +82,12 @@ def measured_files(
             if form == "DSF":
                 values = values * np.abs(np.cos(np.radians(out[:, 0])))
             lines = [
-                '#sample_name "closed form"', f"#format: theta phi {form}", "#upphi 90",
+                '#sample_name "closed form"',
+                f"#format: theta phi {form}",
+                "#upphi 90",
                 f"#incident_angle {theta:g} {azimuth:g}",
                 *(f"{a:.5f} {b:.5f} {v:.7g}" for (a, b), v in zip(out, values, strict=True)),
-            ]  # fmt: skip
+            ]
             paths.append(folder / f"in_{azimuth:03.0f}_{theta:04.1f}.txt")
             paths[-1].write_text("\n".join(lines) + "\n")
     return paths

@@ -20,15 +20,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bim.defaults import (
-    CEILING_SLAB,
-    EXTERIOR_WALL,
-    GROUND_FLOOR,
-    INTERIOR_WALL,
-    ROOF,
-    ROOM_REFLECTANCE,
-    UPPER_FLOOR,
-)
+from bim.defaults import CEILING_SLAB, EXTERIOR_WALL, GROUND_FLOOR, INTERIOR_WALL, ROOF, ROOM_REFLECTANCE, UPPER_FLOOR
 from bim.model import Construction
 from tests.validation.differences import rmse_and_bias
 from tests.validation.energyplus_by_study import known_window, our_year
@@ -38,9 +30,11 @@ from thermal.zone import OUTSIDE_ABSORPTANCE
 SETTLED = 7 * 24  # hours left out of the temperatures at the start
 OUTDOORS, INDOORS = "Outdoors", "Adiabatic"
 SIDES = ("front", "right", "back", "left", "floor", "ceiling")
-CELLS = {"Oklahoma": "USA_OK_Oklahoma.City-Will.Rogers.World.AP.723530_TMY3.epw",
-         "Boulder": "USA_CO_Boulder-Broomfield-Jefferson.County.AP.724699_TMY3.epw",
-         "Las Vegas": "USA_NV_Las.Vegas-McCarran.Intl.AP.723860_TMY3.epw"}  # fmt: skip
+CELLS = {
+    "Oklahoma": "USA_OK_Oklahoma.City-Will.Rogers.World.AP.723530_TMY3.epw",
+    "Boulder": "USA_CO_Boulder-Broomfield-Jefferson.County.AP.724699_TMY3.epw",
+    "Las Vegas": "USA_NV_Las.Vegas-McCarran.Intl.AP.723860_TMY3.epw",
+}
 ATTIC = """
 [box]
 width = 8
@@ -148,15 +142,21 @@ class Box:
     def model(self) -> Model:
         """The whole model."""
         room = json.loads((MODELS / "room.epJSON").read_text("utf-8"))
-        kept = ("Version", "SimulationControl", "Timestep", "RunPeriod", "GlobalGeometryRules",
-                "ShadowCalculation", "OutputControl:Files", "Building")  # fmt: skip
+        kept = (
+            "Version",
+            "SimulationControl",
+            "Timestep",
+            "RunPeriod",
+            "GlobalGeometryRules",
+            "ShadowCalculation",
+            "OutputControl:Files",
+            "Building",
+        )
         zone = {"zone_or_zonelist_or_space_or_spacelist_name": "ROOM"}
         model: Model = {name: room[name] for name in kept}
         model["Building"]["main"]["north_axis"] = self.facing_deg - 180.0
         model["Zone"] = {"ROOM": {}}
-        model["Schedule:Compact"] = {
-            name: room["Schedule:Compact"][name] for name in ("WORK", "ON")
-        }
+        model["Schedule:Compact"] = {name: room["Schedule:Compact"][name] for name in ("WORK", "ON")}
         if self.window is not None:
             for name in ("WindowMaterial:Glazing", "WindowMaterial:GasMixture"):
                 model[name] = room[name]
@@ -165,38 +165,46 @@ class Box:
         for side in SIDES:
             model = merged(model, self._side(side))
         model["ZoneInfiltration:DesignFlowRate"] = {
-            "AIR": zone | {
+            "AIR": zone
+            | {
                 "schedule_name": "ON",
                 "design_flow_rate_calculation_method": "AirChanges/Hour",
                 "air_changes_per_hour": self.infiltration_ach,
                 "constant_term_coefficient": 1.0,
             }
-        }  # fmt: skip
+        }
         model["ElectricEquipment"] = {
-            "GAINS": zone | {
+            "GAINS": zone
+            | {
                 "schedule_name": "WORK",
                 "design_level_calculation_method": "EquipmentLevel",
                 "design_level": self.gain_w,
                 "fraction_radiant": 0.5,
             }
-        }  # fmt: skip
+        }
         if self.heating_c is not None:
             held = json.loads((MODELS / "ideal_loads_20_26.epJSON").read_text("utf-8"))
             for name, value in (("HEATED", self.heating_c), ("COOLED", 90.0)):
                 held["Schedule:Compact"][name]["data"][-1]["field"] = value
             model = merged(model, held)
-        names = ("Zone Mean Air Temperature", "Zone Operative Temperature",
-                 "Zone Ideal Loads Zone Sensible Heating Rate")  # fmt: skip
+        names = (
+            "Zone Mean Air Temperature",
+            "Zone Operative Temperature",
+            "Zone Ideal Loads Zone Sensible Heating Rate",
+        )
         model["Output:Variable"] = {
-            name: {"key_value": "*", "variable_name": name, "reporting_frequency": "Hourly"}
-            for name in names
+            name: {"key_value": "*", "variable_name": name, "reporting_frequency": "Hourly"} for name in names
         }
         return merged(model, self.more)
 
     def _side(self, side: str) -> Model:
         w, d, h = self.size
-        ends = {"front": ((0, 0), (w, 0)), "right": ((w, 0), (w, d)), "back": ((w, d), (0, d)),
-                "left": ((0, d), (0, 0))}  # fmt: skip
+        ends = {
+            "front": ((0, 0), (w, 0)),
+            "right": ((w, 0), (w, d)),
+            "back": ((w, d), (0, d)),
+            "left": ((0, d), (0, 0)),
+        }
         if side in ends:
             (a, b), (c, e) = ends[side]
             corners = [(a, b, h), (a, b, 0), (c, e, 0), (c, e, h)]
@@ -207,27 +215,31 @@ class Box:
         layers, beyond = self.layers[side].layers, self.beyond[side]
         materials = {
             f"{side} {k}": {
-                "roughness": "MediumRough", "thickness": one.thickness,
-                "conductivity": one.conductivity, "density": one.density,
-                "specific_heat": one.heat_capacity, "thermal_absorptance": 0.9,
-                "solar_absorptance": OUTSIDE_ABSORPTANCE if k < len(layers) - 1
+                "roughness": "MediumRough",
+                "thickness": one.thickness,
+                "conductivity": one.conductivity,
+                "density": one.density,
+                "specific_heat": one.heat_capacity,
+                "thermal_absorptance": 0.9,
+                "solar_absorptance": OUTSIDE_ABSORPTANCE
+                if k < len(layers) - 1
                 else 1.0 - ROOM_REFLECTANCE.get(side, ROOM_REFLECTANCE["wall"]),
             }
             for k, one in enumerate(layers)
-        }  # fmt: skip
+        }
         keys = ["outside_layer", *(f"layer_{k}" for k in range(2, len(layers) + 1))]
         free, upright = beyond == OUTDOORS, side in ends
         face: dict[str, Any] = {
             "surface_type": "Wall" if upright else side.capitalize(),
-            "construction_name": side, "zone_name": "ROOM",
+            "construction_name": side,
+            "zone_name": "ROOM",
             "outside_boundary_condition": beyond if isinstance(beyond, str) else beyond[0],
             "sun_exposure": "SunExposed" if free else "NoSun",
             "wind_exposure": "WindExposed" if free else "NoWind",
             "vertices": [
-                {f"vertex_{axis}_coordinate": value for axis, value in zip("xyz", p, strict=True)}
-                for p in corners
+                {f"vertex_{axis}_coordinate": value for axis, value in zip("xyz", p, strict=True)} for p in corners
             ],
-        }  # fmt: skip
+        }
         if side == "ceiling" and free:
             face["surface_type"] = "Roof"
         if not isinstance(beyond, str):
@@ -242,49 +254,68 @@ class Box:
         top = sill + height
         corners = [(x, 0, top), (x, 0, sill), (x + width, 0, sill), (x + width, 0, top)]
         return {
-            "surface_type": "Window", "construction_name": "GLAZING",
-            "building_surface_name": "FRONT", "number_of_vertices": 4,
+            "surface_type": "Window",
+            "construction_name": "GLAZING",
+            "building_surface_name": "FRONT",
+            "number_of_vertices": 4,
         } | {
             f"vertex_{k}_{axis}_coordinate": value
             for k, p in enumerate(corners, 1)
             for axis, value in zip("xyz", p, strict=True)
-        }  # fmt: skip
+        }
 
 
 def attic() -> Box:
     """Over a storey at 20 degC, behind a film of 0.13 m2 K/W."""
     below = {
         "combined_convective_radiative_film_coefficient": 1.0 / 0.13,
-        "constant_temperature": 20.0, "constant_temperature_coefficient": 1.0,
+        "constant_temperature": 20.0,
+        "constant_temperature_coefficient": 1.0,
         "external_dry_bulb_temperature_coefficient": 0.0,
-    }  # fmt: skip
+    }
     return Box(
-        (8.0, 6.0, 2.4), 200.0,
+        (8.0, 6.0, 2.4),
+        200.0,
         dict.fromkeys(SIDES, OUTDOORS) | {"floor": ("OtherSideCoefficients", "BELOW")},
         dict.fromkeys(SIDES, EXTERIOR_WALL) | {"ceiling": ROOF, "floor": UPPER_FLOOR},
-        (3.0, 0.8, 1.4, 1.2), 0.7, 0.0,
+        (3.0, 0.8, 1.4, 1.2),
+        0.7,
+        0.0,
         more={"SurfaceProperty:OtherSideCoefficients": {"BELOW": below}},
-    )  # fmt: skip
+    )
 
 
 def cellar(*, dark: bool) -> Box:
     """With all of its walls in clay; dark: no sun and no sky on the ground."""
-    soil = {"soil_conductivity": 1.5, "soil_density": 2000.0, "soil_specific_heat": 1500.0,
-            "simulation_timestep": "Timestep"}  # fmt: skip
+    soil = {
+        "soil_conductivity": 1.5,
+        "soil_density": 2000.0,
+        "soil_specific_heat": 1500.0,
+        "simulation_timestep": "Timestep",
+    }
     if dark:
         soil |= {"ground_solar_absorptivity": 0.0, "ground_thermal_absorptivity": 0.0}
-    edge = {"surface_name": "FLOOR", "total_exposed_perimeter": 18.0,
-            "exposed_perimeter_calculation_method": "TotalExposedPerimeter"}  # fmt: skip
-    foundation = {"initial_indoor_air_temperature": 18.0, "wall_height_above_grade": 0.0,
-                  "wall_depth_below_slab": 0.0}  # fmt: skip
+    edge = {
+        "surface_name": "FLOOR",
+        "total_exposed_perimeter": 18.0,
+        "exposed_perimeter_calculation_method": "TotalExposedPerimeter",
+    }
+    foundation = {"initial_indoor_air_temperature": 18.0, "wall_height_above_grade": 0.0, "wall_depth_below_slab": 0.0}
     return Box(
-        (5.0, 4.0, 2.4), 180.0,
+        (5.0, 4.0, 2.4),
+        180.0,
         dict.fromkeys(SIDES, ("Foundation", "F")) | {"ceiling": INDOORS},
         dict.fromkeys(SIDES, EXTERIOR_WALL) | {"ceiling": CEILING_SLAB, "floor": GROUND_FLOOR},
-        None, 0.2, 80.0, 18.0,
-        {"Foundation:Kiva": {"F": foundation}, "Foundation:Kiva:Settings": {"K": soil},
-         "SurfaceProperty:ExposedFoundationPerimeter": {"FLOOR": edge}},
-    )  # fmt: skip
+        None,
+        0.2,
+        80.0,
+        18.0,
+        {
+            "Foundation:Kiva": {"F": foundation},
+            "Foundation:Kiva:Settings": {"K": soil},
+            "SurfaceProperty:ExposedFoundationPerimeter": {"FLOOR": edge},
+        },
+    )
 
 
 def office(*, opened: bool) -> Box:
@@ -293,25 +324,32 @@ def office(*, opened: bool) -> Box:
     EnergyPlus adds these as squares, where the standard takes the greater one.
     """
     airing = {
-        "zone_or_space_name": "ROOM", "opening_area": 0.45,
+        "zone_or_space_name": "ROOM",
+        "opening_area": 0.45,
         "opening_area_fraction_schedule_name": "WORK",
         # sqrt(0.001)/2 and 0.2 sqrt(2 g 0.493 m/295 K) = sqrt(0.0035 1.5 m)/2
-        "opening_effectiveness": 0.0158, "height_difference": 0.493,
+        "opening_effectiveness": 0.0158,
+        "height_difference": 0.493,
         "discharge_coefficient_for_opening": 0.2,
-        "minimum_indoor_temperature": 23.0, "minimum_outdoor_temperature": 10.0,
+        "minimum_indoor_temperature": 23.0,
+        "minimum_outdoor_temperature": 10.0,
         "delta_temperature": -100.0,
-    }  # fmt: skip
+    }
     more = json.loads((MODELS / "ext_shade.epJSON").read_text("utf-8"))
     if opened:
         more["ZoneVentilation:WindandStackOpenArea"] = {"OPENED": airing}
     return Box(
-        (5.0, 6.0, 2.8), 260.0,
+        (5.0, 6.0, 2.8),
+        260.0,
         dict.fromkeys(SIDES, INDOORS) | {"front": OUTDOORS, "left": OUTDOORS},
         dict.fromkeys(SIDES, INTERIOR_WALL)
-        | {"front": EXTERIOR_WALL, "left": EXTERIOR_WALL, "ceiling": CEILING_SLAB,
-           "floor": UPPER_FLOOR},
-        (1.0, 0.9, 3.0, 1.5), 0.3, 330.0, 20.0, more,
-    )  # fmt: skip
+        | {"front": EXTERIOR_WALL, "left": EXTERIOR_WALL, "ceiling": CEILING_SLAB, "floor": UPPER_FLOOR},
+        (1.0, 0.9, 3.0, 1.5),
+        0.3,
+        330.0,
+        20.0,
+        more,
+    )
 
 
 def main(folder: Path, *, reference: Path, weather: Path) -> pd.DataFrame:
@@ -327,10 +365,9 @@ def main(folder: Path, *, reference: Path, weather: Path) -> pd.DataFrame:
         ("attic, unheated", "Oklahoma", ATTIC, attic()),
         ("cellar in the ground, sunlit", "Boulder", CELLAR, cellar(dark=False)),
         ("cellar in the ground, dark", "Boulder", CELLAR, cellar(dark=True)),
-        ("office, exterior shade by U, g, BSDF, windows opened", "Las Vegas", shaded,
-         office(opened=True)),
+        ("office, exterior shade by U, g, BSDF, windows opened", "Las Vegas", shaded, office(opened=True)),
         ("the same, windows shut", "Las Vegas", shut, office(opened=False)),
-    )  # fmt: skip
+    )
     rows = []
     for name, place, text, box in trials:
         epw, here = (weather / CELLS[place]).resolve(), folder / name.replace(",", "")

@@ -79,10 +79,7 @@ def room(number: int, rooms: int) -> Quads:
 def _around(y: float, hole: tuple) -> Quads:
     """A wall across y with a hole."""
     (x0, x1), (z0, z1) = hole
-    strips = (
-        ((0, WIDTH), (0, z0)), ((0, WIDTH), (z1, HEIGHT)), ((0, x0), (z0, z1)),
-        ((x1, WIDTH), (z0, z1)),
-    )  # fmt: skip
+    strips = (((0, WIDTH), (0, z0)), ((0, WIDTH), (z1, HEIGHT)), ((0, x0), (z0, z1)), ((x1, WIDTH), (z0, z1)))
     return [(upright(y, strip, north=True), 0.5) for strip in strips]
 
 
@@ -117,9 +114,12 @@ def scene(rooms: int) -> DaylightScene:
             straight, glass = tau * np.ones(145), INNER_TAU * np.ones(145)
             beyond = (AdjacentRoom(found, (tau * eye,), (straight,), glass),)
         found = DaylightScene(
-            surfaces([*room(number, rooms), *taken]), Surfaces.none(), [group(number, rooms)],
-            *((sensors(rooms), UP) if last else ()), adjacent=beyond,
-        )  # fmt: skip
+            surfaces([*room(number, rooms), *taken]),
+            Surfaces.none(),
+            [group(number, rooms)],
+            *((sensors(rooms), UP) if last else ()),
+            adjacent=beyond,
+        )
     return found
 
 
@@ -160,13 +160,7 @@ def illuminance_by_path(
 
 
 def luminance_by_path(
-    opaque: Quads,
-    panes: Quads,
-    eye: Sequence[float],
-    ways: NDArray[np.float64],
-    samples: int,
-    *,
-    seed: int = 0,
+    opaque: Quads, panes: Quads, eye: Sequence[float], ways: NDArray[np.float64], samples: int, *, seed: int = 0
 ) -> NDArray[np.float64]:
     """Luminance [n] [cd/m2] that an eye in the rooms sees along directions [n, 3], the same way."""
     whole, sampler = _mitsuba_scene(opaque, panes), mi.load_dict({"type": "independent"})
@@ -176,9 +170,7 @@ def luminance_by_path(
     return seen.numpy().reshape(len(ways), samples).mean(axis=1)
 
 
-def _radiance(
-    whole: mi.Scene, sampler: mi.Sampler, start: mi.Point3f, direction: mi.Vector3f
-) -> mi.Float:
+def _radiance(whole: mi.Scene, sampler: mi.Sampler, start: mi.Point3f, direction: mi.Vector3f) -> mi.Float:
     """What a path finds from a point along each direction."""
     integrator = mi.load_dict({"type": "path", "max_depth": 64, "rr_depth": 16})
     ray = mi.RayDifferential3f(mi.Ray3f(start, direction))
@@ -264,10 +256,7 @@ def pooled(runs: list[NDArray[np.float64]]) -> tuple[NDArray[np.float64], NDArra
 
 
 def main(
-    *,
-    rooms: Sequence[int] = (2, 3),
-    seeds: int = 4,
-    paths: Annotated[int, "of a sensor for each seed"] = 1 << 19,
+    *, rooms: Sequence[int] = (2, 3), seeds: int = 4, paths: Annotated[int, "of a sensor for each seed"] = 1 << 19
 ) -> None:
     """Print the table."""
     variants.activate()

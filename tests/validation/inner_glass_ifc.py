@@ -41,14 +41,7 @@ from scenes.room.options import SensorGrid
 from scenes.room.windows import in_all_windows, room_windows
 from tests.benchmarks.radiance import polygon, write_surfaces
 from tests.validation.cut_groups import Quads
-from tests.validation.inner_glass import (
-    INNER_TAU,
-    TAU,
-    illuminance_by_path,
-    illuminance_by_rtrace,
-    overcast,
-    pooled,
-)
+from tests.validation.inner_glass import INNER_TAU, TAU, illuminance_by_path, illuminance_by_rtrace, overcast, pooled
 
 MOST_SENSORS = 5
 EYE = np.eye(KLEMS_FULL.size)
@@ -106,9 +99,8 @@ def whole_rooms(scene: DaylightScene) -> tuple[Quads, Quads]:
     rooms = list(_all_behind([scene]))
     walls = [_without_panes(room, scene) for room in rooms]
     opaque = [
-        (part.triangles[part.reflectance == rho], float(rho))
-        for part in walls for rho in np.unique(part.reflectance)
-    ]  # fmt: skip
+        (part.triangles[part.reflectance == rho], float(rho)) for part in walls for rho in np.unique(part.reflectance)
+    ]
     panes = [(_triangles(scene.outdoor_groups), 0.0)] if scene.outdoor_groups else []
     for room in rooms:
         panes += [

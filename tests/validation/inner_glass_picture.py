@@ -85,9 +85,7 @@ def ours(scene: DaylightScene, taus: Sequence[float]) -> NDArray[np.float64]:
     """Luminance [ny, nx] [cd/m2] by this project's three phases."""
     traced = phase_matrices(scene, SAMPLING, five_phase=False)
     systems = [[MatrixOptics(tau * np.eye(KLEMS_FULL.size))] for tau in taus]
-    made = pictures_in_state(
-        phase_light(traced, systems, overcast()), np.arange(1), [0] * len(taus)
-    )
+    made = pictures_in_state(phase_light(traced, systems, overcast()), np.arange(1), [0] * len(taus))
     view = scene.view
     picture = np.zeros(view.width * view.height)
     picture[made.pixels] = made.values(np.arange(1))[0]

@@ -48,8 +48,7 @@ from tests.validation.inner_sun import (
 Hours = NDArray[np.float64]  # [H]
 HEATED_C = 20.0
 SUN_FIELDS = (14, 15, 16)  # of an EPW: global, direct normal, diffuse
-PANE = {"thickness": 0.003048, "conductivity": 1.0, "emissivity": (0.84, 0.84),
-        "solar": (0.834, 0.075, 0.075)}  # fmt: skip
+PANE = {"thickness": 0.003048, "conductivity": 1.0, "emissivity": (0.84, 0.84), "solar": (0.834, 0.075, 0.075)}
 GLAZING = {"layers": [PANE | {"gap": {"width": 0.012}}, PANE]}  # of `clear_double.epJSON`
 EMPTY = {
     "gains": {"equipment_w_m2": 0.0, "persons": 0.0},
@@ -107,9 +106,15 @@ def coupled_rooms(case: str, weather_file: Path, *, one_air: bool) -> Coupled:
     skies, rooms = skies_for(weather, options.sampling), []
     for space, heated in zip(building.spaces, (one_air, True), strict=True):
         room = room_inputs(
-            building, space, glazing, weather, options, skies=skies, together=guids,
+            building,
+            space,
+            glazing,
+            weather,
+            options,
+            skies=skies,
+            together=guids,
             operation=OperationTables.model_validate(EMPTY | (HEATED if heated else {})),
-        )  # fmt: skip
+        )
         rooms.append(_radiating(operated_zone(room)))
     rooms, links, notes = coupled(rooms, 0.0)
     if notes:
@@ -200,13 +205,19 @@ def compare(case: str, weather: Path, *, one_air: bool) -> pd.DataFrame:
         needed = theirs[HEATING][week].sum()
         for program, hours in programs.items():
             heating = hours[HEATING][week].sum()
-            rows.append({
-                "case": case, "rooms": "one air" if one_air else "apart",
-                "sun": "sun" if weather == WEATHER else "none", "time": title, "program": program,
-                FRONT_AIR: hours[FRONT_AIR][week].mean(), REAR_AIR: hours[REAR_AIR][week].mean(),
-                HEATING: heating,
-                "heating %": 100.0 * (heating / needed - 1.0) if needed else np.nan,
-            })  # fmt: skip
+            rows.append(
+                {
+                    "case": case,
+                    "rooms": "one air" if one_air else "apart",
+                    "sun": "sun" if weather == WEATHER else "none",
+                    "time": title,
+                    "program": program,
+                    FRONT_AIR: hours[FRONT_AIR][week].mean(),
+                    REAR_AIR: hours[REAR_AIR][week].mean(),
+                    HEATING: heating,
+                    "heating %": 100.0 * (heating / needed - 1.0) if needed else np.nan,
+                }
+            )
     return pd.DataFrame(rows)
 
 

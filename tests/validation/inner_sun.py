@@ -50,15 +50,12 @@ FRONT = ("FACADE", "X0", "X4", "BACK", "FLOOR", "CEILING")
 REAR = ("FRONT", "R0", "R4", "NORTH", "REAR FLOOR", "REAR CEILING")
 ABSORBED = "Surface Inside Face Solar Radiation Heat Gain Rate"
 PASSING = tuple(
-    f"Enclosure Interior Windows Total Transmitted {kind} Solar Radiation Rate"
-    for kind in ("Beam", "Diffuse")
+    f"Enclosure Interior Windows Total Transmitted {kind} Solar Radiation Rate" for kind in ("Beam", "Diffuse")
 )
 ENTERING = "Surface Window Transmitted Solar Radiation Rate"
 
 
-def two_rooms(
-    reflectance: dict[str, float], case: str = "room", rear: dict[str, float] | None = None
-) -> Building:
+def two_rooms(reflectance: dict[str, float], case: str = "room", rear: dict[str, float] | None = None) -> Building:
     """The two rooms, joined by wall and pane; layers are those of EnergyPlus' models.
 
     Args: rear: reflectances of the room behind; those of the front room without.
@@ -67,37 +64,43 @@ def two_rooms(
     wall, slab = _construction("left"), _construction("floor")
     inside = {"left": wall, "right": wall, "floor": slab, "ceiling": slab}
     lit = shoebox(
-        4.0, depth, 3.0, windows=(WindowRectangle(*window), WindowRectangle(*pane, "back")),
-        reflectance=reflectance, name="front", adjacency={"back": "space"},
+        4.0,
+        depth,
+        3.0,
+        windows=(WindowRectangle(*window), WindowRectangle(*pane, "back")),
+        reflectance=reflectance,
+        name="front",
+        adjacency={"back": "space"},
         constructions=inside | {"front": _construction("facade"), "back": wall},
-    )  # fmt: skip
+    )
     dark = shoebox(
-        4.0, REAR_DEPTH, 3.0, windows=(WindowRectangle(*pane, "front"),),
-        reflectance=reflectance if rear is None else rear, name="rear",
+        4.0,
+        REAR_DEPTH,
+        3.0,
+        windows=(WindowRectangle(*pane, "front"),),
+        reflectance=reflectance if rear is None else rear,
+        name="rear",
         adjacency={"front": "space", "back": "outside"},
         constructions=inside | {"front": wall, "back": _construction("facade")},
-    )  # fmt: skip
+    )
     (front,) = lit.spaces
     behind = _moved(dark.spaces[0], depth)
     front, behind = (
         replace(
-            space, windows=space.windows[:-1],
-            faces=(*(_towards(face, other.guid) for face in space.faces),
-                   _pane(space.windows[-1], other.guid)),
+            space,
+            windows=space.windows[:-1],
+            faces=(*(_towards(face, other.guid) for face in space.faces), _pane(space.windows[-1], other.guid)),
         )
         for space, other in ((front, behind), (behind, front))
-    )  # fmt: skip
+    )
     return replace(lit, spaces=(front, behind))
 
 
 def _construction(surface: str) -> Construction:
     """The layers of a surface of Table 15's room."""
-    (one,) = (s for s in reference_room.zone("S", clear_double().fenestration).surfaces
-              if s.name == surface)  # fmt: skip
+    (one,) = (s for s in reference_room.zone("S", clear_double().fenestration).surfaces if s.name == surface)
     layers = (
-        MaterialLayer(
-            f"{surface} {number}", x.thickness, x.conductivity, x.density, x.heat_capacity
-        )
+        MaterialLayer(f"{surface} {number}", x.thickness, x.conductivity, x.density, x.heat_capacity)
         for number, x in enumerate(one.layers)
     )
     return Construction(surface, tuple(layers))
@@ -110,23 +113,31 @@ def _towards(face: Face, beyond: str) -> Face:
 def _moved(space: Space, north: float) -> Space:
     step = np.array([0.0, north, 0.0])
     return replace(
-        space, guid="rear", name="rear",
+        space,
+        guid="rear",
+        name="rear",
         faces=tuple(replace(f, triangles=f.triangles + step) for f in space.faces),
         windows=tuple(replace(w, triangles=w.triangles + step) for w in space.windows),
-    )  # fmt: skip
+    )
 
 
 def _pane(window: Window, beyond: str) -> Face:
     same = replace(window, guid="inner", solar_transmittance=SOLAR_CLEAR)
     return Face(
-        "inner pane", "wall", window.triangles, "space", FLOAT, 0.15, 0.15,
-        emissivity=GLASS_EMISSIVITY, neighbour=beyond, pane=same,
-    )  # fmt: skip
+        "inner pane",
+        "wall",
+        window.triangles,
+        "space",
+        FLOAT,
+        0.15,
+        0.15,
+        emissivity=GLASS_EMISSIVITY,
+        neighbour=beyond,
+        pane=same,
+    )
 
 
-def ours(
-    case: str, patch_samples: int, weather: Path = WEATHER, albedo: float = 0.2
-) -> dict[str, float]:
+def ours(case: str, patch_samples: int, weather: Path = WEATHER, albedo: float = 0.2) -> dict[str, float]:
     """Sun through window and pane, in both rooms' opaque surfaces and on the rear floor [kWh].
 
     What enters by the pane is what a black room behind it absorbs.
@@ -134,27 +145,27 @@ def ours(
     sky = (patch_samples, weather, albedo)
     black = _sums(two_rooms(REFLECTANCE, case, dict.fromkeys(REFLECTANCE, 0.0)), *sky)
     sums = _sums(two_rooms(REFLECTANCE, case), *sky)
-    return {"through the window": sums.pop("through the window"),
-            "through the pane": black["rear room"], **sums}  # fmt: skip
+    return {"through the window": sums.pop("through the window"), "through the pane": black["rear room"], **sums}
 
 
-def _sums(
-    building: Building, patch_samples: int, weather_file: Path, albedo: float
-) -> dict[str, float]:
+def _sums(building: Building, patch_samples: int, weather_file: Path, albedo: float) -> dict[str, float]:
     weather = replace(read_epw(weather_file), albedo=albedo)
     front, rear = building.spaces
     glazing = glazing_system(StatedValues(0.81, 0.70, 0.76, 2.7, 2), "clear double")
     sampling = replace(RoomOptions().sampling, patch_samples=patch_samples)
     room = room_inputs(
-        building, front, in_all_windows(front, glazing), weather,
-        RoomOptions(sampling=sampling), together=[front.guid, rear.guid],
-    )  # fmt: skip
+        building,
+        front,
+        in_all_windows(front, glazing),
+        weather,
+        RoomOptions(sampling=sampling),
+        together=[front.guid, rear.guid],
+    )
     surfaces = zone_surfaces(room)
     state = np.zeros((room.skies.hours, len(room.windows.groups)), dtype=np.int64)
     solar, gains, beyond = solar_gains(
-        room, seasonal_outdoors(room), surfaces.room, surfaces.outer, state,
-        thermals=surfaces.thermals,
-    )  # fmt: skip
+        room, seasonal_outdoors(room), surfaces.room, surfaces.outer, state, thermals=surfaces.thermals
+    )
     dark = [i for i, face in enumerate(rear.faces) if face.pane is None]
     floor = [i for i in dark if rear.faces[i].kind == "floor"]
     sums = {
@@ -191,9 +202,7 @@ def energyplus_model(case: str, outputs: dict[str, str], *changes: str) -> Model
     inner = pane_transmissivity(SOLAR_CLEAR, GLASS_INDEX)
     rho = float(pane_shares(cosine, GLASS_INDEX, inner)[1][0])
     glass = {"optical_data_type": "SpectralAverage", "thickness": 0.006, "conductivity": 1.0}
-    glass |= {
-        f"{band}_transmittance_at_normal_incidence": SOLAR_CLEAR for band in ("solar", "visible")
-    }
+    glass |= {f"{band}_transmittance_at_normal_incidence": SOLAR_CLEAR for band in ("solar", "visible")}
     glass |= {
         f"{side}_side_{band}_reflectance_at_normal_incidence": rho
         for side in ("front", "back")
@@ -204,19 +213,14 @@ def energyplus_model(case: str, outputs: dict[str, str], *changes: str) -> Model
         "WindowMaterial:Glazing": {"INNER PANE": glass},
         "Construction": {"INNER GLASS": {"outside_layer": "INNER PANE"}},
         "FenestrationSurface:Detailed": {
-            "INNER BACK": _interior_window("BACK", "INNER FRONT")
-            | _vertices(corners[::-1], TABLE_DEPTH),
-            "INNER FRONT": _interior_window("FRONT", "INNER BACK")
-            | _vertices(corners, TABLE_DEPTH),
+            "INNER BACK": _interior_window("BACK", "INNER FRONT") | _vertices(corners[::-1], TABLE_DEPTH),
+            "INNER FRONT": _interior_window("FRONT", "INNER BACK") | _vertices(corners, TABLE_DEPTH),
             "WINDOW": _vertices(_corners(window), 0.0),
         },
         "Zone": {"ROOM": {"volume": 12.0 * depth}},
     }
     model = merged(room_model("S", "clear_double", "second_room", *changes, outputs=outputs), patch)
-    return {
-        kind: {name: _deep(one, depth) for name, one in objects.items()}
-        for kind, objects in model.items()
-    }
+    return {kind: {name: _deep(one, depth) for name, one in objects.items()} for kind, objects in model.items()}
 
 
 def _deep(one: dict, depth: float) -> dict:
@@ -247,10 +251,12 @@ def _vertices(corners: list[tuple[float, float]], y: float) -> dict:
 
 def _interior_window(wall: str, other: str) -> dict:
     return {
-        "surface_type": "Window", "construction_name": "INNER GLASS",
-        "building_surface_name": wall, "outside_boundary_condition_object": other,
+        "surface_type": "Window",
+        "construction_name": "INNER GLASS",
+        "building_surface_name": wall,
+        "outside_boundary_condition_object": other,
         "number_of_vertices": 4,
-    }  # fmt: skip
+    }
 
 
 def without_fields(folder: Path, *fields: int) -> Path:
@@ -268,10 +274,7 @@ def compare(patch_samples: int, weather: Path, albedo: float) -> pd.DataFrame:
     tables = []
     for case in CASES:
         table = pd.DataFrame(
-            {
-                "ours": ours(case, patch_samples, weather, albedo),
-                "EnergyPlus": energyplus(case, weather, albedo),
-            }
+            {"ours": ours(case, patch_samples, weather, albedo), "EnergyPlus": energyplus(case, weather, albedo)}
         )
         share = table / table.loc["through the window"] * 100.0
         table["ours %"], table["EnergyPlus %"] = share["ours"], share["EnergyPlus"]

@@ -26,14 +26,7 @@ from bim.fenestration import pane_transmissivity
 from mitsuba_cfs.gloss import pane_shares
 from scenes.demo import WEATHER
 from scenes.room.solar import GLASS_INDEX, SOLAR_CLEAR
-from tests.validation.inner_sun import (
-    CASES,
-    REAR_DEPTH,
-    REFLECTANCE,
-    Rectangle,
-    energyplus,
-    ours,
-)
+from tests.validation.inner_sun import CASES, REAR_DEPTH, REFLECTANCE, Rectangle, energyplus, ours
 
 GLAZING = 0.70  # transmittance of the window at normal incidence, as in `inner_sun` [-]
 WIDTH, HEIGHT = 4.0, 3.0  # of the rooms [m]
@@ -90,21 +83,16 @@ def _wall(name: str, material: str, y: float, hole: Rectangle) -> list[str]:
         "left": (0.0, sill, x, height),
         "right": (x + width, sill, WIDTH - x - width, height),
     }
-    return [
-        _upright(f"{name}_{key}", material, y, r) for key, r in strips.items() if min(r[2:]) > 0
-    ]
+    return [_upright(f"{name}_{key}", material, y, r) for key, r in strips.items() if min(r[2:]) > 0]
 
 
 def _upright(name: str, material: str, y: float, rectangle: Rectangle) -> str:
     x, z, width, height = rectangle
-    return _polygon(name, material, [(x, y, z), (x + width, y, z), (x + width, y, z + height),
-                                     (x, y, z + height)])  # fmt: skip
+    return _polygon(name, material, [(x, y, z), (x + width, y, z), (x + width, y, z + height), (x, y, z + height)])
 
 
 def _level(name: str, material: str, z: float, near: float, far: float) -> str:
-    return _polygon(
-        name, material, [(0.0, near, z), (WIDTH, near, z), (WIDTH, far, z), (0.0, far, z)]
-    )
+    return _polygon(name, material, [(0.0, near, z), (WIDTH, near, z), (WIDTH, far, z), (0.0, far, z)])
 
 
 def _side(name: str, material: str, x: float, near: float, far: float) -> str:
@@ -133,12 +121,8 @@ def run(command: str, folder: Path, text: bytes = b"") -> bytes:
     """Output of a command of Radiance."""
     binaries = Path(pyradiance.__file__).parent / "bin"
     library = Path(pyradiance.__file__).parent / "lib"
-    environment = os.environ | {
-        "PATH": f"{binaries}:{os.environ['PATH']}", "RAYPATH": f".:{library}",
-    }  # fmt: skip
-    done = subprocess.run(
-        command, shell=True, cwd=folder, env=environment, input=text, capture_output=True
-    )
+    environment = os.environ | {"PATH": f"{binaries}:{os.environ['PATH']}", "RAYPATH": f".:{library}"}
+    done = subprocess.run(command, shell=True, cwd=folder, env=environment, input=text, capture_output=True)
     if done.returncode:
         raise RuntimeError(done.stderr.decode()[-2000:])
     return done.stdout
@@ -166,8 +150,10 @@ def radiance(case: str, samples: int) -> dict[str, float]:
             # -lw ends only paths that carry less than a tenth of one of a point's samples
             matrix = run(
                 f"rfluxmtx -h -I+ -ab {bounces} -ad {samples} -lw {0.1 / samples:g} -lr -12 "
-                f"-y {len(rows)} - sky.rad room.rad", folder, text,
-            ).decode()  # fmt: skip
+                f"-y {len(rows)} - sky.rad room.rad",
+                folder,
+                text,
+            ).decode()
             coefficients = np.array(matrix.split(), dtype=float).reshape(len(rows), -1, 3)[..., 0]
             return float((coefficients @ sky).mean()) * rectangle[2] * rectangle[3] * 8.760
 

@@ -24,9 +24,8 @@ from tests.radiance import run, sensors_text, write_surfaces
 
 PLACES = {
     "one": [((1.5, 2.0, 2.6), 0.0)],
-    "four": [((1.0, 1.2, 2.8), 0.0), ((3.0, 1.2, 2.8), 90.0), ((1.0, 3.8, 2.8), 180.0),
-             ((3.0, 3.8, 2.8), 30.0)],
-}  # fmt: skip
+    "four": [((1.0, 1.2, 2.8), 0.0), ((3.0, 1.2, 2.8), 90.0), ((1.0, 3.8, 2.8), 180.0), ((3.0, 3.8, 2.8), 30.0)],
+}
 OPTIONS = "-I -h -ab {} -ad 1024 -as 0 -aa 0 -lw 1e-6 -dt 0 -dc 1"  # of rtrace
 
 
@@ -34,10 +33,7 @@ def photometric_file(folder: Path) -> Path:
     """An IES file whose intensity differs by both angles."""
     c = np.arange(0.0, 361.0, 15.0)
     down = np.cos(np.radians(GAMMA))
-    rows = [
-        800.0 * down * (1.0 + 0.6 * np.cos(np.radians(a)) * np.sin(2 * np.radians(GAMMA)))
-        for a in c
-    ]
+    rows = [800.0 * down * (1.0 + 0.6 * np.cos(np.radians(a)) * np.sin(2 * np.radians(GAMMA))) for a in c]
     path = folder / "lamp.ies"
     path.write_text(ies(c, GAMMA, rows))
     return path
@@ -45,9 +41,7 @@ def photometric_file(folder: Path) -> Path:
 
 def compare(paths: int = 4096) -> pd.DataFrame:
     """By arrangement: means, and the differences of the sensors."""
-    building = shoebox(
-        4.0, 5.0, 3.0, windows=(), reflectance={"wall": 0.5, "floor": 0.2, "ceiling": 0.8}
-    )
+    building = shoebox(4.0, 5.0, 3.0, windows=(), reflectance={"wall": 0.5, "floor": 0.2, "ceiling": 0.8})
     space = building.spaces[0]
     points = sensor_grid(space, spacing=0.5, height=0.8, margin=0.5)[0]
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
@@ -60,9 +54,7 @@ def compare(paths: int = 4096) -> pd.DataFrame:
         write_surfaces(surfaces, folder / "room.rad")
         run("ies2rad -o lamp lamp.ies", folder)
         for label, places in PLACES.items():
-            scene = "".join(
-                f"!xform -rz {turned} -t {x} {y} {z} lamp.rad\n" for (x, y, z), turned in places
-            )
+            scene = "".join(f"!xform -rz {turned} -t {x} {y} {z} lamp.rad\n" for (x, y, z), turned in places)
             (folder / "lamps.rad").write_text(scene)
             run("oconv room.rad lamps.rad > scene.oct", folder)
             both = []
@@ -76,15 +68,17 @@ def compare(paths: int = 4096) -> pd.DataFrame:
             whole, theirs = ours.direct + ours.reflected, both[1]
             rows.append(
                 {
-                    "luminaires": label, "sensors": len(points),
+                    "luminaires": label,
+                    "sensors": len(points),
                     "direct lx": round(float(ours.direct.mean()), 2),
                     "Radiance": round(float(both[0].mean()), 2),
                     "direct rms %": round(100 * _rms(ours.direct, both[0]), 2),
-                    "all lx": round(ours.mean, 2), "Radiance, all": round(float(theirs.mean()), 2),
+                    "all lx": round(ours.mean, 2),
+                    "Radiance, all": round(float(theirs.mean()), 2),
                     "stated error lx": round(ours.standard_error, 2),
                     "rms %": round(100 * _rms(whole, theirs), 2),
                 }
-            )  # fmt: skip
+            )
     return pd.DataFrame(rows)
 
 

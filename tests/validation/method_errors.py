@@ -101,11 +101,7 @@ def rooms(size: int) -> dict[str, tuple[DaylightScene, bool]]:
     view = fisheye((1.8, 2.0, 1.2), (0.0, -1.0, 0.0), size)
     free = DaylightScene(box.room(), Surfaces.none(), box.window_groups(), points, normals, view)
     blocked = replace(free, exterior=opposite())
-    return {
-        "sun aside": (free, False),
-        "sun in view": (free, True),
-        "building opposite": (blocked, False),
-    }
+    return {"sun aside": (free, False), "sun in view": (free, True), "building opposite": (blocked, False)}
 
 
 def opposite() -> Surfaces:
@@ -147,9 +143,7 @@ def with_sun(scene: DaylightScene, series: SkySeries) -> NDArray[np.bool_]:
     return seen
 
 
-def method_matrices(
-    method: str, scene: DaylightScene, sampling: Sampling | None = None
-) -> PhaseMatrices | None:
+def method_matrices(method: str, scene: DaylightScene, sampling: Sampling | None = None) -> PhaseMatrices | None:
     """The matrices of a scene that a method takes for every glare metric."""
     if method == "point-in-time":
         return None
@@ -194,11 +188,7 @@ def made(hours: int, size: int, out: Path) -> MeasuredErrors:
             found = measured(scene, traced, bsdf, lit)
             cases.append(MeasuredCase(place, name, traits_of(scene, bsdf, lit), found))
             print(name, place, {k: round(v, 3) for k, v in found.items()}, file=sys.stderr)
-            table = MeasuredErrors(
-                f"python -m {__spec__.name}",
-                date.today().isoformat(),
-                tuple(cases),
-            )
+            table = MeasuredErrors(f"python -m {__spec__.name}", date.today().isoformat(), tuple(cases))
             out.write_text(json.dumps(asdict(table), indent=1) + "\n")
     return MeasuredErrors.read(out)
 
@@ -234,16 +224,13 @@ def print_check(table: MeasuredErrors) -> None:
     bars = ", ".join(f"{100 * bar:.0f}" for bar in BARS)
     print(f"said to be within {bars} % and not so: {broken} of {asked}")
     ratios = held_out(table)
-    print(
-        "| method, metric | measured, least to most [%] | predicted over measured: median | 80 % |"
-    )
+    print("| method, metric | measured, least to most [%] | predicted over measured: median | 80 % |")
     print("|---|---|---|---|")
     for pair, found in ratios.items():
         errors = 100 * np.array([case.errors[pair] for case in table.cases])
         low, high = np.quantile(found, [0.1, 0.9])
         print(
-            f"| {pair} | {errors.min():.1f} to {errors.max():.1f} | {np.median(found):.2f} "
-            f"| {low:.2f} to {high:.2f} |"
+            f"| {pair} | {errors.min():.1f} to {errors.max():.1f} | {np.median(found):.2f} | {low:.2f} to {high:.2f} |"
         )
 
 

@@ -35,14 +35,7 @@ from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.calibration.errors import FILE, LEAST, MeasuredErrors
-from tests.validation.method_errors import (
-    BARS,
-    BRIGHT,
-    measured,
-    method_matrices,
-    traits_of,
-    with_sun,
-)
+from tests.validation.method_errors import BARS, BRIGHT, measured, method_matrices, traits_of, with_sun
 
 NEAR = [WindowRectangle(x, 0.8, 1.6, 1.7) for x in (0.3, 2.2, 4.1)]
 DEEP = [WindowRectangle(0.2, 1.9, 3.1, 0.8)]
@@ -75,9 +68,7 @@ def fresh_hours(weather: Weather, hours: int, scene: DaylightScene | None = None
     series = sky_series(weather)
     chosen = series.diffuse_horizontal > BRIGHT if scene is None else with_sun(scene, series)
     bright = np.flatnonzero(chosen)
-    return annual_sky(
-        weather, hours=bright[np.linspace(0, len(bright) - 1, hours + 2)[1:-1].astype(int)]
-    )
+    return annual_sky(weather, hours=bright[np.linspace(0, len(bright) - 1, hours + 2)[1:-1].astype(int)])
 
 
 def visible(path: Path) -> Bsdf:
@@ -99,10 +90,17 @@ def compared(scene: DaylightScene, lit: AnnualSky, files: list[Path], room: str)
         found, said = measured(scene, traced, bsdf, lit), table.expected(traits)
         far = float(table.distances(traits).min())
         rows += [
-            {"room": room, "system": path.stem, "pair": " ".join(pair), "expected": value,
-             "measured": found[" ".join(pair)], "distance": far, "sun": traits.sun}
+            {
+                "room": room,
+                "system": path.stem,
+                "pair": " ".join(pair),
+                "expected": value,
+                "measured": found[" ".join(pair)],
+                "distance": far,
+                "sun": traits.sun,
+            }
             for pair, value in said.items()
-        ]  # fmt: skip
+        ]
         print(json.dumps(rows[-len(said) :]), file=sys.stderr, flush=True)
     return rows
 
@@ -118,9 +116,11 @@ def print_table(rows: list[dict]) -> None:
         )
     broken = sum(r["expected"] <= bar < r["measured"] for r in rows for bar in BARS)
     ratio = [row["expected"] / max(row["measured"], LEAST) for row in rows]
-    print(f"\nbroken promises: {broken} of {len(rows) * len(BARS)}; expected over measured: "
-          f"median {np.median(ratio):.2f}, 10 to 90 % {np.quantile(ratio, 0.1):.2f} to "
-          f"{np.quantile(ratio, 0.9):.2f}")  # fmt: skip
+    print(
+        f"\nbroken promises: {broken} of {len(rows) * len(BARS)}; expected over measured: "
+        f"median {np.median(ratio):.2f}, 10 to 90 % {np.quantile(ratio, 0.1):.2f} to "
+        f"{np.quantile(ratio, 0.9):.2f}"
+    )
 
 
 def main(

@@ -31,8 +31,7 @@ FACADE = (
     "facade polygon opposite\n0\n0\n12 8 -12 0  -12 -12 0  -12 -12 30  8 -12 30\n"
 )
 SHELF = (
-    "\nvoid mirror polish\n0\n0\n3 .01 .01 .01\n"
-    "polish polygon shelf\n0\n0\n12 1 .6 .9  4 .6 .9  4 1.6 .9  1 1.6 .9\n"
+    "\nvoid mirror polish\n0\n0\n3 .01 .01 .01\npolish polygon shelf\n0\n0\n12 1 .6 .9  4 .6 .9  4 1.6 .9  1 1.6 .9\n"
 )
 FISHEYE = "-vta -vp {} -vd {} -vu 0 0 1 -vh 180 -vv 180"
 SCENES = {  # text, rotation [deg], hour, view

@@ -39,10 +39,12 @@ def street(share: float) -> Surfaces:
         return quad((x0, 0, low), (x1, 0, low), (x1, 0, high), (x0, 0, high))
 
     facades = [
-        upright(-HALF, HALF, z1, HIGH), upright(-HALF, HALF, LOW, z0),
-        upright(-HALF, rooms.X0, z0, z1), upright(rooms.X1, HALF, z0, z1),
+        upright(-HALF, HALF, z1, HIGH),
+        upright(-HALF, HALF, LOW, z0),
+        upright(-HALF, rooms.X0, z0, z1),
+        upright(rooms.X1, HALF, z0, z1),
         quad((HALF, -WIDE, LOW), (-HALF, -WIDE, LOW), (-HALF, -WIDE, HIGH), (HALF, -WIDE, HIGH)),
-    ]  # fmt: skip
+    ]
     ground = quad((-HALF, -WIDE, LOW), (HALF, -WIDE, LOW), (HALF, 0, LOW), (-HALF, 0, LOW))
     triangles = np.concatenate([*facades, ground])
     surface = np.repeat([0, 0, 0, 0, 1, 2], 2)
@@ -66,9 +68,7 @@ def main(
     lux, errors = [], []
     for method in ("five-phase", "point-in-time"):
         sampling = cfs.Sampling(hour_samples=paths)
-        light = cfs.daylight(
-            scene, [[cfs.AngularOptics(GLASS)]], sky, method=method, sampling=sampling
-        )
+        light = cfs.daylight(scene, [[cfs.AngularOptics(GLASS)]], sky, method=method, sampling=sampling)
         values, noise = illuminance_with_noise(light)
         lux.append(values)
         errors.append(hourly_errors(noise, values.shape))

@@ -78,16 +78,44 @@ MODULES = {
     "scenes/toml_file": ["scenes/test_toml_file"],
 }
 SWAPPED = {
-    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult,
-    ast.FloorDiv: ast.Mult, ast.Mod: ast.Mult, ast.Lt: ast.GtE, ast.GtE: ast.Lt, ast.Gt: ast.LtE,
-    ast.LtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.In: ast.NotIn, ast.NotIn: ast.In,
-    ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.And: ast.Or, ast.Or: ast.And,
-    ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd,
-}  # fmt: skip
-RENAMED = {"sin": "cos", "cos": "sin", "arcsin": "arccos", "arccos": "arcsin", "min": "max",
-           "max": "min", "minimum": "maximum", "maximum": "minimum", "any": "all", "all": "any",
-           "floor": "ceil", "ceil": "floor", "degrees": "radians",
-           "radians": "degrees"}  # fmt: skip
+    ast.Add: ast.Sub,
+    ast.Sub: ast.Add,
+    ast.Mult: ast.Div,
+    ast.Div: ast.Mult,
+    ast.Pow: ast.Mult,
+    ast.FloorDiv: ast.Mult,
+    ast.Mod: ast.Mult,
+    ast.Lt: ast.GtE,
+    ast.GtE: ast.Lt,
+    ast.Gt: ast.LtE,
+    ast.LtE: ast.Gt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+    ast.In: ast.NotIn,
+    ast.NotIn: ast.In,
+    ast.Is: ast.IsNot,
+    ast.IsNot: ast.Is,
+    ast.And: ast.Or,
+    ast.Or: ast.And,
+    ast.BitAnd: ast.BitOr,
+    ast.BitOr: ast.BitAnd,
+}
+RENAMED = {
+    "sin": "cos",
+    "cos": "sin",
+    "arcsin": "arccos",
+    "arccos": "arcsin",
+    "min": "max",
+    "max": "min",
+    "minimum": "maximum",
+    "maximum": "minimum",
+    "any": "all",
+    "all": "any",
+    "floor": "ceil",
+    "ceil": "floor",
+    "degrees": "radians",
+    "radians": "degrees",
+}
 LONGEST_S = 600  # of the same by the clock
 LIMIT_S = 60  # processor time of the tests of one fault: longer is a loop without an end
 # No fault: without an effect at run time, or only on what a type checker refuses
@@ -147,9 +175,7 @@ def _faults(node: ast.AST) -> Iterator:
         yield lambda: setattr(node, "operand", ast.UnaryOp(ast.Not(), node.operand))
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):
         value = node.value
-        yield lambda: setattr(
-            node, "value", value + 1 if type(value) is int else value * 1.1 + 0.01
-        )
+        yield lambda: setattr(node, "value", value + 1 if type(value) is int else value * 1.1 + 0.01)
     if isinstance(node, ast.Constant) and type(node.value) is bool:
         yield lambda: setattr(node, "value", not node.value)
     if isinstance(node, ast.Call):
@@ -282,9 +308,7 @@ def main(
         fails, *kinds = noticed(module, [unchanged, *(source for _, source in sample)], tests)
         if fails:
             raise RuntimeError(f"{module}: its tests fail without a fault")
-        results += [
-            replace(one, noticed=kind) for (one, _), kind in zip(sample, kinds, strict=True)
-        ]
+        results += [replace(one, noticed=kind) for (one, _), kind in zip(sample, kinds, strict=True)]
         print(f"{module}: {sum(kinds)} of {len(kinds)}", file=sys.stderr, flush=True)
         if json_ is not None:
             json_.write_text(json.dumps([asdict(one) for one in results], indent=1))

@@ -41,7 +41,7 @@ WINDOWS = {
     "two slits of a wall": (("S", 1, 4, 0.9, 1.6), ("S", 5, 8, 2.2, 2.7)),
     "small panes": (("S", 1, 2.2, 2.3, 2.6), ("W", 1, 2.2, 2.3, 2.6), ("E", 3, 4.2, 2.3, 2.6)),
     "west": (("W", 0.5, 6.5, 0.8, 2.8),),
-}  # fmt: skip
+}
 PEER = """
 import json, sys
 from pathlib import Path
@@ -154,8 +154,14 @@ def _write(folder: Path, room: StatedRoom, weather: Weather) -> None:
                 place = results / path / f"{state}_{path}" / kind
                 place.mkdir(parents=True)
                 np.save(place / "room.npy", values[up].T)
-    info = {"name": "room", "identifier": "room", "full_id": "room", "group": "",
-            "count": room.total.shape[2], "light_path": [[path] for path in paths]}  # fmt: skip
+    info = {
+        "name": "room",
+        "identifier": "room",
+        "full_id": "room",
+        "group": "",
+        "count": room.total.shape[2],
+        "light_path": [[path] for path in paths],
+    }
     states = {path: [f"0_{path}", f"1_{path}"] for path in paths}
     (results / "grids_info.json").write_text(json.dumps([info]))
     (results / "grid_states.json").write_text(json.dumps({"room": states}))

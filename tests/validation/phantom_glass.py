@@ -104,10 +104,20 @@ def counted(path: Path) -> Counted:
     misses += [f"{_said(model, g)}: {area:.2f} left in silence" for g, area in silent.items()]
     left_area = sum(left.values())
     return Counted(
-        path.name, sum(ours.values()) + down, parts["drawn"], parts["assumed"], parts["empty"],
-        parts["beyond"], down, twice(windows), before, before - sum(lost.values()), left_area,
-        left_area - sum(silent.values()), tuple(misses),
-    )  # fmt: skip
+        path.name,
+        sum(ours.values()) + down,
+        parts["drawn"],
+        parts["assumed"],
+        parts["empty"],
+        parts["beyond"],
+        down,
+        twice(windows),
+        before,
+        before - sum(lost.values()),
+        left_area,
+        left_area - sum(silent.values()),
+        tuple(misses),
+    )
 
 
 def _with_wholes(model: ifcopenshell.file, guid: str) -> set[str]:
@@ -167,9 +177,10 @@ def table(rows: Sequence[Counted]) -> str:
             f"| {r.file} | {r.used:.1f} | {r.drawn:.1f} | {r.assumed:.1f} | {r.empty:.1f} "
             f"| {r.phantom:.2f} | {r.before:.1f} | {share} | {r.left:.1f} | {told} |"
         )
-    sums = [sum(getattr(r, name) for r in rows) for name in (
-        "used", "drawn", "assumed", "empty", "phantom", "before", "before_used",
-        "left", "told")]  # fmt: skip
+    sums = [
+        sum(getattr(r, name) for r in rows)
+        for name in ("used", "drawn", "assumed", "empty", "phantom", "before", "before_used", "left", "told")
+    ]
     lines.append(
         f"| all | {sums[0]:.1f} | {sums[1]:.1f} | {sums[2]:.1f} | {sums[3]:.1f} | {sums[4]:.2f} "
         f"| {sums[5]:.1f} | {_share(sums[6], sums[5])} "
@@ -182,9 +193,7 @@ def _share(part: float, whole: float) -> str:
     return f"{100 * part / whole:.1f} %" if whole > EXACT else "-"
 
 
-def main(
-    files: Sequence[Path], *, misses: Annotated[bool, "name the elements that differ"] = False
-) -> None:
+def main(files: Sequence[Path], *, misses: Annotated[bool, "name the elements that differ"] = False) -> None:
     """Print the table, and with `--misses` the elements that miss."""
     rows = []
     for path in files:
@@ -196,8 +205,7 @@ def main(
         if misses:
             print(
                 rows[-1].file,
-                f"phantom {rows[-1].phantom:.2f} (down {rows[-1].down:.2f}, "
-                f"twice {rows[-1].twice:.2f})",
+                f"phantom {rows[-1].phantom:.2f} (down {rows[-1].down:.2f}, twice {rows[-1].twice:.2f})",
                 *rows[-1].misses,
                 sep="\n  ",
                 flush=True,

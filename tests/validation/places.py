@@ -34,7 +34,7 @@ PLACES = {  # name: latitude, longitude, time zone, year
     "St. John's": (47.56, -52.71, -3.5, 2023),
     "Ushuaia": (-54.80, -68.30, -3.0, 2023),
     "Neumayer": (-70.67, -8.27, 0.0, 2023),
-}  # fmt: skip
+}
 STUDY = """
 methods = ["three-phase"]
 glare = "none"
@@ -70,10 +70,43 @@ def write_year(path: Path, name: str, place: tuple[float, float, float, int]) ->
         begin = end - pd.Timedelta("1h")
         season = np.cos(2 * np.pi * (begin.dayofyear - 15) / 365) * np.sign(latitude)
         warm = 10.0 - 10.0 * season + 3.0 * np.sin(2 * np.pi * (begin.hour - 9) / 24)
-        fields = [begin.year, begin.month, begin.day, begin.hour + 1, 60, "?", f"{warm:.1f}",
-                  f"{warm - 5:.1f}", 71, 101325, 0, 0, 300, f"{row['global']:.0f}",
-                  f"{row['direct']:.0f}", f"{row['diffuse']:.0f}", 999999, 999999, 999999, 9999,
-                  270, 3.5, 0, 0, 9999, 99999, 9, 999999999, 0, 0, 0, 88, 0.2, 0, 0]  # fmt: skip
+        fields = [
+            begin.year,
+            begin.month,
+            begin.day,
+            begin.hour + 1,
+            60,
+            "?",
+            f"{warm:.1f}",
+            f"{warm - 5:.1f}",
+            71,
+            101325,
+            0,
+            0,
+            300,
+            f"{row['global']:.0f}",
+            f"{row['direct']:.0f}",
+            f"{row['diffuse']:.0f}",
+            999999,
+            999999,
+            999999,
+            9999,
+            270,
+            3.5,
+            0,
+            0,
+            9999,
+            99999,
+            9,
+            999999999,
+            0,
+            0,
+            0,
+            88,
+            0.2,
+            0,
+            0,
+        ]
         lines.append(",".join(map(str, fields)))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
@@ -82,8 +115,11 @@ def cfs(*words: object) -> str:
     """The output of a command."""
     result = subprocess.run(
         [sys.executable, "-m", "scenes.cli", *map(str, words)],
-        cwd=REPOSITORY, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     if result.returncode:
         raise RuntimeError(result.stderr)
     return result.stdout
@@ -97,17 +133,29 @@ def sun_figures(table: pd.DataFrame) -> list[str]:
     march = table[(times.dt.month == 3) & (times.dt.day == 21)]
     noon = pd.to_datetime(march.iloc[march["altitude_deg"].argmax(), 0])
     return [
-        f"{up.sum()}", f"{(by_day == 0).sum()}", f"{(by_day >= 24).sum()}", f"{noon:%H:%M}",
+        f"{up.sum()}",
+        f"{(by_day == 0).sum()}",
+        f"{(by_day >= 24).sum()}",
+        f"{noon:%H:%M}",
         f"{table['altitude_deg'].max():.1f}",
-    ]  # fmt: skip
+    ]
 
 
 def main() -> None:
     """One row for each place."""
-    columns = ("place", "rows", "sun up [h]", "days without sun", "days without night",
-               "highest sun of 21 March, middle of hour", "highest altitude [deg]",
-               "DA toward the equator [%]", "away [%]", "operative max [C]",
-               "not finite")  # fmt: skip
+    columns = (
+        "place",
+        "rows",
+        "sun up [h]",
+        "days without sun",
+        "days without night",
+        "highest sun of 21 March, middle of hour",
+        "highest altitude [deg]",
+        "DA toward the equator [%]",
+        "away [%]",
+        "operative max [C]",
+        "not finite",
+    )
     print("| " + " | ".join(columns) + " |\n|" + "---|" * len(columns))
     with tempfile.TemporaryDirectory() as folder:
         for name, place in PLACES.items():
@@ -118,17 +166,23 @@ def main() -> None:
             angles = [0, 180] if place[0] > 0 else [180, 0]  # of the window: south at 0
             study = Path(folder) / "study.toml"
             text = STUDY.format(
-                box=BOX, blind=VENETIAN_BLIND, rest=FEW_RAYS,
+                box=BOX,
+                blind=VENETIAN_BLIND,
+                rest=FEW_RAYS,
                 climates=f'[[climate]]\nname = "{name}"\nweather = "{weather}"',
-            )  # fmt: skip
+            )
             study.write_text(f"orientations_deg = {sorted(angles)}\n{text}", encoding="utf-8")
             cfs("study", study, "--out", out)
             table = pd.read_parquet(out / "results.parquet").set_index("orientation_deg")
             toward, away = table.loc[angles[0]], table.loc[angles[1]]
             numbers = table.select_dtypes("number").to_numpy(float)
             row = [
-                name, f"{len(sun)}", *sun_figures(sun), f"{toward.da300:.1f}", f"{away.da300:.1f}",
+                name,
+                f"{len(sun)}",
+                *sun_figures(sun),
+                f"{toward.da300:.1f}",
+                f"{away.da300:.1f}",
                 f"{toward.operative_max_c:.1f}",
                 f"{(~np.isfinite(numbers)).sum()}",
-            ]  # fmt: skip
+            ]
             print("| " + " | ".join(row) + " |", flush=True)

@@ -25,12 +25,7 @@ from bim.shoebox import WindowRectangle, shoebox
 from scenes.demo import WEATHER
 from tests.validation.tilted_blinds import SPACING, WIDTH, family_tables, write_blind
 
-FAMILY = (
-    0.0,
-    20.0,
-    40.0,
-    60.0,
-)  # [deg]; with the step of 10 degrees and the raised blind: 8 states
+FAMILY = (0.0, 20.0, 40.0, 60.0)  # [deg]; with the step of 10 degrees and the raised blind: 8 states
 LIMIT = 0.40
 HOME = """
 tilt_step_deg = 10
@@ -55,10 +50,16 @@ PLANS = {
 }
 LIMITS_W_M2 = (100.0, 150.0, 200.0, 300.0, 400.0)  # of the fixed rules
 OPTIONS = {
-    "sensor_spacing": 1.0, "sensor_samples": 2048, "patch_samples": 1024, "sky_subdivision": 1,
-    "picture_size": 80, "picture_samples": 4, "picture_count": 1, "annual_glare": True,
+    "sensor_spacing": 1.0,
+    "sensor_samples": 2048,
+    "patch_samples": 1024,
+    "sky_subdivision": 1,
+    "picture_size": 80,
+    "picture_samples": 4,
+    "picture_count": 1,
+    "annual_glare": True,
     "heat_step_s": 3600.0,
-}  # fmt: skip
+}
 WITHOUT_GLARE = f'rule = "glare"\nlimit_dgp = {LIMIT}\n'
 CUT_OFF = f'rule = "cut-off"\nslat_width = {WIDTH}\nslat_spacing = {SPACING}\n'
 
@@ -103,20 +104,12 @@ class Controlled:
 
 def office() -> Room:
     """The room: windows of 5 m2 to the south and to the west, seen from its middle."""
-    windows = (
-        WindowRectangle(0.5, 0.9, 3.0, 1.7),
-        WindowRectangle(1.0, 0.9, 3.0, 1.7, side="left"),
-    )
-    building = shoebox(
-        4.0, 5.0, 3.0, windows=windows,
-        reflectance={"wall": 0.5, "floor": 0.2, "ceiling": 0.8},
-    )  # fmt: skip
+    windows = (WindowRectangle(0.5, 0.9, 3.0, 1.7), WindowRectangle(1.0, 0.9, 3.0, 1.7, side="left"))
+    building = shoebox(4.0, 5.0, 3.0, windows=windows, reflectance={"wall": 0.5, "floor": 0.2, "ceiling": 0.8})
     return building.room(building.spaces[0].name)
 
 
-def controlled(
-    name: str, control: str, weather: Path, method: str, folder: Path, family: str
-) -> Controlled:
+def controlled(name: str, control: str, weather: Path, method: str, folder: Path, family: str) -> Controlled:
     """The year by a control."""
     file = folder / "office.toml"
     file.write_text(HOME.format(family=family, control=control))
@@ -164,13 +157,16 @@ def by_paths(one: Controlled, weather: Path, folder: Path, family: str, most: in
     file.write_text(HOME.format(family=family, control='rule = "always"'))
     times = one.year.hours.index[hours]
     chosen = {
-        **OPTIONS, "annual_glare": False, "method": "point-in-time", "picture_count": len(hours),
-        "picture_hours": tuple(f"{t:%m-%d %H}" for t in times), "path_samples": 64,
-    }  # fmt: skip
+        **OPTIONS,
+        "annual_glare": False,
+        "method": "point-in-time",
+        "picture_count": len(hours),
+        "picture_hours": tuple(f"{t:%m-%d %H}" for t in times),
+        "path_samples": 64,
+    }
     year = cfs.simulate(
-        office(), None, weather, operation=file,
-        control=lambda hour: states[hour.index].tolist(), **chosen,
-    )  # fmt: skip
+        office(), None, weather, operation=file, control=lambda hour: states[hour.index].tolist(), **chosen
+    )
     traced = {p.hour: p.glare["dgp"] for p in year.glare.pictures}
     pairs = np.array([(dgp[h], traced[h]) for h in hours.tolist() if h in traced])
     above = np.count_nonzero(pairs[:, 1] > LIMIT)
@@ -197,9 +193,7 @@ def main(
         folder = Path(name)
         files = [write_blind(folder, tilt, samples) for tilt in FAMILY]
         family = family_tables(files, FAMILY)
-        print(
-            "| control | kWh | heating | cooling | lamps | DGP > .40 | moves a day | raised | CPU |"
-        )
+        print("| control | kWh | heating | cooling | lamps | DGP > .40 | moves a day | raised | CPU |")
         print("|---|---|---|---|---|---|---|---|---|")
         years = []
         for plan, table in PLANS.items():

@@ -71,15 +71,15 @@ DAYS = {
 
 def published(day: str) -> tuple[Weather, pd.DataFrame]:
     """The weather of a day in Richmond, and the published hours."""
-    table = pd.DataFrame([
-        {"hour": int(head), **dict(zip(COLUMNS, map(float, rest.split()), strict=True))}
-        for head, rest in (line.split(":") for line in DAYS[day].strip().splitlines())
-    ]).set_index("hour")  # fmt: skip
+    table = pd.DataFrame(
+        [
+            {"hour": int(head), **dict(zip(COLUMNS, map(float, rest.split()), strict=True))}
+            for head, rest in (line.split(":") for line in DAYS[day].strip().splitlines())
+        ]
+    ).set_index("hour")
     sun = table[["direct", "diffuse"]].reindex(range(1, 25), fill_value=0.0).to_numpy()
     times = pd.date_range(f"{day} 01:00", periods=24, freq="h")
-    weather = Weather(
-        "Richmond", 37.517, -77.317, -5.0, 50.0, 1.0, times, sun[:, 0], sun[:, 1], albedo=ALBEDO,
-    )  # fmt: skip
+    weather = Weather("Richmond", 37.517, -77.317, -5.0, 50.0, 1.0, times, sun[:, 0], sun[:, 1], albedo=ALBEDO)
     return weather, table
 
 
@@ -93,12 +93,22 @@ def peer(weather: Weather, model: str) -> pd.DataFrame:
     azimuth = np.degrees(np.arctan2(series.sun[:, 0], series.sun[:, 1])) % 360.0
     days = weather.midpoints.day_of_year.to_numpy()
     return pvlib.bifacial.infinite_sheds.get_irradiance(
-        TILT, 180.0, pd.Series(zenith), pd.Series(azimuth), WIDTH / PITCH, HEIGHT, PITCH,
-        pd.Series(series.global_horizontal), pd.Series(series.diffuse_horizontal),
-        pd.Series(series.direct_normal), ALBEDO, model=model,
-        dni_extra=pd.Series(SOLAR_CONSTANT * eccentricity(days)), bifaciality=1.0,
+        TILT,
+        180.0,
+        pd.Series(zenith),
+        pd.Series(azimuth),
+        WIDTH / PITCH,
+        HEIGHT,
+        PITCH,
+        pd.Series(series.global_horizontal),
+        pd.Series(series.diffuse_horizontal),
+        pd.Series(series.direct_normal),
+        ALBEDO,
+        model=model,
+        dni_extra=pd.Series(SOLAR_CONSTANT * eccentricity(days)),
+        bifaciality=1.0,
         shade_factor=0.0,
-    )  # fmt: skip
+    )
 
 
 def main() -> dict[str, pd.DataFrame]:
@@ -122,9 +132,10 @@ def main() -> dict[str, pd.DataFrame]:
                 up = module.points[:, 2]
                 order = np.array_split(np.argsort(up), 6)
                 rest = found.effective[mine][:, columns].sum(axis=1)
-                places.append({"day": day, "of": "ours"} | {
-                    name: rest[some].mean() for name, some in zip(backs, order, strict=True)
-                })  # fmt: skip
+                places.append(
+                    {"day": day, "of": "ours"}
+                    | {name: rest[some].mean() for name, some in zip(backs, order, strict=True)}
+                )
         row["front, Marion"] = table["front"].sum()
         row["back, Marion"] = table[backs].mean(axis=1).sum()
         places.append({"day": day, "of": "Marion"} | table[backs].sum().to_dict())

@@ -65,8 +65,7 @@ def rows(tilt_deg: float, pitch: float, height: float, albedo: float = ALBEDO) -
         middle = np.array([0.0, number * pitch, height])
         cuts = [(-LENGTH / 2, LENGTH / 2, "")]
         if number == 0:
-            cuts = [(-LENGTH / 2, -MODULE / 2, ""), (-MODULE / 2, MODULE / 2, "judged"),
-                    (MODULE / 2, LENGTH / 2, "")]  # fmt: skip
+            cuts = [(-LENGTH / 2, -MODULE / 2, ""), (-MODULE / 2, MODULE / 2, "judged"), (MODULE / 2, LENGTH / 2, "")]
         for start, end, kind in cuts:
             for side in (1.0, -1.0):
                 at = middle + side * APART / 2 * normal
@@ -99,12 +98,22 @@ def theirs(case: tuple[float, float, float], weather: Weather, model: str) -> pd
     azimuth = np.degrees(np.arctan2(series.sun[:, 0], series.sun[:, 1])) % 360.0
     days = weather.midpoints.day_of_year.to_numpy()
     return pvlib.bifacial.infinite_sheds.get_irradiance(
-        tilt, 180.0, pd.Series(zenith), pd.Series(azimuth), WIDTH / pitch, height, pitch,
-        pd.Series(series.global_horizontal), pd.Series(series.diffuse_horizontal),
-        pd.Series(series.direct_normal), ALBEDO, model=model,
-        dni_extra=pd.Series(SOLAR_CONSTANT * eccentricity(days)), bifaciality=1.0,
+        tilt,
+        180.0,
+        pd.Series(zenith),
+        pd.Series(azimuth),
+        WIDTH / pitch,
+        height,
+        pitch,
+        pd.Series(series.global_horizontal),
+        pd.Series(series.diffuse_horizontal),
+        pd.Series(series.direct_normal),
+        ALBEDO,
+        model=model,
+        dni_extra=pd.Series(SOLAR_CONSTANT * eccentricity(days)),
+        bifaciality=1.0,
         shade_factor=0.0,
-    )  # fmt: skip
+    )
 
 
 def shaded(case: tuple[float, float, float], weather: Weather) -> tuple[FloatArray, FloatArray]:
@@ -122,9 +131,8 @@ def shaded(case: tuple[float, float, float], weather: Weather) -> tuple[FloatArr
     zenith = np.degrees(np.arccos(sun[lit, 2]))
     azimuth = np.degrees(np.arctan2(sun[lit, 0], sun[lit, 1])) % 360.0
     fraction = pvlib.shading.shaded_fraction1d(
-        zenith, azimuth, axis_azimuth=90.0, shaded_row_rotation=case[0], collector_width=WIDTH,
-        pitch=case[1],
-    )  # fmt: skip
+        zenith, azimuth, axis_azimuth=90.0, shaded_row_rotation=case[0], collector_width=WIDTH, pitch=case[1]
+    )
     return 1.0 - share, np.asarray(fraction)
 
 
@@ -135,9 +143,20 @@ def uniform(case: tuple[float, float, float]) -> dict[str, float]:
     surfaces, found = element_surfaces(elements, "solar"), {}
     one, none = pd.Series([1.0]), pd.Series([0.0])
     peer = pvlib.bifacial.infinite_sheds.get_irradiance(
-        case[0], 180.0, one, one, WIDTH / case[1], case[2], case[1], one, one, none, ALBEDO,
-        bifaciality=1.0, shade_factor=0.0,
-    )  # fmt: skip
+        case[0],
+        180.0,
+        one,
+        one,
+        WIDTH / case[1],
+        case[2],
+        case[1],
+        one,
+        one,
+        none,
+        ALBEDO,
+        bifaciality=1.0,
+        shade_factor=0.0,
+    )
     for module in modules:
         normals = np.tile(module.normal, (len(module.points), 1))
         matrix = sky_irradiance_matrix(surfaces, module.points, normals, subdivision=2)
@@ -182,9 +201,7 @@ def quadrature(case: tuple[float, float, float]) -> dict[str, float]:
     return found
 
 
-def main(
-    epw: Path, *, cases: Annotated[Sequence[str], tuple(CASES)] = tuple(CASES)
-) -> dict[str, pd.DataFrame]:
+def main(epw: Path, *, cases: Annotated[Sequence[str], tuple(CASES)] = tuple(CASES)) -> dict[str, pd.DataFrame]:
     """Irradiation of a year of front and back [kWh/m2], shaded shares; both under a uniform sky."""
     variants.activate()
     weather = replace(read_epw(epw), albedo=ALBEDO)

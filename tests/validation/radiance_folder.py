@@ -90,9 +90,7 @@ def three_days(weather: Path, folder: Path) -> Path:
     return days
 
 
-def theirs(
-    room: Room, indoors: int, outdoors: int, *, materials: str = "grey.rad"
-) -> tuple[NDArray, NDArray | None]:
+def theirs(room: Room, indoors: int, outdoors: int, *, materials: str = "grey.rad") -> tuple[NDArray, NDArray | None]:
     """Coefficients [S, P] by Radiance alone, its seed the clock's, and lux [S, H] of the hours."""
     folder, call = room.files.script.parent, [str(room.files.script.resolve())]
     rays = {"INDOORS": str(indoors), "OUTDOORS": str(outdoors), "MATERIALS": materials}
@@ -128,12 +126,9 @@ def ours(room: Room, seed: int, *, even: bool = True) -> tuple[NDArray, NDArray 
     assert isinstance(block, KlemsScattering)
     block = EvenBeams(block) if even else block
     suns = direct_sun_matrix(
-        inside, outside, groups, [block] * len(groups), *sensors,
-        suns=ReinhartSky(SUNS).directions[1:], seed=seed,
-    ).values  # fmt: skip
-    sky, direct, places = (
-        _sky(room, options) for options in ("-m 1", "-m 1 -d", f"-m {SUNS} -5 0.533 -d")
-    )
+        inside, outside, groups, [block] * len(groups), *sensors, suns=ReinhartSky(SUNS).directions[1:], seed=seed
+    ).values
+    sky, direct, places = (_sky(room, options) for options in ("-m 1", "-m 1 -d", f"-m {SUNS} -5 0.533 -d"))
     return whole, whole @ sky - product(max_depth=1) @ direct + suns @ places[1:]
 
 
@@ -185,10 +180,7 @@ def _print(name: str, a: NDArray[np.float64], b: NDArray[np.float64]) -> None:
     difference = _rms(a.mean(axis=0) / b.mean(axis=0) - 1)
     noises = [_rms(x.std(axis=0, ddof=1) / x.mean(axis=0)) / len(x) ** 0.5 for x in (a, b)]
     ratio = a.mean(axis=0).sum() / b.mean(axis=0).sum()
-    print(
-        f"| {name} | {100 * difference:.2f} % | {100 * noises[1]:.2f} % "
-        f"| {100 * noises[0]:.2f} % | {ratio:.4f} |"
-    )
+    print(f"| {name} | {100 * difference:.2f} % | {100 * noises[1]:.2f} % | {100 * noises[0]:.2f} % | {ratio:.4f} |")
 
 
 def _rms(values: NDArray[np.float64]) -> float:

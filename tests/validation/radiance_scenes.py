@@ -66,10 +66,7 @@ def _turned(text: str) -> str:
 
 
 def _cloth(share: float) -> str:
-    return (
-        f"\nvoid BRTDfunc cloth\n10 0 0 0 {share} {share} {share} 0 0 0 .\n0\n"
-        "9 .4 .4 .4 .1 .1 .1 .02 .02 .02\n"
-    )
+    return f"\nvoid BRTDfunc cloth\n10 0 0 0 {share} {share} {share} 0 0 0 .\n0\n9 .4 .4 .4 .1 .1 .1 .02 .02 .02\n"
 
 
 def ours() -> dict[str, tuple[str, list[str]]]:
@@ -80,10 +77,12 @@ def ours() -> dict[str, tuple[str, list[str]]]:
     niche = "".join(
         f"\n!genbox plaster {name} {width} 0.15 {height} | xform -t {x} 0 {z}\n"
         for name, width, height, x, z in (
-            ("left", 0.1, 1.8, 0.5, 0.8), ("right", 0.1, 1.8, 3.4, 0.8),
-            ("sill", 2.8, 0.1, 0.6, 0.8), ("head", 2.8, 0.1, 0.6, 2.5),
+            ("left", 0.1, 1.8, 0.5, 0.8),
+            ("right", 0.1, 1.8, 3.4, 0.8),
+            ("sill", 2.8, 0.1, 0.6, 0.8),
+            ("head", 2.8, 0.1, 0.6, 2.5),
         )
-    )  # fmt: skip
+    )
     facade = (
         "\nvoid glass facade\n0\n0\n3 .6 .6 .6\nvoid plastic dark\n0\n0\n5 0 0 0 0 0\n"
         "!genbox dark block 16 4 12 | xform -t -6 -10.02 0\n"
@@ -154,14 +153,24 @@ def further() -> dict[str, tuple[str, list[str]]]:
     }
 
 
-def by_command(
-    scene: Path, weather: Path, at: str, seeds: int, options: Sequence[str]
-) -> tuple[float, float] | str:
+def by_command(scene: Path, weather: Path, at: str, seeds: int, options: Sequence[str]) -> tuple[float, float] | str:
     """Illuminance at the eye [lx] by `cfs picture` and its standard error, or its refusal."""
     words = [
-        "picture", scene, "--weather", weather, "--at", at, "--view", VIEW,
-        "--sun-model", "radiance", "--sky-ground", "gendaylit", "--out", scene.with_suffix(".png"),
-    ]  # fmt: skip
+        "picture",
+        scene,
+        "--weather",
+        weather,
+        "--at",
+        at,
+        "--view",
+        VIEW,
+        "--sun-model",
+        "radiance",
+        "--sky-ground",
+        "gendaylit",
+        "--out",
+        scene.with_suffix(".png"),
+    ]
     values = []
     for seed in range(seeds):
         with redirect_stdout(io.StringIO()) as shown, redirect_stderr(io.StringIO()) as refusal:
@@ -174,18 +183,14 @@ def by_command(
     return float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(seeds))
 
 
-def by_rtrace(
-    scene: Path, weather: Path, at: str, points: int, view: str = VIEW
-) -> tuple[float, float]:
+def by_rtrace(scene: Path, weather: Path, at: str, points: int, view: str = VIEW) -> tuple[float, float]:
     """The same by `rtrace` under the same sky, and the standard error of its mean."""
     hours = read_epw(weather)
     date, _, time = at.partition(" ")
     month, day, hour = (int(part) for part in (*date.split("-"), time[:2]))
     midpoints = pd.DatetimeIndex(hours.midpoints)
     chosen = (midpoints.month == month) & (midpoints.day == day) & (midpoints.hour == hour)
-    sky = annual_sky(
-        hours, SUBDIVISION, hours=np.flatnonzero(chosen), sun_model="radiance", ground="gendaylit"
-    )
+    sky = annual_sky(hours, SUBDIVISION, hours=np.flatnonzero(chosen), sun_model="radiance", ground="gendaylit")
     rendered = RenderedScene(scene.parent, scene.name, "", RTRACE)
     luminance = float(sky.illuminance[0]) / SUN_SOLID_ANGLE
     rendered.set_sky(sky.without_sun()[:, 0], SUBDIVISION, sky.direction[0], luminance)
@@ -221,9 +226,7 @@ def main(
     """Print a row for each scene [lx] as soon as it is computed."""
     environment()  # says at once where there is no Radiance
     files = {path.name: path.read_text() for path in sorted(folder.glob("*.rad"))}
-    scenes: dict[str, tuple[str, list[str]]] = {
-        name: (text, []) for name, text in files.items() if "polygon" in text
-    }
+    scenes: dict[str, tuple[str, list[str]]] = {name: (text, []) for name, text in files.items() if "polygon" in text}
     scenes |= ours() | further()
     columns = [f" {sky}: `rtrace` | `cfs picture` | % |" for sky in HOURS]
     print(f"| scene |{''.join(columns)}\n{'|---' * (1 + 3 * len(HOURS))}|", flush=True)

@@ -15,10 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 GLAZED = ("IfcWindow", "IfcDoor", "IfcPlate", "IfcMember", "IfcCurtainWall")
-NAMES = re.compile(
-    r"gla[sz]|verre|vitr|crist|vidr|vetr[oa]|szk|sklo|polycarb|plexi|acryl|pmma|ガラス|玻璃|стекл",
-    re.I,
-)
+NAMES = re.compile(r"gla[sz]|verre|vitr|crist|vidr|vetr[oa]|szk|sklo|polycarb|plexi|acryl|pmma|ガラス|玻璃|стекл", re.I)
 BAR = 0.2  # narrower members are bars [m]
 CLEAR = 0.25  # transparency of a style from which on it is glass
 FRAMED = 0.7  # of a window whose glass is not drawn
@@ -48,13 +45,12 @@ def real_glass(model: ifcopenshell.file, more: set[str]) -> dict[str, Pane]:
             continue
     bodies = dict(_meshes(model, list(wanted.values())))
     bodies = _each_once(bodies, [element.id() for guid, element in wanted.items() if guid in more])
-    spaces = [
-        triangles for triangles, _ in dict(_meshes(model, model.by_type("IfcSpace"))).values()
-    ]
+    spaces = [triangles for triangles, _ in dict(_meshes(model, model.by_type("IfcSpace"))).values()]
     return {
         guid: _pane(element, *bodies[element.id()], spaces)
-        for guid, element in wanted.items() if element.id() in bodies
-    }  # fmt: skip
+        for guid, element in wanted.items()
+        if element.id() in bodies
+    }
 
 
 def _each_once(bodies: dict, first: Sequence[int]) -> dict:
@@ -98,9 +94,7 @@ def _pane(element, triangles: NDArray, clear: NDArray, spaces: Sequence[NDArray]
     if element.is_a("IfcOpeningElement"):
         outline, _ = _outline(triangles)
         return Pane(outline.area, "empty")
-    if element.is_a("IfcVirtualElement") or not (
-        element.is_a().startswith(GLAZED) or NAMES.search(_names(element))
-    ):
+    if element.is_a("IfcVirtualElement") or not (element.is_a().startswith(GLAZED) or NAMES.search(_names(element))):
         return Pane(0.0, "none")
     if clear.any():
         if element.is_a("IfcMember") and _width(triangles) < BAR:
@@ -126,16 +120,12 @@ def _width(triangles: NDArray) -> float:
 def _names(element) -> str:
     """Names of the materials and styles of an element."""
     styles = [
-        style.Name or ""
-        for item in element_of.get_styles(element) or ()
-        for style in [item] if hasattr(style, "Name")
-    ]  # fmt: skip
+        style.Name or "" for item in element_of.get_styles(element) or () for style in [item] if hasattr(style, "Name")
+    ]
     return " ".join([*(m.Name or "" for m in element_of.get_materials(element)), *styles])
 
 
-def _outline(
-    triangles: NDArray, stated: float = 0.0
-) -> tuple[shapely.Geometry, tuple[NDArray, NDArray]]:
+def _outline(triangles: NDArray, stated: float = 0.0) -> tuple[shapely.Geometry, tuple[NDArray, NDArray]]:
     """Outline across the direction of the largest faces, and the plane: a point, axes [3, 3].
 
     Args: stated: area [m2] that the whole is said to have: where that across the largest faces is
@@ -183,10 +173,7 @@ def _before_a_room(outline, frame, spaces: Sequence[NDArray]) -> float:
     if not len(flat):
         return 0.0
     points = flat @ axes[:2] + origin
-    sides = [
-        np.any([_within(points + s * step * axes[2], spaces) for step in STEPS], axis=0)
-        for s in (1.0, -1.0)
-    ]
+    sides = [np.any([_within(points + s * step * axes[2], spaces) for step in STEPS], axis=0) for s in (1.0, -1.0)]
     return float(np.mean(sides[0] ^ sides[1]))
 
 
@@ -221,9 +208,12 @@ def _lining(element) -> float:
     for source in (element_of.get_type(element), element):
         sets = [
             *(getattr(source, "HasPropertySets", None) or ()),
-            *(r.RelatingPropertyDefinition for r in getattr(source, "IsDefinedBy", None) or ()
-              if r.is_a("IfcRelDefinesByProperties")),
-        ]  # fmt: skip
+            *(
+                r.RelatingPropertyDefinition
+                for r in getattr(source, "IsDefinedBy", None) or ()
+                if r.is_a("IfcRelDefinesByProperties")
+            ),
+        ]
         for one in sets:
             if one.is_a("IfcWindowLiningProperties"):
                 total += (one.LiningThickness or 0.0) * scale

@@ -59,9 +59,7 @@ def zone(orientation: str, fenestration: Fenestration, *, loads: IdealLoads | No
             roughness="medium rough",
             height=1.5,
         )
-        for (name, layers, normal, outside), area, rho in zip(
-            walls, ROOM.areas, REFLECTANCE, strict=True
-        )
+        for (name, layers, normal, outside), area, rho in zip(walls, ROOM.areas, REFLECTANCE, strict=True)
     )
     window = WindowElement("window", ROOM.window_area, out, (fenestration,), 1.5, height=1.75)
     occupied = work_hours(8, 18)

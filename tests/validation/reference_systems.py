@@ -102,9 +102,7 @@ def read_optics(folder: Path, name: str) -> Optics:
     if name == "ext_blind":
         return _klems_optics(folder, back)
     rows = sorted(data["angular"], key=lambda row: row["theta"])
-    if (
-        data["cfs"] != "dgu"
-    ):  # by matrices of the Klems basis: 75 and 80 degrees repeat others' rows
+    if data["cfs"] != "dgu":  # by matrices of the Klems basis: 75 and 80 degrees repeat others' rows
         rows = [row for row in rows if row["theta"] not in (75, 80)]
         rows = [row | {"theta": 82.5} if row["theta"] == 85 else row for row in rows]
     theta, tau, rho, g = (np.array([r[k] for r in rows]) for k in ("theta", "tau", "rho", "g"))
@@ -180,9 +178,7 @@ def _of_layers(folder: Path, name: str, optics: Optics) -> tuple[WindowModel, Op
     return _modelled(folder, name, optics, Closure("layers", unit=layers(name)), None)
 
 
-def _of_stated(
-    folder: Path, name: str, optics: Optics, u_value: float, closure: str
-) -> tuple[WindowModel, Optics]:
+def _of_stated(folder: Path, name: str, optics: Optics, u_value: float, closure: str) -> tuple[WindowModel, Optics]:
     """Window model and optics with g by direction, from U and g at normal incidence alone."""
     model = {"by direction": "typical", "linear U": "linear"}.get(closure, closure)
     stated = Closure(model, gap=GAP if model == "gap" else None)
@@ -196,10 +192,16 @@ def _modelled(
     """As a study has it, g at normal incidence stated where U is."""
     order = np.argsort(optics.theta, kind="stable")  # the first direction is the normal
     window = window_model(
-        optics.tau[order], optics.rho[order], optics.theta[order], PLACES[name], closure,
-        absorbed=sun_in_layers, u_value=u_value, item=name,
+        optics.tau[order],
+        optics.rho[order],
+        optics.theta[order],
+        PLACES[name],
+        closure,
+        absorbed=sun_in_layers,
+        u_value=u_value,
+        item=name,
         g_normal=None if u_value is None else float(optics.g[order[0]]),
-    )  # fmt: skip
+    )
     g, absorbed = np.empty_like(optics.g), window.absorbed
     g[order] = window.data.g_value
     if absorbed is not None:
@@ -222,12 +224,7 @@ def _of_diffuse(folder: Path, optics: Optics, values: FloatArray) -> FloatArray:
 
 
 def system(
-    folder: Path,
-    name: str,
-    closure: str,
-    optics: Optics | None = None,
-    *,
-    u_value: float | None = None,
+    folder: Path, name: str, closure: str, optics: Optics | None = None, *, u_value: float | None = None
 ) -> ReferenceSystem:
     """A system of the reference set with one of the closures; other optics or U where given."""
     if closure not in CLOSURES:
@@ -239,12 +236,8 @@ def system(
     u = state["U"] if u_value is None else u_value
     emissivity = 0.84 if name in ("dgu", "ext_blind", "ext_shade") else 0.9
     outside = 0.9 if name.startswith("ext") else 0.84
-    resistance = {"kuhn": None, "linear": linear_u(u)}.get(
-        closure, LayerResistance("surface", tuple(fit))
-    )
-    plain = Fenestration(
-        name, u, R_OUTER, R_INNER, resistance, emissivity_in=emissivity, emissivity_out=outside
-    )
+    resistance = {"kuhn": None, "linear": linear_u(u)}.get(closure, LayerResistance("surface", tuple(fit)))
+    plain = Fenestration(name, u, R_OUTER, R_INNER, resistance, emissivity_in=emissivity, emissivity_out=outside)
     window = None
     if closure in STATED:
         window, optics = _of_stated(folder, name, optics, u, closure)

@@ -160,17 +160,13 @@ def set_moment(scene: RenderedScene, moment: Moment) -> None:
     scene.set_sky(moment.patches, SUBDIVISION, moment.sun, moment.sun_luminance)
 
 
-def outcomes(
-    systems: list[str], chosen: list[Moment], folder: Path, *, size: int = SIZE
-) -> Iterator[Outcome]:
+def outcomes(systems: list[str], chosen: list[Moment], folder: Path, *, size: int = SIZE) -> Iterator[Outcome]:
     """Render every moment with every system in both programs."""
     view = fisheye(EYE, DIRECTION, size)
     for name in systems:
         fenestration = PicturedSystem(name, folder)
         peer = rendered_room(folder, fenestration)
-        lit = PathTracingScene(
-            room.room(), room.NOTHING, room.window_groups(), [fenestration.system]
-        )
+        lit = PathTracingScene(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
         for moment in chosen:
             start = time.perf_counter()
             sky = Sky(moment.patches, moment.sun, moment.sun_luminance)
@@ -186,9 +182,19 @@ def outcomes(
             rated = evaluate(theirs, view, illuminance=ev)
             altitude = float(np.degrees(np.arcsin(moment.sun[2])))
             yield Outcome(
-                name, moment.name, altitude, ev, ev_error, ours.Ev, rated.dgp, ours.dgp,
-                rated.count, ours.count, peer_seconds, seconds,
-            )  # fmt: skip
+                name,
+                moment.name,
+                altitude,
+                ev,
+                ev_error,
+                ours.Ev,
+                rated.dgp,
+                ours.dgp,
+                rated.count,
+                ours.count,
+                peer_seconds,
+                seconds,
+            )
 
 
 def line(row: Outcome) -> str:

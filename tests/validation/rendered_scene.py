@@ -41,8 +41,7 @@ class RenderedScene:
         strength, angle = f" {luminance / EFFICACY:.8g}", 2 * np.degrees(SUN_RADIUS)
         x, y, z = np.asarray(sun, dtype=float)
         disc = (
-            f"void light solar\n0\n0\n3{3 * strength}\nsolar source sun\n0\n0\n"
-            f"4 {x:.9g} {y:.9g} {z:.9g} {angle:.6g}\n"
+            f"void light solar\n0\n0\n3{3 * strength}\nsolar source sun\n0\n0\n4 {x:.9g} {y:.9g} {z:.9g} {angle:.6g}\n"
         )
         (self.folder / "sky.rad").write_text(
             "void brightdata patches\n4 noop sky.dat sky.cal rbin\n0\n0\n"
@@ -82,9 +81,7 @@ class RenderedScene:
 Row = TypeVar("Row")
 
 
-def show_rows(
-    file: Path | None, rows: Callable[[Path], Iterable[Row]], line: Callable[[Row], str]
-) -> None:
+def show_rows(file: Path | None, rows: Callable[[Path], Iterable[Row]], line: Callable[[Row], str]) -> None:
     """Print a line of each row, which are dataclasses, made in a folder; write them to a file."""
     found = []
     with tempfile.TemporaryDirectory() as folder:

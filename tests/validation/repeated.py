@@ -65,9 +65,8 @@ def compared(first: Path, other: Path) -> str:
     files = sorted(path.relative_to(first) for path in first.rglob("*") if path.is_file())
     extra = {path.relative_to(other) for path in other.rglob("*") if path.is_file()} ^ set(files)
     differ = [
-        file for file in files
-        if file not in extra and (first / file).read_bytes() != (other / file).read_bytes()
-    ]  # fmt: skip
+        file for file in files if file not in extra and (first / file).read_bytes() != (other / file).read_bytes()
+    ]
     gaps, others = [], [str(file) for file in extra]
     for file in differ:
         pair = columns_of(first / file), columns_of(other / file)
@@ -82,8 +81,13 @@ def compared(first: Path, other: Path) -> str:
 
 def main() -> None:
     """One row for each variant."""
-    columns = ("command", "variant", "files of the same content, times apart",
-               "others that differ", "largest difference in a table")  # fmt: skip
+    columns = (
+        "command",
+        "variant",
+        "files of the same content, times apart",
+        "others that differ",
+        "largest difference in a table",
+    )
     print("| " + " | ".join(columns) + " |")
     print("|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as name:
@@ -92,30 +96,26 @@ def main() -> None:
         climate = f'[[climate]]\nname = "c"\nweather = "{WEATHER}"'
         text = STUDY.format(box=BOX, blind=VENETIAN_BLIND, rest=FEW_RAYS, climates=climate)
         study.write_text(f"orientations_deg = [0, 90]\n{text}", encoding="utf-8")
-        commands = {
-            "run": ["run", MODEL, "--weather", WEATHER, "--quick"],
-            "study": ["study", study],
-        }
+        commands = {"run": ["run", MODEL, "--weather", WEATHER, "--quick"], "study": ["study", study]}
         for command, words in commands.items():
             first: Path | None = None
             variants: list[tuple[str, str, dict[str, str]]] = [
-                (f"--processes {count}, empty cache", f"--processes={count}", {})
-                for count in PROCESSES
+                (f"--processes {count}, empty cache", f"--processes={count}", {}) for count in PROCESSES
             ]
             variants.insert(1, ("the same, cache of the first", "", {}))
-            variants.append(
-                ("--processes 1, one thread of BLAS", "", {"OPENBLAS_NUM_THREADS": "1"})
-            )
+            variants.append(("--processes 1, one thread of BLAS", "", {"OPENBLAS_NUM_THREADS": "1"}))
             for number, (label, option, environment) in enumerate(variants):
                 warm = label.startswith("the same")
                 cache = folder / f"cache_{command}_{number - warm}"
                 out = folder / f"{command}_{number}"
                 result = subprocess.run(
-                    [sys.executable, "-m", "scenes.cli", *map(str, words), "--out", out,
-                     *option.split()],
-                    cwd=REPOSITORY, capture_output=True, text=True, check=False,
+                    [sys.executable, "-m", "scenes.cli", *map(str, words), "--out", out, *option.split()],
+                    cwd=REPOSITORY,
+                    capture_output=True,
+                    text=True,
+                    check=False,
                     env=os.environ | environment | {"CFS_CACHE": str(cache)},
-                )  # fmt: skip
+                )
                 if result.returncode:
                     raise RuntimeError(result.stderr)
                 first = first or out

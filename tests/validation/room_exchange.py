@@ -30,9 +30,7 @@ def absorbed_after_reflections(
     return hit @ total.T * (1.0 - rho)
 
 
-def spread_evenly(
-    first_hit: ArrayLike, reflectance: ArrayLike, area: ArrayLike
-) -> NDArray[np.float64]:
+def spread_evenly(first_hit: ArrayLike, reflectance: ArrayLike, area: ArrayLike) -> NDArray[np.float64]:
     """Light kept [H, N] [W] where the reflected part spreads by area times absorptance.
 
     What EnergyPlus does: every surface keeps its share of the first hit, the reflected remainder
@@ -44,9 +42,7 @@ def spread_evenly(
     return hit * (1.0 - rho) + reflected[..., None] * weight / weight.sum()
 
 
-def window_share(
-    absorbed: ArrayLike, tau_back: float, alpha_back_inner: float, rho_back: float
-) -> NDArray[np.float64]:
+def window_share(absorbed: ArrayLike, tau_back: float, alpha_back_inner: float, rho_back: float) -> NDArray[np.float64]:
     """Part [...] of the room's light absorbed by a window that heats its inner layer.
 
     absorbed: [...] light not reflected into the room; the rest, tau_back and the outer panes'

@@ -55,8 +55,7 @@ sky_subdivision = 4
 view_factors = false
 """
 PLATES = "".join(
-    f"[[box.plate]]\nstart = {start}\nend = {end}\ndepth = {FIN}\nside = '{side}'\n"
-    "reflectance = 0.0\n"
+    f"[[box.plate]]\nstart = {start}\nend = {end}\ndepth = {FIN}\nside = '{side}'\nreflectance = 0.0\n"
     for side in ("front", "back")
     for start, end in (([0.0, 2.6], [4.0, 2.6]), ([3.6, 0.0], [3.6, 3.0]))
 )
@@ -83,9 +82,11 @@ def energyplus_model(control: dict[str, Any], *, shaded: bool) -> Model:
     model = room_model("S", "clear_double", "ext_blind", outputs=OUTPUTS, steps=1)
     model["ShadowCalculation"]["main"]["shading_calculation_update_frequency_method"] = "Timestep"
     back = {
-        "outside_boundary_condition": "Outdoors", "sun_exposure": "SunExposed",
-        "wind_exposure": "WindExposed", "construction_name": "FACADE",
-    }  # fmt: skip
+        "outside_boundary_condition": "Outdoors",
+        "sun_exposure": "SunExposed",
+        "wind_exposure": "WindExposed",
+        "construction_name": "FACADE",
+    }
     corners = [(3.5, 5.0, 2.5), (3.5, 5.0, 1.0), (0.5, 5.0, 1.0), (0.5, 5.0, 2.5)]
     north = dict(model["FenestrationSurface:Detailed"]["WINDOW"])
     north |= {"building_surface_name": "BACK"}
@@ -103,9 +104,7 @@ def energyplus_model(control: dict[str, Any], *, shaded: bool) -> Model:
     plain = model["WindowShadingControl"].pop("CONTROL")
     for window in WINDOWS.values():
         surfaces = [{"fenestration_surface_name": window}]
-        model["WindowShadingControl"][window] = (
-            plain | {"fenestration_surfaces": surfaces} | control
-        )
+        model["WindowShadingControl"][window] = plain | {"fenestration_surfaces": surfaces} | control
     if shaded:
         model["Shading:Building:Detailed"] = dict(_plates())
     return model
@@ -135,10 +134,7 @@ OUTPUTS = {
         ("Surface Outside Face Incident Beam Solar Radiation Rate per Area", "beam"),
         ("Surface Outside Face Incident Solar Radiation Rate per Area", "sun"),
     )
-} | {
-    "Environment:Site Solar Altitude Angle": "altitude",
-    "Environment:Site Solar Azimuth Angle": "azimuth",
-}
+} | {"Environment:Site Solar Altitude Angle": "altitude", "Environment:Site Solar Azimuth Angle": "azimuth"}
 
 
 def energyplus_cut_off(table: pd.DataFrame, name: str) -> NDArray[np.int64]:
@@ -175,21 +171,17 @@ def compare() -> pd.DataFrame:
             ours = our_states(f'rule = "irradiance"\nclose_above = {limit}', 2, shaded=shaded)
             for name in WINDOWS:
                 on = theirs[f"{name} on"].to_numpy().round().astype(int)
-                row = _row(
-                    f"irradiance above {limit:.0f} W/m2", shaded, name, ours[name].to_numpy(), on
-                )
+                row = _row(f"irradiance above {limit:.0f} W/m2", shaded, name, ours[name].to_numpy(), on)
                 # its control does not read the reflections that its heat balance then has
                 other = (reflected[f"{name} sun"].to_numpy() > limit).astype(int)
                 rows.append(row | {"its two models differ h": int((other != on).sum())})
         control = {
-            "shading_control_type": "OnIfHighSolarOnWindow", "setpoint": 0.1,
+            "shading_control_type": "OnIfHighSolarOnWindow",
+            "setpoint": 0.1,
             "type_of_slat_angle_control_for_blinds": "BlockBeamSolar",
-        }  # fmt: skip
+        }
         theirs = run_energyplus(energyplus_model(control, shaded=shaded), WEATHER, outputs=OUTPUTS)
-        rule = (
-            f'rule = "cut-off"\nslat_tilts_deg = {list(TILTS)}\nslat_width = {WIDTH}\n'
-            f"slat_spacing = {SPACING}"
-        )
+        rule = f'rule = "cut-off"\nslat_tilts_deg = {list(TILTS)}\nslat_width = {WIDTH}\nslat_spacing = {SPACING}'
         ours = our_states(rule, len(TILTS), shaded=shaded)
         for name in WINDOWS:
             slats = energyplus_cut_off(theirs, name)
@@ -226,15 +218,17 @@ def with_reflections(model: Model) -> Model:
     return merged(model, changes | ({"ShadingProperty:Reflectance": black} if black else {}))
 
 
-def _row(
-    rule: str, shaded: bool, window: str, ours: NDArray[np.int64], theirs: NDArray[np.int64]
-) -> dict[str, Any]:
+def _row(rule: str, shaded: bool, window: str, ours: NDArray[np.int64], theirs: NDArray[np.int64]) -> dict[str, Any]:
     apart = ours != theirs
     return {
-        "rule": rule, "surroundings": "overhang and fin" if shaded else "open", "window": window,
-        "closed h": int((ours > 0).sum()), "EnergyPlus h": int((theirs > 0).sum()),
-        "differ h": int(apart.sum()), "of the year %": round(100 * float(apart.mean()), 2),
-    }  # fmt: skip
+        "rule": rule,
+        "surroundings": "overhang and fin" if shaded else "open",
+        "window": window,
+        "closed h": int((ours > 0).sum()),
+        "EnergyPlus h": int((theirs > 0).sum()),
+        "differ h": int(apart.sum()),
+        "of the year %": round(100 * float(apart.mean()), 2),
+    }
 
 
 def main() -> pd.DataFrame:

@@ -41,13 +41,23 @@ def main(
         for number in sorted(set(range(first, first + trials)) - done):
             one = trial(number, earlier_of)
             results.append(one)
-            print(one.number, one.command, one.kind, f"{one.after_s:.2f}", one.ended,
-                  f"{one.seconds:.1f}", "; ".join(one.faults),
-                  file=sys.stderr, flush=True)  # fmt: skip
+            print(
+                one.number,
+                one.command,
+                one.kind,
+                f"{one.after_s:.2f}",
+                one.ended,
+                f"{one.seconds:.1f}",
+                "; ".join(one.faults),
+                file=sys.stderr,
+                flush=True,
+            )
             if json_ is not None:
                 json_.write_text(json.dumps([asdict(one) for one in results], indent=1))
-    print("| signal | trials | ended by it | before the program began | ended before | faults |"
-          " longest time to the end [s] |")  # fmt: skip
+    print(
+        "| signal | trials | ended by it | before the program began | ended before | faults |"
+        " longest time to the end [s] |"
+    )
     print("|---|---|---|---|---|---|---|")
     for kind in SIGNALS:
         rows = [one for one in results if one.kind == kind]
@@ -55,11 +65,7 @@ def main(
         counts = [sum(one.ended == way for one in rows) for way in ways]
         faults = sum(bool(one.faults) for one in rows)
         longest = max((one.seconds for one in rows), default=0.0)
-        print(
-            f"| {kind} | {len(rows)} | {' | '.join(map(str, counts))} | {faults} | {longest:.1f} |"
-        )
+        print(f"| {kind} | {len(rows)} | {' | '.join(map(str, counts))} | {faults} | {longest:.1f} |")
     for one in results:
         for fault in one.faults:
-            print(
-                f"trial {one.number}: {one.command}, {one.kind} after {one.after_s:.2f} s: {fault}"
-            )
+            print(f"trial {one.number}: {one.command}, {one.kind} after {one.after_s:.2f} s: {fault}")

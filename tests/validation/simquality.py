@@ -36,10 +36,16 @@ STEP_AIR = {  # of TF03 [degC]: TF03/reference/Referenzwerte_minus8d.tsv of the 
 }
 POSITIONS = "TF01_reference_states.tsv"
 LIMA = Weather(  # of PER_Lima.846280_IWEC, the place of TF01's table
-    "Lima", -12.0, -77.12, -5.0, 13.0, 1.0,
+    "Lima",
+    -12.0,
+    -77.12,
+    -5.0,
+    13.0,
+    1.0,
     times=pd.date_range("2021-01-01 00:30", periods=8760, freq="h"),
-    direct_normal=np.zeros(8760), diffuse_horizontal=np.zeros(8760),
-)  # fmt: skip
+    direct_normal=np.zeros(8760),
+    diffuse_horizontal=np.zeros(8760),
+)
 LOW = 5.0  # altitude below which the air bends the light by more than 0.15 degrees [deg]
 
 
@@ -68,16 +74,18 @@ def compare(reference: Path, folder: Path = STUDIES, only: Sequence[str] = ()) -
             continue
         column = f"Var09.{number} [---]"
         rows.append(
-            pd.DataFrame({
-                "variant": number,
-                "azimuth": suite["Azimuth [Deg]"],
-                "altitude": suite["Altitude [Deg]"],
-                "ours": sunlit_share(read_study(file))[interval],
-                "suite": suite[column],
-                "low": low[column],
-                "high": high[column],
-            })
-        )  # fmt: skip
+            pd.DataFrame(
+                {
+                    "variant": number,
+                    "azimuth": suite["Azimuth [Deg]"],
+                    "altitude": suite["Altitude [Deg]"],
+                    "ours": sunlit_share(read_study(file))[interval],
+                    "suite": suite[column],
+                    "low": low[column],
+                    "high": high[column],
+                }
+            )
+        )
     table = pd.concat(rows, ignore_index=True)
     table["inside"] = table["ours"].between(table["low"], table["high"])
     return table
@@ -92,9 +100,7 @@ def step_response(folder: Path = STUDIES) -> pd.DataFrame:
         start = air.index[0].normalize() + pd.Timedelta(days=STEP_DAY)
         since = (air.index - start) / pd.Timedelta(hours=1)  # middles of the intervals
         ours = np.interp(STEP_HOURS, since, air)
-        rows.append(
-            pd.DataFrame({"variant": number, "hours": STEP_HOURS, "ours": ours, "suite": theirs})
-        )
+        rows.append(pd.DataFrame({"variant": number, "hours": STEP_HOURS, "ours": ours, "suite": theirs}))
     return pd.concat(rows, ignore_index=True)
 
 

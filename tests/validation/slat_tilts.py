@@ -27,19 +27,22 @@ FAMILY = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)  # [deg]
 BETWEEN = (7.5, 22.5, 37.5, 52.5, 67.5)
 EVERY = 40  # of the lit occupied hours, one is rated for glare
 OPTIONS = {
-    "sensor_spacing": 1.0, "sensor_samples": 2048, "patch_samples": 1024, "sky_subdivision": 1,
-    "sun_points": 64, "picture_size": 80, "picture_samples": 4, "picture_count": 1,
+    "sensor_spacing": 1.0,
+    "sensor_samples": 2048,
+    "patch_samples": 1024,
+    "sky_subdivision": 1,
+    "sun_points": 64,
+    "picture_size": 80,
+    "picture_samples": 4,
+    "picture_count": 1,
     "heat_step_s": 3600.0,
-}  # fmt: skip
+}
 
 
 def office(*sides: str):
     """A room with a window on each of some sides."""
     windows = tuple(WindowRectangle(0.5, 0.9, 3.0, 1.7, side=side) for side in sides)
-    building = shoebox(
-        4.0, 5.0, 3.0, windows=windows,
-        reflectance={"wall": 0.5, "floor": 0.2, "ceiling": 0.8},
-    )  # fmt: skip
+    building = shoebox(4.0, 5.0, 3.0, windows=windows, reflectance={"wall": 0.5, "floor": 0.2, "ceiling": 0.8})
     return building.room(building.spaces[0].name)
 
 
@@ -66,10 +69,7 @@ def listened(text: str, folder: Path) -> tuple[NDArray[np.float64], NDArray[np.f
     """Illuminance [h, T] and DGP [n, T] at the tilts between, by states of an operation file."""
     file, listener = folder / "own.toml", Listener(BETWEEN)
     file.write_text(text)
-    cfs.simulate(
-        office("front"), None, WEATHER, operation=file, control=listener, method="three-phase",
-        **OPTIONS,
-    )  # fmt: skip
+    cfs.simulate(office("front"), None, WEATHER, operation=file, control=listener, method="three-phase", **OPTIONS)
     return np.array(listener.lux), np.array(listener.dgp)
 
 

@@ -18,11 +18,7 @@ from mitsuba_cfs.bsdf.glazing import BRONZE_SHAPE, CLEAR_ABOVE, CLEAR_SHAPE
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
-from mitsuba_cfs.bsdf.spectral_pane import (
-    SpectralPane,
-    read_spectral_pane,
-    spectral_transmittance,
-)
+from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, read_spectral_pane, spectral_transmittance
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods.light import daylight
 from mitsuba_cfs.methods.optics import BsdfOptics
@@ -31,12 +27,7 @@ from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.methods.spectral_light import Detection, spectral_light
 from mitsuba_cfs.sky.annual import AnnualSky, given_sky
 from mitsuba_cfs.spectra.channels import channels_of
-from mitsuba_cfs.spectra.daylight import (
-    OVERCAST_K,
-    daylight_components,
-    daylight_shares,
-    sun_spectra,
-)
+from mitsuba_cfs.spectra.daylight import OVERCAST_K, daylight_components, daylight_shares, sun_spectra
 from mitsuba_cfs.spectra.detectors import (
     NANOMETRES,
     colour_temperature,
@@ -98,13 +89,15 @@ class Light:
 
 
 def main(
-    *, data: Path = Path("../shared/data/bsdf/products_spectral"), bounces: int = 8,
-    divisions: int = 20000, only: str = "",
-) -> str:  # fmt: skip
+    *,
+    data: Path = Path("../shared/data/bsdf/products_spectral"),
+    bounces: int = 8,
+    divisions: int = 20000,
+    only: str = "",
+) -> str:
     """The table of docs/evidence_daylight.md; only: of one of `WINDOWS`."""
     rows = [
-        "| panes | sky | point | EDI [lx] | Radiance | difference % | DER | difference % | CCT, "
-        "difference [K] |",
+        "| panes | sky | point | EDI [lx] | Radiance | difference % | DER | difference % | CCT, difference [K] |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for name, (files, fabric) in WINDOWS.items():
@@ -129,9 +122,8 @@ def room_scene() -> DaylightScene:
     space = shoebox().spaces[0]
     view = fisheye(tuple(POINTS[-1]), tuple(NORMALS[-1]), 16)
     return DaylightScene(
-        interior_surfaces(space, "visible"), Surfaces.none(), window_groups(space), POINTS[:-1],
-        NORMALS[:-1], view,
-    )  # fmt: skip
+        interior_surfaces(space, "visible"), Surfaces.none(), window_groups(space), POINTS[:-1], NORMALS[:-1], view
+    )
 
 
 def hour(kind: str) -> AnnualSky:
@@ -185,14 +177,8 @@ def radiances(window: Window, kind: str, bounces: int, divisions: int) -> Light:
         made = run(f"gendaylit -ang {ALTITUDE} {azimuth} -W {beam} {diffuse}", folder).decode()
         (folder / "sky.rad").write_text(_sky(made, kind, window.panes), "utf-8")
         run("oconv sky.rad room.rad glass.rad > scene.oct", folder)
-        lines = "".join(
-            " ".join(f"{v:g}" for v in (*p, *n)) + "\n"
-            for p, n in zip(POINTS, NORMALS, strict=True)
-        )
-        options = (
-            f"-I+ -h -ab {bounces} -aa 0 -ad {divisions} -as 0 -lw 1e-7 -dj 0 -dc 1 -dt 0 "
-            f"-cs {BANDS} -co+"
-        )
+        lines = "".join(" ".join(f"{v:g}" for v in (*p, *n)) + "\n" for p, n in zip(POINTS, NORMALS, strict=True))
+        options = f"-I+ -h -ab {bounces} -aa 0 -ad {divisions} -as 0 -lw 1e-7 -dj 0 -dc 1 -dt 0 -cs {BANDS} -co+"
         text = run(f"rtrace {options} scene.oct", folder, lines.encode()).decode()
     values = np.array([[float(v) for v in line.split()] for line in text.splitlines()])
     if values[0].size != BANDS:

@@ -17,10 +17,7 @@ SKIES = ("overcast", "clear", "sun")
 
 def main(*, data: Path = Path("../shared/data/bsdf/products_spectral")) -> str:
     """The table of docs/spectral.md: largest errors of three points under three skies."""
-    rows = [
-        "| window | bands | melanopic EDI % | DER % | CCT [K] |",
-        "|---|---|---|---|---|",
-    ]
+    rows = ["| window | bands | melanopic EDI % | DER % | CCT [K] |", "|---|---|---|---|---|"]
     for name, (files, fabric) in WINDOWS.items():
         window = Window([read_spectral_pane(data / file) for file in files], fabric)
         found: dict[int, list[Light]] = {count: [] for count in CHANNEL_SETS}
@@ -33,9 +30,7 @@ def main(*, data: Path = Path("../shared/data/bsdf/products_spectral")) -> str:
             edi = max(_most(a.edi / b.edi - 1) for a, b in zip(own, exact, strict=True))
             ratio = max(_most(a.ratio / b.ratio - 1) for a, b in zip(own, exact, strict=True))
             kelvin = max(_most(a.kelvin - b.kelvin) for a, b in zip(own, exact, strict=True))
-            rows.append(
-                f"| {name} | {count} | {100 * edi:.2f} | {100 * ratio:.2f} | {kelvin:.0f} |"
-            )
+            rows.append(f"| {name} | {count} | {100 * edi:.2f} | {100 * ratio:.2f} | {kelvin:.0f} |")
     return "\n".join(rows)
 
 

@@ -52,10 +52,12 @@ def main(measured: Path) -> str:
 
 def _sky(position: pd.DataFrame, split: pd.DataFrame, times: pd.DatetimeIndex) -> AnnualSky:
     azimuth, height = (np.radians(position[name]) for name in ("azimuth", "elevation"))
-    towards = np.stack(
-        [np.sin(azimuth) * np.cos(height), np.cos(azimuth) * np.cos(height), np.sin(height)], axis=1
-    )
+    towards = np.stack([np.sin(azimuth) * np.cos(height), np.cos(azimuth) * np.cos(height), np.sin(height)], axis=1)
     return given_sky(
-        towards, np.asarray(split["dni"]), np.asarray(split["dhi"]), 1,
-        day_of_year=times.dayofyear.to_numpy(), dew_point_c=24.0,
-    )  # fmt: skip
+        towards,
+        np.asarray(split["dni"]),
+        np.asarray(split["dhi"]),
+        1,
+        day_of_year=times.dayofyear.to_numpy(),
+        dew_point_c=24.0,
+    )

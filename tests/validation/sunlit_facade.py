@@ -48,9 +48,7 @@ def lit_share(
     nx, ny = grid
     px, py = (
         a.ravel()
-        for a in np.meshgrid(
-            x0 + (np.arange(nx) + 0.5) / nx * (x1 - x0), y0 + (np.arange(ny) + 0.5) / ny * (y1 - y0)
-        )
+        for a in np.meshgrid(x0 + (np.arange(nx) + 0.5) / nx * (x1 - x0), y0 + (np.arange(ny) + 0.5) / ny * (y1 - y0))
     )
     share = np.empty(len(directions))
     for start in range(0, len(directions), 5000):

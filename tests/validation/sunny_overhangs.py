@@ -30,15 +30,7 @@ from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.methods.sun_by_patches import sunny_hour_error
 from mitsuba_cfs.sky.annual import AnnualSky, given_sky
 from mitsuba_cfs.surfaces import Surfaces
-from tests.validation.cut_groups import (
-    BRIGHT,
-    CASES,
-    POINTS,
-    UP,
-    front,
-    room,
-    surfaces,
-)
+from tests.validation.cut_groups import BRIGHT, CASES, POINTS, UP, front, room, surfaces
 
 SUNS = ((20, 0), (45, 10), (62, -25), (30, 50))  # altitude, azimuth from south to east [degrees]
 SEEDS = 2
@@ -63,9 +55,7 @@ def by_phases(
     return values, time.process_time() - start, len(traced.parts.groups)
 
 
-def by_paths(
-    scene: DaylightScene, glass: KlemsBsdf, paths: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def by_paths(scene: DaylightScene, glass: KlemsBsdf, paths: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Illuminance [S, H] and its standard error."""
     values, errors = [], []
     optics, sampling = [[BsdfOptics(glass)]], Sampling(hour_samples=paths)
@@ -111,9 +101,7 @@ def row(name: str, glass: KlemsBsdf, paths: int) -> str:
 
 
 def main(
-    *,
-    cases: Annotated[Sequence[str], CASES] = tuple(CASES),
-    paths: Annotated[int, "of a sensor in an hour"] = 131_072,
+    *, cases: Annotated[Sequence[str], CASES] = tuple(CASES), paths: Annotated[int, "of a sensor in an hour"] = 131_072
 ) -> None:
     """Print the table."""
     glass = specular_klems(Glazing("double", 0.78, 0.14, 0.14), KLEMS_FULL)

@@ -34,9 +34,7 @@ MESH, THREAD = 0.001, 0.0004  # its spacing and thickness [m]
 
 def blind_before_glazing(folder: Path, tilt_deg: float) -> Path:
     """BSDF file of the dissertation's blind outside of double low-e glazing; U and g beside it."""
-    layer = venetian_blind(
-        BLIND, depth=0.080, radius=0.104, spacing=0.072, tilt=np.radians(tilt_deg)
-    )
+    layer = venetian_blind(BLIND, depth=0.080, radius=0.104, spacing=0.072, tilt=np.radians(tilt_deg))
     return _before_glazing(folder / f"blind_{tilt_deg:.0f}.xml", layer, f"blind {tilt_deg:.0f}")
 
 
@@ -49,8 +47,7 @@ def shade_before_glazing(folder: Path) -> Path:
 def glazing(folder: Path) -> Path:
     """BSDF file of the double low-e glazing by itself; U and g beside it."""
     systems = {
-        band: combine_layers([specular_klems(pane, KLEMS_FULL) for pane in panes])
-        for band, panes in PANES.items()
+        band: combine_layers([specular_klems(pane, KLEMS_FULL) for pane in panes]) for band, panes in PANES.items()
     }
     path = folder / "glazing.xml"
     bands = {band: system.bsdf for band, system in systems.items()}
@@ -60,9 +57,7 @@ def glazing(folder: Path) -> Path:
     inward = np.array([OUTER_FILM * GLAZING_U, 1 - INNER_FILM * GLAZING_U])
     through = solar.bsdf.direct_hemispherical(solar.bsdf.transmission_front)
     g = through + inward @ solar.absorptance_front
-    path.with_suffix(".toml").write_text(
-        f"u_value = {GLAZING_U:.3f}\ng_value = {g[0]:.4f}\n", encoding="utf-8"
-    )
+    path.with_suffix(".toml").write_text(f"u_value = {GLAZING_U:.3f}\ng_value = {g[0]:.4f}\n", encoding="utf-8")
     return path
 
 

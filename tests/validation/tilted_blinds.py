@@ -18,14 +18,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.xml import BsdfFile, write_bsdf_xml
 from scenes.demo import VENETIAN_BLIND
-from scenes.demo.make_blind import (
-    BEAM,
-    BEFORE_BLIND,
-    BLIND,
-    BLIND_TOTAL,
-    PANES,
-    thermal_values,
-)
+from scenes.demo.make_blind import BEAM, BEFORE_BLIND, BLIND, BLIND_TOTAL, PANES, thermal_values
 
 GLAZING = Path(VENETIAN_BLIND).with_name("glazing.xml")
 WIDTH, SPACING, RADIUS = 0.080, 0.072, 0.104  # [m]
@@ -34,9 +27,7 @@ WIDTH, SPACING, RADIUS = 0.080, 0.072, 0.104  # [m]
 def write_blind(folder: Path, tilt_deg: float, samples: int) -> Path:
     """The BSDF file of the blind at a tilt, with its thermal file beside it."""
     path = folder / f"blind_{tilt_deg:04.1f}.xml"
-    layer = venetian_blind(
-        BLIND, depth=WIDTH, radius=RADIUS, spacing=SPACING, tilt=np.radians(tilt_deg)
-    )
+    layer = venetian_blind(BLIND, depth=WIDTH, radius=RADIUS, spacing=SPACING, tilt=np.radians(tilt_deg))
     blind = generate_klems(layer, samples=samples, seed=1).bsdf[0]
     systems = {
         band: combine_layers([blind, *(specular_klems(pane, KLEMS_FULL) for pane in pair)])
@@ -52,7 +43,6 @@ def write_blind(folder: Path, tilt_deg: float, samples: int) -> Path:
 def family_tables(files: Iterable[Path], tilts_deg: Iterable[float]) -> str:
     """The `[[system]]` tables: glazing without the blind, then the blind at each tilt."""
     blinds = "".join(
-        f'[[system]]\nbsdf = "{file}"\ntilt_deg = {tilt}\n'
-        for file, tilt in zip(files, tilts_deg, strict=True)
+        f'[[system]]\nbsdf = "{file}"\ntilt_deg = {tilt}\n' for file, tilt in zip(files, tilts_deg, strict=True)
     )
     return f'[[system]]\nbsdf = "{GLAZING}"\n{blinds}'

@@ -106,9 +106,7 @@ CONTROLS = {
     .replace("23.5", "25.0")
     .replace("22.5", "24.9, open_delay_h = 2, hold_h = 3"),
     "combined shading that waits": AIR + LOADS + TINTED + COMBINED,
-    RAIN: AIR
-    + WINDOWS
-    + 'when = "always"\nnight_share = 0.02\nclosed_in_rain = true\n[loads]\nheating_c = 20\n',
+    RAIN: AIR + WINDOWS + 'when = "always"\nnight_share = 0.02\nclosed_in_rain = true\n[loads]\nheating_c = 20\n',
     "shading and windows": AIR + WINDOWS + HEATED + TINTED + SHADED.format("operative temperature"),
     "air by night": f"{AIR}night_ach = 3\nnight = [22, 6]\n{LOADS}",
     "heat recovery": FAN + LOADS,
@@ -116,15 +114,12 @@ CONTROLS = {
     "supply air heated to 18 degC": f"{FAN}bypass_above_c = 23\nleast_supply_c = 18\n{HEATED}",
     "bypass and heated slab": f"{FAN}bypass_above_c = 23\n[loads]\n{SLAB}",
     "bypass, windows and slab": f"{FAN}bypass_above_c = 22.5\n{WINDOWS}[loads]\n{SLAB}",
-    "door to a room at 18 degC": (
-        f"{AIR}[[air.neighbour]]\ntemperature_c = 18\nwidth = 0.9\nheight = 2.0\n{LOADS}"
-    ),
+    "door to a room at 18 degC": (f"{AIR}[[air.neighbour]]\ntemperature_c = 18\nwidth = 0.9\nheight = 2.0\n{LOADS}"),
     "leaks by wind and temperature": (
         f"[air]\n[air.leakage]\narea_cm2 = 300\nstack = 0.000145\nwind = 0.000174\n{LOADS}"
     ),
 }
-FIGURES = {"heating": "kWh", "cooling": "kWh", "peak heating": "W", "peak cooling": "W",
-           "above 26 degC": "K h"}  # fmt: skip
+FIGURES = {"heating": "kWh", "cooling": "kWh", "peak heating": "W", "peak cooling": "W", "above 26 degC": "K h"}
 
 
 def main(
@@ -132,9 +127,7 @@ def main(
     *,
     epw: Path,
     minutes: Sequence[int] = (20, 10, 5),
-    controls: Annotated[Sequence[str], tuple(CONTROLS)] = tuple(
-        one for one in CONTROLS if one != RAIN
-    ),
+    controls: Annotated[Sequence[str], tuple(CONTROLS)] = tuple(one for one in CONTROLS if one != RAIN),
 ) -> pd.DataFrame:
     """Figures at the second step, and their change from step to step [%]."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -152,8 +145,7 @@ def main(
             values = [year[name] for year in years]
             row[f"{name} [{unit}]"] = f"{values[1]:.0f}"
             changes = [
-                f"{100.0 * (fine - coarse) / fine:+.1f}" if fine > 1.0 else "-"
-                for coarse, fine in pairwise(values)
+                f"{100.0 * (fine - coarse) / fine:+.1f}" if fine > 1.0 else "-" for coarse, fine in pairwise(values)
             ]
             row[f"{name} [%]"] = ", ".join(changes)
         rows.append(row)

@@ -84,9 +84,8 @@ def layer_tree(layer: str, levels: int) -> BsdfFile:
 
 
 def outcomes(
-    tree: Path | None, layer: str, levels: int, chosen: list[rendered.Moment], view: View,
-    folder: Path,
-) -> Iterator[Outcome]:  # fmt: skip
+    tree: Path | None, layer: str, levels: int, chosen: list[rendered.Moment], view: View, folder: Path
+) -> Iterator[Outcome]:
     """Every moment in both programs."""
     file = folder / "tree.xml"
     if tree is None:
@@ -102,9 +101,7 @@ def outcomes(
     for moment, third in zip(chosen, phases, strict=True):
         local = group.frame @ moment.sun
         sky = Sky(moment.patches, moment.sun, moment.sun_luminance)
-        ours = [
-            point_in_time_picture(lit, sky, view, samples=rendered.SAMPLES, seed=s) for s in (0, 1)
-        ]
+        ours = [point_in_time_picture(lit, sky, view, samples=rendered.SAMPLES, seed=s) for s in (0, 1)]
         rendered.set_moment(peer, moment)
         ev, ev_error = peer.eye_illuminance(view, POINTS)
         halves = peer.halves(view)
@@ -130,9 +127,7 @@ def outcomes(
         )
 
 
-def five_phase(
-    optics: cfs.BsdfOptics, chosen: list[rendered.Moment], view: View
-) -> list[NDArray[np.float32]]:
+def five_phase(optics: cfs.BsdfOptics, chosen: list[rendered.Moment], view: View) -> list[NDArray[np.float32]]:
     """Pictures of the moments by five phases; the sun also lies on the patch that it stands in."""
     reinhart, n = ReinhartSky(rendered.SUBDIVISION), len(chosen)
     towards = np.array([moment.sun for moment in chosen])

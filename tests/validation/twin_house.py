@@ -46,8 +46,11 @@ class Experiment:
 
 EXPERIMENTS = {
     1: Experiment(
-        STUDIES / "twin_house_shutters.toml", "validationdataN2Exp1.txt",
-        "2013-01-01", "2013-08-21", "2013-09-30",
+        STUDIES / "twin_house_shutters.toml",
+        "validationdataN2Exp1.txt",
+        "2013-01-01",
+        "2013-08-21",
+        "2013-09-30",
         {  # the first week of 30 degC is given for a start
             "30 degC held": slice("2013-08-28 00:10", "2013-08-29 17:40"),
             "random heat": slice("2013-08-29 17:50", "2013-09-14 00:10"),
@@ -55,15 +58,32 @@ EXPERIMENTS = {
             "floating": slice("2013-09-20 00:20", "2013-09-30 23:59"),
         },
         {
-            "cellar": [3], "kitchen": [10], "doorway": [11], "living": [4, 5, 6], "corridor": [7],
-            "child": [9], "attic": [1, 2], "heater": [19], "supply_m3_h": [30],
-            "supply_c": [28], "T": [35], "G": [36], "D": [37], "L": [42], "south": [40],
-            "wind_from": [45], "wind": [44], "RH": [46],
+            "cellar": [3],
+            "kitchen": [10],
+            "doorway": [11],
+            "living": [4, 5, 6],
+            "corridor": [7],
+            "child": [9],
+            "attic": [1, 2],
+            "heater": [19],
+            "supply_m3_h": [30],
+            "supply_c": [28],
+            "T": [35],
+            "G": [36],
+            "D": [37],
+            "L": [42],
+            "south": [40],
+            "wind_from": [45],
+            "wind": [44],
+            "RH": [46],
         },
     ),
     2: Experiment(
-        STUDIES / "twin_house_living.toml", "validationdataExp2.txt",
-        "2014-01-01", "2014-04-10", "2014-05-19",
+        STUDIES / "twin_house_living.toml",
+        "validationdataExp2.txt",
+        "2014-01-01",
+        "2014-04-10",
+        "2014-05-19",
         {
             "30 degC held": slice("2014-04-14 00:10", "2014-04-17 07:50"),
             "floating": slice("2014-04-17 08:00", "2014-04-23 16:10"),
@@ -72,13 +92,27 @@ EXPERIMENTS = {
             "30 degC held at last": slice("2014-05-14 01:10", "2014-05-19 23:50"),
         },
         {
-            "cellar": [1], "kitchen": [2], "doorway": [3], "living": [5, 6, 9], "corridor": [10],
-            "child": [14, 15, 16], "attic": [17, 18, 19], "heater": [27], "supply_m3_h": [31],
-            "supply_c": [33], "T": [53], "G": [54], "D": [55], "L": [56], "south": [59],
-            "wind_from": [61], "wind": [62], "RH": [63],
+            "cellar": [1],
+            "kitchen": [2],
+            "doorway": [3],
+            "living": [5, 6, 9],
+            "corridor": [10],
+            "child": [14, 15, 16],
+            "attic": [17, 18, 19],
+            "heater": [27],
+            "supply_m3_h": [31],
+            "supply_c": [33],
+            "T": [53],
+            "G": [54],
+            "D": [55],
+            "L": [56],
+            "south": [59],
+            "wind_from": [61],
+            "wind": [62],
+            "RH": [63],
         },
     ),
-}  # fmt: skip
+}
 # solar values of the panes by EN 410's spectrum at each 10 degrees, as the house's description has
 # them: transmittance, absorptance of both panes together
 ANGLES = np.radians(np.arange(0.0, 91.0, 10.0))
@@ -144,13 +178,15 @@ def heat_to_hold(study: Path, data: pd.DataFrame) -> pd.Series:
     """The heater's power that holds the measured air in our room [W], by the intervals' ends."""
     found = read_study(study)
     column = found.schedules["heater"].model_copy(update={"column": "living"})
-    held = found.model_copy(update={
-        "gains": found.gains.model_copy(update={"equipment_w_m2": 0.0}),
-        "loads": found.loads.model_copy(update={
-            "heating_c": "living", "heating_radiant": found.gains.radiant_share
-        }),
-        "schedules": found.schedules | {"living": column},
-    })  # fmt: skip
+    held = found.model_copy(
+        update={
+            "gains": found.gains.model_copy(update={"equipment_w_m2": 0.0}),
+            "loads": found.loads.model_copy(
+                update={"heating_c": "living", "heating_radiant": found.gains.radiant_share}
+            ),
+            "schedules": found.schedules | {"living": column},
+        }
+    )
     (year,), _ = run_study(held, silent)
     ends = year.hours.index + pd.Timedelta(minutes=5)
     return pd.Series(year.hours["heating_w"].to_numpy(), index=ends).reindex(data.index)
@@ -167,39 +203,38 @@ def what_is_missing(data: pd.DataFrame, held: pd.Series) -> tuple[float, float]:
     Returns: least squares for each kelvin to the rooms in the north [W/K], and for each W/m2 of
         sun measured on the south facade [m2]; positive: our room has too much of it.
     """
-    days = pd.DataFrame({
-        "north": data["living"] - north_c(data),
-        "south": data["south"],
-        "more": data["heater"] - held,
-    }).resample("D").mean().iloc[4:-1]  # fmt: skip
+    days = (
+        pd.DataFrame({"north": data["living"] - north_c(data), "south": data["south"], "more": data["heater"] - held})
+        .resample("D")
+        .mean()
+        .iloc[4:-1]
+    )
     of, *_ = np.linalg.lstsq(days[["north", "south"]].to_numpy(), days["more"].to_numpy())
     return float(of[0]), float(of[1])
 
 
-def by_phase(
-    experiment: Experiment, study: Path, data: pd.DataFrame, held: pd.Series
-) -> pd.DataFrame:
+def by_phase(experiment: Experiment, study: Path, data: pd.DataFrame, held: pd.Series) -> pd.DataFrame:
     """A row a phase: errors of the air [K]; the mean power that holds the measured air [W]."""
     both = compare(study, data)
     rows = []
     for name, times in experiment.phases.items():
         part = both.loc[times]
         gap, daily = part["ours"] - part["measured"], part.resample("D").max()
-        rows.append({
-            "phase": name,
-            "intervals": len(part),
-            "RMSE [K]": np.sqrt((gap**2).mean()),
-            "bias [K]": gap.mean(),
-            "daily maxima [K]": (daily["ours"] - daily["measured"]).mean(),
-            "heat to hold [W]": held.loc[times].mean(),
-            "heater [W]": data.loc[times, "heater"].mean(),
-        })  # fmt: skip
+        rows.append(
+            {
+                "phase": name,
+                "intervals": len(part),
+                "RMSE [K]": np.sqrt((gap**2).mean()),
+                "bias [K]": gap.mean(),
+                "daily maxima [K]": (daily["ours"] - daily["measured"]).mean(),
+                "heat to hold [W]": held.loc[times].mean(),
+                "heater [W]": data.loc[times, "heater"].mean(),
+            }
+        )
     return pd.DataFrame(rows)
 
 
-def main(
-    source: Path, folder: Path, *, experiment: Annotated[int, EXPERIMENTS] = 2
-) -> dict[str, pd.DataFrame]:
+def main(source: Path, folder: Path, *, experiment: Annotated[int, EXPERIMENTS] = 2) -> dict[str, pd.DataFrame]:
     """Write the inputs, run `cfs thermal`'s study, compare by phase."""
     chosen = EXPERIMENTS[experiment]
     data = measured(source, chosen)

@@ -39,25 +39,75 @@ THIN = 0.01  # [m] of a layer that is a capacity
 POWER = (6, 7, 11)  # cases whose result is heating (cooling: negative) [W]
 
 OUTDOOR = np.array(
-    [18.8, 17.1, 16.5, 16.1, 16.5, 17.8, 20.3, 22.8, 24.8, 26.7, 28.1, 29.0,
-     29.7, 30.4, 30.9, 31.0, 30.8, 30.1, 28.9, 27.0, 24.7, 22.9, 21.9, 20.9]
-)  # fmt: skip
+    [
+        18.8,
+        17.1,
+        16.5,
+        16.1,
+        16.5,
+        17.8,
+        20.3,
+        22.8,
+        24.8,
+        26.7,
+        28.1,
+        29.0,
+        29.7,
+        30.4,
+        30.9,
+        31.0,
+        30.8,
+        30.1,
+        28.9,
+        27.0,
+        24.7,
+        22.9,
+        21.9,
+        20.9,
+    ]
+)
 SUN = np.array(
-    [[0, 0, 0, 0, 17, 38, 59, 98, 186, 287, 359, 385,
-      359, 287, 186, 98, 59, 38, 17, 0, 0, 0, 0, 0],
-     [0, 0, 0, 0, 17, 36, 51, 64, 74, 84, 92, 100,
-      180, 344, 475, 528, 492, 359, 147, 0, 0, 0, 0, 0]], dtype=float
-)  # fmt: skip  # behind the glass of two facades [W/m2]
+    [
+        [0, 0, 0, 0, 17, 38, 59, 98, 186, 287, 359, 385, 359, 287, 186, 98, 59, 38, 17, 0, 0, 0, 0, 0],
+        [0, 0, 0, 0, 17, 36, 51, 64, 74, 84, 92, 100, 180, 344, 475, 528, 492, 359, 147, 0, 0, 0, 0, 0],
+    ],
+    dtype=float,
+)  # behind the glass of two facades [W/m2]
 WALL_SUN = np.array(
-    [[0, 0, 0, 0, 24, 58, 91, 203, 348, 472, 553, 581,
-      553, 472, 348, 203, 91, 58, 24, 0, 0, 0, 0, 0],
-     [0, 0, 0, 0, 23, 53, 77, 97, 114, 131, 144, 159,
-      372, 557, 685, 733, 666, 474, 177, 0, 0, 0, 0, 0]], dtype=float
-)  # fmt: skip
+    [
+        [0, 0, 0, 0, 24, 58, 91, 203, 348, 472, 553, 581, 553, 472, 348, 203, 91, 58, 24, 0, 0, 0, 0, 0],
+        [0, 0, 0, 0, 23, 53, 77, 97, 114, 131, 144, 159, 372, 557, 685, 733, 666, 474, 177, 0, 0, 0, 0, 0],
+    ],
+    dtype=float,
+)
 SKY = np.array(
-    [362.5, 364, 364.5, 364, 380.5, 390.5, 400.5, 414, 427.5, 439, 448.5, 457,
-     459.5, 460, 457.5, 452.5, 445, 438.5, 437, 420, 412.5, 405, 397.5, 390]
-)  # fmt: skip  # longwave of the sky [W/m2]
+    [
+        362.5,
+        364,
+        364.5,
+        364,
+        380.5,
+        390.5,
+        400.5,
+        414,
+        427.5,
+        439,
+        448.5,
+        457,
+        459.5,
+        460,
+        457.5,
+        452.5,
+        445,
+        438.5,
+        437,
+        420,
+        412.5,
+        405,
+        397.5,
+        390,
+    ]
+)  # longwave of the sky [W/m2]
 BLIND_ABOVE, BLIND = 100.0, 0.15  # [W/m2] and what a closed blind passes
 SUN_TO_AIR, WALL_ABSORPTANCE = 0.09, 0.7
 GLASS = 7.0  # [m2] of a facade
@@ -74,10 +124,7 @@ LAYERED = {  # facade, window, inner wall, door, slab [m, W/(m K), kg/m3, J/(kg 
         _stack((0.024, 0.07834934897, 0, 0)),
         _stack((0.24, 0.56, 1300, 1050)),
         _stack((0.04, 0.14, 700, 2520)),
-        _stack(
-            (0.15, 2.035, 2400, 1050), (0.012, 0.06, 50, 840), (0.045, 1.4, 2200, 1050),
-            (0.002, 0.21, 1300, 1470),
-        ),
+        _stack((0.15, 2.035, 2400, 1050), (0.012, 0.06, 50, 840), (0.045, 1.4, 2200, 1050), (0.002, 0.21, 1300, 1470)),
     ),
     "L": (
         _stack((0.01, 0.14, 500, 2520), (0.064, 0.047, 75, 840), (0.01, 0.14, 500, 2520)),
@@ -85,11 +132,15 @@ LAYERED = {  # facade, window, inner wall, door, slab [m, W/(m K), kg/m3, J/(kg 
         _stack((0.12, 0.4, 1200, 1050)),
         _stack((0.04, 0.14, 500, 2520)),
         _stack(
-            (0.001, 58.0, 7800, 480), (0.02, 0.047, 75, 840), (0.2, 1.085, 1, 1200),
-            (0.12, 2.035, 2100, 920), (0.02, 0.047, 75, 840), (0.03, 1.4, 2200, 1050),
+            (0.001, 58.0, 7800, 480),
+            (0.02, 0.047, 75, 840),
+            (0.2, 1.085, 1, 1200),
+            (0.12, 2.035, 2100, 920),
+            (0.02, 0.047, 75, 840),
+            (0.03, 1.4, 2200, 1050),
         ),
     ),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,18 +170,19 @@ class TwoCapacities:
         )
 
 
-S = TwoCapacities(
-    10.5, (0.03895919557, 0.00436791293674, 1600848.94), 75.5, (0.000595693407511, 14836354.6282)
-)
+S = TwoCapacities(10.5, (0.03895919557, 0.00436791293674, 1600848.94), 75.5, (0.000595693407511, 14836354.6282))
 L = TwoCapacities(10.5, (0.039330865, 0.00404935160802, 47900.0), 75.5, (0.003237138, 7297100.0))
 CORNER = TwoCapacities(
-    25.5, (0.01913729904, 0.0017362530106, 5259932.23), 60.5, (0.000668895639141, 12391363.8631),
-    (2.7, 2.12),
-)  # fmt: skip
+    25.5, (0.01913729904, 0.0017362530106, 5259932.23), 60.5, (0.000668895639141, 12391363.8631), (2.7, 2.12)
+)
 OVER_CELLAR = TwoCapacities(
-    28.0, (0.011638548, 0.00171957697767797, 4338751.41), 58.0,
-    (0.000779671554640369, 12333949.4129606), (2.4, 2.398), 9.75,
-)  # fmt: skip
+    28.0,
+    (0.011638548, 0.00171957697767797, 4338751.41),
+    58.0,
+    (0.000779671554640369, 12333949.4129606),
+    (2.4, 2.398),
+    9.75,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,13 +208,10 @@ def _capacity(value: float) -> Layer:
 
 
 def _surface(
-    name: str, area: float, layers: tuple[Layer, ...], normal: FloatArray, outside: str,
-    partner: str = "",
-) -> OpaqueSurface:  # fmt: skip
+    name: str, area: float, layers: tuple[Layer, ...], normal: FloatArray, outside: str, partner: str = ""
+) -> OpaqueSurface:
     """A black face inside, and no longwave exchange outdoors beside the film."""
-    return OpaqueSurface(
-        name, area, layers, normal, outside, partner, emissivity_in=1.0, emissivity_out=0.0
-    )
+    return OpaqueSurface(name, area, layers, normal, outside, partner, emissivity_in=1.0, emissivity_out=0.0)
 
 
 def cases() -> dict[int, Case]:
@@ -176,21 +225,23 @@ def cases() -> dict[int, Case]:
     fifth = Case(S, sun=SUN[:1], **people)
     eighth = replace(fifth, room=CORNER, sun=SUN, outdoor=_outdoors(OUTDOOR))
     return {
-        1: Case(S, convective=machines), 2: Case(S, radiant=machines),
-        3: Case(L, convective=machines), 4: Case(L, radiant=machines),
+        1: Case(S, convective=machines),
+        2: Case(S, radiant=machines),
+        3: Case(L, convective=machines),
+        4: Case(L, radiant=machines),
         5: fifth,
-        6: Case(S, radiant=machines, loads=free), 7: Case(S, radiant=machines, loads=limited),
-        8: eighth, 9: replace(eighth, outdoor=_outdoors(OUTDOOR, SKY)),
-        10: replace(
-            fifth, room=OVER_CELLAR, start_c=17.6,
-            outdoor=OUTDOOR + 0.6291235190524047 * (15.0 - OUTDOOR),
-        ),
+        6: Case(S, radiant=machines, loads=free),
+        7: Case(S, radiant=machines, loads=limited),
+        8: eighth,
+        9: replace(eighth, outdoor=_outdoors(OUTDOOR, SKY)),
+        10: replace(fifth, room=OVER_CELLAR, start_c=17.6, outdoor=OUTDOOR + 0.6291235190524047 * (15.0 - OUTDOOR)),
         11: Case(
-            replace(S, films=(2.7, 3.0)), radiant=machines,
+            replace(S, films=(2.7, 3.0)),
+            radiant=machines,
             loads=replace(limited, cooling_radiant=1.0, cooling_surface="inner"),
         ),
         12: replace(fifth, air_m3_h=np.where(used > 0, 50.0, 100.0)),
-    }  # fmt: skip
+    }
 
 
 def _hours(start: int, end: int) -> FloatArray:
@@ -212,9 +263,7 @@ def _outdoors(outdoor: FloatArray, sky: FloatArray | None = None) -> FloatArray:
     return total
 
 
-def run(
-    case: Case, surfaces: tuple[OpaqueSurface, ...] | None = None, *, rows_h: int = ROWS_H
-) -> ZoneResult:
+def run(case: Case, surfaces: tuple[OpaqueSurface, ...] | None = None, *, rows_h: int = ROWS_H) -> ZoneResult:
     """60 days of a case from its start; surfaces: other walls than its own; rows_h: of an hour."""
     rows = DAYS * 24 * rows_h
     faces = case.room.surfaces() if surfaces is None else surfaces
@@ -225,10 +274,7 @@ def run(
     outdoor = profile(case.outdoor)
     # the mass flow of the norm's air, 1.189 kg/m3, that a volume flow of ours has
     pressure = 0.000330375898 * 3600.0 * 1005.0 / AIR_HEAT * AIR_GAS_CONSTANT * (outdoor + KELVIN)
-    climate = Climate(
-        outdoor, outdoor, np.zeros(rows), np.zeros(rows), np.full(rows, 10.0),
-        np.full(rows, pressure),
-    )  # fmt: skip
+    climate = Climate(outdoor, outdoor, np.zeros(rows), np.zeros(rows), np.full(rows, 10.0), np.full(rows, pressure))
     loads = case.loads
     if np.ndim(loads.heating_c):
         held = profile(np.asarray(loads.heating_c))
@@ -236,16 +282,27 @@ def run(
     volume = 52.5
     to_air, walls = _sun(case, np.array([face.area for face in faces]))
     zone = Zone(
-        "room", volume, faces, infiltration_ach=0.0, loads=loads, air_capacity_factor=0.0,
+        "room",
+        volume,
+        faces,
+        infiltration_ach=0.0,
+        loads=loads,
+        air_capacity_factor=0.0,
         other_air_ach=profile(case.air_m3_h) / volume,
         gains=Gains(profile(case.convective + to_air), profile(case.radiant)),
-    )  # fmt: skip
+    )
     upright, flat = case.room.films
     options = BalanceOptions(
-        inside_convection="stated", inside_films=(upright, flat, flat), inside_radiation=RADIATION,
-        outside_convection="constant", outside_film=case.room.outer_film,
-        warm_days=0, start_c=case.start_c, tolerance=1e-6, iterations=20,
-    )  # fmt: skip
+        inside_convection="stated",
+        inside_films=(upright, flat, flat),
+        inside_radiation=RADIATION,
+        outside_convection="constant",
+        outside_film=case.room.outer_film,
+        warm_days=0,
+        start_c=case.start_c,
+        tolerance=1e-6,
+        iterations=20,
+    )
     none, inside = np.zeros((rows, 0)), np.stack([profile(column) for column in walls.T], axis=1)
     solar = Solar(none, none, inside, np.zeros_like(inside))
     return simulate(zone, climate, solar, step_s=60.0, row_s=3600.0 / rows_h, options=options)
@@ -308,10 +365,14 @@ def _row(number: int, walls: str, hours: FloatArray) -> dict[str, object]:
     difference = apart(number, hours)
     outside = int(np.sum(np.abs(difference) > TOLERANCE[unit] + 1e-9))
     return {
-        "case": number, "walls": walls, "unit": unit,
-        "largest": float(np.max(np.abs(difference))), "mean": float(difference.mean()),
-        "RMS": float(np.sqrt(np.mean(difference**2))), "hours outside": outside,
-    }  # fmt: skip
+        "case": number,
+        "walls": walls,
+        "unit": unit,
+        "largest": float(np.max(np.abs(difference))),
+        "mean": float(difference.mean()),
+        "RMS": float(np.sqrt(np.mean(difference**2))),
+        "hours outside": outside,
+    }
 
 
 def main() -> dict[str, pd.DataFrame]:

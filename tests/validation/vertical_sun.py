@@ -40,9 +40,13 @@ def weather_of(data: pd.DataFrame) -> Weather:
     """The site's weather by its horizontal pyranometers."""
     none = np.zeros(len(data))
     site = Weather(
-        site="Twin Houses", step_h=STEP / pd.Timedelta(hours=1), times=data.index,
-        direct_normal=none, diffuse_horizontal=none, **PLACE,
-    )  # fmt: skip
+        site="Twin Houses",
+        step_h=STEP / pd.Timedelta(hours=1),
+        times=data.index,
+        direct_normal=none,
+        diffuse_horizontal=none,
+        **PLACE,
+    )
     whole = data["G"].to_numpy()
     return measured_weather(site, whole, np.minimum(data["D"].to_numpy(), whole))
 
@@ -55,9 +59,7 @@ def upright(
     normal = np.array([*outward, 0.0])
     weight = sky.solid_angles[1:] * np.maximum(sky.directions[1:] @ normal, 0.0)
     beam = series.direct_normal[hours] * np.maximum(series.sun[hours] @ normal, 0.0)
-    return (
-        weight @ series.patches(sky, hours) + beam + 0.5 * albedo * series.global_horizontal[hours]
-    )
+    return weight @ series.patches(sky, hours) + beam + 0.5 * albedo * series.global_horizontal[hours]
 
 
 def compared(folder: Path, number: int, albedo: float) -> pd.DataFrame:

@@ -67,10 +67,12 @@ def by_seconds(weather: Weather, day: tuple[int, int], facing: float, free: Shad
     times = pd.date_range(pd.Timestamp(weather.midpoints[0].year, *day), periods=86400, freq="s")
     sun = solarposition.get_solarposition(
         (times - pd.Timedelta(hours=weather.timezone_h)).tz_localize("UTC"),
-        weather.latitude_deg, weather.longitude_deg, weather.elevation_m,
+        weather.latitude_deg,
+        weather.longitude_deg,
+        weather.elevation_m,
         pressure=float(np.mean(weather.pressure_pa)),
         temperature=float(np.mean(weather.dry_bulb_c)),
-    )  # fmt: skip
+    )
     altitude = sun["apparent_elevation"].to_numpy()
     aside = (sun["azimuth"].to_numpy() - facing + 180) % 360 - 180
     lit = (altitude >= LEAST) & (np.abs(aside) < 90) & free(altitude, aside)
@@ -80,14 +82,10 @@ def by_seconds(weather: Weather, day: tuple[int, int], facing: float, free: Shad
 def sunlight() -> None:
     """Print the hours of each case by both, and their difference."""
     weather = read_epw(WEATHER)
-    print(
-        "| case | day | hours | pvlib, seconds counted | difference [min] |\n|---|---|---|---|---|"
-    )
+    print("| case | day | hours | pvlib, seconds counted | difference [min] |\n|---|---|---|---|---|")
     for name, building, facing, free in sun_cases():
         for day in DAYS:
-            ours = sun_exposure(
-                building.spaces[0], outdoors_of(building), sun_day(weather, *day, LEAST)
-            ).hours
+            ours = sun_exposure(building.spaces[0], outdoors_of(building), sun_day(weather, *day, LEAST)).hours
             wanted = by_seconds(weather, day, facing, free)
             when = f"{day[0]:02d}-{day[1]:02d}"
             print(f"| {name} | {when} | {ours:.3f} | {wanted:.3f} | {60 * (ours - wanted):+.2f} |")
@@ -97,15 +95,9 @@ def view() -> None:
     """Print the largest deviations of sight angle and distance over the eyes of rooms."""
     worst = {"sight angle [deg]": 0.0, "distance [m]": 0.0}
     count = 0
-    for width, depth, recess, far in (
-        (3.0, 6.0, 0.0, 17.43),
-        (1.0, 4.0, 0.35, 8.2),
-        (2.2, 9.0, 0.2, 61.0),
-    ):
+    for width, depth, recess, far in ((3.0, 6.0, 0.0, 17.43), (1.0, 4.0, 0.35, 8.2), (2.2, 9.0, 0.2, 61.0)):
         window = WindowRectangle(0.5, 0.9, width, 1.8)
-        building = shoebox(
-            4.0, depth, windows=[window], recess=recess, elements=[opposite(far, 90)]
-        )
+        building = shoebox(4.0, depth, windows=[window], recess=recess, elements=[opposite(far, 90)])
         found = view_out(building.spaces[0], outdoors_of(building))
         x, y = found.points[:, 0], found.points[:, 1]
         right = np.minimum(*(np.arctan2(0.5 + width - x, y + r) for r in (0.0, recess)))

@@ -33,9 +33,19 @@ MEASURED = (20.0, 2.7)  # convection outdoors and indoors [W/(m2 K)] where U and
 CALM = (12.0, 2.0)  # and over a year, for the resistance between the faces
 SUNNY = (25.0, 24.0, 500.0)  # outdoors, indoors [degC], sun [W/m2]
 CONDITIONS = (  # outdoors, indoors [degC]; the first is the one of U
-    (0, 20), (-10, 20), (10, 20), (15, 25), (2.5, 17.5), (5, 15), (-15, 5), (25, 35), (35, 25),
-    (45, 30), (20, 0), (30, 20),
-)  # fmt: skip
+    (0, 20),
+    (-10, 20),
+    (10, 20),
+    (15, 25),
+    (2.5, 17.5),
+    (5, 15),
+    (-15, 5),
+    (25, 35),
+    (35, 25),
+    (45, 30),
+    (20, 0),
+    (30, 20),
+)
 OUTDOOR, INDOOR = range(-25, 50, 10), range(5, 50, 10)
 ANGLES_DEG = (0, 10, 20, 30, 40, 50, 60, 70, 75, 80, 85)
 WIDTH, HEIGHT = 3.0, 1.5  # [m] of the window
@@ -46,9 +56,7 @@ SHADE_GAP = {"ext_shade": 0.1, "int_shade": 0.05}  # [m] to the glass
 
 def layers(system: str) -> tuple[list[Any], list[Any]]:
     """Solid layers and the gaps between them, outside to inside."""
-    argon = pywincalc.create_gas(
-        [(0.9, pywincalc.PredefinedGasType.ARGON), (0.1, pywincalc.PredefinedGasType.AIR)]
-    )
+    argon = pywincalc.create_gas([(0.9, pywincalc.PredefinedGasType.ARGON), (0.1, pywincalc.PredefinedGasType.AIR)])
     panes = [_pane(0.775, 0.071, 0.071, 0.84, 0.84), _pane(0.600, 0.220, 0.170, 0.05, 0.84)]
     gaps = [pywincalc.Layers.gap(thickness=0.016, gas=argon)]
     if system == "dgu":
@@ -65,9 +73,7 @@ def _pane(tau: float, front: float, back: float, e_front: float, e_back: float) 
     kind = pywincalc.MaterialType.COATED if coated else pywincalc.MaterialType.MONOLITHIC
     side = pywincalc.CoatedSide.FRONT if coated else pywincalc.CoatedSide.NEITHER
     spectrum = [pywincalc.WavelengthData(w, tau, front, back) for w in (0.3, 1.0, 2.5)]
-    optical = pywincalc.ProductDataOpticalNBand(
-        kind, 0.006, spectrum, side, 0.0, 0.0, e_front, e_back
-    )
+    optical = pywincalc.ProductDataOpticalNBand(kind, 0.006, spectrum, side, 0.0, 0.0, e_front, e_back)
     return pywincalc.ProductDataOpticalAndThermal(optical, pywincalc.ProductDataThermal(0.9, 0.006))
 
 
@@ -77,14 +83,23 @@ def _hemisphere() -> Any:
 
 def _shade() -> Any:
     """A sheet that scatters evenly, open all around; the engine's own diffuse sheet does not."""
-    passed, thrown = (
-        np.full((145, 145), SHADE[name] / np.pi).tolist()
-        for name in ("transmittance", "reflectance")
-    )
+    passed, thrown = (np.full((145, 145), SHADE[name] / np.pi).tolist() for name in ("transmittance", "reflectance"))
     optical = pywincalc.ProductDataOpticalDualBandBSDF(
-        passed, passed, thrown, thrown, passed, passed, thrown, thrown,
-        _hemisphere(), SHADE_DEPTH, 0.0, 0.0, SHADE["emissivity"], SHADE["emissivity"],
-    )  # fmt: skip
+        passed,
+        passed,
+        thrown,
+        thrown,
+        passed,
+        passed,
+        thrown,
+        thrown,
+        _hemisphere(),
+        SHADE_DEPTH,
+        0.0,
+        0.0,
+        SHADE["emissivity"],
+        SHADE["emissivity"],
+    )
     openings = {f"opening_{side}": 1.0 for side in ("top", "bottom", "left", "right")}
     thermal = pywincalc.ProductDataThermal(SHADE_CONDUCTIVITY, SHADE_DEPTH, **openings)
     return pywincalc.ProductDataOpticalAndThermal(optical, thermal)
@@ -97,9 +112,13 @@ class Engine:
         solid, gaps = layers(system)
         more = {} if system == "dgu" else {"bsdf_hemisphere": _hemisphere()}
         self._system = pywincalc.GlazingSystem(
-            solid_layers=solid, gap_layers=gaps, width_meters=WIDTH, height_meters=HEIGHT,
-            environment=_environments(*SUNNY, MEASURED), **more,
-        )  # fmt: skip
+            solid_layers=solid,
+            gap_layers=gaps,
+            width_meters=WIDTH,
+            height_meters=HEIGHT,
+            environment=_environments(*SUNNY, MEASURED),
+            **more,
+        )
 
     def dark(
         self, outdoor: float, indoor: float, convection: tuple[float, float] = MEASURED
@@ -119,18 +138,20 @@ class Engine:
         return float(self._system.shgc(theta_deg, 0.0))
 
 
-def _environments(
-    outdoor: float, indoor: float, sun: float, convection: tuple[float, float]
-) -> Any:
+def _environments(outdoor: float, indoor: float, sun: float, convection: tuple[float, float]) -> Any:
     prescribed = pywincalc.BoundaryConditionsCoefficientModelType.HC_PRESCRIBED
 
     def one(celsius: float, film: float, light: float) -> Any:
         kelvin = celsius + 273.15
         return pywincalc.Environment(
-            air_temperature=kelvin, pressure=101325.0, convection_coefficient=film,
-            coefficient_model=prescribed, radiation_temperature=kelvin, emissivity=1.0,
+            air_temperature=kelvin,
+            pressure=101325.0,
+            convection_coefficient=film,
+            coefficient_model=prescribed,
+            radiation_temperature=kelvin,
+            emissivity=1.0,
             direct_solar_radiation=light,
-        )  # fmt: skip
+        )
 
     return pywincalc.Environments(one(outdoor, convection[0], sun), one(indoor, convection[1], 0.0))
 
@@ -143,11 +164,14 @@ def u_values(engine: Engine) -> list[dict[str, Any]]:
         heat = u * (indoor - outdoor)
         found.append(
             {
-                "T_e": outdoor, "T_i": indoor, "U": u,
-                "R_e": (faces[0] - outdoor) / heat, "R_i": (indoor - faces[-1]) / heat,
+                "T_e": outdoor,
+                "T_i": indoor,
+                "U": u,
+                "R_e": (faces[0] - outdoor) / heat,
+                "R_i": (indoor - faces[-1]) / heat,
                 "T_layers": faces.tolist(),
             }
-        )  # fmt: skip
+        )
     return found
 
 
@@ -182,9 +206,10 @@ def _at(engine: Engine, theta_deg: float) -> dict[str, Any]:
     front = result.system_results.front
     return {
         "theta": theta_deg,
-        "tau": _total(front.transmittance), "rho": _total(front.reflectance),
+        "tau": _total(front.transmittance),
+        "rho": _total(front.reflectance),
         "alpha_layers": [one.front.absorptance.direct for one in result.layer_results],
-    }  # fmt: skip
+    }
 
 
 def _total(part: Any) -> float:
@@ -198,9 +223,11 @@ def diffuse(engine: Engine, inward: FloatArray) -> dict[str, Any]:
     absorbed = [one.front.absorptance.diffuse for one in result.layer_results]
     tau = front.transmittance.diffuse_diffuse
     return {
-        "tau": tau, "rho": front.reflectance.diffuse_diffuse, "alpha_layers": absorbed,
+        "tau": tau,
+        "rho": front.reflectance.diffuse_diffuse,
+        "alpha_layers": absorbed,
         "g": float(tau + inward @ absorbed),
-    }  # fmt: skip
+    }
 
 
 def from_the_room(engine: Engine) -> dict[str, Any]:
@@ -228,9 +255,13 @@ def write(systems: Sequence[str], out: Path) -> None:
         outdoors, room_side[name] = diffuse(engine, inward), from_the_room(engine)
         by_faces[name], by_faces[f"{name}_fit"] = resistances(engine)
         data = {
-            "cfs": name, "engine": f"pywincalc {version('pywincalc')}", "U": u_values(engine),
-            "diffuse": outdoors, "N_inward_fractions": inward.tolist(), "angular": angular,
-        }  # fmt: skip
+            "cfs": name,
+            "engine": f"pywincalc {version('pywincalc')}",
+            "U": u_values(engine),
+            "diffuse": outdoors,
+            "N_inward_fractions": inward.tolist(),
+            "angular": angular,
+        }
         (out / f"blackbox_{name}.json").write_text(json.dumps(data, indent=1) + "\n")
     (out / "blackbox_R.json").write_text(json.dumps(by_faces, indent=1) + "\n")
     (out / "blackbox_back.json").write_text(json.dumps(room_side, indent=1) + "\n")

@@ -79,10 +79,7 @@ class DirectionBins:
 
     def _within_ring(self, values: mi.Float, ring: mi.UInt32, turn: mi.Float) -> mi.Float:
         """Linear between the two patches of a ring next to an azimuth [turns]."""
-        count, first = (
-            dr.gather(mi.Float, self._count, ring),
-            dr.gather(mi.UInt32, self._first, ring),
-        )
+        count, first = (dr.gather(mi.Float, self._count, ring), dr.gather(mi.UInt32, self._first, ring))
         place = turn * count
         low = dr.floor(place)
         whole = mi.Int32(count)

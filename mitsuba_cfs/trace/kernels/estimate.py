@@ -174,9 +174,7 @@ def accumulate(
             values = batch(count)
             mean, spread, covariance = _with_another(values, mean, spread, covariance, count)
             count += 1
-            state = BatchMean(
-                count, mean, spread, covariance, before + time.monotonic() - start, False
-            )
+            state = BatchMean(count, mean, spread, covariance, before + time.monotonic() - start, False)
             fraction = _fraction_done(state, stopping)
             progress(label, min(fraction, 1.0))
             if fraction >= 1.0 or count >= stopping.max_batches:
@@ -234,9 +232,7 @@ class JoinedEntry:
             return None
         seconds = sum(one.seconds for one in some)
         first = some[0]
-        return BatchMean(
-            first.count, mean, spread, joined_of("covariance", 2), seconds, first.finished
-        )
+        return BatchMean(first.count, mean, spread, joined_of("covariance", 2), seconds, first.finished)
 
     def save(self, state: BatchMean) -> None:
         """Write the state of each."""
@@ -316,7 +312,5 @@ def _fraction_done(state: BatchMean, stopping: Stopping) -> float:
         fractions.append(state.seconds / stopping.time_limit)
     if stopping.target_error is not None:
         error = estimate_of(state).relative_error
-        fractions.append(
-            1.0 if error <= stopping.target_error else (stopping.target_error / error) ** 2
-        )
+        fractions.append(1.0 if error <= stopping.target_error else (stopping.target_error / error) ** 2)
     return max(fractions)

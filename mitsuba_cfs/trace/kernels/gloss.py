@@ -44,8 +44,7 @@ class TracedGloss:
         self.mirrors = np.flatnonzero(roughness[planes[:, 3].astype(int)] == 0)  # smooth planes
         self.normals = planes[:, :3]  # [J, 3] of the planes
         self.corners = [  # [J] of each plane's triangles, in the world
-            surfaces.triangles[plane[: len(surfaces.surface)] == j].reshape(-1, 3)
-            for j in range(len(planes))
+            surfaces.triangles[plane[: len(surfaces.surface)] == j].reshape(-1, 3) for j in range(len(planes))
         ]
         self._plane_normal = vectors(planes[:, :3])
         self._plane_roughness = mi.Float(roughness[planes[:, 3].astype(int)].astype(np.float32))

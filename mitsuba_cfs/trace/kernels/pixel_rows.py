@@ -96,10 +96,7 @@ def neighbours(tiles: Tiles, key: NDArray[np.int64], step: int) -> sparse.csr_ar
 
 
 def smoothing(
-    tiles: Tiles,
-    key: NDArray[np.int64],
-    count: NDArray,
-    close: NDArray[np.bool_] | None = None,
+    tiles: Tiles, key: NDArray[np.int64], count: NDArray, close: NDArray[np.bool_] | None = None
 ) -> sparse.csr_array:
     """Smoothing of means over tiles by the tiles around each on its face [m, m].
 
@@ -133,9 +130,7 @@ def _apart(near: sparse.csr_array, close: NDArray[np.bool_]) -> sparse.csr_array
     return sparse.csr_array(others @ near @ others + sparse.diags_array(close.astype(float)))
 
 
-def _find(
-    table: NDArray[np.int64], key: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _find(table: NDArray[np.int64], key: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Position of each number in a sorted table, and whether it is in the table."""
     place = np.minimum(np.searchsorted(table, key), len(table) - 1)
     return place, table[place] == key
@@ -145,11 +140,7 @@ class SharedLight:
     """Means of the light on faces, tile by tile."""
 
     def __init__(
-        self,
-        tiles: Tiles,
-        key: NDArray[np.int64],
-        total: NDArray[np.float64],
-        count: NDArray[np.float64],
+        self, tiles: Tiles, key: NDArray[np.int64], total: NDArray[np.float64], count: NDArray[np.float64]
     ) -> None:
         """From the numbers [n] of faces in tiles, sums over their paths and how many these are."""
         self.tiles = tiles
@@ -257,9 +248,7 @@ class PictureRows:
             wanted *= SMOOTHED_TILES
         return np.clip(np.ceil(wanted / count), 1, MOST_TIMES).astype(np.int64)[self.row]
 
-    def of_halves(
-        self, share: NDArray[np.float32], least: float
-    ) -> tuple[sparse.csr_array, sparse.csr_array]:
+    def of_halves(self, share: NDArray[np.float32], least: float) -> tuple[sparse.csr_array, sparse.csr_array]:
         """From sums over the halves [2 m] to the means of the rows and their noise [m, 2 m].
 
         Args: share: [n] weight of each pixel in its sum; least: weight of a row that counts.

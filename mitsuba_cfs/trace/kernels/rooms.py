@@ -18,12 +18,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.matrices.cache import CacheEntry
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
-from mitsuba_cfs.trace.kernels.estimate import (
-    Estimate,
-    JoinedEntry,
-    Stopping,
-    accumulate,
-)
+from mitsuba_cfs.trace.kernels.estimate import Estimate, JoinedEntry, Stopping, accumulate
 
 FARTHEST = 100.0  # of a room from the middle of all, where float32 has steps of 8e-6 m [m]
 ENTRIES = 1 << 22  # of the matrices that rooms in one scene have together
@@ -114,9 +109,7 @@ def _padded(parts: Sequence[tuple[T, ...]], counts: Sequence[int]) -> tuple[T | 
     return tuple(v for p, n in pairs for v in (*p[:n], *(None,) * (n - len(p))))
 
 
-def batches_of_rooms(
-    rooms: Sequence[TracedRoom], entries: Sequence[int], *, outdoors: bool
-) -> Iterator[list[int]]:
+def batches_of_rooms(rooms: Sequence[TracedRoom], entries: Sequence[int], *, outdoors: bool) -> Iterator[list[int]]:
     """Numbers of the rooms that share a scene: few enough for memory; indoors alike in `kind`.
 
     Args: entries: of each room's matrix.
@@ -170,25 +163,24 @@ def of_rooms(
         of_each = [shapes[i % count] for i in those]
         rows = [math.prod(shape[:-1]) for shape in of_each]
         together = accumulate(
-            _at_first_use(partial(traced, some)), stopping=stopping, label=label,
-            progress=progress, entry=_joined_entry([entries[i] for i in those], of_each),
-        )  # fmt: skip
+            _at_first_use(partial(traced, some)),
+            stopping=stopping,
+            label=label,
+            progress=progress,
+            entry=_joined_entry([entries[i] for i in those], of_each),
+        )
         for i, shape, first, size in zip(those, of_each, np.cumsum(rows) - rows, rows, strict=True):
             estimates[i] = together.part(np.s_[first : first + size]).shaped(shape)
     return [estimates[number] for number in range(layers * count)]
 
 
-def _at_first_use(
-    prepare: Callable[[], Callable[[int], NDArray[np.float64]]],
-) -> Callable[[int], NDArray[np.float64]]:
+def _at_first_use(prepare: Callable[[], Callable[[int], NDArray[np.float64]]]) -> Callable[[int], NDArray[np.float64]]:
     """A function that is prepared when it is first called."""
     prepared = cache(prepare)
     return lambda number: prepared()(number)
 
 
-def _joined_entry(
-    entries: Sequence[CacheEntry | None], shapes: Sequence[tuple[int, ...]]
-) -> JoinedEntry | None:
+def _joined_entry(entries: Sequence[CacheEntry | None], shapes: Sequence[tuple[int, ...]]) -> JoinedEntry | None:
     """None without a cache."""
     some = [entry for entry in entries if entry is not None]
     return JoinedEntry(some, shapes) if some else None

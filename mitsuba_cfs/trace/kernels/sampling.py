@@ -92,12 +92,7 @@ def column(values: ArrayLike, kind: type | None = None) -> Any:
     Args: kind: `mi.Float` by default.
     """
     kind = mi.Float if kind is None else kind
-    names = {
-        mi.Float: np.float32,
-        mi.UInt32: np.uint32,
-        mi.UInt64: np.uint64,
-        mi.Bool: np.bool_,
-    }
+    names = {mi.Float: np.float32, mi.UInt32: np.uint32, mi.UInt64: np.uint64, mi.Bool: np.bool_}
     given = np.asarray(values, dtype=names[kind])
     memory = np.empty(given.nbytes + ALIGNMENT, dtype=np.uint8)
     start = -memory.ctypes.data % ALIGNMENT
@@ -118,9 +113,7 @@ def tables(*arrays: Any) -> list[NDArray[Any]]:
     """Results of a kernel from one launch: vectors as tables [n, 3], the others as [n]."""
     dr.eval(*arrays)
     return [
-        np.stack(np.broadcast_arrays(*(axis.numpy() for axis in one)), axis=1)
-        if dr.depth_v(one) > 1
-        else one.numpy()
+        np.stack(np.broadcast_arrays(*(axis.numpy() for axis in one)), axis=1) if dr.depth_v(one) > 1 else one.numpy()
         for one in arrays
     ]
 
@@ -172,16 +165,12 @@ class DiscreteDistribution:
 
     STEPS = 4  # of the search: kernels differ by so many halvings of the table
 
-    def __init__(
-        self, weights: NDArray[np.float64], group: NDArray[np.integer] | None = None
-    ) -> None:
+    def __init__(self, weights: NDArray[np.float64], group: NDArray[np.integer] | None = None) -> None:
         """From weights [n], not all zero in any group, and their groups [n], rising from 0."""
         weights = np.asarray(weights, dtype=np.float32)
         group = np.zeros(len(weights), dtype=np.int64) if group is None else np.asarray(group, int)
         starts = np.flatnonzero(np.diff(group, prepend=-1))
-        climbed = np.concatenate(
-            [np.cumsum(part, dtype=float) for part in np.split(weights, starts[1:])]
-        )
+        climbed = np.concatenate([np.cumsum(part, dtype=float) for part in np.split(weights, starts[1:])])
         some = np.flatnonzero(weights > 0)
         if len(np.unique(group[some])) < len(starts):
             raise ValueError("weights: expected one above 0 in each group")
@@ -224,9 +213,7 @@ def pixel_positions(samples: int) -> NDArray[np.float64]:
     return even_numbers(samples)
 
 
-def spread_rays(
-    view: View, pixels: NDArray[np.int64], samples: int
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def spread_rays(view: View, pixels: NDArray[np.int64], samples: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Rays [n * samples, 3] evenly spread over some pixels [n], and which of them exist."""
     across, down = np.tile(pixel_positions(samples), (len(pixels), 1)).T
     return pixel_rays(view, np.repeat(pixels, samples), across, down)

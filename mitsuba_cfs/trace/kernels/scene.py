@@ -22,14 +22,7 @@ from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup, triangle
 from mitsuba_cfs.trace.kernels.gloss import TracedGloss, TracedPanes
 from mitsuba_cfs.trace.kernels.random_walk import diffuse_direction
 from mitsuba_cfs.trace.kernels.rooms import TracedRoom, apart, joined_surfaces
-from mitsuba_cfs.trace.kernels.sampling import (
-    DiscreteDistribution,
-    column,
-    lattice_2d,
-    opaque,
-    opaque_vector,
-    vectors,
-)
+from mitsuba_cfs.trace.kernels.sampling import DiscreteDistribution, column, lattice_2d, opaque, opaque_vector, vectors
 
 FROM = 2048  # triangles; a smaller mesh takes less time to build than a second structure to trace
 NOT_HERE = 0xFFFFFFFF  # a room that no ray is of
@@ -190,9 +183,7 @@ class OwnedScene:
         hit.t += gone
         return hit
 
-    def _passes(
-        self, owner: mi.UInt32, hit: mi.PreliminaryIntersection3f, active: mi.Bool, passes: bool
-    ) -> mi.Bool:
+    def _passes(self, owner: mi.UInt32, hit: mi.PreliminaryIntersection3f, active: mi.Bool, passes: bool) -> mi.Bool:
         """Whether active rays pass the triangles that they hit."""
         active = active & hit.is_valid()
         same = dr.gather(mi.UInt32, owner, hit.prim_index, active) == self._room
@@ -202,9 +193,7 @@ class OwnedScene:
 class SharedScene:
     """A shared mesh in its own coordinates and the panes of one scene, for rays of the scene."""
 
-    def __init__(
-        self, mesh: SolidMesh, panes: NDArray[np.float64], centre: NDArray[np.float64]
-    ) -> None:
+    def __init__(self, mesh: SolidMesh, panes: NDArray[np.float64], centre: NDArray[np.float64]) -> None:
         """Of panes [N, 3, 3] in coordinates about the centre; they are numbered after the mesh."""
         self._solid = mesh.scene
         self._shift = opaque_vector(centre - mesh.middle)
@@ -312,9 +301,7 @@ class TracedScene:
         glazed_reflectance = np.asarray(window_reflectance, float)[glazed_group.astype(int)]
         blocking = slice(None) if windows_block else slice(0)
         mesh = SolidMesh(surfaces.triangles) if mesh is None else mesh
-        self._load_mesh(
-            surfaces, mesh, glazed[blocking], glazed_group[blocking], glazed_reflectance[blocking]
-        )
+        self._load_mesh(surfaces, mesh, glazed[blocking], glazed_group[blocking], glazed_reflectance[blocking])
         if windows:
             self._load_windows(glazed, glazed_group)
 
@@ -342,20 +329,12 @@ class TracedScene:
         self.reflectance = mi.Float(reflectance.astype(np.float32))
         self.surface = mi.UInt32(surface.astype(np.uint32))
         self.group = mi.Int32(group.astype(np.int32))
-        self.gloss = (
-            TracedGloss(solid, normals[: len(solid.triangles)], len(glazed))
-            if (solid.glossy)
-            else None
-        )
-        self.panes = (
-            TracedPanes(solid, len(glazed)) if any(map(bool, solid.transmittance)) else None
-        )
+        self.gloss = TracedGloss(solid, normals[: len(solid.triangles)], len(glazed)) if (solid.glossy) else None
+        self.panes = TracedPanes(solid, len(glazed)) if any(map(bool, solid.transmittance)) else None
         self.scene: mi.Scene | SharedScene | OwnedScene
         if isinstance(mesh, OwnedMesh):
             room = self._room_of_group[glazed_group.astype(int)]
-            self.scene = OwnedScene(
-                mesh, panes, self.centre, room=room[: len(panes)], numbers=self._numbers
-            )
+            self.scene = OwnedScene(mesh, panes, self.centre, room=room[: len(panes)], numbers=self._numbers)
         elif mesh.is_shared:
             self.scene = SharedScene(mesh, panes, self.centre)
         else:
@@ -381,9 +360,7 @@ class TracedScene:
         room_of_group = self._room_of_group
         firsts = np.cumsum(of_room) - of_room
         local = np.arange(len(groups)) - firsts[room_of_group]
-        self._group_tables = [
-            column(table, mi.UInt32) for table in (room_of_group, local, of_room[room_of_group])
-        ]
+        self._group_tables = [column(table, mi.UInt32) for table in (room_of_group, local, of_room[room_of_group])]
         self._glazed_by_group = DiscreteDistribution(areas, window_group)
 
     def derived(self, function: Callable[[TracedScene], T]) -> T:
@@ -431,9 +408,7 @@ class TracedScene:
         triangle, reused = self._glazed_by_group.sample_reuse(u.x, mi.Bool(True), group)
         return self._point(triangle, mi.Point2f(reused, u.y), mi.Bool(True))
 
-    def window_triangle(
-        self, triangle: mi.UInt32, origin: mi.Point3f
-    ) -> tuple[mi.Int32, tuple[mi.Vector3f, ...]]:
+    def window_triangle(self, triangle: mi.UInt32, origin: mi.Point3f) -> tuple[mi.Int32, tuple[mi.Vector3f, ...]]:
         """The group of a window's triangle, and its corners from `origin` in the group's frame."""
         group = dr.gather(mi.Int32, self._glazed_group, triangle)
         corners = (dr.gather(mi.Point3f, v, triangle) - origin for v in self._glazed_vertices)
@@ -445,11 +420,7 @@ class TracedScene:
         return a * (1 - root) + b * (root * (1 - u.y)) + c * (root * u.y)
 
     def surface_at(
-        self,
-        hit: mi.PreliminaryIntersection3f,
-        origin: mi.Point3f,
-        direction: mi.Vector3f,
-        active: mi.Bool,
+        self, hit: mi.PreliminaryIntersection3f, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool
     ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
         """Point of a hit, offset off the surface; normal towards the ray; diffuse reflectance.
 
@@ -476,9 +447,7 @@ class TracedScene:
         gloss = self.gloss.specular(triangle, cosine, active)
         return self.diffuse(triangle, cosine, active) + gloss
 
-    def without_mirrors(
-        self, triangle: mi.UInt32, direction: mi.Vector3f, active: mi.Bool
-    ) -> mi.Float:
+    def without_mirrors(self, triangle: mi.UInt32, direction: mi.Vector3f, active: mi.Bool) -> mi.Float:
         """The same without the specular part of smooth mirrors."""
         if self.gloss is None:
             return self.whole(triangle, direction, active)
@@ -500,16 +469,12 @@ class TracedScene:
         position, face, weight = self.surface_at(hit, origin, direction, active)
         away, mirrored = diffuse_direction(face, generator), mi.Bool(False)
         if self.gloss is not None:
-            glossy, towards, weight = self.gloss.leave(
-                hit.prim_index, face, direction, weight, generator, active
-            )
+            glossy, towards, weight = self.gloss.leave(hit.prim_index, face, direction, weight, generator, active)
             away = dr.select(glossy, towards, away)
             mirrored = glossy & (self.gloss.roughness(hit.prim_index, glossy) <= 0)
         return position, away, weight, mirrored
 
-    def leaves(
-        self, hit: mi.PreliminaryIntersection3f, direction: mi.Vector3f, active: mi.Bool
-    ) -> mi.Bool:
+    def leaves(self, hit: mi.PreliminaryIntersection3f, direction: mi.Vector3f, active: mi.Bool) -> mi.Bool:
         """Which active rays meet a window from its room side."""
         active = active & hit.is_valid()
         outwards = dr.gather(mi.Vector3f, self.normal, hit.prim_index, active)
@@ -553,9 +518,7 @@ class TracedScene:
             return self.met_outdoors(ray.o, ray.d, active)[0].is_valid()
         return self.scene.ray_test(ray, coherent=coherent, active=active)
 
-    def _met(
-        self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool
-    ) -> mi.PreliminaryIntersection3f:
+    def _met(self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool) -> mi.PreliminaryIntersection3f:
         ray = mi.Ray3f(origin, direction)
         return self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
 
@@ -608,9 +571,7 @@ class SceneCache:
         # with the objects whose ids are in the key, so that no other object gets these ids
         self._scenes: OrderedDict[tuple, tuple[tuple, TracedScene]] = OrderedDict()
         self._meshes: list[tuple[str, SolidMesh]] = []
-        self._together: dict[
-            tuple, tuple[tuple, list[TracedRoom], TracedScene]
-        ] = {}  # the last one
+        self._together: dict[tuple, tuple[tuple, list[TracedRoom], TracedScene]] = {}  # the last one
         self._building: dict[tuple, tuple[tuple, OwnedMesh]] = {}  # the last one
         # surroundings of rooms in a building's mesh, by identity
         self._fronts: dict[int, tuple[Surfaces, SharedOutdoors, int]] = {}
@@ -643,17 +604,31 @@ class SceneCache:
         )
         if key not in self._scenes and id(surfaces) in self._fronts:
             _, outdoors, number = self._fronts[id(surfaces)]
-            self._scenes[key] = inputs, TracedScene(
-                outdoors.surfaces, groups, windows_block=windows_block,
-                window_reflectance=arrays[0], centre=arrays[1],
-                mesh=self._building_mesh(outdoors), numbers=[number],
-            )  # fmt: skip
+            self._scenes[key] = (
+                inputs,
+                TracedScene(
+                    outdoors.surfaces,
+                    groups,
+                    windows_block=windows_block,
+                    window_reflectance=arrays[0],
+                    centre=arrays[1],
+                    mesh=self._building_mesh(outdoors),
+                    numbers=[number],
+                ),
+            )
         if key not in self._scenes:
             reflectance, middle = arrays
-            self._scenes[key] = inputs, TracedScene(
-                surfaces, groups, windows_block=windows_block, window_reflectance=reflectance,
-                centre=middle, mesh=self._mesh(surfaces.triangles),
-            )  # fmt: skip
+            self._scenes[key] = (
+                inputs,
+                TracedScene(
+                    surfaces,
+                    groups,
+                    windows_block=windows_block,
+                    window_reflectance=reflectance,
+                    centre=middle,
+                    mesh=self._mesh(surfaces.triangles),
+                ),
+            )
         self._scenes.move_to_end(key)
         while len(self._scenes) > self._most_scenes:
             self._scenes.popitem(last=False)
@@ -669,20 +644,30 @@ class SceneCache:
             placed, reach = apart(rooms)
             groups = [group for room in placed for group in room.groups]
             self._together.clear()  # it stays the dictionary that is cleared at exit
-            self._together[key] = inputs, placed, TracedScene(
-                joined_surfaces([room.surfaces for room in placed]), groups, centre=np.zeros(3),
-                rooms=[len(room.groups) for room in rooms], reach=reach,
-            )  # fmt: skip
+            self._together[key] = (
+                inputs,
+                placed,
+                TracedScene(
+                    joined_surfaces([room.surfaces for room in placed]),
+                    groups,
+                    centre=np.zeros(3),
+                    rooms=[len(room.groups) for room in rooms],
+                    reach=reach,
+                ),
+            )
         return self._together[key][1:]
 
     def outdoors(self, outdoors: SharedOutdoors, rooms: Sequence[TracedRoom]) -> TracedScene:
         """The scene in front of some rooms of a building; its mesh is built once."""
         mesh = self._building_mesh(outdoors)
         return TracedScene(
-            outdoors.surfaces, [group for room in rooms for group in room.groups],
-            centre=mesh.middle, mesh=mesh, rooms=[len(room.groups) for room in rooms],
+            outdoors.surfaces,
+            [group for room in rooms for group in room.groups],
+            centre=mesh.middle,
+            mesh=mesh,
+            rooms=[len(room.groups) for room in rooms],
             numbers=[room.number for room in rooms],
-        )  # fmt: skip
+        )
 
     def know_fronts(self, outdoors: SharedOutdoors, fronts: Sequence[Surfaces]) -> None:
         """Trace what is in front of each room, by its number, in the mesh of the building."""

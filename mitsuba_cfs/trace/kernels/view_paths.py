@@ -115,9 +115,7 @@ def add_view_paths(
         # ----- Bounce: E(x) gains rho E(hit); Russian roulette -----
         position, normal, rho = tracer.surface_at(hit, position, direction, active)
         if dr.hint(shiny, mode="scalar"):
-            glossy, onwards, rho = tracer.gloss.leave(
-                hit.prim_index, normal, direction, rho, generator, active
-            )
+            glossy, onwards, rho = tracer.gloss.leave(hit.prim_index, normal, direction, rho, generator, active)
             beta *= dr.select(by_gloss, 1.0, dr.pi) * dr.select(glossy, 1.0, dr.inv_pi)
             by_gloss = mi.Bool(glossy)
         beta *= rho
@@ -155,13 +153,23 @@ def add_mirrored(
 ) -> None:
     """Add the light that the gloss of surfaces reflects to rays with first hits `hit`."""
     position, face, _ = tracer.surface_at(hit, origin, direction, active)
-    glossy, onwards, weight = tracer.gloss.leave(
-        hit.prim_index, face, direction, mi.Float(0), generator, active
-    )
+    glossy, onwards, weight = tracer.gloss.leave(hit.prim_index, face, direction, mi.Float(0), generator, active)
     add_view_paths(
-        tracer, bins, matrix, entry, position, face, later=later,
-        beta=dr.select(glossy, beta * weight, 0.0), sample=sample,
-        stream=mi.sample_tea_32(stream, mi.UInt32(0x6A09E667))[0], generator=generator,
-        max_depth=max_depth, active=glossy & (weight > 0), carried=None, mirrored=onwards,
-        light=None, room=room,
-    )  # fmt: skip
+        tracer,
+        bins,
+        matrix,
+        entry,
+        position,
+        face,
+        later=later,
+        beta=dr.select(glossy, beta * weight, 0.0),
+        sample=sample,
+        stream=mi.sample_tea_32(stream, mi.UInt32(0x6A09E667))[0],
+        generator=generator,
+        max_depth=max_depth,
+        active=glossy & (weight > 0),
+        carried=None,
+        mirrored=onwards,
+        light=None,
+        room=room,
+    )

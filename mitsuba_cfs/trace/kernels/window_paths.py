@@ -75,10 +75,7 @@ def window_batches(
         stream = mi.sample_tea_32(patch, key)[0]
         local = bins.sample(patch, lattice_2d(sample, stream, 0))
         position = tracer.sample_group(group, lattice_2d(sample, stream, 2))
-        outward, generator = (
-            tracer.to_world_any(group, local),
-            path_generator(patch * each + sample, key),
-        )
+        outward, generator = (tracer.to_world_any(group, local), path_generator(patch * each + sample, key))
         follow(matrix, WindowPaths(group, row, patch, sample, position, outward, stream, generator))
         return sums_of(matrix, (count, K, columns)) / samples
 

@@ -127,9 +127,7 @@ def absorption_matrix(
         normal = tracer.exterior_normal(paths.group)
         position = mi.Point3f(paths.position - normal * tracer.epsilon)
         depth = dr.opaque(mi.UInt32, max_depth)
-        starts = PathStarts(
-            paths.row, position, -paths.outward, paths.generator, depth, mi.Bool(True)
-        )
+        starts = PathStarts(paths.row, position, -paths.outward, paths.generator, depth, mi.Bool(True))
         _absorption_kernel(tracer, matrix, starts)
 
     return accumulate(
@@ -138,10 +136,19 @@ def absorption_matrix(
         label="absorption matrix",
         progress=progress,
         entry=cache_entry(
-            cache, "absorption matrix", surfaces, groups, reflectance, basis, n,
-            max_depth, seed, by=__name__, stopping=stopping,
+            cache,
+            "absorption matrix",
+            surfaces,
+            groups,
+            reflectance,
+            basis,
+            n,
+            max_depth,
+            seed,
+            by=__name__,
+            stopping=stopping,
         ),
-    )  # fmt: skip
+    )
 
 
 def window_exchange(
@@ -193,10 +200,9 @@ def window_exchange(
         stopping=stopping,
         label="window exchange",
         entry=cache_entry(
-            cache, "window exchange", surfaces, groups, basis, n, max_depth, seed,
-            by=__name__, stopping=stopping,
+            cache, "window exchange", surfaces, groups, basis, n, max_depth, seed, by=__name__, stopping=stopping
         ),
-    )  # fmt: skip
+    )
 
 
 def outdoor_exchange(
@@ -217,9 +223,15 @@ def outdoor_exchange(
     for incident and outgoing patches of the front; arguments as for `window_exchange`.
     """
     exchange = window_exchange(
-        surfaces, [_turned(group) for group in groups], samples=samples, max_depth=max_depth,
-        stopping=stopping, seed=seed, cache=cache, scenes=scenes,
-    )  # fmt: skip
+        surfaces,
+        [_turned(group) for group in groups],
+        samples=samples,
+        max_depth=max_depth,
+        stopping=stopping,
+        seed=seed,
+        cache=cache,
+        scenes=scenes,
+    )
     theta, phi = KLEMS_FULL.centres()
     patch = KLEMS_FULL.index(theta, np.pi - phi)  # x of the turned windows is that of the others, -
     columns = (np.arange(len(groups))[:, None] * KLEMS_FULL.size + patch).ravel()
@@ -292,10 +304,20 @@ def adjacent_daylight(
         stopping=stopping,
         label="adjacent daylight",
         entry=cache_entry(
-            cache, "adjacent daylight", surfaces, groups, flat, inner, basis, n, max_depth, seed,
-            by=__name__, stopping=stopping,
+            cache,
+            "adjacent daylight",
+            surfaces,
+            groups,
+            flat,
+            inner,
+            basis,
+            n,
+            max_depth,
+            seed,
+            by=__name__,
+            stopping=stopping,
         ),
-    )  # fmt: skip
+    )
 
 
 Room = tuple[Surfaces, Sequence[WindowGroup]]
@@ -380,11 +402,20 @@ def adjacent_view(
         active &= generator.next_float32() < dr.gather(mi.Float, passed, patch, active)
         start = start + away * hit.t + here.exterior_normal(group) * here.epsilon
         _add_paths(
-            beyond, iter(sums), bins, start, mi.Vector3f(away), active,
-            scenes=scenes, centre=here.centre, row=sensor, stream=stream, sample=sample,
+            beyond,
+            iter(sums),
+            bins,
+            start,
+            mi.Vector3f(away),
+            active,
+            scenes=scenes,
+            centre=here.centre,
+            row=sensor,
+            stream=stream,
+            sample=sample,
             generator=generator,
             max_depth=dr.opaque(mi.UInt32, max_depth),
-        )  # fmt: skip
+        )
         dr.eval(*sums)
         each = zip(sums, flat, strict=True)
         return sum(sums_of(one, (S, len(light))) @ light for one, light in each) * (np.pi / n)
@@ -394,10 +425,21 @@ def adjacent_view(
         stopping=stopping,
         label="adjacent view",
         entry=cache_entry(
-            cache, "adjacent view", room, group, beam, beyond, points, directions, n,
-            max_depth, seed, by=__name__, stopping=stopping,
+            cache,
+            "adjacent view",
+            room,
+            group,
+            beam,
+            beyond,
+            points,
+            directions,
+            n,
+            max_depth,
+            seed,
+            by=__name__,
+            stopping=stopping,
         ),
-    )  # fmt: skip
+    )
 
 
 def _add_paths(
@@ -428,11 +470,18 @@ def _add_paths(
         through = met & (generator.next_float32() < dr.gather(mi.Float, passed, patch, met))
         outside = tracer.exterior_normal(behind.first) * tracer.epsilon
         _add_paths(
-            behind.room, sums, bins, start + direction * hit.t + outside, direction, through,
-            scenes=scenes, centre=centre, generator=generator, **paths,
-        )  # fmt: skip
+            behind.room,
+            sums,
+            bins,
+            start + direction * hit.t + outside,
+            direction,
+            through,
+            scenes=scenes,
+            centre=centre,
+            generator=generator,
+            **paths,
+        )
         active &= ~met
     add_seen_and_reflected(
-        tracer, bins, matrix, start, direction, active,
-        beta=mi.Float(1), generator=generator, **paths,
-    )  # fmt: skip
+        tracer, bins, matrix, start, direction, active, beta=mi.Float(1), generator=generator, **paths
+    )

@@ -64,9 +64,17 @@ def cell_daylight(
     """
     room = TracedRoom(surfaces, tuple(groups))
     (estimate,) = cells_of_rooms(
-        [room], None, [cells], [samples], subdivision=subdivision, basis=basis,
-        max_depth=max_depth, seed=seed, cache=cache, scenes=scenes,
-    )  # fmt: skip
+        [room],
+        None,
+        [cells],
+        [samples],
+        subdivision=subdivision,
+        basis=basis,
+        max_depth=max_depth,
+        seed=seed,
+        cache=cache,
+        scenes=scenes,
+    )
     return estimate
 
 
@@ -91,16 +99,25 @@ def cells_of_rooms(
     """
     scenes = SceneCache() if scenes is None else scenes
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
-    places = [
-        list(_places(room.groups, of, np.zeros(3))) for room, of in zip(rooms, cells, strict=True)
-    ]
+    places = [list(_places(room.groups, of, np.zeros(3))) for room, of in zip(rooms, cells, strict=True)]
     entries = [
-        None if cache is None else cache.entry(
-            "cell daylight", mi.variant(), room.surfaces, room.groups, *place[1:], subdivision,
-            basis, n, max_depth, seed, by=__name__,
+        None
+        if cache is None
+        else cache.entry(
+            "cell daylight",
+            mi.variant(),
+            room.surfaces,
+            room.groups,
+            *place[1:],
+            subdivision,
+            basis,
+            n,
+            max_depth,
+            seed,
+            by=__name__,
         )
         for room, place, n in zip(rooms, places, samples, strict=True)
-    ]  # fmt: skip
+    ]
 
     def traced(some: Sequence[int]) -> Callable[[int], NDArray[np.float64]]:
         if outdoors is None:
@@ -113,8 +130,7 @@ def cells_of_rooms(
         frames, corner, *sides = joined
         tables = [vectors(v) for v in (corner - tracer.centre, *sides)]
         axes = [vectors(frames[:, i]) for i in range(3)]
-        return _batches(tracer, bins, sky, tables, axes, counts=counts, samples=paths,
-                        max_depth=max_depth, seed=seed)  # fmt: skip
+        return _batches(tracer, bins, sky, tables, axes, counts=counts, samples=paths, max_depth=max_depth, seed=seed)
 
     stored = (None if entry is None else entry.read(_stored) for entry in entries)
     values = [one for one in stored if one is not None]
@@ -273,9 +289,7 @@ def add_daylight_paths(
                 passed = tracer.leaves(hit, direction, active)
             before, face, _ = tracer.surface_at(hit, position, direction, active)
             beyond = mi.Point3f(before - 2 * tracer.epsilon * face)
-            after, away, reflectance, mirrored = tracer.bounce(
-                hit, position, direction, generator, active
-            )
+            after, away, reflectance, mirrored = tracer.bounce(hit, position, direction, generator, active)
             position = dr.select(passed, beyond, after)
             direction = dr.select(passed, direction, away)
             depth += dr.select(passed, mi.UInt32(0), mi.UInt32(1))
@@ -321,9 +335,18 @@ def daylight_matrix(
     """
     room = TracedRoom(surfaces, tuple(groups))
     (estimate,) = daylight_of_rooms(
-        [room], None, subdivision=subdivision, basis=basis, samples=samples, max_depth=max_depth,
-        stopping=stopping, seed=seed, progress=progress, cache=cache, scenes=scenes,
-    )  # fmt: skip
+        [room],
+        None,
+        subdivision=subdivision,
+        basis=basis,
+        samples=samples,
+        max_depth=max_depth,
+        stopping=stopping,
+        seed=seed,
+        progress=progress,
+        cache=cache,
+        scenes=scenes,
+    )
     return estimate
 
 
@@ -353,11 +376,20 @@ def daylight_of_rooms(
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     entries = [
         cache_entry(
-            cache, "daylight matrix", room.surfaces, room.groups, subdivision, basis, n, max_depth,
-            seed, by=__name__, stopping=stopping,
+            cache,
+            "daylight matrix",
+            room.surfaces,
+            room.groups,
+            subdivision,
+            basis,
+            n,
+            max_depth,
+            seed,
+            by=__name__,
+            stopping=stopping,
         )
         for room in rooms
-    ]  # fmt: skip
+    ]
 
     def traced(some: Sequence[int]) -> Callable[[int], NDArray[np.float64]]:
         something = outdoors is not None or len(rooms[0].surfaces.triangles) > 0
@@ -371,15 +403,11 @@ def daylight_of_rooms(
             # light comes back to the windows where there is something
             clear = tracer.exterior_normal(paths.group) * tracer.epsilon if something else 0.0
             place = mi.Point3f(paths.position + clear)
-            starts = PathStarts(
-                paths.row, place, paths.outward, paths.generator, depth, mi.Bool(True)
-            )
+            starts = PathStarts(paths.row, place, paths.outward, paths.generator, depth, mi.Bool(True))
             here = tracer.of_lanes(tracer.group_in_room(paths.group)[0])
             add_daylight_paths(here, sky, matrix, starts)
 
-        batch = window_batches(
-            tracer, bins, sky.size, n, seed, follow, stopping=stopping or Stopping()
-        )
+        batch = window_batches(tracer, bins, sky.size, n, seed, follow, stopping=stopping or Stopping())
         return lambda number: batch(number).reshape(-1, sky.size)
 
     return of_rooms(
@@ -462,8 +490,17 @@ def sky_irradiance_matrix(
         label="sky irradiance",
         progress=progress,
         entry=cache_entry(
-            cache, "sky irradiance", surfaces, points, directions, subdivision,
-            () if acceptance is None else np.asarray(acceptance, dtype=float), n, max_depth,
-            seed, by=__name__, stopping=stopping,
+            cache,
+            "sky irradiance",
+            surfaces,
+            points,
+            directions,
+            subdivision,
+            () if acceptance is None else np.asarray(acceptance, dtype=float),
+            n,
+            max_depth,
+            seed,
+            by=__name__,
+            stopping=stopping,
         ),
-    )  # fmt: skip
+    )

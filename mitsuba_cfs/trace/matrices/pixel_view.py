@@ -85,9 +85,7 @@ def picture_part_blocks(
     scenes = SceneCache() if scenes is None else scenes
     tracer = scenes.scene(surfaces, groups, window_reflectance=window_reflectance)
     if light is not None and tracer.gloss is not None:
-        raise ValueError(
-            "light: expected None for a room with gloss, whose matrix is stored by patches"
-        )
+        raise ValueError("light: expected None for a room with gloss, whose matrix is stored by patches")
     bins = DirectionBins(basis)
     shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1)) if pixels is None else pixels
     row = np.arange(len(shown)) if row is None else row
@@ -165,9 +163,7 @@ def _block(
     return PictureBlock(pixels, seen, rows, sums[own : own + b], sums[own + b :])
 
 
-def _shares(
-    patches: NDArray[np.int32], weight: NDArray[np.floating], columns: int
-) -> sparse.csr_array:
+def _shares(patches: NDArray[np.int32], weight: NDArray[np.floating], columns: int) -> sparse.csr_array:
     """Share of each patch in each pixel [n, columns], from the patches of its rays [samples, n]."""
     _, pixel = indices = np.nonzero(patches != NO_PATCH)
     entries = weight[pixel], (pixel, patches[indices])
@@ -176,11 +172,7 @@ def _shares(
 
 
 def seen_patch(
-    tracer: TracedScene,
-    bins: DirectionBins,
-    eye: mi.Point3f,
-    direction: mi.Vector3f,
-    active: mi.Bool,
+    tracer: TracedScene, bins: DirectionBins, eye: mi.Point3f, direction: mi.Vector3f, active: mi.Bool
 ) -> tuple[mi.PreliminaryIntersection3f, mi.UInt32, mi.Bool]:
     """First hits of rays, the window patch that each shows, and whether it shows one."""
     ray = mi.Ray3f(eye, direction)
@@ -212,9 +204,20 @@ def add_seen_and_reflected(
     entry = row * opaque(bins.size * len(tracer.groups), mi.UInt32)
     dr.scatter_add(matrix, mi.Float64(beta), entry + patch, glazed)
     add_picture_paths(
-        tracer, bins, matrix, eye, direction, hit,
-        active=active, entry=entry, lit=entry, later=entry, beta=beta, light=None, **paths,
-    )  # fmt: skip
+        tracer,
+        bins,
+        matrix,
+        eye,
+        direction,
+        hit,
+        active=active,
+        entry=entry,
+        lit=entry,
+        later=entry,
+        beta=beta,
+        light=None,
+        **paths,
+    )
 
 
 def add_picture_paths(
@@ -264,7 +267,18 @@ def add_picture_paths(
     )
     if tracer.gloss is not None:
         add_mirrored(
-            tracer, bins, matrix, hit, eye, direction,
-            entry=entry, later=later - entry, beta=beta, sample=sample, stream=stream,
-            generator=mirrors, max_depth=max_depth, active=active,
-        )  # fmt: skip
+            tracer,
+            bins,
+            matrix,
+            hit,
+            eye,
+            direction,
+            entry=entry,
+            later=later - entry,
+            beta=beta,
+            sample=sample,
+            stream=stream,
+            generator=mirrors,
+            max_depth=max_depth,
+            active=active,
+        )

@@ -80,9 +80,9 @@ def escaped_view(
     scenes = SceneCache() if scenes is None else scenes
     points, directions = sensors_of(points, directions)
     tracer = scenes.scene(surfaces, groups)
-    corners = np.concatenate(
-        [surfaces.triangles, *(w.triangles for group in groups for w in group.windows)]
-    ).reshape(-1, 3)
+    corners = np.concatenate([surfaces.triangles, *(w.triangles for group in groups for w in group.windows)]).reshape(
+        -1, 3
+    )
     box = [tracer.place(f(axis=0)) for f in (corners.min, corners.max)]
     S, n = len(points), int(samples)
     place = vectors(points - tracer.centre, mi.Point3f)
@@ -114,10 +114,19 @@ def escaped_view(
         label="escape",
         progress=progress,
         entry=cache_entry(
-            cache, "escape", surfaces, groups, points, directions, n, max_depth, seed,
-            by=__name__, stopping=Stopping(batches=BATCHES),
+            cache,
+            "escape",
+            surfaces,
+            groups,
+            points,
+            directions,
+            n,
+            max_depth,
+            seed,
+            by=__name__,
+            stopping=Stopping(batches=BATCHES),
         ),
-    )  # fmt: skip
+    )
     return _escape(estimate, tracer.centre)
 
 
@@ -154,9 +163,7 @@ def _add_escapes(
         way = dr.select(dr.abs(direction) > 1e-8, (end - position) / direction, dr.inf)
         t = dr.maximum(dr.minimum(way.x, dr.minimum(way.y, way.z)), 0.0)
         axis = dr.select(
-            way.x <= dr.minimum(way.y, way.z),
-            mi.UInt32(0),
-            dr.select(way.y <= way.z, mi.UInt32(1), mi.UInt32(2)),
+            way.x <= dr.minimum(way.y, way.z), mi.UInt32(0), dr.select(way.y <= way.z, mi.UInt32(1), mi.UInt32(2))
         )
         along = dr.select(axis == 0, direction.x, dr.select(axis == 1, direction.y, direction.z))
         side = 2 * axis + dr.select(along > 0, mi.UInt32(1), mi.UInt32(0))
@@ -171,9 +178,7 @@ def _add_escapes(
         active &= hit.is_valid()
         group = dr.gather(mi.Int32, tracer.group, hit.prim_index, active)
         active &= group == OPAQUE
-        position, direction, reflectance, _ = tracer.bounce(
-            hit, position, direction, generator, active
-        )
+        position, direction, reflectance, _ = tracer.bounce(hit, position, direction, generator, active)
         depth += 1
         alive, beta = roulette(beta * reflectance, depth, generator)
         active &= alive & (depth < max_depth)
@@ -219,9 +224,7 @@ def straight_view_matrix(
     def one_group(g: int, way: Scattering, key: mi.UInt32) -> NDArray[np.float64]:
         matrix = empty_sums(S * sky.size)
         stream = key ^ opaque(0x510E527F + g, mi.UInt32)
-        sensor, start, omega, weight = straight_rays(
-            inside, g, way, (points, directions), n, stream
-        )
+        sensor, start, omega, weight = straight_rays(inside, g, way, (points, directions), n, stream)
         starts = PathStarts(
             sensor,
             start,
@@ -236,9 +239,7 @@ def straight_view_matrix(
     def batch(number: int) -> NDArray[np.float64]:
         key = batch_key(seed, number)
         nothing = np.zeros((S, sky.size))
-        return np.stack(
-            [nothing if way is None else one_group(g, way, key) for g, way in enumerate(scattering)]
-        )
+        return np.stack([nothing if way is None else one_group(g, way, key) for g, way in enumerate(scattering)])
 
     keys = [None if way is None else way.key for way in scattering]
     return accumulate(
@@ -246,10 +247,22 @@ def straight_view_matrix(
         stopping=stopping,
         label="straight view",
         entry=cache_entry(
-            cache, "straight view", interior, exterior, groups, keys, points, directions,
-            subdivision, n, max_depth, seed, by=__name__, stopping=stopping,
+            cache,
+            "straight view",
+            interior,
+            exterior,
+            groups,
+            keys,
+            points,
+            directions,
+            subdivision,
+            n,
+            max_depth,
+            seed,
+            by=__name__,
+            stopping=stopping,
         ),
-    )  # fmt: skip
+    )
 
 
 def straight_rays(
@@ -289,9 +302,7 @@ def straight_rays(
     reach = dr.select(by_cosine, dr.largest(mi.Float), dr.norm(to_target) * (1 - 1e-4))
     ray = mi.Ray3f(start, omega, reach, 0.0, [])
     hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=True)
-    is_window = dr.gather(mi.Int32, inside.group, hit.prim_index, hit.is_valid()) == opaque(
-        group, mi.Int32
-    )
+    is_window = dr.gather(mi.Int32, inside.group, hit.prim_index, hit.is_valid()) == opaque(group, mi.Int32)
     distance = dr.select(by_cosine, hit.t, dr.norm(to_target))
     local = inside.to_group(group, omega)
     cosine = dr.dot(away, omega)

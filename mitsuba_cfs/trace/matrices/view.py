@@ -184,9 +184,16 @@ def indirect_rows(
     rows = empty_sums(int(entries[-1]))
     paths = Ranges(points * [block.paths for block in blocks])
     _add_paths(
-        of, rows, paths, blocks, entries[:-1], (position, face, weight),
-        first_point=first_point, max_depth=max_depth, key_of=key_of,
-    )  # fmt: skip
+        of,
+        rows,
+        paths,
+        blocks,
+        entries[:-1],
+        (position, face, weight),
+        first_point=first_point,
+        max_depth=max_depth,
+        key_of=key_of,
+    )
     rows, weight = rows.numpy(), weight.numpy()
     estimates, ends = [], np.cumsum(points)
     for i, block in enumerate(blocks):
@@ -253,11 +260,7 @@ def _add_paths(
 
 
 def _hits(
-    of: _Sensors,
-    points: Ranges,
-    key_of: Callable[[mi.UInt32], mi.UInt32],
-    first: mi.UInt32,
-    hits: mi.UInt32,
+    of: _Sensors, points: Ranges, key_of: Callable[[mi.UInt32], mi.UInt32], first: mi.UInt32, hits: mi.UInt32
 ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.UInt32]:
     """Points [M], their normals, diffuse reflectances and triangles.
 
@@ -287,10 +290,7 @@ def _hits(
 
 
 def _exchange(
-    of: _Sensors,
-    pairs: Ranges,
-    blocks: tuple[mi.UInt32, ...],
-    points: tuple[mi.Point3f, mi.Vector3f],
+    of: _Sensors, pairs: Ranges, blocks: tuple[mi.UInt32, ...], points: tuple[mi.Point3f, mi.Vector3f]
 ) -> tuple[mi.Float, mi.Float, mi.UInt32]:
     """G of the sensors and points of each block: cosines over squared distance where one sees one.
 
@@ -319,9 +319,7 @@ def _exchange(
     return dr.select(seen, cosines / distance2, 0.0), slant, point
 
 
-def _add_mirrored(
-    of: _Sensors, matrix: mi.Float64, *, samples: int, max_depth: int, key: mi.UInt32
-) -> None:
+def _add_mirrored(of: _Sensors, matrix: mi.Float64, *, samples: int, max_depth: int, key: mi.UInt32) -> None:
     """Add what the gloss of the first surfaces reflects to the view matrix."""
     tracer = of.tracer
     lanes = Ranges(of.counts * samples)
@@ -336,16 +334,24 @@ def _add_mirrored(
         local = mi.warp.square_to_cosine_hemisphere(lattice_2d(sample, stream, 0))
         start = dr.gather(mi.Point3f, of.place, sensor)
         away = mi.Frame3f(dr.gather(mi.Vector3f, of.normal, sensor)).to_world(local)
-        hit = tracer.scene.ray_intersect_preliminary(
-            tracer.ray(start, away), coherent=False, active=True
-        )
+        hit = tracer.scene.ray_intersect_preliminary(tracer.ray(start, away), coherent=False, active=True)
         add_mirrored(
-            tracer, of.bins, matrix, hit, start, away,
-            entry=dr.gather(mi.UInt32, of.entry, sensor), later=dr.opaque(mi.UInt32, 0),
-            beta=dr.opaque(mi.Float, np.pi / samples), sample=sample, stream=stream,
+            tracer,
+            of.bins,
+            matrix,
+            hit,
+            start,
+            away,
+            entry=dr.gather(mi.UInt32, of.entry, sensor),
+            later=dr.opaque(mi.UInt32, 0),
+            beta=dr.opaque(mi.Float, np.pi / samples),
+            sample=sample,
+            stream=stream,
             generator=path_generator(path, key ^ mi.UInt32(0x9B05688C)),
-            max_depth=dr.opaque(mi.UInt32, max_depth - 1), active=hit.is_valid(), room=room,
-        )  # fmt: skip
+            max_depth=dr.opaque(mi.UInt32, max_depth - 1),
+            active=hit.is_valid(),
+            room=room,
+        )
 
 
 @dr.syntax
@@ -474,9 +480,16 @@ def view_matrix(
     """
     room = TracedRoom(surfaces, tuple(groups), *sensors_of(points, directions))
     ((estimate, _),) = views_of_rooms(
-        [room], basis=basis, samples=samples, max_depth=max_depth, stopping=stopping, seed=seed,
-        progress=progress, cache=cache, scenes=scenes,
-    )  # fmt: skip
+        [room],
+        basis=basis,
+        samples=samples,
+        max_depth=max_depth,
+        stopping=stopping,
+        seed=seed,
+        progress=progress,
+        cache=cache,
+        scenes=scenes,
+    )
     return estimate
 
 
@@ -504,12 +517,22 @@ def views_of_rooms(
     bins, depths = DirectionBins(basis), (max_depth, 1) if with_direct else (max_depth,)
     entries = [
         cache_entry(
-            cache, "view matrix", room.surfaces, room.groups, room.points, room.directions, basis,
-            n, depth, seed, by=__name__, stopping=stopping,
+            cache,
+            "view matrix",
+            room.surfaces,
+            room.groups,
+            room.points,
+            room.directions,
+            basis,
+            n,
+            depth,
+            seed,
+            by=__name__,
+            stopping=stopping,
         )
         for depth in depths
         for room in rooms
-    ]  # fmt: skip
+    ]
 
     def traced(some: Sequence[int]) -> Callable[[int], NDArray[np.float64]]:
         placed, tracer = scenes.together([rooms[i] for i in some])
@@ -529,9 +552,7 @@ def views_of_rooms(
     return list(zip(estimates[:count], estimates[count:] or [None] * count, strict=True))
 
 
-def _batches(
-    of: _Sensors, samples: int, depths: Sequence[int], seed: int
-) -> Callable[[int], NDArray[np.float64]]:
+def _batches(of: _Sensors, samples: int, depths: Sequence[int], seed: int) -> Callable[[int], NDArray[np.float64]]:
     """Batches of the rows of all rooms [S * G of each, K], those of each depth.
 
     Args: depths: most bounces; a second one is 1.
@@ -567,10 +588,7 @@ def _add_direct(of: _Sensors, matrix: mi.Float64, *, samples: int, key: mi.UInt3
     least = min(max(samples // COARSE, 1), LEAST_STRATA)
     strata = np.maximum(least, DIRECT_SHARE * samples // (triangles * K))
     lanes = Ranges(of.counts * triangles * K * strata)
-    tables = [
-        column(values, mi.UInt32)
-        for values in (strata, triangles, np.cumsum(triangles) - triangles, of.firsts)
-    ]
+    tables = [column(values, mi.UInt32) for values in (strata, triangles, np.cumsum(triangles) - triangles, of.firsts)]
     for first in range(0, lanes.total, BLOCK_LANES):
         lane = dr.arange(mi.UInt32, min(BLOCK_LANES, lanes.total - first))
         room, lane = lanes.of(lane + dr.opaque(mi.UInt32, first))

@@ -64,9 +64,7 @@ def person_view_factors(
     up = np.array([0.0, 0.0, 1.0])
     planes = (ahead, -ahead, side, -side, up, -up)
     plan = _Plan(samples, seed)
-    rays = np.concatenate(
-        [_cosine(window_frame(n)[None], plan.numbers(k)[:, 2:]) for k, n in enumerate(planes)]
-    )
+    rays = np.concatenate([_cosine(window_frame(n)[None], plan.numbers(k)[:, 2:]) for k, n in enumerate(planes)])
     N = int(surfaces.surface.max()) + 1
     origins = np.broadcast_to(np.asarray(place, dtype=float), rays.shape)
     shares = _shares(_hits(surfaces, origins, rays).reshape(6, plan.count), N)
@@ -74,12 +72,7 @@ def person_view_factors(
 
 
 def sky_shares(
-    surfaces: Surfaces,
-    points: ArrayLike,
-    normals: ArrayLike,
-    *,
-    samples: int = 4096,
-    seed: int = 0,
+    surfaces: Surfaces, points: ArrayLike, normals: ArrayLike, *, samples: int = 4096, seed: int = 0
 ) -> FloatArray:
     """Sky view of planes outdoors [S] over that without obstructions.
 

@@ -46,14 +46,21 @@ def daylight_coefficients(
         raise ValueError("a room needs a `key` before its matrix can be kept in a cache")
     sky = PatchSky(subdivision)
     return accumulate(
-        sensor_batches(
-            room, sky, points, directions, samples=samples, max_depth=max_depth, seed=seed
-        ),
+        sensor_batches(room, sky, points, directions, samples=samples, max_depth=max_depth, seed=seed),
         stopping=stopping,
         label="daylight coefficients",
         progress=progress,
         entry=cache_entry(
-            cache, "daylight coefficients", key, np.asarray(points), np.asarray(directions),
-            subdivision, samples, max_depth, seed, by=__name__, stopping=stopping,
+            cache,
+            "daylight coefficients",
+            key,
+            np.asarray(points),
+            np.asarray(directions),
+            subdivision,
+            samples,
+            max_depth,
+            seed,
+            by=__name__,
+            stopping=stopping,
         ),
-    )  # fmt: skip
+    )

@@ -38,9 +38,7 @@ def discs_seen(room: PathTracingScene, sky: Sky, view: View) -> tuple[SunDisc, .
     return tuple(disc for disc in discs if disc is not None)
 
 
-def with_discs(
-    picture: NDArray[np.float32], room: PathTracingScene, sky: Sky, view: View
-) -> NDArray[np.float32]:
+def with_discs(picture: NDArray[np.float32], room: PathTracingScene, sky: Sky, view: View) -> NDArray[np.float32]:
     """A picture [ny, nx] with the disc and its images added to its pixels."""
     whole = picture.astype(float).ravel()
     add_discs(whole, room, sky, view)
@@ -63,9 +61,7 @@ def add_discs(picture: NDArray[np.float64], room: PathTracingScene, sky: Sky, vi
             picture[near] += seen * share * radiance
 
 
-def _images(
-    room: PathTracingScene, sky: Sky, view: View
-) -> Iterator[tuple[NDArray[np.float64], Transmittance]]:
+def _images(room: PathTracingScene, sky: Sky, view: View) -> Iterator[tuple[NDArray[np.float64], Transmittance]]:
     """Apparent direction [3] of the sun and transmittance from the eye, straight and by mirrors."""
     sun, gloss = sky.sun.numpy().reshape(1, 3).astype(float), room.inside.gloss
     for path in specular_sun_paths(room.outside):
@@ -78,11 +74,7 @@ def _images(
 
 
 def _transmittance(
-    room: PathTracingScene,
-    view: View,
-    path: SpecularPath,
-    plane: int | None,
-    ways: NDArray[np.float64],
+    room: PathTracingScene, view: View, path: SpecularPath, plane: int | None, ways: NDArray[np.float64]
 ) -> NDArray[np.float32]:
     """Transmittance [n] from the eye in directions [n, 3] to the sky.
 

@@ -17,14 +17,7 @@ from mitsuba_cfs.trace.kernels.random_walk import PathStarts
 from mitsuba_cfs.trace.kernels.sampling import batch_key, path_generator, vectors
 from mitsuba_cfs.trace.kernels.scene import OPAQUE
 from mitsuba_cfs.trace.paths.scene import PatchSky, PathTracingScene, Sky
-from mitsuba_cfs.trace.paths.sun import (
-    Vertex,
-    leave_by_gloss,
-    on_disc,
-    sun_at,
-    sun_images,
-    surface_sun,
-)
+from mitsuba_cfs.trace.paths.sun import Vertex, leave_by_gloss, on_disc, sun_at, sun_images, surface_sun
 
 CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that paths prefer
 # Shares of a room path's directions that aim at windows and near the sun; the rest follows the
@@ -35,9 +28,7 @@ NEAR = 1e-4  # of its distance, within which a path has met the point that it ai
 TO_WINDOW, TO_SUN = (0.5, 0.2), (0.15, 0.05)  # (first, later)
 
 
-def _interaction(
-    room: PathTracingScene, group: int, direction: mi.Vector3f
-) -> mi.SurfaceInteraction3f:
+def _interaction(room: PathTracingScene, group: int, direction: mi.Vector3f) -> mi.SurfaceInteraction3f:
     """Interaction record, in a window's frame, of a ray along `direction` that meets the window."""
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(direction))
     si.n = mi.Normal3f(0, 0, 1)
@@ -90,13 +81,9 @@ def _density(
     dropped, so only directions that meet a window have that part of the density, for that window.
     """
     window = dr.select(
-        glass_cosine > 1e-4,
-        distance * distance / (room.inside.window_area() * dr.maximum(glass_cosine, 1e-4)),
-        0.0,
+        glass_cosine > 1e-4, distance * distance / (room.inside.window_area() * dr.maximum(glass_cosine, 1e-4)), 0.0
     )
-    cone = dr.select(
-        dr.dot(direction, sky.sun) > CONE_COSINE, 1 / (2 * np.pi * (1 - CONE_COSINE)), 0.0
-    )
+    cone = dr.select(dr.dot(direction, sky.sun) > CONE_COSINE, 1 / (2 * np.pi * (1 - CONE_COSINE)), 0.0)
     window_share, sun_share = (dr.select(later, s[1], s[0]) for s in (TO_WINDOW, TO_SUN))
     rest = 1 - window_share - sun_share
     return rest * cosine * dr.inv_pi + window_share * window + sun_share * cone
@@ -136,11 +123,7 @@ def window_parts(
 
 
 def scattered_at(
-    room: PathTracingScene,
-    group: mi.Int32,
-    direction: mi.Vector3f,
-    towards: mi.Vector3f,
-    glazed: mi.Bool,
+    room: PathTracingScene, group: mi.Int32, direction: mi.Vector3f, towards: mi.Vector3f, glazed: mi.Bool
 ) -> mi.Float:
     """Light of the sun at `towards` that windows scatter to -`direction`, cosine included."""
     scattered = mi.Float(0)
@@ -245,18 +228,14 @@ def add_paths(
         active &= ~glazed | facing
         glazed &= active
         glass_cosine = dr.select(glazed & ~outdoors, local.z, 0.0)
-        density = _density(
-            room, sky, cosine, direction, t, glass_cosine=glass_cosine, later=depth > 0
-        )
+        density = _density(room, sky, cosine, direction, t, glass_cosine=glass_cosine, later=depth > 0)
         beta *= dr.select(diffuse & ~outdoors, cosine / dr.maximum(density, 1e-12), 1.0)
         point = mi.Point3f(origin + direction * t)
 
         # ----- Windows: the sun scattered in them, and where the path goes on -----
         u_sun = mi.Point2f(generator.next_float32(), generator.next_float32())
         towards = on_disc(sky, u_sun)
-        scattered, next_direction, next_beta, straight = _at_window(
-            room, group, direction, towards, generator, glazed
-        )
+        scattered, next_direction, next_beta, straight = _at_window(room, group, direction, towards, generator, glazed)
         sunlit = glazed & (scattered > 0) & (sky.sun_radiance > 0)
         before = mi.Point3f(point + room.inside.outward(group, glazed))
         sun_ray = mi.Ray3f(before, towards)
@@ -264,9 +243,7 @@ def add_paths(
         from_sun = scattered * float(SUN_SOLID_ANGLE) * sky.sun_radiance
         dr.scatter_add(result, mi.Float64(beta * from_sun), row, sunlit)
         if dr.hint(room.glossy, mode="scalar"):
-            by_mirrors = window_sun(
-                room, sky, before, group, direction, generator=generator, glazed=glazed
-            )
+            by_mirrors = window_sun(room, sky, before, group, direction, generator=generator, glazed=glazed)
             dr.scatter_add(result, mi.Float64(beta * by_mirrors), row, glazed)
 
         # ----- Surfaces: the sun on them, and a new direction -----
@@ -282,9 +259,8 @@ def add_paths(
         rho = dr.select(outdoors, rho_out, rho_in)
         vertex = Vertex(mi.Point3f(point + face * room.inside.epsilon), face, outdoors)
         sun = surface_sun(
-            room, sky, vertex, prim, direction,
-            rho=rho, came=came, u=u_sun, generator=generator, active=opaque,
-        )  # fmt: skip
+            room, sky, vertex, prim, direction, rho=rho, came=came, u=u_sun, generator=generator, active=opaque
+        )
         dr.scatter_add(result, mi.Float64(beta * sun), row, opaque)
         u_away = mi.Point2f(generator.next_float32(), generator.next_float32())
         away, aimed = leave(room, sky, vertex, u_away, generator.next_float32(), opaque, later=True)
@@ -338,15 +314,8 @@ def point_in_time(
         points, directions: [S, 3] sensor positions [m] and normals.
         samples: paths for each sensor in each batch.
     """
-    batch = sensor_batches(
-        room, sky, points, directions, samples=samples, max_depth=max_depth, seed=seed
-    )
-    return accumulate(
-        lambda number: batch(number)[:, 0],
-        stopping=stopping,
-        label="point in time",
-        progress=progress,
-    )
+    batch = sensor_batches(room, sky, points, directions, samples=samples, max_depth=max_depth, seed=seed)
+    return accumulate(lambda number: batch(number)[:, 0], stopping=stopping, label="point in time", progress=progress)
 
 
 def sensor_batches(
@@ -386,10 +355,16 @@ def sensor_batches(
         depth = dr.opaque(mi.UInt32, max_depth)
         starts = PathStarts(sensor, origin, away, generator, depth, cosine > 0)
         add_paths(
-            room, sky, result, starts,
-            cosine=cosine, came=dr.maximum(cosine, 0) * dr.inv_pi, aimed=aimed, beta=mi.Float(1),
+            room,
+            sky,
+            result,
+            starts,
+            cosine=cosine,
+            came=dr.maximum(cosine, 0) * dr.inv_pi,
+            aimed=aimed,
+            beta=mi.Float(1),
             outdoors=vertex.outdoors,
-        )  # fmt: skip
+        )
         return result.numpy().reshape(S, sky.columns) / n
 
     return batch

@@ -21,13 +21,7 @@ from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import SkyBins
-from mitsuba_cfs.trace.kernels.scattering import (
-    WINDOW_UP,
-    AngularBeam,
-    PatchBeam,
-    TreeBeam,
-    loaded,
-)
+from mitsuba_cfs.trace.kernels.scattering import WINDOW_UP, AngularBeam, PatchBeam, TreeBeam, loaded
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.specular_paths import SpecularPath, mirror_sequences
 
@@ -71,10 +65,7 @@ class Sky:
         self.sun = mi.Vector3f(*(dr.opaque(mi.Float, float(v)) for v in towards))
         self.sun_radiance = dr.opaque(mi.Float, float(sun_radiance) if towards[2] > 0 else 0.0)
 
-    def add(
-        self, result: mi.Float64, row: mi.UInt32, direction: mi.Vector3f, beta: mi.Float,
-        active: mi.Bool,
-    ) -> None:  # fmt: skip
+    def add(self, result: mi.Float64, row: mi.UInt32, direction: mi.Vector3f, beta: mi.Float, active: mi.Bool) -> None:
         """Add the light of paths that leave to the sky to their rows of `result`."""
         light = dr.gather(mi.Float, self.radiance, self.bins.index(direction), active)
         dr.scatter_add(result, mi.Float64(beta * light), row, active)
@@ -89,10 +80,7 @@ class PatchSky:
         self.columns = self.bins.size
         self.sun, self.sun_radiance = mi.Vector3f(0, 0, 1), mi.Float(0)
 
-    def add(
-        self, result: mi.Float64, row: mi.UInt32, direction: mi.Vector3f, beta: mi.Float,
-        active: mi.Bool,
-    ) -> None:  # fmt: skip
+    def add(self, result: mi.Float64, row: mi.UInt32, direction: mi.Vector3f, beta: mi.Float, active: mi.Bool) -> None:
         """Add the weight of paths to the sky patch of their row that they leave to."""
         slot = row * self.columns + self.bins.index(direction)
         dr.scatter_add(result, mi.Float64(beta), slot, active)
@@ -102,11 +90,7 @@ class PathTracingScene:
     """The scenes on both sides of the windows, and the systems in the windows."""
 
     def __init__(
-        self,
-        interior: Surfaces,
-        exterior: Surfaces,
-        groups: Sequence[WindowGroup],
-        systems: Sequence[PathOptics],
+        self, interior: Surfaces, exterior: Surfaces, groups: Sequence[WindowGroup], systems: Sequence[PathOptics]
     ) -> None:
         """Build both scenes; they share the origin of their coordinates."""
         if len(systems) != len(groups):
@@ -129,9 +113,7 @@ def path_optics(bsdf: Bsdf, angular: AngularTable | None = None) -> PathOptics:
     if angular is not None:
         return _specular_system(replace(bsdf, see_through=1.0), angular)
     if isinstance(bsdf, TensorTreeBsdf):
-        return PathOptics(
-            loaded(tensor_tree_plugin(without_beam(bsdf), up=WINDOW_UP)), TreeBeam(bsdf)
-        )
+        return PathOptics(loaded(tensor_tree_plugin(without_beam(bsdf), up=WINDOW_UP)), TreeBeam(bsdf))
     front = through_peak(bsdf.filled().transmission_front, bsdf.basis_in, bsdf.see_through)
     beam = PatchBeam(bsdf.basis_in, front.transmittance, specular_exponent(front, bsdf.basis_in))
     return PathOptics(loaded(klems_plugin(without_peaks(bsdf, "transmission"), up=WINDOW_UP)), beam)
@@ -163,8 +145,7 @@ def _specular_system(bsdf: Bsdf, angular: AngularTable) -> PathOptics:
         trees = without_beam(bsdf)
         if "reflection" in kinds:
             trees = TensorTreeBsdf(
-                transmission_front=trees.transmission_front,
-                transmission_back=trees.transmission_back,
+                transmission_front=trees.transmission_front, transmission_back=trees.transmission_back
             )
         return PathOptics(loaded(tensor_tree_plugin(trees, up=WINDOW_UP)), beam, tuple(mirrors))
     rest = without_peaks(bsdf, *kinds)

@@ -49,11 +49,7 @@ def on_disc(sky: Sky | PatchSky, u: mi.Point2f) -> mi.Vector3f:
 
 
 def through_window(
-    room: PathTracingScene,
-    position: mi.Point3f,
-    towards: mi.Vector3f,
-    outdoors: mi.Bool,
-    active: mi.Bool,
+    room: PathTracingScene, position: mi.Point3f, towards: mi.Vector3f, outdoors: mi.Bool, active: mi.Bool
 ) -> tuple[mi.Float, mi.Point3f]:
     """Transmittance of the straight way outdoors, and where it starts there.
 
@@ -74,11 +70,7 @@ def through_window(
 
 
 def straight_to_sky(
-    room: PathTracingScene,
-    position: mi.Point3f,
-    towards: mi.Vector3f,
-    outdoors: mi.Bool,
-    active: mi.Bool,
+    room: PathTracingScene, position: mi.Point3f, towards: mi.Vector3f, outdoors: mi.Bool, active: mi.Bool
 ) -> mi.Float:
     """Transmittance straight to the sky: 1 outdoors, a window's beam indoors; 0 if hidden."""
     tau, start = mi.Float(1), position
@@ -92,9 +84,7 @@ def straight_to_sky(
     return dr.select(free, tau, 0.0)
 
 
-def sun_at(
-    room: PathTracingScene, sky: Sky | PatchSky, vertex: Vertex, u: mi.Point2f, active: mi.Bool
-) -> mi.Float:
+def sun_at(room: PathTracingScene, sky: Sky | PatchSky, vertex: Vertex, u: mi.Point2f, active: mi.Bool) -> mi.Float:
     """Irradiance directly from the sun, outdoors or through a window's straight beam."""
     towards = on_disc(sky, u)
     cosine = dr.dot(vertex.normal, towards)
@@ -138,12 +128,7 @@ def sun_images(
 
 
 def _image_by_mirrors(
-    room: PathTracingScene,
-    sky: Sky,
-    path: SpecularPath,
-    vertex: Vertex,
-    u: mi.Point2f,
-    active: mi.Bool,
+    room: PathTracingScene, sky: Sky, path: SpecularPath, vertex: Vertex, u: mi.Point2f, active: mi.Bool
 ) -> SunImage:
     """The image of the sun by several smooth mirrors outdoors."""
     towards = path.apparent_rays(on_disc(sky, u))
@@ -179,9 +164,8 @@ def _image(
     active &= sky.sun_radiance > 0
 
     shown = by_plane(
-        room, tracer, mi.Int32(number), vertex.position, towards,
-        onwards=sun, outdoors=vertex.outdoors, active=active,
-    )  # fmt: skip
+        room, tracer, mi.Int32(number), vertex.position, towards, onwards=sun, outdoors=vertex.outdoors, active=active
+    )
     density = _image_density(gloss, slope, along, alpha)
     own = cosine * dr.inv_pi  # of a path from the vertex, about
     weight = dr.select(sharp, 1.0, density / dr.maximum(density + own, 1e-12))
@@ -215,11 +199,7 @@ def by_plane(
 
 
 def by_mirror(
-    tracer: TracedScene,
-    number: mi.Int32,
-    position: mi.Point3f,
-    towards: mi.Vector3f,
-    active: mi.Bool,
+    tracer: TracedScene, number: mi.Int32, position: mi.Point3f, towards: mi.Vector3f, active: mi.Bool
 ) -> tuple[mi.Float, mi.Point3f, mi.Vector3f]:
     """Reflectance of a mirror plane that rays meet first, else 0; where they continue, and how."""
     gloss = tracer.gloss
@@ -240,9 +220,7 @@ def _drawn(gloss: TracedGloss) -> float:
     return max(gloss.plane_count / MOST_IMAGES, 1.0)
 
 
-def _image_density(
-    gloss: TracedGloss, slope: mi.Float, along: mi.Float, alpha: mi.Float
-) -> mi.Float:
+def _image_density(gloss: TracedGloss, slope: mi.Float, along: mi.Float, alpha: mi.Float) -> mi.Float:
     """Density [1/sr] of the directions to a rough plane's images."""
     return facet_density(slope, alpha) / (4 * dr.maximum(along, 1e-6) * _drawn(gloss))
 
@@ -283,9 +261,7 @@ def surface_sun(
             room,
             vertex.outdoors,
             active & image.sharp,
-            lambda gloss, here, towards=image.towards: gloss.lobe(
-                triangle, vertex.normal, direction, towards, here
-            ),
+            lambda gloss, here, towards=image.towards: gloss.lobe(triangle, vertex.normal, direction, towards, here),
         )
         cosine = dr.maximum(dr.dot(vertex.normal, image.towards), 0.0)
         light += (rho * dr.inv_pi * share + lobe) * cosine * image.strength
@@ -293,20 +269,11 @@ def surface_sun(
 
 
 def diffuse_share(
-    room: PathTracingScene,
-    vertex: Vertex,
-    triangle: mi.UInt32,
-    towards: mi.Vector3f,
-    active: mi.Bool,
+    room: PathTracingScene, vertex: Vertex, triangle: mi.UInt32, towards: mi.Vector3f, active: mi.Bool
 ) -> mi.Float:
     """Diffuse reflectance for light from a direction over that at normal incidence."""
     cosine = dr.dot(vertex.normal, towards)
-    rest = _by_side(
-        room,
-        vertex.outdoors,
-        active,
-        lambda gloss, here: 1 - gloss.diffuse_share(triangle, cosine, here),
-    )
+    rest = _by_side(room, vertex.outdoors, active, lambda gloss, here: 1 - gloss.diffuse_share(triangle, cosine, here))
     return 1 - rest
 
 
@@ -325,9 +292,7 @@ def leave_by_gloss(
     for tracer, here in ((room.inside, ~vertex.outdoors), (room.outside, vertex.outdoors)):
         if tracer.gloss is not None:
             leaves = active & here
-            one, way, factor = tracer.gloss.leave(
-                triangle, vertex.normal, direction, rho, generator, leaves
-            )
+            one, way, factor = tracer.gloss.leave(triangle, vertex.normal, direction, rho, generator, leaves)
             glossy |= one
             towards = dr.select(one, way, towards)
             weight = dr.select(leaves, factor, weight)
@@ -353,10 +318,7 @@ def _own_weight(
 
 
 def _by_side(
-    room: PathTracingScene,
-    outdoors: mi.Bool,
-    active: mi.Bool,
-    value: Callable[[TracedGloss, mi.Bool], mi.Float],
+    room: PathTracingScene, outdoors: mi.Bool, active: mi.Bool, value: Callable[[TracedGloss, mi.Bool], mi.Float]
 ) -> mi.Float:
     """A value of the gloss on each lane's side of the windows, 0 where there is none."""
     light = mi.Float(0)

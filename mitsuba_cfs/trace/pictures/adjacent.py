@@ -22,25 +22,12 @@ from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.kernels.pixel_rows import Tiles, face_numbers, numbered, smoothing, tile_size
-from mitsuba_cfs.trace.kernels.sampling import (
-    column,
-    empty_sums,
-    opaque,
-    path_generator,
-    sums_of,
-    tables,
-    vectors,
-)
+from mitsuba_cfs.trace.kernels.sampling import column, empty_sums, opaque, path_generator, sums_of, tables, vectors
 from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 from mitsuba_cfs.trace.kernels.scene import SceneCache, TracedScene
 from mitsuba_cfs.trace.kernels.view_paths import add_view_paths
 from mitsuba_cfs.trace.matrices.adjacent import AdjacentRoomLight, GlassToRoom
-from mitsuba_cfs.trace.pictures.outdoors import (
-    RAYS,
-    SeenOutdoors,
-    through_windows,
-    view_lanes,
-)
+from mitsuba_cfs.trace.pictures.outdoors import RAYS, SeenOutdoors, through_windows, view_lanes
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_points
 from mitsuba_cfs.trace.sun.outdoors import MOST_MIRRORS, PixelRays, mirrored
 
@@ -102,9 +89,7 @@ def adjacent_picture(
     pixels = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
     tiles = Tiles(tile_size(view) if tile is None else tile, view.width)
     sky = SkyBins(ReinhartSky(subdivision))
-    met = [
-        _MetInRoom(b.room, t, tiles, sky, scenes) for (_, b), t in zip(nodes, tracers, strict=True)
-    ]
+    met = [_MetInRoom(b.room, t, tiles, sky, scenes) for (_, b), t in zip(nodes, tracers, strict=True)]
     step = max(256, RAYS // samples)
     for start in range(0, len(pixels), step):
         block = pixels[start : start + step]
@@ -153,12 +138,7 @@ class _MetInRoom:
     """Accumulates hits of rays in a room and outside its windows: patches, points on surfaces."""
 
     def __init__(
-        self,
-        room: AdjacentRoomLight,
-        tracer: TracedScene,
-        tiles: Tiles,
-        sky: SkyBins,
-        scenes: SceneCache,
+        self, room: AdjacentRoomLight, tracer: TracedScene, tiles: Tiles, sky: SkyBins, scenes: SceneCache
     ) -> None:
         self.room, self.tracer, self.bins = room, tracer, DirectionBins(KLEMS_FULL)
         self._tiles, self._columns = tiles, len(room.groups) * KLEMS_FULL.size
@@ -192,12 +172,7 @@ class _MetInRoom:
             lanes = mirrored(tracer, lanes, hit, bounce)
 
     def _sort(
-        self,
-        lanes: PixelRays,
-        places: SurfacePoints,
-        of_hits: list[NDArray],
-        block: NDArray,
-        start: int,
+        self, lanes: PixelRays, places: SurfacePoints, of_hits: list[NDArray], block: NDArray, start: int
     ) -> None:
         found, window, group, patch, rho, triangle = of_hits
         lit = np.flatnonzero(window & (group < self._outdoors))
@@ -219,8 +194,7 @@ class _MetInRoom:
         places = SurfacePoints.joined([s[3] for s in self._shown])
         light = self._irradiance(tile, places, size, max_depth, seed)
         luminance, beam, daylight = (
-            np.asarray(part, dtype=np.float32)
-            for part in (self.room.luminance, self.room.beam, self.room.daylight)
+            np.asarray(part, dtype=np.float32) for part in (self.room.luminance, self.room.beam, self.room.daylight)
         )
         outdoors, _, reflected = self._beyond.faces(seed)
         flat = self._columns, luminance.shape[-1]
@@ -236,12 +210,7 @@ class _MetInRoom:
         )
 
     def _irradiance(
-        self,
-        tile: NDArray[np.int64],
-        places: SurfacePoints,
-        size: NDArray,
-        max_depth: int,
-        seed: int,
+        self, tile: NDArray[np.int64], places: SurfacePoints, size: NDArray, max_depth: int, seed: int
     ) -> NDArray[np.float32]:
         """Mean irradiance at the points of each tile per unit luminance of the windows [C, N]."""
         again = np.ceil(LEAST_PATHS / np.maximum(size, 1)).astype(np.int64)
@@ -261,30 +230,44 @@ class _MetInRoom:
         return irradiance
 
     def _add_paths(
-        self, matrix: mi.Float64, path: NDArray[np.int64], row: NDArray[np.int64],
-        places: SurfacePoints, max_depth: int, seed: int,
-    ) -> None:  # fmt: skip
+        self,
+        matrix: mi.Float64,
+        path: NDArray[np.int64],
+        row: NDArray[np.int64],
+        places: SurfacePoints,
+        max_depth: int,
+        seed: int,
+    ) -> None:
         key, width = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF), opaque(self._columns, mi.UInt32)
         entry = column(row, mi.UInt32) * width
         first = path[np.unique(row, return_index=True)[1]]  # of each row, for its stream
         streams = column(first[row] & 0xFFFFFFFF, mi.UInt32)
         add_view_paths(
-            self.tracer, self.bins, matrix, entry, places.points(), places.normals(),
-            later=mi.UInt32(0), beta=mi.Float(1), sample=column(numbered(row), mi.UInt32),
+            self.tracer,
+            self.bins,
+            matrix,
+            entry,
+            places.points(),
+            places.normals(),
+            later=mi.UInt32(0),
+            beta=mi.Float(1),
+            sample=column(numbered(row), mi.UInt32),
             stream=mi.sample_tea_32(streams, key)[0],
             generator=path_generator(column(path & 0xFFFFFFFF, mi.UInt32), key),
-            max_depth=dr.opaque(mi.UInt32, max_depth), active=mi.Bool(True),
-            carried=None, mirrored=None, light=None, room=None,
-        )  # fmt: skip
+            max_depth=dr.opaque(mi.UInt32, max_depth),
+            active=mi.Bool(True),
+            carried=None,
+            mirrored=None,
+            light=None,
+            room=None,
+        )
 
 
 def _joined(parts: Sequence[NDArray]) -> NDArray:
     return np.concatenate([np.empty(0, dtype=np.int64), *parts])
 
 
-def _shares(
-    share: NDArray, place: tuple[NDArray, NDArray], shape: tuple[int, int]
-) -> sparse.csr_array:
+def _shares(share: NDArray, place: tuple[NDArray, NDArray], shape: tuple[int, int]) -> sparse.csr_array:
     """A sparse matrix from entries at rows and columns, repeated ones summed."""
     rows, columns = (part.astype(np.int64) for part in place)
     entries = share.astype(np.float32), (rows, columns)

@@ -269,11 +269,7 @@ class FivePhasePictures:
 
     def light(self, batch: NDArray[np.int64]) -> PatchLight:
         """Window luminances for the view's paths in some hours."""
-        rest, suns, strength = (
-            self._lighting[:, batch],
-            self._directions[batch],
-            self._illuminance[batch],
-        )
+        rest, suns, strength = (self._lighting[:, batch], self._directions[batch], self._illuminance[batch])
         scattered = self._sun.scattered_luminance(suns, strength)
         return PatchLight(rest + scattered.reshape(rest.shape), self._reflected[:, batch])
 
@@ -292,9 +288,7 @@ class FivePhasePictures:
         self.add_disc(values, batch)
         return values
 
-    def without_disc(
-        self, batch: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
+    def without_disc(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], list[tuple[SunDisc, ...]]]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
         return self._values(batch), self.discs(batch)
 

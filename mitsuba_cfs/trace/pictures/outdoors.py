@@ -50,9 +50,7 @@ BLOCK_BYTES = 128 * 2**20
 PATCH_POINTS = 16  # directions in each window patch, for its mean transmittance
 MAX_DEPTH = 16
 RAYS = 2**20  # at once
-_Met = tuple[
-    PixelRays, NDArray[np.int64], NDArray[np.float32], SurfacePoints
-]  # and triangle, reflectance
+_Met = tuple[PixelRays, NDArray[np.int64], NDArray[np.float32], SurfacePoints]  # and triangle, reflectance
 
 
 @dataclass(frozen=True)
@@ -104,11 +102,7 @@ def outdoors(
         seen.add(lanes, block, start)
     shown, smooth, reflected = seen.faces(seed)
     return OutdoorCoefficients(
-        seen.sky(),
-        reflected,
-        _beams(scattering, basis),
-        OutdoorSun(outside, shown, smooth, view, seed),
-        seen.rough(),
+        seen.sky(), reflected, _beams(scattering, basis), OutdoorSun(outside, shown, smooth, view, seed), seen.rough()
     )
 
 
@@ -152,23 +146,17 @@ class SeenOutdoors:
         return RoughSun(self._outside, RoughFaces.joined(self._rough)) if self._rough else None
 
 
-def view_lanes(
-    inside: TracedScene, view: View, pixels: NDArray[np.int64], samples: int
-) -> PixelRays:
+def view_lanes(inside: TracedScene, view: View, pixels: NDArray[np.int64], samples: int) -> PixelRays:
     """Rays of a block's pixels from the eye."""
     eye = np.asarray(view.position) - inside.centre
     row = np.repeat(np.arange(len(pixels)), samples)
     directions, exists = spread_rays(view, pixels, samples)
     start = np.tile(eye[:, None], len(row)).astype(np.float32)
     share = np.full(len(row), 1.0 / samples)
-    return PixelRays(row, start, directions.T.astype(np.float32), share).some(
-        np.flatnonzero(exists)
-    )
+    return PixelRays(row, start, directions.T.astype(np.float32), share).some(np.flatnonzero(exists))
 
 
-def through_windows(
-    inside: TracedScene, scattering: Sequence[Scattering], lanes: PixelRays
-) -> PixelRays:
+def through_windows(inside: TracedScene, scattering: Sequence[Scattering], lanes: PixelRays) -> PixelRays:
     """Rays of a block that pass a window straight, at the window."""
     luminances = []
     for bounce in range(MOST_MIRRORS + 1):
@@ -242,17 +230,13 @@ def _with_faces(met: _Met, block: NDArray, start: int, faces: NDArray, tiles: Ti
 def _joined(shown: Sequence[ShownFaces]) -> tuple[ShownFaces, NDArray[np.int64]]:
     """The faces of all blocks with tiles numbered from 0, and the keys of the tiles."""
     none, nothing = np.empty(0, dtype=np.int64), np.empty(0)
-    pixel, tile = (
-        np.concatenate([none, *(getattr(s, name) for s in shown)]) for name in ("pixel", "tile")
-    )
+    pixel, tile = (np.concatenate([none, *(getattr(s, name) for s in shown)]) for name in ("pixel", "tile"))
     value = np.concatenate([nothing, *(s.value for s in shown)])
     numbers, tile = np.unique(tile, return_inverse=True)
     return ShownFaces(pixel, tile, value, SurfacePoints.joined([s.places for s in shown])), numbers
 
 
-def _reflected(
-    outside: TracedScene, sky: SkyBins, shown: ShownFaces, count: int, seed: int
-) -> sparse.csr_array:
+def _reflected(outside: TracedScene, sky: SkyBins, shown: ShownFaces, count: int, seed: int) -> sparse.csr_array:
     """Irradiance of the faces in tiles per unit luminance of the sky [C, P]."""
     order = np.argsort(shown.tile, kind="stable")
     ends = np.searchsorted(shown.tile[order], np.arange(count + 1))

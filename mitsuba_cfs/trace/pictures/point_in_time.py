@@ -58,9 +58,8 @@ def _sharp_light(
 ) -> mi.Float64:
     """Radiance of surfaces by the direct sun and by their gloss, for each ray."""
     sun = surface_sun(
-        room, sky, vertex, triangle, direction,
-        rho=rho, came=mi.Float(0), u=u_sun, generator=generator, active=active,
-    )  # fmt: skip
+        room, sky, vertex, triangle, direction, rho=rho, came=mi.Float(0), u=u_sun, generator=generator, active=active
+    )
     sharp = dr.select(active, mi.Float64(sun), 0.0)
     for tracer, here in ((room.inside, ~vertex.outdoors), (room.outside, vertex.outdoors)):
         if tracer.gloss is None:
@@ -71,14 +70,19 @@ def _sharp_light(
         lane = dr.arange(mi.UInt32, dr.width(direction))
         seen = dr.zeros(mi.Float64, dr.width(direction))
         starts = PathStarts(
-            lane, mi.Point3f(vertex.position), mi.Vector3f(towards), mi.PCG32(generator), depth,
-            glossy & (weight > 0),
-        )  # fmt: skip
+            lane, mi.Point3f(vertex.position), mi.Vector3f(towards), mi.PCG32(generator), depth, glossy & (weight > 0)
+        )
         add_paths(
-            room, sky, seen, starts,
-            cosine=mi.Float(0), came=mi.Float(0), aimed=mi.Float(0),
-            beta=dr.select(glossy, weight, 0.0), outdoors=mi.Bool(vertex.outdoors),
-        )  # fmt: skip
+            room,
+            sky,
+            seen,
+            starts,
+            cosine=mi.Float(0),
+            came=mi.Float(0),
+            aimed=mi.Float(0),
+            beta=dr.select(glossy, weight, 0.0),
+            outdoors=mi.Bool(vertex.outdoors),
+        )
         sharp += seen
     return sharp
 
@@ -112,9 +116,7 @@ def point_in_time_picture(
     shifts = np.random.default_rng(seed).random((len(shown), 2))
     tiles, numbers = Tiles(tile, view.width), _Faces(room)
     picture = np.zeros(view.height * view.width)
-    kernel = _Kernel(
-        room, sky, view, numbers, tiles, samples=samples, max_depth=max_depth, seed=seed
-    )
+    kernel = _Kernel(room, sky, view, numbers, tiles, samples=samples, max_depth=max_depth, seed=seed)
     pairs, rows = [], []
     size = max(1, BLOCK // samples)
     for start in range(0, len(shown), size):
@@ -143,15 +145,11 @@ def colour_picture(
     """
     if not len(rooms) == len(skies) == 3:
         raise ValueError(f"{len(rooms)} rooms and {len(skies)} skies: expected three bands")
-    bands = [
-        point_in_time_picture(r, s, view, **options) for r, s in zip(rooms, skies, strict=True)
-    ]
+    bands = [point_in_time_picture(r, s, view, **options) for r, s in zip(rooms, skies, strict=True)]
     return np.stack(bands, axis=-1)
 
 
-def _add_shared(
-    picture: NDArray, tiles: Tiles, pairs: Sequence, rows: Sequence, windows: int
-) -> None:
+def _add_shared(picture: NDArray, tiles: Tiles, pairs: Sequence, rows: Sequence, windows: int) -> None:
     """Add to each pixel the smoothed light of the faces that it shows."""
     key, total, count = (np.concatenate(part) for part in zip(*rows, strict=True))
     if not len(key):
@@ -206,9 +204,7 @@ class _Light:
         weight = np.bincount(place, self.weight[ray], minlength=len(lit)) / samples
         return lit & 0xFFFFFFFF, lit >> 32, weight
 
-    def by_tile(
-        self, pixels: NDArray, samples: int, tiles: Tiles
-    ) -> tuple[NDArray, NDArray, NDArray]:
+    def by_tile(self, pixels: NDArray, samples: int, tiles: Tiles) -> tuple[NDArray, NDArray, NDArray]:
         """Numbers of faces in tiles, and the sum and number of their paths."""
         ray = np.flatnonzero(self.weight > 0)
         key = tiles.of_pixels(pixels[ray // samples], self.face[ray])
@@ -268,12 +264,7 @@ class _Kernel:
         return streams(tile, self._seed), mi.UInt32(place.astype(np.uint32))
 
     def _rays(
-        self,
-        direction: mi.Vector3f,
-        generator: mi.PCG32,
-        stream: mi.UInt32,
-        sample: mi.UInt32,
-        active: mi.Bool,
+        self, direction: mi.Vector3f, generator: mi.PCG32, stream: mi.UInt32, sample: mi.UInt32, active: mi.Bool
     ) -> tuple[mi.Float64, list[tuple[mi.UInt32, mi.Float, mi.Float64]]]:
         """One ray and its paths for each lane: sharp light; face, weight and light to share."""
         room, sky = self._room, self._sky
@@ -299,9 +290,17 @@ class _Kernel:
         rho = inside.diffuse(hit.prim_index, -dr.dot(normal, direction), opaque)
         vertex = Vertex(mi.Point3f(point + normal * inside.epsilon), normal, indoors)
         sharp = _sharp_light(
-            room, sky, vertex, hit.prim_index, direction,
-            rho=rho, u_sun=u_sun, generator=generator, depth=self._depth, active=opaque,
-        )  # fmt: skip
+            room,
+            sky,
+            vertex,
+            hit.prim_index,
+            direction,
+            rho=rho,
+            u_sun=u_sun,
+            generator=generator,
+            depth=self._depth,
+            active=opaque,
+        )
         away, aimed = leave(room, sky, vertex, u, choice, opaque)
         cosine = dr.select(opaque, dr.dot(away, normal), 0.0)
 
@@ -317,9 +316,7 @@ class _Kernel:
         sun = scattered * float(SUN_SOLID_ANGLE) * sky.sun_radiance
         sharp += dr.select(sunlit, mi.Float64(sun), 0.0)
         if room.glossy:
-            more = window_sun(
-                room, sky, outer, group, direction, generator=generator, glazed=glazed
-            )
+            more = window_sun(room, sky, outer, group, direction, generator=generator, glazed=glazed)
             sharp += dr.select(glazed, mi.Float64(more), 0.0)
         outward = glazed & (dr.dot(step, onwards) > 0)
 
@@ -327,14 +324,24 @@ class _Kernel:
         found = dr.zeros(mi.Float64, dr.width(lane))
         origin = dr.select(opaque, vertex.position, dr.select(outward, outer, inner))
         starts = PathStarts(
-            lane, mi.Point3f(origin), dr.select(opaque, away, onwards), mi.PCG32(generator),
-            self._depth, (opaque & (cosine > 0)) | (glazed & (rest > 0)),
-        )  # fmt: skip
+            lane,
+            mi.Point3f(origin),
+            dr.select(opaque, away, onwards),
+            mi.PCG32(generator),
+            self._depth,
+            (opaque & (cosine > 0)) | (glazed & (rest > 0)),
+        )
         add_paths(
-            room, sky, found, starts,
-            cosine=cosine, came=cosine * dr.inv_pi, aimed=dr.select(opaque, aimed, 0.0),
-            beta=dr.select(opaque, 1.0, rest), outdoors=outward,
-        )  # fmt: skip
+            room,
+            sky,
+            found,
+            starts,
+            cosine=cosine,
+            came=cosine * dr.inv_pi,
+            aimed=dr.select(opaque, aimed, 0.0),
+            beta=dr.select(opaque, 1.0, rest),
+            outdoors=outward,
+        )
         face = self._faces.inside(hit.prim_index, behind, opaque)
         face = dr.select(opaque, face, mi.UInt32(group))
         scattering = dr.select(glazed & self._scatters(group), 1.0, 0.0)
@@ -348,14 +355,18 @@ class _Kernel:
             shared.append(light)
         if self._mirrors:
             seen = dr.zeros(mi.Float64, dr.width(lane))
-            starts = PathStarts(
-                lane, inner, mirror, mi.PCG32(generator), self._depth, glazed & (mirrored > 0)
-            )
+            starts = PathStarts(lane, inner, mirror, mi.PCG32(generator), self._depth, glazed & (mirrored > 0))
             add_paths(
-                room, sky, seen, starts,
-                cosine=mi.Float(0), came=mi.Float(0), aimed=mi.Float(0), beta=mirrored,
+                room,
+                sky,
+                seen,
+                starts,
+                cosine=mi.Float(0),
+                came=mi.Float(0),
+                aimed=mi.Float(0),
+                beta=mirrored,
                 outdoors=mi.Bool(False),
-            )  # fmt: skip
+            )
             sharp += seen
         return sharp, shared
 
@@ -395,9 +406,17 @@ class _Kernel:
         rho = outside.diffuse(hit.prim_index, -dr.dot(normal, direction), opaque)
         u_sun = mi.Point2f(generator.next_float32(), generator.next_float32())
         sharp += straight * _sharp_light(
-            room, sky, vertex, hit.prim_index, direction,
-            rho=rho, u_sun=u_sun, generator=generator, depth=self._depth, active=opaque,
-        )  # fmt: skip
+            room,
+            sky,
+            vertex,
+            hit.prim_index,
+            direction,
+            rho=rho,
+            u_sun=u_sun,
+            generator=generator,
+            depth=self._depth,
+            active=opaque,
+        )
         away, _ = leave(room, sky, vertex, u, mi.Float(1), opaque)
         # a surface's irradiance is pi times the mean by cosine; another window is looked into
         found = dr.zeros(mi.Float64, dr.width(lane))
@@ -410,10 +429,16 @@ class _Kernel:
             mi.Bool(active),  # a copy: the loop changes what it is given
         )
         add_paths(
-            room, sky, found, starts,
-            cosine=mi.Float(0), came=dr.select(opaque, dr.dot(away, normal) * dr.inv_pi, 0.0),
-            aimed=mi.Float(0), beta=dr.select(opaque, dr.pi, 1.0), outdoors=outdoors,
-        )  # fmt: skip
+            room,
+            sky,
+            found,
+            starts,
+            cosine=mi.Float(0),
+            came=dr.select(opaque, dr.dot(away, normal) * dr.inv_pi, 0.0),
+            aimed=mi.Float(0),
+            beta=dr.select(opaque, dr.pi, 1.0),
+            outdoors=outdoors,
+        )
         face = self._faces.outside(hit.prim_index, behind, opaque)
         face = dr.select(opaque, face, mi.UInt32(self._faces.windows - 1))
         weight = dr.select(active, straight * dr.select(opaque, rho * dr.inv_pi, 1.0), 0.0)

@@ -22,15 +22,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
-from mitsuba_cfs.trace.kernels.sampling import (
-    batch_key,
-    column,
-    lattice,
-    lattice_2d,
-    opaque,
-    opaque_vector,
-    vectors,
-)
+from mitsuba_cfs.trace.kernels.sampling import batch_key, column, lattice, lattice_2d, opaque, opaque_vector, vectors
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 from mitsuba_cfs.trace.sun.specular_paths import (
@@ -65,9 +57,7 @@ class SunScene:
 class SunDiscs:
     """The straight beam of the sun's disc at all pairs of sensor and sun [S * Q]."""
 
-    def __init__(
-        self, around: SunScene, scattering: Sequence[Scattering | None], seed: int
-    ) -> None:
+    def __init__(self, around: SunScene, scattering: Sequence[Scattering | None], seed: int) -> None:
         """Classify the pairs: disc hidden, whole, or crossed by an edge."""
         self._around, self._scattering = around, scattering
         chosen = np.flatnonzero(self._before_windows())
@@ -180,9 +170,7 @@ def _added(total: list[mi.Float], values: list[mi.Float], share: mi.Float) -> li
     return [a + share * b for a, b in zip(total, values, strict=True)]
 
 
-def _meets_group(
-    inside: TracedScene, group: int, origin: mi.Point3f, towards: mi.Vector3f
-) -> mi.Bool:
+def _meets_group(inside: TracedScene, group: int, origin: mi.Point3f, towards: mi.Vector3f) -> mi.Bool:
     """Whether a disc about a direction may meet the bounding box of a window group."""
     windows = inside.groups[group].windows
     corners = np.concatenate([w.triangles for w in windows]).reshape(-1, 3) - inside.centre
@@ -273,10 +261,7 @@ def direct_sun_matrix(
     outside = scenes.scene(exterior, groups, windows_block=False)
     place = vectors(points - inside.centre, mi.Point3f)
     normal = vectors(directions)
-    ways = [
-        SunScene(inside, way, place, normal, vectors(way.apparent(suns)))
-        for way in specular_sun_paths(outside)
-    ]
+    ways = [SunScene(inside, way, place, normal, vectors(way.apparent(suns))) for way in specular_sun_paths(outside)]
 
     @functools.cache
     def discs() -> list[SunDiscs]:
@@ -315,10 +300,22 @@ def direct_sun_matrix(
         label="direct sun",
         progress=progress,
         entry=cache_entry(
-            cache, "direct sun", interior, exterior, groups, keys, points, directions, suns,
-            window_points, seed, by_group, by=__name__, stopping=stopping,
+            cache,
+            "direct sun",
+            interior,
+            exterior,
+            groups,
+            keys,
+            points,
+            directions,
+            suns,
+            window_points,
+            seed,
+            by_group,
+            by=__name__,
+            stopping=stopping,
         ),
-    )  # fmt: skip
+    )
 
 
 def _window_points(around: SunScene, group: int, count: int, keys: mi.UInt32) -> _Points:
@@ -353,8 +350,7 @@ def _window_points(around: SunScene, group: int, count: int, keys: mi.UInt32) ->
     point, sun = pairs(total, Q)
     drawn, of_batch = (dr.gather(mi.UInt32, one, point) for one in (number, stream))
     ray = mi.Ray3f(
-        dr.gather(mi.Point3f, position, point),
-        on_disc(dr.gather(mi.Vector3f, towards, sun), drawn, of_batch),
+        dr.gather(mi.Point3f, position, point), on_disc(dr.gather(mi.Vector3f, towards, sun), drawn, of_batch)
     )
     before = dr.dot(ray.d, inside.exterior_normal(group)) > 0
     sunlit = around.way.transmittance(ray, before)
@@ -365,12 +361,7 @@ def _window_points(around: SunScene, group: int, count: int, keys: mi.UInt32) ->
 
 @dr.syntax
 def _scattered(
-    inside: TracedScene,
-    group: int,
-    scattering: Scattering,
-    points: _Points,
-    towards: mi.Vector3f,
-    sensors: int,
+    inside: TracedScene, group: int, scattering: Scattering, points: _Points, towards: mi.Vector3f, sensors: int
 ) -> mi.Float:
     """Sum over the points of f cos(sun) G, for each batch, sensor and sun [B * S * Q]."""
     total_points, batches = dr.width(points.position), points.batches

@@ -80,8 +80,7 @@ class SurfacePoints:
         """The points of all parts."""
         nowhere = np.empty((0, 3), dtype=np.float32)
         return SurfacePoints(
-            np.concatenate([nowhere, *(p.point for p in parts)]),
-            np.concatenate([nowhere, *(p.normal for p in parts)]),
+            np.concatenate([nowhere, *(p.point for p in parts)]), np.concatenate([nowhere, *(p.normal for p in parts)])
         )
 
 
@@ -174,11 +173,7 @@ def hit_points(
 
 
 def hit_faces(
-    tracer: TracedScene,
-    origin: mi.Point3f,
-    way: mi.Vector3f,
-    hit: mi.PreliminaryIntersection3f,
-    valid: mi.Bool,
+    tracer: TracedScene, origin: mi.Point3f, way: mi.Vector3f, hit: mi.PreliminaryIntersection3f, valid: mi.Bool
 ) -> tuple[mi.Point3f, mi.Vector3f]:
     """Points and normals where rays meet surfaces, offset to the side that they come from."""
     face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, valid)
@@ -194,10 +189,7 @@ def on_disc_of(centre: mi.Vector3f, number: mi.UInt32) -> mi.Vector3f:
 
 
 def points_and_suns(
-    places: SurfacePoints,
-    suns: NDArray[np.float64],
-    pair: mi.UInt32 | None = None,
-    number: mi.UInt32 | None = None,
+    places: SurfacePoints, suns: NDArray[np.float64], pair: mi.UInt32 | None = None, number: mi.UInt32 | None = None
 ) -> tuple[mi.Point3f, mi.Vector3f, mi.Vector3f]:
     """Point, normal and direction to the sun of pairs of points and hours, of all [m * h].
 
@@ -213,9 +205,7 @@ def points_and_suns(
     return point, normal, on_disc_of(towards, drawn)
 
 
-def sunlight(
-    outside: TracedScene, places: SurfacePoints, suns: NDArray[np.float64]
-) -> NDArray[np.float32]:
+def sunlight(outside: TracedScene, places: SurfacePoints, suns: NDArray[np.float64]) -> NDArray[np.float32]:
     """Irradiance of points outdoors per unit normal to the sun, mirrored sun included [m, h]."""
     light = mi.Float(0)
     for way in specular_sun_paths(outside):
@@ -228,11 +218,7 @@ def sunlight(
 
 
 def sunlight_of_pairs(
-    way: SpecularPath,
-    places: SurfacePoints,
-    suns: NDArray[np.float64],
-    pair: mi.UInt32,
-    number: mi.UInt32,
+    way: SpecularPath, places: SurfacePoints, suns: NDArray[np.float64], pair: mi.UInt32, number: mi.UInt32
 ) -> mi.Float:
     """The same of some pairs by one specular path; suns: [h, 3] apparent directions."""
     point, normal, to_sun = points_and_suns(places, suns, pair, number)
@@ -240,9 +226,7 @@ def sunlight_of_pairs(
     return _shone(way, point, normal, to_sun, dr.dot(normal, middle))
 
 
-def sunlight_of_each(
-    outside: TracedScene, places: SurfacePoints, suns: NDArray[np.float64]
-) -> NDArray[np.float32]:
+def sunlight_of_each(outside: TracedScene, places: SurfacePoints, suns: NDArray[np.float64]) -> NDArray[np.float32]:
     """The same of each point by a sun of its own [m, 3]: [m]."""
     light, number = mi.Float(0), dr.arange(mi.UInt32, places.size)
     for way in specular_sun_paths(outside):
@@ -317,10 +301,7 @@ class SunGrid:
             value = dr.gather(mi.Float, at, start + node)
             share += dr.gather(mi.Float, column(weight), hour) * value
             lit += dr.select(value > 0, mi.UInt32(1), mi.UInt32(0))
-        cosine = dr.dot(
-            dr.gather(mi.Vector3f, places.normals(), place),
-            dr.gather(mi.Vector3f, vectors(suns), hour),
-        )
+        cosine = dr.dot(dr.gather(mi.Vector3f, places.normals(), place), dr.gather(mi.Vector3f, vectors(suns), hour))
         differ, level = (lit > 0) & (lit < 3), dr.abs(cosine) <= SPREAD
         first = dr.gather(mi.UInt32, column(self.first, mi.UInt32), hour)
         checked = (dr.gather(mi.UInt32, number, place) + first) % each == 0
@@ -337,10 +318,7 @@ class SunGrid:
 
 
 def sunlight_of_many(
-    outside: TracedScene,
-    places: SurfacePoints,
-    suns: NDArray[np.float64],
-    number: NDArray[np.int64] | None = None,
+    outside: TracedScene, places: SurfacePoints, suns: NDArray[np.float64], number: NDArray[np.int64] | None = None
 ) -> NDArray[np.float32]:
     """`sunlight` of many points [m, h] by the grid, unbiased in the sum over the points.
 

@@ -47,9 +47,7 @@ class PixelRays:
 
     def some(self, chosen: NDArray) -> PixelRays:
         """Some of the rays."""
-        return PixelRays(
-            self.row[chosen], self.origin[:, chosen], self.way[:, chosen], self.weight[chosen]
-        )
+        return PixelRays(self.row[chosen], self.origin[:, chosen], self.way[:, chosen], self.weight[chosen])
 
     @staticmethod
     def joined(parts: list[PixelRays]) -> PixelRays:
@@ -65,9 +63,7 @@ class PixelRays:
         )
 
 
-def mirrored(
-    tracer: TracedScene, lanes: PixelRays, hit: mi.PreliminaryIntersection3f, bounce: int
-) -> PixelRays:
+def mirrored(tracer: TracedScene, lanes: PixelRays, hit: mi.PreliminaryIntersection3f, bounce: int) -> PixelRays:
     """The rays after a specular reflection at the surfaces that rays met; none without gloss."""
     none = np.empty(0, dtype=np.int64)
     if tracer.gloss is None or bounce >= MOST_MIRRORS or not len(lanes.row):
@@ -80,10 +76,7 @@ def mirrored(
     )
     kept = np.flatnonzero((glossy & (weight > 0)).numpy())
     return PixelRays(
-        lanes.row[kept],
-        position.numpy()[:, kept],
-        towards.numpy()[:, kept],
-        lanes.weight[kept] * weight.numpy()[kept],
+        lanes.row[kept], position.numpy()[:, kept], towards.numpy()[:, kept], lanes.weight[kept] * weight.numpy()[kept]
     )
 
 
@@ -170,12 +163,7 @@ class OutdoorSun:
     """The sun on the diffuse surfaces outdoors in a view, hour by hour."""
 
     def __init__(
-        self,
-        outside: TracedScene,
-        shown: ShownFaces,
-        smooth: sparse.csr_array,
-        view: View,
-        seed: int,
+        self, outside: TracedScene, shown: ShownFaces, smooth: sparse.csr_array, view: View, seed: int
     ) -> None:
         """Trace the reflecting points; `smooth`: [C, C] smoothing of the means over tiles."""
         self._outside, self._view, count = outside, view, smooth.shape[0]
@@ -198,11 +186,7 @@ class OutdoorSun:
         self._gather = sparse.csr_array((smooth @ gather).astype(np.float32))
 
     def add_to(
-        self,
-        values: NDArray,
-        suns: NDArray[np.float64],
-        illuminance: NDArray[np.float64],
-        sky: NDArray[np.float32],
+        self, values: NDArray, suns: NDArray[np.float64], illuminance: NDArray[np.float64], sky: NDArray[np.float32]
     ) -> None:
         """Add the luminance of surfaces outdoors [cd/m2] to the pixels' values [h, n].
 
@@ -240,9 +224,7 @@ class OutdoorSun:
         light[pair, hour] = mean / np.maximum(np.bincount(part, minlength=len(pair)), 1)
 
 
-def _each(
-    first: NDArray[np.int64], end: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _each(first: NDArray[np.int64], end: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The range of each number, and all numbers of some ranges [n]."""
     count = end - first
     of = np.repeat(np.arange(len(count)), count)

@@ -116,9 +116,7 @@ def beam_light(
     # half the light of the next
     mean, noise = (sparse.csr_array(a @ light) for a in rows.of_halves(seen, least))
     split = bins[1].size
-    return BeamLight(
-        transmittance, mean[:, :split], mean[:, split:], noise[:, :split], noise[:, split:]
-    )
+    return BeamLight(transmittance, mean[:, :split], mean[:, split:], noise[:, :split], noise[:, split:])
 
 
 class _Look:
@@ -162,11 +160,7 @@ class _Look:
         return found, np.concatenate(share), equal
 
     def at(
-        self,
-        pixels: NDArray[np.int64],
-        half: NDArray[np.int64],
-        number: NDArray[np.int64],
-        seed: int,
+        self, pixels: NDArray[np.int64], half: NDArray[np.int64], number: NDArray[np.int64], seed: int
     ) -> tuple[tuple[NDArray, tuple[NDArray, NDArray]], NDArray[np.float32]]:
         """Entries of the halves' rows, and the share [n] of each pixel that shows no window.
 
@@ -201,9 +195,7 @@ class _Look:
         entries = values[some], (np.tile(row, 2)[some], slots[some].astype(np.int64))
         return entries, 1 - window.numpy().reshape(-1, samples).mean(axis=1, dtype=np.float32)
 
-    def _shown(
-        self, pixels: NDArray[np.int64]
-    ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.Bool]:
+    def _shown(self, pixels: NDArray[np.int64]) -> tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.Bool]:
         """Hits of the pixels' rays: point, normal, luminance per irradiance; whether a window."""
         inside, samples = self._inside, self._samples
         eye, way, hit, shown = pixel_hits(inside, self._view, pixels, samples)

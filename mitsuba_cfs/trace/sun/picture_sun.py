@@ -148,9 +148,7 @@ class PictureSun:
         for g, (pane, _, _) in enumerate(self._panes):
             self._add(values, lit, pane, towards, strength, self._scattered_in_panes, g)
 
-    def sunlit_luminance(
-        self, sunlit: SunlitShares, suns: NDArray, illuminance: NDArray
-    ) -> NDArray[np.float32]:
+    def sunlit_luminance(self, sunlit: SunlitShares, suns: NDArray, illuminance: NDArray) -> NDArray[np.float32]:
         """Luminance [m, h] of a picture's rows by the sun that the surfaces of the room reflect."""
         shining = np.flatnonzero((suns[:, 2] > 0) & (illuminance > 0))
         found = np.zeros((sunlit.share.shape[0], len(suns)), dtype=np.float32)
@@ -169,9 +167,7 @@ class PictureSun:
             self._last = cells, hours, self._traced_on_cells(cells, suns, illuminance)
         return self._last[2]
 
-    def _traced_on_cells(
-        self, cells: RoomCells, suns: NDArray, illuminance: NDArray
-    ) -> sparse.csr_array:
+    def _traced_on_cells(self, cells: RoomCells, suns: NDArray, illuminance: NDArray) -> sparse.csr_array:
         groups, scenes = self._inside.groups, (self._inside, self._outside)
         whole, flux = sum(group.area for group in groups), sparse.csr_array((cells.size, len(suns)))
         for g, (group, scattering) in enumerate(zip(groups, self._scattering, strict=True)):
@@ -180,9 +176,7 @@ class PictureSun:
         by_area = sparse.diags_array(1 / cells.area) @ flux @ sparse.diags_array(illuminance)
         return sparse.csr_array(by_area).astype(np.float32)
 
-    def _add_near(
-        self, found: NDArray, sunlit: SunlitShares, suns: NDArray, illuminance: NDArray
-    ) -> None:
+    def _add_near(self, found: NDArray, sunlit: SunlitShares, suns: NDArray, illuminance: NDArray) -> None:
         """Add the luminance [m, h] of rows by the sunlit pieces near them, point by point."""
         for mirror in self._mirrors:
             mirror._add_near(found, sunlit, suns, illuminance)
@@ -211,9 +205,7 @@ class PictureSun:
             value = self._beam_at(places.points(), places.normals(), to_sun)
             near[element[part], hour[part]] = value.reshape(-1, EDGE_POINTS).mean(axis=1)
 
-    def _beam_at(
-        self, point: mi.Point3f, normal: mi.Vector3f, to_sun: mi.Vector3f
-    ) -> NDArray[np.float32]:
+    def _beam_at(self, point: mi.Point3f, normal: mi.Vector3f, to_sun: mi.Vector3f) -> NDArray[np.float32]:
         """Irradiance of points through the windows, per unit normal to the sun [n]."""
         cosine = dr.dot(normal, to_sun)
         tau = self._straight(point, to_sun, cosine > 0)
@@ -354,9 +346,7 @@ class PictureSun:
             tau = self._passed(group, mi.Point3f(place + to_sun * hit.t), to_sun, active)
         return tau
 
-    def _passed(
-        self, group: mi.Int32, window: mi.Point3f, to_sun: mi.Vector3f, active: mi.Bool
-    ) -> mi.Float:
+    def _passed(self, group: mi.Int32, window: mi.Point3f, to_sun: mi.Vector3f, active: mi.Bool) -> mi.Float:
         """Transmittance from points on windows to the sun."""
         local = self._inside.to_local(group, to_sun, active)
         active = active & (local.z > 0)
@@ -414,9 +404,7 @@ class PictureSun:
             return 1.0
         lane = dr.arange(mi.UInt32, WINDOW_POINTS * dr.width(suns))
         hour = lane // WINDOW_POINTS
-        place = self._inside.sample_group(
-            g, lattice_2d(lane - hour * WINDOW_POINTS, opaque(g, mi.UInt32), 0)
-        )
+        place = self._inside.sample_group(g, lattice_2d(lane - hour * WINDOW_POINTS, opaque(g, mi.UInt32), 0))
         step = self._inside.exterior_normal(g) * self._inside.epsilon
         ray = mi.Ray3f(place + step, dr.gather(mi.Vector3f, suns, hour))
         seen = self._way.transmittance(ray, dr.full(mi.Bool, True, dr.width(lane)))

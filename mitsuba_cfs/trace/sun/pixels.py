@@ -28,9 +28,7 @@ def disc_parts(sun: NDArray[np.float64]) -> NDArray[np.float64]:
     return cosine[:, None] * sun + sine[:, None] * across
 
 
-def disc_in_view(
-    directions: NDArray[np.float64], sun: NDArray[np.float64], pixel_size: float
-) -> bool:
+def disc_in_view(directions: NDArray[np.float64], sun: NDArray[np.float64], pixel_size: float) -> bool:
     """Whether a sun [3] is in one of the pixels with directions [n, 3]."""
     return bool(np.max(directions @ sun, initial=-1.0) > np.cos(pixel_size))
 
@@ -46,12 +44,7 @@ def disc_reach(pixel_size: float) -> float:
 
 
 def disc_rays(
-    view: View,
-    pixels: NDArray[np.int64],
-    suns: NDArray[np.float64],
-    pixel_size: float,
-    *,
-    step: float = SUBPIXEL,
+    view: View, pixels: NDArray[np.int64], suns: NDArray[np.float64], pixel_size: float, *, step: float = SUBPIXEL
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], float]:
     """Rays of pixels [n] that meet the disc of one sun [n, 3] each, and the share of one ray.
 

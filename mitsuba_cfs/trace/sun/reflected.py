@@ -25,23 +25,11 @@ from scipy import sparse
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
-from mitsuba_cfs.trace.kernels.sampling import (
-    batch_key,
-    column,
-    lattice_2d,
-    opaque,
-    tables,
-    vectors,
-)
+from mitsuba_cfs.trace.kernels.sampling import batch_key, column, lattice_2d, opaque, tables, vectors
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.matrices.straight_view import straight_rays
-from mitsuba_cfs.trace.sun.lit_points import (
-    SurfacePoints,
-    hit_points,
-    reflecting_points,
-    sunlight_of_many,
-)
+from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_points, reflecting_points, sunlight_of_many
 from mitsuba_cfs.trace.sun.outdoors import MOST_MIRRORS, PixelRays, RoughFaces, mirrored
 
 BOUNCES = 32  # surfaces that a path meets at most; roulette ends most before
@@ -49,12 +37,7 @@ PLACES = 1024  # largest number of points that represent the hits of paths, by d
 FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
 MORTON_BITS = 12  # along each axis
 # shifts and masks that leave two empty bits behind each of up to 16
-SPREAD_BITS = (
-    (16, 0xFF0000FF),
-    (8, 0xF00F00F00F),
-    (4, 0xC30C30C30C3),
-    (2, 0x249249249249),
-)
+SPREAD_BITS = ((16, 0xFF0000FF), (8, 0xF00F00F00F), (4, 0xC30C30C30C3), (2, 0x249249249249))
 ROUGH = 4096  # rough faces whose lobes a row sees, at most
 LANES = 2**22  # shadow rays at once
 
@@ -156,9 +139,7 @@ def view_shares(
 
     def begun(beam: Straight, seed: int) -> _Met:
         key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
-        sensor, target, omega, weight = straight_rays(
-            inside, beam.group, beam.scattering, sensors, samples, key
-        )
+        sensor, target, omega, weight = straight_rays(inside, beam.group, beam.scattering, sensors, samples, key)
         return _first_met(outside, sensor, weight / samples, target, omega)
 
     starts = [partial(begun, beam, seed) for beam in beams for seed in seeds]
@@ -167,10 +148,7 @@ def view_shares(
 
 
 def outdoor_light(
-    sets: Sequence[SunShares],
-    outside: TracedScene,
-    suns: NDArray[np.float64],
-    strength: NDArray[np.float64],
+    sets: Sequence[SunShares], outside: TracedScene, suns: NDArray[np.float64], strength: NDArray[np.float64]
 ) -> list[NDArray[np.float32]]:
     """Light of the rows of each set [rows, h] from sunlit outdoor surfaces.
 
@@ -186,10 +164,7 @@ def outdoor_light(
 
 
 def _light_of_block(
-    sets: Sequence[SunShares],
-    outside: TracedScene,
-    suns: NDArray[np.float64],
-    strength: NDArray[np.float32],
+    sets: Sequence[SunShares], outside: TracedScene, suns: NDArray[np.float64], strength: NDArray[np.float32]
 ) -> list[NDArray[np.float32]]:
     """Light of the rows of some sets [rows, h]."""
     light = [np.zeros((one.share.shape[0], len(suns)), dtype=np.float32) for one in sets]
@@ -224,11 +199,7 @@ def _together(sizes: Sequence[int]) -> Iterator[slice]:
 
 
 def _shares_of(
-    outside: TracedScene,
-    starts: Sequence[Callable[[], _Met]],
-    seeds: Sequence[int],
-    shape: tuple[int, int],
-    most: int,
+    outside: TracedScene, starts: Sequence[Callable[[], _Met]], seeds: Sequence[int], shape: tuple[int, int], most: int
 ) -> list[SunShares]:
     """Shares of what paths meet after what they meet first, those of several runs in one launch.
 
@@ -256,9 +227,7 @@ def _shares_of(
     return shares
 
 
-def _first_met(
-    outside: TracedScene, row: mi.UInt32, weight: mi.Float, origin: mi.Point3f, way: mi.Vector3f
-) -> _Met:
+def _first_met(outside: TracedScene, row: mi.UInt32, weight: mi.Float, origin: mi.Point3f, way: mi.Vector3f) -> _Met:
     """Points that paths from windows meet first, with their BRDF rho / pi as weights [1/sr].
 
     Gloss sends a path on to the surfaces that it mirrors; the direct sun has the sun in a mirror.
@@ -292,11 +261,7 @@ def _first_met(
 
 
 def _rough(
-    outside: TracedScene,
-    lanes: PixelRays,
-    places: SurfacePoints,
-    triangle: NDArray[np.uint32],
-    met: NDArray[np.bool_],
+    outside: TracedScene, lanes: PixelRays, places: SurfacePoints, triangle: NDArray[np.uint32], met: NDArray[np.bool_]
 ) -> RoughFaces:
     """Hits on faces with rough gloss."""
     alpha = outside.gloss.roughness(column(triangle, mi.UInt32), column(met, mi.Bool)).numpy()

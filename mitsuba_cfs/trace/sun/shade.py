@@ -43,9 +43,7 @@ def sunlit_shares(
     edges = np.zeros((len(points), 2, 3)) if edges is None else np.asarray(edges, dtype=float)
     tracer = TracedScene(surfaces, centre=points.mean(axis=0))
     S, H = len(points), len(suns)
-    place = mi.Point3f(
-        (points - tracer.centre + tracer.epsilon[0] * directions).T.astype(np.float32)
-    )
+    place = mi.Point3f((points - tracer.centre + tracer.epsilon[0] * directions).T.astype(np.float32))
     normal = vectors(directions)
     sides = [vectors(edges[:, i]) for i in range(2)]
     shares = np.empty((S, H), dtype=np.float32)

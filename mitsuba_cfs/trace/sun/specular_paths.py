@@ -79,10 +79,7 @@ class SpecularPath:
 
 
 def meets_box(
-    start: mi.Vector3f,
-    way: mi.Vector3f,
-    box: tuple[NDArray[np.float64], NDArray[np.float64]],
-    margin: mi.Float,
+    start: mi.Vector3f, way: mi.Vector3f, box: tuple[NDArray[np.float64], NDArray[np.float64]], margin: mi.Float
 ) -> mi.Bool:
     """Whether rays meet a box, given by its lowest and highest corner [3], or start within it.
 
@@ -149,9 +146,7 @@ def _seen(outside: TracedScene, plane: int) -> bool:
     return not windows or any(map(np.any, before))
 
 
-def shining(
-    outside: TracedScene, facing: NDArray[np.float64], suns: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def shining(outside: TracedScene, facing: NDArray[np.float64], suns: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Whether suns [Q, 3] are in front of a plane with normals [G, 3], directly or mirrored."""
     if not len(suns):
         return np.zeros(0, dtype=bool)

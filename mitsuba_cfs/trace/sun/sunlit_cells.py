@@ -24,14 +24,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.kernels.sampling import (
-    column,
-    lattice_2d,
-    opaque,
-    opaque_vector,
-    pixel_positions,
-    vectors,
-)
+from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, opaque_vector, pixel_positions, vectors
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_faces, on_disc_of
@@ -168,14 +161,10 @@ class Beam:
         Args: suns: [h, 3] directions.
         """
         step, columns = max(RAYS // self.fewer, 1), np.arange(len(self.seeds) * len(suns))
-        blocks = [
-            self._flux(cells, suns, columns[i : i + step]) for i in range(0, len(columns), step)
-        ]
+        blocks = [self._flux(cells, suns, columns[i : i + step]) for i in range(0, len(columns), step)]
         return sparse.csr_array(sparse.hstack([sparse.csr_array((cells.size, 0)), *blocks]))
 
-    def _flux(
-        self, cells: RoomCells, suns: NDArray[np.float64], columns: NDArray[np.int64]
-    ) -> sparse.csr_array:
+    def _flux(self, cells: RoomCells, suns: NDArray[np.float64], columns: NDArray[np.int64]) -> sparse.csr_array:
         """Some columns [n] of the flux."""
         flux = sparse.csr_array((cells.size, len(columns)))
         if not cells.size:

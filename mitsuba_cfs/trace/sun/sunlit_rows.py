@@ -78,9 +78,7 @@ class SunlitShares:
     places: SurfacePoints  # [f] one point of each piece
     edges: EdgePoints  # of the pieces
 
-    def rows(
-        self, cells: NDArray[np.float32] | sparse.csr_array, near: NDArray[np.float32]
-    ) -> NDArray[np.float32]:
+    def rows(self, cells: NDArray[np.float32] | sparse.csr_array, near: NDArray[np.float32]) -> NDArray[np.float32]:
         """Luminance [m, h] of rows under irradiances of the cells [c, h] and pieces [f, h]."""
         return self.far_rows(cells) + self.near @ near
 
@@ -130,27 +128,13 @@ class SunlitRows:
         Raises: `KeyError` where one is missing.
         """
         cells = RoomCells(
-            float(data["cell_edge"]),
-            data["cell_low"],
-            int(data["cell_halvings"]),
-            data["cell_keys"],
-            data["cell_area"],
+            float(data["cell_edge"]), data["cell_low"], int(data["cell_halvings"]), data["cell_keys"], data["cell_area"]
         )
         places = SurfacePoints(data["places_point"], data["places_normal"])
         more = SurfacePoints(data["more_point"], data["more_normal"])
-        smooth, edges = (
-            sparse_matrix(data, "smooth"),
-            EdgePoints(more, sparse_matrix(data, "beside")),
-        )
+        smooth, edges = (sparse_matrix(data, "smooth"), EdgePoints(more, sparse_matrix(data, "beside")))
         mean, noise = (
-            SunlitShares(
-                cells,
-                sparse_matrix(data, f"far{i}"),
-                smooth,
-                sparse_matrix(data, f"near{i}"),
-                places,
-                edges,
-            )
+            SunlitShares(cells, sparse_matrix(data, f"far{i}"), smooth, sparse_matrix(data, f"near{i}"), places, edges)
             for i in range(2)
         )
         return cls(mean, noise, data["close"])
@@ -231,9 +215,7 @@ class _Pixels:
 class _Look:
     """Traces a view's pixels to the surfaces that reflect sun to the shown ones."""
 
-    def __init__(
-        self, tracer: TracedScene, cells: RoomCells, view: View, tile: int, edge: float, seed: int
-    ) -> None:
+    def __init__(self, tracer: TracedScene, cells: RoomCells, view: View, tile: int, edge: float, seed: int) -> None:
         self._tracer, self._cells, self._view = tracer, cells, view
         self._edge, self._seed = edge, seed
         width = float(np.sqrt(pixel_solid_angles(view).max()))
@@ -390,9 +372,7 @@ def _widest(interior: Surfaces) -> float:
     return float(np.sqrt(max(float(interior.areas.sum()), 1e-6) / PIECES))
 
 
-def _with_pieces(
-    cells: RoomCells, far: sparse.csr_array, near: _Hits, edge: float, seed: int
-) -> SunlitShares:
+def _with_pieces(cells: RoomCells, far: sparse.csr_array, near: _Hits, edge: float, seed: int) -> SunlitShares:
     """The shares of the cells with those of pieces near rows, whose widest have an edge [m]."""
     piece, order, cubes = _pieces(near, edge)
     entries = near.weight.astype(np.float32), (near.row, piece)
@@ -404,9 +384,7 @@ def _with_pieces(
     return SunlitShares(cells, far, alone, share, first, EdgePoints(more, _beside(cubes)))
 
 
-def _pieces(
-    hits: _Hits, edge: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def _pieces(hits: _Hits, edge: float) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """The piece of each place, cubes of an edge [m] by the side of the surface.
 
     Returns: [q]; the places in the pieces' order [q]; and of each piece the cube's numbers, the

@@ -23,11 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from mitsuba_cfs.trace.kernels.sampling import (
-    column,
-    lattice_2d,
-    tables,
-)
+from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, tables
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_faces
 from mitsuba_cfs.trace.sun.sunlit_cells import RAYS, Beam, RoomCells, surface_cells
@@ -53,9 +49,7 @@ class ReflectingCells:
         return self.starts.size // max(self.cells.size, 1)
 
 
-def room_cells(
-    inside: TracedScene, *, samples: int = CELL_RAYS * CELL_SHARE
-) -> tuple[RoomCells, ReflectingCells]:
+def room_cells(inside: TracedScene, *, samples: int = CELL_RAYS * CELL_SHARE) -> tuple[RoomCells, ReflectingCells]:
     """The cells of a room's surfaces, and the wider ones that these lie in.
 
     Args: samples: rays of each sensor; with few of them cells have fewer, their noise far below.
@@ -93,9 +87,7 @@ def room_shares(
     local = SurfacePoints((points - inside.centre).astype(np.float32), normals.astype(np.float32))
     narrow, wide = cells[0], cells[1].cells
     every = np.arange(local.size)
-    first = _reflected(
-        narrow, inside, local, every, local.size, samples=samples, seed=seed ^ 0x6A09E667
-    )
+    first = _reflected(narrow, inside, local, every, local.size, samples=samples, seed=seed ^ 0x6A09E667)
     entries = np.ones(narrow.size), (np.arange(narrow.size), cells[1].of)
     step = (first @ sparse.csr_array(entries, shape=(narrow.size, wide.size))).toarray()
     between = _between(cells[1], inside, np.flatnonzero(step.any(axis=0)), seed)
@@ -108,9 +100,7 @@ def room_shares(
     return first.toarray() / narrow.area + (found / wide.area)[:, cells[1].of]
 
 
-def _between(
-    wide: ReflectingCells, inside: TracedScene, met: NDArray[np.int64], seed: int
-) -> sparse.csr_array:
+def _between(wide: ReflectingCells, inside: TracedScene, met: NDArray[np.int64], seed: int) -> sparse.csr_array:
     """What cells have of each other [w, w]: of those that some meet, and of what these meet.
 
     The others, most of them the backs of walls, have no part in any sensor's light.
@@ -119,9 +109,7 @@ def _between(
     found, known = sparse.csr_array((size, size)), np.zeros(size, dtype=bool)
     while len(met):
         known[met] = True
-        found = found + _reflected(
-            wide.cells, inside, wide.starts, met, size, samples=wide.rays, seed=seed
-        )
+        found = found + _reflected(wide.cells, inside, wide.starts, met, size, samples=wide.rays, seed=seed)
         others = np.zeros(size, dtype=bool)
         others[found.indices] = True
         met = np.flatnonzero(others & ~known)

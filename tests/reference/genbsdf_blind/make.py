@@ -19,9 +19,7 @@ MATERIAL = plastic("grey", 0.55, specular=0.01, roughness=0.06)
 
 def main(tilt_deg: float, samples: int) -> None:
     """Trace one cell in the middle of 101 slats 8 m wide."""
-    layer = venetian_blind(
-        MATERIAL, depth=0.08, radius=0.104, spacing=SPACING, tilt=np.radians(tilt_deg), width=8.0
-    )
+    layer = venetian_blind(MATERIAL, depth=0.08, radius=0.104, spacing=SPACING, tilt=np.radians(tilt_deg), width=8.0)
     write_radiance(layer, "blind.rad", 1, ROWS)
     bottom = (ROWS // 2) * SPACING
     cell = genbsdf.SamplingBox(-4.04, -3.96, bottom, bottom + SPACING, -layer.thickness, 0)
