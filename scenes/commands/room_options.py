@@ -7,31 +7,24 @@ What a command means by one of them beside that stands behind a semicolon in its
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+from click.core import ParameterSource
 
 from mitsuba_cfs.sky.options import GROUNDS, SUBDIVISIONS, SUN_MODELS
 from mitsuba_cfs.spectra.channels import CHANNEL_SETS
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
-from scenes.room.options import GLARE_SOURCES, GLARE_SUN, SensorGrid
-
-if TYPE_CHECKING:
-    from scenes.heat.study_file import StudyFile
-    from scenes.study.study_file import Study as Grid
-
-
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
-
-from click.core import ParameterSource
+from scenes.room.options import GLARE_SOURCES, GLARE_SUN, Outputs, SensorGrid
 
 if TYPE_CHECKING:
     from scenes.head import Head
+    from scenes.heat.study_file import StudyFile
+    from scenes.study.study_file import Study as Grid
 
 
 class IfcFile(click.Path):
@@ -288,7 +281,7 @@ spectral_option = click.option(
 channels_option = click.option(
     "--channels",
     type=click.Choice(list(map(str, CHANNEL_SETS))),
-    default="20",
+    default=str(Outputs().channels),
     show_default=True,
     callback=lambda _context, _parameter, value: int(value),
     help="Bands of wavelength for --spectral.",

@@ -406,22 +406,24 @@ class SpectralTable(TomlTable):
         # no transmittance depends on the thickness, which some files do not state
         panes = [read_spectral_pane(pane, thickness=0.004) for pane in self.panes]
         for file, pane in zip(self.panes, panes, strict=True):
-            check_visible(pane, file)
+            if fault := visible_fault(pane):
+                raise DataError(fault, file=file, field="spectral_data")
         shade = (1.0, 0.0) if self.shade is None else read_spectrum(self.shade)
         return SpectralFactor.of_panes(panes, *shade)
 
 
-def check_visible(pane: SpectralPane, file: Path) -> None:
-    """Raise `DataError` for a pane whose data do not tell its visible spectrum."""
+def visible_fault(pane: SpectralPane) -> str:
+    """Why the data of a pane do not tell its visible spectrum; "" where they do."""
     nm, (low, high) = pane.wavelength_nm, VISIBLE_NM
     if nm[0] > low or nm[-1] < high:
-        message = f"its spectrum is of {nm[0]:g} to {nm[-1]:g} nm, expected {low:g} to {high:g}"
-        raise DataError(message, file=file, field="spectral_data")
+        return f"its spectrum is of {nm[0]:g} to {nm[-1]:g} nm, expected {low:g} to {high:g}"
     widest = int(np.argmax(np.where((nm[1:] > low) & (nm[:-1] < high), np.diff(nm), 0.0)))
-    if nm[widest + 1] - nm[widest] > WIDEST_GAP_NM:
-        message = f"its spectrum has nothing between {nm[widest]:g} and {nm[widest + 1]:g} nm, "
-        message += f"expected steps of {WIDEST_GAP_NM:g} nm at most"
-        raise DataError(message, file=file, field="spectral_data")
+    if nm[widest + 1] - nm[widest] <= WIDEST_GAP_NM:
+        return ""
+    return (
+        f"its spectrum has nothing between {nm[widest]:g} and {nm[widest + 1]:g} nm, "
+        f"expected steps of {WIDEST_GAP_NM:g} nm at most"
+    )
 
 
 def read_spectrum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -475,14 +477,15 @@ class WindowHeatTable(ClosureTable):
         return whole.model_copy(update={"spectral": self.spectral.placed(folder)})
 
     def spectrum(self) -> SpectralFactor | None:
-        """Spectrum that the table states, else that of the panes of its layers; None: not known."""
+        """Spectrum that the table states, else that of the panes of its layers.
+
+        None where it is not known: neither is there, or data of a pane are too coarse for colour.
+        """
         if self.spectral is not None:
             return self.spectral.factor()
         files = [layer for layer in self.layers if layer.pane is not None]
         panes = [layer.spectral() for layer in files]
-        for layer, pane in zip(files, panes, strict=True):
-            check_visible(pane, layer.pane)
-        if not panes:
+        if not panes or any(map(visible_fault, panes)):
             return None
         return replace(SpectralFactor.of_panes(panes), whole=len(panes) == len(self.layers))
 

@@ -235,6 +235,7 @@ def test_each_group_of_windows_has_its_carpet_of_states() -> None:
         groups=("S", "door"),
         rules=("irradiance", "any"),
         states=np.column_stack([states, 2 - states]),
+        views=2 * room.operation.shading.views,
     )
     two = replace(room, operation=replace(room.operation, shading=shading))
     south, door = state_carpets(result, two)

@@ -79,7 +79,7 @@ def test_three_commands_give_the_same_numbers(variant, tmp_path, method) -> None
         f'methods = ["{method}"]\nglare = "none"\noperation = "{operation}"\n'
         f'[[room]]\nbuilding = "{OFFICE}"\nspaces = ["A"]\n'
         f'[[system]]\nbsdf = "{VENETIAN_BLIND}"\n[[climate]]\nweather = "{WEATHER}"\n'
-        f"[options]\n{TRACE}\nspectral = true\nchannels = 3\n"
+        f"[options]\n{TRACE}\n"
     )
     options = JobOptions(
         OFFICE,
@@ -87,7 +87,7 @@ def test_three_commands_give_the_same_numbers(variant, tmp_path, method) -> None
         VENETIAN_BLIND,
         ("A",),
         operation=operation,
-        room=RoomOptions.of(method=method, picture_hours=("06-21 12",), spectral=True, channels=3, **SAMPLING),
+        room=RoomOptions.of(method=method, picture_hours=("06-21 12",), **SAMPLING),
     )
     (room,) = run_job(options).spaces
     (year,), _ = run_study(read_study(thermal), silent)
@@ -105,13 +105,26 @@ def test_three_commands_give_the_same_numbers(variant, tmp_path, method) -> None
     for name in ("heating_kwh", "cooling_kwh", "peak_heating_w", "peak_cooling_w"):
         assert row.figures[name] == ran.summary[name] == year.summary[name], name
     assert row.figures["lighting_kwh"] == ran.summary["lighting_kwh"]
-    assert room.spectral is not None and room.spectral.summary["melanopic_250_percent"] > 0
-    for name, value in room.spectral.summary.items():
-        assert row.figures[name] == value, name
     np.testing.assert_array_equal(row.arrays["mean_illuminance"], light.illuminance.mean(axis=0))
     for name in ("air_c", "operative_c"):
         kept = heat[name].to_numpy(np.float32)
         np.testing.assert_array_equal(row.arrays[f"temperature/{name}"], kept, err_msg=name)
+
+
+def test_a_study_has_the_light_by_wavelength_of_a_run(variant, tmp_path) -> None:
+    grid = tmp_path / "s.toml"
+    grid.write_text(
+        f'methods = ["three-phase"]\nglare = "none"\n[[room]]\nbuilding = "{OFFICE}"\nspaces = ["A"]\n'
+        f'[[system]]\nbsdf = "{VENETIAN_BLIND}"\n[[climate]]\nweather = "{WEATHER}"\n'
+        f"[options]\n{TRACE}\nspectral = true\nchannels = 3\n"
+    )
+    options = RoomOptions.of(method="three-phase", picture_hours=("06-21 12",), spectral=True, channels=3, **SAMPLING)
+    (room,) = run_job(JobOptions(OFFICE, WEATHER, VENETIAN_BLIND, ("A",), room=options)).spaces
+    (case,) = plan_of(read_grid(grid)).cases
+    row = compute_case(case)
+    assert room.spectral is not None and room.spectral.summary["melanopic_250_percent"] > 0
+    for name, value in room.spectral.summary.items():
+        assert row.figures[name] == value, name
 
 
 BOX = """
