@@ -1,4 +1,4 @@
-"""What sensors on the facade and the roof of a room measure: beam, irradiance, illuminance."""
+"""Measurements of sensors on the facade and the roof of a room: beam, irradiance, illuminance."""
 
 from __future__ import annotations
 
