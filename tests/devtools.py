@@ -182,11 +182,17 @@ class Page:
         """A place of an element in the window, scrolled into view."""
         text = json.dumps(selector)
         how = "{block: 'center', behavior: 'instant'}"  # pages scroll smoothly: the mouse is faster
-        self.value(f"document.querySelector({text}).scrollIntoView({how})")
-        box = self.value(
-            f"(({{x, y, width, height}}) => [x, y, width, height])"
-            f"(document.querySelector({text}).getBoundingClientRect())"
-        )
+        # A link to a part of the page may still be scrolling it: the place counts once two frames agree
+        frame = "await new Promise((on) => requestAnimationFrame(on));"
+        sizes = "(({x, y, width, height}) => [x, y, width, height])"
+        measure = f"{sizes}(document.querySelector({text}).getBoundingClientRect())"
+        end, box, before = time.monotonic() + WAIT, [], None
+        while box != before:
+            if time.monotonic() > end:
+                raise AssertionError(f"does not come to rest: {selector}")
+            self.value(f"document.querySelector({text}).scrollIntoView({how})")
+            before = self.value(f"(async () => {{ {frame} return {measure}; }})()")
+            box = self.value(f"(async () => {{ {frame} {frame} return {measure}; }})()")
         return box[0] + across * box[2], box[1] + down * box[3]
 
     def click(self, selector: str, across: float = 0.5, down: float = 0.5) -> None:
