@@ -18,6 +18,7 @@ from bim.building_file import no_window
 from bim.model import Building, Space, in_month
 from bim.report.issue import Effect, Issue
 from bim.sensors import plane_sides
+from bim.templates import template_rooms
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.glare import hourly_glare
@@ -368,6 +369,7 @@ class Check:
         results, issues, notes = RoomSeries(
             self.building,
             spaces,
+            template_rooms(spaces),
             self.systems,
             options.room.sampling,
             cache,

@@ -17,7 +17,7 @@ from bim.doorways import panes_between, source_rooms
 from bim.model import Space
 from bim.report.issue import Issue, issue_note
 from bim.sensors import model_grids
-from bim.templates import same_hues
+from bim.templates import same_hues, template_rooms
 from bim.to_thermal import same_surfaces, shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -75,11 +75,13 @@ def computed_rooms(
     spaces = run_spaces(inputs, options)
     store = StoredArrays() if len(spaces) > 1 else None
     with scratch_folder() as folder:
-        together = RoomsTogether(inputs, spaces, skies, options, folder)
+        equal = template_rooms(spaces)
+        together = RoomsTogether(inputs, equal, skies, options, folder)
         work = RoomWork(inputs, spaces, skies, options, together, with_heat=not coupled)
         series = RoomSeries(
             inputs.building,
             spaces,
+            equal,
             inputs.systems,
             options.room.sampling,
             MatrixCache.of_user() if options.cache else None,
@@ -251,7 +253,7 @@ def _read(options: JobOptions, run: str) -> tuple[Inputs, RoomsTogether, Sequenc
     skies = skies_for(inputs.weather, room.sampling, **room.sky)
     spaces, folder = run_spaces(inputs, options), ExitStack()
     place = folder.enter_context(scratch_folder())
-    together = RoomsTogether(inputs, spaces, skies, options, place)
+    together = RoomsTogether(inputs, template_rooms(spaces), skies, options, place)
     weakref.finalize(together, folder.close)  # with the next run, and at the end
     return inputs, together, spaces, skies
 

@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from bim.model import Space, seasons
-from bim.templates import template_rooms
-from bim.to_tracer import orientation_groups, outdoors_of_rooms
+from bim.to_tracer import element_surfaces, orientation_groups, outdoors_of_rooms
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -40,15 +39,15 @@ class RoomsTogether:
     """
 
     def __init__(
-        self, inputs: Inputs, spaces: Sequence[Space], skies: AnnualSky, options: JobOptions, folder: Path
+        self, inputs: Inputs, equal: Sequence[tuple[Space, ...]], skies: AnnualSky, options: JobOptions, folder: Path
     ) -> None:
         """Of the rooms of a run.
 
-        Args: folder: for matrices while there is no cache.
+        Args: equal: `template_rooms`; folder: for matrices while there is no cache.
         """
         self._inputs, self._skies, self._options = inputs, skies, options
         self._folder, self._set = folder, -1
-        self._spaces = [rooms[0] for rooms in template_rooms(spaces) if rooms[0].windows]
+        self._spaces = [rooms[0] for rooms in equal if rooms[0].windows]
         patches = ReinhartSky(options.room.sampling.subdivision).size
         groups = np.cumsum([0, *(len(orientation_groups(space)) for space in self._spaces)])
         number = groups[:-1] * KLEMS_FULL.size * patches // ENTRIES
@@ -113,7 +112,7 @@ def traced_together(
             continue
     windows = Counter(window.guid for space in spaces for window in space.windows)
     first = seasons(inputs.building)[0].building
-    glossy = bool(outdoors_of_rooms(first, [room.space for room, _ in rooms]).surfaces.glossy)
+    glossy = bool(element_surfaces(element for element in first.elements if element.gloss).glossy)
     some = [
         i
         for i, (room, scene) in enumerate(rooms)

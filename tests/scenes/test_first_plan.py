@@ -103,7 +103,7 @@ def test_rooms_of_equal_shape_are_not_traced_ahead(two_rooms, tmp_path, monkeypa
     monkeypatch.setattr(
         together, "traced_together", lambda inputs, spaces, *_, **__: traced.append([space.name for space in spaces])
     )
-    rooms = together.RoomsTogether(inputs, [near, far, twin], None, options, tmp_path)
+    rooms = together.RoomsTogether(inputs, [(near, twin), (far,)], None, options, tmp_path)
     assert rooms.cache_for(twin, silent) is None and not traced
     assert rooms.cache_for(near, silent) is not None and traced == [["near", "far"]]
 

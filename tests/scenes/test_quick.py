@@ -20,7 +20,6 @@ from scenes.room import series as rooms_of_a_run
 from scenes.room.glare import default_hours
 from scenes.room.options import RoomOptions
 from scenes.run import run as rooms
-from scenes.run import together as rooms_together
 from scenes.run.options import JobOptions
 from scenes.study.study_file import read_study
 from scenes.year_of_glare.options import YearOptions
@@ -166,8 +165,7 @@ def three_rooms(monkeypatch: pytest.MonkeyPatch, no_pictures: None) -> SimpleNam
     """Rooms of which the third equals the first, each computed by a stub."""
     rooms = [SimpleNamespace(guid=g, label=g.upper(), template="", windows=()) for g in ("a", "b", "c")]
     a, b, c = rooms
-    for module in (rooms_of_a_run, rooms_together):
-        monkeypatch.setattr(module, "template_rooms", lambda spaces: [(a, c), (b,)])
+    monkeypatch.setattr(rooms, "template_rooms", lambda spaces: [(a, c), (b,)])
     monkeypatch.setattr(rooms_of_a_run, "same_systems", lambda *_: False)
     return SimpleNamespace(spaces=rooms, building=None, systems={}, weather=None, operation=None)
 
