@@ -18,7 +18,6 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from bim.leaks import may_enclose
-from bim.mesh_repair import welded_mesh
 from bim.planes import area_vectors, principal_extents
 from bim.rays import ray_mesh
 from bim.shell import enclosed_volume
@@ -167,13 +166,16 @@ def interior_parts(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     return [part for part in parts if enclosed_volume(part) < 0]
 
 
-def touching_parts(triangles: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Number of the connected part that each triangle [N, 3, 3] belongs to."""
-    vertices, faces = welded_mesh(triangles, 1e-6)
-    if len(faces) != len(triangles):  # collapsed triangles keep their corners' part
-        keys = np.round(triangles.reshape(-1, 3) / 1e-6).astype(np.int64)
-        faces = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1, 3)
-    count = max(len(vertices), int(faces.max(initial=-1)) + 1)
+def touching_parts(triangles: NDArray[np.float64], body: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
+    """Number of the connected part that each triangle [N, 3, 3] belongs to.
+
+    Args: body: of each triangle [N]; triangles of different bodies do not touch.
+    """
+    keys = np.round(triangles.reshape(-1, 3) / 1e-6).astype(np.int64)
+    if body is not None:
+        keys = np.column_stack([keys, np.repeat(body, 3)])
+    faces = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    count = int(faces.max(initial=-1)) + 1
     rows, columns = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
     graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
     return connected_components(graph, directed=False)[1][faces[:, 0]]

@@ -413,8 +413,9 @@ class Season:
 def seasons(building: Building) -> tuple[Season, ...]:
     """The seasons of a building, that with most leaves first; one where nothing changes."""
     stands: dict[tuple[bool, ...], list[int]] = {}
+    changing = [element.months for element in building.elements if element.months]
     for month in MONTHS:
-        kind = tuple(not e.months or month in e.months for e in building.elements)
+        kind = tuple(month in months for months in changing)
         stands.setdefault(kind, []).append(month)
     if len(stands) == 1:
         return (Season(tuple(MONTHS), building),)

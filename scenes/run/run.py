@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import time
 import weakref
+from collections import Counter
 from collections.abc import Callable, Generator, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, replace
@@ -197,18 +198,24 @@ class RoomWork:
         rooms = {space.guid: space for space in spaces}
         here = workers.scheduler is None
         run = "" if here else _identity(self.options, self.inputs)
-        compute = _Here(self) if here else _FromFiles(self.with_heat, self.options, run)
+        together = self.together.for_processes()
+        compute = _Here(replace(self, together=together)) if here else _FromFiles(self.with_heat, self.options, run)
+        left = Counter(together.set_of(guid) for guid in rooms)
         tasks = Tasks(
             list(rooms),
             compute,
             _failed,
             key=lambda guid: f"{run}{guid}",
-            scene=lambda guid: guid,
+            scene=together.set_of if here else lambda guid: guid,  # a cluster has no common folder
             needs=Requirements() if here else _requirements(self.inputs),
         )
         with closing(tasks.results(**asdict(workers))) as results:
             for guid, result in results:
                 yield rooms[guid], result
+                number = together.set_of(guid)
+                left[number] -= 1
+                if not left[number]:
+                    together.remove(number)
 
     def of(self, guid: str) -> RoomYear | DaylitRoom:
         """The result of the room with a GUID."""

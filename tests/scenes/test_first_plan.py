@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -106,6 +107,25 @@ def test_rooms_of_equal_shape_are_not_traced_ahead(two_rooms, tmp_path, monkeypa
     rooms = together.RoomsTogether(inputs, [(near, twin), (far,)], None, options, tmp_path)
     assert rooms.cache_for(twin, silent) is None and not traced
     assert rooms.cache_for(near, silent) is not None and traced == [["near", "far"]]
+
+
+def test_processes_trace_each_set_of_rooms_once(two_rooms, tmp_path, monkeypatch):
+    inputs, options = two_rooms
+    near, far = inputs.spaces
+    traced: list[list[str]] = []
+    monkeypatch.setattr(
+        together, "traced_together", lambda inputs, spaces, *_, **__: traced.append([space.name for space in spaces])
+    )
+    rooms = together.RoomsTogether(inputs, [(near,), (far,)], None, options, tmp_path).for_processes()
+    assert rooms.set_of(near.guid) == rooms.set_of(far.guid), "the second waits for the first"
+    folders = []
+    for room in (near, far):  # each in a process of its own
+        cache = copy.copy(rooms).cache_for(room, silent)
+        assert cache is not None
+        folders.append(cache.folder)
+    assert traced == [["near", "far"]] and folders[0] == folders[1]
+    rooms.remove(rooms.set_of(near.guid))
+    assert not any(tmp_path.iterdir())
 
 
 def test_a_killed_run_leaves_no_matrices(two_rooms, tmp_path, monkeypatch):

@@ -163,11 +163,11 @@ def test_one_picture_is_the_brightest_hours() -> None:
 @pytest.fixture
 def three_rooms(monkeypatch: pytest.MonkeyPatch, no_pictures: None) -> SimpleNamespace:
     """Rooms of which the third equals the first, each computed by a stub."""
-    rooms = [SimpleNamespace(guid=g, label=g.upper(), template="", windows=()) for g in ("a", "b", "c")]
-    a, b, c = rooms
+    spaces = [SimpleNamespace(guid=g, label=g.upper(), template="", windows=()) for g in ("a", "b", "c")]
+    a, b, c = spaces
     monkeypatch.setattr(rooms, "template_rooms", lambda spaces: [(a, c), (b,)])
     monkeypatch.setattr(rooms_of_a_run, "same_systems", lambda *_: False)
-    return SimpleNamespace(spaces=rooms, building=None, systems={}, weather=None, operation=None)
+    return SimpleNamespace(spaces=spaces, building=None, systems={}, weather=None, operation=None)
 
 
 def test_each_room_is_told_when_it_is_computed_in_their_order(three_rooms, monkeypatch) -> None:
