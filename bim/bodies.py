@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.enclosure import touching_parts
-from bim.planes import area_vectors
 from bim.rays import RayMesh
+from mitsuba_cfs.surfaces import area_vectors
 
 SAME_PLACE = 1e-5  # faces nearer than this along a ray are in one place [m]
 OPEN = 1e-4  # share of a closed part's area that its faces may fail to cancel by

@@ -379,6 +379,26 @@ def check_building_file(path: str | PathLike[str]) -> None:
     _format(Path(path)).check(Path(path))
 
 
+def check_room_names(paths: Sequence[Path], rooms: Sequence[str]) -> None:
+    """Refuse names that are like none of IFC files, before anything heavy is loaded.
+
+    A name whose text is in a file is left to the reader.
+
+    Raises: `DataError`.
+    """
+    if not rooms or not all(map(is_ifc, paths)):
+        return
+    texts = [path.read_bytes().lower() for path in paths]
+    # letters beyond ASCII are written in another form
+    parts = {room: [part.encode() for part in re.findall(r"[ -~]+", room.lower())] for room in rooms}
+    absent = [room for room, of in parts.items() if not any(of and all(one in text for one in of) for text in texts)]
+    if absent:
+        from bim.ifc.project import open_all
+        from bim.ifc.spaces import check_rooms
+
+        check_rooms([*open_all(paths).values()], absent, paths[0], corrections_beside(paths[0]).room_names)
+
+
 def refuse_unread_format(path: Path) -> None:
     """Raise `DataError` for a known format that is not read; it says which file to give instead."""
     reason = UNREAD.get(path.suffix.lower())

@@ -18,11 +18,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from bim.leaks import may_enclose
-from bim.planes import area_vectors, principal_extents
+from bim.planes import principal_extents
 from bim.rays import ray_mesh
 from bim.shell import enclosed_volume
 from bim.solids import solid_of, triangles_of, union
 from mitsuba_cfs.processes import Told
+from mitsuba_cfs.surfaces import area_vectors
 
 GAP = 0.02  # gaps between elements up to this are closed [m]
 FINEST = 1e-3  # smaller details of a found room are smoothed out [m]

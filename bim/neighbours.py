@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from bim.bodies import Bodies, Span
 from bim.boxes import Boxes
-from bim.planes import Facet, area_vectors, polygons_of, triangulated
+from bim.planes import Facet, polygons_of, triangulated
 from bim.rays import RayMesh, hemisphere
 from bim.rooms import Piece, RoomSolid, cut
+from mitsuba_cfs.surfaces import area_vectors
 
 T = TypeVar("T", bound=Hashable)
 

@@ -18,10 +18,11 @@ from trimesh.intersections import slice_faces_plane
 from bim.defaults import CLEAR_GLAZING, GLASS_REFLECTANCE
 from bim.isolated_solids import Outline, opened
 from bim.model import Element, Space, Window
-from bim.planes import area_vectors, merged_polygons, plane_through
+from bim.planes import merged_polygons, plane_through
 from bim.rays import hemisphere, ray_mesh
 from bim.report.issue import Effect, Issue
 from mitsuba_cfs.processes import ProcessEnded
+from mitsuba_cfs.surfaces import area_vectors
 
 COVERED = 0.9  # share of rays stopped at once that makes a window blind
 AT_ONCE = 0.35  # an obstruction this near to the glass is on the window [m]

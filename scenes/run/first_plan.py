@@ -106,7 +106,7 @@ class _Transmitting:
     """Optics of a system that reflects nothing."""
 
     optics: SystemOptics
-    reflection: None = None
+    reflection = property(lambda self: self.optics.reflection)
     outdoor_reflection: None = None
 
     @property
