@@ -27,7 +27,7 @@ from bim.report.issue import Issue
 from bim.use import StatedUse
 from mitsuba_cfs.errors import DataError, check_number
 from mitsuba_cfs.gloss import Gloss
-from mitsuba_cfs.surfaces import triangle_areas
+from mitsuba_cfs.surfaces import area_vectors, triangle_areas
 
 LONGITUDE_LATITUDE = "OGC:CRS84"  # degrees, as GeoJSON has them (RFC 7946)
 EQUATOR, FLATTENING = 6378137.0, 1 / 298.257223563  # WGS 84 [m], [1]
