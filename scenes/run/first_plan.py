@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 
@@ -64,6 +64,9 @@ class PlannedRoom:
     errors: dict[str, float]
     mean_error: float  # relative, of the yearly mean illuminance: the mean of the sensors
     unshaded: bool = False  # in the first shading state: its rules need more than a first plan has
+
+
+OnPlan = Callable[[Sequence[PlannedRoom]], None]  # called with the first plan of many rooms
 
 
 def plan_options(options: RoomOptions) -> RoomOptions:

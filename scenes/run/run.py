@@ -41,7 +41,7 @@ from scenes.room.inputs import skies_for
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import RoomChoices, compute_room, lit_room
 from scenes.room.series import RoomSeries, moved_light, moved_result
-from scenes.run.first_plan import FROM, PlannedRoom, first_plan, options_for_error
+from scenes.run.first_plan import FROM, OnPlan, first_plan, options_for_error
 from scenes.run.options import JobOptions
 from scenes.run.together import RoomsTogether
 from scenes.workers import Tasks
@@ -280,7 +280,6 @@ def _requirements(inputs: Inputs) -> Requirements:
 
 
 OnHead = Callable[[Head], None]  # called as soon as all inputs are read
-OnPlan = Callable[[Sequence[PlannedRoom]], None]  # called with the first plan of many rooms
 
 
 def run_job(

@@ -14,7 +14,10 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import TEMPORARY
 from mitsuba_cfs.progress import silent
 from scenes import cli
-from scenes.demo import OFFICE, WEATHER
+from scenes.comply import comply
+from scenes.comply.files import read_files
+from scenes.comply.options import ComplyOptions
+from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.inputs import Inputs
 from scenes.result_folder import FolderMark, ResultFolder
 from scenes.room.options import RoomOptions
@@ -80,6 +83,19 @@ def test_the_first_plan_has_each_room_with_its_errors(two_rooms):
     for room in (near, far):
         assert 0 < room.mean_error < 0.2 and 0 < room.errors["da300"] < 10 and not room.unshaded
         assert 0 < room.errors["daylight_factor"] < 0.2 * room.figures["daylight_factor"]
+
+
+def test_a_check_of_rules_says_the_first_plan_before_it_traces_the_rest(two_rooms, monkeypatch):
+    class Heard(Exception):
+        pass
+
+    def heard(rooms):
+        raise Heard([room.space.name for room in rooms])
+
+    monkeypatch.setattr(comply, "FROM", 2)
+    options = ComplyOptions(OFFICE, WEATHER, system=VENETIAN_BLIND, standards=("en17037",), room=FEW, cache=False)
+    with pytest.raises(Heard, match=r"near.*far"):
+        comply.check_rooms(two_rooms[0].building, options, read_files(options), on_plan=heard)
 
 
 def test_a_window_of_two_rooms_lights_both_in_the_first_plan(two_rooms):
