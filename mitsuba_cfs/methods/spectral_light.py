@@ -7,7 +7,8 @@ of incidence (rank one: spectrum of the panes, times angles of the visible band)
 
 so that nothing is traced again where the surfaces reflect all channels equally: V, D and their kin
 are those of the visible band, and what was traced through a group is scaled by its factor at the
-angle that it came from.
+angle that it came from.  Rooms with colour are traced in a few bands q of reflectance
+(`coloured_room`), and V is the sum of these by b_q(lambda).
 
 All of this is linear in r_c and in the spectrum of the sky.  The factors of all channels are sums
 of a few modes m, r_c = sum a_cm r_m, and skies are sums of the three components k of CIE daylight.
@@ -39,6 +40,7 @@ from mitsuba_cfs.methods.coefficients import (
     sun_shares,
     without_straight,
 )
+from mitsuba_cfs.methods.coloured_room import RoomInBand, rooms_in_bands
 from mitsuba_cfs.methods.light import SeasonalLight, seasons_of
 from mitsuba_cfs.methods.optics import SystemOptics, combinations
 from mitsuba_cfs.methods.phase_light import (
@@ -131,6 +133,7 @@ def spectral_light(
     wanted: Sequence[Detection],
     state: NDArray[np.int64] | None = None,
     *,
+    reflectance: Array | None = None,
     water_cm: ArrayLike = WATER_CM,
     progress: Progress = silent,
 ) -> SpectralLight:
@@ -138,6 +141,7 @@ def spectral_light(
 
     Args:
         factors: of the systems of the light [G][J].
+        reflectance: diffuse reflectance of the room's surfaces [F, N]; neutral by default.
         state: of each window group in each hour [G, L]; the first by default.
         water_cm: precipitable water of the atmosphere [L] or of all hours.
 
@@ -154,7 +158,7 @@ def spectral_light(
         if not isinstance(phase, PhaseLight):
             raise ValueError("path tracing has no matrices: expected the light of a phase method")
         water = np.broadcast_to(np.asarray(water_cm, dtype=float), (hours_of_all,))[hours]
-        season = _Season(with_sensor_light(phase), factors, channels, water)
+        season = _Season(with_sensor_light(phase), factors, channels, water, reflectance)
         outdoors += season.sky.horizontal.sum(axis=0)
         rows = states_of(phase, None if state is None else state[:, hours])
         for kind, some in combinations(rows):
@@ -184,24 +188,33 @@ def sky_spectra(sky: AnnualSky, water_cm: ArrayLike = WATER_CM) -> SpectralSky:
 class _Season:
     """The light of the hours of one season, in the modes of its systems' factors."""
 
-    def __init__(self, light: PhaseLight, factors: Factors, channels: Channels, water_cm: Array) -> None:
+    def __init__(
+        self, light: PhaseLight, factors: Factors, channels: Channels, water_cm: Array, reflectance: Array | None
+    ) -> None:
         self._light, self.sky = light, sky_spectra(light.sky, water_cm)
         # power of sun and ground in each band per lumen and of the sky's components
         self._sun, self._ground = channels.power(self.sky.sun), channels.power(self.sky.ground)
         self._components = channels.power(daylight_components())  # [k, C]
         lit = sensor_light(light)
         distinct = {id(factor): factor for of in factors for factor in of}
-        self._shares, angles = _modes(list(distinct.values()), channels)  # [C, M]
+        of_factors, angles = _modes(list(distinct.values()), channels)  # [C, M]
         known = dict(zip(distinct, angles, strict=True))
         self._angles = [[known[id(factor)] for factor in of] for of in factors]
-        groups = [
-            [_GroupInState(light, lit[g][j], g, self._angles[g][j]) for j in traced_states(states)]
-            for g, states in enumerate(light.systems)
-        ]
-        self._modes = [self._in_mode(groups, m) for m in range(self._shares.shape[1])]
+        rooms, of_rooms = rooms_in_bands(light, reflectance, channels)
+        self._shares = np.einsum("cq,cm->cqm", of_rooms, of_factors).reshape(channels.count, -1)
+        self._modes = []
+        for room in rooms:
+            groups = [
+                [
+                    _GroupInState(light, lit[g][j], g, self._angles[g][j], room, beam)
+                    for j, beam in zip(traced_states(states), room.beams[g], strict=True)
+                ]
+                for g, states in enumerate(light.systems)
+            ]
+            self._modes += [self._in_mode(groups, m, room) for m in range(of_factors.shape[1])]
 
-    def _in_mode(self, groups: Sequence[Sequence[_GroupInState]], m: int) -> PhaseLight:
-        """The light in a mode, under the photopic sun."""
+    def _in_mode(self, groups: Sequence[Sequence[_GroupInState]], m: int, room: RoomInBand) -> PhaseLight:
+        """The light in a mode of a room, under the photopic sun."""
         light = self._light
         # a state between two others is the mean of them in each mode too
         sensors = tuple(
@@ -212,7 +225,7 @@ class _Season:
             [ModeOptics(one, of.patches[m]) for one, of in zip(states, angles, strict=True)]
             for states, angles in zip(light.systems, self._angles, strict=True)
         ]
-        return replace(light, systems=systems, sensors=sensors)
+        return replace(light, matrices=room.matrices, systems=systems, sensors=sensors)
 
     def modes_in(self, kind: Sequence[int], hours: NDArray[np.int64]) -> _Modes:
         """The light in all modes in some hours, with each group in a state [G]."""
@@ -314,11 +327,13 @@ class _Angles:
 
 
 class _GroupInState:
-    """The light of the sensors through a group in a state, as modes scale it."""
+    """The light of the sensors through a group in a state, in a band of the room, as modes scale it."""
 
-    def __init__(self, light: PhaseLight, one: SensorLight, g: int, angles: _Angles) -> None:
-        matrices, coefficients = light.matrices, one.coefficients
-        self._one, self._angles = one, angles
+    def __init__(
+        self, light: PhaseLight, one: SensorLight, g: int, angles: _Angles, room: RoomInBand, beam: Array | None
+    ) -> None:
+        matrices, coefficients = room.matrices, one.coefficients
+        self._one, self._angles, self._beam = one, angles, beam
         parts = matrices.parts.of(g)
         self._daylight = [matrices.daylight.values[q] for q in parts]
         self._rest = [without_straight(matrices, coefficients, q) for q in parts]
@@ -333,7 +348,8 @@ class _GroupInState:
         if one.added is not None and one.beam_in_room is not None:
             self._straight_outdoors = one.added - one.beam_in_room
             if light.reflected is not None:
-                self._straight_outdoors -= replaced_through(light.reflected, parts, self._rest)
+                visible = [without_straight(light.matrices, coefficients, q) for q in parts]
+                self._straight_outdoors -= replaced_through(light.reflected, parts, visible)
         group = matrices.scene.groups[g]
         sky = ReinhartSky(matrices.sampling.subdivision).directions
         self._to_sky = angles.towards(group, sky)  # [M, P]
@@ -356,8 +372,8 @@ class _GroupInState:
             if by_sun is not None and straight.direct is not None:
                 by_sun = by_sun + scaled
         beam, added = self._to_sun[m], one.added
-        if added is not None and one.beam_in_room is not None:
-            added = one.beam_in_room * beam
+        if added is not None and self._beam is not None:
+            added = self._beam * beam
             added += self._straight_outdoors * (self._seen @ patches)
             if self._reflected is not None:
                 shares = [rest * patches for rest in self._rest]
