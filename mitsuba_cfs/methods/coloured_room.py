@@ -66,10 +66,12 @@ def reflectance_bands(visible: Array, reflectance: Array, area: Array, channels:
 def _functions(reflectance: Array, share: Array) -> Array:
     """What the light of a room is made of [1 + C, n], weighted by shares [F] of the area."""
     distinct, of = np.unique(np.round(reflectance, 4), axis=0, return_inverse=True)
-    weight, mean = np.bincount(of.ravel(), share), share @ reflectance
+    weight = np.bincount(of.ravel(), share).astype(float)
+    mean = share @ reflectance
     if len(distinct) > MOST_SPECTRA:
         _, size, right = np.linalg.svd(np.sqrt(weight)[:, None] * distinct, full_matrices=False)
-        distinct, weight = size[:MOST_SPECTRA, None] * right[:MOST_SPECTRA], np.ones(MOST_SPECTRA)
+        distinct = size[:MOST_SPECTRA, None] * right[:MOST_SPECTRA]
+        weight = np.ones(MOST_SPECTRA)
     first = weight[:, None] * distinct
     second = (first[:, None] * first[None]).reshape(-1, reflectance.shape[1])
     later = mean / np.maximum(1.0 - mean, 0.05)
@@ -119,7 +121,8 @@ def _by_surface(interior: Surfaces, reflectance: Array) -> tuple[Array, Array, A
     F = int(interior.surface.max()) + 1
     if len(reflectance) < F:
         raise ValueError(f"reflectance: expected a row for each of {F} surfaces, got {len(reflectance)}")
-    visible, area = np.zeros(F), np.bincount(interior.surface, interior.areas, F)
+    visible: Array = np.zeros(F)
+    area = np.bincount(interior.surface, interior.areas, F).astype(float)
     visible[interior.surface] = interior.reflectance
     return visible, np.minimum(reflectance[:F], _most(interior, F)[:, None]), area
 

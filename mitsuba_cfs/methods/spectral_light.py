@@ -11,12 +11,12 @@ angle that it came from.  Rooms with colour are traced in a few bands q of refle
 (`coloured_room`), and V is the sum of these by b_q(lambda).
 
 All of this is linear in r_c and in the spectrum of the sky.  The factors of all channels are sums
-of a few modes m, r_c = sum a_cm r_m, and skies are sums of the three components k of CIE daylight.
+of a few modes m, r_c = sum a_cm r_m, and skies are sums of a few components k.
 A detector that weighs the channels by w_c receives
 
     E = sum_k (sum_cm w_c a_cm S_kc V T_m D) s_k + sum_cm w_c a_cm (E_m of the sun) sun_c
 
-which are three products with the sky for any number of channels.
+which are a few products with the sky for any number of channels.
 
     sensors by patches       r_c at the patch of incidence
     straight view            r_c at the patch of the sky; of what the outdoors reflects, the mean
@@ -63,7 +63,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.spectra.channels import Channels
-from mitsuba_cfs.spectra.daylight import COMPONENTS, WATER_CM, SpectralSky, daylight_components, spectral_sky
+from mitsuba_cfs.spectra.daylight import WATER_CM, SpectralSky, spectral_sky
 from mitsuba_cfs.spectra.detectors import NANOMETRES
 from mitsuba_cfs.surfaces import WindowGroup
 from mitsuba_cfs.trace.kernels.scattering import Scattering
@@ -135,6 +135,7 @@ def spectral_light(
     *,
     reflectance: Array | None = None,
     water_cm: ArrayLike = WATER_CM,
+    clear: str = "cie",
     progress: Progress = silent,
 ) -> SpectralLight:
     """What detectors receive of the light of the sensors.
@@ -144,6 +145,7 @@ def spectral_light(
         reflectance: diffuse reflectance of the room's surfaces [F, N]; neutral by default.
         state: of each window group in each hour [G, L]; the first by default.
         water_cm: precipitable water of the atmosphere [L] or of all hours.
+        clear: spectrum of a clear sky, one of `SKY_SPECTRA`.
 
     Raises: `ValueError` for path tracing, which has no matrices.
     """
@@ -158,7 +160,8 @@ def spectral_light(
         if not isinstance(phase, PhaseLight):
             raise ValueError("path tracing has no matrices: expected the light of a phase method")
         water = np.broadcast_to(np.asarray(water_cm, dtype=float), (hours_of_all,))[hours]
-        season = _Season(with_sensor_light(phase), factors, channels, water, reflectance)
+        skies = sky_spectra(phase.sky, water, clear)
+        season = _Season(with_sensor_light(phase), factors, channels, skies, reflectance)
         outdoors += season.sky.horizontal.sum(axis=0)
         rows = states_of(phase, None if state is None else state[:, hours])
         for kind, some in combinations(rows):
@@ -173,8 +176,8 @@ def spectral_light(
     return SpectralLight(tuple(received), outdoors)
 
 
-def sky_spectra(sky: AnnualSky, water_cm: ArrayLike = WATER_CM) -> SpectralSky:
-    """The spectra of the skies, grounds and suns of hours."""
+def sky_spectra(sky: AnnualSky, water_cm: ArrayLike = WATER_CM, clear: str = "cie") -> SpectralSky:
+    """The spectra of the skies, grounds and suns of hours; clear: one of `SKY_SPECTRA`."""
     luminance = sky.without_sun()
     return spectral_sky(
         luminance,
@@ -182,6 +185,7 @@ def sky_spectra(sky: AnnualSky, water_cm: ArrayLike = WATER_CM) -> SpectralSky:
         np.asarray(sky.illuminance, dtype=float),
         sky.direction[:, 2],
         water_cm,
+        clear,
     )
 
 
@@ -189,12 +193,12 @@ class _Season:
     """The light of the hours of one season, in the modes of its systems' factors."""
 
     def __init__(
-        self, light: PhaseLight, factors: Factors, channels: Channels, water_cm: Array, reflectance: Array | None
+        self, light: PhaseLight, factors: Factors, channels: Channels, sky: SpectralSky, reflectance: Array | None
     ) -> None:
-        self._light, self.sky = light, sky_spectra(light.sky, water_cm)
+        self._light, self.sky = light, sky
         # power of sun and ground in each band per lumen and of the sky's components
         self._sun, self._ground = channels.power(self.sky.sun), channels.power(self.sky.ground)
-        self._components = channels.power(daylight_components())  # [k, C]
+        self._components = channels.power(self.sky.components)  # [k, C]
         lit = sensor_light(light)
         distinct = {id(factor): factor for of in factors for factor in of}
         of_factors, angles = _modes(list(distinct.values()), channels)  # [C, M]
@@ -283,7 +287,7 @@ class _Modes:
         coefficients = self.coefficients[:, sensors]
         D, M, s = len(weights), len(coefficients), coefficients.shape[1]
         values = np.zeros((D, s * self.amount.shape[-1]))
-        for k in range(COMPONENTS):
+        for k in range(len(self.components)):
             mixed = np.tensordot(weights, self.components[k], (1, 0)).astype(np.float32)  # [D, M]
             if D < M:
                 rows = np.tensordot(mixed, coefficients, 1).reshape(D * s, -1)

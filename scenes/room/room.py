@@ -229,8 +229,7 @@ def lit_room(
             explored = explored_room(room, light, state, sensors=len(daylight.points), progress=progress)
     if options.outputs.spectral:
         with times.stage("spectral"):
-            sensors = len(daylight.points)
-            spectral = room_spectral(room, light, state, sensors, progress=progress)
+            spectral = room_spectral(room, light, state, daylight, progress=progress)
     with times.stage("thermal"):
         surfaces = surfaces or zone_surfaces(room)
         if outdoors is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -24,23 +25,34 @@ from mitsuba_cfs.spectra.detectors import (
     detected,
     equivalent_daylight,
 )
-from scenes.results import MELANOPIC_BY_DAY, SpectralYear
+from scenes.results import MELANOPIC_BY_DAY, DaylightResult, SpectralYear
 from scenes.room.inputs import EYE_TURNS, RoomInputs
 from scenes.room.light import RoomLight
+from scenes.room.luminaires import lamp_spectra
+from scenes.room.surface_spectra import room_reflectance
+from scenes.room.zone import lamp_lux
 
 MELANOPIC = DETECTORS.index("melanopic")
 LEAST_LX = 1.0  # illuminance at the eye below which colour is not stated
 
 
 def room_spectral(
-    room: RoomInputs, light: RoomLight, state: NDArray[np.int64], sensors: int, *, progress: Progress = silent
+    room: RoomInputs,
+    light: RoomLight,
+    state: NDArray[np.int64],
+    daylight: DaylightResult,
+    *,
+    progress: Progress = silent,
 ) -> SpectralYear:
     """Alpha-opic quantities and colour of a year with the shading states of each hour [H, G].
 
-    Args: sensors: number of sensors of the work plane, the first of the scene's.
+    Args: daylight: of the work plane, whose sensors are the first of the scene's.
     """
-    channels = channels_of(room.options.outputs.channels)
+    channels, sensors = channels_of(room.options.outputs.channels), len(daylight.points)
     factors, notes = _factors(room, light)
+    left_out = frozenset() if light.inner is None else light.inner.faces
+    tables = () if room.operation is None else room.operation.surface
+    reflectance, of_surfaces = room_reflectance(room.space, tables, left_out)
     water = _water(room.weather)[room.skies.lit]
     melanopic, photopic = channels.detection[[MELANOPIC]], channels.detection[[0]]
     wanted = (
@@ -49,12 +61,66 @@ def room_spectral(
         Detection(np.eye(channels.count), slice(-1 - len(EYE_TURNS), None)),
     )
     spectral = spectral_light(
-        light.light, factors, channels, wanted, light.states(state), water_cm=water, progress=progress
+        light.light,
+        factors,
+        channels,
+        wanted,
+        light.states(state),
+        reflectance=reflectance,
+        water_cm=water,
+        clear=room.options.sky_spectrum,
+        progress=progress,
     )
-    return spectral_year(room, channels, spectral, notes)
+    lamps, of_lamps = _lamps(room, light, channels, daylight)
+    return spectral_year(room, channels, spectral, [*notes, *of_surfaces, *of_lamps], lamps)
 
 
-def spectral_year(room: RoomInputs, channels: Channels, light: SpectralLight, notes: Sequence[str]) -> SpectralYear:
+@dataclass(frozen=True, slots=True)
+class LampYear:
+    """Light of the lamps by wavelength."""
+
+    power: NDArray[np.float64]  # [S + E, C] of the work plane's sensors and the eyes at full power [W/m2]
+    lux: NDArray[np.float64]  # [S] of the work plane's sensors at full power
+    share: NDArray[np.float64]  # [H] of it that is on
+
+
+def _lamps(
+    room: RoomInputs, light: RoomLight, channels: Channels, daylight: DaylightResult
+) -> tuple[LampYear | None, list[str]]:
+    """The light of the lamps that have a spectrum, dimmed by daylight, and notes."""
+    tables = room.operation
+    if tables is None or not tables.gains.lighting_w_m2:
+        return None, []
+    points, normals = light.scene.sensors()
+    some = np.r_[: len(daylight.points), len(points) - 1 - len(EYE_TURNS) : len(points)]
+    lamps = lamp_spectra(tables, room.space, points[some], normals[some], seed=room.options.sampling.seed)
+    full = tables.gains.lighting_full_lx
+    if lamps is None or not full:
+        return None, [
+            Note(
+                "Room {room}: light by wavelength has no lamps: state the spectrum of each [[gains.luminaire]].",
+                room=room.space.label,
+            )
+        ]
+    lit = lamp_lux(tables, room.weather, daylight.illuminance.mean(axis=1, dtype=float))
+    power, lux = lamps
+    notes: list[str] = []
+    missed = 1 - float(detected(power)[:, 0].sum() / max(lux.sum(), 1e-9))
+    if missed > 1e-3:
+        notes.append(
+            Note(
+                "Room {room}: {share:.0f} % of the lamps' light has no spectrum, and is left out by wavelength.",
+                room=room.space.label,
+                share=100 * missed,
+            )
+        )
+    share = np.zeros(len(room.weather.times)) if lit is None else lit / full
+    return LampYear(channels.power(power), detected(power)[: len(daylight.points), 0], share), notes
+
+
+def spectral_year(
+    room: RoomInputs, channels: Channels, light: SpectralLight, notes: Sequence[str], lamps: LampYear | None = None
+) -> SpectralYear:
     """The results of a year from its light.
 
     Args:
@@ -64,36 +130,39 @@ def spectral_year(room: RoomInputs, channels: Channels, light: SpectralLight, no
     """
     skies, occupied = room.skies, room.occupied
     plane, photopic, bands = light.received
-    received = np.einsum("dc,cel->edl", channels.detection, bands)  # [E, 9, L]
+    eyes = skies.whole_year(bands)  # [C, E, H]
+    edi = equivalent_daylight(skies.whole_year(plane[0]))  # [S, H]
+    total = photopic[0].astype(float)
+    if lamps is not None:
+        count = len(edi)
+        eyes += (lamps.power[count:].T[..., None] * lamps.share).astype(np.float32)
+        edi += equivalent_daylight(lamps.power[:count] @ channels.detection[MELANOPIC])[:, None] * lamps.share
+        total += lamps.lux * lamps.share.sum()
+    received = np.einsum("dc,ceh->edh", channels.detection, eyes)  # [E, 9, H]
     own = received[-1]
-    illuminance = skies.whole_year(own[0])
-    melanopic = skies.whole_year(equivalent_daylight(received[:, MELANOPIC]))  # [E, H]
+    melanopic = equivalent_daylight(received[:, MELANOPIC])  # [E, H]
     temperature, distance = colour_temperature(np.where(own[0] >= LEAST_LX, own[-3:], 0.0).T)
     table = pd.DataFrame({"melanopic_edi_lx": melanopic[-1]}, index=room.weather.midpoints)
-    table["melanopic_der"] = _ratio(melanopic[-1], illuminance)
-    table["photopic_lx"] = illuminance
+    table["melanopic_der"] = _ratio(melanopic[-1], own[0])
+    table["photopic_lx"] = own[0]
     for name in ALPHA_OPIC:
-        alpha = skies.whole_year(own[DETECTORS.index(name)])
-        table[f"{name}_irradiance_mw_m2"] = 1e3 * alpha
-    for column, values in (("cct_k", temperature), ("duv", distance)):
-        whole = np.full(skies.hours, np.nan)
-        whole[skies.lit] = values
-        table[column] = whole
+        table[f"{name}_irradiance_mw_m2"] = 1e3 * own[DETECTORS.index(name)]
+    table["cct_k"], table["duv"] = temperature, distance
     for turn, values in zip(EYE_TURNS, melanopic, strict=False):
         table[f"melanopic_edi_{turn}_lx"] = values
-    edi = skies.whole_year(equivalent_daylight(plane[0]).astype(np.float32)).T
+    on_plane = edi.astype(np.float32).T
     return SpectralYear(
         channels.edges_nm,
         table.rename_axis("time"),
-        edi,
-        _sensors(photopic[0], edi, occupied),
-        np.moveaxis(skies.whole_year(bands[:, -1]), 0, 1).astype(np.float32),
-        _summary(channels, table, bands[:, -1], light.outdoors, room.weather.step_h, occupied),
+        on_plane,
+        _sensors(total, on_plane, occupied),
+        np.ascontiguousarray(eyes[:, -1].T),
+        _summary(channels, table, eyes[:, -1], light.outdoors, room.weather.step_h, occupied),
         tuple(notes),
     )
 
 
-def _sensors(photopic: NDArray[np.float32], edi: NDArray[np.float32], occupied: NDArray[np.bool_]) -> pd.DataFrame:
+def _sensors(photopic: NDArray[np.float64], edi: NDArray[np.float32], occupied: NDArray[np.bool_]) -> pd.DataFrame:
     """Mean melanopic EDI [lx], DER and share of occupied hours at 250 lx or more, by sensor.
 
     Args: photopic: sum over the hours [S] [lx].
