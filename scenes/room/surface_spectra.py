@@ -98,8 +98,8 @@ def room_reflectance(
     if coloured:
         notes.append(
             Note(
-                "Room {room}: {count} surfaces reflect by wavelength as the smooth spectrum of their colour in "
-                "the model; state [[surface]] for measured ones.",
+                "Room {room}: surfaces with a colour in the model ({count}) have a smooth spectrum of that colour; "
+                "state [[surface]] for measured ones.",
                 room=space.label,
                 count=coloured,
             )

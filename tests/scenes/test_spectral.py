@@ -233,7 +233,7 @@ def test_colours_of_surfaces_are_those_stated_then_those_of_the_model(tmp_path) 
     floor, left = found[kinds.index("floor")], found[[face.name for face in space.faces].index("left")]
     assert floor[-1] / floor[0] == pytest.approx(5.0)
     assert left[250] > 1.5 * left[60] and found[0, 250] > 1.5 * found[0, 60]
-    assert len(notes) == 1 and "1 surfaces reflect by wavelength" in notes[0]
+    assert len(notes) == 1 and "with a colour in the model (1)" in notes[0]
     assert room_reflectance(shoebox().spaces[0]) == (None, [])
     other = room_reflectance(shoebox().spaces[0], (*tables[1:], SurfaceTable(select="no such", colour="#ff0000")))
     assert [note for note in other[1] if "no such" in note]
