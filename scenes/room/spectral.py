@@ -49,17 +49,41 @@ def room_spectral(
     Args: daylight: of the work plane, whose sensors are the first of the scene's.
     """
     channels, sensors = channels_of(room.options.outputs.channels), len(daylight.points)
+    wanted = (
+        Detection(channels.detection[[MELANOPIC]], slice(sensors)),
+        Detection(channels.detection[[0]], slice(sensors), total=True),
+        Detection(np.eye(channels.count), slice(-1 - len(EYE_TURNS), None)),
+    )
+    spectral, notes = _light(room, light, state, channels, wanted, progress)
+    lamps, of_lamps = _lamps(room, light, channels, daylight)
+    return spectral_year(room, channels, spectral, [*notes, *of_lamps], lamps)
+
+
+def eye_illuminances(
+    room: RoomInputs, light: RoomLight, state: NDArray[np.int64], *, progress: Progress = silent
+) -> tuple[NDArray[np.float64], list[str]]:
+    """Illuminance and melanopic EDI [2, H] [lx] of the eye by daylight, and notes; state: [H, G]."""
+    channels = channels_of(room.options.outputs.channels)
+    wanted = (Detection(channels.detection[[0, MELANOPIC]], slice(-1, None)),)
+    spectral, notes = _light(room, light, state, channels, wanted, progress)
+    values = spectral.received[0][:, 0].astype(float)
+    values[1] = equivalent_daylight(values[1])
+    return room.skies.whole_year(values), notes
+
+
+def _light(
+    room: RoomInputs,
+    light: RoomLight,
+    state: NDArray[np.int64],
+    channels: Channels,
+    wanted: Sequence[Detection],
+    progress: Progress,
+) -> tuple[SpectralLight, list[str]]:
+    """What detectors receive of a room's daylight, and what was assumed."""
     factors, notes = _factors(room, light)
     left_out = frozenset() if light.inner is None else light.inner.faces
     tables = () if room.operation is None else room.operation.surface
     reflectance, of_surfaces = room_reflectance(room.space, tables, left_out)
-    water = _water(room.weather)[room.skies.lit]
-    melanopic, photopic = channels.detection[[MELANOPIC]], channels.detection[[0]]
-    wanted = (
-        Detection(melanopic, slice(sensors)),
-        Detection(photopic, slice(sensors), total=True),
-        Detection(np.eye(channels.count), slice(-1 - len(EYE_TURNS), None)),
-    )
     spectral = spectral_light(
         light.light,
         factors,
@@ -67,12 +91,11 @@ def room_spectral(
         wanted,
         light.states(state),
         reflectance=reflectance,
-        water_cm=water,
+        water_cm=_water(room.weather)[room.skies.lit],
         clear=room.options.sky_spectrum,
         progress=progress,
     )
-    lamps, of_lamps = _lamps(room, light, channels, daylight)
-    return spectral_year(room, channels, spectral, [*notes, *of_surfaces, *of_lamps], lamps)
+    return spectral, [*notes, *of_surfaces]
 
 
 @dataclass(frozen=True, slots=True)
