@@ -9,10 +9,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
+from bim.rays import ray_mesh
+from mitsuba_cfs.bsdf.spectral_factor import ANGLES, SpectralFactor
+from mitsuba_cfs.images.hdr import LUMINANCE_WEIGHTS
+from mitsuba_cfs.images.view import pixel_directions
+from mitsuba_cfs.methods.colour_view import rgb_over_luminance
 from mitsuba_cfs.methods.optics import SystemOptics
-from mitsuba_cfs.methods.spectral_light import Detection, SpectralLight, spectral_light
+from mitsuba_cfs.methods.spectral_light import Detection, SpectralLight, sky_spectra, spectral_light
 from mitsuba_cfs.notes import Note
+from mitsuba_cfs.picture_year.year import PictureYear
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.spectra.channels import Channels, channels_of
@@ -20,12 +25,14 @@ from mitsuba_cfs.spectra.daylight import WATER_CM, water_vapour_cm
 from mitsuba_cfs.spectra.detectors import (
     ALPHA_OPIC,
     DETECTORS,
+    NANOMETRES,
     colour_rendering,
     colour_temperature,
     detected,
     equivalent_daylight,
+    illuminant,
 )
-from scenes.results import MELANOPIC_BY_DAY, DaylightResult, SpectralYear
+from scenes.results import MELANOPIC_BY_DAY, DaylightResult, ExploredColour, SpectralYear
 from scenes.room.inputs import EYE_TURNS, RoomInputs
 from scenes.room.light import RoomLight
 from scenes.room.luminaires import lamp_spectra
@@ -286,3 +293,110 @@ def _ratio(a: NDArray[np.floating] | float, b: NDArray[np.floating] | float) -> 
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     ratio: NDArray[np.float64] = np.divide(a, b, out=np.full(a.shape, np.nan), where=b > 0)
     return ratio
+
+
+def explored_colour(
+    room: RoomInputs, light: RoomLight, combinations: NDArray[np.int64], pictures: Sequence[PictureYear], sensors: int
+) -> ExploredColour:
+    """Colours of the explorer's pictures by part, and melanopic light, in each combination of states [J, G].
+
+    Args: sensors: number of sensors of the work plane, the first of the scene's.
+    """
+    channels = channels_of(room.options.outputs.channels)
+    wanted = (
+        Detection(channels.detection[[MELANOPIC]], slice(sensors)),
+        Detection(channels.detection, slice(-1, None)),
+    )
+    water = _water(room.weather)[room.skies.lit]
+    skies = sky_spectra(room.skies, water, room.options.sky_spectrum)
+    beam = room.skies.illuminance * np.maximum(room.skies.direction[:, 2], 0.0)
+    white = detected(skies.horizontal)
+    of_sky = detected(np.maximum(skies.horizontal - beam[:, None] * skies.sun, 0.0))
+    factors, _ = _factors(room, light)
+    left_out = frozenset() if light.inner is None else light.inner.faces
+    tables = () if room.operation is None else room.operation.surface
+    reflectance, _ = room_reflectance(room.space, tables, left_out)
+    seen = _seen_surfaces(light, pictures[0])
+    pixels, indoors, suns, plane = [], [], [], []
+    for combination, pictured in zip(combinations, pictures, strict=True):
+        states = np.tile(combination, (room.skies.hours, 1))
+        spectral, _ = _light(room, light, states, channels, wanted, silent)
+        plane.append(equivalent_daylight(spectral.received[0][0]).astype(np.float32))
+        indoors.append(spectral.received[1][:, 0].T.astype(float))
+        of_groups = [factors[g][min(j, len(factors[g]) - 1)] for g, j in enumerate(combination.tolist())]
+        suns.append(detected(skies.sun * _towards_sun(light, of_groups, room.skies.direction)))
+        pixels.append(_pixel_tints(light, pictured, seen, reflectance, of_groups))
+    indoor, sun = np.array(indoors), np.array(suns)
+    return ExploredColour(
+        tuple(pixels),
+        _tints(indoor, white),
+        _tints(of_sky, white),
+        _tints(sun, white),
+        tuple(plane),
+        equivalent_daylight(indoor[..., MELANOPIC]).astype(np.float32),
+    )
+
+
+def _tints(received: NDArray[np.float64], white: NDArray[np.float64] | None = None) -> NDArray[np.float32]:
+    """Linear sRGB over luminance and DER [.., 4] of what detectors receive [.., 9], 1 in the dark.
+
+    Args: white: [L, 9] that is balanced; of no hour: D65.
+    """
+    dark = received[..., 0] <= 0
+    x, y, z = np.moveaxis(np.where(dark[..., None], 1.0, received[..., -3:]), -1, 0)
+    rgb = rgb_over_luminance(x / y, z / y)
+    if white is not None:
+        wx, wy, wz = np.where(white[:, :1] <= 0, 1.0, white[:, -3:]).T
+        rgb = rgb / np.maximum(rgb_over_luminance(wx / wy, wz / wy), 1e-3)
+        rgb = rgb / np.maximum(rgb @ np.asarray(LUMINANCE_WEIGHTS), 1e-6)[..., None]
+    ratio = np.where(dark, 1.0, equivalent_daylight(received[..., MELANOPIC]) / np.where(dark, 1.0, received[..., 0]))
+    return np.concatenate([rgb, ratio[..., None]], axis=-1).astype(np.float32)
+
+
+def _seen_surfaces(light: RoomLight, pictures: PictureYear) -> NDArray[np.int64]:
+    """The surface of the room that each pixel of the pictures shows [n]; -1: none."""
+    interior = light.scene.interior
+    ways = pixel_directions(pictures.view)[0].reshape(-1, 3)[pictures.pixels]
+    start = np.tile(np.asarray(pictures.view.position, dtype=float), (len(ways), 1))
+    _, hit = ray_mesh(interior.triangles).first_hits(start, ways)
+    return np.where(hit >= 0, interior.surface[hit], -1)
+
+
+def _pixel_tints(
+    light: RoomLight,
+    pictures: PictureYear,
+    seen: NDArray[np.int64],
+    reflectance: NDArray[np.float64] | None,
+    factors: Sequence[SpectralFactor],
+) -> NDArray[np.float32]:
+    """Tints under D65 of the surfaces and panes that pixels show [n, 4]."""
+    tints = np.ones((len(seen), 4), dtype=np.float32)
+    if reflectance is not None:
+        tints = np.where((seen >= 0)[:, None], _tints(detected(reflectance * illuminant("D65")))[seen], tints)
+    ways = pixel_directions(pictures.view)[0].reshape(-1, 3)[pictures.pixels][pictures.window]
+    groups = light.scene.groups
+    start = np.asarray(pictures.view.position, dtype=float)
+    meshes = [ray_mesh(np.concatenate([w.triangles for w in group.windows])) for group in groups]
+    far = np.array([mesh.first_hits(np.tile(start, (len(ways), 1)), ways)[0] for mesh in meshes])
+    nearest = far.argmin(axis=0) if len(far) else np.zeros(len(ways), dtype=np.int64)
+    for g, factor in enumerate(factors):
+        of_angle = _tints(detected(factor.transmittance * illuminant("D65")))
+        theta = np.arccos(np.clip(ways @ groups[g].frame[2], 0.0, 1.0))
+        some = nearest == g
+        columns = [np.interp(theta[some], ANGLES, column) for column in of_angle.T]
+        tints[pictures.window[some]] = np.stack(columns, axis=1)
+    return tints
+
+
+def _towards_sun(
+    light: RoomLight, factors: Sequence[SpectralFactor], towards: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Relative transmittance [L, N] of the window group that faces the sun most."""
+    facing = np.array([towards @ group.frame[2] for group in light.scene.groups[: len(factors)]])
+    first = facing.argmax(axis=0)
+    found = np.ones((len(towards), len(NANOMETRES)))
+    for g, factor in enumerate(factors[: len(facing)]):
+        some = first == g
+        theta = np.arccos(np.clip(facing[g][some], 0.0, 1.0))
+        found[some] = factor.transmittance[np.clip(np.rint(np.degrees(theta)), 0, len(ANGLES) - 1).astype(int)]
+    return np.maximum(found, 1e-9)

@@ -14,10 +14,10 @@ from pydantic import Field, model_validator
 
 from bim.colours import GREY, linear_of_display
 from bim.model import FACE_KINDS, Element, Face, Space
+from mitsuba_cfs.bsdf.colour import reflectance_of_colour, with_visible
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.spectra.detectors import NANOMETRES
-from mitsuba_cfs.spectra.reflectance import reflectance_of_colour, with_visible
 from scenes.fenestration.thermal_file import csv_columns
 from scenes.toml_file import TomlTable
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.colour import relative_rgb
+from mitsuba_cfs.bsdf.colour import reflectance_of_colour, relative_rgb, with_visible
 from mitsuba_cfs.spectra.detectors import NANOMETRES, illuminant, sensitivities
-from mitsuba_cfs.spectra.reflectance import reflectance_of_colour, with_visible
 
 
 @pytest.mark.parametrize("linear", [(0.5, 0.5, 0.5), (0.6, 0.05, 0.03), (0.3, 0.2, 0.1), (0.02, 0.1, 0.5)])
