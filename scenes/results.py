@@ -264,7 +264,7 @@ class ExploredColour:
     pixels: tuple[NDArray[np.float32], ...]  # [J][n, 4] tint of what each pixel shows, under white light
     indoors: NDArray[np.float32]  # [J, L, 4] of the light at the eye, for what the room reflects
     sky: NDArray[np.float32]  # [L, 4] of the sky, for what is seen through windows
-    sun: NDArray[np.float32]  # [J, L, 4] of the sun's beam behind the windows
+    sun: NDArray[np.float32]  # [J, L, 4] of the sun's beam indoors
     melanopic: tuple[NDArray[np.float32], ...]  # [J] melanopic EDI of the sensors [S, L] [lx]
     eye: NDArray[np.float32]  # [J, L] melanopic EDI of the eye [lx]
 
