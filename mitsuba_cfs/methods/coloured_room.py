@@ -16,11 +16,13 @@ Source of the choice of channels: Drmac and Gugercin 2016, SIAM J. Sci. Comput. 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.bsdf.spectral_factor import VISIBLE, SpectralFactor
 from mitsuba_cfs.methods.coefficients import beam_matrix
 from mitsuba_cfs.methods.phase_light import PhaseLight, beam_by_patches, sensor_light, traced_states
 from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, with_exchange, with_sensors
@@ -92,39 +94,72 @@ class RoomInBand:
     """The room of a light in one of its bands of reflectance."""
 
     matrices: PhaseMatrices
+    mirrored: tuple[tuple[float, ...], ...]  # [G][J] what windows reflect of the room's light, over visible
     beams: tuple[tuple[Array | None, ...], ...]  # [G][J] as `SensorLight.beam_in_room`, of traced states
 
 
 def rooms_in_bands(
-    light: PhaseLight, reflectance: Array | None, channels: Channels
+    light: PhaseLight, reflectance: Array | None, factors: Sequence[Sequence[SpectralFactor]], channels: Channels
 ) -> tuple[tuple[RoomInBand, ...], Array]:
     """The room in each of its bands [Q], that of visible light first, and their shares [C, Q].
 
-    Args: reflectance: diffuse reflectance of the interior's surfaces [F, N]; None: all are neutral.
+    Windows reflect the room's light as surfaces of their own.
+
+    Args:
+        reflectance: diffuse reflectance of the interior's surfaces [F, N]; None: all are neutral.
+        factors: of the systems of the light [G][J].
     """
     lit, states = sensor_light(light), tuple(map(traced_states, light.systems))
     seen = tuple(tuple(of[j].beam_in_room for j in js) for of, js in zip(lit, states, strict=True))
-    visible = RoomInBand(light.matrices, seen)
-    interior = light.scene.interior
-    if reflectance is None or not len(interior.triangles):
+    interior, matrices = light.scene.interior, light.matrices
+    neutral = tuple(tuple(1.0 for _ in of) for of in factors)
+    visible = RoomInBand(matrices, neutral, seen)
+    if not len(interior.triangles):
         return (visible,), np.ones((channels.count, 1))
-    bands = reflectance_bands(*_by_surface(interior, channels.mean(reflectance)), channels)
-    matrices = [_in_band(light.matrices, _with(interior, values)) for values in bands.reflectance[1:]]
-    if not matrices:
-        return (visible,), bands.shares
-    rooms = [RoomInBand(one, beams) for one, beams in zip(matrices, _beams(light, matrices, seen), strict=True)]
-    return (visible, *rooms), bands.shares
+    own, by_channel, area = _by_surface(interior, reflectance, channels)
+    panes: dict[int, tuple[Array, float]] = {}
+    for of, group in zip(factors, light.scene.groups, strict=True):
+        panes |= {id(one): (one.mirrored, group.area) for one in of if one.mirrored is not None}
+    rows = [spectrum for spectrum, _ in panes.values()]
+    bands = reflectance_bands(
+        np.array([*own, *(spectrum @ VISIBLE / VISIBLE.sum() for spectrum in rows)]),
+        np.array([*by_channel, *map(channels.mean, rows)]),
+        np.array([*area, *(size for _, size in panes.values())]),
+        channels,
+    )
+    number, surfaces = {key: len(own) + i for i, key in enumerate(panes)}, bands.reflectance[:, : len(own)]
+    coloured = np.flatnonzero((surfaces != own).any(axis=1))
+    traced = {int(q): _in_band(matrices, _with(interior, surfaces[q])) for q in coloured}
+    beams, rooms = dict(zip(traced, _beams(light, list(traced.values()), seen), strict=True)), [visible]
+    for q, values in enumerate(bands.reflectance[1:], start=1):
+        mirrored = tuple(
+            tuple(_over(values, bands.reflectance[0], number.get(id(factor))) for factor in of) for of in factors
+        )
+        rooms.append(RoomInBand(traced.get(q, matrices), mirrored, beams.get(q, seen)))
+    return tuple(rooms), bands.shares
 
 
-def _by_surface(interior: Surfaces, reflectance: Array) -> tuple[Array, Array, Array]:
-    """Visible reflectance [F], that by channel [F, C] and area [F] of the surfaces."""
+def _over(values: Array, visible: Array, number: int | None) -> float:
+    """A value over the visible one; 1 where there is none."""
+    if number is None or not visible[number]:
+        return 1.0
+    return float(values[number] / visible[number])
+
+
+def _by_surface(interior: Surfaces, reflectance: Array | None, channels: Channels) -> tuple[Array, Array, Array]:
+    """Visible reflectance [F], that by channel [F, C] and area [F] of the surfaces.
+
+    Args: reflectance: [F, N]; None: all are neutral.
+    """
     F = int(interior.surface.max()) + 1
-    if len(reflectance) < F:
+    if reflectance is not None and len(reflectance) < F:
         raise ValueError(f"reflectance: expected a row for each of {F} surfaces, got {len(reflectance)}")
     visible: Array = np.zeros(F)
     area = np.bincount(interior.surface, interior.areas, F).astype(float)
     visible[interior.surface] = interior.reflectance
-    return visible, np.minimum(reflectance[:F], _most(interior, F)[:, None]), area
+    if reflectance is None:
+        return visible, np.repeat(visible[:, None], channels.count, axis=1), area
+    return visible, np.minimum(channels.mean(reflectance[:F]), _most(interior, F)[:, None]), area
 
 
 def _most(interior: Surfaces, count: int) -> Array:
@@ -150,6 +185,8 @@ def _beams(
     light: PhaseLight, rooms: list[PhaseMatrices], visible: tuple[tuple[Array | None, ...], ...]
 ) -> list[tuple[tuple[Array | None, ...], ...]]:
     """The sun's beam that each room reflects to the sensors [Q][G][J]."""
+    if not rooms:
+        return []
     sun, lit, states = light.reflected, sensor_light(light), tuple(map(traced_states, light.systems))
     known: dict[tuple[int, int], list[Array | None]] = {}
     shown: list[SunlitRoom | None] = []

@@ -78,6 +78,7 @@ class ModeOptics:
 
     visible: SystemOptics
     factor: Array  # [K] r_m of the patches of incidence
+    mirrored: float = 1.0  # what it reflects of the room's light, over visible light
 
     @property
     def transmission(self) -> Array:
@@ -96,8 +97,9 @@ class ModeOptics:
 
     @property
     def reflection(self) -> Array | None:
-        """See `SystemOptics`; of the visible band."""
-        return self.visible.reflection
+        """See `SystemOptics`; that of the visible band times a number."""
+        reflection = self.visible.reflection
+        return reflection if reflection is None or self.mirrored == 1.0 else reflection * self.mirrored
 
     @property
     def outdoor_reflection(self) -> Array | None:
@@ -204,7 +206,7 @@ class _Season:
         of_factors, angles = _modes(list(distinct.values()), channels)  # [C, M]
         known = dict(zip(distinct, angles, strict=True))
         self._angles = [[known[id(factor)] for factor in of] for of in factors]
-        rooms, of_rooms = rooms_in_bands(light, reflectance, channels)
+        rooms, of_rooms = rooms_in_bands(light, reflectance, factors, channels)
         self._shares = np.einsum("cq,cm->cqm", of_rooms, of_factors).reshape(channels.count, -1)
         self._modes = []
         for room in rooms:
@@ -226,8 +228,8 @@ class _Season:
             for states, traced in zip(light.systems, groups, strict=True)
         )
         systems = [
-            [ModeOptics(one, of.patches[m]) for one, of in zip(states, angles, strict=True)]
-            for states, angles in zip(light.systems, self._angles, strict=True)
+            [ModeOptics(one, of.patches[m], k) for one, of, k in zip(states, angles, mirrored, strict=True)]
+            for states, angles, mirrored in zip(light.systems, self._angles, room.mirrored, strict=True)
         ]
         return replace(light, matrices=room.matrices, systems=systems, sensors=sensors)
 
