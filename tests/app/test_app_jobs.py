@@ -60,12 +60,18 @@ def test_a_command_reports_its_progress_and_leaves_its_results(project, jobs) ->
     assert log.read_text("utf-8").startswith("$ cfs check inputs/office.ifc")
 
 
-def test_stop_and_resume(project, jobs) -> None:
+def test_stop_and_resume(project, jobs, monkeypatch) -> None:
     blind = actions.library("double clear", "venetian 25 mm inside, 45 deg")  # traced for seconds
+    take = jobs._take
+
+    def stop_at_first_progress(job, line, log) -> None:
+        take(job, line, log)
+        if job.number == 1 and job.progress and job.code is None:
+            jobs.stop(2)
+            jobs.stop(1)
+
+    monkeypatch.setattr(jobs, "_take", stop_at_first_progress)
     jobs.add([blind, actions.check(project)])
-    until(lambda: jobs.facts()[0]["progress"])
-    jobs.stop(2)
-    jobs.stop(1)
     until(lambda: not jobs.busy)
     assert [job["state"] for job in jobs.facts()] == ["stopped", "stopped"]
     assert jobs.facts()[0]["code"] == 130 and not (project.folder / blind.out).exists()
