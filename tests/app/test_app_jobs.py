@@ -31,9 +31,12 @@ def project(tmp_path) -> Project:
 
 @pytest.fixture
 def jobs(project):
+    # As uvicorn does in `cfs app`: what a shell runs in the background ignores SIGINT, and so would the commands
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     one = Jobs(project)
     yield one
     one.close()
+    signal.signal(signal.SIGINT, before)
 
 
 def until(happened) -> None:
