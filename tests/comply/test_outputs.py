@@ -79,7 +79,7 @@ def options(tmp_path_factory) -> ComplyOptions:
 
 def files_of(options: ComplyOptions, **more) -> ComplyFiles:
     rules = {"rays": read_rule(options.standards[0])}
-    found = ComplyFiles(InputFiles(read_weather(WEATHER)), rules, read_uses(), None, 13.0, "assumed: as you like")
+    found = ComplyFiles(InputFiles(read_weather(WEATHER)), rules, read_uses(), None, None, 13.0, "assumed: as you like")
     return replace(found, **more)
 
 
