@@ -86,6 +86,7 @@ def first_plan(
     inputs: Inputs, spaces: Sequence[Space], options: JobOptions, progress: Progress = silent
 ) -> list[PlannedRoom]:
     """The first plan of the rooms of a run; those that cannot be computed are left out."""
+    progress("first plan", 0.0)
     room = plan_options(options.room)
     skies = skies_for(inputs.weather, room.sampling, **room.sky)
     chosen = replace(options, room=room, inner_glass=False, cache=False)
