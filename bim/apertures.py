@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from bim.boxes import Boxes
 from bim.colours import GREY, Colour
 from bim.defaults import FRAME_FRACTION
-from bim.planes import Plane, area_vectors, plane_through, polygons_of, without_slits
+from bim.planes import Plane, plane_through, polygons_of, without_slits
 from bim.rays import RayMesh, ray_mesh
 from bim.report.issue import Effect, Issue, Phrase
+from mitsuba_cfs.surfaces import area_vectors
 
 FLAT = 0.95  # cosine: panes within 18 degrees of the main direction are in its plane
 SMALLEST_PANE = 0.01  # less glass than this is a spy hole, not a window [m2]

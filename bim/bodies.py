@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.enclosure import touching_parts
-from bim.planes import area_vectors
 from bim.rays import RayMesh
-from bim.shell import enclosed_volume
+from mitsuba_cfs.surfaces import area_vectors
 
 SAME_PLACE = 1e-5  # faces nearer than this along a ray are in one place [m]
 OPEN = 1e-4  # share of a closed part's area that its faces may fail to cancel by
@@ -67,7 +66,12 @@ class Bodies:
     mesh: RayMesh
     element: NDArray[np.int64]  # [N] element of each triangle, rising
     item: NDArray[np.int64]  # [N] representation item of each triangle
-    turned: dict[int, NDArray[np.bool_]] = field(default_factory=dict)  # of elements asked so far
+    # [N] whether a triangle is of a closed body that is drawn inside out
+    turned: NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        body = self.element * (self.item.max(initial=0) + 1) + self.item  # bodies that touch share corners
+        object.__setattr__(self, "turned", _inside_out(self.mesh.triangles, body))
 
     def along(self, origin: NDArray[np.float64], direction: NDArray[np.float64], reach: float) -> list[Span]:
         """The elements that a ray is in within its reach [m], by where it enters them.
@@ -86,7 +90,7 @@ class Bodies:
                 own = of_element & (items == item)
                 faces = _faces(distance[own], hit[own], into[own])
                 if _depths(faces)[0] > 0:  # the ray begins inside, or the body is inside out
-                    turned = into[own] ^ self._is_turned(number, hit[own])
+                    turned = into[own] ^ self.turned[hit[own]]
                     faces = _faces(distance[own], hit[own], turned)
                 parts += self._parts(number, item, faces, origin, direction, reach=reach)
             spans += _joined(number, parts)
@@ -124,17 +128,6 @@ class Bodies:
         first, last = np.searchsorted(self.element, [number, number + 1]).tolist()
         return first, last
 
-    def _is_turned(self, number: int, hit: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Whether triangles of an element belong to a closed body that is drawn inside out."""
-        first, last = self._rows(number)
-        if number not in self.turned:
-            triangles, items = self.mesh.triangles[first:last], self.item[first:last]
-            turned = np.zeros(last - first, dtype=bool)
-            for item in np.unique(items):  # bodies that touch share corners
-                turned[items == item] = _inside_out(triangles[items == item])
-            self.turned[number] = turned
-        return self.turned[number][hit - first]
-
 
 def _joined(number: int, parts: list[Part]) -> list[Span]:
     """An element's bodies along a ray as one where they touch."""
@@ -167,13 +160,17 @@ def _depths(faces: Sequence[Face]) -> list[int]:
     return [step - least for step in steps]
 
 
-def _inside_out(triangles: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether each triangle [N, 3, 3] is of a closed part whose normals point into it [N]."""
-    turned = np.zeros(len(triangles), dtype=bool)
-    part = touching_parts(triangles)
-    for number in range(part.max(initial=-1) + 1):
-        own = triangles[part == number]
-        gap = np.linalg.norm(area_vectors(own).sum(axis=0))
-        is_closed = gap < OPEN * np.linalg.norm(area_vectors(own), axis=1).sum()
-        turned[part == number] = is_closed and enclosed_volume(own) < 0
-    return turned
+def _inside_out(triangles: NDArray[np.float64], body: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether each triangle [N, 3, 3] of a body [N] is of a closed part of it whose normals point inwards [N]."""
+    part, vectors = touching_parts(triangles, body), area_vectors(triangles)
+
+    def sums(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sums [parts, k] of values [N, k]."""
+        return np.stack([np.bincount(part, column) for column in values.T], axis=1)
+
+    areas = sums(np.linalg.norm(vectors, axis=1, keepdims=True))[:, 0]
+    is_closed = np.linalg.norm(sums(vectors), axis=1) < OPEN * areas
+    middle = sums(triangles.mean(axis=1)) / np.bincount(part)[:, None]
+    # a . (b x c) / 6 of each tetrahedron with the middle
+    volume = sums(np.einsum("ij,ij->i", triangles[:, 0] - middle[part], vectors)[:, None])[:, 0] / 3
+    return (is_closed & (volume < 0))[part]

@@ -22,10 +22,10 @@ from bim.defaults import (
 from bim.material_names import NamedMaterial
 from bim.model import Construction, Face, MaterialLayer, Window
 from bim.neighbours import THICKEST_SPAN, Beyond
-from bim.planes import area_vectors
 from bim.rooms import Piece
 from bim.shell import conforming_triangles
 from mitsuba_cfs.gloss import Gloss
+from mitsuba_cfs.surfaces import area_vectors
 
 SHALLOWEST_GAP = 0.01  # air between two elements from this on is a layer [m]
 

@@ -72,32 +72,39 @@ class _NotStored(Exception):
 
 
 def read_once(
-    read: Callable[[], Building], files: Sequence[Path], options: Sequence[object], cache: MatrixCache
+    read: Callable[[], Building],
+    files: Sequence[Path],
+    options: Sequence[object],
+    cache: MatrixCache,
+    *,
+    corrected: bool = True,
 ) -> Building:
     """The building of IFC files from the cache; read and stored where it is not in it.
 
     It is not stored where a process of its reading was stopped or crashed: another time, with more
     memory or less other work, the building may have what it lacks now.
 
-    Args: options: of the reader, besides the files and the corrections beside them.
+    Args:
+        options: of the reader, besides the files and the corrections beside them.
+        corrected: whether it reads these corrections.
     """
-    entry = _entry(files, options, cache)
+    entry = _entry(files, options, cache, corrected)
     building = None if entry is None else entry.read(_restored)
     if building is None:
         with ended_processes() as ended:
             building = read()
         # files that changed while they were read are not those of the key
-        if entry is not None and not ended and entry == _entry(files, options, cache):
+        if entry is not None and not ended and entry == _entry(files, options, cache, corrected):
             _store(entry, building)
     return building
 
 
-def _entry(files: Sequence[Path], options: Sequence[object], cache: MatrixCache) -> CacheEntry | None:
+def _entry(files: Sequence[Path], options: Sequence[object], cache: MatrixCache, corrected: bool) -> CacheEntry | None:
     """The entry by the content of all files; None where one of them cannot be read."""
     corrections = [corrections_file(file) for file in files]
     try:
         contents = [sha256(file) for file in files]
-        contents += [sha256(file) if file.is_file() else "" for file in corrections]
+        contents += [sha256(file) if corrected and file.is_file() else "" for file in corrections]
     except OSError:
         return None
     return cache.entry("building", [*map(str, files)], contents, list(options), by=READER)
@@ -377,6 +384,26 @@ def check_building_file(path: str | PathLike[str]) -> None:
     """
     refuse_unread_format(Path(path))
     _format(Path(path)).check(Path(path))
+
+
+def check_room_names(paths: Sequence[Path], rooms: Sequence[str]) -> None:
+    """Refuse names that are like none of IFC files, before anything heavy is loaded.
+
+    A name whose text is in a file is left to the reader.
+
+    Raises: `DataError`.
+    """
+    if not (rooms and paths and all(map(is_ifc, paths))):
+        return
+    texts = [path.read_bytes().lower() for path in paths]
+    # letters beyond ASCII are written in another form
+    parts = {room: [part.encode() for part in re.findall(r"[ -~]+", room.lower())] for room in rooms}
+    absent = [room for room, of in parts.items() if not any(of and all(one in text for one in of) for text in texts)]
+    if absent:
+        from bim.ifc.project import open_all
+        from bim.ifc.spaces import check_rooms
+
+        check_rooms([*open_all(paths).values()], absent, paths[0], corrections_beside(paths[0]).room_names)
 
 
 def refuse_unread_format(path: Path) -> None:

@@ -18,12 +18,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from bim.leaks import may_enclose
-from bim.mesh_repair import welded_mesh
-from bim.planes import area_vectors, principal_extents
+from bim.planes import principal_extents
 from bim.rays import ray_mesh
 from bim.shell import enclosed_volume
 from bim.solids import solid_of, triangles_of, union
 from mitsuba_cfs.processes import Told
+from mitsuba_cfs.surfaces import area_vectors
 
 GAP = 0.02  # gaps between elements up to this are closed [m]
 FINEST = 1e-3  # smaller details of a found room are smoothed out [m]
@@ -167,13 +167,16 @@ def interior_parts(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     return [part for part in parts if enclosed_volume(part) < 0]
 
 
-def touching_parts(triangles: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Number of the connected part that each triangle [N, 3, 3] belongs to."""
-    vertices, faces = welded_mesh(triangles, 1e-6)
-    if len(faces) != len(triangles):  # collapsed triangles keep their corners' part
-        keys = np.round(triangles.reshape(-1, 3) / 1e-6).astype(np.int64)
-        faces = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1, 3)
-    count = max(len(vertices), int(faces.max(initial=-1)) + 1)
+def touching_parts(triangles: NDArray[np.float64], body: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
+    """Number of the connected part that each triangle [N, 3, 3] belongs to.
+
+    Args: body: of each triangle [N]; triangles of different bodies do not touch.
+    """
+    keys = np.round(triangles.reshape(-1, 3) / 1e-6).astype(np.int64)
+    if body is not None:
+        keys = np.column_stack([keys, np.repeat(body, 3)])
+    faces = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    count = int(faces.max(initial=-1)) + 1
     rows, columns = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
     graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
     return connected_components(graph, directed=False)[1][faces[:, 0]]

@@ -27,6 +27,7 @@ from bim.report.issue import Issue
 from bim.use import StatedUse
 from mitsuba_cfs.errors import DataError, check_number
 from mitsuba_cfs.gloss import Gloss
+from mitsuba_cfs.surfaces import area_vectors, triangle_areas
 
 LONGITUDE_LATITUDE = "OGC:CRS84"  # degrees, as GeoJSON has them (RFC 7946)
 EQUATOR, FLATTENING = 6378137.0, 1 / 298.257223563  # WGS 84 [m], [1]
@@ -384,19 +385,17 @@ def set_normal_and_area(surface: Face | Window) -> None:
     t = np.asarray(surface.triangles, dtype=float)
     if t.ndim != 3 or t.shape[1:] != (3, 3) or len(t) == 0:
         raise ValueError(f"{surface.name}: expected triangles [T, 3, 3], got {t.shape}")
-    area_vectors = 0.5 * np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
-    vector = area_vectors.sum(axis=0)
+    vector = area_vectors(t).sum(axis=0)
     if not np.linalg.norm(vector) > 0:
         raise ValueError(f"{surface.name}: has no area")
     object.__setattr__(surface, "triangles", t)
     object.__setattr__(surface, "normal", vector / np.linalg.norm(vector))
-    object.__setattr__(surface, "area", float(np.linalg.norm(area_vectors, axis=1).sum()))
+    object.__setattr__(surface, "area", float(triangle_areas(t).sum()))
 
 
 def centroid(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Area-weighted centre [3] [m] of triangles [T, 3, 3]."""
-    edges = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return np.average(triangles.mean(axis=1), axis=0, weights=np.linalg.norm(edges, axis=1))
+    return np.average(triangles.mean(axis=1), axis=0, weights=triangle_areas(triangles))
 
 
 MONTHS = range(1, 13)
@@ -413,8 +412,9 @@ class Season:
 def seasons(building: Building) -> tuple[Season, ...]:
     """The seasons of a building, that with most leaves first; one where nothing changes."""
     stands: dict[tuple[bool, ...], list[int]] = {}
+    changing = [element.months for element in building.elements if element.months]
     for month in MONTHS:
-        kind = tuple(not e.months or month in e.months for e in building.elements)
+        kind = tuple(month in months for months in changing)
         stands.setdefault(kind, []).append(month)
     if len(stands) == 1:
         return (Season(tuple(MONTHS), building),)

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from bim.bodies import Bodies, Span
 from bim.boxes import Boxes
-from bim.planes import Facet, area_vectors, polygons_of, triangulated
+from bim.planes import Facet, polygons_of, triangulated
 from bim.rays import RayMesh, hemisphere
 from bim.rooms import Piece, RoomSolid, cut
+from mitsuba_cfs.surfaces import area_vectors
 
 T = TypeVar("T", bound=Hashable)
 
@@ -71,13 +72,16 @@ def cut_by_neighbours(
     """
     around = boxes.near(room.low, room.high, DEEPEST_WALL)
     near = [rooms[index] for index in around if rooms[index].guid != room.guid]
+    facets = [(other.guid, facet) for other in near for facet in other.facets]
+    normals = np.array([facet.plane.normal for _, facet in facets]).reshape(-1, 3)
     result: list[Piece] = []
     for piece in pieces:
         if piece.role == "glass":
             result.append(piece)
             continue
         rest = [piece.facet.polygon]
-        for _, guid, region in _opposite(piece.facet, near):
+        towards = np.flatnonzero(normals @ piece.facet.plane.normal <= OPPOSITE)
+        for _, guid, region in _opposite(piece.facet, [facets[i] for i in towards]):
             left: list[shapely.Polygon] = []
             for polygon in rest:
                 inside, outside = cut(polygon, region)
@@ -88,23 +92,23 @@ def cut_by_neighbours(
     return result
 
 
-def _opposite(facet: Facet, rooms: Sequence[RoomSolid]) -> list[tuple[float, str, shapely.Geometry]]:
-    """Distance, room and outline in the facet's plane of the faces opposite, nearest first."""
+def _opposite(facet: Facet, towards: Sequence[tuple[str, Facet]]) -> list[tuple[float, str, shapely.Geometry]]:
+    """Distance, room and outline in the facet's plane of the faces opposite, nearest first.
+
+    Args: towards: rooms and their facets that face this one.
+    """
     faces = []
-    for room in rooms:
-        for other in room.facets:
-            if other.plane.normal @ facet.plane.normal > OPPOSITE:
-                continue
-            corners = other.plane.to_world(shapely.get_coordinates(other.polygon))
-            distance = float(np.mean((corners - facet.plane.origin) @ facet.plane.normal))
-            if not -0.05 < distance < DEEPEST_WALL:
-                continue
-            region = shapely.transform(
-                other.polygon, lambda p, other=other: facet.plane.to_plane(other.plane.to_world(p))[:, :2]
-            )
-            region = shapely.make_valid(region).intersection(facet.polygon)
-            if polygons_of(region):
-                faces.append((distance, room.guid, shapely.union_all(polygons_of(region))))
+    for guid, other in towards:
+        corners = other.plane.to_world(shapely.get_coordinates(other.polygon))
+        distance = float(np.mean((corners - facet.plane.origin) @ facet.plane.normal))
+        if not -0.05 < distance < DEEPEST_WALL:
+            continue
+        region = shapely.transform(
+            other.polygon, lambda p, other=other: facet.plane.to_plane(other.plane.to_world(p))[:, :2]
+        )
+        region = shapely.make_valid(region).intersection(facet.polygon)
+        if polygons := polygons_of(region):
+            faces.append((distance, guid, shapely.union_all(polygons)))
     return sorted(faces, key=lambda item: item[0])
 
 

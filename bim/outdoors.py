@@ -18,10 +18,11 @@ from trimesh.intersections import slice_faces_plane
 from bim.defaults import CLEAR_GLAZING, GLASS_REFLECTANCE
 from bim.isolated_solids import Outline, opened
 from bim.model import Element, Space, Window
-from bim.planes import area_vectors, merged_polygons, plane_through
+from bim.planes import merged_polygons, plane_through
 from bim.rays import hemisphere, ray_mesh
 from bim.report.issue import Effect, Issue
 from mitsuba_cfs.processes import ProcessEnded
+from mitsuba_cfs.surfaces import area_vectors
 
 COVERED = 0.9  # share of rays stopped at once that makes a window blind
 AT_ONCE = 0.35  # an obstruction this near to the glass is on the window [m]
@@ -296,24 +297,19 @@ def _holes(windows: Sequence[Window]) -> list[Outline]:
 def lifted_sites(elements: Sequence[Element], windows: Sequence[Window]) -> tuple[list[Element], list[Issue]]:
     """Elements without the terrain that buries the middle of a window; such terrain is reported."""
     kept, issues = [], []
+    points = np.array([window.centre + 0.05 * window.normal for window in windows]).reshape(-1, 3)
+    upwards = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     for element in elements:
-        if not element.ifc_class.startswith(SITE_CLASSES):
-            kept.append(element)
-            continue
-        mesh = ray_mesh(element.triangles)
-        buried = [window for window in windows if _below(mesh, window)]
+        buried = 0
+        if element.ifc_class.startswith(SITE_CLASSES):
+            distance, _ = ray_mesh(element.triangles).first_hits(points, upwards, 100.0)
+            buried = int(np.isfinite(distance).sum())
         if not buried:
             kept.append(element)
             continue
-        values = {"element": element.name, "count": len(buried)}
+        values = {"element": element.name, "count": buried}
         issues.append(Issue("terrain-above-window", element.guid, values))
     return kept, issues
-
-
-def _below(mesh, window: Window) -> bool:
-    point: NDArray[np.float64] = window.centre + 0.05 * window.normal
-    distance, _ = mesh.first_hits(point[None], np.array([[0.0, 0.0, 1.0]]), 100.0)
-    return bool(np.isfinite(distance[0]))
 
 
 FINE = 5_000  # triangles of one element, above which it is made coarser

@@ -8,6 +8,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from mitsuba_cfs.surfaces import area_vectors
+
 PLANE_TOLERANCE = 2e-5  # vertices this near a plane lie in it [m]: a fifth of what is welded
 SAME_DIRECTION = 0.99999  # cosine of 0.26 degrees: facets of curved walls stay apart
 GRID = 1e-6  # overlays of polygons are rounded to this: no zero-width strips [m]
@@ -67,17 +69,6 @@ def newell_normal(ring: NDArray[np.float64]) -> NDArray[np.float64]:
     plane equation of a polygon").
     """
     return 0.5 * np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)
-
-
-def area_vectors(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Area vectors [T, 3] [m2] of triangles [T, 3, 3]."""
-    # written out: np.cross takes nearly three times as long on few triangles
-    a = triangles[:, 1] - triangles[:, 0]
-    b = triangles[:, 2] - triangles[:, 0]
-    x = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
-    y = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
-    z = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return 0.5 * np.stack([x, y, z], axis=1)
 
 
 def planar_facets(triangles: NDArray[np.float64], labels: NDArray[np.int64] | None = None) -> list[Facet]:

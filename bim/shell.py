@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -21,12 +22,12 @@ def conforming_triangles(facets: list[Facet]) -> list[NDArray[np.float64]]:
     triangulated with all its vertices (constrained Delaunay).  Facets that collapse give [0, 3, 3].
     """
     rings = [[facet.plane.to_world(ring) for ring in rings_of(facet.polygon)] for facet in facets]
-    vertices = welded(np.concatenate([ring for many in rings for ring in many]))
+    points = np.concatenate([ring for many in rings for ring in many])
+    vertices = welded(points)
     tree = cKDTree(vertices)
-    return [
-        _triangles(facet, [_with_touching(ring, vertices, tree) for ring in many], vertices)
-        for facet, many in zip(facets, rings, strict=True)
-    ]
+    corners = np.split(tree.query(points)[1], np.cumsum([len(ring) for many in rings for ring in many])[:-1])
+    whole = iter(_with_touching(corners, vertices, tree))
+    return [_triangles(facet, [next(whole) for _ in many], vertices) for facet, many in zip(facets, rings, strict=True)]
 
 
 def welded(points: NDArray[np.float64], distance: float = WELD) -> NDArray[np.float64]:
@@ -39,27 +40,31 @@ def welded(points: NDArray[np.float64], distance: float = WELD) -> NDArray[np.fl
     return points[keep]
 
 
-def _with_touching(ring: NDArray[np.float64], vertices: NDArray[np.float64], tree: cKDTree) -> list[int]:
-    """Indices of the welded vertices along a ring [N, 3], those of other facets included."""
-    corners = tree.query(ring)[1]
-    indices: list[int] = []
-    for start, end in zip(corners, np.roll(corners, -1), strict=True):
-        indices.append(int(start))
-        if start != end:
-            indices += _between(int(start), int(end), vertices, tree)
-    return [i for i, before in zip(indices, [indices[-1], *indices], strict=False) if i != before]
+def _with_touching(
+    rings: Sequence[NDArray[np.int64]], vertices: NDArray[np.float64], tree: cKDTree
+) -> Iterator[list[int]]:
+    """Indices of the welded vertices along each ring, those of other facets included."""
+    edges = [
+        [(a, b) for a, b in zip(ring, np.roll(ring, -1), strict=True) if a != b] for ring in map(np.asarray, rings)
+    ]
+    between = iter(_between(np.array([edge for ring in edges for edge in ring]).reshape(-1, 2), vertices, tree))
+    for ring in edges:
+        yield [i for start, _ in ring for i in (int(start), *next(between).tolist())]
 
 
-def _between(start: int, end: int, vertices: NDArray[np.float64], tree: cKDTree) -> list[int]:
-    """Indices of the vertices on an edge, from its start to its end, without these."""
-    a, edge = vertices[start], vertices[end] - vertices[start]
-    length = np.linalg.norm(edge)
-    near = np.array(tree.query_ball_point(a + edge / 2, length / 2 + WELD))
-    along = (vertices[near] - a) @ edge / length
-    off = np.linalg.norm(vertices[near] - a - np.outer(along / length, edge), axis=1)
-    between = (off < 2 * WELD) & (along > WELD) & (along < length - WELD)
-    order = np.argsort(along[between])
-    return [int(i) for i in near[between][order]]
+def _between(edges: NDArray[np.int64], vertices: NDArray[np.float64], tree: cKDTree) -> list[NDArray[np.int64]]:
+    """Indices of the vertices on each edge [E, 2], from its start to its end, without these."""
+    start, edge = vertices[edges[:, 0]], vertices[edges[:, 1]] - vertices[edges[:, 0]]
+    length = np.linalg.norm(edge, axis=1)
+    near = tree.query_ball_point(start + edge / 2, length / 2 + WELD)
+    of = np.repeat(np.arange(len(edges)), [len(some) for some in near])
+    vertex = np.array([i for some in near for i in some], dtype=np.int64)
+    offset = vertices[vertex] - start[of]
+    along = np.einsum("ij,ij->i", offset, edge[of]) / length[of]
+    off = np.linalg.norm(offset - (along / length[of])[:, None] * edge[of], axis=1)
+    between = (off < 2 * WELD) & (along > WELD) & (along < length[of] - WELD)
+    order = np.flatnonzero(between)[np.lexsort((along[between], of[between]))]
+    return np.split(vertex[order], np.searchsorted(of[order], np.arange(1, len(edges))))
 
 
 def _triangles(facet: Facet, rings: list[list[int]], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -94,7 +99,9 @@ def open_edges(triangles: NDArray[np.float64]) -> int:
     if not len(edges):
         return 0
     tree = cKDTree(vertices)
-    chains = [[a, *_between(a, b, vertices, tree), b] for a, b in edges.tolist()]
+    chains = [
+        [a, *some.tolist(), b] for (a, b), some in zip(edges.tolist(), _between(edges, vertices, tree), strict=True)
+    ]
     return len(_unmatched(np.array([pair for chain in chains for pair in pairwise(chain)])))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from bim.model import Face, Space, centroid
-from bim.planes import area_vectors
+from mitsuba_cfs.surfaces import area_vectors
 
 ALIKE = 0.005  # lengths may differ by this between rooms that are alike [m]
 ALIKE_SHARE = 0.005  # and reflectances by this

@@ -102,12 +102,16 @@ def _modules(name: str, root: Path) -> Iterator[str]:
             yield ".".join(parts[:length])
 
 
+@cache
 def _file(name: str, root: Path) -> Path | None:
     """The source of an own module; None for others."""
     if name.partition(".")[0] not in OWN:
         return None
     stem = root.joinpath(*name.split("."))
     return next((f for f in (stem / "__init__.py", stem.with_suffix(".py")) if f.is_file()), None)
+
+
+_distributions = cache(metadata.packages_distributions)  # the files of all packages are listed for it
 
 
 @cache
@@ -117,5 +121,5 @@ def _installed(package: str) -> str:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
         pass
-    names = metadata.packages_distributions().get(package, ())
+    names = _distributions().get(package, ())
     return " ".join(f"{name} {metadata.version(name)}" for name in sorted(set(names)))

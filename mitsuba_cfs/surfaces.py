@@ -90,7 +90,7 @@ class WindowSurface:
         t = np.asarray(self.triangles, dtype=float)
         if t.ndim != 3 or t.shape[1:] != (3, 3) or len(t) == 0:
             raise ValueError(f"window {self.name}: expected triangles [T, 3, 3], got {t.shape}")
-        area_vector = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]).sum(axis=0)
+        area_vector = area_vectors(t).sum(axis=0)
         length = np.linalg.norm(area_vector)
         if not length > 0:
             raise ValueError(f"window {self.name}: has no area")
@@ -161,5 +161,15 @@ def points_on_triangles(
 
 def triangle_areas(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Area of each triangle [N] [m2] from vertices [N, 3, 3] [m]."""
-    edges = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return 0.5 * np.linalg.norm(edges, axis=-1)
+    return np.asarray(np.linalg.norm(area_vectors(triangles), axis=-1))
+
+
+def area_vectors(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Area vectors [T, 3] [m2] of triangles [T, 3, 3]."""
+    # written out: np.cross takes nearly three times as long on few triangles
+    a = triangles[:, 1] - triangles[:, 0]
+    b = triangles[:, 2] - triangles[:, 0]
+    x = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
+    y = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
+    z = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return 0.5 * np.stack([x, y, z], axis=1)

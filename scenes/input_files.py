@@ -10,7 +10,14 @@ from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 
-from bim.building_file import STAGES, ReadOptions, building_files, check_building_file, read_building_file
+from bim.building_file import (
+    STAGES,
+    ReadOptions,
+    building_files,
+    check_building_file,
+    check_room_names,
+    read_building_file,
+)
 from bim.building_file import files_beside as building_files_beside
 from bim.model import Building
 from mitsuba_cfs.errors import DataError
@@ -104,11 +111,13 @@ def named_files(options: InputOptions, operation: Operation | None) -> dict[str,
 def check_building(options: InputOptions) -> None:
     """Check what can be checked of the building and the rooms' names without reading the building.
 
-    Raises: `DataError` for a file of no format that is read, or an empty name.
+    Raises: `DataError` for a file of no format that is read, or a name that is empty or like none in it.
     """
     check_names(options.spaces)
-    for path in building_files(options.building_files):
+    files = building_files(options.building_files)
+    for path in files:
         check_building_file(path)
+    check_room_names(files, options.spaces)
 
 
 def check_names(names: Sequence[str], field: str = "--space") -> None:

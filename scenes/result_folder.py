@@ -22,6 +22,7 @@ from mitsuba_cfs.files import TEMPORARY, json_text, reason, remove_stale, stale,
 MARK, PROGRAM, FORMAT = "cfs-results.json", "mitsuba-cfs", 1
 RENAMED = {"ifc export": "export"}  # commands by their earlier names, which marks may have
 EXPLORER = "explore"  # folder of the explorer, inside that of the results
+REPORT, FIRST_PLAN = "report.html", "first_plan.csv"
 CASES = "cases"  # folder of the finished cases of a study, inside that of its results
 
 

@@ -19,8 +19,8 @@ from scenes.fenestration.thermal_system import checked_system
 from scenes.head import NO_HEAD, Head
 from scenes.input_files import InputFiles, overrides_of, read_weather
 from scenes.inputs import inputs_of
-from scenes.report import write_report
 from scenes.report.headline import cards
+from scenes.report.page import write_report
 from scenes.result_folder import ResultFolder
 from scenes.results import RoomYear, RunResult
 from scenes.room.operation import Controller, Operation, read_operation

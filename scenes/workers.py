@@ -1,8 +1,8 @@
 """Tasks computed in this process, in parallel processes, or on a Dask cluster.
 
-The first task of a scene runs before the others, which then read the scene's matrices from the
-cache. If a process crashes (fault of a library, out of memory), its tasks are repeated one by one;
-a task that crashes a process of its own has failed.
+The first task of a scene runs before the others, which then read its matrices from the cache,
+before other scenes begin. If a process crashes (fault of a library, out of memory), its tasks are
+repeated one by one; a task that crashes a process of its own has failed.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class Tasks(Generic[T, R]):
                 for item, result in done:
                     ended = 0
                     yield self._collected(result, item)
-                    left.extend(followers.pop(self.key(item), []))
+                    left.extendleft(reversed(followers.pop(self.key(item), [])))
                 if not lost:
                     continue
                 reason = crew.renew()
@@ -105,7 +105,7 @@ class Tasks(Generic[T, R]):
                 if ended > MOST_ENDED:
                     raise DataError(f"{ended} tasks one after the other: {reason}")
                 yield self.failed(lost[0], RoomError(reason))
-                left.extend(followers.pop(self.key(lost[0]), []))
+                left.extendleft(reversed(followers.pop(self.key(lost[0]), [])))
         finally:
             crew.end()
 

@@ -23,12 +23,12 @@ from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.isolated_solids import parted
-from bim.planes import area_vectors
 from bim.rays import RayMesh, ray_mesh
 from bim.report.issue import Issue
 from bim.rooms import RoomSolid, room_solid
 from bim.solids import packed, unpacked
 from mitsuba_cfs.processes import ProcessEnded
+from mitsuba_cfs.surfaces import area_vectors
 
 THROUGH = 0.1  # a space that ends less far beyond a slab is drawn into it [m]
 TOUCHING = 1e-9  # a lid beside a space that overlaps it by less does not cover it [m]

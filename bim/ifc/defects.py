@@ -14,10 +14,10 @@ from bim.apertures import main_direction
 from bim.boxes import Boxes
 from bim.ifc.shapes import Shape
 from bim.isolated_solids import gaps_between, solids_of
-from bim.planes import area_vectors
 from bim.report.issue import Issue, Phrase
 from bim.solids import PackedSolid, Solid, packed
 from mitsuba_cfs.processes import ProcessEnded
+from mitsuba_cfs.surfaces import area_vectors
 
 DRAWN_TWICE = "element-drawn-twice"  # code of the issue
 SAME_PLACE = 0.002  # boxes that agree to this are one element drawn twice [m]

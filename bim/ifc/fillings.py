@@ -15,8 +15,8 @@ from bim.colours import GREY
 from bim.ifc.damage import Damage, instances, type_of
 from bim.ifc.project import definitions_of, length_scale, psets_of
 from bim.ifc.shapes import Shape
-from bim.planes import area_vectors
 from bim.report.issue import Effect, Issue
+from mitsuba_cfs.surfaces import area_vectors
 
 PANELS = (
     "IfcPlate",

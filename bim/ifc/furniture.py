@@ -21,9 +21,9 @@ from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source, painted
 from bim.model import Element, Space
 from bim.outdoors import simplified
-from bim.planes import area_vectors
 from bim.rays import RayMesh, ray_mesh
 from bim.report.issue import Issue
+from mitsuba_cfs.surfaces import area_vectors
 
 FURNITURE = "IfcFurnishingElement"  # IfcFurniture and IfcSystemFurnitureElement are kinds of it
 ASKED = 64  # corners of a piece that are asked for their room

@@ -37,12 +37,13 @@ from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.isolated_solids import solids_of
-from bim.planes import area_vectors, plane_through, polygons_of
+from bim.planes import plane_through, polygons_of
 from bim.rays import ray_mesh
 from bim.report.issue import Issue, Phrase
 from bim.rooms import OVERLAP, RoomSolid, room_solid
 from bim.solids import prism, solid_of, triangles_of, union
 from mitsuba_cfs.processes import ProcessEnded, Told, answer_apart
+from mitsuba_cfs.surfaces import area_vectors
 
 LEVEL = 0.99  # z of the normal of a level top
 SAME_TOP = 0.01  # level tops within this of the highest are one [m]

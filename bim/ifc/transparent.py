@@ -38,9 +38,10 @@ from bim.ifc.materials import own_materials
 from bim.ifc.shapes import NO_ELEMENTS, Shape
 from bim.material_names import material_named
 from bim.names import plain_text
-from bim.planes import area_vectors, principal_extents
+from bim.planes import principal_extents
 from bim.rays import RayMesh, ray_mesh
 from bim.report.issue import Effect, Issue, Phrase
+from mitsuba_cfs.surfaces import area_vectors
 
 JUDGED = ("IfcWall", "IfcSlab", "IfcRoof", "IfcCovering", "IfcBuildingElementProxy")
 THINNEST, THICKEST = 0.001, 0.06  # of a pane with its spacers [m]

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
@@ -173,13 +173,14 @@ class AnnualSky:
     solar: NDArray[np.floating] | None = None  # [P, L] radiance, the sun among it [W/m2/sr]
     _lit_sun: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
     _totals: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
-    _of_year: dict[Callable[..., Any], Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _of_year: dict[tuple[Any, ...], Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
-    def once(self, function: Callable[[Weather], T], weather: Weather) -> T:
-        """A result of the weather of these skies alone, made once for all rooms."""
-        if function not in self._of_year:
-            self._of_year[function] = function(weather)
-        result: T = self._of_year[function]
+    def once(self, function: Callable[..., T], weather: Weather, *arguments: Hashable) -> T:
+        """A result of the weather of these skies and arguments alone, made once for all rooms."""
+        key = function, *arguments
+        if key not in self._of_year:
+            self._of_year[key] = function(weather, *arguments)
+        result: T = self._of_year[key]
         return result
 
     @property

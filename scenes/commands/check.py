@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from bim.model import Building, Space
     from mitsuba_cfs.progress import Progress
 
+UNCHANGED = (), False, ()  # rooms to join, furniture, storeys: as the building is read without options
 UNCUT = 100_000  # columns of a table that nobody sees
 
 
@@ -148,14 +150,18 @@ def command(
 
 def _uncorrected(options: InputOptions, progress: Progress) -> Building | None:
     """The building without the corrections beside it; None where there are none."""
-    from bim.building_file import files_beside
+    from bim.building_file import files_beside, read_once
     from bim.ifc.building import read_ifc
     from bim.ifc.corrections import Corrections
+    from mitsuba_cfs.matrices.cache import MatrixCache
 
     first, *linked = options.building_files
     if not files_beside(first):
         return None
-    return read_ifc(first, linked=linked, corrections=Corrections(), progress=progress)
+    read = partial(read_ifc, first, linked=linked, corrections=Corrections(), progress=progress)
+    if not options.cache:
+        return read()
+    return read_once(read, (first, *linked), UNCHANGED, MatrixCache.of_user(), corrected=False)
 
 
 def _rooms(building: str, spaces: Sequence[Space]) -> Table:

@@ -129,12 +129,15 @@ def command(
     from scenes.commands.progress_bar import ProgressBar, compiled_beside
     from scenes.comply.comply import check_building
     from scenes.comply.outputs import write_compliance, write_into_ifc
+    from scenes.run.first_plan import plan_lines
 
     if quick:
         click.echo(quick_run.NOTE)
     head = PrintedHead()
     with ProgressBar() as progress, compiled_beside():
-        result = check_building(options, progress, files, head)
+        result = check_building(
+            options, progress, files, head, on_plan=lambda rooms: click.echo("\n".join(plan_lines(rooms)))
+        )
         write_compliance(result, folder, quick=quick, page=page_options)
     for verdict in result.verdicts:
         if verdict.rooms and verdict.criterion.over != "no building":

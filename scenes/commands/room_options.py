@@ -461,7 +461,9 @@ def named_settings(settings: Sequence[str], but: Collection[str] = ()) -> dict[s
 
     Args: but: names that mean nothing to the command.
     """
-    from scenes.study.study_file import OptionsTable
+    if not settings:
+        return {}
+    from scenes.study.study_file import OptionsTable  # takes a second to load
     from scenes.toml_file import validated
 
     table: dict[str, object] = {}

@@ -165,11 +165,8 @@ def run_to_folder(
         default_folder()  # or one line that it cannot be one
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar, compiled_beside
-    from scenes.explore.folder import write_explorer
     from scenes.language.catalogue import in_language, ngettext
-    from scenes.report import write_report
     from scenes.result_folder import EXPLORER
-    from scenes.run.outputs import write_results
     from scenes.run.run import Workers, run_job
 
     beside = processes > 1 or scheduler is not None
@@ -188,6 +185,10 @@ def run_to_folder(
             workers=Workers(processes, scheduler) if beside else None,
         )
         progress("results", 0.0)
+        from scenes.explore.folder import write_explorer  # half a second, which the first plan does not wait for
+        from scenes.report.page import write_report
+        from scenes.run.outputs import write_results
+
         report = partial(write_report, page=page_options)
         explorer = partial(write_explorer, page=page_options) if options.explore else None
         with in_language(page_options.language):
@@ -219,8 +220,8 @@ class _FirstPlan:
 
     def __call__(self, rooms: Sequence[PlannedRoom]) -> None:
         from scenes.language.catalogue import in_language
+        from scenes.result_folder import FIRST_PLAN, REPORT
         from scenes.run.first_plan import plan_lines, plan_page, plan_table
-        from scenes.run.outputs import FIRST_PLAN, REPORT
 
         self.table = plan_table(rooms)
         with in_language(self._language):

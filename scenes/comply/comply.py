@@ -18,6 +18,7 @@ from bim.building_file import no_window
 from bim.model import Building, Space, in_month
 from bim.report.issue import Effect, Issue
 from bim.sensors import plane_sides
+from bim.templates import template_rooms
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.glare import hourly_glare
@@ -67,6 +68,8 @@ from scenes.room.solar import seasonal_outdoors
 from scenes.room.spectral import eye_illuminances
 from scenes.room.zone import room_zone, zone_surfaces
 from scenes.room_views import eyes_of
+from scenes.run.first_plan import FROM, OnPlan, first_plan
+from scenes.run.options import JobOptions
 from thermal.errors import ThermalInputError
 from thermal.ratings import CLASSES, ThermalRating
 
@@ -252,12 +255,14 @@ def check_building(
     progress: Progress = silent,
     files: ComplyFiles | None = None,
     on_head: OnHead = lambda head: None,
+    on_plan: OnPlan | None = None,
 ) -> Compliance:
     """The rooms of a building file against the rules of the options.
 
     Args:
         files: of `read_files`; read now by default.
         on_head: called with what was left out and assumed, before anything is traced.
+        on_plan: called with first figures of all rooms where these are many, before the rest.
 
     Raises: `DataError` for a file that cannot be used, before anything is traced.
     """
@@ -267,7 +272,7 @@ def check_building(
     start, steps = time.monotonic(), part(progress, 0.1, 1.0)
     building = building_of(options, steps)
     reading = round(time.monotonic() - start, 1)
-    result = check_rooms(building, options, files, progress, on_head)
+    result = check_rooms(building, options, files, progress, on_head, on_plan=on_plan)
     return replace(result, seconds={"reading": reading, **result.seconds})
 
 
@@ -277,8 +282,10 @@ def check_rooms(
     files: ComplyFiles,
     progress: Progress = silent,
     on_head: OnHead = lambda head: None,
+    *,
+    on_plan: OnPlan | None = None,
 ) -> Compliance:
-    """The rooms of a building against the rules of the options; on_head: as `check_building`."""
+    """The rooms of a building against the rules of the options; on_head, on_plan: as `check_building`."""
     check = Check(building, options, files, progress)
     on_head(check.head)
     spaces = list(check.inputs.spaces)
@@ -287,6 +294,9 @@ def check_rooms(
     dark = [s for s in spaces if not s.windows and uses[s.guid].occupied]
     if not glazed:
         raise no_window(building, check.file)
+    if on_plan is not None and check.lit and len(glazed) >= FROM:
+        job = JobOptions(options.building, options.weather, room=options.room)
+        on_plan(first_plan(check.inputs, glazed, job, progress))
     views, view_issues = check.views(glazed)
     check.asked_uses = uses
     check.asked = {s.guid: asked_of(files.rules, s, uses[s.guid]) for s in glazed}
@@ -403,6 +413,7 @@ class Check:
         results, issues, notes = RoomSeries(
             self.building,
             spaces,
+            template_rooms(spaces),
             self.systems,
             options.room.sampling,
             cache,

@@ -10,8 +10,9 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.model import Element
-from bim.planes import area_vectors, planar_facets
+from bim.planes import planar_facets
 from bim.rays import RayMesh, hemisphere, ray_mesh
+from mitsuba_cfs.surfaces import area_vectors
 
 OFF_THE_FACE = 0.005  # distance of the sensors from the glass [m]
 NEARLY_AS_BIG = 0.8  # share of the biggest face's area that the other side of a module has

@@ -8,9 +8,9 @@ import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.planes import area_vectors
 from bim.rays import ray_mesh
 from mitsuba_cfs.files import replacing
+from mitsuba_cfs.surfaces import area_vectors
 from scenes.figures.scale import ColourScale
 from scenes.photovoltaics.study import PvResult
 

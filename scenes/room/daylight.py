@@ -50,7 +50,10 @@ def room_daylight(
     illuminance = room.skies.whole_year(lit.astype(np.float32)).T
     error = relative_error_of_mean(lit, noise)
     autonomy_noise = daylight_autonomy_noise(
-        illuminance, lm83_hours(room.weather), lambda weights: noise(weights[lights.sky.lit].T), relative_error=error
+        illuminance,
+        room.skies.once(lm83_hours, room.weather),
+        lambda weights: noise(weights[lights.sky.lit].T),
+        relative_error=error,
     )
     blurred = None
     if room.options.method == "three-phase" and sunny_hours:

@@ -93,7 +93,7 @@ class RoomInputs:
         """The hours with people [H]."""
         if self.operation is not None:
             return OperationHours(self.operation, self.weather).present > 0
-        return working_hours(self.weather, *self.options.occupancy.hours)
+        return self.skies.once(working_hours, self.weather, *self.options.occupancy.hours)
 
     def shading(
         self, state: NDArray[np.int64], moved_by: NDArray[np.int64] | None = None, reasons: tuple[str, ...] = ()

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from bim.model import Building, Space, seasons
 from bim.report.issue import Effect, Issue
-from bim.templates import template_rooms
 from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -133,6 +132,7 @@ class RoomSeries(Generic[R]):
 
     building: Building
     spaces: Sequence[Space]
+    equal: Sequence[tuple[Space, ...]]  # `template_rooms`
     systems: Mapping[str, States]  # by window GUID
     sampling: Sampling
     cache: MatrixCache | None
@@ -220,7 +220,7 @@ class _Templates:
     def __init__(self, series: RoomSeries[R]) -> None:
         self._series = series
         self._group: dict[str, list[OutdoorLight]] = {}  # templates, by GUID
-        for group in template_rooms(series.spaces):
+        for group in series.equal:
             templates: list[OutdoorLight] = []
             self._group |= dict.fromkeys((space.guid for space in group), templates)
         self._template: dict[str, Space | None] = {}

@@ -22,7 +22,7 @@ from mitsuba_cfs.progress import Progress, silent
 from scenes.language.catalogue import current_language, in_language
 from scenes.language.numbers import rounded, spoken
 from scenes.pictures import write_falsecolour, write_tone_mapped
-from scenes.result_folder import EXPLORER, ResultFolder
+from scenes.result_folder import EXPLORER, FIRST_PLAN, REPORT, ResultFolder
 from scenes.results import GridDaylight, RoomYear, RunResult, SpectralYear
 from scenes.room.daylight import sensor_table
 from scenes.room.glare import glare_table
@@ -31,7 +31,6 @@ from scenes.run.netcdf import write_netcdf
 from scenes.user_errors import user_message
 from scenes.workers import Tasks
 
-REPORT, FIRST_PLAN = "report.html", "first_plan.csv"
 ROOMS_A_PROCESS = 8
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import time
 import weakref
+from collections import Counter
 from collections.abc import Callable, Generator, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, replace
@@ -17,7 +18,7 @@ from bim.doorways import panes_between, source_rooms
 from bim.model import Space
 from bim.report.issue import Issue, issue_note
 from bim.sensors import model_grids
-from bim.templates import same_hues
+from bim.templates import same_hues, template_rooms
 from bim.to_thermal import same_surfaces, shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -40,7 +41,7 @@ from scenes.room.inputs import skies_for
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import RoomChoices, compute_room, lit_room
 from scenes.room.series import RoomSeries, moved_light, moved_result
-from scenes.run.first_plan import FROM, PlannedRoom, first_plan, options_for_error
+from scenes.run.first_plan import FROM, OnPlan, first_plan, options_for_error
 from scenes.run.options import JobOptions
 from scenes.run.together import RoomsTogether
 from scenes.workers import Tasks
@@ -75,11 +76,13 @@ def computed_rooms(
     spaces = run_spaces(inputs, options)
     store = StoredArrays() if len(spaces) > 1 else None
     with scratch_folder() as folder:
-        together = RoomsTogether(inputs, spaces, skies, options, folder)
+        equal = template_rooms(spaces)
+        together = RoomsTogether(inputs, equal, skies, options, folder)
         work = RoomWork(inputs, spaces, skies, options, together, with_heat=not coupled)
         series = RoomSeries(
             inputs.building,
             spaces,
+            equal,
             inputs.systems,
             options.room.sampling,
             MatrixCache.of_user() if options.cache else None,
@@ -195,18 +198,24 @@ class RoomWork:
         rooms = {space.guid: space for space in spaces}
         here = workers.scheduler is None
         run = "" if here else _identity(self.options, self.inputs)
-        compute = _Here(self) if here else _FromFiles(self.with_heat, self.options, run)
+        together = self.together.for_processes()
+        compute = _Here(replace(self, together=together)) if here else _FromFiles(self.with_heat, self.options, run)
+        left = Counter(together.set_of(guid) for guid in rooms)
         tasks = Tasks(
             list(rooms),
             compute,
             _failed,
             key=lambda guid: f"{run}{guid}",
-            scene=lambda guid: guid,
+            scene=together.set_of if here else lambda guid: guid,  # a cluster has no common folder
             needs=Requirements() if here else _requirements(self.inputs),
         )
         with closing(tasks.results(**asdict(workers))) as results:
             for guid, result in results:
                 yield rooms[guid], result
+                number = together.set_of(guid)
+                left[number] -= 1
+                if not left[number]:
+                    together.remove(number)
 
     def of(self, guid: str) -> RoomYear | DaylitRoom:
         """The result of the room with a GUID."""
@@ -251,7 +260,7 @@ def _read(options: JobOptions, run: str) -> tuple[Inputs, RoomsTogether, Sequenc
     skies = skies_for(inputs.weather, room.sampling, **room.sky)
     spaces, folder = run_spaces(inputs, options), ExitStack()
     place = folder.enter_context(scratch_folder())
-    together = RoomsTogether(inputs, spaces, skies, options, place)
+    together = RoomsTogether(inputs, template_rooms(spaces), skies, options, place)
     weakref.finalize(together, folder.close)  # with the next run, and at the end
     return inputs, together, spaces, skies
 
@@ -271,7 +280,6 @@ def _requirements(inputs: Inputs) -> Requirements:
 
 
 OnHead = Callable[[Head], None]  # called as soon as all inputs are read
-OnPlan = Callable[[Sequence[PlannedRoom]], None]  # called with the first plan of many rooms
 
 
 def run_job(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import copy
 import shutil
 from collections import Counter
 from collections.abc import Sequence
@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from bim.model import Space, seasons
-from bim.templates import template_rooms
-from bim.to_tracer import orientation_groups, outdoors_of_rooms
+from bim.to_tracer import element_surfaces, orientation_groups, outdoors_of_rooms
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -29,54 +28,64 @@ from scenes.room.room import inputs_of_room
 from scenes.run.options import JobOptions
 
 ENTRIES = 1 << 21  # of D of the rooms that are traced together: 16 MB in each of some ten arrays
+TRACED = "traced"  # file that tells that a set has been
 
 
 class RoomsTogether:
     """Traces the matrices of a room with those of its neighbours in the order of the rooms.
 
     The stages of each room find them in the cache; without one, in a folder that holds those of
-    one set of rooms.  Sets are the same in every process, and so are results to the last digit.
+    the sets of rooms at work.  Sets are the same in every process, and so are results to the last
+    digit; processes that share the folder trace each set once.
     Of rooms of equal shape only the first is in a set: the others may take over its results.
     """
 
     def __init__(
-        self, inputs: Inputs, spaces: Sequence[Space], skies: AnnualSky, options: JobOptions, folder: Path
+        self, inputs: Inputs, equal: Sequence[tuple[Space, ...]], skies: AnnualSky, options: JobOptions, folder: Path
     ) -> None:
         """Of the rooms of a run.
 
-        Args: folder: for matrices while there is no cache.
+        Args: equal: `template_rooms`; folder: for matrices while there is no cache.
         """
         self._inputs, self._skies, self._options = inputs, skies, options
-        self._folder, self._set = folder, -1
-        self._spaces = [rooms[0] for rooms in template_rooms(spaces) if rooms[0].windows]
+        self._folder, self._set, self._shared = folder, -1, False
+        self._spaces = [rooms[0] for rooms in equal if rooms[0].windows]
         patches = ReinhartSky(options.room.sampling.subdivision).size
         groups = np.cumsum([0, *(len(orientation_groups(space)) for space in self._spaces)])
         number = groups[:-1] * KLEMS_FULL.size * patches // ENTRIES
         self._set_of = {one.guid: int(i) for one, i in zip(self._spaces, number, strict=True)}
 
+    def for_processes(self) -> RoomsTogether:
+        """The same for processes that share the folder; the first room of a set goes before the others."""
+        other = copy.copy(self)
+        other._shared = True
+        return other
+
+    def set_of(self, guid: str) -> str:
+        """The rooms that a room is traced with; its GUID if it is traced alone."""
+        return str(self._set_of.get(guid, guid))
+
+    def remove(self, number: str) -> None:
+        """Remove what the folder holds of a set."""
+        shutil.rmtree(self._folder / number, ignore_errors=True)
+
     def cache_for(self, space: Space, progress: Progress) -> MatrixCache | None:
         """The cache with the matrices of a room, which are traced now unless they have been."""
         number = self._set_of.get(space.guid)
         if number is None:
-            return self._cache() if self._options.cache else None
+            return MatrixCache.of_user() if self._options.cache else None
+        folder = self._folder / str(number)
+        cache = MatrixCache.of_user() if self._options.cache else MatrixCache(folder)
         if number != self._set:
+            if not self._shared:
+                self.remove(str(self._set))
             self._set = number
-            rooms = [one for one in self._spaces if self._set_of[one.guid] == number]
-            self._trace(rooms, progress)
-        cache = self._cache()
+            if not (folder / TRACED).exists():
+                rooms = [one for one in self._spaces if self._set_of[one.guid] == number]
+                traced_together(self._inputs, rooms, self._skies, self._options, cache, progress=progress)
+                folder.mkdir(exist_ok=True)
+                (folder / TRACED).touch()
         return cache if self._options.cache else replace(cache, stores=False)
-
-    def _cache(self) -> MatrixCache:
-        if self._options.cache:
-            return MatrixCache.of_user()
-        return MatrixCache(self._folder / str(os.getpid()))
-
-    def _trace(self, spaces: Sequence[Space], progress: Progress) -> None:
-        """Trace the matrices of some rooms, in place of those traced before."""
-        cache = self._cache()
-        if not self._options.cache and cache.folder.exists():
-            shutil.rmtree(cache.folder)
-        traced_together(self._inputs, spaces, self._skies, self._options, cache, progress=progress)
 
 
 def traced_together(
@@ -113,7 +122,7 @@ def traced_together(
             continue
     windows = Counter(window.guid for space in spaces for window in space.windows)
     first = seasons(inputs.building)[0].building
-    glossy = bool(outdoors_of_rooms(first, [room.space for room, _ in rooms]).surfaces.glossy)
+    glossy = bool(element_surfaces(element for element in first.elements if element.gloss).glossy)
     some = [
         i
         for i, (room, scene) in enumerate(rooms)

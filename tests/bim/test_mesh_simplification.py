@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from bim.model import Element
 from bim.outdoors import FINE, STEPS, simplified, simplified_mesh
-from bim.planes import area_vectors
+from mitsuba_cfs.surfaces import area_vectors
 
 
 def sphere(count: int) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bim.building_file import ReadOptions, named_spaces, read_building_file
+from bim.building_file import ReadOptions, check_room_names, named_spaces, read_building_file
 from mitsuba_cfs.errors import DataError
 from scenes.demo import OFFICE
 
@@ -41,6 +41,20 @@ def test_a_wrong_name_is_refused_before_geometry(wrong) -> None:
 def test_a_name_like_one_of_the_file_is_decided_by_its_rooms(room) -> None:
     with pytest.raises(_Read):
         asked_for(room)
+
+
+@pytest.mark.parametrize("wrong", ["nowhere", "Nowhere ö"])
+def test_a_wrong_name_is_refused_before_the_reader_is_loaded(wrong) -> None:
+    with pytest.raises(DataError, match=f"no space '{wrong}'") as early:
+        check_room_names([OFFICE], ["South office", wrong])
+    with pytest.raises(DataError) as late:
+        asked_for(wrong)
+    assert str(early.value) == str(late.value)
+
+
+@pytest.mark.parametrize("room", ["south  OFFICE", "A South office", "A + B", "Büro A"])
+def test_a_name_that_may_be_right_is_left_to_the_reader(room) -> None:
+    check_room_names([OFFICE], [room])
 
 
 @pytest.mark.usefixtures("no_geometry")

@@ -19,7 +19,7 @@ from mitsuba_cfs.errors import DataError
 from scenes.cli import cfs
 from scenes.explore.case_files import read_data
 from scenes.explore.folder import copy_explorer, explorer_of, join_explorers, packed, server, write_data, write_explorer
-from scenes.report import write_report
+from scenes.report.page import write_report
 from scenes.result_folder import ResultFolder
 from scenes.run.outputs import write_results
 from tests.explore.synthetic import explored_run

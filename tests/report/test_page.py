@@ -15,9 +15,8 @@ from PIL import Image
 
 from bim.account import Account, StoreyAccount
 from bim.report.issue import Effect, Issue, issue_text
-from scenes.report import write_report
 from scenes.report.glare_figures import gallery
-from scenes.report.page import report_html, tied
+from scenes.report.page import report_html, tied, write_report
 from scenes.results import GlareResults
 from tests.report.synthetic import run_result
 

@@ -45,12 +45,16 @@ def test_a_leak_is_marked_where_it_is(tmp_path) -> None:
     assert not len(corners(data, "before"))
 
 
-def test_rooms_without_the_corrections_are_beside_those_with_them(tmp_path) -> None:
-    path = tmp_path / "m.ifc"
+def test_rooms_without_the_corrections_are_beside_those_with_them(tmp_path, monkeypatch) -> None:
+    path, read = tmp_path / "m.ifc", []
+    monkeypatch.setattr(
+        "bim.ifc.building.read_ifc", lambda *a, **options: read.append(options) or read_ifc(*a, **options)
+    )
     box_model(space_height=HEIGHT + 1.0)[0].model.write(str(path))
     assert not len(corners(page_data(path, tmp_path / "plain.html"), "before"))
     path.with_name("m.corrections.toml").write_text("as_drawn = ['IfcSpace']", "utf-8")
     data = page_data(path, tmp_path / "m.html")
+    assert len(read) == 2, "without and with the corrections, each once"
     before, after = corners(data, "before"), corners(data, "wall")
     assert np.ptp(before[:, 2]) == pytest.approx(HEIGHT, abs=0.01)  # cut at the roof
     assert np.ptp(after[:, 2]) == pytest.approx(HEIGHT + 1.0, abs=0.01)

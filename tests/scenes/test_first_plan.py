@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,10 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import TEMPORARY
 from mitsuba_cfs.progress import silent
 from scenes import cli
-from scenes.demo import OFFICE, WEATHER
+from scenes.comply import comply
+from scenes.comply.files import read_files
+from scenes.comply.options import ComplyOptions
+from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.inputs import Inputs
 from scenes.result_folder import FolderMark, ResultFolder
 from scenes.room.options import RoomOptions
@@ -81,6 +85,19 @@ def test_the_first_plan_has_each_room_with_its_errors(two_rooms):
         assert 0 < room.errors["daylight_factor"] < 0.2 * room.figures["daylight_factor"]
 
 
+def test_a_check_of_rules_says_the_first_plan_before_it_traces_the_rest(two_rooms, monkeypatch):
+    class Heard(Exception):
+        pass
+
+    def heard(rooms):
+        raise Heard([room.space.name for room in rooms])
+
+    monkeypatch.setattr(comply, "FROM", 2)
+    options = ComplyOptions(OFFICE, WEATHER, system=VENETIAN_BLIND, standards=("en17037",), room=FEW, cache=False)
+    with pytest.raises(Heard, match=r"near.*far"):
+        comply.check_rooms(two_rooms[0].building, options, read_files(options), on_plan=heard)
+
+
 def test_a_window_of_two_rooms_lights_both_in_the_first_plan(two_rooms):
     inputs, options = two_rooms
     panes = [space.windows[0].triangles for space in inputs.spaces]
@@ -103,9 +120,28 @@ def test_rooms_of_equal_shape_are_not_traced_ahead(two_rooms, tmp_path, monkeypa
     monkeypatch.setattr(
         together, "traced_together", lambda inputs, spaces, *_, **__: traced.append([space.name for space in spaces])
     )
-    rooms = together.RoomsTogether(inputs, [near, far, twin], None, options, tmp_path)
+    rooms = together.RoomsTogether(inputs, [(near, twin), (far,)], None, options, tmp_path)
     assert rooms.cache_for(twin, silent) is None and not traced
     assert rooms.cache_for(near, silent) is not None and traced == [["near", "far"]]
+
+
+def test_processes_trace_each_set_of_rooms_once(two_rooms, tmp_path, monkeypatch):
+    inputs, options = two_rooms
+    near, far = inputs.spaces
+    traced: list[list[str]] = []
+    monkeypatch.setattr(
+        together, "traced_together", lambda inputs, spaces, *_, **__: traced.append([space.name for space in spaces])
+    )
+    rooms = together.RoomsTogether(inputs, [(near,), (far,)], None, options, tmp_path).for_processes()
+    assert rooms.set_of(near.guid) == rooms.set_of(far.guid), "the second waits for the first"
+    folders = []
+    for room in (near, far):  # each in a process of its own
+        cache = copy.copy(rooms).cache_for(room, silent)
+        assert cache is not None
+        folders.append(cache.folder)
+    assert traced == [["near", "far"]] and folders[0] == folders[1]
+    rooms.remove(rooms.set_of(near.guid))
+    assert not any(tmp_path.iterdir())
 
 
 def test_a_killed_run_leaves_no_matrices(two_rooms, tmp_path, monkeypatch):

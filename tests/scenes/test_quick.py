@@ -20,7 +20,6 @@ from scenes.room import series as rooms_of_a_run
 from scenes.room.glare import default_hours
 from scenes.room.options import RoomOptions
 from scenes.run import run as rooms
-from scenes.run import together as rooms_together
 from scenes.run.options import JobOptions
 from scenes.study.study_file import read_study
 from scenes.year_of_glare.options import YearOptions
@@ -164,12 +163,11 @@ def test_one_picture_is_the_brightest_hours() -> None:
 @pytest.fixture
 def three_rooms(monkeypatch: pytest.MonkeyPatch, no_pictures: None) -> SimpleNamespace:
     """Rooms of which the third equals the first, each computed by a stub."""
-    rooms = [SimpleNamespace(guid=g, label=g.upper(), template="", windows=()) for g in ("a", "b", "c")]
-    a, b, c = rooms
-    for module in (rooms_of_a_run, rooms_together):
-        monkeypatch.setattr(module, "template_rooms", lambda spaces: [(a, c), (b,)])
+    spaces = [SimpleNamespace(guid=g, label=g.upper(), template="", windows=()) for g in ("a", "b", "c")]
+    a, b, c = spaces
+    monkeypatch.setattr(rooms, "template_rooms", lambda spaces: [(a, c), (b,)])
     monkeypatch.setattr(rooms_of_a_run, "same_systems", lambda *_: False)
-    return SimpleNamespace(spaces=rooms, building=None, systems={}, weather=None, operation=None)
+    return SimpleNamespace(spaces=spaces, building=None, systems={}, weather=None, operation=None)
 
 
 def test_each_room_is_told_when_it_is_computed_in_their_order(three_rooms, monkeypatch) -> None:

@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_info
 
 from bim.model import Building, Space
 from bim.shoebox import WindowRectangle, shoebox
+from bim.templates import template_rooms
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.progress import silent
 from mitsuba_cfs.variants import BLAS_THREADS
@@ -55,6 +56,7 @@ def named(spaces: list[Space], fails: str = "", alike: bool = True) -> tuple[Roo
     return RoomSeries(
         replace(BOX, spaces=tuple(spaces)),
         spaces,
+        template_rooms(spaces),
         {},
         SMALL.sampling,
         None,
